@@ -7,9 +7,7 @@ use super::effect::DraftedBrick;
 use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::volume::layers::{self, Layers, offset, ones};
-use crate::volume::{
-    Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_hash, for_runs, resolve, solid_layers,
-};
+use crate::volume::{Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_hash, for_runs, solid_layers};
 
 /// A brick that edits change one after the other.
 pub(super) struct BrickEditor<'a> {
@@ -53,6 +51,7 @@ impl<'a> BrickEditor<'a> {
     }
 
     /// The brick, to be changed.
+    #[inline]
     pub fn brick(&mut self) -> &mut Brick {
         let (base, heights, y) = (self.base, &self.heights, self.pos.origin().y);
         self.brick.get_or_insert_with(|| match base {
@@ -119,22 +118,25 @@ impl<'a> BrickEditor<'a> {
 
     /// Counts voxels of a layer by the materials that they have now.
     fn count_by_material(&mut self, outcome: VoxelOutcome, y: usize, voxels: u64, counts: &mut Counts<'_>) {
-        let (ground, low) = (self.view.ground(), self.pos.origin());
+        let (ground, pos) = (self.view.ground(), self.pos);
         let single = ground.single_material();
         let brick = &*self.brick();
-        if brick.material_bytes() == 0
-            && let Some(material) = single
-        {
-            return counts.add(outcome, material, voxels.count_ones().into());
+        let mut own = voxels;
+        if brick.material_bytes() != 0 {
+            let stored = |bit: &usize| brick.material_at(y * 64 + bit);
+            own = ones(voxels)
+                .filter(|bit| stored(bit) == MaterialId::GROUND)
+                .fold(0, |own, bit| own | 1 << bit);
+            let others = ones(voxels & !own).map(|bit| stored(&bit));
+            for_runs(others, |material, voxels| counts.add(outcome, material, voxels));
         }
-        let materials = ones(voxels).map(|bit| {
-            let index = y * 64 + bit;
-            match (brick.material_at(index), single) {
-                (MaterialId::GROUND, Some(material)) => material,
-                (stored, _) => resolve(ground, low + offset(index), stored),
-            }
-        });
-        for_runs(materials, |material, voxels| counts.add(outcome, material, voxels));
+        match single {
+            _ if own == 0 => {}
+            Some(material) => counts.add(outcome, material, own.count_ones().into()),
+            None => ground.for_materials(pos, y, own, |material, voxels| {
+                counts.add(outcome, material, voxels.count_ones().into());
+            }),
+        }
     }
 
     /// By how much the brick changes the hash of the world's samples.

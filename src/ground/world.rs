@@ -348,11 +348,17 @@ impl Ground {
     }
 
     /// Change of height around a column along x and along z.
+    #[inline]
     fn rises(&self, column: Column) -> [Rise; 2] {
         if let Some(pages) = &self.pages {
             return self.rises_on_demand(pages, column);
         }
         let Column { x, z } = self.extent.clamp(column);
+        if (1..self.width()).contains(&x) && (1..self.depth()).contains(&z) {
+            let (at, row) = (self.extent.inner_index(Column::new(x, z)), self.extent.row_len());
+            let rise = |step: usize| Rise { rise: self.heights[at + step] - self.heights[at - step], run: 2 };
+            return [rise(1), rise(row)];
+        }
         let (west, east) = ((x - 1).max(0), (x + 1).min(self.width()));
         let (north, south) = ((z - 1).max(0), (z + 1).min(self.depth()));
         [
@@ -398,12 +404,17 @@ impl Ground {
     }
 
     /// Square of the surface's steepness over a column of the world, in 1/256 voxel of rise over two voxels of run.
+    #[inline]
     pub(super) fn squared_slope(&self, column: Column) -> u64 {
         Self::squared_slope_of(self.rises(column))
     }
 
+    #[inline]
     pub(super) fn squared_slope_of(rises: [Rise; 2]) -> u64 {
-        let steps = |along: Rise| i64::from(along.rise * 2 / along.run).unsigned_abs();
+        let steps = |along: Rise| match along.run {
+            2 => u64::from(along.rise.unsigned_abs()),
+            run => u64::from((along.rise * 2 / run).unsigned_abs()),
+        };
         let [x, z] = rises.map(steps);
         x * x + z * z
     }

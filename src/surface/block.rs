@@ -157,6 +157,7 @@ impl Mesher {
             self.samples.extrapolate_beyond(&columns, layers, rows);
         }
         self.list_edges(&cubes.solid, &drawn, bottom, top);
+        self.crossings.ends = stack.has_own_materials().then(|| solid_ends(&cubes.solid, &drawn));
         self.crossings.make(&self.samples, stack, around, brick.origin(), origin, &mut out.vertices);
         self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);
     }
@@ -212,6 +213,24 @@ impl Mesher {
         }
         out.truncate(end);
     }
+}
+
+/// The solid ends of all lattice edges that vertices of drawn cubes lie on: those corners of the cubes that are one edge away
+/// from another corner, of air.
+fn solid_ends(solid: &[LayerBits; 9], drawn: &[LayerBits; 8]) -> [LayerBits; 9] {
+    let mut ends = [0; 9];
+    for (y, &drawn) in drawn.iter().enumerate().filter(|(_, drawn)| **drawn != 0) {
+        let (low, high) = (solid[y], solid[y + 1]);
+        // The solid ends of the cubes' edges in a layer, along one axis.
+        let along = |level: LayerBits, step: u32, across: u32| {
+            let edges = (level ^ level >> step) & beside(drawn, across);
+            level & (edges | edges << step)
+        };
+        let upright = (low ^ high) & beside(beside(drawn, X), Z);
+        ends[y] |= low & upright | along(low, X, Z) | along(low, Z, X);
+        ends[y + 1] |= high & upright | along(high, X, Z) | along(high, Z, X);
+    }
+    ends
 }
 
 fn stack_of(brick: BrickPos) -> (i32, i32) {

@@ -35,22 +35,24 @@ pub(crate) struct CellOutline<T> {
 impl<T: Copy> CellOutline<T> {
     pub fn with_capacity(vertices: usize) -> Self {
         let lines = [(); 5].map(|()| Vec::with_capacity(vertices));
-        Self { lines, is_steep: false, around: Vec::new() }
+        Self { lines, is_steep: false, around: Vec::with_capacity(vertices) }
     }
 
-    /// Makes it that of a cell, given its [flags](super::mask::Borders), the vertices at its corners, and those of crossed
-    /// lattice edges, as lower end and axis.
+    /// Makes it that of a cell, given its [flags](super::mask::Borders), the vertices at its corners, by column and height, and
+    /// those of crossed lattice edges, as lower end and axis.
     pub fn trace(
         &mut self,
         ground: &Ground,
         cell: Column,
         flags: u8,
-        corner: impl Fn(Column) -> T,
+        corner: impl Fn(Column, i32) -> T,
         mut crossing: impl FnMut(IVec3, usize) -> T,
     ) {
         const ENDS: [(usize, usize); 5] = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)];
         let columns = cell.corners();
-        let corners = columns.map(corner);
+        let [[a, d], [b, c]] = ground.heights::<2>(cell);
+        let heights = [a, b, c, d];
+        let corners: [T; 4] = std::array::from_fn(|number| corner(columns[number], heights[number]));
         self.is_steep = flags == Borders::STEEP;
         // Only steep cells need the diagonal.
         let lines = if self.is_steep { 5 } else { 4 };
@@ -58,7 +60,7 @@ impl<T: Copy> CellOutline<T> {
             line.clear();
             line.push(corners[from]);
             if flags >> number & 1 == 1 {
-                let crossings = chain(ground, columns[from], columns[to]);
+                let crossings = chain([from, to].map(|end| (columns[end], heights[end])));
                 line.extend(crossings.map(|(p, axis)| crossing(p, axis)));
             }
             line.push(corners[to]);
@@ -127,10 +129,10 @@ fn bands<T: Copy, H: PartialOrd>(
     }
 }
 
-/// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, in order: one for each
-/// lattice y that separates their heights, as lower end and axis. Also between the ends of a cell's diagonal.
-fn chain(ground: &Ground, from: Column, to: Column) -> impl Iterator<Item = (IVec3, usize)> {
-    let (h_from, h_to) = (ground.height(from), ground.height(to));
+/// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, given by column and height, in
+/// order: one for each lattice y that separates their heights, as lower end and axis. Also between the ends of a cell's
+/// diagonal.
+fn chain([(from, h_from), (to, h_to)]: [(Column, i32); 2]) -> impl Iterator<Item = (IVec3, usize)> {
     let axis = match (from.x != to.x, from.z != to.z) {
         (true, true) => DIAGONAL,
         (true, false) => 0,

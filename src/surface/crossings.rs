@@ -7,15 +7,16 @@
 use glam::{IVec3, Vec3};
 use wide::{f32x4, i32x4};
 
-use super::layer_bits::{PLACES, SIDE};
+use super::layer_bits::{self, LayerBits, PLACES, SIDE};
 use super::mesh::{MaterialMix, Vertex};
 use super::neighbours::{CornerBricks, Neighbours};
 use super::padded_samples::{AREA, Marked, PaddedSamples};
 use super::stack::Stack;
 use super::vertex::{between, lerp_normal};
-use crate::ground::{MaterialId, OVERLAY_DEPTH};
-use crate::lattice::{ONE, SNAP};
+use crate::ground::{Ground, MaterialId, OVERLAY_DEPTH};
+use crate::lattice::{BrickPos, ONE, SNAP};
 use crate::volume::Brick;
+use crate::volume::layers::ones;
 
 /// Edges taken together.
 const LANES: usize = 4;
@@ -32,6 +33,8 @@ pub(super) struct Edge {
 pub(super) struct Crossings {
     /// Along x, y and z.
     pub lists: [Vec<Edge>; 3],
+    /// Their solid ends, layer by layer; only where the ground's materials differ from voxel to voxel.
+    pub ends: Option<[LayerBits; 9]>,
 }
 
 impl Crossings {
@@ -46,8 +49,14 @@ impl Crossings {
         origin: IVec3,
         out: &mut Vec<Vertex>,
     ) {
-        let mut site =
-            Site { samples, stack, materials: StoredMaterials::new(around), low, base: low - origin };
+        let materials = StoredMaterials::new(around);
+        let solid;
+        let mut own = None;
+        if let Some(ends) = &self.ends {
+            solid = solid_materials(ends, stack.ground(), low);
+            own = Some(&solid);
+        }
+        let mut site = Site { samples, stack, materials, own, low, base: low - origin };
         let [x, y, z] = &self.lists;
         out.reserve(x.len() + y.len() + z.len());
         site.make::<0>(x, out);
@@ -56,11 +65,37 @@ impl Crossings {
     }
 }
 
+/// The ground's own materials at the solid ends of edges of a block. Several edges end at the same voxel, and neighbours are asked
+/// together.
+fn solid_materials(ends: &[LayerBits; 9], ground: &Ground, low: IVec3) -> SolidMaterials {
+    let mut materials = [[[MaterialId::GROUND; 64]; 4]; 9];
+    let brick = BrickPos::of(low).0;
+    for (y, (&ends, materials)) in
+        ends.iter().zip(&mut materials).enumerate().filter(|(_, (ends, _))| **ends != 0)
+    {
+        for (number, (voxels, materials)) in layer_bits::split(ends).into_iter().zip(materials).enumerate() {
+            let step = IVec3::new((number & 1) as i32, (y >> 3) as i32, (number >> 1) as i32);
+            if voxels != 0 {
+                ground.for_materials(BrickPos(brick + step), y & 7, voxels, |material, held| {
+                    ones(held).for_each(|bit| materials[bit] = material);
+                });
+            }
+        }
+    }
+    materials
+}
+
+/// Materials of the voxels at the corners of a block's cells: for each layer those of four bricks, as bits of
+/// [`Layers`](crate::volume::Layers). Only those at solid ends of edges are filled in.
+type SolidMaterials = [[[MaterialId; 64]; 4]; 9];
+
 /// What the vertices of a block are made from.
 struct Site<'a, 'b> {
     samples: &'a PaddedSamples,
     stack: &'a mut Stack<'b>,
     materials: StoredMaterials<'a>,
+    /// The ground's own materials at solid ends, if they differ from voxel to voxel.
+    own: Option<&'a SolidMaterials>,
     /// The brick's lowest sample.
     low: IVec3,
     /// The same, from where positions count.
@@ -112,12 +147,13 @@ impl Site<'_, '_> {
         };
         let materials = match (stored, self.stack.single_mix()) {
             (MaterialId::GROUND, Some(mix)) => mix,
-            (MaterialId::GROUND, None) => {
-                let mut solid = self.low + IVec3::new(place.x, y, place.z);
-                solid[AXIS] += i32::from(!is_lower);
-                let own = self.stack.voxel_mix(solid);
-                own.unwrap_or_else(|| self.own_materials::<AXIS>(corner, self.low.y + y, step))
-            }
+            (MaterialId::GROUND, None) => match self.own {
+                Some(own) => {
+                    let (solid, y) = solid_end::<AXIS>(edge, is_lower);
+                    MaterialMix::pure(own[y][PLACES[solid].brick][PLACES[solid].index])
+                }
+                None => self.own_materials::<AXIS>(corner, self.low.y + y, step),
+            },
             _ => MaterialMix::pure(stored),
         };
         Vertex { position, normal, materials }
@@ -229,6 +265,12 @@ fn linear_steps(p: i32x4, q: i32x4) -> i32x4 {
     i32x4::new(steps).max(i32x4::splat(1)).min(i32x4::splat(SNAP - 1))
 }
 
+/// The solid end of an edge: corner and layer.
+fn solid_end<const AXIS: usize>(edge: Edge, is_lower: bool) -> (usize, usize) {
+    let corner = usize::from(edge.corner) + if is_lower { 0 } else { NEXT_CORNER[AXIS] };
+    (corner, usize::from(edge.y) + usize::from(AXIS == 1 && !is_lower))
+}
+
 /// The stored materials around a block's corners.
 struct StoredMaterials<'a> {
     bricks: CornerBricks<'a>,
@@ -245,8 +287,7 @@ impl<'a> StoredMaterials<'a> {
 
     /// What is stored at the solid end of an edge.
     fn at<const AXIS: usize>(&self, edge: Edge, is_lower: bool) -> MaterialId {
-        let corner = usize::from(edge.corner) + if is_lower { 0 } else { NEXT_CORNER[AXIS] };
-        let y = usize::from(edge.y) + usize::from(AXIS == 1 && !is_lower);
+        let (corner, y) = solid_end::<AXIS>(edge, is_lower);
         let place = &PLACES[corner];
         let brick = self.bricks.0[y / 8][place.brick];
         brick.map_or(MaterialId::GROUND, |brick| brick.material_at(y % 8 * 64 + place.index))

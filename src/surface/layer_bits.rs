@@ -48,6 +48,22 @@ pub fn join([own, x, z, xz]: [u64; 4]) -> LayerBits {
     spread(own) | spread(x & FIRST_OF_ROWS) << 8 | (z as u128 & 0xff) << 72 | (xz as u128 & 1) << 80
 }
 
+/// The words of four bricks from the bits of 9x9 corners: [`join`] makes them one.
+pub fn split(corners: LayerBits) -> [u64; 4] {
+    const FIRST_OF_ROWS: u64 = 0x0101_0101_0101_0101;
+    let x = gather(corners >> 8 & CELLS) & FIRST_OF_ROWS;
+    [gather(corners & CELLS), x, (corners >> 72 & 0xff) as u64, (corners >> 80 & 1) as u64]
+}
+
+/// Puts the rows of 8x8 cells where a word has them: [`spread`] puts them back.
+fn gather(cells: LayerBits) -> u64 {
+    let rows = 0xff | 0xff << 18 | 0xff << 36 | 0xff << 54;
+    let bits = cells & rows | cells >> 1 & rows << 8;
+    let pairs = 0xffff | 0xffff << 36;
+    let bits = bits & pairs | bits >> 2 & pairs << 16;
+    (bits & 0xffff_ffff | bits >> 4 & 0xffff_ffff << 32) as u64
+}
+
 /// Cells with a bit at some corner of their lower face.
 #[inline]
 pub fn any(corners: LayerBits) -> LayerBits {
@@ -130,6 +146,8 @@ mod tests {
         #[test]
         fn words_are_joined_to_corners(words: [u64; 4]) {
             let joined = join(words);
+            let [own, x, z, xz] = words;
+            prop_assert_eq!(split(joined), [own, x & 0x0101_0101_0101_0101, z & 0xff, xz & 1]);
             for (x, z) in (0..9).flat_map(|z| (0..9).map(move |x| (x, z))) {
                 let word = words[x / 8 + z / 8 * 2];
                 prop_assert_eq!(at(joined, x, z), word >> (z % 8 * 8 + x % 8) & 1 == 1, "{} {}", x, z);

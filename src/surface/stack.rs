@@ -3,7 +3,7 @@
 
 use std::ops::RangeInclusive;
 
-use glam::{IVec3, Vec3};
+use glam::Vec3;
 
 use super::layer_bits::{self, LayerBits, PLACES, SIDE};
 use super::mask::WINDOW;
@@ -31,8 +31,6 @@ pub(super) struct Stack<'a> {
     mixes: [Option<[MaterialMix; 2]>; 81],
     /// The material of all columns of the world, if they have only one.
     single: Option<MaterialMix>,
-    /// Does the ground's material differ from voxel to voxel?
-    has_own_materials: bool,
 }
 
 impl<'a> Stack<'a> {
@@ -50,7 +48,6 @@ impl<'a> Stack<'a> {
             normals: [None; 81],
             mixes: [None; 81],
             single: ground.single_material().map(MaterialMix::pure),
-            has_own_materials: ground.has_own_materials(),
         }
     }
 
@@ -88,9 +85,14 @@ impl<'a> Stack<'a> {
         self.single
     }
 
-    /// The ground's own material at a lattice point, if it differs from voxel to voxel.
-    pub fn voxel_mix(&self, point: IVec3) -> Option<MaterialMix> {
-        self.has_own_materials.then(|| MaterialMix::pure(self.ground.material(point)))
+    /// Does the ground's material differ from voxel to voxel?
+    pub fn has_own_materials(&self) -> bool {
+        self.ground.has_own_materials()
+    }
+
+    /// The pristine world.
+    pub fn ground(&self) -> &'a Ground {
+        self.ground
     }
 
     /// The tile's normal over a corner.

@@ -116,6 +116,8 @@ impl Rings {
     pub fn new(world: &WorldView, tile: TilePos, borders: &Borders) -> Self {
         let (low, high) = world.grid.tile_cells(tile);
         let mut drawing = Drawing::new(world, tile, borders);
+        drawing.rings.vertices.reserve(ROOM);
+        drawing.rings.fans.reserve(12 * ROOM);
         for z in low.z >> 3..=(high.z - 1) >> 3 {
             for x in low.x >> 3..=(high.x - 1) >> 3 {
                 drawing.patch((z, x));
@@ -189,13 +191,16 @@ struct Drawing<'a> {
     rings: Rings,
     /// The lines of the cell under work.
     outline: CellOutline<Numbered>,
-    /// Sides of the patch's cells that have vertices: 81 along x and as many along z. Empty where no cell is steep: there, only
-    /// the mask's border has vertices, and each side of it but once.
-    sides: Vec<Option<Side>>,
+    /// Sides of a patch's cells that have vertices: 81 along x and as many along z. Those with numbers below the patch's first
+    /// were of an earlier one. Empty where no cell is steep: there, only the mask's border has vertices, and each side of it but
+    /// once.
+    sides: Vec<Side>,
+    /// The number that the patch's first vertex has, or would have.
+    first: u32,
 }
 
 /// The vertices of a cell's side, which two cells of a patch share: numbered one after the other, up or down.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Side {
     /// The number of the first one.
     number: u32,
@@ -208,8 +213,8 @@ impl<'a> Drawing<'a> {
         let (low, high) = world.grid.tile_cells(tile);
         let (base, ground) = (column_count(low, high), world.samples.ground());
         let outline = CellOutline::with_capacity(ROOM);
-        let sides = if ground.steep_cells().is_some() { vec![None; 2 * 81] } else { Vec::new() };
-        Self { ground, borders, low, high, base, rings: Rings::default(), outline, sides }
+        let sides = if ground.steep_cells().is_some() { vec![Side::default(); 2 * 81] } else { Vec::new() };
+        Self { ground, borders, low, high, base, rings: Rings::default(), outline, sides, first: base }
     }
 
     /// The rings, without room for more: they are kept until the next edit nearby.
@@ -236,11 +241,8 @@ impl<'a> Drawing<'a> {
 
     /// Draws the rings of 8x8 cells.
     fn patch(&mut self, at: (i32, i32)) {
-        let before = self.rings.vertices.len();
+        self.first = self.base + self.rings.vertices.len() as u32;
         self.borders.bordering(at).for_each(|(cell, flags)| self.cell(cell, flags));
-        if self.rings.vertices.len() != before {
-            self.sides.fill(None);
-        }
         self.close(at);
     }
 
@@ -253,12 +255,12 @@ impl<'a> Drawing<'a> {
 
     /// Draws a cell's two triangles, with vertices on the lines that its flags name.
     fn cell(&mut self, cell: Column, flags: u8) {
-        let (ground, low, base) = (self.ground, self.low, self.base);
+        let (ground, low, base, first) = (self.ground, self.low, self.base, self.first);
         let (rings, sides) = (&mut self.rings, &mut self.sides);
         let width = (self.high.x - low.x + 1) as u32;
-        let corner = |column: Column| Numbered {
+        let corner = |column: Column, height: i32| Numbered {
             number: (column.z - low.z) as u32 * width + (column.x - low.x) as u32,
-            height: ground.height(column) * (SNAP / ONE),
+            height: height * (SNAP / ONE),
         };
         let start = Column::new(cell.x & !7, cell.z & !7);
         self.outline.trace(ground, cell, flags, corner, |p, axis| {
@@ -268,8 +270,10 @@ impl<'a> Drawing<'a> {
                 _ if sides.is_empty() => next,
                 _ => {
                     let side = &mut sides[axis / 2 * 81 + ((p.z - start.z) * 9 + p.x - start.x) as usize];
-                    let first = side.get_or_insert(Side { number: next, y: p.y });
-                    first.number + first.y.abs_diff(p.y)
+                    if side.number < first {
+                        *side = Side { number: next, y: p.y };
+                    }
+                    side.number + side.y.abs_diff(p.y)
                 }
             };
             if number == next {

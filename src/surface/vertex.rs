@@ -122,15 +122,15 @@ pub fn vertex(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> V
 /// The vertex where the sheet has no edited sample near, or meets the heightmap: the tile's own normals and materials.
 /// Also on a cell's diagonal.
 pub fn sheet_vertex(ground: &Ground, p: IVec3, axis: usize, origin: IVec3) -> Vertex {
-    let q = p + UNIT[axis];
+    let (q, distance) = (p + UNIT[axis], ground.distance(p));
     let step = match axis {
         1 => (ground.height(Column::of(p)) - p.y * ONE) * (SNAP / ONE),
-        _ => linear(ground.distance(p), ground.distance(q)),
+        _ => linear(distance, ground.distance(q)),
     };
     Vertex {
         position: (p - origin) * SNAP + UNIT[axis] * step,
         normal: heightmap_normal(ground, Column::of(p), Column::of(q), step),
-        materials: own_materials(ground, [p, q], step, if ground.distance(p) < 0 { p } else { q }),
+        materials: own_materials(ground, [p, q], step, if distance < 0 { p } else { q }),
     }
 }
 

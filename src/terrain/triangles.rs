@@ -47,14 +47,15 @@ pub(super) fn for_triangles(
 /// The triangles that a tile draws for a cell.
 fn heightmap_triangles(view: &WorldView, cell: Column, found: &mut impl FnMut(Triangle)) {
     let ground = view.ground();
-    let corner = |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
+    let corner =
+        |at: Column, height: i32| DVec3::new(at.x.into(), f64::from(height) / f64::from(ONE), at.z.into());
     let is_steep = |cell| ground.steep_cells().is_some_and(|steep| steep.contains(cell));
     let bends = |(dx, dz)| view.mask.contains(cell.offset(dx, dz)) || is_steep(cell.offset(dx, dz));
     let bordering =
         (0..).zip(Borders::SIDES).fold(0, |flags, (side, step)| flags | u8::from(bends(step)) << side);
     let flags = if is_steep(cell) { Borders::STEEP } else { bordering };
     if flags == 0 {
-        let [a, b, c, d] = cell.corners().map(corner);
+        let [a, b, c, d] = cell.corners().map(|at| corner(at, ground.height(at)));
         found([a, b, c]);
         found([c, d, a]);
         return;

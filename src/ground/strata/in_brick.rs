@@ -1,16 +1,16 @@
 //! The strata in one brick, and the bricks that a thread asked for last.
 //!
-//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks, many of them several
-//! times. So a brick first finds out which strata may be in it at all, hashes the corners of their noise once, and keeps
-//! what it found for each column and voxel.
+//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks. Most strata are ruled out
+//! for 4x4x4 voxels at a time, an eighth of a brick: by their ranges when the first voxel of the eighth is asked for, and by
+//! bounds of their noise when one comes that the ranges leave open. The corners of the noise are hashed once for a brick.
 
 use std::cell::RefCell;
 
 use glam::{IVec2, IVec3};
 
 use super::StrataRecords;
-use super::records::{BED, BeddingRecord, FILL, POCKET, StratumRecord, VEIN};
-use super::value_noise::{Corners, FlatCorners, ValueNoise};
+use super::records::{BED, FILL, POCKET, StratumRecord, VEIN};
+use super::value_noise::{Corners, ValueNoise};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::lattice::{BRICK, BrickPos, Column, ONE};
@@ -22,21 +22,17 @@ thread_local! {
     static BRICKS: RefCell<Vec<BrickStrata>> = const { RefCell::new(Vec::new()) };
 }
 
-/// A voxel of the ground, with the column of the world that is nearest.
-#[derive(Clone, Copy)]
-pub(super) struct Voxel {
-    pub column: Column,
-    pub y: i32,
-    /// How deep it lies in 1/256 voxel: 0 to 255 for the highest solid voxel of its column, and 0 above it.
-    pub depth: i32,
-}
-
-/// The material that strata give a voxel; [`MaterialId::GROUND`] if no stratum holds it.
-pub(super) fn material(ground: &Ground, records: &StrataRecords, voxel: Voxel) -> Option<MaterialId> {
-    let pos = BrickPos::of(voxel.column.at(voxel.y));
+/// Calls `ask` with the strata of a brick.
+#[inline]
+pub(super) fn with_brick<R>(
+    ground: &Ground,
+    records: &StrataRecords,
+    pos: BrickPos,
+    ask: impl FnOnce(&mut BrickStrata) -> R,
+) -> Option<R> {
     let IVec3 { x, y, z } = pos.0 & (KEPT - 1);
+    let place = ((y * KEPT + z) * KEPT + x) as usize;
     BRICKS.with_borrow_mut(|bricks| {
-        let place = ((y * KEPT + z) * KEPT + x) as usize;
         if bricks.is_empty() {
             bricks.resize_with((KEPT * KEPT * KEPT) as usize, BrickStrata::default);
         }
@@ -44,58 +40,47 @@ pub(super) fn material(ground: &Ground, records: &StrataRecords, voxel: Voxel) -
         if brick.key != (records.id, pos.0) {
             brick.fill(ground, records, pos);
         }
-        Some(brick.material(ground, records, voxel))
+        Some(ask(brick))
     })
 }
 
-/// The strata of a brick.
+/// The strata of a brick. Sets of strata are bits, by their numbers.
 #[derive(Default)]
-struct BrickStrata {
+pub(super) struct BrickStrata {
     /// Which strata, by their [id](StrataRecords::id), and which brick. No strata have id 0.
     key: (u64, IVec3),
-    /// The bedding's noise at the corners of its cell.
-    folds: FlatCorners,
-    /// The strata that may hold a voxel of the brick, topmost first.
-    near: Vec<Near>,
-    /// The columns for which `conditions` are known.
-    known_columns: u64,
-    /// The conditions of strata that a column fulfils: a bit each.
-    conditions: Conditions,
-    /// The voxels for which `materials` are known: bit `z * 8 + x` of layer y.
-    known: [u64; 8],
-    materials: Materials,
+    /// Of the columns, rows along x.
+    heights: [[i32; 8]; 8],
+    /// Those whose noise is known.
+    hashed: u32,
+    /// By the numbers of strata.
+    noises: Vec<Noises>,
+    /// The eighths that are known: a bit each.
+    known_eighths: u8,
+    /// Those with low and high x, the same at high z, and all four at high y.
+    eighths: [Eighth; 8],
 }
 
-/// One word for each column; only those that are known count.
-struct Conditions([u32; 64]);
-
-/// One material for each voxel; only those that are known count.
-struct Materials([MaterialId; 512]);
-
-impl Default for Conditions {
-    fn default() -> Self {
-        Self([0; 64])
-    }
+/// The strata in an eighth of a brick.
+#[derive(Clone, Copy, Default)]
+struct Eighth {
+    /// Those that may hold a voxel of it.
+    near: u32,
+    /// Those whose ranges hold all its voxels, so only the body and the column decide.
+    inside: u32,
+    /// Those whose bodies were looked for: the ones still near may be in it.
+    bounded: u32,
 }
 
-impl Default for Materials {
-    fn default() -> Self {
-        Self([MaterialId(0); 512])
-    }
-}
+/// Voxels along the side of an eighth.
+const HALF: i32 = BRICK / 2;
 
-/// A stratum that may hold voxels of a brick.
-struct Near {
-    /// Its number.
-    number: usize,
-    /// It holds them all.
-    is_whole: bool,
-    /// Its ranges hold all of them, so only its body decides.
-    is_inside: bool,
-    /// The depths at which it may be, in 1/256 voxel, the second not included: noise included.
-    depth: [i32; 2],
-    roughness: FlatCorners,
-    noises: [Corners; 2],
+/// The noise of a stratum at the corners of the brick's cells.
+#[derive(Clone, Copy, Default)]
+struct Noises {
+    roughness: Corners,
+    /// Of beds, the first is the bedding's.
+    body: [Corners; 2],
 }
 
 /// Least and greatest of some numbers.
@@ -104,157 +89,278 @@ fn bounds(values: impl IntoIterator<Item = i32>) -> [i32; 2] {
 }
 
 /// Where all numbers of a range lie that are moved by up to `by`: inside another one, outside it, or neither.
+#[inline]
 fn lies([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Option<bool> {
-    if high.saturating_add(by) < from || low.saturating_sub(by) >= to {
+    if high + by < from || low - by >= to {
         Some(false)
-    } else if low.saturating_sub(by) >= from && high.saturating_add(by) < to {
+    } else if low - by >= from && high + by < to {
         Some(true)
     } else {
         None
     }
 }
 
+/// How deep a voxel lies, in 1/256 voxel: 0 to 255 for the highest solid one of its column, and 0 above it.
+#[inline]
+fn depth(height: i32, y: i32) -> i32 {
+    (height - y * ONE - 1).max(0)
+}
+
 impl BrickStrata {
     /// Begins anew, with another brick.
     fn fill(&mut self, ground: &Ground, records: &StrataRecords, pos: BrickPos) {
-        let low = pos.origin();
         self.key = (records.id, pos.0);
-        let column_heights = ground.heights::<8>(Column::of(low));
-        (self.known_columns, self.known) = (0, [0; 8]);
-        self.near.clear();
-        let place = IVec2::new(low.x, low.z);
-        let [lowest, highest] = bounds(column_heights.as_flattened().iter().copied());
-        let ys = [low.y, low.y + BRICK - 1];
-        let heights = ys.map(|y| y * ONE);
-        let depths = [lowest - heights[1], highest - heights[0]].map(|distance| (distance - 1).max(0));
-        self.folds = if records.has_beds { records.bedding.noise().flat_corners(place) } else { [0; 4] };
+        self.heights = ground.heights(Column::of(pos.origin()));
+        (self.hashed, self.known_eighths) = (0, 0);
+        self.noises.resize(records.strata.len(), Noises::default());
+    }
+
+    /// The lowest voxel of an eighth.
+    fn low(&self, eighth: usize) -> IVec3 {
+        let half = |bit: usize| (eighth >> bit & 1) as i32 * HALF;
+        BrickPos(self.key.1).origin() + IVec3::new(half(0), half(2), half(1))
+    }
+
+    /// Finds the strata of an eighth by their ranges.
+    fn fill_eighth(&mut self, records: &StrataRecords, number: usize) {
+        let low = self.low(number).y;
+        let (x, z) = ((number & 1) * 4, (number >> 1 & 1) * 4);
+        let rows = self.heights[z..z + 4].iter();
+        let [lowest, highest] = bounds(rows.flat_map(|row| row[x..x + 4].iter().copied()));
+        let ys = [low, low + HALF - 1];
+        let (depths, heights) = ([depth(lowest, ys[1]), depth(highest, ys[0])], ys.map(|y| y * ONE));
+        let mut eighth = Eighth::default();
         for (number, record) in records.strata.iter().enumerate() {
-            let rough = record.rough;
-            let is_deep = lies(depths, rough, record.depth);
+            let is_deep = lies(depths, record.rough, record.depth);
             if is_deep == Some(false) {
                 continue;
             }
-            let known = [is_deep, lies(heights, rough, record.height), lies(ys, 0, record.ys)];
+            let known = [is_deep, lies(heights, record.rough, record.height), lies(ys, 0, record.ys)];
             if known.contains(&Some(false)) {
                 continue;
             }
-            let mut noises = [[0; 8]; 2];
-            let is_possible = match record.body {
-                BED => self.may_hold_bed(records, record, heights),
-                POCKET => {
-                    noises[0] = record.noise().corners(low);
-                    record.noise().bounds_within(&noises[0], low, low + 7)[1] > record.limit
+            eighth.near |= 1 << number;
+            if known == [Some(true); 3] {
+                eighth.inside |= 1 << number;
+                if record.body == FILL && record.condition == 0 {
+                    // It holds what those above it leave.
+                    break;
                 }
-                VEIN => {
-                    noises.iter_mut().zip([record.noise(), record.second_noise()]).all(|(corners, noise)| {
-                        *corners = noise.corners(low);
-                        let [least, greatest] = noise.bounds_within(corners, low, low + 7);
-                        least < record.limit && greatest > -record.limit
-                    })
-                }
-                _ => true,
-            };
-            if !is_possible {
-                continue;
-            }
-            let is_inside = known == [Some(true); 3];
-            let is_whole = is_inside && record.body == FILL && record.condition == 0;
-            let needs_roughness = rough != 0 && (!is_inside || record.body == BED);
-            let roughness = if needs_roughness { record.roughness().flat_corners(place) } else { [0; 4] };
-            let [from, to] = record.depth;
-            let depth = [from.saturating_sub(rough), to.saturating_add(rough)];
-            self.near.push(Near { number, is_whole, is_inside, depth, roughness, noises });
-            if is_whole {
-                break;
             }
         }
+        self.known_eighths |= 1 << number;
+        self.eighths[number] = eighth;
     }
 
-    /// May a bed be in the brick, whose samples have heights in this range?
-    fn may_hold_bed(&self, records: &StrataRecords, record: &StratumRecord, [low, high]: [i32; 2]) -> bool {
-        let start = Column::of(BrickPos(self.key.1).origin());
-        let bedding = &records.bedding;
-        let corners = [(0, 0), (7, 0), (0, 7), (7, 7)].map(|(x, z)| start.offset(x, z));
-        let dips = corners.map(|corner| bedding.dip_at(corner));
-        let [least, greatest] = bounds(self.folds).map(|noise| i64::from(bedding.fold_at(noise)));
-        let rough = i64::from(record.rough);
-        let first = i64::from(low) + dips.iter().min().unwrap_or(&0) + least - rough;
-        let last = i64::from(high) + dips.iter().max().unwrap_or(&0) + greatest + rough;
-        let [from, thickness, every] = record.bed.map(i64::from);
-        let above = first - from;
-        let above = if every > 0 { above.rem_euclid(every) } else { above };
-        let end = above + last - first;
-        above < thickness && end >= 0 || every > 0 && end >= every
-    }
-
-    /// The material of a voxel of the brick; [`MaterialId::GROUND`] if no stratum holds it.
+    /// The voxels of a set that are the highest solid ones of their columns. Sets are bits `z * 8 + x` of the layer at a y.
     #[inline]
-    fn material(&mut self, ground: &Ground, records: &StrataRecords, voxel: Voxel) -> MaterialId {
-        let index = BrickPos::index(voxel.column.at(voxel.y));
-        let (layer, bit) = (index >> 6, 1 << (index & 63));
-        if self.known[layer] & bit == 0 {
-            self.known[layer] |= bit;
-            self.materials.0[index] = self.look_up(ground, records, voxel);
-        }
-        self.materials.0[index]
+    pub fn tops(&self, y: i32, voxels: u64) -> u64 {
+        let heights = self.heights.as_flattened();
+        let is_top = |&column: &usize| (1..=ONE).contains(&(heights[column] - y * ONE));
+        ones(voxels).filter(is_top).fold(0, |tops, column| tops | 1 << column)
     }
 
-    fn look_up(&mut self, ground: &Ground, records: &StrataRecords, voxel: Voxel) -> MaterialId {
-        for at in 0..self.near.len() {
-            let near = &self.near[at];
-            if voxel.depth < near.depth[0] || voxel.depth >= near.depth[1] {
+    /// Calls `each` with the materials of a set of voxels, and which of them each holds; [`MaterialId::GROUND`] for those
+    /// that no stratum holds. Sets are bits `z * 8 + x` of the layer at a y.
+    #[inline]
+    pub fn for_materials(
+        &mut self,
+        ground: &Ground,
+        records: &StrataRecords,
+        y: i32,
+        voxels: u64,
+        mut each: impl FnMut(MaterialId, u64),
+    ) {
+        for quarter in 0..4 {
+            let mut left = voxels & 0x0f0f_0f0f << ((quarter & 1) * 4 + (quarter >> 1) * 32);
+            if left == 0 {
                 continue;
             }
-            let record = &records.strata[near.number];
-            if near.is_whole
-                || self.holds(near, record, &records.bedding, voxel)
-                    && (record.condition == 0
-                        || self.conditions_of(ground, records, voxel.column) & record.condition != 0)
-            {
-                return MaterialId(record.material as u8);
+            let eighth = quarter + (y >> 2 & 1) as usize * 4;
+            if self.known_eighths >> eighth & 1 == 0 {
+                self.fill_eighth(records, eighth);
+            }
+            for number in ones(self.eighths[eighth].near.into()) {
+                let record = &records.strata[number];
+                let held = self.held_by(ground, records, (number, record), (eighth, y), left);
+                if held != 0 {
+                    each(MaterialId(record.material as u8), held);
+                    left &= !held;
+                    if left == 0 {
+                        break;
+                    }
+                }
+            }
+            if left != 0 {
+                each(MaterialId::GROUND, left);
             }
         }
-        MaterialId::GROUND
     }
 
-    /// The conditions that a column fulfils.
-    fn conditions_of(&mut self, ground: &Ground, records: &StrataRecords, column: Column) -> u32 {
-        let number = ((column.z & 7) * 8 + (column.x & 7)) as usize;
-        if self.known_columns >> number & 1 == 0 {
-            self.known_columns |= 1 << number;
-            self.conditions.0[number] = records.conditions_of(ground, column);
-        }
-        self.conditions.0[number]
-    }
-
-    /// Does a stratum near the brick hold a voxel, if its conditions on the column are met?
-    fn holds(&self, near: &Near, record: &StratumRecord, bedding: &BeddingRecord, voxel: Voxel) -> bool {
-        let Voxel { column, y, depth } = voxel;
-        let Near { roughness, noises, .. } = near;
-        let (place, point) = (IVec2::new(column.x, column.z), column.at(y));
-        let flat = |noise: ValueNoise, corners| noise.flat_within(corners, place);
-        let moved = || match record.rough {
-            0 => 0,
-            _ => record.moved(flat(record.roughness(), roughness)),
-        };
-        let is_in_ranges = near.is_inside || {
-            let moved = moved();
-            (record.depth[0]..record.depth[1]).contains(&(depth + moved))
-                && (record.height[0]..record.height[1]).contains(&(y * ONE + moved))
-                && (record.ys[0]..record.ys[1]).contains(&y)
-        };
-        is_in_ranges
-            && match record.body {
-                BED => {
-                    let fold = bedding.fold_at(flat(bedding.noise(), &self.folds));
-                    record.is_in_bed(i64::from(y * ONE + moved() + fold) + bedding.dip_at(column))
-                }
-                VEIN => {
-                    record.noise().within(&noises[0], point).abs() < record.limit
-                        && record.second_noise().within(&noises[1], point).abs() < record.limit
-                }
-                POCKET => record.noise().within(&noises[0], point) > record.limit,
-                _ => true,
+    /// Those of a set of voxels of an eighth that a stratum holds.
+    #[inline]
+    fn held_by(
+        &mut self,
+        ground: &Ground,
+        records: &StrataRecords,
+        (number, record): (usize, &StratumRecord),
+        (eighth, y): (usize, i32),
+        voxels: u64,
+    ) -> u64 {
+        // Those for which ranges decide, and those that they leave to noise.
+        let (mut held, mut open) = (0, voxels);
+        if self.eighths[eighth].inside >> number & 1 == 1 {
+            if record.body == FILL {
+                (held, open) = (voxels, 0);
             }
+        } else {
+            open = 0;
+            let is_level = match (record.ys[0]..record.ys[1]).contains(&y) {
+                true => lies([y * ONE; 2], record.rough, record.height),
+                false => Some(false),
+            };
+            if is_level == Some(false) {
+                return 0;
+            }
+            let is_sure = record.body == FILL && is_level == Some(true);
+            for column in ones(voxels) {
+                let depth = depth(self.heights.as_flattened()[column], y);
+                match lies([depth; 2], record.rough, record.depth) {
+                    Some(false) => {}
+                    Some(true) if is_sure => held |= 1 << column,
+                    _ => open |= 1 << column,
+                }
+            }
+        }
+        if open != 0 {
+            held |= self.held_by_noise(records, (number, record), (eighth, y), open);
+        }
+        if record.condition != 0 && held != 0 {
+            let low = Column::of(BrickPos(self.key.1).origin());
+            let column = |bit: usize| low.offset((bit & 7) as i32, (bit >> 3) as i32);
+            let is_met = |bit: &usize| records.meets(ground, column(*bit), record.condition);
+            held = ones(held).filter(is_met).fold(0, |held, column| held | 1 << column);
+        }
+        held
     }
+
+    /// Those of a set of voxels of an eighth that a stratum holds, if its condition on the column is met.
+    #[inline(never)]
+    fn held_by_noise(
+        &mut self,
+        records: &StrataRecords,
+        (number, record): (usize, &StratumRecord),
+        (eighth, y): (usize, i32),
+        voxels: u64,
+    ) -> u64 {
+        let flag = 1 << number;
+        if self.eighths[eighth].bounded & flag == 0 {
+            self.eighths[eighth].bounded |= flag;
+            if !self.may_hold(records, number, eighth) {
+                self.eighths[eighth].near &= !flag;
+                return 0;
+            }
+        }
+        let is_inside = self.eighths[eighth].inside & flag != 0;
+        let Noises { roughness, body } = self.noises[number];
+        let (bedding, low) = (&records.bedding, BrickPos(self.key.1).origin());
+        let is_held = |&column: &usize| {
+            let point = IVec3::new(low.x + (column & 7) as i32, y, low.z + (column >> 3) as i32);
+            let place = IVec2::new(point.x, point.z);
+            let moved = match record.rough {
+                0 => 0,
+                _ if is_inside && record.body != BED => 0,
+                _ => record.moved(record.roughness().flat_within(roughness, place)),
+            };
+            let (depth, height) = (depth(self.heights.as_flattened()[column], y), y * ONE);
+            let is_in_ranges = is_inside
+                || (record.depth[0]..record.depth[1]).contains(&(depth + moved))
+                    && (record.height[0]..record.height[1]).contains(&(height + moved));
+            is_in_ranges
+                && match record.body {
+                    BED => {
+                        let fold = bedding.fold_at(bedding.noise().flat_within(body[0], place));
+                        record.is_in_bed(i64::from(height + moved + fold) + bedding.dip_at(Column::of(point)))
+                    }
+                    VEIN => {
+                        record.noise().within(body[0], point).abs() < record.limit
+                            && record.second_noise().within(body[1], point).abs() < record.limit
+                    }
+                    POCKET => record.noise().within(body[0], point) > record.limit,
+                    _ => true,
+                }
+        };
+        ones(voxels).filter(is_held).fold(0, |held, column| held | 1 << column)
+    }
+
+    /// May the body of a stratum be in an eighth?
+    fn may_hold(&mut self, records: &StrataRecords, number: usize, eighth: usize) -> bool {
+        let record = &records.strata[number];
+        let Noises { body, .. } = self.noises(records, number);
+        let low = self.low(eighth);
+        let high = low + (HALF - 1);
+        let crosses = |noise: ValueNoise, corners| {
+            let [least, greatest] = noise.bounds_within(corners, low, high);
+            least < record.limit && greatest > -record.limit
+        };
+        match record.body {
+            BED => may_hold_bed(records, record, body[0], [low, high]),
+            POCKET => record.noise().bounds_within(body[0], low, high)[1] > record.limit,
+            VEIN => crosses(record.noise(), body[0]) && crosses(record.second_noise(), body[1]),
+            _ => true,
+        }
+    }
+
+    /// The noise of a stratum, hashed when it is first asked for.
+    fn noises(&mut self, records: &StrataRecords, number: usize) -> Noises {
+        if self.hashed >> number & 1 == 0 {
+            self.hashed |= 1 << number;
+            let low = BrickPos(self.key.1).origin();
+            let (place, record) = (IVec2::new(low.x, low.z), &records.strata[number]);
+            let mut noises = Noises::default();
+            if record.rough != 0 {
+                noises.roughness = record.roughness().flat_corners(place);
+            }
+            match record.body {
+                BED => noises.body[0] = records.bedding.noise().flat_corners(place),
+                POCKET => noises.body[0] = record.noise().corners(low),
+                VEIN => noises.body = [record.noise(), record.second_noise()].map(|noise| noise.corners(low)),
+                _ => {}
+            }
+            self.noises[number] = noises;
+        }
+        self.noises[number]
+    }
+}
+
+/// May a bed be in a box of a brick, where the bedding's noise has these corners?
+fn may_hold_bed(
+    records: &StrataRecords,
+    record: &StratumRecord,
+    folds: Corners,
+    [low, high]: [IVec3; 2],
+) -> bool {
+    let (bedding, rough) = (&records.bedding, i64::from(record.rough));
+    let [from, to] = [low, high].map(|end| IVec2::new(end.x, end.z));
+    let dips = [(from.x, from.y), (to.x, from.y), (from.x, to.y), (to.x, to.y)]
+        .map(|(x, z)| bedding.dip_at(Column::new(x, z)));
+    let folds = bedding.noise().flat_bounds_within(folds, from, to);
+    let [least, greatest] = folds.map(|noise| i64::from(bedding.fold_at(noise)));
+    let first = i64::from(low.y * ONE) + dips.iter().min().unwrap_or(&0) + least - rough;
+    let last = i64::from(high.y * ONE) + dips.iter().max().unwrap_or(&0) + greatest + rough;
+    let [from, thickness, every] = record.bed.map(i64::from);
+    let above = first - from;
+    let above = if every > 0 { above.rem_euclid(every) } else { above };
+    let end = above + last - first;
+    above < thickness && end >= 0 || every > 0 && end >= every
+}
+
+/// Positions of the bits that are set, lowest first.
+#[inline]
+pub(super) fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (bit < 64).then_some(bit)
+    })
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::IVec3;
 use rayon::prelude::*;
 
-use super::in_brick::{self, Voxel};
+use super::in_brick::{self, ones};
 use super::records::LoneVoxel;
 use super::steep::Steep;
 use super::{OwnMaterials, SteepCells, Strata, StrataRecords};
@@ -13,7 +13,7 @@ use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::ground::{ColumnMaterial, GroundError};
 use crate::lattice::hash::hash_words;
-use crate::lattice::{Column, LIMIT, ONE, ceil};
+use crate::lattice::{BrickPos, Column, LIMIT, ONE, ceil};
 
 /// What a ground has beside the materials of its columns.
 #[derive(Clone, PartialEq)]
@@ -145,12 +145,54 @@ impl Ground {
         {
             return top;
         }
-        let voxel = Voxel { column, y, depth: depth.max(0) };
         let found = match &below.own {
-            OwnMaterials::Strata { records, .. } => in_brick::material(self, records, voxel),
-            OwnMaterials::Function { function, .. } => function(column.at(y), voxel.depth),
+            OwnMaterials::Strata { records, .. } => {
+                let (pos, voxel) = (BrickPos::of(column.at(y)), 1 << ((column.z & 7) << 3 | column.x & 7));
+                in_brick::with_brick(self, records, pos, |brick| {
+                    let mut found = MaterialId::GROUND;
+                    brick.for_materials(self, records, y, voxel, |material, _| found = material);
+                    found
+                })
+            }
+            OwnMaterials::Function { function, .. } => function(column.at(y), depth.max(0)),
         };
         found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| self.material_of_column(point))
+    }
+
+    /// Calls `each` with the materials of pristine voxels, and which are of each, in one call or several. Voxels are bits
+    /// `z * 8 + x` of layer `y` of a brick.
+    pub(crate) fn for_materials(
+        &self,
+        pos: BrickPos,
+        y: usize,
+        voxels: u64,
+        mut each: impl FnMut(MaterialId, u64),
+    ) {
+        let low = pos.origin() + IVec3::Y * y as i32;
+        // Those asked one by one: what no stratum holds, and all beyond the rim.
+        let mut rest = voxels;
+        if let Some(Below { own: OwnMaterials::Strata { records, .. }, tops, .. }) = self.below()
+            && [low, low + IVec3::new(7, 0, 7)].iter().all(|&corner| self.is_inside(corner))
+        {
+            let first = self.extent().inner_index(Column::of(low));
+            in_brick::with_brick(self, records, pos, |brick| {
+                let shown = brick.tops(low.y, voxels);
+                let top = |bit: usize| tops.get(first + (bit >> 3) * self.extent().row_len() + (bit & 7));
+                for_runs(shown, |bit| top(bit).copied().unwrap_or_default(), &mut each);
+                rest = 0;
+                brick.for_materials(self, records, low.y, voxels & !shown, |material, held| match material {
+                    MaterialId::GROUND => rest |= held,
+                    _ => each(material, held),
+                });
+            });
+        }
+        let point = |bit: usize| low + IVec3::new((bit & 7) as i32, 0, (bit >> 3) as i32);
+        for_runs(rest, |bit| self.material(point(bit)), each);
+    }
+
+    /// Does a point lie in a column of the world, and no farther up or down than questions reach?
+    fn is_inside(&self, point: IVec3) -> bool {
+        self.nearest_column(point) == Column::of(point) && point.y.unsigned_abs() <= HIGHEST.unsigned_abs()
     }
 
     /// What the undug surface shows over a column: the material of its highest solid voxel where the ground has strata,
@@ -217,3 +259,20 @@ impl Ground {
 
 /// Points farther up or down, where no edit reaches, count as if they were here.
 const HIGHEST: i32 = 4 * LIMIT;
+
+/// Calls `each` with runs of voxels that have the same material.
+#[inline]
+fn for_runs(voxels: u64, material: impl Fn(usize) -> MaterialId, mut each: impl FnMut(MaterialId, u64)) {
+    let (mut last, mut run) = (MaterialId::GROUND, 0);
+    for bit in ones(voxels) {
+        let material = material(bit);
+        if material != last && run != 0 {
+            each(last, run);
+            run = 0;
+        }
+        (last, run) = (material, run | 1 << bit);
+    }
+    if run != 0 {
+        each(last, run);
+    }
+}

@@ -27,7 +27,7 @@ const ROUGH: u32 = 0x7F4A_7C15;
 pub(crate) struct StratumRecord {
     pub material: u32,
     pub body: u32,
-    /// The bit of its condition in [`StrataRecords::conditions_of`]; 0 without one.
+    /// The bit of its condition on columns; 0 without one.
     pub condition: u32,
     pub seed: u32,
     /// The width of the body's noise in voxels, as a power of two.
@@ -72,8 +72,6 @@ pub(super) struct ColumnCondition {
 pub(crate) struct StrataRecords {
     /// A number that no other strata of the program have.
     pub id: u64,
-    /// Is any of them a bed?
-    pub has_beds: bool,
     pub strata: Vec<StratumRecord>,
     pub bedding: BeddingRecord,
     /// What strata ask of columns, by the bits of [`StratumRecord::condition`].
@@ -186,6 +184,7 @@ impl ColumnCondition {
     }
 
     /// May the stratum be in this column of the world?
+    #[inline]
     pub(super) fn admits(&self, ground: &Ground, column: Column) -> bool {
         self.admits_slope(ground, column, || ground.squared_slope(column))
     }
@@ -248,11 +247,18 @@ impl StrataRecords {
         let hash = hash_words(words.chain(of_columns));
         static LAST: AtomicU64 = AtomicU64::new(0);
         let id = LAST.fetch_add(1, Ordering::Relaxed) + 1;
-        let has_beds = strata.iter().any(|record| record.body == BED);
-        Self { id, has_beds, strata, bedding, conditions, hash }
+        Self { id, strata, bedding, conditions, hash }
+    }
+
+    /// Does a column of the world fulfil a condition, given by its bit?
+    #[inline]
+    pub fn meets(&self, ground: &Ground, column: Column, condition: u32) -> bool {
+        let own = self.conditions.get(condition.trailing_zeros() as usize);
+        own.is_none_or(|own| own.admits(ground, column))
     }
 
     /// The conditions that a column of the world fulfils: a bit each.
+    #[cfg(any(test, feature = "cuda"))]
     pub fn conditions_of(&self, ground: &Ground, column: Column) -> u32 {
         let is_met = |(bit, own): (u32, &ColumnCondition)| u32::from(own.admits(ground, column)) << bit;
         (0..).zip(&self.conditions).map(is_met).sum()
@@ -269,7 +275,7 @@ impl StrataRecords {
         let LoneVoxel { column, y, depth, squared_slope } = voxel;
         let (place, at) = (IVec2::new(column.x, column.z), column.at(y));
         let height = y * ONE;
-        let flat = |noise: ValueNoise| noise.flat_within(&noise.flat_corners(place), place);
+        let flat = |noise: ValueNoise| noise.flat_within(noise.flat_corners(place), place);
         let moved = if record.rough == 0 { 0 } else { record.moved(flat(record.roughness())) };
         let is_admitted = || {
             let own = self.conditions.get(record.condition.trailing_zeros() as usize);
