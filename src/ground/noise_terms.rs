@@ -93,6 +93,7 @@ impl NoiseHeights {
 #[cfg(any(test, feature = "cuda"))]
 impl NoiseTerms {
     /// Columns in a row, of which there are as many as it takes.
+    #[cfg(feature = "cuda")]
     pub fn row_len(&self) -> usize {
         self.extent.row_len()
     }
