@@ -36,7 +36,8 @@ impl HeightSource for Copy {
 }
 
 fn terrain(ground: Ground, chunk_size: u32) -> Terrain {
-    Terrain::new(ground, &TerrainSettings { chunk_size, ..TerrainSettings::default() }).expect("valid settings")
+    Terrain::new(ground, &TerrainSettings { chunk_size, ..TerrainSettings::default() })
+        .expect("valid settings")
 }
 
 #[test]

@@ -83,11 +83,10 @@ mod tests {
     #[test]
     fn coordinates_clamped_to_the_rim_are_few_runs() {
         let run = |low, count, places| Run { low, count, places };
-        assert_eq!(runs(&[0, 0, 0, 1, 5, 9, 12, 12], 4), [
-            run(0, 1, 0..3),
-            run(1, 3, 3..6),
-            run(12, 1, 6..8),
-        ]);
+        assert_eq!(
+            runs(&[0, 0, 0, 1, 5, 9, 12, 12], 4),
+            [run(0, 1, 0..3), run(1, 3, 3..6), run(12, 1, 6..8),]
+        );
         assert_eq!(runs(&[], 4), []);
     }
 }

@@ -111,9 +111,11 @@ impl MaterialControl {
             Self::Uniform(material) => hash_words([1, material.word()]),
             Self::Rules { base, rules } => {
                 let words = rules.iter().flat_map(|rule| {
-                    let numbers = [rule.height.0, rule.height.1, rule.height_fade]
-                        .into_iter()
-                        .chain([rule.slope.0, rule.slope.1, rule.slope_fade]);
+                    let numbers = [rule.height.0, rule.height.1, rule.height_fade].into_iter().chain([
+                        rule.slope.0,
+                        rule.slope.1,
+                        rule.slope_fade,
+                    ]);
                     [u64::from(rule.overlay.0)].into_iter().chain(numbers.map(f64::to_bits))
                 });
                 hash_words([2, base.0.into()].into_iter().chain(words))
@@ -166,7 +168,10 @@ impl Ground {
     /// Where a column of the world lies on an image stretched over it.
     pub(super) fn stretched<'a>(&self, image: &'a GreyImage, column: Column) -> ImagePoint<'a> {
         let along = |column: i32, cells: i32, samples: u32| {
-            LinePosition::of_long(u64::from(column.unsigned_abs()) * u64::from(samples - 1), cells.unsigned_abs())
+            LinePosition::of_long(
+                u64::from(column.unsigned_abs()) * u64::from(samples - 1),
+                cells.unsigned_abs(),
+            )
         };
         ImagePoint {
             image,

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{MAX_SIZE, MAX_SOURCE_SIZE};
 use super::error::GroundError;
+use super::{MAX_SIZE, MAX_SOURCE_SIZE};
 use crate::lattice::Column;
 
 /// The columns (0, 0) to (width, depth), both included; arrays over them are row-major, x fastest.

@@ -86,7 +86,11 @@ impl Ground {
 
     /// What the world's column nearest to another is made of.
     #[inline(never)]
-    pub(super) fn material_on_demand(&self, control: Option<&MaterialControl>, column: Column) -> ColumnMaterial {
+    pub(super) fn material_on_demand(
+        &self,
+        control: Option<&MaterialControl>,
+        column: Column,
+    ) -> ColumnMaterial {
         let column = self.extent().clamp(column);
         let read = |page: &Page| page.materials.get()?.get(Page::index(column)).copied();
         let found = self.pages().and_then(|pages| {

@@ -319,7 +319,8 @@ impl Ground {
                 let (west, east) = (&self.heights[start - 1..], &self.heights[start + 1..]);
                 let along_x = west.iter().zip(east).map(|(west, east)| Rise { rise: east - west, run: 2 });
                 let along_z = before[inner.clone()].iter().zip(&after[inner.clone()]);
-                let along_z = along_z.map(|(before, after)| Rise { rise: after - before, run: south - north });
+                let along_z =
+                    along_z.map(|(before, after)| Rise { rise: after - before, run: south - north });
                 normals.extend(along_x.zip(along_z).map(|(x, z)| Self::normal_of([x, z])));
             }
             normals.extend((normals.len()..count).map(rim));

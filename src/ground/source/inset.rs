@@ -50,7 +50,8 @@ impl<Inner: HeightSource, Outer: HeightSource> InsetSource<Inner, Outer> {
     fn inside(&self, grid: ColumnGrid) -> Option<(ColumnGrid, [usize; 2])> {
         let range = |count: usize, low: i32, size: i32, from: i32| {
             let (stride, ahead) = (i64::from(grid.stride.max(1)), i64::from(low) - i64::from(from));
-            let start = (ahead.max(0).unsigned_abs().div_ceil(stride.unsigned_abs()) as i64).min(count as i64);
+            let start =
+                (ahead.max(0).unsigned_abs().div_ceil(stride.unsigned_abs()) as i64).min(count as i64);
             let end = ((ahead + i64::from(size)).div_euclid(stride) + 1).clamp(start, count as i64);
             start as usize..end as usize
         };
@@ -122,7 +123,13 @@ impl<Inner: HeightSource, Outer: HeightSource> HeightSource for InsetSource<Inne
         let inner = |grid, materials: &mut [ColumnMaterial]| self.inner.fill_materials(grid, materials);
         let outer = |grid, materials: &mut [ColumnMaterial]| self.outer.fill_materials(grid, materials);
         let half = 1 << (SHARE_BITS - 1);
-        self.fill(grid, materials, inner, outer, |outer, inner, share| if share >= half { inner } else { outer });
+        self.fill(
+            grid,
+            materials,
+            inner,
+            outer,
+            |outer, inner, share| if share >= half { inner } else { outer },
+        );
     }
 
     fn bytes(&self) -> usize {

@@ -195,7 +195,8 @@ fn noise_and_images_give_the_heights_of_grounds_in_memory() {
         let made = Ground::from_source(140, 90, NoiseSource::new(&noise).unwrap()).unwrap();
         assert_alike(&made, &Ground::from_noise(140, 90, &noise).unwrap(), rng, 100);
     }
-    for (step, detail) in [(1, None), (3, None), (10, Some(Detail::default())), (64, Some(Detail::default()))] {
+    for (step, detail) in [(1, None), (3, None), (10, Some(Detail::default())), (64, Some(Detail::default()))]
+    {
         let (width, depth) = (rng.u32(2..9), rng.u32(2..9));
         let samples = (0..width * depth).map(|_| rng.u16(..)).collect();
         let image = GreyImage::from_samples(width, depth, samples).unwrap();
@@ -229,7 +230,10 @@ fn an_inset_is_one_source_inside_and_the_other_outside() {
             16.. => assert_eq!(height(x, z), inner.min(99 * 256), "({x}, {z})"),
             _ => {
                 let ends = [inner.min(99 * 256), outside(x, z)];
-                assert!(ends.iter().min().unwrap() <= &height(x, z) && &height(x, z) <= ends.iter().max().unwrap());
+                assert!(
+                    ends.iter().min().unwrap() <= &height(x, z)
+                        && &height(x, z) <= ends.iter().max().unwrap()
+                );
             }
         }
     }
@@ -272,7 +276,8 @@ fn heights_stay_within_what_was_promised() {
 
 #[test]
 fn the_hash_is_of_the_source_and_what_it_is_made_of() {
-    let made = |width, id| Ground::from_source(width, 90, FunctionSource::new(id, -40.0, 40.0, bumps)).unwrap();
+    let made =
+        |width, id| Ground::from_source(width, 90, FunctionSource::new(id, -40.0, 40.0, bumps)).unwrap();
     let rock = MaterialControl::Uniform(ColumnMaterial::solid(MaterialId(4)));
     let rules = MaterialControl::Rules { base: MaterialId(4), rules: vec![MaterialRule::default()] };
     let all = || {
@@ -346,7 +351,10 @@ fn times_of_pages() {
         ("noise, 6 octaves", plain),
         ("image, 4 voxels a sample", of(Box::new(image()))),
         ("image in noise", of(Box::new(inset))),
-        ("noise with strata", of(Box::new(NoiseSource::new(&noise).unwrap())).with_strata(&Strata::alpine()).unwrap()),
+        (
+            "noise with strata",
+            of(Box::new(NoiseSource::new(&noise).unwrap())).with_strata(&Strata::alpine()).unwrap(),
+        ),
     ] {
         for stride in [1, 2, 4, 16, 64] {
             // A column of nodes, so that no page of the ground is computed for another one.
@@ -361,7 +369,9 @@ fn times_of_pages() {
             let fresh = time(&|low| drop(ground.page(low, stride, [33, 33])));
             let again = time(&|low| drop(ground.page(low, stride, [33, 33])));
             let heights = time(&|low| drop(ground.page_heights(low, stride, [33, 33])));
-            println!("{name}, stride {stride}: {fresh:.0} us, again {again:.0} us, heights alone {heights:.0} us");
+            println!(
+                "{name}, stride {stride}: {fresh:.0} us, again {again:.0} us, heights alone {heights:.0} us"
+            );
         }
         let start = std::time::Instant::now();
         let mut sum = 0i64;

@@ -186,7 +186,11 @@ impl Ground {
         let found = self.below().and_then(|below| match &below.own {
             OwnMaterials::Strata { records, .. } => {
                 let lone = LoneVoxel { column, y, depth, squared_slope };
-                records.strata.iter().find(|record| records.holds(record, self, lone)).map(|record| MaterialId(record.material as u8))
+                records
+                    .strata
+                    .iter()
+                    .find(|record| records.holds(record, self, lone))
+                    .map(|record| MaterialId(record.material as u8))
             }
             OwnMaterials::Function { function, .. } => function(column.at(y), depth),
         });

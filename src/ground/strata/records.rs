@@ -282,7 +282,8 @@ impl StrataRecords {
             && match record.body {
                 BED => {
                     let fold = self.bedding.fold_at(flat(self.bedding.noise()));
-                    record.is_in_bed(i64::from(height + moved) + self.bedding.dip_at(column) + i64::from(fold))
+                    record
+                        .is_in_bed(i64::from(height + moved) + self.bedding.dip_at(column) + i64::from(fold))
                 }
                 VEIN => {
                     let is_within = |noise: ValueNoise| noise.at(at).abs() < record.limit;

@@ -61,7 +61,9 @@ impl Steep<'_> {
     pub fn word(self, (x, z): (i32, i32)) -> u64 {
         match self {
             Self::Resident(cells) => cells.word((x, z)),
-            Self::OnDemand(ground) => ground.steep_word_on_demand(Column::new(x.saturating_mul(8), z.saturating_mul(8))),
+            Self::OnDemand(ground) => {
+                ground.steep_word_on_demand(Column::new(x.saturating_mul(8), z.saturating_mul(8)))
+            }
         }
     }
 
