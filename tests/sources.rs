@@ -120,7 +120,7 @@ fn digging_at_the_far_corner_is_digging_at_the_origin() {
         let receipts = [near.apply([brush(0)]), far.apply([brush(away)])];
         let [here, there] = receipts.map(|receipts| receipts[0].outcome.clone().expect("accepted"));
         assert_eq!(moved(&here, away).bounds, there.bounds, "step {step}");
-        assert_eq!((here.removed, here.added), (there.removed, there.added), "step {step}");
+        assert_eq!((&here.removed, &here.added), (&there.removed, &there.added), "step {step}");
         let scenarios = |applied: &Applied| {
             applied.chunks.iter().map(|chunk| (chunk.chunk, chunk.scenario)).collect::<Vec<_>>()
         };

@@ -323,7 +323,7 @@ mod tests {
             (Brush::level(shape, 40_000.0), "`height` is 40000, but it must be -32768 to 32768"),
             (Brush::flatten(shape, Vec3::ZERO, Vec3::ZERO), "`normal` is 0 long"),
             (Brush::flatten(shape, Vec3::ZERO, Vec3::NAN), "`normal` must be finite"),
-            (Brush::flatten(shape, Vec3::X * 1e9, Vec3::Y), "beyond +-32768"),
+            (Brush::flatten(shape, Vec3::X * 1e9, Vec3::Y), "beyond +-262144"),
             (Brush::terrace(shape, 0.5), "`step` is 0.5, but it must be 1 to 256"),
         ] {
             assert!(error(brush.clone()).contains(message), "{}", error(brush));

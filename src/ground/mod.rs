@@ -24,7 +24,7 @@ mod grey_image;
 mod image_heights;
 mod material;
 mod noise_heights;
-#[cfg(feature = "cuda")]
+mod noise_rows;
 mod noise_terms;
 mod on_demand;
 mod page;
@@ -64,5 +64,6 @@ pub const MAX_SIZE: u32 = 16_384;
 ///
 /// Positions in 1/4096 voxel, counted from the world's origin, would fit 32 bits up to 524,287 voxels. But a
 /// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536 voxels from the origin,
-/// and to 1/64 voxel at the far end of such a world.
+/// and to 1/64 voxel at the far end of such a world. Meshes lie beside their own origins and lose nothing; a camera that goes
+/// that far needs an origin that follows it, as in any game with `f32` transforms.
 pub const MAX_SOURCE_SIZE: u32 = crate::lattice::REACH.cast_unsigned();

@@ -1,4 +1,4 @@
-//! The parameters of noise as numbers, for computing the same heights, bit by bit, on a graphics card.
+//! The parameters of noise as numbers, for computing the same heights, bit by bit, row by row or on a graphics card.
 
 use bytemuck::{Pod, Zeroable};
 use noise::permutationtable::{NoiseHasher, PermutationTable};
@@ -7,11 +7,14 @@ use noise::{Fbm, Perlin, RidgedMulti};
 use super::error::GroundError;
 use super::extent::Extent;
 use super::noise_heights::{NoiseHeights, NoiseKind, ORIGIN, Octaves, seeds};
+#[cfg(any(test, feature = "cuda"))]
 use super::world::Ground;
+#[cfg(any(test, feature = "cuda"))]
 use crate::lattice::{LIMIT, ONE};
 
 /// [`NoiseHeights`] over a world, checked, and all numbers derived from them.
 pub(crate) struct NoiseTerms {
+    #[cfg_attr(not(any(test, feature = "cuda")), expect(dead_code))]
     extent: Extent,
     pub kind: NoiseKind,
     /// For each octave the permutation of 0 to 255 that its gradients are drawn from.
@@ -44,7 +47,7 @@ impl NoiseHeights {
     /// The numbers for a world of `width` x `depth` cells.
     ///
     /// # Errors
-    /// Those of [`Ground::from_noise`] that show before any height is computed.
+    /// Those of [`Ground::from_noise`](super::Ground::from_noise) that show before any height is computed.
     pub(crate) fn terms(&self, width: u32, depth: u32) -> Result<NoiseTerms, GroundError> {
         let &Self { seed, kind, octaves, scale, amplitude, base } = self;
         let noise = Octaves::new(self)?;
@@ -79,7 +82,7 @@ impl NoiseHeights {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cuda"))]
 impl NoiseHeights {
     /// The processor's noise over columns, before it becomes heights.
     pub(crate) fn by_column(&self) -> impl Fn(i32, i32) -> f64 {
@@ -87,8 +90,10 @@ impl NoiseHeights {
     }
 }
 
+#[cfg(any(test, feature = "cuda"))]
 impl NoiseTerms {
     /// Columns in a row, of which there are as many as it takes.
+    #[cfg(feature = "cuda")]
     pub fn row_len(&self) -> usize {
         self.extent.row_len()
     }
