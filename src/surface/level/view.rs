@@ -21,7 +21,7 @@ pub struct LevelView<'a> {
     pub stacks: Stacks<'a>,
     /// A rule that is broken.
     #[cfg(test)]
-    pub fault: Option<super::Fault>,
+    pub(crate) fault: Option<super::Fault>,
 }
 
 impl<'a> LevelView<'a> {
