@@ -377,6 +377,7 @@ mod guide {
         Readme "README.md"
         GettingStarted "docs/guide/src/getting-started.md"
         Sizes "docs/guide/src/sizes.md"
+        Levels "docs/guide/src/levels.md"
         Brushes "docs/guide/src/brushes.md"
         Materials "docs/guide/src/materials.md"
         Physics "docs/guide/src/physics.md"
