@@ -1,5 +1,6 @@
-//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT]`;
-//! with 0 seconds materials alone are compared.
+//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT [horizon]]`;
+//! with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with levels of detail and a plain material,
+//! with views of 0.5 to 16 km, is compared with the real landscape in full detail.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
 //! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
@@ -22,7 +23,7 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{PollType, TextureFormat};
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 use bevy_burrow::backend::{Backend, Engine, EngineState};
-use bevy_burrow::ground::{GreyImage, ImageLimits, ImageScale};
+use bevy_burrow::ground::{GreyImage, ImageLimits, ImageScale, NoiseSource};
 use bevy_burrow::lattice::Column;
 use bevy_burrow::physics::{ColliderSource, PhysicsFigures, TerrainPhysicsPlugin};
 use bevy_burrow::prelude::*;
@@ -72,12 +73,16 @@ fn main() {
     }
     let frames = seconds as usize * 60;
     println!("{width} x {height}, {seconds} s each; us");
+    if std::env::args().any(|arg| arg == "horizon") {
+        horizon((width, height), seconds as usize * 60);
+        return;
+    }
     if frames == 0 {
-        Walk::new(Backend::Cpu, (width, height)).compare_materials(FRAMES_OF_ROUND);
+        Walk::new(Backend::Cpu, (width, height), Scene::Landscape).compare_materials(FRAMES_OF_ROUND);
         return;
     }
     for backend in backends {
-        let mut walk = Walk::new(backend, (width, height));
+        let mut walk = Walk::new(backend, (width, height), Scene::Landscape);
         for _ in 0..WARM_UP {
             walk.frame(0, false);
         }
@@ -133,7 +138,7 @@ struct Walk {
 }
 
 impl Walk {
-    fn new(backend: Backend, (width, height): (u32, u32)) -> Self {
+    fn new(backend: Backend, (width, height): (u32, u32), scene: Scene) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         let engine = Engine::new(backend);
         engine.wait(Duration::from_secs(30));
@@ -142,7 +147,10 @@ impl Walk {
             app.add_plugins((BurrowPlugins, PhysicsPlugins::default(), TerrainPhysicsPlugin))
                 .insert_resource(BurrowEngine(engine));
         });
-        let ground = ground();
+        let ground = match scene {
+            Scene::Horizon { .. } => mountains(),
+            Scene::Landscape | Scene::Plain => ground(),
+        };
         let path = path(&ground);
         let world = app.world_mut();
         println!("drawn by {}", world.resource::<RenderAdapterInfo>().name);
@@ -152,7 +160,9 @@ impl Walk {
             DistanceFog { falloff: FogFalloff::from_visibility_squared(900.0), ..DistanceFog::default() };
         // What hills cover is not shaded, as in the digger.
         let camera = (Camera3d::default(), DepthPrepass, RenderTarget::from(film), fog, Transform::default());
-        let camera = world.spawn((camera, ColliderSource { radius: 48.0 })).id();
+        // All scenes are seen as far.
+        let projection = Projection::from(PerspectiveProjection { far: 20_000.0, ..default() });
+        let camera = world.spawn((camera, projection, ColliderSource { radius: 48.0 })).id();
         let shadows =
             CascadeShadowConfigBuilder { num_cascades: 3, maximum_distance: 150.0, ..default() }.build();
         world.spawn((
@@ -161,13 +171,22 @@ impl Walk {
             Transform::from_xyz(1.0, 0.9, 0.4).looking_at(Vec3::ZERO, Vec3::Y),
         ));
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
-        world.spawn((terrain, GroundLook::default()));
+        let plain = world.resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default());
+        let plain = (MeshMaterial3d(plain), SlimVertices);
+        match scene {
+            Scene::Landscape => world.spawn((terrain, GroundLook::default())),
+            Scene::Plain => world.spawn((terrain, plain)),
+            Scene::Horizon { view_distance } => {
+                world.spawn((terrain, plain, LevelsOfDetail { view_distance, ..default() }))
+            }
+        };
         let mut walk =
             Self { app, camera, path, balls: Vec::new(), is_far: false, next_brush: Instant::now() };
         // The ground is ready when its textures are generated and its tiles are shown.
         let start = Instant::now();
         while !walk.is_shown() {
             assert!(start.elapsed() < Duration::from_secs(300), "the ground never appeared");
+            walk.place_camera(0);
             walk.app.update();
         }
         walk
@@ -176,8 +195,10 @@ impl Walk {
     fn is_shown(&mut self) -> bool {
         let world = self.app.world_mut();
         let is_painted = world.get_resource::<GroundLoading>().is_none_or(|loading| loading.is_ready());
+        let mut levels = world.query::<&ShownLevels>();
+        let is_fine = levels.iter(world).all(|shown| shown.waiting == 0 && shown.progress() > 0.0);
         let mut tiles = world.query_filtered::<(), (With<Tile>, With<Mesh3d>)>();
-        is_painted && tiles.iter(world).count() > 0
+        is_painted && is_fine && tiles.iter(world).count() > 0
     }
 
     /// Compares the look, in each quality, with a plain material, round by round, and prints medians of the rounds.
@@ -238,19 +259,40 @@ impl Walk {
         suns.iter_mut(world).for_each(|mut sun| sun.shadow_maps_enabled = has_shadows);
     }
 
+    /// How many nodes are drawn.
+    fn nodes(&mut self) -> usize {
+        let world = self.app.world_mut();
+        let mut levels = world.query::<&ShownLevels>();
+        levels.iter(world).flat_map(|shown| &shown.nodes).sum()
+    }
+
     fn figures(&self) -> BurrowFigures {
         self.app.world().resource::<BurrowFigures>().clone()
+    }
+
+    /// Puts the camera where it is in a frame, and returns a place ahead.
+    fn place_camera(&mut self, number: usize) -> Vec3 {
+        let up = if self.is_far { 1e5 } else { 0.0 } * Vec3::Y;
+        let [at, ahead] = [number, number + 90].map(|number| self.path[number % self.path.len()] + up);
+        if let Some(mut camera) = self.app.world_mut().get_mut::<Transform>(self.camera) {
+            *camera = Transform::from_translation(at + Vec3::Y * 6.0).looking_at(ahead, Vec3::Y);
+        }
+        ahead
+    }
+
+    /// Shows the terrain or hides it.
+    fn set_visible(&mut self, is_visible: bool) {
+        let world = self.app.world_mut();
+        let mut terrains = world.query_filtered::<&mut Visibility, With<Terrain>>();
+        let visibility = if is_visible { Visibility::Inherited } else { Visibility::Hidden };
+        terrains.iter_mut(world).for_each(|mut own| *own = visibility);
     }
 
     /// Draws one frame and returns its time.
     fn frame(&mut self, number: usize, is_digging: bool) -> Duration {
         let start = Instant::now();
-        let up = if self.is_far { 1e5 } else { 0.0 } * Vec3::Y;
-        let [at, ahead] = [number, number + 90].map(|number| self.path[number % self.path.len()] + up);
+        let ahead = self.place_camera(number);
         let world = self.app.world_mut();
-        if let Some(mut camera) = world.get_mut::<Transform>(self.camera) {
-            *camera = Transform::from_translation(at + Vec3::Y * 6.0).looking_at(ahead, Vec3::Y);
-        }
         while is_digging && self.next_brush <= start {
             world.write_message(Brush::dig(Shape::sphere(ahead, 3.0)));
             self.next_brush += BRUSH;
@@ -271,6 +313,84 @@ impl Walk {
     }
 }
 
+/// What is walked over.
+#[derive(Clone, Copy)]
+enum Scene {
+    /// The real landscape with a look.
+    Landscape,
+    /// The same with a plain material.
+    Plain,
+    /// Mountains to the horizon with levels of detail and a plain material.
+    Horizon { view_distance: f32 },
+}
+
+/// Draws scenes with a plain material, each less the frame with nothing in sight.
+fn horizon(size: (u32, u32), frames: usize) {
+    let mut first = [0.0; 2];
+    for view in [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0] {
+        let scene = match view {
+            0.0 => Scene::Plain,
+            view => Scene::Horizon { view_distance: view * 1000.0 },
+        };
+        let mut walk = Walk::new(Backend::Cpu, size, scene);
+        let nodes = walk.nodes();
+        let mut times = [0.0; 2];
+        for (time, has_shadows) in times.iter_mut().zip([true, false]) {
+            walk.set_shadows(has_shadows);
+            let mut own = [true, false].map(|is_visible| {
+                walk.set_visible(is_visible);
+                let mut took: Vec<_> =
+                    (0..FIRST_FRAMES + FRAMES_OF_ROUND).map(|number| walk.frame(number, false)).collect();
+                took.drain(..FIRST_FRAMES);
+                took.sort_unstable();
+                took[took.len() / 2].as_secs_f64() * 1e6
+            });
+            own[0] -= own[1];
+            *time = own[0];
+        }
+        walk.set_visible(true);
+        if view == 0.0 {
+            first = times;
+            println!("1.2 km in full detail: {:.0} with shadows, {:.0} without", times[0], times[1]);
+            continue;
+        }
+        let [shadows, none] = [0, 1].map(|at| times[at] / first[at]);
+        println!(
+            "{view} km: {nodes} nodes; {:.0} with shadows, {:.0} without; over full detail: {shadows:.2}, {none:.2}",
+            times[0], times[1]
+        );
+        if frames > 0 && view == 8.0 {
+            let passes = [true, false].map(|is_digging| {
+                walk.next_brush = Instant::now();
+                let mut terrain = Vec::new();
+                let all = (0..frames).map(|number| {
+                    let took = walk.frame(number, is_digging);
+                    terrain.push(walk.figures().main_thread);
+                    took
+                });
+                let all = report(if is_digging { "    digging" } else { "    nothing to do" }, all.collect());
+                report("    the plugin on the main thread", terrain);
+                all
+            });
+            println!("digging over nothing to do: p99 {:.2}", passes[0][1] / passes[1][1]);
+        }
+    }
+}
+
+/// Mountains of 16 x 16 km, computed on demand.
+fn mountains() -> Ground {
+    let heights = NoiseHeights {
+        seed: 7,
+        kind: NoiseKind::Ridged,
+        octaves: 7,
+        scale: 1400.0,
+        amplitude: 420.0,
+        base: 0.0,
+    };
+    let source = NoiseSource::new(&heights).expect("valid noise");
+    Ground::from_source(16_384, 16_384, source).expect("a valid size")
+}
+
 /// The landscape of the examples.
 fn ground() -> Ground {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/jacksboro_fault.png");
@@ -283,7 +403,10 @@ fn ground() -> Ground {
 
 /// The position of the walk in each frame: a wide loop at 9 m/s on the ground.
 fn path(ground: &Ground) -> Vec<Vec3> {
-    let (center, radius, frames) = (Vec2::new(560.0, 500.0), 280.0, 12_000);
+    let middle = Vec2::new(ground.width() as f32, ground.depth() as f32) / 2.0;
+    // In the middle of a large world, else where there is a way.
+    let center = if middle.x > 2000.0 { middle } else { Vec2::new(560.0, 500.0) };
+    let (radius, frames) = (280.0, 12_000);
     let place = |frame: i32| {
         let angle = frame as f32 / frames as f32 * std::f32::consts::TAU;
         let at = center + Vec2::from_angle(angle) * radius;

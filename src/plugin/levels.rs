@@ -352,14 +352,12 @@ pub(super) fn keep_wanted_tiles(
     mut commands: Commands,
     wanted: Res<WantedTiles>,
     mut terrains: Query<(Entity, &Terrain, &mut TerrainEntities), With<LevelsOfDetail>>,
-    loaded: Query<(), (With<LevelsOfDetail>, Added<TerrainEntities>)>,
 ) {
-    if !wanted.is_changed() && loaded.is_empty() {
-        return;
-    }
+    let nothing = HashSet::default();
     for (entity, terrain, mut entities) in &mut terrains {
-        let nothing = HashSet::default();
-        let tiles = wanted.0.get(&entity).unwrap_or(&nothing);
-        entities.keep_tiles(&mut commands, entity, terrain, tiles);
+        if wanted.is_changed() || entities.is_added() {
+            let tiles = wanted.0.get(&entity).unwrap_or(&nothing);
+            entities.keep_tiles(&mut commands, entity, terrain, tiles);
+        }
     }
 }
