@@ -7,6 +7,7 @@ mod crowd;
 mod debris;
 mod edges;
 mod holding;
+mod levels;
 mod placement;
 mod sources;
 mod stage;
