@@ -297,7 +297,9 @@ impl Ground {
         let is_inside = self.extent.clamp(low) == low && count <= (self.width() - low.x) as usize + 1;
         let count = if is_inside { count } else { 0 };
         let RowBuffer { normals, heights, materials } = buffer;
-        (normals.clear(), heights.clear(), materials.clear());
+        normals.clear();
+        heights.clear();
+        materials.clear();
         let row = |z: i32| {
             let start = self.extent.index(Column::new(low.x, z));
             start..start + count
