@@ -65,15 +65,16 @@ fn assert_covers_once(stage: &mut Stage, terrain: Entity, what: &str) {
     }
 }
 
+/// `BURROW_FRAMES` is the number of frames.
 #[test]
 fn no_frame_of_a_flight_with_digging_shows_a_hole() {
-    const FRAMES: usize = 2000;
+    let frames = std::env::var("BURROW_FRAMES").ok().and_then(|frames| frames.parse().ok()).unwrap_or(500);
     let mut stage = Stage::drawing();
     let (terrain, camera) = show(&mut stage, mountains());
     stage.assert_whole(terrain, "loaded");
     let mut rng = Rng::with_seed(4);
     let (mut cuts, mut hash, mut last) = (0, stage.hash(terrain), shown_levels(&stage, terrain).clone());
-    for frame in 0..FRAMES {
+    for frame in 0..frames {
         let turn = frame as f32 / 400.0;
         let at = Vec3::new(
             160.0 + 150.0 * turn.cos(),
@@ -89,16 +90,21 @@ fn no_frame_of_a_flight_with_digging_shows_a_hole() {
             stage.send(if rng.bool() { Brush::dig(shape) } else { Brush::add(shape, MaterialId(5)) });
         }
         stage.frames(1);
-        stage.assert_whole(terrain, &format!("frame {frame}"));
-        assert_covers_once(&mut stage, terrain, &format!("frame {frame}"));
+        let what = format!("frame {frame}");
+        let shown = stage.shown(terrain);
+        assert!(shown.is_closed(), "{what}: {shown:?}");
+        assert_covers_once(&mut stage, terrain, &what);
+        if frame % 50 == 0 {
+            stage.assert_whole(terrain, &what);
+        }
         let now = shown_levels(&stage, terrain);
         cuts += usize::from(now.nodes != last.nodes);
         last = now.clone();
         hash ^= stage.hash(terrain);
     }
     stage.settle();
-    println!("{FRAMES} frames, the cut changed in {cuts} of them; now {:?}", last.nodes);
-    assert!(cuts > 50 && last.nodes.iter().filter(|&&count| count > 0).count() > 2 && hash != 0);
+    println!("{frames} frames, the cut changed in {cuts} of them; now {:?}", last.nodes);
+    assert!(cuts > 30 && last.nodes.iter().filter(|&&count| count > 0).count() > 2 && hash != 0);
     // All is exact at level 0, wherever it is drawn coarsely.
     assert!(stage.terrain(terrain).world().check_seams().is_flawless());
 }
