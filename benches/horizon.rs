@@ -14,7 +14,7 @@ use bevy_burrow::ground::{GreyImage, Ground, ImageScale, ImageSource, NoiseSourc
 use bevy_burrow::levels::{Choice, Cut, Eye, Node, NodeFacts};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{ChooseCut, GroundFacts, NodeUpdate, World};
-use glam::Vec3;
+use glam::{Vec2, Vec3, Vec3Swizzles};
 use rayon::prelude::*;
 
 /// Pixels of a picture 1440 high at 45 degrees.
@@ -71,7 +71,38 @@ fn main() {
     views(terrain().world(), summit);
     load(terrain(), summit);
     nodes(terrain().world(), summit);
+    digs([terrain(), terrain()], summit);
     flight(terrain(), summit);
+}
+
+/// Digs of radius 4 near the eye, with a cut drawn and without, in turns.
+fn digs(mut terrains: [Terrain; 2], summit: Vec3) {
+    let coarsest = Cut::coarsest(terrains[0].world().level_grid(u8::MAX));
+    let cut = Known::default().cut(terrains[0].world(), &Choice::default(), coarsest, eye(summit));
+    let (drawn, _) = terrains[0].world().draw_cut(cut);
+    terrains[0].set_drawn_cut(Some(Arc::new(drawn)));
+    let mut times = [Vec::new(), Vec::new()];
+    for number in 0..600 {
+        let (x, z) = ((number * 37 % 100) as f32 - 50.0, (number * 61 % 100) as f32 - 50.0);
+        let (x, z) = (summit.x + x, summit.z + z);
+        let height = terrains[0].world().height(x.into(), z.into()).unwrap_or_default() as f32;
+        for (terrain, times) in terrains.iter_mut().zip(&mut times) {
+            terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(x, height, z), 4.0)));
+            let transaction = terrain.begin().expect("a dig waits");
+            let start = Instant::now();
+            let commit = transaction.run();
+            times.push(start.elapsed());
+            terrain.commit(commit).expect("the one under way");
+        }
+    }
+    let [with, without] = times.map(|mut times| {
+        times.sort_unstable();
+        times[times.len() / 2]
+    });
+    let ratio = with.as_secs_f64() / without.as_secs_f64();
+    println!(
+        "\na dig of radius 4 near the eye: {with:.1?} with levels, {without:.1?} without, {ratio:.3} times"
+    );
 }
 
 /// The highest of some places around the middle, 2 m above the ground.
@@ -89,19 +120,53 @@ fn eye(position: Vec3) -> Eye {
     Eye { position, velocity: Vec3::ZERO, pixels: PIXELS }
 }
 
+/// Directions in which an eye looks.
+const DIRECTIONS: usize = 64;
+
+/// Half the horizontal angle of view of a picture of 16 to 9 that is 45 degrees high.
+const HALF_ANGLE: f32 = 0.635;
+
+/// Is any part of a node within the angle of view, seen from above?
+fn is_in_sight(cut: &Cut, node: Node, eye: Vec3, angle: f32) -> bool {
+    let (low, high) = cut.grid().columns(node);
+    let [low, high] = [low, high].map(|column| Vec2::new(column.x as f32, column.z as f32));
+    let corners = [low, Vec2::new(low.x, high.y), high, Vec2::new(high.x, low.y)];
+    // Beside neither side of the wedge.
+    let sides = [-HALF_ANGLE, HALF_ANGLE].map(|half| Vec2::from_angle(angle + half));
+    let is_inside = |corner: &Vec2, side: usize| {
+        let across = sides[side].perp_dot(*corner - eye.xz());
+        if side == 0 { across >= 0.0 } else { across <= 0.0 }
+    };
+    (0..2).all(|side| corners.iter().any(|corner| is_inside(corner, side)))
+}
+
 fn views(world: &World, summit: Vec3) {
-    println!("\n| view, km | nodes | triangles, millions | nodes by level |\n| --- | --- | --- | --- |");
+    println!(
+        "\n| view, km | nodes | triangles all round, millions | in sight, p50 | most | nodes by level |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- |");
     let known = Known::default();
     for view in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0] {
         let choice = Choice { view_distance: view * 1000.0, ..Choice::default() };
         let coarsest = Cut::coarsest(world.level_grid(u8::MAX));
         let cut = known.cut(world, &choice, coarsest, eye(summit));
         let nodes: Vec<Node> = cut.nodes().collect();
-        let triangles: usize =
-            nodes.par_iter().map(|&node| world.node_mesh(&cut, node).indices.len() / 3).sum();
+        let triangles = |&node: &Node| (node, world.node_mesh(&cut, node).indices.len() / 3);
+        let triangles: Vec<(Node, usize)> = nodes.par_iter().map(triangles).collect();
+        let mut in_sight: Vec<usize> = (0..DIRECTIONS)
+            .map(|at| {
+                let angle = at as f32 / DIRECTIONS as f32 * std::f32::consts::TAU;
+                let seen = triangles.iter().filter(|(node, _)| is_in_sight(&cut, *node, summit, angle));
+                seen.map(|(_, triangles)| triangles).sum()
+            })
+            .collect();
+        in_sight.sort_unstable();
+        let all: usize = triangles.iter().map(|(_, triangles)| triangles).sum();
+        let [all, p50, most] =
+            [all, in_sight[DIRECTIONS / 2], in_sight[DIRECTIONS - 1]].map(|count| count as f64 / 1e6);
         let mut levels = vec![0; usize::from(cut.grid().top()) + 1];
         nodes.iter().for_each(|node| levels[usize::from(node.level)] += 1);
-        println!("| {view} | {} | {:.3} | {levels:?} |", nodes.len(), triangles as f64 / 1e6);
+        println!("| {view} | {} | {all:.3} | {p50:.3} | {most:.3} | {levels:?} |", nodes.len());
     }
 }
 

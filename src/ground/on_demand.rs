@@ -27,7 +27,7 @@ impl Ground {
         Ok(Self::of_pages(extent, Pages::new(Box::new(source), extent)))
     }
 
-    /// The same ground, which keeps at most so many bytes of computed pages; 64 MiB unless told otherwise. Each thread keeps up to
+    /// The same ground, which keeps at most so many bytes of computed pages; 32 MiB unless told otherwise. Each thread keeps up to
     /// four pages beyond that. A small budget costs time, and changes nothing else. Does nothing without a
     /// [source](Self::from_source).
     pub fn with_page_budget(self, bytes: usize) -> Self {

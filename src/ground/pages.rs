@@ -22,7 +22,7 @@ const AFTER: i32 = 2;
 const SIDE: usize = (BEFORE + PAGE + AFTER) as usize;
 
 /// Bytes of pages that a ground keeps unless told otherwise.
-pub(super) const DEFAULT_BUDGET: usize = 64 << 20;
+pub(super) const DEFAULT_BUDGET: usize = 32 << 20;
 
 /// Most parts of the cache that are locked on their own.
 const MOST_SHARDS: usize = 16;
