@@ -22,6 +22,9 @@
 //!
 //! Keys are bound by their position on an American keyboard. The menus show the letters of the player's own layout.
 //!
+//! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows into
+//! mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
+//!
 //! With `--features examples,gamepad`, a gamepad does all of this except for the panel and the frame times. Its sticks
 //! walk and look, its shoulder buttons change the tool, and its left stick or D-pad selects menu items.
 //!

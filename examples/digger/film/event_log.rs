@@ -70,12 +70,14 @@ fn log_aim(hand: Res<Hand>, camera: Single<&Transform, With<PlayerCamera>>, mut 
 /// Logs whether the camera is in the air or in the ground.
 fn log_camera(
     camera: Single<&Transform, With<PlayerCamera>>,
-    terrains: Query<&Terrain>,
+    loaded: Query<(), With<Terrain>>,
+    terrains: Terrains,
     mut last: Local<String>,
 ) {
-    let Some(terrain) = terrains.iter().next() else { return };
-    let place = camera.translation / terrain.voxel_size();
-    let medium = if terrain.world().is_solid(place.as_dvec3()) { "ground" } else { "air" };
+    if loaded.is_empty() {
+        return;
+    }
+    let medium = if terrains.is_solid(camera.translation) { "ground" } else { "air" };
     log_change(format!("eyes in {medium}"), &mut last);
 }
 

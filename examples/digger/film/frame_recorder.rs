@@ -57,28 +57,41 @@ impl FrameRecorder {
         let frames = (seconds * self.fps as f32).round() as usize;
         for frame in 0..frames {
             direct(&mut self.studio, frame as f32 / frames as f32)?;
+            if frame == 0 {
+                self.notice_camera();
+            }
             self.settle()?;
             self.frame()?;
         }
         Ok(())
     }
 
-    /// Waits until all edits are applied, without any game time.
+    /// Lets the plugin notice that the camera is at another place, without any game time.
+    fn notice_camera(&mut self) {
+        self.set_frame_time(Duration::ZERO);
+        (0..2).for_each(|_| self.studio.app.update());
+    }
+
+    /// Waits until all edits are applied and all ground is drawn in detail, without any game time.
     ///
     /// # Errors
-    /// If they are not applied in time.
+    /// If that takes too long.
     pub fn settle(&mut self) -> Result {
         self.set_frame_time(Duration::ZERO);
         let start = Instant::now();
         let is_idle = |terrains: Terrains| terrains.is_ready(Vec3::splat(-1.0e5), Vec3::splat(1.0e5));
-        while !self.studio.world().run_system_cached(is_idle).map_err(|error| error.to_string())? {
+        loop {
+            let is_applied =
+                self.studio.world().run_system_cached(is_idle).map_err(|error| error.to_string())?;
+            if is_applied && self.studio.is_detailed() {
+                return Ok(());
+            }
             if start.elapsed() > PATIENCE {
-                return Err("an edit was not applied".into());
+                return Err("an edit was not applied, or the ground not drawn in detail".into());
             }
             std::thread::sleep(Duration::from_millis(1));
             self.studio.app.update();
         }
-        Ok(())
     }
 
     fn set_frame_time(&mut self, time: Duration) {

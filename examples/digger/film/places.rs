@@ -1,13 +1,15 @@
 //! Good places to dig and build: a steep hillside for a tunnel, a ravine for a bridge, a chunk corner for a pit.
 //!
-//! They are found by searching the ground, so that they fit any heightmap at any scale. The game starts at the
-//! hillside.
+//! They are found by searching the real land, so that they fit any heightmap at any scale. The game starts at the
+//! hillside. All places are in space, whose origin is a corner of the real land.
 
+use bevy::math::DVec3;
 use bevy::prelude::*;
 use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::{Column, ONE};
 use bevy_burrow::terrain::World as Model;
 
+use crate::world::landscape::{ORIGIN, REAL_SIZE};
 use crate::world::light::SUN;
 
 /// The side of the terrain's chunks.
@@ -20,7 +22,7 @@ pub const ROOM_RADIUS: f32 = 8.0;
 const LEGS: (f32, f32) = (36.0, 34.0);
 /// Slope of the tunnel.
 const GRADE: f32 = 0.03;
-/// Least distance from the edge of the world.
+/// Least distance from the rim of the real land.
 const MARGIN: i32 = 100;
 
 /// All places.
@@ -64,7 +66,7 @@ impl Places {
     /// # Errors
     /// If a place was not found.
     pub fn find(ground: &Ground) -> Result<Self, String> {
-        let relief = Relief { ground };
+        let relief = Relief::new(ground);
         let hillside = relief.hillside().ok_or("no hillside is steep and high enough for the tunnel")?;
         let far_from_tunnel = |place: Vec2| place.distance(hillside.mouth.xz()) > 110.0;
         let ravine = relief
@@ -101,40 +103,77 @@ impl Hillside {
 impl Ravine {
     /// How many points on the deck and the arch of a bridge over it are visible from a place, whether or not the bridge
     /// is built.
-    pub fn points_visible_from(&self, world: &Model, eye: Vec3) -> usize {
+    pub fn points_visible_from(&self, land: &Land, eye: Vec3) -> usize {
         /// The bridge itself is nearer to its middle line than this.
         const BRIDGE: f32 = 4.0;
         let across = (self.to - self.from).cross(Vec3::Y).normalize();
         let open = 1.0 - (BRIDGE / (eye - self.from).dot(across).abs()).min(1.0);
         let points = (1..12).map(|i| self.from.lerp(self.to, i as f32 / 12.0));
         let points = points.flat_map(|bank| [1.0, -4.0].map(|up| bank + Vec3::Y * up));
-        let is_visible = |point: &Vec3| {
-            let direction = *point - eye;
-            world.raycast(eye.as_dvec3(), direction.as_dvec3(), (open * direction.length()).into()).is_none()
-        };
-        points.filter(is_visible).count()
+        points.filter(|&point| land.is_free(eye, eye + open * (point - eye))).count()
     }
 }
 
-/// The ground, with heights in metres.
-struct Relief<'a> {
-    ground: &'a Ground,
+/// The ground as it is now, at its place in space.
+pub struct Land<'a> {
+    pub model: &'a Model,
+    /// The voxel at the origin of space.
+    pub origin: IVec3,
 }
 
-impl Relief<'_> {
+impl Land<'_> {
+    fn voxel(&self, place: Vec3) -> DVec3 {
+        (place + self.origin.as_vec3()).as_dvec3()
+    }
+
+    /// The height of the ground; `None` outside the world.
+    pub fn height(&self, place: Vec2) -> Option<f32> {
+        let DVec3 { x, z, .. } = self.voxel(flat(place));
+        self.model.height(x, z).map(|height| height as f32 - self.origin.y as f32)
+    }
+
+    /// Is there no ground between two places?
+    fn is_free(&self, from: Vec3, to: Vec3) -> bool {
+        let direction = (to - from).as_dvec3();
+        self.model.raycast(self.voxel(from), direction, direction.length()).is_none()
+    }
+}
+
+/// The real land, with heights in metres.
+struct Relief<'a> {
+    ground: &'a Ground,
+    /// Heights of its columns, row by row: the search needs each of them many times.
+    heights: Vec<i32>,
+}
+
+impl<'a> Relief<'a> {
+    fn new(ground: &'a Ground) -> Self {
+        let [width, depth] = REAL_SIZE;
+        let places = (0..=depth).flat_map(|z| (0..=width).map(move |x| (x, z)));
+        let heights = places.map(|(x, z)| ground.height(Column::new(ORIGIN.x + x, ORIGIN.z + z))).collect();
+        Self { ground, heights }
+    }
+
     fn height(&self, place: Vec2) -> f32 {
-        let column = Column::new(place.x.round() as i32, place.y.round() as i32);
-        self.ground.height(column) as f32 / ONE as f32
+        let [x, z] = [place.x, place.y].map(|at| at.round() as i32);
+        let [width, depth] = REAL_SIZE;
+        let is_inside = (0..=width).contains(&x) && (0..=depth).contains(&z);
+        let height = if is_inside {
+            self.heights[(z * (width + 1) + x) as usize]
+        } else {
+            self.ground.height(Column::new(ORIGIN.x + x, ORIGIN.z + z))
+        };
+        height as f32 / ONE as f32
     }
 
     fn at(&self, place: Vec2) -> Vec3 {
         Vec3::new(place.x, self.height(place), place.y)
     }
 
-    /// A grid of places, away from the edge of the world.
+    /// A grid of places, away from the rim.
     fn places(&self, step: i32) -> impl Iterator<Item = Vec2> {
         let along = move |cells: i32| (MARGIN + step - 1) / step..=(cells - MARGIN) / step;
-        let (width, depth) = (self.ground.width(), self.ground.depth());
+        let [width, depth] = REAL_SIZE;
         along(depth)
             .flat_map(move |z| along(width).map(move |x| Vec2::new((x * step) as f32, (z * step) as f32)))
     }
@@ -269,8 +308,10 @@ mod tests {
         let ravine =
             Ravine { from: bank(41.0), to: bank(71.0), behind: [bank(29.0), bank(83.0)], bottom: 10.0 };
         let [before, behind] = [30.0, 98.0].map(|z| Vec3::new(56.0, 30.0, z));
-        let seen =
-            |terrain: &Terrain| [before, behind].map(|eye| ravine.points_visible_from(terrain.world(), eye));
+        let seen = |terrain: &Terrain| {
+            let land = Land { model: terrain.world(), origin: IVec3::ZERO };
+            [before, behind].map(|eye| ravine.points_visible_from(&land, eye))
+        };
         assert_eq!(seen(&terrain), [22, 0]);
         terrain.apply(scripted_brushes::bridge(&ravine));
         assert_eq!(seen(&terrain), [22, 0], "the bridge does not hide itself");

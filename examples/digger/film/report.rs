@@ -97,7 +97,10 @@ pub struct Report {
     pub receipts: Durations,
     pub fields: usize,
     pub chunks: usize,
-    pub seams: SeamReport,
+    /// Of all that is drawn.
+    pub drawn_seams: SeamReport,
+    /// Of what was dug and built, at full detail.
+    pub edited_seams: SeamReport,
     pub memory: Memory,
     pub pictures: Vec<PathBuf>,
     pub frames: Durations,
@@ -109,7 +112,7 @@ pub struct Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { edit_log, seams, memory, transactions, receipts, frames, drawn, .. } = self;
+        let Self { edit_log, memory, transactions, receipts, frames, drawn, .. } = self;
         let renderer = self.renderer.as_deref().unwrap_or("no renderer, hence no pictures");
         let (ready, took) = (self.ready.as_secs_f64(), self.took.as_secs_f64());
         let (width, depth) = self.size;
@@ -126,13 +129,15 @@ impl fmt::Display for Report {
         let ((dug, filled), tunnel) = (edit_log.moved, self.tunnel);
         writeln!(f, "  ground        {dug} voxels dug, {filled} filled; the tunnel is {tunnel:.0} long")?;
         writeln!(f, "  fields        {} in {} drawn chunks", self.fields, self.chunks)?;
-        let nonmanifold = seams.nonmanifold_edges + seams.nonmanifold_vertices;
-        let SeamReport { open, unbalanced, degenerate, triangles, worst_normal_jump, .. } = seams;
-        writeln!(
-            f,
-            "  seams         {open} open edges, {unbalanced} unbalanced, {nonmanifold} non-manifold, {degenerate} degenerate of {triangles} triangles"
-        )?;
-        writeln!(f, "                worst normal jump {worst_normal_jump:.3} degrees")?;
+        for (name, seams) in [("drawn seams", &self.drawn_seams), ("edited seams", &self.edited_seams)] {
+            let nonmanifold = seams.nonmanifold_edges + seams.nonmanifold_vertices;
+            let SeamReport { open, unbalanced, degenerate, triangles, worst_normal_jump, .. } = seams;
+            writeln!(
+                f,
+                "  {name:<13} {open} open edges, {unbalanced} unbalanced, {nonmanifold} non-manifold, {degenerate} degenerate of {triangles} triangles"
+            )?;
+            writeln!(f, "                worst normal jump {worst_normal_jump:.3} degrees")?;
+        }
         writeln!(f, "  ms per edit   {transactions} in the transaction,")?;
         writeln!(f, "                {receipts} from brush to receipt, frames included")?;
         let all = memory.ground + memory.edits();

@@ -11,6 +11,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use avian3d::prelude::Position;
+use bevy::camera::RenderTarget;
+use bevy::camera::visibility::RenderLayers;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy::render::settings::RenderResources;
@@ -22,6 +24,7 @@ use photo::Photographer;
 pub use photo::{Developed, PATIENCE, pixels};
 
 use crate::Options;
+use crate::film::places::Land;
 use crate::film::report::{Durations, EditLog};
 use crate::offscreen;
 use crate::player::camera::{DetachedCamera, PlayerCamera};
@@ -35,6 +38,7 @@ use crate::ui::hud::ShowHud;
 use crate::ui::settings::SettingsFile;
 use crate::ui::widgets::scale_for;
 use crate::world::day::Clock;
+use crate::world::landscape::ORIGIN;
 
 /// Game time of a frame.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
@@ -88,7 +92,9 @@ impl Studio {
         app.update();
         let eyes = app.world_mut().query_filtered::<Entity, With<PlayerCamera>>().single(app.world())?;
         // The camera is off until the landscape has loaded.
-        let mut photographer = Photographer::new(&mut app, eyes, (options.width, options.height));
+        let size = (options.width, options.height);
+        let mut photographer = Photographer::new(&mut app, eyes, size);
+        keep_levels(&mut app, eyes, size.into());
         let player = wait_for_player(&mut app, renders)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
@@ -142,6 +148,39 @@ impl Studio {
         Ok(terrains.single(world)?)
     }
 
+    /// The ground as it is now.
+    ///
+    /// # Errors
+    /// If there is not exactly one terrain.
+    pub fn land(&mut self) -> Result<Land<'_>> {
+        Ok(Land { model: self.terrain()?.world(), origin: ORIGIN })
+    }
+
+    /// Is all ground drawn at the levels of detail that the camera needs? A camera that moved is noticed in the second
+    /// frame.
+    pub fn is_detailed(&mut self) -> bool {
+        let world = self.app.world_mut();
+        let mut terrains = world.query::<(&Terrain, &ShownLevels)>();
+        terrains.iter(world).all(|(terrain, shown)| shown.waiting == 0 && !terrain.is_busy())
+    }
+
+    /// Waits until it is.
+    ///
+    /// # Errors
+    /// If it takes too long.
+    fn wait_for_details(&mut self) -> Result {
+        self.wait(2);
+        let start = Instant::now();
+        while !self.is_detailed() {
+            if start.elapsed() > PATIENCE {
+                return Err("the ground was not drawn in detail".into());
+            }
+            std::thread::sleep(Duration::from_millis(1));
+            self.step();
+        }
+        Ok(())
+    }
+
     /// One frame.
     fn step(&mut self) {
         if self.is_held() {
@@ -188,9 +227,8 @@ impl Studio {
 
     /// Moves the player to the ground at a place.
     pub fn move_to(&mut self, place: Vec2) -> Result {
-        let at = place.as_dvec2();
-        let height = self.terrain()?.world().height(at.x, at.y).ok_or("the script left the world")?;
-        self.stand_at(Vec3::new(place.x, height as f32, place.y))?;
+        let height = self.land()?.height(place).ok_or("the script left the world")?;
+        self.stand_at(Vec3::new(place.x, height, place.y))?;
         self.wait(10);
         Ok(())
     }
@@ -316,6 +354,9 @@ impl Studio {
     pub fn shoot(&mut self, name: &str) -> Result {
         // The ambient light adapts slowly.
         self.wait(90);
+        if self.photographer.is_some() {
+            self.wait_for_details()?;
+        }
         let Some(photographer) = &self.photographer else { return Ok(()) };
         let path = self.folder.join(name).with_extension("png");
         // Lights need a few frames after a pause in drawing, and the first picture needs more.
@@ -346,6 +387,22 @@ impl Studio {
     pub fn step_and_draw(&mut self) {
         draw(&mut self.app, &mut self.drawn);
     }
+}
+
+/// Levels of detail are chosen for cameras that are on. This one is always on, looks with the player's camera, and draws
+/// nothing.
+fn keep_levels(app: &mut App, eyes: Entity, size: UVec2) {
+    let world = app.world_mut();
+    let Some(lens) = world.get::<Projection>(eyes).cloned() else { return };
+    let target = RenderTarget::None { size };
+    world.spawn((
+        Name::new("level camera"),
+        ChildOf(eyes),
+        Camera::default(),
+        lens,
+        target,
+        RenderLayers::none(),
+    ));
 }
 
 fn draw(app: &mut App, drawn: &mut Durations) {

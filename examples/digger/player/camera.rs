@@ -27,6 +27,10 @@ pub struct PlayerCamera;
 #[derive(Component)]
 pub struct DetachedCamera;
 
+/// The camera's far plane, as a multiple of the view distance. Fog hides 95 % of what is at the view distance, and more than
+/// 99 % here, so that ground does not end in a line.
+const FAR: f32 = 1.3;
+
 /// How hard the camera shakes from blows and explosions.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct CameraShake(f32);
@@ -119,6 +123,23 @@ pub fn follow_player(
     }
 }
 
+/// The levels of detail for these settings.
+fn levels(settings: &Settings) -> LevelsOfDetail {
+    let defaults = LevelsOfDetail::default();
+    let coarseness = match settings.quality {
+        Quality::Low => 2.0,
+        Quality::Medium => 1.0,
+        Quality::High => 0.7,
+    };
+    LevelsOfDetail {
+        view_distance: settings.view_distance,
+        cell_pixels: coarseness * defaults.cell_pixels,
+        error_pixels: coarseness * defaults.error_pixels,
+        edited_pixels: coarseness * defaults.edited_pixels,
+        ..defaults
+    }
+}
+
 /// Applies the field of view, the view distance and the quality.
 fn apply_settings(
     mut commands: Commands,
@@ -126,19 +147,20 @@ fn apply_settings(
     adapter: Option<Res<RenderAdapterInfo>>,
     mut camera: Single<(Entity, &mut Projection, &mut DistanceFog), With<PlayerCamera>>,
     sun: Single<Entity, With<Sun>>,
-    mut looks: Query<&mut GroundLook>,
+    mut terrains: Query<(&mut GroundLook, &mut LevelsOfDetail)>,
 ) {
     let (entity, projection, fog) = &mut *camera;
     if let Projection::Perspective(lens) = &mut **projection {
         lens.fov = settings.field_of_view.to_radians();
-        lens.far = settings.view_distance;
+        lens.far = FAR * settings.view_distance;
     }
-    fog.falloff = FogFalloff::from_visibility_squared(0.7 * settings.view_distance);
+    fog.falloff = FogFalloff::from_visibility_squared(settings.view_distance);
     let (size, num_cascades, first_cascade_far_bound, maximum_distance) = match settings.quality {
         Quality::Low => (1024, 2, 20.0, 200.0),
         Quality::Medium => (2048, 4, 25.0, 900.0),
         Quality::High => (4096, 4, 30.0, 1200.0),
     };
+    let levels = levels(&settings);
     commands.insert_resource(DirectionalLightShadowMap { size });
     let cascades = CascadeShadowConfigBuilder {
         num_cascades,
@@ -149,7 +171,8 @@ fn apply_settings(
     };
     commands.entity(*sun).insert(CascadeShadowConfig::from(cascades));
     let is_cheap = settings.quality == Quality::Low || draws_in_software(adapter.as_deref());
-    for mut look in &mut looks {
+    for (mut look, mut shown) in &mut terrains {
+        shown.set_if_neq(levels.clone());
         // The high quality reads some fifty texels per pixel: fast on a graphics card, but seconds per frame without
         // one.
         look.quality = if is_cheap { GroundQuality::Low } else { GroundQuality::High };

@@ -67,19 +67,17 @@ impl Player {
 }
 
 fn spawn_player(
-    ready: On<TerrainReady>,
+    _: On<TerrainReady>,
     mut commands: Commands,
-    terrains: Query<&Terrain>,
+    terrains: Terrains,
     places: Res<Places>,
     players: Query<(), With<Player>>,
 ) {
-    let Ok(terrain) = terrains.get(ready.entity) else { return };
     // The event comes again whenever the terrain has loaded anew.
     if !players.is_empty() {
         return;
     }
-    let height = |place: Vec2| terrain.world().height(place.x.into(), place.y.into());
-    let feet = start(&places, |place| height(place).map(|height| height as f32));
+    let feet = start(&places, |place| terrains.height(place.x, place.y));
     let hill = places.hillside.mouth + Vec3::Y * 2.5;
     commands.spawn((Name::new("player"), Player::looking(feet, hill), body::standing_at(feet)));
 }

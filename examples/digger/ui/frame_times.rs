@@ -1,4 +1,4 @@
-//! Frame times as text: percentiles of the latest frames, and the plugin's share of the main thread.
+//! Frame times as text: percentiles of the latest frames, the plugin's share of the main thread, and levels of detail.
 
 use std::time::Duration;
 
@@ -67,6 +67,7 @@ fn show(
     times: Res<FrameTimes>,
     figures: Res<BurrowFigures>,
     chunks: Query<(), With<Chunk>>,
+    levels: Query<&ShownLevels>,
     panel: Single<&Visibility, With<FrameTimesPanel>>,
     mut text: Single<&mut Text, With<FrameTimesText>>,
 ) {
@@ -85,4 +86,8 @@ fn show(
         chunks.iter().count(),
         ms(figures.last_transaction),
     );
+    for ShownLevels { nodes, waiting } in &levels {
+        let counts: Vec<String> = nodes.iter().map(usize::to_string).collect();
+        text.0 += &format!("\nsquares by level, finest first: {}; {waiting} waiting", counts.join(" "));
+    }
 }

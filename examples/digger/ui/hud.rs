@@ -227,12 +227,12 @@ const CORE_DEPTH: i32 = 24;
 /// Names what lies straight below the crosshair, from the surface down.
 fn show_core_sample(
     hand: Res<Hand>,
-    terrains: Query<&Terrain>,
+    terrains: Query<(&Terrain, &GlobalTransform)>,
     mut core: Single<&mut Text, With<CoreSample>>,
 ) {
-    let lines = hand.aim.zip(terrains.iter().next()).map(|(aim, terrain)| {
+    let lines = hand.aim.zip(terrains.iter().next()).map(|(aim, (terrain, place))| {
         let world = terrain.world();
-        let top = aim.point.floor().as_ivec3();
+        let top = place.affine().inverse().transform_point3(aim.point).floor().as_ivec3();
         let is_solid = |depth: &i32| world.samples().is_solid(top - IVec3::Y * depth);
         let solid = (0..CORE_DEPTH).filter(is_solid);
         let mut layers: Vec<(i32, MaterialId)> =

@@ -21,8 +21,9 @@ pub struct Settings {
     pub invert_y: bool,
     /// Vertical field of view in degrees.
     pub field_of_view: f32,
-    /// Distance of the camera's far plane in metres.
+    /// Metres up to which ground is visible; what is farther fades into the sky.
     pub view_distance: f32,
+    /// Of shadows, textures and far ground.
     pub quality: Quality,
     /// Minutes from sunrise to sunrise; 0 stops the sun.
     pub day_minutes: f32,
@@ -51,7 +52,7 @@ impl Default for Settings {
             sensitivity: 1.0,
             invert_y: false,
             field_of_view: 70.0,
-            view_distance: 3000.0,
+            view_distance: 6000.0,
             quality: Quality::default(),
             day_minutes: 20.0,
             radius: 2.0,
@@ -112,7 +113,7 @@ impl Settings {
         for (number, low, high) in [
             (&mut self.sensitivity, 0.1, 5.0),
             (&mut self.field_of_view, 40.0, 110.0),
-            (&mut self.view_distance, 200.0, 6000.0),
+            (&mut self.view_distance, 200.0, 8000.0),
             (&mut self.day_minutes, 0.0, 120.0),
             (&mut self.radius, 1.0, 12.0),
         ] {

@@ -1,4 +1,5 @@
-//! The landscape: an elevation model of the Jacksboro fault in Tennessee, scaled down and made steeper.
+//! The landscape: an elevation model of the Jacksboro fault in Tennessee, scaled down and made steeper, among hills and
+//! mountains of noise up to the horizon.
 //!
 //! The heightmap is embedded in the program and loaded by the asset server like any other file. Slow work runs in a
 //! task, so the game keeps drawing meanwhile.
@@ -10,6 +11,8 @@ use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::embedded::EmbeddedAssetRegistry;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy_burrow::ground::{GroundError, ImageSource, InsetSource, NoiseSource};
+use bevy_burrow::lattice::Column;
 use bevy_burrow::physics::EdgeWalls;
 use bevy_burrow::prelude::*;
 
@@ -59,6 +62,20 @@ const HEIGHTMAP: &[u8] = include_bytes!("../../../assets/jacksboro_fault.png");
 const HEIGHTMAP_PATH: &str = "digger/jacksboro_fault.png";
 const HEIGHTMAP_ASSET: &str = "embedded://digger/jacksboro_fault.png";
 
+/// Cells of the world along each side.
+const WORLD: u32 = 8192;
+
+/// Where the real land begins: in the middle of the world, at a corner of four chunks.
+const REAL_CORNER: Column = Column::new(3456, 3552);
+/// Cells that the elevation model covers.
+pub const REAL_SIZE: [i32; 2] = [1206, 1029];
+/// Over so many cells inside its rim, the real land blends into the hills around it.
+const REAL_MARGIN: i32 = 64;
+
+/// The voxel at the origin of space: a corner of the real land. Numbers are small there, so what the player holds does not
+/// jitter.
+pub const ORIGIN: IVec3 = IVec3::new(REAL_CORNER.x, 0, REAL_CORNER.z);
+
 /// One sample every three voxels: 1206 x 1029 cells, and 120 voxels from the lowest to the highest.
 const SCALE: ImageScale = ImageScale {
     voxels_per_sample: 3,
@@ -66,6 +83,24 @@ const SCALE: ImageScale = ImageScale {
     high: 120.0,
     detail: Some(Detail { amplitude: 1.2, scale: 9.0, octaves: 4, seed: 17 }),
 };
+
+/// Hills around the real land, about as high.
+const HILLS: NoiseHeights =
+    NoiseHeights { seed: 5, kind: NoiseKind::Fractal, octaves: 7, scale: 260.0, amplitude: 85.0, base: 55.0 };
+
+/// Mountains at the horizon.
+const MOUNTAINS: NoiseHeights = NoiseHeights {
+    seed: 23,
+    kind: NoiseKind::Fractal,
+    octaves: 7,
+    scale: 1500.0,
+    amplitude: 380.0,
+    base: 250.0,
+};
+
+/// There are only mountains up to so many cells from the world's edge. Over `MOUNTAINS_MARGIN` more they sink to hills.
+const MOUNTAINS_WIDTH: i32 = 700;
+const MOUNTAINS_MARGIN: i32 = 2000;
 
 /// Loads the heightmap and spawns the terrain. From then on there are [`Places`].
 pub struct LandscapePlugin;
@@ -106,7 +141,8 @@ struct Generation(Task<Result<(Arc<Ground>, Terrain, Places), String>>);
 
 /// Spawns the terrain's entity with its look before there is a terrain, so that the textures are made meanwhile.
 fn load_heightmap(mut commands: Commands, assets: Res<AssetServer>) {
-    commands.spawn((Name::new("Jacksboro fault"), GroundLook::default()));
+    let place = Transform::from_translation(-ORIGIN.as_vec3());
+    commands.spawn((Name::new("Jacksboro fault"), GroundLook::default(), LevelsOfDetail::default(), place));
     commands.insert_resource(LoadingHeightmap(assets.load(HEIGHTMAP_ASSET)));
 }
 
@@ -118,18 +154,27 @@ fn start_generation(
 ) {
     let Some(HeightmapImage(image)) = loading.and_then(|loading| images.get(&loading.0)) else { return };
     let image = image.clone();
-    commands.insert_resource(Generation(AsyncComputeTaskPool::get().spawn(async move { generate(&image) })));
+    commands.insert_resource(Generation(AsyncComputeTaskPool::get().spawn(async move { generate(image) })));
     commands.remove_resource::<LoadingHeightmap>();
 }
 
-fn generate(heightmap: &GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
-    let ground = Ground::from_image(heightmap, &SCALE)
-        .and_then(|ground| ground.with_strata(&strata()))
-        .map_err(|error| error.to_string())?;
+fn generate(heightmap: GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
+    let ground = ground(heightmap).map_err(|error| error.to_string())?;
     let places = Places::find(&ground)?;
     let ground = Arc::new(ground);
     let terrain = new_terrain(&ground).map_err(|error| error.to_string())?;
     Ok((ground, terrain, places))
+}
+
+/// The whole world: heights are computed where they are needed.
+fn ground(heightmap: GreyImage) -> Result<Ground, GroundError> {
+    let side = WORLD as i32 - 2 * MOUNTAINS_WIDTH;
+    let corner = Column::new(MOUNTAINS_WIDTH, MOUNTAINS_WIDTH);
+    let (hills, mountains) = (NoiseSource::new(&HILLS)?, NoiseSource::new(&MOUNTAINS)?);
+    let around = InsetSource::new(hills, mountains, corner, [side; 2], MOUNTAINS_MARGIN);
+    let real = ImageSource::new(heightmap, &SCALE)?;
+    let all = InsetSource::new(real, around, REAL_CORNER, REAL_SIZE, REAL_MARGIN);
+    Ground::from_source(WORLD, WORLD, all)?.with_strata(&strata())
 }
 
 /// A terrain without any edits.
@@ -189,5 +234,27 @@ fn exit_on_failure(
     for failure in failures.read() {
         error!("the heightmap can't be read: {}", failure.error);
         exit.write(AppExit::error());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_real_land_is_in_the_middle_and_mountains_are_at_the_edge() {
+        let image = GreyImage::decode_png(HEIGHTMAP, &ImageLimits::default()).expect("a valid image");
+        let real = Ground::from_image(&image, &SCALE).expect("valid parameters");
+        assert_eq!([real.width(), real.depth()], REAL_SIZE);
+        let world = ground(image).expect("valid parameters");
+        let inside = |size: i32| (REAL_MARGIN..=size - REAL_MARGIN).step_by(41);
+        for (x, z) in inside(REAL_SIZE[1]).flat_map(|z| inside(REAL_SIZE[0]).map(move |x| (x, z))) {
+            let here = world.height(Column::new(ORIGIN.x + x, ORIGIN.z + z));
+            assert_eq!(here, real.height(Column::new(x, z)), "at {x}, {z}");
+        }
+        let edge = (0..=WORLD as i32).step_by(64).map(|x| world.height(Column::new(x, 0)));
+        let (count, sum) = edge.fold((0, 0), |(count, sum), height| (count + 1, sum + height));
+        assert!(sum / count > real.height_range().1, "{} is not high", sum / count);
+        Places::find(&world).expect("all places");
     }
 }

@@ -2,9 +2,8 @@
 
 use bevy::math::cubic_splines::{CubicCardinalSpline, CubicCurve, CubicGenerator};
 use bevy::prelude::*;
-use bevy_burrow::terrain::World as Model;
 
-use crate::film::places::Ravine;
+use crate::film::places::{Land, Ravine};
 
 /// A smooth curve through points.
 pub struct CameraPath(CubicCurve<Vec3>);
@@ -22,14 +21,10 @@ impl CameraPath {
     ///
     /// # Errors
     /// If there are too few points, or one is outside the world.
-    pub fn over(world: &Model, places: &[(Vec3, f32)]) -> Result<Self> {
-        const MARGIN: f32 = 20.0;
-        let (width, depth) = (world.grid().width() as f32, world.grid().depth() as f32);
+    pub fn over(land: &Land, places: &[(Vec3, f32)]) -> Result<Self> {
         let points = places.iter().map(|&(place, metres)| {
-            // Hills may be near the edge of the world; the path stays inside.
-            let [x, z] = [(place.x, width), (place.z, depth)].map(|(at, end)| at.clamp(MARGIN, end - MARGIN));
-            let height = world.height(x.into(), z.into()).ok_or("the tour left the world")?;
-            Ok(Vec3::new(x, height as f32 + metres, z))
+            let height = land.height(place.xz()).ok_or("the tour left the world")?;
+            Ok(place.with_y(height + metres))
         });
         Self::through(points.collect::<Result<Vec<Vec3>>>()?)
     }
@@ -38,7 +33,7 @@ impl CameraPath {
     ///
     /// # Errors
     /// If it leads out of the world.
-    pub fn around(world: &Model, middle: Vec3, aside: Vec3) -> Result<Self> {
+    pub fn around(land: &Land, middle: Vec3, aside: Vec3) -> Result<Self> {
         let swing = |angle: f32, out: f32| middle + Quat::from_rotation_y(angle) * aside * out;
         let places = [
             (swing(0.75, 40.0), 12.0),
@@ -46,12 +41,12 @@ impl CameraPath {
             (swing(0.12, 34.0), 7.0),
             (swing(-0.1, 33.0), 6.5),
         ];
-        Self::over(world, &places)
+        Self::over(land, &places)
     }
 
     /// How much of a bridge is visible along the whole path.
-    pub fn visibility(&self, world: &Model, ravine: &Ravine) -> usize {
-        (0..=8).map(|i| ravine.points_visible_from(world, self.at(i as f32 / 8.0))).sum()
+    pub fn visibility(&self, land: &Land, ravine: &Ravine) -> usize {
+        (0..=8).map(|i| ravine.points_visible_from(land, self.at(i as f32 / 8.0))).sum()
     }
 
     /// The point at a part of the path, from 0 to 1.

@@ -153,7 +153,7 @@ impl Tour {
             (mouth - along * 80.0 + aside * 22.0, 20.0),
             (mouth - along * 38.0, 7.0),
         ];
-        let path = CameraPath::over(self.studio().terrain()?.world(), &path)?;
+        let path = CameraPath::over(&self.studio().land()?, &path)?;
         let look = CameraPath::through([
             mouth + along * 40.0 - aside * 120.0,
             mouth + along * 60.0 - aside * 40.0,
@@ -268,8 +268,8 @@ impl Tour {
     fn boulder(&mut self, places: &Places) -> Result {
         let direction = Vec2::new(0.51, 0.86);
         let place = places.corner.xz() + direction * 24.0;
-        let height = self.studio().terrain()?.world().height(place.x.into(), place.y.into());
-        let foot = Vec3::new(place.x, height.ok_or("the tour left the world")? as f32, place.y);
+        let height = self.studio().land()?.height(place).ok_or("the tour left the world")?;
+        let foot = Vec3::new(place.x, height, place.y);
         let boulder = foot + Vec3::Y * 8.0 + flat(direction) * 1.2;
         self.prepare(scripted_brushes::boulder(foot, boulder))?;
         self.studio().move_to(place - direction * 9.0)?;
@@ -302,12 +302,12 @@ impl Tour {
         let brushes = scripted_brushes::bridge(&ravine);
         let along = (ravine.to - ravine.from).with_y(0.0).normalize();
         let east = along.cross(Vec3::Y) * (along.cross(Vec3::Y).x + 0.01).signum();
-        let world = self.studio().terrain()?.world();
+        let land = self.studio().land()?;
         let (east, west) =
-            (CameraPath::around(world, middle, east)?, CameraPath::around(world, middle, -east)?);
+            (CameraPath::around(&land, middle, east)?, CameraPath::around(&land, middle, -east)?);
         // From the east, so that the sunset is behind it, unless more of it is visible from the west.
         let path =
-            if west.visibility(world, &ravine) > east.visibility(world, &ravine) { west } else { east };
+            if west.visibility(&land, &ravine) > east.visibility(&land, &ravine) { west } else { east };
         let mut sent = 0;
         self.scene("the bridge", BRIDGE + SUNSET, |studio, t| {
             let seconds = t * (BRIDGE + SUNSET);

@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use super::go_to;
 use crate::player::game_state::MenuPage;
 use crate::ui::settings::{DefaultSettings, Quality, Settings};
-use crate::ui::widgets::{self, Activated, Adjusted, Arrow, GOLD, WHITE, text};
+use crate::ui::widgets::{self, Activated, Adjusted, Arrow, GOLD, GREY, WHITE, text};
 
 /// The settings page.
 pub struct SettingsPagePlugin;
@@ -40,7 +40,7 @@ const ROWS: [Row; 9] = [
     (
         "View distance",
         |settings| format!("{:.0} m", settings.view_distance),
-        |settings, by| step(&mut settings.view_distance, by, 200.0, 200.0, 6000.0),
+        |settings, by| step(&mut settings.view_distance, by, 200.0, 200.0, 8000.0),
     ),
     (
         "Quality",
@@ -77,6 +77,10 @@ const ROWS: [Row; 9] = [
         |settings, _| settings.survival = !settings.survival,
     ),
 ];
+
+/// What the labels do not say.
+const NOTES: &str = "View distance: what is farther fades into the sky. Far ground is drawn coarsely, so a long view costs \
+                     little.\nQuality: of shadows, textures and far ground.";
 
 fn yes_or_no(value: bool) -> String {
     if value { "yes" } else { "no" }.into()
@@ -117,7 +121,8 @@ fn open(mut commands: Commands) {
                 // A click on the row does the same as its right arrow.
                 .observe(move |_: On<Activated>, mut settings: ResMut<Settings>| adjust(&mut settings, 1));
         }
-        column.spawn(Node { height: px(10), ..default() });
+        let around = Node { margin: UiRect::axes(px(14), px(8)), ..default() };
+        column.spawn((text(NOTES, 13.0, GREY), around));
         column.spawn(widgets::button(ROWS.len(), "Reset", 540.0)).observe(reset);
         column.spawn(widgets::button(ROWS.len() + 1, "Back", 540.0)).observe(go_to(MenuPage::Menu));
     });
