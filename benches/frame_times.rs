@@ -194,7 +194,9 @@ impl Walk {
 
     fn is_shown(&mut self) -> bool {
         let world = self.app.world_mut();
-        let is_painted = world.get_resource::<GroundLoading>().is_none_or(|loading| loading.is_ready());
+        let mut looks = world.query_filtered::<(), With<GroundLook>>();
+        let is_painted = looks.iter(world).count() == 0
+            || world.get_resource::<GroundLoading>().is_none_or(|loading| loading.is_ready());
         let mut levels = world.query::<&ShownLevels>();
         let is_fine = levels.iter(world).all(|shown| shown.waiting == 0 && shown.progress() > 0.0);
         let mut tiles = world.query_filtered::<(), (With<Tile>, With<Mesh3d>)>();
