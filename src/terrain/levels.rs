@@ -295,8 +295,8 @@ impl World {
     fn rows_over(&self, tile: TilePos) -> Option<Range<i32>> {
         let (low, high) = self.grid.tile_cells(tile);
         // Edits one brick further may put cells of the tile into the mask.
-        let places = (low.z - 1 >> 3..=high.z + 1 >> 3)
-            .flat_map(|z| (low.x - 1 >> 3..=high.x + 1 >> 3).map(move |x| (x, z)));
+        let places = ((low.z - 1) >> 3..=(high.z + 1) >> 3)
+            .flat_map(|z| ((low.x - 1) >> 3..=(high.x + 1) >> 3).map(move |x| (x, z)));
         let rows = |stack: &Vec<i32>| Some((*stack.first()? * 8 - 2, *stack.last()? * 8 + 10));
         let wider = |a: (i32, i32), b: (i32, i32)| (a.0.min(b.0), a.1.max(b.1));
         let edited = places.filter_map(|place| self.stacks.get(&place).and_then(rows)).reduce(wider)?;
