@@ -157,7 +157,7 @@ impl<'a> Drawing<'a> {
             let is_cubes = is_volumetric(x, z);
             if has_edits || is_cubes {
                 self.cube_rows(cell, is_cubes, &mut cubes);
-                cubes.iter().for_each(|&y| self.cube(cell, y));
+                self.cubes(cell, &cubes);
             }
             if is_cubes {
                 continue;
@@ -251,17 +251,29 @@ impl<'a> Drawing<'a> {
         rows.dedup();
     }
 
-    /// Marching cubes in one cube.
-    fn cube(&mut self, cell: Cell, y: i32) {
-        let (low, stride) = (cell.low.at(y), self.stride);
-        let at = |index: usize| low + IVec3::from_array(cases::corner(index)) * stride;
-        let case = (0..8).fold(0, |case, i| case | usize::from(self.view.is_solid(at(i))) << i);
-        for triangle in cases::table()[case].triangles() {
-            let triangle = triangle.map(|edge| {
-                let (corner, axis) = cases::edge_corners(edge);
-                self.edge_number(Edge { p: at(corner), axis, length: stride })
-            });
-            self.builder.emit(triangle);
+    /// Marching cubes in some cubes over a cell, from below.
+    fn cubes(&mut self, cell: Cell, rows: &[i32]) {
+        // Which corners of the last cube's upper face are solid, and where it lies.
+        let mut upper = None;
+        for &y in rows {
+            let (low, stride) = (cell.low.at(y), self.stride);
+            let at = |index: usize| low + IVec3::from_array(cases::corner(index)) * stride;
+            let face = |indices: [usize; 4]| {
+                indices.into_iter().fold(0, |case, i| case | usize::from(self.view.is_solid(at(i))) << i)
+            };
+            let below = match upper {
+                Some((at, solid)) if at == y => solid,
+                _ => face([0, 1, 4, 5]),
+            };
+            let above = face([2, 3, 6, 7]);
+            upper = Some((y + stride, above >> 2));
+            for triangle in cases::table()[below | above].triangles() {
+                let triangle = triangle.map(|edge| {
+                    let (corner, axis) = cases::edge_corners(edge);
+                    self.edge_number(Edge { p: at(corner), axis, length: stride })
+                });
+                self.builder.emit(triangle);
+            }
         }
     }
 

@@ -76,6 +76,7 @@ impl Edge {
     }
 
     /// Of the two halves of an edge with a crossing, one has a crossing.
+    #[cfg(test)]
     pub fn half(self, view: &LevelView) -> Self {
         let [low, high] = self.halves();
         if low.is_crossed(view) { low } else { high }
@@ -87,8 +88,13 @@ impl Edge {
             return self;
         }
         let own = if view.has(Fault::OwnDescent) { stride_at(view, self.p) } else { 1 };
-        while self.length > own && !self.is_pristine(view) {
-            self = self.half(view);
+        let [mut low, mut high] = [self.p, self.q()].map(|end| view.state(end));
+        while self.length > own && (low.0 || high.0) {
+            let halves = self.halves();
+            let middle = view.state(halves[1].p);
+            // The half whose ends differ in sign.
+            (self, low, high) =
+                if low.1 != middle.1 { (halves[0], low, middle) } else { (halves[1], middle, high) };
         }
         self
     }

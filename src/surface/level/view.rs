@@ -61,6 +61,15 @@ impl<'a> LevelView<'a> {
         self.world.samples.is_solid(self.drawn(point))
     }
 
+    /// Both at once: was a sample edited, and is it solid?
+    pub(super) fn state(&self, point: IVec3) -> (bool, bool) {
+        let drawn = self.drawn(point);
+        match self.world.samples.sample(drawn).distance() {
+            Some(distance) => (true, distance < 0),
+            None => (false, self.ground().distance(drawn) < 0),
+        }
+    }
+
     /// The level of the node that draws a cell; `None` outside the world.
     pub(super) fn level_at(&self, cell: Column) -> Option<u8> {
         let grid = self.world.grid;
