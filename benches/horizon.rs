@@ -1,4 +1,4 @@
-//! Levels of detail by their figures, without drawing: `cargo bench --bench horizon [-- KILOMETRES]`.
+//! Levels of detail by their figures, without drawing: `cargo bench --no-default-features --bench horizon [-- KILOMETRES]`.
 //!
 //! A world of 16 x 16 km (or so many) whose mountains are computed on demand, seen by an eye on a summit at 1440 lines and 45
 //! degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the whole cut take;

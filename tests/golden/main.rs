@@ -19,6 +19,7 @@
 mod album;
 mod debug_views;
 mod landscape;
+mod levels;
 #[path = "../../examples/shared/offscreen.rs"]
 mod offscreen;
 mod own_textures;
@@ -52,6 +53,17 @@ fn ground_looks_as_approved() {
     return_of_ground::shoot(&mut studio, &mut album);
     pieces::shoot(&mut studio, &mut album);
     truth::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+#[test]
+fn levels_look_as_approved() {
+    let add = |app: &mut App| {
+        app.add_plugins(bevy_burrow::debug::BurrowDebugPlugin);
+    };
+    let Some(mut studio) = Studio::open(add) else { return };
+    let mut album = Album::default();
+    levels::shoot(&mut studio, &mut album);
     album.close();
 }
 

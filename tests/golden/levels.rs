@@ -1,0 +1,103 @@
+//! Levels of detail: a far horizon, a far pit, edges coloured by level; and how much a change of levels shows.
+
+use bevy::camera::RenderTarget;
+use bevy::camera::visibility::RenderLayers;
+use bevy::prelude::*;
+use bevy_burrow::debug::BurrowDebug;
+use bevy_burrow::ground::NoiseSource;
+use bevy_burrow::prelude::*;
+
+use crate::album::{Album, flip};
+use crate::studio::{SIZE, Studio};
+
+/// Cells along a side of the world.
+const SIDE: u32 = 4096;
+
+/// The largest mean FLIP that a change of levels may make. Measured: at most 0.012.
+const SHOWS: f32 = 0.03;
+
+/// Mountains of 4 x 4 km.
+fn mountains() -> Ground {
+    let heights = NoiseHeights {
+        seed: 7,
+        kind: NoiseKind::Ridged,
+        octaves: 7,
+        scale: 900.0,
+        amplitude: 320.0,
+        base: 0.0,
+    };
+    let source = NoiseSource::new(&heights).expect("valid noise");
+    Ground::from_source(SIDE, SIDE, source).expect("a valid size")
+}
+
+/// Updates the app until all is drawn as the cameras need it.
+fn settle(studio: &mut Studio) {
+    studio.app.update();
+    // Twice: a change of levels begins the frame after the camera moved.
+    for _ in 0..2 {
+        studio.until("levels", |app| {
+            let world = app.world_mut();
+            let mut levels = world.query::<(&ShownLevels, &Terrain)>();
+            levels.iter(world).all(|(shown, terrain)| shown.waiting == 0 && !terrain.is_busy())
+        });
+        studio.app.update();
+    }
+}
+
+pub fn shoot(studio: &mut Studio, album: &mut Album) {
+    studio.terrain(mountains(), GroundLook::default());
+    let far = Projection::from(PerspectiveProjection { far: 10_000.0, ..default() });
+    let camera = studio.camera;
+    let world = studio.app.world_mut();
+    let fog = DistanceFog { falloff: FogFalloff::from_visibility_squared(8000.0), ..default() };
+    world.entity_mut(camera).insert((far.clone(), fog));
+    // The studio turns its camera off while it waits. This one is always on, looks with it, and draws nothing.
+    let target = RenderTarget::None { size: UVec2::new(SIZE.0, SIZE.1) };
+    world.spawn((ChildOf(camera), Camera::default(), far, target, RenderLayers::none()));
+    let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
+    world.entity_mut(terrain).insert(LevelsOfDetail { view_distance: 4000.0, ..default() });
+    let at = |studio: &mut Studio, x: f32, z: f32, up: f32| Vec3::new(x, studio.height(x, z) + up, z);
+    let eye = at(studio, 1500.0, 1500.0, 60.0);
+    studio.look(eye, eye + Vec3::new(10.0, -1.0, 9.0));
+    studio.until("levels", |app| {
+        let world = app.world_mut();
+        world.query::<&ShownLevels>().iter(world).any(|shown| shown.progress() > 0.0)
+    });
+    settle(studio);
+    let horizon = studio.picture();
+    album.compare("levels_horizon", &horizon);
+
+    let pit = at(studio, 1960.0, 1900.0, 0.0);
+    studio.apply([Brush::dig(Shape::sphere(pit, 20.0))]);
+    let fresh = studio.picture();
+    let (apart, _) = flip(&horizon, &fresh);
+    println!("a pit of radius 20, {:.0} m away: FLIP {apart:.5}", pit.distance(eye));
+    album.check(apart > 1e-4, || format!("the far pit is not seen: FLIP {apart:.5}"));
+    settle(studio);
+    album.compare("levels_far_pit", &studio.picture());
+
+    studio.app.world_mut().insert_resource(BurrowDebug {
+        levels: true,
+        focus: Some(eye),
+        radius: 600.0,
+        most_lines: 120_000,
+        ..default()
+    });
+    (0..3).for_each(|_| studio.app.update());
+    album.compare("levels_wires", &studio.picture());
+    studio.app.world_mut().insert_resource(BurrowDebug::default());
+
+    // From place to place: what is drawn at first, still at the levels of the place before, and then.
+    let mut most = 0.0f32;
+    for step in 1..=4 {
+        let eye = eye + Vec3::new(30.0, 2.0, 25.0) * step as f32;
+        studio.look(eye, eye + Vec3::new(10.0, -1.0, 9.0));
+        let before = studio.picture();
+        settle(studio);
+        let (apart, _) = flip(&before, &studio.picture());
+        most = most.max(apart);
+    }
+    println!("changes of levels within 40 m: FLIP at most {most:.5}");
+    album.check(most < SHOWS, || format!("changes of levels show: FLIP {most:.5}"));
+    studio.close_terrain();
+}
