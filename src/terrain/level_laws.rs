@@ -183,7 +183,7 @@ fn control_world() -> (Terrain, Cut) {
     let (width, depth) = (75, 70);
     let heights: Vec<f64> = (0..(width + 1) * (depth + 1)).map(|_| rng.f64() * 6.0).collect();
     let height = |x: i32, z: i32| heights[(z * (width as i32 + 1) + x) as usize];
-    let ground = Ground::from_fn(width, depth as u32, height).expect("finite heights");
+    let ground = Ground::from_fn(width, depth, height).expect("finite heights");
     let mut terrain = Terrain::new(ground, &TerrainSettings { chunk_size: 8, ..Default::default() })
         .expect("valid settings");
     let cut = Cut::random(terrain.world().level_grid(2), 3, 50);
