@@ -22,13 +22,24 @@ fn mountains() -> Ground {
         seed: 7,
         kind: NoiseKind::Ridged,
         octaves: 7,
-        scale: 900.0,
-        amplitude: 320.0,
+        scale: 1400.0,
+        amplitude: 260.0,
         base: 0.0,
     };
     let source = NoiseSource::new(&heights).expect("valid noise");
-    Ground::from_source(SIDE, SIDE, source).expect("a valid size")
+    let ground = Ground::from_source(SIDE, SIDE, source).expect("a valid size");
+    ground.with_strata(&Strata::alpine()).expect("valid strata")
 }
+
+/// Over the highest of some places in the world's middle.
+fn summit(studio: &mut Studio) -> Vec3 {
+    let places = (0..400).map(|at| (1500.0 + (at % 20 * 40) as f32, 1500.0 + (at / 20 * 40) as f32));
+    let places = places.map(|(x, z)| Vec3::new(x, studio.height(x, z), z));
+    places.max_by(|a, b| a.y.total_cmp(&b.y)).expect("some places") + Vec3::Y * 40.0
+}
+
+/// Where the eye looks.
+const AHEAD: Vec3 = Vec3::new(10.0, -3.0, 9.0);
 
 /// Updates the app until all is drawn as the cameras need it.
 fn settle(studio: &mut Studio) {
@@ -56,9 +67,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     world.spawn((ChildOf(camera), Camera::default(), far, target, RenderLayers::none()));
     let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
     world.entity_mut(terrain).insert(LevelsOfDetail { view_distance: 4000.0, ..default() });
-    let at = |studio: &mut Studio, x: f32, z: f32, up: f32| Vec3::new(x, studio.height(x, z) + up, z);
-    let eye = at(studio, 1500.0, 1500.0, 60.0);
-    studio.look(eye, eye + Vec3::new(10.0, -1.0, 9.0));
+    let eye = summit(studio);
+    studio.look(eye, eye + AHEAD);
     studio.until("levels", |app| {
         let world = app.world_mut();
         world.query::<&ShownLevels>().iter(world).any(|shown| shown.progress() > 0.0)
@@ -67,7 +77,9 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let horizon = studio.picture();
     album.compare("levels_horizon", &horizon);
 
-    let pit = at(studio, 1960.0, 1900.0, 0.0);
+    let below = (AHEAD - Vec3::Y).as_dvec3();
+    let hit = studio.one::<Terrain>().world().raycast(eye.as_dvec3(), below, 4000.0);
+    let pit = hit.expect("ground is ahead").position.as_vec3();
     studio.apply([Brush::dig(Shape::sphere(pit, 20.0))]);
     let fresh = studio.picture();
     let (apart, _) = flip(&horizon, &fresh);
@@ -91,7 +103,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let mut most = 0.0f32;
     for step in 1..=4 {
         let eye = eye + Vec3::new(30.0, 2.0, 25.0) * step as f32;
-        studio.look(eye, eye + Vec3::new(10.0, -1.0, 9.0));
+        studio.look(eye, eye + AHEAD);
         let before = studio.picture();
         settle(studio);
         let (apart, _) = flip(&before, &studio.picture());
