@@ -176,7 +176,8 @@ impl Ground {
         {
             let first = self.extent().inner_index(Column::of(low));
             in_brick::with_brick(self, records, pos, |brick| {
-                let shown = brick.tops(low.y, voxels);
+                // A ground with a source stores no tops: they are asked as all others are.
+                let shown = if tops.is_empty() { 0 } else { brick.tops(low.y, voxels) };
                 let top = |bit: usize| tops.get(first + (bit >> 3) * self.extent().row_len() + (bit & 7));
                 for_runs(shown, |bit| top(bit).copied().unwrap_or_default(), &mut each);
                 rest = 0;
