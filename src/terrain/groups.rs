@@ -131,7 +131,7 @@ pub(super) fn edit(transaction: &Transaction, submissions: &[Submission], backen
     }
     let view = WorldView { mask: MaskView::new(&world.mask).over(&all_mask), ..before };
     let positions = || bricks.iter().map(|drafted| drafted.pos).collect();
-    let drawn = transaction.drawn_cut.as_deref().map(|drawn| (drawn, positions()));
+    let drawn = transaction.drawn_cut.as_ref().map(|drawn| (drawn, positions()));
     let meshes = || redraw::updates(world, &view, backend, &dirty, &all_mask, drawn, &mut stages);
     let all = groups.iter().map(|group| (group.submissions, &*group.bricks));
     let all = all.chain([(last, &*draft.bricks)]).zip(effects);

@@ -134,7 +134,7 @@ impl World {
     #[cfg(feature = "plugin")]
     pub(crate) fn redraw_tiles(
         &self,
-        drawn: &DrawnCut,
+        drawn: &Arc<DrawnCut>,
         tiles: impl Iterator<Item = TilePos>,
     ) -> Vec<NodeUpdate> {
         let size = self.grid.size();
@@ -174,7 +174,7 @@ pub(super) fn change_cut(world: &World, drawn: &DrawnCut, choose: &ChooseCut) ->
 pub(super) fn redraw_changed(
     world: &World,
     view: &WorldView,
-    drawn: &DrawnCut,
+    drawn: &Arc<DrawnCut>,
     meshes: &MeshUpdates,
     bricks: &[BrickPos],
     changed: &[(Column, Column)],
@@ -186,16 +186,44 @@ pub(super) fn redraw_changed(
 
 fn redraw(
     state: &State,
-    drawn: &DrawnCut,
+    drawn: &Arc<DrawnCut>,
     areas: impl Iterator<Item = (Column, Column)>,
     shows_parts: impl Fn(TilePos) -> bool + Sync,
 ) -> NodeChanges {
     let mut nodes: Vec<Node> =
-        areas.flat_map(|(low, high)| level::nodes_near(&drawn.cut, low, high)).collect();
+        merged(areas).into_iter().flat_map(|(low, high)| level::nodes_near(&drawn.cut, low, high)).collect();
     nodes.sort_unstable();
     nodes.dedup();
     let updates = state.updates(&drawn.cut, &nodes, shows_parts);
-    (Arc::new(drawn.after(drawn.cut.clone(), &updates)), updates)
+    let changes = |update: &NodeUpdate| {
+        update.node.level == 0 && update.mesh.is_some() != drawn.joined.contains(&update.node.tile())
+    };
+    match updates.iter().any(changes) {
+        true => (Arc::new(drawn.after(drawn.cut.clone(), &updates)), updates),
+        false => (Arc::clone(drawn), updates),
+    }
+}
+
+/// Areas that follow each other are taken together while they stay this narrow, in voxels.
+const NARROW: i32 = 64;
+
+/// Fewer areas that hold these, both ends included.
+fn merged(areas: impl Iterator<Item = (Column, Column)>) -> Vec<(Column, Column)> {
+    let mut merged: Vec<(Column, Column)> = Vec::new();
+    for (low, high) in areas {
+        if let Some(last) = merged.last_mut() {
+            let all = (
+                Column::new(last.0.x.min(low.x), last.0.z.min(low.z)),
+                Column::new(last.1.x.max(high.x), last.1.z.max(high.z)),
+            );
+            if (all.1.x - all.0.x).max(all.1.z - all.0.z) < NARROW {
+                *last = all;
+                continue;
+            }
+        }
+        merged.push((low, high));
+    }
+    merged
 }
 
 impl DrawnCut {

@@ -43,7 +43,7 @@ pub(super) fn updates(
     backend: &dyn Compute,
     dirty: &ByBrick,
     newer: &Mask,
-    drawn: Option<(&DrawnCut, Vec<BrickPos>)>,
+    drawn: Option<(&Arc<DrawnCut>, Vec<BrickPos>)>,
     stages: &mut Stages,
 ) -> MeshUpdates {
     let Stages { meshing, assembly, ring, .. } = stages;

@@ -51,7 +51,7 @@ pub(super) fn step(
         dirty_cells(world.grid, &changed, |&(pos, own)| (pos, own, false))
     });
     let positions = || bricks.iter().map(|(pos, _)| *pos).collect();
-    let drawn = transaction.drawn_cut.as_deref().map(|drawn| (drawn, positions()));
+    let drawn = transaction.drawn_cut.as_ref().map(|drawn| (drawn, positions()));
     let meshes = redraw::updates(world, &view, backend, &dirty, &mask, drawn, &mut stages);
 
     let nothing = Fields::default();

@@ -64,6 +64,7 @@ impl ColumnGrid {
 ///
 /// ```
 /// use bevy_burrow::ground::{ColumnGrid, HeightSource};
+/// # use bevy_burrow::lattice::Column;
 /// use bevy_burrow::prelude::*;
 ///
 /// /// Terraces, a voxel higher every 8 voxels.
@@ -86,7 +87,6 @@ impl ColumnGrid {
 /// let ground = Ground::from_source(200_000, 200_000, Terraces)?;
 /// assert_eq!(ground.height(Column::new(800, 5)), 100 * 256);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
-/// # use bevy_burrow::lattice::Column;
 /// ```
 pub trait HeightSource: Send + Sync + 'static {
     /// A number that stands for all that the source gives, in [`Ground::hash`](super::Ground::hash) and where grounds are
