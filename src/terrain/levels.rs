@@ -188,7 +188,7 @@ fn redraw(
     state: &State,
     drawn: &Arc<DrawnCut>,
     areas: impl Iterator<Item = (Column, Column)>,
-    shows_parts: impl Fn(TilePos) -> bool + Sync,
+    shows_parts: impl Fn(TilePos) -> bool,
 ) -> NodeChanges {
     let mut nodes: Vec<Node> =
         merged(areas).into_iter().flat_map(|(low, high)| level::nodes_near(&drawn.cut, low, high)).collect();
@@ -256,28 +256,22 @@ impl<'a> State<'a> {
 
     /// What these nodes of a cut are drawn with. Nodes of level 0 that were and are drawn by their parts are left out, as parts
     /// that change have updates of their own.
-    fn updates(
-        &self,
-        cut: &Cut,
-        nodes: &[Node],
-        shows_parts: impl Fn(TilePos) -> bool + Sync,
-    ) -> Vec<NodeUpdate> {
+    fn updates(&self, cut: &Cut, nodes: &[Node], shows_parts: impl Fn(TilePos) -> bool) -> Vec<NodeUpdate> {
         let view = LevelView::new(self.view, cut, self.stacks);
-        let updates = parallel_map(nodes, ItemCost::Surface, |&node| {
-            let is_plain = level::is_plain(&view, node);
-            let tile = node.tile();
-            if is_plain && shows_parts(tile) {
-                return None;
-            }
-            let parts = if node.level == 0 { self.parts_over(tile) } else { Vec::new() };
+        // Most often nothing is to be drawn near a dig: threads need not be asked.
+        let changing = nodes.iter().filter_map(|&node| {
+            let is_plain = node.level == 0 && level::is_plain(&view, node);
+            (!is_plain || !shows_parts(node.tile())).then_some((node, is_plain))
+        });
+        parallel_map(&changing.collect::<Vec<_>>(), ItemCost::Surface, |&(node, is_plain)| {
+            let parts = if node.level == 0 { self.parts_over(node.tile()) } else { Vec::new() };
             if !is_plain {
                 let mesh = Some(Arc::new(level::node_mesh(&view, node)));
-                return Some(NodeUpdate { node, mesh, shown: Vec::new(), hidden: parts });
+                return NodeUpdate { node, mesh, shown: Vec::new(), hidden: parts };
             }
             let shown = parts.into_iter().map(|drawn| (drawn, self.draft(drawn))).collect();
-            Some(NodeUpdate { node, mesh: None, shown, hidden: Vec::new() })
-        });
-        updates.into_iter().flatten().collect()
+            NodeUpdate { node, mesh: None, shown, hidden: Vec::new() }
+        })
     }
 
     /// The tile and all chunks over it that draw something.
