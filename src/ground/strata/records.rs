@@ -258,7 +258,7 @@ impl StrataRecords {
     }
 
     /// The conditions that a column of the world fulfils: a bit each.
-    #[cfg(any(test, feature = "cuda"))]
+    #[cfg(feature = "cuda")]
     pub fn conditions_of(&self, ground: &Ground, column: Column) -> u32 {
         let is_met = |(bit, own): (u32, &ColumnCondition)| u32::from(own.admits(ground, column)) << bit;
         (0..).zip(&self.conditions).map(is_met).sum()
