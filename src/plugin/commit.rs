@@ -53,12 +53,12 @@ pub(super) fn begin_transactions(
         if terrain.queued() == 0 || !entities.show(terrain.world()) || entities.is_slim != is_slim {
             continue;
         }
-        if levels.is_some_and(|mut levels| levels.count_edit()) {
-            continue;
-        }
         let transaction = terrain.begin_for(true);
         send_history(entity, &mut terrain, &mut moved);
         let Some(transaction) = transaction else { continue };
+        if let Some(mut levels) = levels {
+            levels.count_edit();
+        }
         let engine = terrain.engine().unwrap_or(&engine).clone();
         let extras = VertexExtras::of(colors, is_slim);
         let mut builder = SurfaceBuilder::new((entity, &terrain), extras, assets.is_some(), &processors);

@@ -196,7 +196,7 @@ pub(super) struct LevelState {
     shown: Option<Version>,
     /// Is all drawn as it should be for these?
     pub is_settled: bool,
-    /// Edits since the cut was last chosen.
+    /// Transactions with edits since the cut was last chosen.
     edits: u32,
     /// Were all nodes drawn once?
     is_complete: bool,
@@ -211,7 +211,7 @@ const FASTEST: f32 = 2000.0;
 /// A new terrain's cut is reached in steps of this many meshes.
 const FIRST_MESHES: usize = 192;
 
-/// After this many transactions with edits, a change of levels has its turn.
+/// Edits come first, but after this many transactions with them a change of levels has its turn.
 const EDITS: u32 = 2;
 
 impl LevelState {
@@ -226,10 +226,9 @@ impl LevelState {
         if self.is_settled { 0 } else { self.known.waiting.load(Ordering::Relaxed) }
     }
 
-    /// Notes a transaction with edits; says whether levels have a turn before the next one.
-    pub(super) fn count_edit(&mut self) -> bool {
-        self.edits += 1;
-        !self.is_settled && self.edits > EDITS
+    /// Notes a transaction with edits.
+    pub(super) fn count_edit(&mut self) {
+        self.edits = self.edits.saturating_add(1);
     }
 
     /// Is the choice for these outdated?
@@ -320,6 +319,9 @@ pub(super) fn begin_level_changes(
     let start = Instant::now();
     for (entity, mut terrain, settings, mut state, place, entities, colors, is_slim) in &mut terrains {
         if !entities.show(terrain.world()) || entities.is_slim != is_slim || terrain.is_busy() {
+            continue;
+        }
+        if terrain.queued() > 0 && state.edits < EDITS {
             continue;
         }
         let eyes = eyes.over(place);

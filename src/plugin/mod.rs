@@ -171,7 +171,7 @@ impl Plugin for TerrainPlugin {
                         .in_set(BurrowSystems::Load),
                     (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
                     commit::commit_transactions.in_set(BurrowSystems::Commit),
-                    (levels::find_eyes, commit::begin_transactions, levels::begin_level_changes)
+                    (levels::find_eyes, levels::begin_level_changes, commit::begin_transactions)
                         .chain()
                         .in_set(BurrowSystems::Begin),
                     diagnostics::measure_frame.after(BurrowSystems::Begin),

@@ -35,7 +35,7 @@ pub(crate) struct CellOutline<T> {
 impl<T: Copy> CellOutline<T> {
     pub fn with_capacity(vertices: usize) -> Self {
         let lines = [(); 5].map(|()| Vec::with_capacity(vertices));
-        Self { lines, is_steep: false, around: Vec::with_capacity(vertices) }
+        Self { lines, is_steep: false, around: Vec::new() }
     }
 
     /// Makes it that of a cell, given its [flags](super::mask::Borders), the vertices at its corners, by column and height, and
@@ -77,6 +77,7 @@ impl<T: Copy> CellOutline<T> {
             }
             let inner = |line: &[T]| line.len() - 1;
             self.around.clear();
+            self.around.reserve(first.len() + second.len() + ac.len());
             self.around.extend_from_slice(&first[..inner(first)]);
             self.around.extend_from_slice(&second[..inner(second)]);
             if half == 0 {
