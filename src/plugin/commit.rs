@@ -10,7 +10,7 @@ use super::collect::send_history;
 use super::diagnostics::measure_commit;
 use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive};
 use super::figures::{TaskTimes, start_measuring, stop_measuring};
-use super::levels::{LevelState, ShownLevels, WantedTiles};
+use super::level_state::{LevelState, ShownLevels, WantedTiles};
 use super::load::Loading;
 use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};

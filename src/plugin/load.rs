@@ -10,7 +10,7 @@ use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
-use super::levels::{KnownNodes, LevelState, LevelsOfDetail, ShownLevels};
+use super::level_state::{KnownNodes, LevelState, LevelsOfDetail, ShownLevels};
 use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{InFlight, TaskCounter};

@@ -26,6 +26,7 @@ mod engine;
 mod entities;
 mod figures;
 mod heightmap;
+mod level_state;
 mod levels;
 mod load;
 mod meshes;
@@ -49,8 +50,8 @@ pub use figures::BurrowFigures;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
-pub(crate) use levels::WantedTiles;
-pub use levels::{LevelsOfDetail, ShownLevels};
+pub(crate) use level_state::WantedTiles;
+pub use level_state::{LevelsOfDetail, ShownLevels};
 pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,

@@ -3,9 +3,9 @@
 use std::fmt;
 use std::sync::Arc;
 
+use super::drawn_cut::DrawnCut;
 use super::field_log::FieldNews;
 use super::history::{HistoryReceipt, UndoDelta};
-use super::levels::DrawnCut;
 use super::receipt::Receipt;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;

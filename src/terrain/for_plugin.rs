@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::commit::Commit;
+use super::drawn_cut::DrawnCut;
 use super::history::{DeferredDrop, HistoryStep};
-use super::levels::DrawnCut;
 use super::model::{StaleCommit, Terrain};
 use super::queue::{Request, Submission};
 use super::receipt::Receipt;

@@ -1,106 +1,22 @@
-//! What is drawn of a world with levels of detail, and how a commit changes it.
-//!
-//! A node of a coarser level has a mesh of its own. One of level 0 is drawn by its tile and chunks, as without levels, or
-//! where the seam towards a coarser node needs it, by one mesh that holds all of them.
+//! Draws the nodes of a cut: all of them, those that lead to another cut, and those that show an edit.
 
-use std::borrow::Cow;
-use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
 use glam::IVec3;
 use rustc_hash::FxHashSet;
 
-use super::model::Terrain;
-use super::redraw::MeshUpdates;
+use super::drawn_cut::{ChooseCut, DrawnCut, NodeUpdate};
+use super::surface::ChunkSurface;
 use super::surface_draft::{SurfaceDraft, TileUpdate};
-use super::transaction::{Transaction, Work};
 use super::world::{Drawn, World};
 use crate::lattice::{BrickPos, ChunkPos, Column, ItemCost, ONE, TilePos, parallel_map};
 use crate::levels::{Cut, LevelGrid, Node};
-use crate::surface::SurfaceMesh;
 use crate::surface::level::{self, LevelView, Stacks};
 use crate::surface::vertex::WorldView;
 
-/// What is drawn of a world: the nodes of a cut.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DrawnCut {
-    cut: Cut,
-    /// Nodes of level 0 that are drawn as one mesh.
-    joined: FxHashSet<TilePos>,
-}
-
-impl DrawnCut {
-    /// Its nodes.
-    pub fn cut(&self) -> &Cut {
-        &self.cut
-    }
-
-    /// Are a tile and its chunks drawn as they are, each with a mesh of its own?
-    pub fn shows_parts(&self, tile: TilePos) -> bool {
-        self.cut.contains(Node::over(tile, 0)) && !self.joined.contains(&tile)
-    }
-}
-
-/// What a node is drawn with after a commit.
-#[derive(Clone)]
-pub struct NodeUpdate {
-    /// The node.
-    pub node: Node,
-    /// Its own mesh, relative to its lowest column at y = 0; `None` if it is drawn by its tile and chunks, or not at all.
-    pub mesh: Option<Arc<SurfaceMesh>>,
-    /// Tile and chunks that are drawn from now on.
-    pub(crate) shown: Vec<(Drawn, SurfaceDraft)>,
-    /// Tile and chunks that may have been drawn, and are no more.
-    pub hidden: Vec<Drawn>,
-}
-
-impl NodeUpdate {
-    /// The tile and chunks that are drawn from now on, with their surfaces.
-    pub fn shown(&self) -> impl Iterator<Item = (Drawn, Cow<'_, SurfaceMesh>)> {
-        self.shown.iter().map(|(drawn, draft)| (*drawn, draft.surface()))
-    }
-}
-
-impl fmt::Debug for NodeUpdate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("NodeUpdate")
-            .field("node", &self.node)
-            .field("has_mesh", &self.mesh.is_some())
-            .field("shown", &self.shown.len())
-            .field("hidden", &self.hidden)
-            .finish()
-    }
-}
-
-/// Says which cut comes next, given the world and the cut that is drawn; called in the transaction.
-pub type ChooseCut = dyn Fn(&World, &Cut) -> Cut + Send + Sync;
-
-impl Terrain {
-    /// What is drawn; `None` if all of the world is drawn in full.
-    pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
-        self.drawn_cut.as_ref()
-    }
-
-    /// Draws the nodes of a cut from now on, or with `None` all of the world in full. Everything has to be drawn anew:
-    /// [`World::draw_cut`] makes the meshes. A transaction under way is given up, and its work queued again.
-    pub fn set_drawn_cut(&mut self, drawn: Option<Arc<DrawnCut>>) {
-        self.abandon();
-        self.drawn_cut = drawn;
-    }
-
-    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](MeshUpdates::nodes) are what has to
-    /// be drawn. `None` while another transaction is under way, and where all of the world is drawn in full.
-    #[must_use = "the terrain waits for the commit of its transaction"]
-    pub fn begin_cut(&mut self, choose: Arc<ChooseCut>) -> Option<Transaction> {
-        self.begin_cut_for(choose, false)
-    }
-
-    pub(crate) fn begin_cut_for(&mut self, choose: Arc<ChooseCut>, is_plugins: bool) -> Option<Transaction> {
-        self.drawn_cut.as_ref()?;
-        self.begin_work(Work::Cut(choose), is_plugins)
-    }
-}
+/// Tiles and chunks that a running transaction changes.
+pub(super) type NewParts<'a> = (&'a [(TilePos, TileUpdate)], &'a [(ChunkPos, Arc<ChunkSurface>)]);
 
 impl World {
     /// A cut as it is drawn, and all meshes for it.
@@ -175,12 +91,12 @@ pub(super) fn redraw_changed(
     world: &World,
     view: &WorldView,
     drawn: &Arc<DrawnCut>,
-    meshes: &MeshUpdates,
+    parts: NewParts,
     bricks: &[BrickPos],
     changed: &[(Column, Column)],
 ) -> NodeChanges {
     let stacks = world.edited_stacks().over(bricks);
-    let state = State { world, view: *view, stacks, meshes: Some(meshes) };
+    let state = State { world, view: *view, stacks, parts };
     redraw(&state, drawn, changed.iter().copied(), |tile| drawn.shows_parts(tile))
 }
 
@@ -226,32 +142,18 @@ fn merged(areas: impl Iterator<Item = (Column, Column)>) -> Vec<(Column, Column)
     merged
 }
 
-impl DrawnCut {
-    /// What is drawn once these updates are, of a cut.
-    fn after(&self, cut: Cut, updates: &[NodeUpdate]) -> Self {
-        let mut joined = self.joined.clone();
-        for update in updates.iter().filter(|update| update.node.level == 0) {
-            if update.mesh.is_some() {
-                joined.insert(update.node.tile());
-            } else {
-                joined.remove(&update.node.tile());
-            }
-        }
-        Self { cut, joined }
-    }
-}
-
 /// A world as it is drawn: as committed, or with what a running transaction changes.
 struct State<'a> {
     world: &'a World,
     view: WorldView<'a>,
     stacks: Stacks<'a>,
-    meshes: Option<&'a MeshUpdates>,
+    /// None of them where all is committed.
+    parts: NewParts<'a>,
 }
 
 impl<'a> State<'a> {
     fn committed(world: &'a World) -> Self {
-        Self { world, view: world.view(), stacks: world.edited_stacks(), meshes: None }
+        Self { world, view: world.view(), stacks: world.edited_stacks(), parts: (&[], &[]) }
     }
 
     /// What these nodes of a cut are drawn with. Nodes of level 0 that were and are drawn by their parts are left out, as parts
@@ -284,8 +186,8 @@ impl<'a> State<'a> {
             let places = ys.map(|y| ChunkPos { x: tile.x, y, z: tile.z });
             chunks.extend(places.filter(|chunk| self.world.surfaces.contains_key(chunk)));
         }
-        let new = self.meshes.into_iter().flat_map(|meshes| &meshes.chunks);
-        chunks.extend(new.map(|(chunk, _)| *chunk).filter(|chunk| chunk.tile() == tile));
+        let (_, new) = self.parts;
+        chunks.extend(new.iter().map(|(chunk, _)| *chunk).filter(|chunk| chunk.tile() == tile));
         chunks.sort_unstable();
         chunks.dedup();
         std::iter::once(Drawn::Tile(tile)).chain(chunks.into_iter().map(Drawn::Chunk)).collect()
@@ -293,10 +195,10 @@ impl<'a> State<'a> {
 
     /// What a tile or chunk is made from.
     fn draft(&self, drawn: Drawn) -> SurfaceDraft {
-        let Some(meshes) = self.meshes else { return self.world.draft(drawn) };
+        let (tiles, chunks) = self.parts;
         match drawn {
             Drawn::Tile(tile) => {
-                let new = meshes.tiles.iter().find(|(other, _)| *other == tile);
+                let new = tiles.iter().find(|(other, _)| *other == tile);
                 let old = || {
                     TileUpdate::new(self.world, &self.view, tile, |borders| {
                         self.world.tile_rings(tile, borders)
@@ -304,7 +206,7 @@ impl<'a> State<'a> {
                 };
                 SurfaceDraft::Tile(new.map_or_else(old, |(_, update)| update.clone()))
             }
-            Drawn::Chunk(chunk) => match meshes.chunks.iter().find(|(other, _)| *other == chunk) {
+            Drawn::Chunk(chunk) => match chunks.iter().find(|(other, _)| *other == chunk) {
                 Some((_, surface)) => SurfaceDraft::Chunk(Arc::clone(surface)),
                 None => self.world.draft(drawn),
             },

@@ -18,6 +18,7 @@ mod change;
 mod commit;
 mod dirty;
 mod draft_group;
+mod drawn_cut;
 mod field_log;
 #[cfg(feature = "plugin")]
 mod for_plugin;
@@ -53,10 +54,10 @@ mod unseen;
 mod world;
 
 pub use commit::Commit;
+pub use drawn_cut::{ChooseCut, DrawnCut, NodeUpdate};
 pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
 pub use level_meshes::GroundFacts;
-pub use levels::{ChooseCut, DrawnCut, NodeUpdate};
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use model::{StaleCommit, Terrain};
 pub use query::{RayHit, Span};

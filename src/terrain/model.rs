@@ -5,8 +5,8 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::commit::Commit;
+use super::drawn_cut::{ChooseCut, DrawnCut};
 use super::history::{DeferredDrop, HistoryReceipt, UndoStack};
-use super::levels::DrawnCut;
 use super::loose::LooseSettings;
 use super::queue::{Queue, Request, Taken};
 use super::receipt::Receipt;
@@ -306,5 +306,29 @@ impl Terrain {
                 Request::Edit(submission) => submission.misses(bounds),
                 Request::Step(_) => !self.undo_stack.reaches(bounds),
             })
+    }
+
+    /// What is drawn; `None` if all of the world is drawn in full.
+    pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
+        self.drawn_cut.as_ref()
+    }
+
+    /// Draws the nodes of a cut from now on, or with `None` all of the world in full. Everything has to be drawn anew:
+    /// [`World::draw_cut`] makes the meshes. A transaction under way is given up, and its work queued again.
+    pub fn set_drawn_cut(&mut self, drawn: Option<Arc<DrawnCut>>) {
+        self.abandon();
+        self.drawn_cut = drawn;
+    }
+
+    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](MeshUpdates::nodes) are what has to
+    /// be drawn. `None` while another transaction is under way, and where all of the world is drawn in full.
+    #[must_use = "the terrain waits for the commit of its transaction"]
+    pub fn begin_cut(&mut self, choose: Arc<ChooseCut>) -> Option<Transaction> {
+        self.begin_cut_for(choose, false)
+    }
+
+    pub(crate) fn begin_cut_for(&mut self, choose: Arc<ChooseCut>, is_plugins: bool) -> Option<Transaction> {
+        self.drawn_cut.as_ref()?;
+        self.begin_work(Work::Cut(choose), is_plugins)
     }
 }

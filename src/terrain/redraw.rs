@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::by_brick::{ByBrick, is_same_stack};
 use super::dirty::dirty_blocks;
-use super::levels::{DrawnCut, NodeUpdate, redraw_changed};
+use super::drawn_cut::{DrawnCut, NodeUpdate};
+use super::levels::redraw_changed;
 use super::stages::Stages;
 use super::surface::{ChunkSurface, Fresh, Key};
 use super::surface_draft::TileUpdate;
@@ -67,8 +68,9 @@ pub(super) fn updates(
     *ring += took;
     let mut meshes = MeshUpdates { tiles, chunks, ..MeshUpdates::default() };
     if let Some((drawn, bricks)) = drawn {
-        let (after, nodes) =
-            Stages::time(meshing, || redraw_changed(world, view, drawn, &meshes, &bricks, &areas(dirty)));
+        let (after, nodes) = Stages::time(meshing, || {
+            redraw_changed(world, view, drawn, (&meshes.tiles, &meshes.chunks), &bricks, &areas(dirty))
+        });
         (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
     }
     meshes

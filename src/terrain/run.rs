@@ -13,8 +13,9 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
 use super::commit::Commit;
+use super::drawn_cut::ChooseCut;
 use super::history::{HistoryReceipt, HistoryRejection};
-use super::levels::{self, ChooseCut};
+use super::levels;
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
 use super::redraw::MeshUpdates;

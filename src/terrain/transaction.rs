@@ -4,8 +4,8 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::commit::Commit;
+use super::drawn_cut::{ChooseCut, DrawnCut};
 use super::history::{HistoryStep, UndoDelta};
-use super::levels::{ChooseCut, DrawnCut};
 use super::queue::Submission;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;
