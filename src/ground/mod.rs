@@ -18,6 +18,7 @@
 
 mod columns;
 mod control;
+mod control_on_ground;
 mod error;
 mod extent;
 mod grey_image;
