@@ -10,6 +10,8 @@
 //! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
 //! times the plain material's part of the frame the look takes.
 
+#[path = "../examples/shared/mountains.rs"]
+mod mountains;
 #[path = "../examples/shared/offscreen.rs"]
 mod offscreen;
 
@@ -381,15 +383,7 @@ fn horizon(size: (u32, u32), frames: usize) {
 
 /// Mountains of 16 x 16 km, computed on demand.
 fn mountains() -> Ground {
-    let heights = NoiseHeights {
-        seed: 7,
-        kind: NoiseKind::Ridged,
-        octaves: 7,
-        scale: 1400.0,
-        amplitude: 420.0,
-        base: 0.0,
-    };
-    let source = NoiseSource::new(&heights).expect("valid noise");
+    let source = NoiseSource::new(&mountains::heights()).expect("valid noise");
     Ground::from_source(16_384, 16_384, source).expect("a valid size")
 }
 

@@ -5,15 +5,16 @@
 //! what a node costs in a task, from noise and from an image; what a flight at 100 m/s with 20 digs a second needs; and the
 //! bytes that the ground and the meshes take, as a card gets them.
 
-use std::cell::RefCell;
-use std::collections::HashMap;
+#[path = "../examples/shared/mountains.rs"]
+mod mountains;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bevy_burrow::ground::{GreyImage, Ground, ImageScale, ImageSource, NoiseSource};
-use bevy_burrow::levels::{Choice, Cut, Eye, Node, NodeFacts};
+use bevy_burrow::levels::{Choice, Cut, Eye, Node};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{ChooseCut, GroundFacts, NodeUpdate, World};
+use bevy_burrow::terrain::{ChooseCut, GroundFacts, KnownNodes, NodeUpdate, World};
 use glam::{Vec2, Vec3, Vec3Swizzles};
 use rayon::prelude::*;
 
@@ -23,46 +24,22 @@ const PIXELS: f32 = 1738.0;
 /// Bytes of a vertex as a game with a look has them, and of an index.
 const VERTEX: usize = 32;
 
-fn mountains() -> NoiseHeights {
-    NoiseHeights { seed: 7, kind: NoiseKind::Ridged, octaves: 7, scale: 1400.0, amplitude: 420.0, base: 0.0 }
-}
-
-/// Facts of nodes, found once.
-#[derive(Default)]
-struct Known(RefCell<HashMap<Node, GroundFacts>>);
-
-impl Known {
-    fn learn(&self, world: &World, cut: &Cut) {
-        let nodes: Vec<Node> = cut.nodes().filter(|node| !self.0.borrow().contains_key(node)).collect();
-        let facts = |node: Node| (node, GroundFacts::new(world.ground(), cut.grid(), node));
-        let found: Vec<_> = nodes.into_par_iter().map(facts).collect();
-        self.0.borrow_mut().extend(found);
-    }
-
-    /// The cut that an eye needs, level by level from the coarsest, as the plugin reaches it.
-    fn cut(&self, world: &World, choice: &Choice, mut cut: Cut, eye: Eye) -> Cut {
-        loop {
-            self.learn(world, &cut);
-            let next = choice.cut(&cut, &[eye], |node| {
-                let known = self.0.borrow().get(&node).copied();
-                known.map_or(NodeFacts::default(), |GroundFacts { heights, error }| NodeFacts {
-                    heights,
-                    error,
-                    has_edits: world.has_edits(cut.grid(), node),
-                })
-            });
-            if next == cut {
-                return cut;
-            }
-            cut = next;
+/// The cut that an eye needs, level by level from the coarsest, as the plugin reaches it.
+fn cut_for(world: &World, choice: &Choice, eye: Eye) -> Cut {
+    let (known, mut cut) = (KnownNodes::default(), Cut::coarsest(world.level_grid(u8::MAX)));
+    loop {
+        let next = known.next_cut(world, &cut, choice, &[eye], usize::MAX);
+        if next == cut {
+            return cut;
         }
+        cut = next;
     }
 }
 
 fn main() {
     let given = std::env::args().skip(1).find_map(|arg| arg.parse().ok());
     let side = given.unwrap_or(16u32).clamp(1, 128) * 1024;
-    let source = NoiseSource::new(&mountains()).expect("valid noise");
+    let source = NoiseSource::new(&mountains::heights()).expect("valid noise");
     let ground = Arc::new(Ground::from_source(side, side, source).expect("a valid size"));
     let terrain = || Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
     let middle = side as f32 / 2.0 + 137.0;
@@ -77,8 +54,7 @@ fn main() {
 
 /// Digs of radius 4 near the eye, with a cut drawn and without, in turns.
 fn digs(mut terrains: [Terrain; 2], summit: Vec3) {
-    let coarsest = Cut::coarsest(terrains[0].world().level_grid(u8::MAX));
-    let cut = Known::default().cut(terrains[0].world(), &Choice::default(), coarsest, eye(summit));
+    let cut = cut_for(terrains[0].world(), &Choice::default(), eye(summit));
     let (drawn, _) = terrains[0].world().draw_cut(cut);
     terrains[0].set_drawn_cut(Some(Arc::new(drawn)));
     let mut times = [Vec::new(), Vec::new()];
@@ -145,11 +121,9 @@ fn views(world: &World, summit: Vec3) {
         "\n| view, km | nodes | triangles all round, millions | in sight, p50 | most | nodes by level |"
     );
     println!("| --- | --- | --- | --- | --- | --- |");
-    let known = Known::default();
     for view in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0] {
         let choice = Choice { view_distance: view * 1000.0, ..Choice::default() };
-        let coarsest = Cut::coarsest(world.level_grid(u8::MAX));
-        let cut = known.cut(world, &choice, coarsest, eye(summit));
+        let cut = cut_for(world, &choice, eye(summit));
         let nodes: Vec<Node> = cut.nodes().collect();
         let triangles = |&node: &Node| (node, world.node_mesh(&cut, node).indices.len() / 3);
         let triangles: Vec<(Node, usize)> = nodes.par_iter().map(triangles).collect();
@@ -183,11 +157,9 @@ fn bytes(nodes: &[NodeUpdate]) -> usize {
 fn load(terrain: Terrain, summit: Vec3) {
     let world = terrain.world();
     let start = Instant::now();
-    let coarsest = Cut::coarsest(world.level_grid(u8::MAX));
-    let (_, first) = world.draw_cut(coarsest.clone());
+    let (_, first) = world.draw_cut(Cut::coarsest(world.level_grid(u8::MAX)));
     let first_took = start.elapsed();
-    let known = Known::default();
-    let cut = known.cut(world, &Choice::default(), coarsest, eye(summit));
+    let cut = cut_for(world, &Choice::default(), eye(summit));
     let chosen = start.elapsed();
     let (drawn, all) = world.draw_cut(cut);
     let took = start.elapsed();
@@ -254,10 +226,8 @@ fn nodes(world: &World, summit: Vec3) {
 /// A minute at 100 m/s, 60 frames a second, one change of levels or transaction a frame.
 fn flight(mut terrain: Terrain, summit: Vec3) {
     const FRAMES: usize = 3600;
-    let known = Arc::new(std::sync::Mutex::new(HashMap::<Node, GroundFacts>::new()));
-    let coarsest = Cut::coarsest(terrain.world().level_grid(u8::MAX));
-    let start = Known::default().cut(terrain.world(), &Choice::default(), coarsest, eye(summit));
-    let (drawn, _) = terrain.world().draw_cut(start);
+    let known = Arc::new(KnownNodes::default());
+    let (drawn, _) = terrain.world().draw_cut(cut_for(terrain.world(), &Choice::default(), eye(summit)));
     terrain.set_drawn_cut(Some(Arc::new(drawn)));
     let (mut made, mut digs, mut cuts, mut most_nodes) = (0, Vec::new(), Vec::new(), 0);
     let begin = Instant::now();
@@ -278,24 +248,9 @@ fn flight(mut terrain: Terrain, summit: Vec3) {
             continue;
         }
         let known = Arc::clone(&known);
-        let choose: Arc<ChooseCut> = Arc::new(move |world, cut| {
-            let mut known = known.lock().expect("not poisoned");
-            let new: Vec<Node> = cut.nodes().filter(|node| !known.contains_key(node)).collect();
-            let facts = |node: Node| (node, GroundFacts::new(world.ground(), cut.grid(), node));
-            known.extend(new.into_par_iter().map(facts).collect::<Vec<_>>());
-            let eyes = [Eye { position: at, velocity, pixels: PIXELS }];
-            let target = Choice::default().cut(cut, &eyes, |node| {
-                let known = known.get(&node).copied();
-                known.map_or(NodeFacts::default(), |GroundFacts { heights, error }| NodeFacts {
-                    heights,
-                    error,
-                    has_edits: world.has_edits(cut.grid(), node),
-                })
-            });
-            let mut next = cut.clone();
-            next.step_to(&target, 16, |node| u64::from(node.level));
-            next
-        });
+        let eyes = [Eye { position: at, velocity, pixels: PIXELS }];
+        let choose: Arc<ChooseCut> =
+            Arc::new(move |world, cut| known.next_cut(world, cut, &Choice::default(), &eyes, 16));
         let start = Instant::now();
         let commit = terrain.begin_cut(choose).expect("a cut is drawn").run();
         cuts.push(start.elapsed());

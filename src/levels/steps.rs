@@ -35,6 +35,12 @@ impl Cut {
     /// merged last. Nodes are merged first while there are more of them than the other cut has, so that on the way there
     /// are at most three more than at one of its ends.
     pub fn step_to(&mut self, other: &Self, most_meshes: usize, rank: impl Fn(Node) -> u64) -> Option<Step> {
+        // Most steps lead all the way.
+        let all = self.changes_to(other);
+        if all.mesh_count() <= most_meshes {
+            self.clone_from(other);
+            return (!all.new.is_empty()).then_some(all);
+        }
         let before = self.clone();
         let mut changed = Vec::new();
         let mut step = Step::default();

@@ -1,16 +1,13 @@
 //! Levels of detail as components: a game's settings, what is shown, and what the plugin knows of a terrain's nodes.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::Arc;
 
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
-use rayon::prelude::*;
-use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::lattice::TilePos;
-use crate::levels::{Choice, Cut, Eye, LevelGrid, Node, NodeFacts};
-use crate::terrain::{GroundFacts, Version, World as Ground};
+use crate::levels::{Choice, Cut, Eye};
+use crate::terrain::{KnownNodes, Version};
 
 /// Draws far ground coarsely: insert it on a terrain's entity, and worlds may be many kilometres wide.
 ///
@@ -109,83 +106,6 @@ impl WantedTiles {
     }
 }
 
-/// What is known of nodes, shared with tasks. Heights and errors depend on the ground alone, and are kept for nodes that were
-/// drawn once.
-#[derive(Default)]
-pub(super) struct KnownNodes {
-    facts: RwLock<FxHashMap<Node, GroundFacts>>,
-    /// Nodes with edits, at one version of the world.
-    edited: RwLock<Option<(Version, Arc<FxHashSet<Node>>)>>,
-    /// Nodes that were still to change when the last cut was chosen.
-    waiting: AtomicUsize,
-}
-
-impl KnownNodes {
-    /// Finds the facts of these nodes where they are not known yet.
-    pub(super) fn learn(&self, world: &Ground, grid: LevelGrid, nodes: &[Node]) {
-        let is_new = |node: &&Node| !self.read().contains_key(node);
-        let new: Vec<Node> = nodes.iter().filter(is_new).copied().collect();
-        let facts = |node| (node, GroundFacts::new(world.ground(), grid, node));
-        let found: Vec<_> = new.into_par_iter().map(facts).collect();
-        self.facts.write().unwrap_or_else(PoisonError::into_inner).extend(found);
-    }
-
-    fn read(&self) -> std::sync::RwLockReadGuard<'_, FxHashMap<Node, GroundFacts>> {
-        self.facts.read().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn edited(&self, world: &Ground, grid: LevelGrid) -> Arc<FxHashSet<Node>> {
-        let mut known = self.edited.write().unwrap_or_else(PoisonError::into_inner);
-        match &*known {
-            Some((version, nodes)) if *version == world.version() => Arc::clone(nodes),
-            _ => {
-                let nodes = Arc::new(world.edited_nodes(grid));
-                *known = Some((world.version(), Arc::clone(&nodes)));
-                nodes
-            }
-        }
-    }
-
-    /// One step towards the cut that these eyes need. Nodes that were not drawn yet are not split, so what is coarse comes
-    /// first.
-    pub(super) fn next_cut(
-        &self,
-        world: &Ground,
-        cut: &Cut,
-        choice: &Choice,
-        eyes: &[Eye],
-        most: usize,
-    ) -> Cut {
-        let edited = self.edited(world, cut.grid());
-        let target = {
-            let facts = self.read();
-            choice.cut(cut, eyes, |node| {
-                let known = facts.get(&node).copied();
-                known.map_or(NodeFacts::default(), |GroundFacts { heights, error }| NodeFacts {
-                    heights,
-                    error,
-                    has_edits: edited.contains(&node),
-                })
-            })
-        };
-        let nearest = |node: Node| {
-            let (low, high) = cut.grid().columns(node);
-            let [low, high] = [low, high].map(|column| Vec2::new(column.x as f32, column.z as f32));
-            let distance = |eye: &Eye| {
-                let place = eye.position.xz();
-                place.distance(place.clamp(low, high.max(low)))
-            };
-            eyes.iter().map(distance).fold(f32::INFINITY, f32::min) as u64
-        };
-        let mut next = cut.clone();
-        let step = next.step_to(&target, most, nearest).unwrap_or_default();
-        self.learn(world, cut.grid(), &step.new);
-        let changed = next.nodes().filter(|&node| !target.contains(node)).count();
-        self.waiting.store(changed.max(step.new.len()), Ordering::Relaxed);
-        next
-    }
-}
-
 /// What a terrain's levels were last chosen for.
 #[derive(Component, Default)]
 pub(super) struct LevelState {
@@ -213,7 +133,7 @@ impl LevelState {
     pub(super) fn count(&mut self, changed: usize) -> usize {
         self.is_settled = changed == 0;
         self.is_complete |= self.is_settled;
-        if self.is_settled { 0 } else { self.known.waiting.load(Ordering::Relaxed) }
+        if self.is_settled { 0 } else { self.known.waiting() }
     }
 
     /// Notes a transaction with edits.

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
-use super::level_state::{KnownNodes, LevelState, LevelsOfDetail, ShownLevels};
+use super::level_state::{LevelState, LevelsOfDetail, ShownLevels};
 use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{InFlight, TaskCounter};
@@ -18,7 +18,7 @@ use super::threads::{ThreadTask, Threads};
 use super::{BurrowSettings, ChunkCreated, MaterialColors, SlimVertices, SurfaceProcessors};
 use crate::lattice::ChunkPos;
 use crate::levels::Cut;
-use crate::terrain::{Drawn, DrawnCut, Terrain, World};
+use crate::terrain::{Drawn, DrawnCut, KnownNodes, Terrain, World};
 
 /// Surfaces of one snapshot that are built, and passed to the renderer, until all can be shown.
 #[derive(Component)]
@@ -265,7 +265,7 @@ fn build_levels(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
     let _span = info_span!("burrow_load").entered();
     let known = Arc::new(KnownNodes::default());
     let cut = Cut::coarsest(world.level_grid(u8::MAX));
-    known.learn(world, cut.grid(), &cut.nodes().collect::<Vec<_>>());
+    known.learn(world, cut.grid(), cut.nodes());
     let (drawn, updates) = world.draw_cut(cut);
     let chunks: Vec<Drawn> = world.drawn_chunks().map(Drawn::Chunk).collect();
     let build = |&drawn: &Drawn| builder.build((drawn, false), false, || world.draft(drawn));

@@ -25,6 +25,7 @@ mod for_plugin;
 mod groups;
 mod history;
 mod inspect;
+mod known_nodes;
 #[cfg(test)]
 mod level_laws;
 mod level_meshes;
@@ -57,6 +58,7 @@ pub use commit::Commit;
 pub use drawn_cut::{ChooseCut, DrawnCut, NodeUpdate};
 pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
+pub use known_nodes::KnownNodes;
 pub use level_meshes::GroundFacts;
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use model::{StaleCommit, Terrain};

@@ -217,3 +217,24 @@ fn a_server_without_meshes_has_no_use_for_levels_and_loses_nothing_by_them() {
     assert_eq!(stage.receipts().len(), 1);
     assert!(stage.terrain(terrain).world().bricks().count() > 0);
 }
+
+#[test]
+fn levels_follow_a_camera_while_brushes_come_in_every_frame() {
+    let mut stage = Stage::drawing();
+    let (terrain, camera) = show(&mut stage, mountains());
+    let there = Vec3::new(300.0, 40.0, 250.0);
+    stage.app.world_mut().get_mut::<Transform>(camera).expect("the camera").translation = there;
+    let level = |stage: &Stage| {
+        let drawn = stage.terrain(terrain).drawn_cut().expect("a cut");
+        drawn.cut().node_at(TilePos { x: 18, z: 15 }).expect("inside the world").level
+    };
+    assert!(level(&stage) > 0);
+    let mut frame = 0;
+    stage.frames_until("the ground there is fine", |stage| {
+        stage.send(dig(40.0 + (frame % 30) as f32, 20.0, 40.0, 2.0));
+        frame += 1;
+        level(stage) == 0
+    });
+    stage.settle();
+    stage.assert_whole(terrain, "dug and moved");
+}

@@ -1,0 +1,89 @@
+//! What is known of the nodes of a world's quadtree, and the cuts that eyes need by it.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
+
+use glam::{Vec2, Vec3Swizzles};
+use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use super::level_meshes::GroundFacts;
+use super::world::{Version, World};
+use crate::levels::{Choice, Cut, Eye, LevelGrid, Node, NodeFacts};
+
+/// What is known of nodes, shared with tasks. Heights and errors depend on the ground alone, and are kept for nodes that were
+/// drawn once.
+#[derive(Default)]
+pub struct KnownNodes {
+    facts: RwLock<FxHashMap<Node, GroundFacts>>,
+    /// Nodes with edits, at one version of the world.
+    edited: RwLock<Option<(Version, Arc<FxHashSet<Node>>)>>,
+    waiting: AtomicUsize,
+}
+
+impl KnownNodes {
+    /// Finds the facts of these nodes where they are not known yet, in parallel.
+    pub fn learn(&self, world: &World, grid: LevelGrid, nodes: impl Iterator<Item = Node>) {
+        let new: Vec<Node> = {
+            let known = self.read();
+            nodes.filter(|node| !known.contains_key(node)).collect()
+        };
+        let facts = |node| (node, GroundFacts::new(world.ground(), grid, node));
+        let found: Vec<_> = new.into_par_iter().map(facts).collect();
+        self.facts.write().unwrap_or_else(PoisonError::into_inner).extend(found);
+    }
+
+    /// Nodes that were still to change when the last cut was chosen.
+    pub fn waiting(&self) -> usize {
+        self.waiting.load(Ordering::Relaxed)
+    }
+
+    fn read(&self) -> RwLockReadGuard<'_, FxHashMap<Node, GroundFacts>> {
+        self.facts.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn edited(&self, world: &World, grid: LevelGrid) -> Arc<FxHashSet<Node>> {
+        let mut known = self.edited.write().unwrap_or_else(PoisonError::into_inner);
+        match &*known {
+            Some((version, nodes)) if *version == world.version() => Arc::clone(nodes),
+            _ => {
+                let nodes = Arc::new(world.edited_nodes(grid));
+                *known = Some((world.version(), Arc::clone(&nodes)));
+                nodes
+            }
+        }
+    }
+
+    /// One step of `most` meshes at most, or of one change, towards the cut that these eyes need. Nodes that were not drawn
+    /// yet, and so are not known, are not split: what is coarse comes first.
+    pub fn next_cut(&self, world: &World, cut: &Cut, choice: &Choice, eyes: &[Eye], most: usize) -> Cut {
+        self.learn(world, cut.grid(), cut.nodes());
+        let edited = self.edited(world, cut.grid());
+        let target = {
+            let facts = self.read();
+            choice.cut(cut, eyes, |node| {
+                let known = facts.get(&node).copied();
+                known.map_or(NodeFacts::default(), |GroundFacts { heights, error }| NodeFacts {
+                    heights,
+                    error,
+                    has_edits: edited.contains(&node),
+                })
+            })
+        };
+        let nearest = |node: Node| {
+            let (low, high) = cut.grid().columns(node);
+            let [low, high] = [low, high].map(|column| Vec2::new(column.x as f32, column.z as f32));
+            let distance = |eye: &Eye| {
+                let place = eye.position.xz();
+                place.distance(place.clamp(low, high.max(low)))
+            };
+            eyes.iter().map(distance).fold(f32::INFINITY, f32::min) as u64
+        };
+        let mut next = cut.clone();
+        let step = next.step_to(&target, most, nearest).unwrap_or_default();
+        self.learn(world, cut.grid(), step.new.iter().copied());
+        let changed = next.nodes().filter(|&node| !target.contains(node)).count();
+        self.waiting.store(changed.max(step.new.len()), Ordering::Relaxed);
+        next
+    }
+}
