@@ -200,3 +200,26 @@ fn edits_and_receipts_know_no_levels() {
         assert!(with.drawn().eq(without.drawn()), "world {index}: level 0 differs");
     }
 }
+
+#[test]
+fn cuts_of_another_world_are_not_drawn() {
+    let terrain = |side| {
+        let ground = Ground::flat(side, side, 4.5).expect("valid ground");
+        Terrain::new(ground, &TerrainSettings { chunk_size: 8, ..TerrainSettings::default() }).expect("valid")
+    };
+    let (mut small, large) = (terrain(40), terrain(500));
+    let foreign = Cut::random(large.world().level_grid(4), 3, 70);
+    let (drawn, nodes) = small.world().draw_cut(foreign.clone());
+    assert_eq!(drawn.cut().grid().chunks(), small.world().grid());
+    let mut display = Display::default();
+    display.show_nodes(&nodes);
+    display.assert_is_closed(small.world(), drawn.cut(), "the coarsest");
+    small.set_drawn_cut(Some(Arc::new(large.world().draw_cut(foreign.clone()).0)));
+    assert!(small.drawn_cut().is_none());
+    small.set_drawn_cut(Some(Arc::new(drawn)));
+    let change = small.begin_cut(Arc::new(move |_, _| foreign.clone())).expect("a cut is drawn");
+    let commit = change.run();
+    assert!(commit.meshes.nodes.is_empty());
+    small.commit(commit).expect("the one under way");
+    assert_eq!(small.drawn_cut().expect("as before").cut().grid().chunks(), small.world().grid());
+}

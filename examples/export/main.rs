@@ -53,6 +53,7 @@ mod tests;
 
 use std::fs::File;
 use std::io::{self, Read, Write};
+use std::num::ParseFloatError;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -97,7 +98,7 @@ struct Args {
     #[arg(long, value_name = "N", default_value_t = 32)]
     chunk_size: u32,
     /// Export what would be drawn from here, in voxels, with levels of detail
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, value_parser = finite)]
     eye: Vec<f32>,
     /// Pixels of the picture's height, for an angle of view of 45 degrees
     #[arg(long, value_name = "PIXELS", default_value_t = 1440, value_parser = clap::value_parser!(u32).range(1..=65536))]
@@ -111,6 +112,12 @@ struct Args {
     /// Folder for mesh.obj and report.json; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+}
+
+/// A number that is finite.
+fn finite(text: &str) -> Result<f32, String> {
+    let number: f32 = text.parse().map_err(|error: ParseFloatError| error.to_string())?;
+    if number.is_finite() { Ok(number) } else { Err("it must be finite".into()) }
 }
 
 /// Why there is no export.

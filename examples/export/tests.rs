@@ -448,6 +448,8 @@ fn random_cuts_are_closed() {
     assert!(seen.len() > 1, "all cuts are alike");
     let both = folder.run(&edits, &["--random-cut", "1", "--eye", "1", "2", "3"]);
     assert_eq!(both.expect_err("which one?").0, 2);
+    let nowhere = folder.run(&edits, &["--eye", "nan", "2", "3"]).expect_err("nowhere");
+    assert!(nowhere.0 == 2 && nowhere.1.contains("finite"), "{nowhere:?}");
 }
 
 #[test]

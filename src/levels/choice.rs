@@ -7,6 +7,12 @@ use super::{Cut, LevelGrid, Node};
 /// How much larger all limits get each time there would be too many nodes.
 const GROWTH: f32 = 1.2;
 
+/// The least of all limits in pixels: what is less, or no number, counts as this.
+const LEAST_PIXELS: f32 = 0.01;
+
+/// The least share of limits at which a node stays split: with none, nothing would ever be merged.
+const LEAST_STAY: f32 = 0.01;
+
 /// The most often they grow: by then they are so large that only nodes around an eye are split.
 const MOST_GROWTHS: u32 = 60;
 
@@ -71,13 +77,15 @@ impl Default for Choice {
 
 impl Choice {
     /// The cut that these eyes need, all together, wherever they look: turning changes nothing. `before` is the one that they
-    /// had.
+    /// had. Eyes whose numbers are not finite see nothing.
     pub fn cut(&self, before: &Cut, eyes: &[Eye], facts: impl Fn(Node) -> NodeFacts) -> Cut {
         let grid = before.grid();
+        let is_somewhere = |eye: &&Eye| eye.position.is_finite() && eye.pixels.is_finite();
+        let eyes: Vec<Eye> = eyes.iter().filter(is_somewhere).copied().collect();
         let with_limits = |growth: f32| {
             Cut::new(grid, |node| {
-                let share = if before.is_split(node) { self.stay } else { 1.0 };
-                self.is_split(grid, node, facts(node), eyes, [share, growth])
+                let share = if before.is_split(node) { self.stay.clamp(LEAST_STAY, 1.0) } else { 1.0 };
+                self.is_split(grid, node, facts(node), &eyes, [share, growth])
             })
         };
         let mut cut = with_limits(1.0);
@@ -100,7 +108,7 @@ impl Choice {
         eyes: &[Eye],
         [share, growth]: [f32; 2],
     ) -> bool {
-        let limit = share * growth;
+        let limit = |pixels: f32| pixels.max(LEAST_PIXELS) * share * growth;
         let (low, high) = grid.columns(node);
         let low = Vec3::new(low.x as f32, facts.heights[0], low.z as f32);
         let high = Vec3::new(high.x as f32, facts.heights[1], high.z as f32);
@@ -112,9 +120,9 @@ impl Choice {
             let distance = places.map(distance).into_iter().fold(f32::INFINITY, f32::min);
             // One voxel away it is large enough in any case.
             let pixels = eye.pixels / distance.max(1.0);
-            let is_rough = stride * pixels > self.cell_pixels * limit
-                && facts.error * pixels > self.error_pixels * limit;
-            let is_edited = has_edits && stride * pixels > self.edited_pixels * limit;
+            let is_rough =
+                stride * pixels > limit(self.cell_pixels) && facts.error * pixels > limit(self.error_pixels);
+            let is_edited = has_edits && stride * pixels > limit(self.edited_pixels);
             distance * share <= self.view_distance && (is_rough || is_edited)
         })
     }
@@ -203,6 +211,22 @@ mod tests {
             for own in eyes {
                 let cut = choice.cut(&coarsest, &[own], mountains);
                 prop_assert!(cut.split_nodes().all(|node| all.is_split(node)));
+            }
+        }
+    }
+
+    #[test]
+    fn limits_that_make_no_sense_give_a_cut_of_few_nodes() {
+        for odd in [f32::NAN, f32::NEG_INFINITY, -5.0, 0.0, f32::INFINITY] {
+            for choice in [
+                Choice { cell_pixels: odd, error_pixels: odd, edited_pixels: odd, ..Choice::default() },
+                Choice { view_distance: odd, look_ahead: odd, stay: odd, ..Choice::default() },
+            ] {
+                for eye in [eye(8000.0, 8000.0), eye(odd, 0.0), Eye { pixels: odd, ..eye(9.0, 9.0) }] {
+                    let cut = choice.cut(&Cut::coarsest(world()), &[eye], mountains);
+                    let count = cut.nodes().count();
+                    assert!(count <= choice.most_nodes, "{count} nodes for {choice:?}, {eye:?}");
+                }
             }
         }
     }

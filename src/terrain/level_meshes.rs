@@ -71,7 +71,7 @@ impl World {
     }
 
     /// Is the cut one of this world's tiles?
-    fn has_cut(&self, cut: &Cut) -> bool {
+    pub(super) fn has_cut(&self, cut: &Cut) -> bool {
         cut.grid().chunks() == self.grid
     }
 

@@ -19,8 +19,9 @@ use crate::surface::vertex::WorldView;
 pub(super) type NewParts<'a> = (&'a [(TilePos, TileUpdate)], &'a [(ChunkPos, Arc<ChunkSurface>)]);
 
 impl World {
-    /// A cut as it is drawn, and all meshes for it.
+    /// A cut as it is drawn, and all meshes for it. In place of a cut of a world of another size, the coarsest is drawn.
     pub fn draw_cut(&self, cut: Cut) -> (DrawnCut, Vec<NodeUpdate>) {
+        let cut = if self.has_cut(&cut) { cut } else { Cut::coarsest(self.level_grid(u8::MAX)) };
         let mut nodes: Vec<Node> = cut.nodes().collect();
         nodes.sort_unstable();
         let before = DrawnCut { cut: Cut::coarsest(cut.grid()), joined: FxHashSet::default() };
@@ -66,7 +67,9 @@ pub(crate) type NodeChanges = (Arc<DrawnCut>, Vec<NodeUpdate>);
 
 /// What leads from one cut to another: the nodes that are gone, those that are new, and those that touch them.
 pub(super) fn change_cut(world: &World, drawn: &DrawnCut, choose: &ChooseCut) -> NodeChanges {
-    let cut = choose(world, &drawn.cut);
+    let chosen = choose(world, &drawn.cut);
+    // One of another quadtree leads nowhere.
+    let cut = if chosen.grid() == drawn.cut.grid() { chosen } else { drawn.cut.clone() };
     let state = State::committed(world);
     let step = drawn.cut.changes_to(&cut);
     let mut nodes = step.new;

@@ -313,11 +313,11 @@ impl Terrain {
         self.drawn_cut.as_ref()
     }
 
-    /// Draws the nodes of a cut from now on, or with `None` all of the world in full. Everything has to be drawn anew:
+    /// Draws the nodes of a cut from now on, or with `None`, or a cut of a world of another size, all of the world in full. Everything has to be drawn anew:
     /// [`World::draw_cut`] makes the meshes. A transaction under way is given up, and its work queued again.
     pub fn set_drawn_cut(&mut self, drawn: Option<Arc<DrawnCut>>) {
         self.abandon();
-        self.drawn_cut = drawn;
+        self.drawn_cut = drawn.filter(|drawn| self.world.has_cut(drawn.cut()));
     }
 
     /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](MeshUpdates::nodes) are what has to
