@@ -45,7 +45,7 @@ impl Ground {
     ///
     /// # Errors
     /// [`GroundError::Parameter`] for a rule with a parameter out of its range, and if a material is
-    /// [`MaterialId::GROUND`]; [`GroundError::Memory`] if the machine has too little.
+    /// [`MaterialId::GROUND`](super::MaterialId::GROUND); [`GroundError::Memory`] if the machine has too little.
     pub fn with_materials(self, control: &MaterialControl) -> Result<Self, GroundError> {
         control.check()?;
         let materials = match control {

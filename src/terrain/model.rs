@@ -320,7 +320,7 @@ impl Terrain {
         self.drawn_cut = drawn.filter(|drawn| self.world.has_cut(drawn.cut()));
     }
 
-    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](MeshUpdates::nodes) are what has to
+    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](super::MeshUpdates::nodes) are what has to
     /// be drawn. `None` while another transaction is under way, and where all of the world is drawn in full.
     #[must_use = "the terrain waits for the commit of its transaction"]
     pub fn begin_cut(&mut self, choose: Arc<ChooseCut>) -> Option<Transaction> {
