@@ -39,7 +39,8 @@ pub enum LogEntry {
 /// A commit: what was asked for, and what came of it.
 #[derive(Clone, Debug)]
 pub struct CommitRecord {
-    /// The [revision](super::World::revision) that it led to: one more than that of the record before.
+    /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same where only
+    /// rules or settings changed.
     pub revision: u64,
     /// The world's [hash](super::World::hash) after it.
     pub hash: u64,
@@ -54,6 +55,8 @@ pub struct CommitRecord {
 pub struct WorldParts {
     /// Every stored brick, and all fields.
     pub change: WorldChange,
+    /// Cells along the side of the chunks that the fields belong to.
+    pub chunk_size: u32,
     /// Its revision.
     pub revision: u64,
     /// The rules for edits; `None` if there are none.

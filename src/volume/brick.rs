@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::layers::{self, Layers};
 use crate::ground::{Ground, MaterialId};
-use crate::lattice::{BRICK, BrickPos, Column, ceil, hash};
+use crate::lattice::{BRICK, BrickPos, Column, LatticeBox, ceil, hash};
 
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
@@ -203,6 +203,11 @@ impl Brick {
     /// Which samples are edited.
     pub fn edited(&self) -> &Layers {
         &self.edited
+    }
+
+    /// The box around the edited samples of the brick at `pos`.
+    pub(crate) fn edited_bounds(&self, pos: BrickPos) -> Option<LatticeBox> {
+        layers::bounds(&self.edited, pos.origin())
     }
 
     /// Samples in order: x fastest, then z, then y.
