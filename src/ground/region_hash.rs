@@ -27,8 +27,8 @@ mod tests {
 
     #[test]
     fn a_changed_height_changes_the_hash_of_its_region_only() {
-        let ground = |raised: Option<(u32, u32)>| {
-            let height = |x: u32, z: u32| if raised == Some((x, z)) { 9.0 } else { f64::from(x % 7) };
+        let ground = |raised: Option<(i32, i32)>| {
+            let height = |x: i32, z: i32| if raised == Some((x, z)) { 9.0 } else { f64::from(x % 7) };
             Ground::from_fn(200, 100, height).expect("valid heights")
         };
         let hashes = |ground: Ground| {
