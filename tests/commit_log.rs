@@ -323,6 +323,23 @@ fn nothing_is_meshed_that_nobody_asks_for() {
     assert!(meshes(server.world()) == meshes(shown.world()));
 }
 
+#[test]
+fn a_piece_that_broke_off_comes_back_from_a_save() {
+    let mut terrain = flat();
+    terrain.set_loose(Some(LooseSettings { largest: 4096, crumbs: 0, debris: 4096 }));
+    let place = Vec3::new(32.0, 20.0, 32.0);
+    terrain.apply([Brush::add(Shape::cuboid(place, Vec3::new(3.0, 12.0, 3.0)), MaterialId(2))]);
+    let receipts = terrain.apply([Brush::dig(Shape::cuboid(place.with_y(14.0), Vec3::new(6.0, 2.0, 6.0)))]);
+    let piece = &receipts[0].outcome.as_ref().expect("applied").loose[0];
+    assert!(piece.mesh.is_some());
+    let json = serde_json::to_string(piece).expect("it can be saved");
+    assert_eq!(serde_json::from_str::<LoosePiece>(&json).expect("it can be read"), *piece);
+    // No triangle may point beyond the vertices.
+    let vertices = piece.mesh.as_ref().map_or(0, |mesh| mesh.vertices.len());
+    let broken = json.replacen("\"indices\":[", &format!("\"indices\":[{vertices},0,0,"), 1);
+    assert!(serde_json::from_str::<LoosePiece>(&broken).is_err());
+}
+
 /// If this fails, the same edits no longer give the same world: raise [`SIMULATION`] and enter the new hash.
 #[test]
 fn the_simulation_has_its_number() {
