@@ -294,6 +294,7 @@
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
+//! | `store` | worlds on disk: a commit journal, checkpoints, portable files | |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
@@ -328,6 +329,8 @@ pub mod panel;
 pub mod physics;
 #[cfg(feature = "plugin")]
 pub mod plugin;
+#[cfg(feature = "store")]
+pub mod store;
 pub mod surface;
 pub mod terrain;
 #[cfg(feature = "render")]

@@ -31,6 +31,7 @@ mod on_demand;
 mod page;
 mod pages;
 mod png;
+mod region_hash;
 mod rules;
 mod source;
 mod sources;

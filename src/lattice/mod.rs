@@ -17,12 +17,14 @@ mod grid;
 pub(crate) mod hash;
 mod parallel;
 mod places;
+mod region;
 mod tables;
 
 pub use boxes::LatticeBox;
 pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
 pub(crate) use parallel::{ItemCost, parallel_map, parallel_map_into, pieces, side_by_side};
 pub(crate) use places::{order_of_places, sort_by_place};
+pub use region::RegionPos;
 pub(crate) use tables::{give_back, table_bytes};
 
 use glam::IVec3;

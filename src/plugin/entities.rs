@@ -270,7 +270,7 @@ pub(crate) fn trigger_if_alive<'a, E: EntityEvent<Trigger<'a>: Default>>(command
 
 /// Does a chunk have no field, and draw nothing?
 pub(super) fn is_empty(world: &World, chunk: ChunkPos) -> bool {
-    world.fields_of(chunk).is_none() && !world.draws(chunk)
+    world.fields_of(chunk).is_none() && !world.may_draw(chunk)
 }
 
 /// Records which surface an entity shows, and runs the actions that come with it.

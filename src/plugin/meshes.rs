@@ -71,6 +71,7 @@ impl MeshBuilder {
             SurfaceDraft::Nothing => None,
             SurfaceDraft::Tile(tile) => self.build_tile(origin, tile),
             SurfaceDraft::Chunk(chunk) => self.build_whole(origin, chunk.mesh()),
+            SurfaceDraft::Unmeshed(chunk) => self.build_whole(origin, chunk.surface().mesh()),
         }
     }
 

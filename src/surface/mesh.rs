@@ -1,13 +1,14 @@
 //! Vertices and meshes, local to the chunk or tile that draws them.
 
 use glam::{IVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use super::indices::Indices;
 use crate::ground::{ColumnMaterial, MaterialId};
 use crate::lattice::SNAP;
 
 /// Up to four materials with weights that sum up to 255.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MaterialMix {
     /// Material ids; those without weight are 0.
     pub ids: [u8; 4],
@@ -73,7 +74,7 @@ impl MaterialMix {
 }
 
 /// A vertex of the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Vertex {
     /// Position in 1/4096 voxel, local to the chunk or tile.
     pub position: IVec3,
@@ -96,12 +97,47 @@ impl Vertex {
 }
 
 /// An indexed triangle mesh; triangles are counter-clockwise seen from the air.
-#[derive(Clone, Debug, Default, PartialEq)]
+///
+/// One that is deserialised has no index beyond its vertices.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Unchecked", into = "Unchecked")]
 pub struct SurfaceMesh {
     /// Vertices, shared by the triangles of a block or tile.
     pub vertices: Vec<Vertex>,
     /// Three for each triangle.
     pub indices: Indices,
+}
+
+/// A mesh as it comes from a file.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "SurfaceMesh")]
+struct Unchecked {
+    vertices: Vec<Vertex>,
+    indices: Vec<u32>,
+}
+
+impl From<SurfaceMesh> for Unchecked {
+    fn from(mesh: SurfaceMesh) -> Self {
+        Self { indices: mesh.indices.iter().collect(), vertices: mesh.vertices }
+    }
+}
+
+impl TryFrom<Unchecked> for SurfaceMesh {
+    type Error = &'static str;
+
+    fn try_from(of: Unchecked) -> Result<Self, Self::Error> {
+        let vertices = of.vertices.len();
+        if of.indices.len() % 3 != 0 {
+            return Err("the indices of the mesh are no triangles");
+        }
+        if of.indices.iter().any(|&index| index as usize >= vertices) {
+            return Err("the mesh has an index beyond its vertices");
+        }
+        if of.vertices.iter().any(|vertex| !vertex.normal.is_finite()) {
+            return Err("the mesh has a normal that is not finite");
+        }
+        Ok(Self { indices: Indices::new(vertices, of.indices), vertices: of.vertices })
+    }
 }
 
 impl SurfaceMesh {

@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use super::drawn_cut::DrawnCut;
 use super::field_log::FieldNews;
-use super::history::{HistoryReceipt, UndoDelta};
+use super::history::{HistoryReceipt, Restored, UndoDelta};
+use super::put::ChangeError;
 use super::receipt::Receipt;
+use super::record::WorldChange;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;
 use super::surface::ChunkSurface;
@@ -27,9 +29,15 @@ pub struct Commit {
     pub(super) next_field: u64,
     pub(super) receipts: Vec<Receipt>,
     pub(super) step: Option<HistoryReceipt>,
+    /// What became of parts that it puts in place.
+    pub(super) put: Option<Result<Restored, ChangeError>>,
+    /// The bricks and fields that it leads to, where a log is kept.
+    pub(super) logged: Option<WorldChange>,
     pub(super) news: Vec<(ChunkPos, FieldNews)>,
     pub(super) surfaces: Vec<(ChunkPos, Arc<ChunkSurface>)>,
     pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
+    /// Chunks that change without being meshed.
+    pub(super) outdated: Vec<ChunkPos>,
     /// What is drawn then, if that changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Does it change only what is drawn?
@@ -58,6 +66,8 @@ pub(super) struct Installed {
     pub receipts: Vec<Receipt>,
     /// The receipt of a step through history, if the commit was one.
     pub step: Option<HistoryReceipt>,
+    /// What became of parts that it put in place.
+    pub put: Option<Result<Restored, ChangeError>>,
     /// What each group replaced that replaced something.
     pub replaced: Vec<UndoDelta>,
 }
@@ -97,7 +107,12 @@ impl Commit {
         if let Some(uniform) = self.uniform {
             world.set_uniform(uniform);
         }
+        for chunk in self.outdated {
+            world.surfaces.remove(&chunk);
+            world.unmeshed.insert(chunk);
+        }
         for (chunk, surface) in self.surfaces {
+            world.unmeshed.remove(&chunk);
             if surface.is_empty() {
                 world.surfaces.remove(&chunk);
             } else {
@@ -114,7 +129,7 @@ impl Commit {
         world.shrink();
         world.next_field = self.next_field;
         world.revision += 1;
-        Installed { receipts: self.receipts, step: self.step, replaced }
+        Installed { receipts: self.receipts, step: self.step, put: self.put, replaced }
     }
 }
 

@@ -37,7 +37,8 @@ pub(super) fn dirty_cells<T: Sync>(
 pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> Mask {
     let words = dirty.collect(|stacks, found| {
         let mut bricks = Vec::with_capacity(stacks.len());
-        let at_sheet = stacks.chunk_by(is_same_stack).filter_map(|stack| at_sheet(world, stack, &mut bricks));
+        let at_sheet =
+            stacks.chunk_by(is_same_stack).filter_map(|stack| at_sheet(world, view, stack, &mut bricks));
         let sheets: Vec<PristineStack> = at_sheet.collect();
         let (mut rest, mut sheets) = (&bricks[..], &sheets[..]);
         while let Some((count, places)) = window::shared(rest.iter().copied()) {
@@ -67,9 +68,14 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
 
 /// Adds to `bricks` those of a stack that the pristine surface crosses and that may have cells that join the mask. Returns that
 /// surface, or `None` where there are no such bricks.
-fn at_sheet(world: &World, stack: &[OfBrick], bricks: &mut Vec<BrickPos>) -> Option<PristineStack> {
+fn at_sheet(
+    world: &World,
+    view: &WorldView,
+    stack: &[OfBrick],
+    bricks: &mut Vec<BrickPos>,
+) -> Option<PristineStack> {
     let word = stack[0].brick.stack();
-    if !stack.iter().any(|own| own.may_join) || world.mask.word(word) == u64::MAX {
+    if !stack.iter().any(|own| own.may_join) || view.mask.word(word) == u64::MAX {
         return None;
     }
     let (sheet, before) = (PristineStack::new(&world.ground, word), bricks.len());

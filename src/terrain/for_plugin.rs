@@ -8,7 +8,7 @@ use super::history::{DeferredDrop, HistoryStep};
 use super::model::{StaleCommit, Terrain};
 use super::queue::{Request, Submission};
 use super::receipt::Receipt;
-use super::transaction::{Transaction, Work};
+use super::transaction::Work;
 use super::unseen::Unseen;
 use super::world::Version;
 
@@ -33,7 +33,7 @@ impl Terrain {
     fn submissions_in_flight(&self) -> impl Iterator<Item = &Submission> {
         self.in_flight.iter().flat_map(|waiting| match &waiting.work {
             Work::Edits(submissions) => &submissions[..],
-            Work::Step(..) | Work::Cut(_) => &[],
+            Work::Step(..) | Work::Put(_) | Work::Cut(_) => &[],
         })
     }
 
@@ -41,11 +41,11 @@ impl Terrain {
     pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
         let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
             Work::Step(step, _) => Some(step),
-            Work::Edits(_) | Work::Cut(_) => None,
+            Work::Edits(_) | Work::Put(_) | Work::Cut(_) => None,
         });
         let queued = self.queue.iter().filter_map(|request| match request {
             Request::Step(step) => Some(*step),
-            Request::Edit(_) => None,
+            Request::Edit(_) | Request::Put(_) => None,
         });
         in_flight.chain(queued)
     }
@@ -67,7 +67,7 @@ impl Terrain {
     pub(crate) fn rejected(&self, ticket: u64) -> Option<Commit> {
         let waiting = self.in_flight.as_ref().filter(|waiting| waiting.ticket == ticket)?;
         let work = waiting.work.clone();
-        Some(Transaction { ticket, world: self.snapshot(), work, engine: None, drawn_cut: None }.rejected())
+        Some(self.transaction(ticket, work).rejected())
     }
 
     /// Is the transaction of this ticket under way?

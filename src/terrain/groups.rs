@@ -131,8 +131,7 @@ pub(super) fn edit(transaction: &Transaction, submissions: &[Submission], backen
     }
     let view = WorldView { mask: MaskView::new(&world.mask).over(&all_mask), ..before };
     let positions = || bricks.iter().map(|drafted| drafted.pos).collect();
-    let drawn = transaction.drawn_cut.as_ref().map(|drawn| (drawn, positions()));
-    let meshes = || redraw::updates(world, &view, backend, &dirty, &all_mask, drawn, &mut stages);
+    let meshes = || redraw::updates(transaction, &view, backend, &dirty, &all_mask, positions, &mut stages);
     let all = groups.iter().map(|group| (group.submissions, &*group.bricks));
     let all = all.chain([(last, &*draft.bricks)]).zip(effects);
     let (meshes, entered) =

@@ -55,7 +55,7 @@ impl World {
         let (low, high) = (self.grid.chunk_of(inside.min), self.grid.chunk_of(inside.max));
         let tiles =
             (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Drawn::Tile(TilePos { x, z })));
-        let mut chunks = found_in(&self.surfaces, LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() });
+        let mut chunks = self.maybe_drawn_in(LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() });
         chunks.sort_unstable();
         tiles.chain(chunks.into_iter().map(Drawn::Chunk)).collect()
     }
@@ -69,7 +69,7 @@ impl World {
         };
         let size = IVec3::splat(self.grid.size());
         let places = LatticeBox { min: inside.min.div_euclid(size), max: inside.max.div_euclid(size) };
-        let mut chunks = found_in(&self.surfaces, places);
+        let mut chunks = self.maybe_drawn_in(places);
         chunks.append(&mut found_in(&self.fields, places));
         chunks.sort_unstable();
         chunks.dedup();
@@ -113,7 +113,14 @@ impl World {
         Box::new(self.stacks.keys().copied().filter(is_in))
     }
 
-    /// The mesh of a chunk as it is kept; `None` where it draws nothing.
+    /// The chunks whose positions lie in a box that draw something, or may.
+    fn maybe_drawn_in(&self, places: LatticeBox) -> Vec<ChunkPos> {
+        let mut chunks = found_in(&self.surfaces, places);
+        chunks.extend(self.unmeshed.iter().copied().filter(|chunk| places.contains(chunk.as_ivec3())));
+        chunks
+    }
+
+    /// The mesh of a chunk as it is kept; `None` where it draws nothing or no mesh is kept.
     pub fn chunk_surface(&self, chunk: ChunkPos) -> Option<&SurfaceMesh> {
         self.surfaces.get(&chunk).map(|surface| surface.mesh())
     }

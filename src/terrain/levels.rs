@@ -187,7 +187,7 @@ impl<'a> State<'a> {
         if !rows.is_empty() {
             let ys = rows.start.div_euclid(size)..=(rows.end - 1).div_euclid(size);
             let places = ys.map(|y| ChunkPos { x: tile.x, y, z: tile.z });
-            chunks.extend(places.filter(|chunk| self.world.surfaces.contains_key(chunk)));
+            chunks.extend(places.filter(|chunk| self.world.may_draw(*chunk)));
         }
         let (_, new) = self.parts;
         chunks.extend(new.iter().map(|(chunk, _)| *chunk).filter(|chunk| chunk.tile() == tile));

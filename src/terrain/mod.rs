@@ -30,15 +30,20 @@ mod known_nodes;
 mod level_laws;
 mod level_meshes;
 mod levels;
+mod log;
 mod loose;
 mod model;
 #[cfg(test)]
 mod order;
+mod put;
 mod query;
 mod queue;
 mod ray;
 mod receipt;
+mod record;
 mod redraw;
+mod regions;
+mod replay;
 mod restore;
 mod run;
 mod settings;
@@ -50,6 +55,7 @@ mod surface_draft;
 mod tiles;
 mod transaction;
 mod triangles;
+mod unmeshed;
 #[cfg(feature = "plugin")]
 mod unseen;
 mod world;
@@ -62,12 +68,15 @@ pub use known_nodes::KnownNodes;
 pub use level_meshes::GroundFacts;
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use model::{StaleCommit, Terrain};
+pub use put::ChangeError;
 pub use query::{RayHit, Span};
 #[cfg(feature = "plugin")]
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
+pub use record::{CommitRecord, LogEntry, SIMULATION, WorldChange, WorldParts};
 pub use redraw::MeshUpdates;
+pub use replay::{ReplayError, RestoreError};
 pub use settings::{TerrainError, TerrainSettings};
 pub use stages::Stages;
 pub use surface::ChunkSurface;
@@ -75,6 +84,7 @@ pub use surface::ChunkSurface;
 pub(crate) use surface_draft::SurfaceDraft;
 pub use surface_draft::TileUpdate;
 pub use transaction::Transaction;
+pub use unmeshed::Meshing;
 #[cfg(feature = "plugin")]
 pub(crate) use unseen::Unseen;
 #[cfg(any(feature = "plugin", test))]

@@ -6,12 +6,15 @@ use std::sync::Arc;
 
 use super::commit::Commit;
 use super::drawn_cut::{ChooseCut, DrawnCut};
-use super::history::{DeferredDrop, HistoryReceipt, UndoStack};
+use super::history::{DeferredDrop, HistoryReceipt, Restored, UndoStack};
+use super::log::CommitLog;
 use super::loose::LooseSettings;
+use super::put::ChangeError;
 use super::queue::{Queue, Request, Taken};
 use super::receipt::Receipt;
 use super::settings::{TerrainError, TerrainSettings};
 use super::transaction::{Transaction, Work};
+use super::unmeshed::Meshing;
 #[cfg(feature = "plugin")]
 use super::unseen::Unseen;
 use super::world::{World, unique};
@@ -62,6 +65,9 @@ pub struct Terrain {
     pub(super) loose: Option<LooseSettings>,
     pub(super) undo_stack: UndoStack,
     pub(super) step_receipts: VecDeque<HistoryReceipt>,
+    pub(super) change_receipts: VecDeque<Result<Restored, ChangeError>>,
+    pub(super) log: Option<CommitLog>,
+    pub(super) meshing: Meshing,
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// What the game committed since the plugin last showed the world; `None` while the plugin does not show it.
     #[cfg(feature = "plugin")]
@@ -109,6 +115,9 @@ impl Terrain {
             loose: None,
             undo_stack: UndoStack::new(UNDO_BUDGET),
             step_receipts: VecDeque::new(),
+            change_receipts: VecDeque::new(),
+            log: None,
+            meshing: Meshing::default(),
             drawn_cut: None,
             #[cfg(feature = "plugin")]
             unseen: None,
@@ -130,6 +139,7 @@ impl Terrain {
     pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
         rules.check()?;
         self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
+        self.log_terms();
         Ok(())
     }
 
@@ -163,6 +173,7 @@ impl Terrain {
     /// default, turns that off. Terrains that must have equal worlds need equal settings.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
         self.loose = settings;
+        self.log_terms();
     }
 
     /// The settings of the search for loose pieces.
@@ -198,6 +209,7 @@ impl Terrain {
         let (work, estimate) = loop {
             match self.queue.take()? {
                 (Taken::Edits(edits), estimate) => break (Work::Edits(edits), estimate),
+                (Taken::Put(put), estimate) => break (Work::Put(put), estimate),
                 (Taken::Step(step), estimate) => match self.undo_stack.next(step) {
                     Some(target) => break (Work::Step(step, Arc::clone(target)), estimate),
                     None => {
@@ -218,8 +230,20 @@ impl Terrain {
     fn start(&mut self, work: Work, estimate: u64, is_plugins: bool) -> Transaction {
         let ticket = unique();
         self.in_flight = Some(InFlight { ticket, work: work.clone(), estimate, is_plugins });
-        let (engine, drawn_cut) = (self.engine.clone(), self.drawn_cut.clone());
-        Transaction { ticket, world: self.snapshot(), work, engine, drawn_cut }
+        self.transaction(ticket, work)
+    }
+
+    /// A transaction on the world as it is.
+    pub(super) fn transaction(&self, ticket: u64, work: Work) -> Transaction {
+        Transaction {
+            ticket,
+            world: self.snapshot(),
+            work,
+            engine: self.engine.clone(),
+            drawn_cut: self.drawn_cut.clone(),
+            meshing: self.meshing,
+            is_logged: self.log.is_some(),
+        }
     }
 
     /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.
@@ -256,17 +280,26 @@ impl Terrain {
         {
             self.world = copy;
         }
+        let logged = commit.logged.take();
         let installed = commit.install(Arc::make_mut(&mut self.world));
         self.queue.finish(done.estimate);
         installed.step.into_iter().for_each(|receipt| self.answer_step(receipt));
+        if let Some(log) = &mut self.log {
+            log.enter(&self.world, &done.work, &installed.receipts, logged.unwrap_or_default());
+        }
+        self.log_terms();
         let mut dropped = DeferredDrop::default();
         dropped.copy = copy;
         for replaced in installed.replaced {
             match &done.work {
                 Work::Edits(_) => self.undo_stack.record(replaced, &mut dropped),
                 Work::Step(step, used) => self.undo_stack.record_step(*step, used, replaced, &mut dropped),
+                Work::Put(_) => self.undo_stack.clear(),
                 Work::Cut(_) => {}
             }
+        }
+        if let Some(receipt) = installed.put {
+            keep(&mut self.change_receipts, receipt);
         }
         Ok((installed.receipts, dropped))
     }
@@ -287,6 +320,7 @@ impl Terrain {
         match lost.work {
             Work::Edits(submissions) => self.queue.put_back(submissions.iter().cloned().map(Request::Edit)),
             Work::Step(step, _) => self.queue.put_back(std::iter::once(Request::Step(step))),
+            Work::Put(put) => self.queue.put_back(std::iter::once(Request::Put(put))),
             // It was not queued either.
             Work::Cut(_) => {}
         }
@@ -298,6 +332,7 @@ impl Terrain {
         let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
             Work::Edits(submissions) => submissions.iter().all(|submission| submission.misses(bounds)),
             Work::Step(_, target) => target.bounds.is_none_or(|own| own.intersection(bounds).is_none()),
+            Work::Put(put) => put.misses(bounds),
             Work::Cut(_) => true,
         });
         let mut queued = self.queue.iter();
@@ -305,6 +340,7 @@ impl Terrain {
             && queued.all(|request| match request {
                 Request::Edit(submission) => submission.misses(bounds),
                 Request::Step(_) => !self.undo_stack.reaches(bounds),
+                Request::Put(put) => put.misses(bounds),
             })
     }
 

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::history::HistoryStep;
 use super::loose::LooseSettings;
+use super::put::Put;
 use super::receipt::Rejection;
 use crate::brush::{Edit, Kind};
 use crate::edits::reach;
@@ -112,13 +113,14 @@ impl Submission {
 pub(super) enum Request {
     Edit(Submission),
     Step(HistoryStep),
+    Put(Arc<Put>),
 }
 
 impl Request {
     fn work(&self) -> u64 {
         match self {
             Self::Edit(submission) => submission.work,
-            Self::Step(_) => STEP,
+            Self::Step(_) | Self::Put(_) => STEP,
         }
     }
 }
@@ -165,6 +167,13 @@ impl Queue {
         self.requests.push_back(Request::Step(step));
     }
 
+    /// Queues parts that are put in place. Edits after them begin a new group.
+    pub fn push_put(&mut self, put: Put) {
+        self.close_group();
+        self.work += STEP;
+        self.requests.push_back(Request::Put(Arc::new(put)));
+    }
+
     /// Lets the next edit begin a new group.
     pub fn close_group(&mut self) {
         self.open = None;
@@ -196,9 +205,14 @@ impl Queue {
 
     /// Takes the next step, or edits up to the first step and to the limit of a transaction; and their work.
     pub fn take(&mut self) -> Option<(Taken, u64)> {
-        if let &Request::Step(step) = self.requests.front()? {
+        let single = match self.requests.front()? {
+            Request::Edit(_) => None,
+            Request::Step(step) => Some(Taken::Step(*step)),
+            Request::Put(put) => Some(Taken::Put(Arc::clone(put))),
+        };
+        if let Some(single) = single {
             self.requests.pop_front();
-            return Some((Taken::Step(step), STEP));
+            return Some((single, STEP));
         }
         let mut work = 0_u64;
         let is_taken = |request: &&Request| {
@@ -209,7 +223,7 @@ impl Queue {
         let count = self.requests.iter().take_while(is_taken).count();
         let edits = self.requests.drain(..count).filter_map(|request| match request {
             Request::Edit(submission) => Some(submission),
-            Request::Step(_) => None,
+            Request::Step(_) | Request::Put(_) => None,
         });
         let edits: Arc<[Submission]> = edits.collect();
         // Frees what a flood of edits needed.
@@ -243,7 +257,7 @@ impl Queue {
     pub fn edits(&self) -> impl Iterator<Item = &Submission> {
         self.requests.iter().filter_map(|request| match request {
             Request::Edit(submission) => Some(submission),
-            Request::Step(_) => None,
+            Request::Step(_) | Request::Put(_) => None,
         })
     }
 }
@@ -252,4 +266,5 @@ impl Queue {
 pub(super) enum Taken {
     Edits(Arc<[Submission]>),
     Step(HistoryStep),
+    Put(Arc<Put>),
 }

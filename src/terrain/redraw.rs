@@ -13,6 +13,8 @@ use super::stages::Stages;
 use super::surface::{ChunkSurface, Fresh, Key};
 use super::surface_draft::TileUpdate;
 use super::tiles::TileWork;
+use super::transaction::Transaction;
+use super::unmeshed::{self, Meshing};
 use super::world::World;
 use crate::backend::Compute;
 use crate::lattice::{
@@ -35,22 +37,36 @@ pub struct MeshUpdates {
     pub nodes: Vec<NodeUpdate>,
     /// What is drawn then, if that changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
+    /// Chunks that change without being meshed.
+    pub(super) outdated: Vec<ChunkPos>,
 }
 
-/// Every mesh that these cells change, and `newer` words of the mask. With what is drawn comes which bricks change.
+/// Every mesh that these cells change, and `newer` words of the mask. `bricks` says which bricks change.
 pub(super) fn updates(
-    world: &World,
+    transaction: &Transaction,
     view: &WorldView,
     backend: &dyn Compute,
     dirty: &ByBrick,
     newer: &Mask,
-    drawn: Option<(&Arc<DrawnCut>, Vec<BrickPos>)>,
+    bricks: impl Fn() -> Vec<BrickPos>,
     stages: &mut Stages,
 ) -> MeshUpdates {
+    let world = &*transaction.world;
     let Stages { meshing, assembly, ring, .. } = stages;
+    if transaction.meshing == Meshing::Never {
+        let blocks = Stages::time(meshing, || dirty_blocks(world, view, newer, dirty));
+        let mut outdated: Vec<ChunkPos> = blocks.iter().map(|block| block.chunk).collect();
+        outdated.sort_unstable();
+        outdated.dedup();
+        return MeshUpdates { outdated, ..MeshUpdates::default() };
+    }
     let tiles = TileWork::new(world, view, newer);
     let mut chunks = |meanwhile: &(dyn Fn() + Sync)| {
-        let blocks = Stages::time(meshing, || dirty_blocks(world, view, newer, dirty));
+        let blocks = Stages::time(meshing, || {
+            let mut blocks = dirty_blocks(world, view, newer, dirty);
+            unmeshed::complete(world, view, &mut blocks);
+            blocks
+        });
         mesh_blocks(world, view, backend, &blocks, meanwhile, meshing, assembly)
     };
     // Tiles and chunks do not depend on each other: each is made while the other leaves threads idle.
@@ -67,9 +83,9 @@ pub(super) fn updates(
     let (tiles, took) = tiles.finish();
     *ring += took;
     let mut meshes = MeshUpdates { tiles, chunks, ..MeshUpdates::default() };
-    if let Some((drawn, bricks)) = drawn {
+    if let Some(drawn) = &transaction.drawn_cut {
         let (after, nodes) = Stages::time(meshing, || {
-            redraw_changed(world, view, drawn, (&meshes.tiles, &meshes.chunks), &bricks, &areas(dirty))
+            redraw_changed(world, view, drawn, (&meshes.tiles, &meshes.chunks), &bricks(), &areas(dirty))
         });
         (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
     }
@@ -181,7 +197,9 @@ fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn Mes
     let update = |chunk: ChunkPos, numbers: &[u32]| {
         let nothing = ChunkSurface::default();
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
-        Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh))?)))
+        // That nothing is drawn is news of a chunk whose surface was not kept.
+        let empty = || world.unmeshed.contains(&chunk).then(ChunkSurface::default);
+        Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh)).or_else(empty)?)))
     };
     if !ItemCost::Lookup.is_shared(blocks.len()) {
         return by_chunk.iter().filter_map(|(own, numbers)| update(own.chunk, numbers)).collect();

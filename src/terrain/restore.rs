@@ -1,23 +1,61 @@
-//! A step through history as a transaction: bricks, fields and mask of another time are put in place.
+//! Bricks, fields and mask of another time, put in place of those of now: a step through history, and what that shares with
+//! parts from a save.
 
 use std::sync::Arc;
 
 use web_time::Instant;
 
-use super::change::replaced_bytes;
+use super::change::{Change, replaced_bytes};
 use super::commit::Commit;
 use super::dirty::dirty_cells;
-use super::field_log::news_of_replaced;
+use super::field_log::{FieldNews, news_of_replaced};
 use super::history::{HistoryReceipt, HistoryStep, Restored, UndoDelta};
-use super::redraw;
+use super::redraw::{self, MeshUpdates};
 use super::stages::Stages;
 use super::transaction::Transaction;
 use crate::backend::Compute;
 use crate::edits::{EditEffect, count_replaced};
-use crate::lattice::LatticeBox;
+use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{Brick, Fields, pristine_layers};
+
+/// What is drawn otherwise, and what happens to fields, when parts are put in place.
+pub(super) struct Placed {
+    pub meshes: MeshUpdates,
+    pub news: Vec<(ChunkPos, FieldNews)>,
+}
+
+/// Draws the world with a change; `bricks` are those of the change with pristine ones made, `changed` says where samples differ.
+pub(super) fn place(
+    transaction: &Transaction,
+    change: &Change,
+    bricks: &[(BrickPos, Arc<Brick>)],
+    changed: &[(BrickPos, LatticeBox)],
+    backend: &dyn Compute,
+    stages: &mut Stages,
+) -> Placed {
+    let world = &*transaction.world;
+    let mut mask = Mask::default();
+    change.mask.iter().for_each(|&(word, cells)| mask.lay_word(word, cells));
+    let latest: Vec<_> = bricks.iter().map(|(pos, brick)| (*pos, brick.as_ref())).collect();
+    let view = WorldView {
+        samples: world.samples().under(&latest),
+        mask: MaskView::new(&world.mask).over(&mask),
+        grid: world.grid,
+    };
+    let dirty = Stages::time(&mut stages.meshing, || {
+        dirty_cells(world.grid, changed, |&(pos, own)| (pos, own, false))
+    });
+    let positions = || bricks.iter().map(|(pos, _)| *pos).collect();
+    let meshes = redraw::updates(transaction, &view, backend, &dirty, &mask, positions, stages);
+    let nothing = Fields::default();
+    let news = change.fields.iter().flat_map(|(chunk, after)| {
+        let before = world.fields.get(chunk).unwrap_or(&nothing);
+        news_of_replaced(before, after).into_iter().map(|news| (*chunk, news))
+    });
+    Placed { meshes, news: news.collect() }
+}
 
 /// Puts in place what a step through history holds.
 pub(super) fn step(
@@ -39,27 +77,7 @@ pub(super) fn step(
             bricks.push((*pos, brick));
         }
     });
-    let mut mask = Mask::default();
-    change.mask.iter().for_each(|&(word, cells)| mask.lay_word(word, cells));
-    let latest: Vec<_> = bricks.iter().map(|(pos, brick)| (*pos, brick.as_ref())).collect();
-    let view = WorldView {
-        samples: world.samples().under(&latest),
-        mask: MaskView::new(&world.mask).over(&mask),
-        grid: world.grid,
-    };
-    let dirty = Stages::time(&mut stages.meshing, || {
-        dirty_cells(world.grid, &changed, |&(pos, own)| (pos, own, false))
-    });
-    let positions = || bricks.iter().map(|(pos, _)| *pos).collect();
-    let drawn = transaction.drawn_cut.as_ref().map(|drawn| (drawn, positions()));
-    let meshes = redraw::updates(world, &view, backend, &dirty, &mask, drawn, &mut stages);
-
-    let nothing = Fields::default();
-    let news = change.fields.iter().flat_map(|(chunk, after)| {
-        let before = world.fields.get(chunk).unwrap_or(&nothing);
-        news_of_replaced(before, after).into_iter().map(|news| (*chunk, news))
-    });
-    let news = news.collect();
+    let Placed { meshes, news } = place(transaction, &change, &bricks, &changed, backend, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let EditEffect { removed, added, painted, .. } = effect;
     let restored = Restored { tags: target.tags.clone(), bounds, removed, added, painted };

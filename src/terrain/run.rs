@@ -16,8 +16,10 @@ use super::commit::Commit;
 use super::drawn_cut::ChooseCut;
 use super::history::{HistoryReceipt, HistoryRejection};
 use super::levels;
+use super::put::{self, ChangeError};
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
+use super::record::WorldChange;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;
 use super::transaction::{Transaction, Work};
@@ -62,6 +64,7 @@ impl Transaction {
         let run = || match &self.work {
             Work::Edits(submissions) => groups::edit(self, submissions, backend),
             Work::Step(step, target) => restore::step(self, *step, target, backend),
+            Work::Put(parts) => put::put(self, parts, backend),
             Work::Cut(choose) => self.cut(choose.as_ref()),
         };
         // A large one runs on a thread of the pool: entering the pool for each stage would take longer.
@@ -71,7 +74,8 @@ impl Transaction {
         let mut stages = commit.stages;
         let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
         let copy = Stages::time(&mut stages.whole, copy);
-        Commit { copy, stages, ..commit }
+        let logged = self.is_logged.then(|| logged(&commit));
+        Commit { copy, logged, stages, ..commit }
     }
 
     /// May it reach so many bricks that several threads will work on them?
@@ -86,6 +90,7 @@ impl Transaction {
                     .is_shared(usize::try_from(bricks.fold(0, u64::saturating_add)).unwrap_or(usize::MAX))
             }
             Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.bricks.len()),
+            Work::Put(put) => ItemCost::Lookup.is_shared(put.change.bricks.len()),
             Work::Cut(_) => true,
         }
     }
@@ -156,9 +161,25 @@ impl Transaction {
                 let outcome = Err(HistoryRejection::Panicked);
                 Commit { step: Some(HistoryReceipt { step: *step, outcome }), ..commit }
             }
+            Work::Put(_) => Commit { put: Some(Err(ChangeError::Panicked)), ..commit },
             Work::Cut(_) => commit,
         }
     }
+}
+
+/// The bricks and fields that a commit leads to, as its record lists them.
+fn logged(commit: &Commit) -> WorldChange {
+    let (mut bricks, mut fields) = (Vec::new(), Vec::new());
+    // Of several groups the last one holds.
+    for change in commit.changes.iter().rev().map(|own| &own.change) {
+        bricks.extend(change.bricks.iter().cloned());
+        fields.extend(change.fields.iter().cloned());
+    }
+    bricks.sort_by_key(|(pos, _)| *pos);
+    bricks.dedup_by_key(|(pos, _)| *pos);
+    fields.sort_by_key(|(chunk, _)| *chunk);
+    fields.dedup_by_key(|(chunk, _)| *chunk);
+    WorldChange { bricks, fields, next_field: commit.next_field }
 }
 
 /// The tag of an edit that panics in tests has this bit.

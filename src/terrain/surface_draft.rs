@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use super::surface::ChunkSurface;
+use super::unmeshed::UnmeshedChunk;
 use super::world::Drawn;
 use super::world::World;
 use crate::ground::Ground;
@@ -64,6 +65,8 @@ pub(crate) enum SurfaceDraft {
     /// A tile; its columns can be made in other forms from the ground.
     Tile(TileUpdate),
     Chunk(Arc<ChunkSurface>),
+    /// A chunk whose surface is not kept: made where it is asked for.
+    Unmeshed(Arc<UnmeshedChunk>),
 }
 
 impl World {
@@ -76,7 +79,9 @@ impl World {
             }
             Drawn::Tile(_) => SurfaceDraft::Nothing,
             Drawn::Chunk(chunk) => {
-                self.surfaces.get(&chunk).cloned().map_or(SurfaceDraft::Nothing, SurfaceDraft::Chunk)
+                let unmeshed = || self.unmeshed(chunk).map(|chunk| SurfaceDraft::Unmeshed(Arc::new(chunk)));
+                let kept = self.surfaces.get(&chunk).cloned().map(SurfaceDraft::Chunk);
+                kept.or_else(unmeshed).unwrap_or(SurfaceDraft::Nothing)
             }
         }
     }
@@ -90,6 +95,7 @@ impl SurfaceDraft {
             Self::Nothing => true,
             Self::Tile(tile) => tile.indices().is_empty(),
             Self::Chunk(chunk) => chunk.is_empty(),
+            Self::Unmeshed(chunk) => chunk.surface().is_empty(),
         }
     }
 
@@ -99,6 +105,7 @@ impl SurfaceDraft {
             Self::Nothing => Cow::default(),
             Self::Tile(tile) => Cow::Owned(tile.mesh()),
             Self::Chunk(chunk) => Cow::Borrowed(chunk.mesh()),
+            Self::Unmeshed(chunk) => Cow::Borrowed(chunk.surface().mesh()),
         }
     }
 }

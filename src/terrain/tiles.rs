@@ -139,8 +139,7 @@ fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePo
             Arc::new(match world.rings.get(&tile) {
                 Some(old) => old.updated(view, tile, borders, &patches),
                 // They are kept from now on.
-                None if world.ground.steep_cells().is_some() => Rings::new(view, tile, borders),
-                None => Rings::default().updated(view, tile, borders, &patches),
+                None => Rings::new(view, tile, borders),
             })
         };
         let update = TileUpdate::new(world, view, tile, rings);

@@ -6,9 +6,11 @@ use std::sync::Arc;
 use super::commit::Commit;
 use super::drawn_cut::{ChooseCut, DrawnCut};
 use super::history::{HistoryStep, UndoDelta};
+use super::put::Put;
 use super::queue::Submission;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;
+use super::unmeshed::Meshing;
 use super::world::World;
 use crate::backend::Engine;
 
@@ -18,6 +20,8 @@ pub(super) enum Work {
     Edits(Arc<[Submission]>),
     /// A step, and what it puts in place.
     Step(HistoryStep, Arc<UndoDelta>),
+    /// Parts are put in place.
+    Put(Arc<Put>),
     /// Another cut is drawn.
     Cut(Arc<ChooseCut>),
 }
@@ -33,6 +37,9 @@ pub struct Transaction {
     pub(super) engine: Option<Engine>,
     /// What is drawn; `None` where all of the world is drawn in full.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
+    pub(super) meshing: Meshing,
+    /// Does the terrain keep a log?
+    pub(super) is_logged: bool,
 }
 
 impl fmt::Debug for Transaction {
@@ -55,7 +62,7 @@ impl Transaction {
     pub fn len(&self) -> usize {
         match &self.work {
             Work::Edits(submissions) => submissions.len(),
-            Work::Step(..) | Work::Cut(_) => 0,
+            Work::Step(..) | Work::Put(_) | Work::Cut(_) => 0,
         }
     }
 
@@ -74,11 +81,14 @@ impl Transaction {
             next_field: self.world.next_field,
             receipts: Vec::new(),
             step: None,
+            put: None,
+            logged: None,
             news: Vec::new(),
             copy: None,
             drawn_cut: meshes.drawn_cut.clone(),
             is_cut: matches!(self.work, Work::Cut(_)),
             surfaces: meshes.chunks.clone(),
+            outdated: meshes.outdated.clone(),
             rings: meshes.tiles.iter().map(|(tile, update)| (*tile, update.kept_rings())).collect(),
             meshes,
             stages: Stages::default(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::IVec3;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::surface::ChunkSurface;
 use crate::ground::Ground;
@@ -88,8 +88,10 @@ pub struct World {
     pub(super) fields: FxHashMap<ChunkPos, Fields>,
     pub(super) mask: Mask,
     pub(super) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
-    /// Of tiles that bordered on the mask when they were last drawn; some may have none. A tile that is not among them has
-    /// rings only if it has steep cells.
+    /// Chunks that may draw something and whose surface is not kept.
+    pub(super) unmeshed: FxHashSet<ChunkPos>,
+    /// Of tiles that bordered on the mask when they were last drawn; some may have none. Those of a tile that is not among them
+    /// are made when they are needed.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
     /// With this many kinds, unused ones are removed from the pool.
@@ -139,6 +141,7 @@ impl World {
             fields: FxHashMap::default(),
             mask: Mask::default(),
             surfaces: FxHashMap::default(),
+            unmeshed: FxHashSet::default(),
             rings: FxHashMap::default(),
             uniform: UniformBricks::default(),
             many_kinds: FEW_KINDS,
@@ -193,7 +196,13 @@ impl World {
     /// Hash of the ground and of every edited sample. It does not depend on chunk size, on how edits were batched, nor on
     /// the machine.
     pub fn hash(&self) -> u64 {
-        hash::mix(self.ground.hash() ^ hash::mix(self.sample_hash))
+        Self::hash_of(self.ground.hash(), self.sample_hash)
+    }
+
+    /// The hash of a world over a ground with this [hash](Ground::hash), whose [regions](Self::region_hash) have hashes with this
+    /// sum, which wraps around.
+    pub fn hash_of(ground: u64, regions: u64) -> u64 {
+        hash::mix(ground ^ hash::mix(regions))
     }
 
     /// The fields of each chunk that has any, in no order.
@@ -211,22 +220,19 @@ impl World {
         self.bricks.iter().map(|(&pos, brick)| (pos, brick.as_ref()))
     }
 
-    /// The chunks that draw something, in no order.
+    /// The chunks that draw something, in no order. Of a world that was [restored](super::Terrain::restore), or whose terrain
+    /// [never meshes](super::Meshing::Never), some may turn out to draw nothing.
     pub fn drawn_chunks(&self) -> impl Iterator<Item = ChunkPos> {
-        self.surfaces.keys().copied()
-    }
-
-    /// Whether the chunk draws something.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn draws(&self, chunk: ChunkPos) -> bool {
-        self.surfaces.contains_key(&chunk)
+        self.maybe_drawn()
     }
 
     /// The rings of a tile as it is drawn now: kept since the last edit nearby, or made from the undug ground.
     pub(super) fn tile_rings(&self, tile: TilePos, borders: &Borders) -> Arc<Rings> {
         match self.rings.get(&tile) {
             Some(rings) => Arc::clone(rings),
-            None if self.ground.steep_cells().is_some() => Arc::new(Rings::new(&self.view(), tile, borders)),
+            None if self.ground.steep_cells().is_some() || borders.has_bordering() => {
+                Arc::new(Rings::new(&self.view(), tile, borders))
+            }
             None => Arc::default(),
         }
     }
@@ -238,7 +244,8 @@ impl World {
 
     /// The mesh of a chunk, relative to its lowest lattice point; empty where it draws nothing.
     pub fn chunk_mesh(&self, chunk: ChunkPos) -> SurfaceMesh {
-        self.surfaces.get(&chunk).map(|surface| surface.mesh().clone()).unwrap_or_default()
+        let made = || self.unmeshed(chunk).map(|chunk| chunk.surface().mesh().clone());
+        self.surfaces.get(&chunk).map(|surface| surface.mesh().clone()).or_else(made).unwrap_or_default()
     }
 
     /// Where a mesh is placed: the lattice point that its positions count from.
@@ -284,6 +291,7 @@ impl World {
         give_back(&mut self.fields);
         give_back(&mut self.surfaces);
         give_back(&mut self.rings);
+        self.unmeshed.shrink_to(2 * self.unmeshed.len());
         self.mask.give_back();
     }
 

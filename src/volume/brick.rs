@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::layers::{self, Layers};
 use crate::ground::{Ground, MaterialId};
-use crate::lattice::{BRICK, BrickPos, Column, ceil, hash};
+use crate::lattice::{BRICK, BrickPos, Column, LatticeBox, ceil, hash};
 
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
@@ -130,6 +130,40 @@ impl Brick {
         brick
     }
 
+    /// A brick of a world over this ground, from its edited samples and their materials, both in order. Which samples are solid
+    /// is computed anew.
+    ///
+    /// `None` where there are not as many of them as `edited` has bits, where a density is [`i16::MIN`], or where a sample of air
+    /// has a material.
+    pub fn restored(
+        ground: &Ground,
+        pos: BrickPos,
+        edited: &Layers,
+        densities: &[i16],
+        materials: Option<&[MaterialId]>,
+    ) -> Option<Self> {
+        let count = layers::count(edited) as usize;
+        if densities.len() != count || materials.is_some_and(|materials| materials.len() != count) {
+            return None;
+        }
+        let mut brick = Self::pristine(pristine_layers(ground, pos));
+        for (number, index) in layers::indices(edited).enumerate() {
+            let (sample, material) = (Sample(densities[number]), materials.map(|all| all[number]));
+            sample.distance()?;
+            let is_solid = sample.0 < 0;
+            if !is_solid && material.is_some_and(|material| material != MaterialId::GROUND) {
+                return None;
+            }
+            brick.samples[index] = sample;
+            let bit = 1 << (index & 63);
+            brick.set_bits(index >> 6, bit, if is_solid { bit } else { 0 });
+            if let Some(material) = material {
+                brick.set_material(index, material);
+            }
+        }
+        Some(brick)
+    }
+
     /// A brick of samples, bits that agree with them, and materials.
     #[cfg(feature = "cuda")]
     pub(crate) fn of_parts(
@@ -169,6 +203,11 @@ impl Brick {
     /// Which samples are edited.
     pub fn edited(&self) -> &Layers {
         &self.edited
+    }
+
+    /// The box around the edited samples of the brick at `pos`.
+    pub(crate) fn edited_bounds(&self, pos: BrickPos) -> Option<LatticeBox> {
+        layers::bounds(&self.edited, pos.origin())
     }
 
     /// Samples in order: x fastest, then z, then y.
@@ -220,7 +259,7 @@ impl Brick {
     }
 
     /// The materials in order of the samples, `None` while all are [`MaterialId::GROUND`].
-    #[cfg(feature = "cuda")]
+    #[cfg(any(feature = "cuda", feature = "store"))]
     pub(crate) fn materials(&self) -> Option<&[MaterialId; LEN]> {
         self.materials.as_deref()
     }

@@ -3,8 +3,20 @@
 use crate::ground::MaterialId;
 
 /// Solid voxels per material, in the order of material ids. A lattice point is one voxel.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(from = "Vec<(MaterialId, u64)>")]
 pub struct MaterialCounts(Vec<(MaterialId, u64)>);
+
+impl From<Vec<(MaterialId, u64)>> for MaterialCounts {
+    /// Counts of one material are added up; a sum stays within 64 bits.
+    fn from(list: Vec<(MaterialId, u64)>) -> Self {
+        let mut counts = Self::default();
+        for (material, voxels) in list.into_iter().filter(|entry| entry.1 > 0) {
+            counts.count_many(material, voxels.min(u64::MAX - counts.of(material)));
+        }
+        counts
+    }
+}
 
 impl MaterialCounts {
     /// Counts more voxels of one material.

@@ -49,6 +49,14 @@ pub(crate) struct Absorbed {
 pub struct Fields(Vec<Field>);
 
 impl Fields {
+    /// Fields that were saved. `None` if two have the same name, or one has an empty box.
+    pub fn restored(mut fields: Vec<Field>) -> Option<Self> {
+        fields.sort_by_key(|field| field.id);
+        let is_valid = |field: &Field| field.bounds.min.cmple(field.bounds.max).all();
+        let is_unique = |pair: &[Field]| pair[0].id < pair[1].id;
+        (fields.iter().all(is_valid) && fields.windows(2).all(is_unique)).then_some(Self(fields))
+    }
+
     /// Every field of the chunk.
     pub fn iter(&self) -> impl Iterator<Item = &Field> {
         self.0.iter()

@@ -20,6 +20,7 @@ mod search;
 use std::sync::Arc;
 
 use glam::IVec3;
+use serde::{Deserialize, Serialize};
 
 use super::world::World;
 use crate::edits::{DraftedBrick, EditDelta, Overlay, take_out};
@@ -34,7 +35,7 @@ use search::{Component, Solid};
 ///
 /// Each edit that can remove ground is followed by a search before the next edit applies, so the result does not depend on how
 /// edits are batched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
     /// The largest piece to look for, in voxels. Larger ones count as anchored; this bounds the time of a search.
@@ -67,7 +68,7 @@ impl LooseSettings {
 }
 
 /// What happened to a loose piece.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum PieceFate {
     /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`] protect a part.
     Left,
@@ -78,7 +79,7 @@ pub enum PieceFate {
 }
 
 /// Solid samples in a row along x.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Run {
     /// The first of them.
     pub start: IVec3,
@@ -86,8 +87,10 @@ pub struct Run {
     pub len: u32,
 }
 
-/// A piece of ground that is not connected to the world.
-#[derive(Clone, Debug, PartialEq)]
+/// A piece of ground that is not connected to the world. It can be saved as it is, with its mesh: pieces that broke off are the
+/// game's, not the terrain's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Plain", into = "Plain")]
 pub struct LoosePiece {
     /// What happened to it.
     pub fate: PieceFate,
@@ -102,6 +105,33 @@ pub struct LoosePiece {
     /// Its surface as marching cubes draws it, closed, with positions counted from the lowest corner of `bounds`; for
     /// those that broke off.
     pub mesh: Option<Arc<SurfaceMesh>>,
+}
+
+/// A piece without shared parts, as it is saved.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "LoosePiece")]
+struct Plain {
+    fate: PieceFate,
+    bounds: LatticeBox,
+    voxels: u64,
+    materials: MaterialCounts,
+    runs: Vec<Run>,
+    mesh: Option<SurfaceMesh>,
+}
+
+impl From<LoosePiece> for Plain {
+    fn from(piece: LoosePiece) -> Self {
+        let LoosePiece { fate, bounds, voxels, materials, runs, mesh } = piece;
+        let mesh = mesh.map(Arc::unwrap_or_clone);
+        Self { fate, bounds, voxels, materials, runs: runs.to_vec(), mesh }
+    }
+}
+
+impl From<Plain> for LoosePiece {
+    fn from(of: Plain) -> Self {
+        let Plain { fate, bounds, voxels, materials, runs, mesh } = of;
+        Self { fate, bounds, voxels, materials, runs: runs.into(), mesh: mesh.map(Arc::new) }
+    }
 }
 
 impl World {

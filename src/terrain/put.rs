@@ -1,0 +1,295 @@
+//! Parts that are put in place of what a world holds: from a save, or from another machine that has the same world.
+
+use std::sync::Arc;
+
+use glam::IVec3;
+use rayon::prelude::*;
+use rustc_hash::FxHashSet;
+use web_time::Instant;
+
+use super::change::{Change, replaced_bytes};
+use super::commit::Commit;
+use super::dirty::{dirty_cells, joined_mask};
+use super::history::{Restored, UndoDelta};
+use super::model::Terrain;
+use super::record::WorldChange;
+use super::redraw::MeshUpdates;
+use super::restore::{Placed, place};
+use super::stages::Stages;
+use super::transaction::Transaction;
+use super::world::World;
+use crate::backend::Compute;
+use crate::edits::{EditEffect, count_replaced};
+use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
+use crate::surface::vertex::WorldView;
+use crate::surface::{Mask, MaskView};
+use crate::volume::layers::{self, offset};
+use crate::volume::{Brick, UniformBricks, column_hash, pristine_layers};
+
+/// Why parts were not put in place; nothing changed then.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChangeError {
+    /// Bricks come twice or out of order.
+    #[error("the brick {0:?} comes twice or out of order")]
+    Order(BrickPos),
+    /// A brick has edited samples that the world has not.
+    #[error("the brick {0:?} reaches out of the world")]
+    OutsideWorld(BrickPos),
+    /// A brick says of a pristine sample that it is solid where this ground is air, or the other way round.
+    #[error("the brick {0:?} belongs to another ground")]
+    OtherGround(BrickPos),
+    /// Fields of a chunk reach out of it.
+    #[error("fields of the chunk {0:?} reach out of it")]
+    Fields(ChunkPos),
+    /// The world would not have the hash that was expected.
+    #[error("the world would have the hash {found:#018x}, not {expected:#018x}")]
+    Hash {
+        /// What it would have.
+        found: u64,
+        /// What it should have.
+        expected: u64,
+    },
+    /// Too much work [waits](super::WorkLimits::waiting).
+    #[error("too much work waits already")]
+    Overloaded,
+    /// It panicked.
+    #[error("putting parts in place panicked; this is a bug of the plugin's")]
+    Panicked,
+}
+
+/// What is to be put in place.
+#[derive(Debug)]
+pub(super) struct Put {
+    pub change: WorldChange,
+    /// The hash that the world must have afterwards.
+    pub hash: Option<u64>,
+    /// Does its receipt count voxels?
+    pub counts: bool,
+}
+
+impl Put {
+    /// Does it certainly change none of these samples?
+    pub fn misses(&self, samples: LatticeBox) -> bool {
+        self.change.bricks.iter().all(|(pos, _)| pos.samples().intersection(samples).is_none())
+    }
+}
+
+/// A brick that is put in place.
+struct NewBrick {
+    pos: BrickPos,
+    brick: Option<Arc<Brick>>,
+    changed: Option<LatticeBox>,
+    effect: EditEffect,
+    /// By how much the hash of the world's samples changes.
+    hash: u64,
+}
+
+impl NewBrick {
+    fn new(
+        world: &World,
+        pos: BrickPos,
+        brick: Option<&Arc<Brick>>,
+        counts: bool,
+    ) -> Result<Self, ChangeError> {
+        let mut brick = brick.map(Arc::clone);
+        if let Some(new) = &brick {
+            let (bounds, own) = (world.grid.edit_bounds(), pos.samples());
+            let is_inside = |index| bounds.contains(pos.origin() + offset(index));
+            if !bounds.encloses(own) && !layers::indices(new.edited()).all(is_inside) {
+                return Err(ChangeError::OutsideWorld(pos));
+            }
+            let pristine = layers::without(&pristine_layers(&world.ground, pos), new.edited());
+            if layers::without(new.solid(), new.edited()) != pristine {
+                return Err(ChangeError::OtherGround(pos));
+            }
+        }
+        // One without an edited sample is pristine.
+        brick.take_if(|brick| *brick.edited() == layers::NONE);
+        let before = world.bricks.get(&pos);
+        let mut effect = EditEffect::default();
+        let changed = if counts || before.is_some() {
+            let pair = [before.map(Arc::as_ref), brick.as_deref()];
+            count_replaced(&world.ground, pos, pair, &mut effect)
+        } else {
+            brick.as_ref().and_then(|brick| layers::bounds(brick.edited(), pos.origin()))
+        };
+        let columns = columns_of(pos);
+        let hash = |brick: Option<&Arc<Brick>>| {
+            brick.map_or(0, |brick| brick.hash(pos.origin().y, brick.edited(), &columns))
+        };
+        let hash = hash(brick.as_ref()).wrapping_sub(hash(before));
+        Ok(Self { pos, brick, changed, effect, hash })
+    }
+}
+
+/// The hashes of a brick's columns.
+pub(super) fn columns_of(pos: BrickPos) -> [u64; 64] {
+    let low = Column::of(pos.origin());
+    std::array::from_fn(|bit| column_hash(low.offset(bit as i32 & 7, bit as i32 >> 3)))
+}
+
+/// Puts parts in place.
+pub(super) fn put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> Commit {
+    let start = Instant::now();
+    let commit = checked_put(transaction, put, backend);
+    let failed = |error| {
+        let commit = transaction.commit(Vec::new(), transaction.world.sample_hash, MeshUpdates::default());
+        Commit { put: Some(Err(error)), ..commit }
+    };
+    let mut commit = commit.unwrap_or_else(failed);
+    commit.stages.whole = start.elapsed();
+    commit
+}
+
+fn checked_put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> Result<Commit, ChangeError> {
+    let (world, change, mut stages) = (&*transaction.world, &put.change, Stages::default());
+    check_order(&change.bricks)?;
+    check_fields(world, change)?;
+    let all = change.bricks.par_iter().with_min_len(64);
+    let all = all.map(|(pos, brick)| NewBrick::new(world, *pos, brick.as_ref(), put.counts));
+    let mut new = Stages::time(&mut stages.edit, || all.collect::<Result<Vec<NewBrick>, ChangeError>>())?;
+    let delta = new.iter().fold(0u64, |sum, own| sum.wrapping_add(own.hash));
+    let sample_hash = world.sample_hash.wrapping_add(delta);
+    let found = World::hash_of(world.ground.hash(), sample_hash);
+    if let Some(expected) = put.hash.filter(|&expected| expected != found) {
+        return Err(ChangeError::Hash { found, expected });
+    }
+    let uniform = share_uniform(world, &mut new);
+    let mut effect = EditEffect::default();
+    for own in &mut new {
+        let EditEffect { removed, added, painted, .. } = std::mem::take(&mut own.effect);
+        effect.removed.add(&removed);
+        effect.added.add(&added);
+        effect.painted.add(&painted);
+    }
+    let bricks: Vec<(BrickPos, Option<Arc<Brick>>)> =
+        new.iter().map(|own| (own.pos, own.brick.clone())).collect();
+    let changed: Vec<(BrickPos, LatticeBox)> =
+        new.iter().filter_map(|own| Some((own.pos, own.changed?))).collect();
+    let pristine = |pos| Arc::new(Brick::pristine(pristine_layers(&world.ground, pos)));
+    let whole: Vec<(BrickPos, Arc<Brick>)> =
+        bricks.iter().map(|(pos, brick)| (*pos, brick.clone().unwrap_or_else(|| pristine(*pos)))).collect();
+    let words = Stages::time(&mut stages.ring, || words_of(world, &whole, &changed));
+    let change = Change { bricks, fields: change.fields.clone(), mask: words, sample_hash };
+    let replaced = change.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
+    let Placed { meshes, news } = place(transaction, &change, &whole, &changed, backend, &mut stages);
+    let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
+    let EditEffect { removed, added, painted, .. } = effect;
+    let restored = Restored { tags: Vec::new(), bounds, removed, added, painted };
+    let delta = UndoDelta::new(change, replaced, 0, Vec::new());
+    Ok(Commit {
+        put: Some(Ok(restored)),
+        news,
+        uniform,
+        next_field: world.next_field.max(put.change.next_field),
+        stages,
+        ..transaction.commit(vec![delta], sample_hash, meshes)
+    })
+}
+
+fn check_order(bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> Result<(), ChangeError> {
+    let wrong = bricks.windows(2).find(|pair| pair[0].0 >= pair[1].0);
+    wrong.map_or(Ok(()), |pair| Err(ChangeError::Order(pair[1].0)))
+}
+
+fn check_fields(world: &World, change: &WorldChange) -> Result<(), ChangeError> {
+    for (chunk, fields) in &change.fields {
+        let own = world.grid.chunk_samples(*chunk);
+        let is_inside =
+            world.grid.has_tile(chunk.tile()) && fields.iter().all(|field| own.encloses(field.bounds));
+        if !is_inside {
+            return Err(ChangeError::Fields(*chunk));
+        }
+    }
+    Ok(())
+}
+
+/// Lets uniform bricks of one kind be one; returns the pool, if it has grown.
+fn share_uniform(world: &World, new: &mut [NewBrick]) -> Option<UniformBricks> {
+    let mut grown: Option<UniformBricks> = None;
+    for brick in new.iter_mut().filter_map(|own| own.brick.as_mut()) {
+        let Some(kind) = brick.uniform() else { continue };
+        let pool = grown.as_ref().unwrap_or(&world.uniform);
+        match pool.get(&kind) {
+            Some(shared) => *brick = Arc::clone(shared),
+            None => {
+                grown.get_or_insert_with(|| world.uniform.clone()).insert(kind, Arc::clone(brick));
+            }
+        }
+    }
+    grown
+}
+
+/// Rule 2 anew for the cells near changed bricks, as samples may have become pristine again: the words of the mask that change.
+fn words_of(
+    world: &World,
+    bricks: &[(BrickPos, Arc<Brick>)],
+    changed: &[(BrickPos, LatticeBox)],
+) -> Vec<((i32, i32), u64)> {
+    // A cell has its corners in its own stack of bricks and in those behind it.
+    let stacks: FxHashSet<(i32, i32)> = changed.iter().map(|(pos, _)| pos.stack()).collect();
+    let behind = |&(x, z): &(i32, i32)| [(x, z), (x - 1, z), (x, z - 1), (x - 1, z - 1)];
+    let words: FxHashSet<(i32, i32)> = stacks.iter().flat_map(behind).collect();
+    let read: FxHashSet<(i32, i32)> =
+        words.iter().flat_map(|&(x, z)| [(x, z), (x + 1, z), (x, z + 1), (x + 1, z + 1)]).collect();
+    let mut cleared = Mask::default();
+    words.iter().for_each(|&word| cleared.lay_word(word, 0));
+    let stored = read.iter().flat_map(|stack| {
+        let ys = world.stacks.get(stack).map(Vec::as_slice).unwrap_or_default();
+        ys.iter().map(|&y| BrickPos(IVec3::new(stack.0, y, stack.1)))
+    });
+    let mut near: Vec<BrickPos> = stored.chain(bricks.iter().map(|(pos, _)| *pos)).collect();
+    near.sort_unstable();
+    near.dedup();
+    let latest: Vec<_> = bricks.iter().map(|(pos, brick)| (*pos, brick.as_ref())).collect();
+    let view = WorldView {
+        samples: world.samples().under(&latest),
+        mask: MaskView::new(&world.mask).over(&cleared),
+        grid: world.grid,
+    };
+    let cells = dirty_cells(world.grid, &near, |&pos| (pos, pos.samples(), true));
+    let found = joined_mask(world, &view, &cells);
+    let words = words.into_iter().map(|word| (word, found.get_word(word).unwrap_or_default()));
+    words.filter(|&(word, cells)| cells != world.mask.word(word)).collect()
+}
+
+impl Terrain {
+    /// Queues parts that take the place of what the world holds, after everything that was submitted before: say a region of
+    /// another machine's world. They are checked in the transaction, where `hash` is given against the hash that the world must
+    /// have afterwards too. History begins anew then, as its steps hold parts of before.
+    /// [What came of it](Self::take_change_receipts) is told in order.
+    ///
+    /// # Errors
+    /// [`ChangeError::Overloaded`] where too much work waits.
+    pub fn submit_change(&mut self, change: WorldChange, hash: Option<u64>) -> Result<(), ChangeError> {
+        if !self.queue.has_room_for_step() {
+            return Err(ChangeError::Overloaded);
+        }
+        self.queue.push_put(Put { change, hash, counts: true });
+        Ok(())
+    }
+
+    /// Puts parts in place at once, after everything that waits; like [`apply`](Self::apply) for brushes.
+    ///
+    /// # Errors
+    /// Says what is wrong with them; nothing changed then.
+    pub fn apply_change(&mut self, change: WorldChange, hash: Option<u64>) -> Result<Restored, ChangeError> {
+        self.abandon();
+        self.put_now(Put { change, hash, counts: true })
+    }
+
+    pub(super) fn put_now(&mut self, put: Put) -> Result<Restored, ChangeError> {
+        self.queue.push_put(put);
+        let receipts = self.finish();
+        receipts.into_iter().for_each(|receipt| self.answer(receipt));
+        // It was the last one.
+        self.change_receipts.pop_back().unwrap_or(Err(ChangeError::Panicked))
+    }
+
+    /// What became of parts that were [submitted](Self::submit_change), in order; each is returned once. If they are not taken,
+    /// the latest 65,536 are kept.
+    pub fn take_change_receipts(&mut self) -> Vec<Result<Restored, ChangeError>> {
+        std::mem::take(&mut self.change_receipts).into()
+    }
+}

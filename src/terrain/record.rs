@@ -1,0 +1,66 @@
+//! The commit log: what each commit was asked for, and what it made of the world.
+
+use std::sync::Arc;
+
+use super::loose::LooseSettings;
+use crate::brush::Edit;
+use crate::lattice::{BrickPos, ChunkPos};
+use crate::volume::{Brick, DiggingRules, Fields};
+
+/// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was written
+/// under another number can't be replayed.
+pub const SIMULATION: u32 = 1;
+
+/// Parts of a world that take the place of others.
+#[derive(Clone, Debug, Default)]
+pub struct WorldChange {
+    /// Bricks in order, each position once; `None` is a pristine one.
+    pub bricks: Vec<(BrickPos, Option<Arc<Brick>>)>,
+    /// All fields of each chunk whose fields change, by chunk.
+    pub fields: Vec<(ChunkPos, Fields)>,
+    /// The greatest name that a field has had so far.
+    pub next_field: u64,
+}
+
+/// What a commit was asked for. Those of one commit apply in order.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum LogEntry {
+    /// From here on edits obey these rules.
+    Rules(Option<Arc<DiggingRules>>),
+    /// From here on loose pieces are searched for like this.
+    Loose(Option<LooseSettings>),
+    /// An edit that was applied.
+    Edit(Edit),
+    /// A step through history, or parts that were put in place: what the record's [change](CommitRecord::change) holds.
+    Change,
+}
+
+/// A commit: what was asked for, and what came of it.
+#[derive(Clone, Debug)]
+pub struct CommitRecord {
+    /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same where only
+    /// rules or settings changed.
+    pub revision: u64,
+    /// The world's [hash](super::World::hash) after it.
+    pub hash: u64,
+    /// What was asked for, in order. Edits that were rejected are left out.
+    pub entries: Vec<LogEntry>,
+    /// What changed.
+    pub change: WorldChange,
+}
+
+/// All of a world but its ground, as it is saved: [`Terrain::restore`](super::Terrain::restore) makes a terrain of it.
+#[derive(Clone, Debug, Default)]
+pub struct WorldParts {
+    /// Every stored brick, and all fields.
+    pub change: WorldChange,
+    /// Cells along the side of the chunks that the fields belong to.
+    pub chunk_size: u32,
+    /// Its revision.
+    pub revision: u64,
+    /// The rules for edits; `None` if there are none.
+    pub rules: Option<DiggingRules>,
+    /// The settings of the search for loose pieces.
+    pub loose: Option<LooseSettings>,
+}

@@ -1,0 +1,44 @@
+//! The world by regions: what is saved, compared and sent of it.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::put::columns_of;
+use super::world::World;
+use crate::lattice::{BrickPos, RegionPos};
+use crate::volume::Brick;
+
+impl World {
+    /// The regions that hold bricks, in order.
+    pub fn regions(&self) -> impl Iterator<Item = RegionPos> {
+        let of_stack = |(&(x, z), ys): (&(i32, i32), &Vec<i32>)| {
+            let region = move |&y: &i32| RegionPos::of(BrickPos(glam::IVec3::new(x, y, z)));
+            ys.iter().map(region).collect::<Vec<_>>()
+        };
+        self.stacks.iter().flat_map(of_stack).collect::<BTreeSet<_>>().into_iter()
+    }
+
+    /// The stored bricks of a region, in order.
+    pub fn bricks_in(&self, region: RegionPos) -> impl Iterator<Item = (BrickPos, &Arc<Brick>)> {
+        let first = region.first_brick().0;
+        let last = first + (RegionPos::BRICKS - 1);
+        let stacks = (first.x..=last.x).flat_map(move |x| (first.z..=last.z).map(move |z| (x, z)));
+        stacks
+            .flat_map(move |(x, z)| {
+                let ys = self.stacks.get(&(x, z)).map(Vec::as_slice).unwrap_or_default();
+                let from = ys.partition_point(|&y| y < first.y);
+                let inside = ys.iter().skip(from).take_while(move |&&y| y <= last.y);
+                inside.filter_map(move |&y| self.bricks.get_key_value(&BrickPos(glam::IVec3::new(x, y, z))))
+            })
+            .map(|(pos, brick)| (*pos, brick))
+    }
+
+    /// Hash of the edited samples of a region; 0 where nothing was edited. The sum of all, which wraps around, is that of the
+    /// world: see [`hash_of`](Self::hash_of).
+    pub fn region_hash(&self, region: RegionPos) -> u64 {
+        let hash = |(pos, brick): (BrickPos, &Arc<Brick>)| {
+            brick.hash(pos.origin().y, brick.edited(), &columns_of(pos))
+        };
+        self.bricks_in(region).map(hash).fold(0, u64::wrapping_add)
+    }
+}

@@ -1,0 +1,178 @@
+//! A terrain from what was saved of it: from parts, or by replaying records.
+
+use std::sync::Arc;
+
+use super::model::Terrain;
+use super::put::{ChangeError, Put};
+use super::queue::WorkLimits;
+use super::receipt::Receipt;
+use super::record::{CommitRecord, LogEntry, WorldChange, WorldParts};
+use super::settings::{TerrainError, TerrainSettings};
+use super::unmeshed::Meshing;
+use crate::ground::Ground;
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos};
+use crate::volume::{Brick, DiggingRules, FieldId, Fields, RulesError};
+
+/// Why a terrain can't be restored.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RestoreError {
+    /// The settings are out of range.
+    #[error(transparent)]
+    Settings(#[from] TerrainError),
+    /// The rules are invalid.
+    #[error(transparent)]
+    Rules(#[from] RulesError),
+    /// Bricks or fields are invalid.
+    #[error(transparent)]
+    Parts(#[from] ChangeError),
+}
+
+/// Why a record can't be replayed. The terrain may hold a part of it then, and should be dropped.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// The record does not follow the world's revision.
+    #[error("the record leads to revision {found}, but the world is at {at}")]
+    Revision {
+        /// The world's.
+        at: u64,
+        /// The record's.
+        found: u64,
+    },
+    /// The world has another hash than the record says: it is another world, or the record was written by a version of the
+    /// crate with another [`SIMULATION`](super::SIMULATION).
+    #[error("revision {revision} has the hash {found:#018x} here, but {expected:#018x} in the record")]
+    Hash {
+        /// The record's revision.
+        revision: u64,
+        /// The hash here.
+        found: u64,
+        /// The record's.
+        expected: u64,
+    },
+    /// An edit was rejected that had been applied.
+    #[error("an edit of revision {0} is rejected here, though it had been applied")]
+    Rejected(u64),
+    /// The rules are invalid.
+    #[error(transparent)]
+    Rules(#[from] RulesError),
+    /// Bricks or fields are invalid.
+    #[error(transparent)]
+    Parts(#[from] ChangeError),
+}
+
+impl Terrain {
+    /// All of the world but its ground, as [`restore`](Self::restore) takes it. Bricks are shared, not copied. History and what
+    /// waits are not part of it.
+    pub fn parts(&self) -> WorldParts {
+        let world = &self.world;
+        let mut bricks: Vec<(BrickPos, Option<Arc<Brick>>)> =
+            world.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))).collect();
+        bricks.sort_unstable_by_key(|(pos, _)| *pos);
+        let mut fields: Vec<(ChunkPos, Fields)> =
+            world.fields.iter().map(|(chunk, fields)| (*chunk, fields.clone())).collect();
+        fields.sort_unstable_by_key(|(chunk, _)| *chunk);
+        WorldParts {
+            change: WorldChange { bricks, fields, next_field: world.next_field },
+            chunk_size: world.grid.size() as u32,
+            revision: world.revision,
+            rules: self.rules().cloned(),
+            loose: self.loose,
+        }
+    }
+
+    /// A terrain from the parts of a world over this ground. Nothing is meshed: surfaces are made when they are asked for. There
+    /// is no history.
+    ///
+    /// Samples and hash do not depend on the chunk size. Fields do: for another size than they were saved with, there is one
+    /// for each connected group of boxes around the samples of a brick.
+    ///
+    /// # Errors
+    /// When settings or rules are out of range, or when parts do not fit this ground.
+    pub fn restore(
+        ground: impl Into<Arc<Ground>>,
+        settings: &TerrainSettings,
+        parts: WorldParts,
+    ) -> Result<Self, RestoreError> {
+        let mut terrain = Self::new(ground, settings)?;
+        let WorldParts { mut change, chunk_size, revision, rules, loose } = parts;
+        if chunk_size != settings.chunk_size {
+            (change.fields, change.next_field) = fields_of(terrain.world.grid(), &change);
+        }
+        terrain.meshing = Meshing::Never;
+        terrain.put_now(Put { change, hash: None, counts: false })?;
+        terrain.meshing = Meshing::All;
+        terrain.set_rules(rules.unwrap_or_default())?;
+        terrain.loose = loose;
+        Arc::make_mut(&mut terrain.world).revision = revision;
+        Ok(terrain)
+    }
+
+    /// Applies a record of a [log](Self::take_log) at once, after everything that waits, and compares the world with it: its
+    /// revision, and its hash. Returns the receipts of its edits.
+    ///
+    /// # Errors
+    /// When the record does not follow, or does not lead to the world that it says.
+    pub fn replay(&mut self, record: &CommitRecord) -> Result<Vec<Receipt>, ReplayError> {
+        let waiting = self.finish();
+        waiting.into_iter().for_each(|receipt| self.answer(receipt));
+        let at = self.world.revision;
+        let is_commit = record.revision == at + 1;
+        let changes =
+            record.entries.iter().any(|entry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change));
+        if !is_commit && (changes || record.revision != at) {
+            return Err(ReplayError::Revision { at, found: record.revision });
+        }
+        let limits = std::mem::replace(&mut self.queue.limits, WorkLimits::UNBOUNDED);
+        let receipts = self.replay_entries(record);
+        self.queue.limits = limits;
+        let receipts = receipts?;
+        if is_commit {
+            // A commit may have changed nothing.
+            Arc::make_mut(&mut self.world).revision = record.revision;
+        }
+        let (found, expected) = (self.world.hash(), record.hash);
+        if found != expected {
+            return Err(ReplayError::Hash { revision: record.revision, found, expected });
+        }
+        Ok(receipts)
+    }
+
+    fn replay_entries(&mut self, record: &CommitRecord) -> Result<Vec<Receipt>, ReplayError> {
+        for entry in &record.entries {
+            match entry {
+                LogEntry::Rules(rules) => {
+                    self.set_rules(rules.as_deref().map_or_else(DiggingRules::default, Clone::clone))?;
+                }
+                LogEntry::Loose(settings) => self.set_loose(*settings),
+                LogEntry::Edit(edit) => self.submit_edit(edit),
+                LogEntry::Change => {
+                    self.apply_change(record.change.clone(), Some(record.hash))?;
+                }
+            }
+        }
+        let receipts = self.finish();
+        match receipts.iter().any(|receipt| receipt.outcome.is_err()) {
+            true => Err(ReplayError::Rejected(record.revision)),
+            false => Ok(receipts),
+        }
+    }
+}
+
+/// Fields for the bricks of a change, and the greatest of their names.
+fn fields_of(grid: ChunkGrid, change: &WorldChange) -> (Vec<(ChunkPos, Fields)>, u64) {
+    let mut fields = std::collections::BTreeMap::<ChunkPos, Fields>::new();
+    let mut next = change.next_field;
+    for (pos, brick) in &change.bricks {
+        let Some(edited) = brick.as_ref().and_then(|brick| brick.edited_bounds(*pos)) else { continue };
+        for chunk in grid.chunks_of(edited) {
+            let Some(own) = grid.chunk_samples(chunk).intersection(edited) else { continue };
+            fields.entry(chunk).or_default().absorb(own, || {
+                next += 1;
+                FieldId(next)
+            });
+        }
+    }
+    (fields.into_iter().collect(), next)
+}
