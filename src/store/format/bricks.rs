@@ -67,7 +67,7 @@ impl Region {
         let neighbours = std::array::from_fn(|number| {
             let lower = |(axis, step): (usize, usize)| match number >> axis & 1 {
                 0 => Some(0),
-                _ => (place / step & 7 != 0).then_some(step),
+                _ => ((place / step) & 7 != 0).then_some(step),
             };
             let back: usize = steps.into_iter().enumerate().map(lower).sum::<Option<usize>>()?;
             self.bricks.get(usize::from(self.slots[place - back]))
@@ -76,7 +76,12 @@ impl Region {
     }
 }
 
-/// The bytes of bricks of one region.
+/// A flag that is set if something is so.
+fn flag(is_so: bool, flag: u8) -> u8 {
+    if is_so { flag } else { 0 }
+}
+
+/// Appends bricks of one region.
 pub fn put_bricks<'a>(to: &mut Vec<u8>, bricks: impl IntoIterator<Item = (BrickPos, &'a Brick)>) {
     let mut bricks: Vec<(usize, &Brick)> =
         bricks.into_iter().map(|(pos, brick)| (place_of(pos), brick)).collect();
@@ -93,9 +98,7 @@ pub fn put_bricks<'a>(to: &mut Vec<u8>, bricks: impl IntoIterator<Item = (BrickP
         let has_materials = solid().any(|index| brick.material_at(index) != MaterialId::GROUND);
         put_number(&mut heads, (place - next) as u64);
         next = place + 1;
-        heads.push(
-            u8::from(is_whole) * WHOLE | u8::from(is_flat) * FLAT | u8::from(has_materials) * MATERIALS,
-        );
+        heads.push(flag(is_whole, WHOLE) | flag(is_flat, FLAT) | flag(has_materials, MATERIALS));
         if is_flat {
             put_signed(&mut heads, densities[0].into());
         } else {
@@ -190,7 +193,7 @@ fn read_heads(reader: &mut Reader) -> Result<Vec<Head>, FormatError> {
         }
         next = place + 1;
         let flat = (flags & FLAT != 0).then(|| reader.signed()).transpose()?;
-        let flat = flat.map(|density| i16::try_from(density)).transpose();
+        let flat = flat.map(i16::try_from).transpose();
         let flat = flat.map_err(|_| FormatError::Invalid("density"))?;
         heads.push(Head { place, flags, flat, edited: ALL });
     }

@@ -1,7 +1,7 @@
 //! Edits in bytes, each as the difference from the one before: players move by little between digs.
 //!
 //! The serialised form of an [`Edit`] is cut into shape, middle, what lies between, tag and stroke. Bits of a head say which of
-//! them are as before. Reading joins them again and deserialises the result, which checks it.
+//! them are as before; it is below 128. Reading joins them again and deserialises the result, which checks it.
 
 use super::bytes::{Reader, put_bytes, put_signed};
 use super::error::FormatError;
@@ -22,9 +22,6 @@ const OTHER_STROKE: u8 = 16;
 const NO_STROKE: u8 = 32;
 /// Not a difference: the serialised edit follows.
 const SERIALIZED: u8 = 64;
-
-/// Heads are below that.
-pub const HEADS: u8 = 128;
 
 /// What is longer is never repeated by a bit, so that no few bytes take much memory.
 const LONGEST_REST: usize = 64;

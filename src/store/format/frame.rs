@@ -134,7 +134,8 @@ fn sealed(
     let stored = packed.unwrap_or(payload);
     let mut frame = Vec::with_capacity(64 + key.len() + stored.len());
     frame.extend_from_slice(&MAGIC);
-    let flags = u8::from(packed.is_some()) * PACKED | u8::from(ground_hash != 0) * GROUND;
+    let packed_flag = if packed.is_some() { PACKED } else { 0 };
+    let flags = packed_flag | if ground_hash != 0 { GROUND } else { 0 };
     frame.extend_from_slice(&[SCHEMA as u8, kind as u8, flags]);
     frame.extend_from_slice(&world.0.to_le_bytes());
     put_bytes(&mut frame, key);

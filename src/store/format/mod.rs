@@ -1,5 +1,18 @@
-//! The bytes of records: bricks, regions, journal entries. Everything that is read is checked.
-#![allow(missing_docs, dead_code, unused)]
+//! The bytes of saved worlds, and worlds from bytes: no files, no threads, no clocks.
+//!
+//! | file | turns into bytes |
+//! | --- | --- |
+//! | [`frame`] | what every part is wrapped in: checksum, schema, world, key |
+//! | [`region`], [`bricks`], [`fields`] | a region's record |
+//! | [`predict`], [`residuals`] | densities of bricks |
+//! | [`batch`], [`edits`], [`change`] | commits, for journals |
+//! | [`metadata`] | a world without its regions |
+//! | [`portable`] | a whole world as one file |
+//! | [`level`] | a designer's level: a folder of files, or one packed file |
+//! | [`container`], [`bytes`], [`plain`] | what these share |
+//!
+//! Whatever bytes are read, the result is what was written or a [`FormatError`]: nothing panics, and memory is taken by the length of
+//! the input and by limits that the caller names. The same content always gives the same bytes.
 
 pub mod batch;
 pub mod bricks;
@@ -21,7 +34,7 @@ pub mod residuals;
 pub use batch::Batch;
 pub use error::FormatError;
 pub use metadata::Metadata;
-pub use region::{REGION_LIMIT, decode_region, encode_region};
+pub use region::{decode_region, encode_region};
 
 #[cfg(test)]
 mod tests;

@@ -100,8 +100,8 @@ pub fn mixed(ground: &Ground, count: usize, seed: u64) -> Vec<Brush> {
 /// Batches of as many commits.
 pub fn batches(log: &[CommitRecord], commits: usize) -> Vec<Batch> {
     let game = |number: usize| {
-        let value = (number % 3 > 0).then(|| vec![number as u8; number % 50]);
-        if number % 4 == 0 { vec![(format!("inventory {number}"), value)] } else { Vec::new() }
+        let value = (!number.is_multiple_of(3)).then(|| vec![number as u8; number % 50]);
+        if number.is_multiple_of(4) { vec![(format!("inventory {number}"), value)] } else { Vec::new() }
     };
     let batch =
         |(number, commits): (usize, &[CommitRecord])| Batch { commits: commits.to_vec(), game: game(number) };
