@@ -1,3 +1,28 @@
 //! Worlds on disk: a journal of commits, checkpoints of regions, recovery after a crash.
 
-mod format;
+mod checkpoint;
+mod database;
+mod disk;
+mod error;
+mod files;
+mod found;
+mod journal;
+mod keys;
+mod mirror;
+mod options;
+mod quarantine;
+mod recover;
+mod salvage;
+mod segment;
+mod settle;
+mod shim;
+mod store;
+mod writer;
+use shim as format;
+
+pub use disk::{DiskFault, DiskImage, SimulatedDisk};
+pub use error::{StoreError, StoreTrouble};
+pub use files::{Files, Folder, Lock, OpenFile, Opening};
+pub use format::frame::WorldId;
+pub use options::{BaseChanged, StoreOptions};
+pub use store::{Opened, Store};

@@ -158,7 +158,7 @@ impl World {
     }
 
     /// The same, shared.
-    #[cfg(feature = "plugin")]
+    #[cfg(any(feature = "plugin", feature = "store"))]
     pub(crate) fn shared_ground(&self) -> Arc<Ground> {
         Arc::clone(&self.ground)
     }
