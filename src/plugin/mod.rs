@@ -92,6 +92,8 @@ pub struct BurrowPlugins;
 impl PluginGroup for BurrowPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>().add(TerrainPlugin).add(HeightmapPlugin);
+        #[cfg(feature = "store")]
+        let group = group.add(crate::saves::SavePlugin);
         #[cfg(feature = "render")]
         let group = group
             .add(crate::view::TerrainMaterialPlugin::<StandardMaterial>::default())

@@ -310,6 +310,18 @@ impl Store {
         self.ask(Message::Checkpoint)
     }
 
+    /// Asks for a checkpoint without waiting for it.
+    ///
+    /// # Errors
+    /// [`StoreError::Ended`] when the store's thread has panicked.
+    pub fn request_checkpoint(&mut self) -> Result<(), StoreError> {
+        if !self.unsent.is_empty() {
+            self.append(Vec::new())?;
+        }
+        // Nobody waits for the answer.
+        self.send(Message::Checkpoint(channel().0))
+    }
+
     /// The same, and makes the file of regions as small as it can be.
     ///
     /// # Errors
