@@ -6,6 +6,7 @@ use std::time::Duration;
 use bevy::prelude::*;
 
 use crate::store::{BaseChanged, Store, StoreOptions};
+use crate::terrain::Version;
 
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
 /// it; the terrain itself they leave out.
@@ -40,6 +41,8 @@ impl SavedWorld {
 #[derive(Component)]
 pub struct WorldStore {
     pub(super) store: Store,
+    /// The world that is saved, as it was last.
+    pub(super) version: Version,
     /// The revision that was told as durable last, and whether it is to be told anyway.
     pub(super) told: Option<u64>,
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use bevy::prelude::*;
 
@@ -9,8 +10,12 @@ use super::components::{SavedWorld, WorldStore};
 use super::messages::{StoreTroubleFound, WorldOpened};
 use crate::ground::Ground;
 use crate::plugin::{Held, ThreadTask, Threads, free_later};
-use crate::store::{Store, StoreError, StoreOptions, StoreTrouble};
+use crate::store::{Opened, Store, StoreError, StoreOptions, StoreTrouble};
 use crate::terrain::{Terrain, TerrainSettings, WorldParts};
+
+/// How often, and how long, a locked world is waited for.
+const LOCK_TRIES: usize = 20;
+const LOCK_WAIT: Duration = Duration::from_millis(50);
 
 /// A world that nobody has begun to read.
 #[derive(Component)]
@@ -29,7 +34,8 @@ struct Read {
 
 /// Holds a terrain until its world is read.
 pub(super) fn hold(new: On<Insert, SavedWorld>, mut commands: Commands) {
-    commands.entity(new.entity).try_remove::<(OpeningWorld, WorldStore)>().try_insert((Held, Unopened));
+    close_later(&mut commands, new.entity);
+    commands.entity(new.entity).try_remove::<OpeningWorld>().try_insert((Held, Unopened));
 }
 
 /// Saves and closes a world that is no longer wanted.
@@ -41,7 +47,16 @@ pub(super) fn close(
     if let Ok((mut terrain, mut world)) = worlds.get_mut(gone.entity) {
         super::saving::follow(&mut terrain, &mut world);
     }
-    commands.entity(gone.entity).try_remove::<(OpeningWorld, WorldStore, Unopened, Held)>();
+    close_later(&mut commands, gone.entity);
+    commands.entity(gone.entity).try_remove::<(OpeningWorld, Unopened, Held)>();
+}
+
+/// Closes the store of an entity on another thread, since that waits for the disk.
+fn close_later(commands: &mut Commands, entity: Entity) {
+    commands.queue(move |world: &mut World| {
+        let store = world.get_entity_mut(entity).ok().and_then(|mut entity| entity.take::<WorldStore>());
+        store.into_iter().for_each(free_later);
+    });
 }
 
 /// Starts to read the worlds of new terrains.
@@ -68,12 +83,27 @@ fn read(
     parts: WorldParts,
 ) -> Result<Read, StoreError> {
     if Store::is_in(path) {
-        let (store, opened) = Store::open(path, ground, options)?;
+        let (store, opened) = open_unlocked(path, &ground, &options)?;
         return Ok(Read { store, terrain: opened.terrain, troubles: opened.troubles });
     }
     let mut terrain = Terrain::restore(ground, settings, parts)?;
     let store = Store::create(path, &mut terrain, options)?;
     Ok(Read { store, terrain, troubles: Vec::new() })
+}
+
+/// Opens a world. This app may be about to close it: then it is waited for a little.
+fn open_unlocked(
+    path: &Path,
+    ground: &Arc<Ground>,
+    options: &StoreOptions,
+) -> Result<(Store, Opened), StoreError> {
+    for _ in 0..LOCK_TRIES {
+        match Store::open(path, Arc::clone(ground), options.clone()) {
+            Err(StoreError::Locked(_)) => std::thread::sleep(LOCK_WAIT),
+            other => return other,
+        }
+    }
+    Store::open(path, Arc::clone(ground), options.clone())
 }
 
 /// Puts worlds that were read in place of their terrains.
@@ -92,7 +122,8 @@ pub(super) fn finish_opening(
             let revision = read.world().revision();
             read.take_over(&mut terrain);
             free_later(std::mem::replace(&mut *terrain, read));
-            commands.entity(entity).try_insert(WorldStore { store, told: None });
+            let version = terrain.world().version();
+            commands.entity(entity).try_insert(WorldStore { store, version, told: None });
             revision
         });
         if let Err(why) = &outcome {

@@ -6,10 +6,25 @@ use super::components::WorldStore;
 use super::messages::{SaveNow, StoreTroubleFound, WorldSaved};
 use crate::terrain::Terrain;
 
+/// Bytes of commits that wait at most until the store takes them, which it does each frame.
+const LOG_BYTES: usize = 64 << 20;
+
 /// Hands over what was committed to one terrain.
 pub(super) fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     // For the game this is no change of the terrain.
-    if let Err(why) = world.store.follow(terrain.bypass_change_detection()) {
+    let terrain = terrain.bypass_change_detection();
+    let now = terrain.world().version();
+    let followed = match now.is_same_world(world.version) {
+        true => world.store.follow(terrain),
+        // The game put another world in its place.
+        false => {
+            terrain.keep_log(Some(LOG_BYTES));
+            drop(terrain.take_log());
+            world.store.append_whole(terrain)
+        }
+    };
+    world.version = now;
+    if let Err(why) = followed {
         error_once!("nothing is saved any more: {why}");
     }
 }
