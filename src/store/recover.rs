@@ -152,6 +152,11 @@ pub(super) fn recover(
 }
 
 impl Recovered {
+    /// The sizes of its chunks and voxels.
+    pub fn settings(&self) -> TerrainSettings {
+        TerrainSettings { chunk_size: self.mirror.chunk_size(), voxel_size: self.terrain.voxel_size() }
+    }
+
     /// A world that was replayed from its first commit.
     fn whole(replayed: Replayed) -> Self {
         let world = replayed.terrain.world();
@@ -169,6 +174,24 @@ impl Recovered {
             base_changed: None,
             refused: replayed.refused,
         }
+    }
+}
+
+/// Replays the whole log from the first commit on, and verifies it.
+pub(super) fn replay_all(
+    contents: &Contents,
+    ground: &Arc<Ground>,
+    settings: TerrainSettings,
+) -> Result<Terrain, StoreError> {
+    let whole = contents.frames_from(1);
+    if whole.last().map_or(0, |last| last.number) < contents.greatest_frame() {
+        return Err(StoreError::Unreadable("the log does not reach back to the first commit".into()));
+    }
+    let empty = Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
+    let replayed = replay(empty, GameData::new(), &whole, true)?;
+    match replayed.refused {
+        Some(why) => Err(StoreError::Unreadable(format!("the log can't be replayed: {why}"))),
+        None => Ok(replayed.terrain),
     }
 }
 

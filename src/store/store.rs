@@ -173,9 +173,9 @@ impl Store {
             recovered.replayed,
             recovered.is_new || settled.is_unfinished || contents.damaged.is_some(),
         );
+        let settings = recovered.settings();
         let (mut terrain, mirror) = (recovered.terrain, recovered.mirror);
         let (revision, game) = (mirror.revision, mirror.game.clone());
-        let settings = TerrainSettings { chunk_size: mirror.chunk_size(), voxel_size: terrain.voxel_size() };
         let shared = Arc::new(Shared::default());
         let (world, database) = (contents.world, contents.database.take());
         let journal = Journal::new(
@@ -382,7 +382,7 @@ impl Drop for Store {
     }
 }
 
-fn has_world(files: &dyn Files) -> std::io::Result<bool> {
+pub(super) fn has_world(files: &dyn Files) -> std::io::Result<bool> {
     Ok(files.exists(super::database::DATABASE)? || !super::segment::list(files)?.is_empty())
 }
 
