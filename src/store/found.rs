@@ -1,6 +1,7 @@
 //! What of a world is found in its files, before anything is made of it.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::checkpoint::Checkpoint;
 use super::database::{DATABASE, DatabaseError, Records};
@@ -28,8 +29,8 @@ pub(super) struct Contents {
     pub database: Option<Records>,
     /// What is wrong with the database, if it can't be used.
     pub damaged: Option<String>,
-    /// The checkpoint that the database holds.
-    checkpoint: Option<Checkpoint>,
+    /// The checkpoints that the database holds: two alike, but for damage.
+    checkpoints: Vec<Checkpoint>,
     /// Valid records of each region: one, but for what was salvaged from a damaged database.
     regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
     /// Records that are not valid, by region.
@@ -55,11 +56,12 @@ impl Contents {
                     (None, Some(error.to_string()), salvage::records(&bytes))
                 }
             };
-        let mut world = raw.iter().filter(|(key, _)| *key == keys::CHECKPOINT).find_map(|(key, record)| {
-            let peeked = frame::peek(record)?;
-            frame::open(record, Kind::Checkpoint, peeked.world, key, FRAME_LIMIT).ok()?;
-            Some(peeked.world)
-        });
+        let mut world =
+            raw.iter().filter(|(key, _)| keys::CHECKPOINTS.contains(&&key[..])).find_map(|(key, record)| {
+                let peeked = frame::peek(record)?;
+                frame::open(record, Kind::Checkpoint, peeked.world, key, FRAME_LIMIT).ok()?;
+                Some(peeked.world)
+            });
         let mut segments = Vec::with_capacity(numbers.len());
         for number in numbers {
             let found = segment::read(files, world, number);
@@ -76,7 +78,7 @@ impl Contents {
             segments,
             database,
             damaged,
-            checkpoint: None,
+            checkpoints: Vec::new(),
             regions: BTreeMap::new(),
             invalid: BTreeMap::new(),
         };
@@ -103,15 +105,7 @@ impl Contents {
         match Key::of(key) {
             Some(Key::Checkpoint) => {
                 match frame::open(&record, Kind::Checkpoint, self.world, key, FRAME_LIMIT) {
-                    Ok(opened) => {
-                        let new = Checkpoint::decode(&opened.payload);
-                        let is_newer = |old: &Checkpoint, new: &Checkpoint| old.frame < new.frame;
-                        match (&self.checkpoint, new) {
-                            (None, new) => self.checkpoint = new,
-                            (Some(old), Some(new)) if is_newer(old, &new) => self.checkpoint = Some(new),
-                            _ => {}
-                        }
-                    }
+                    Ok(opened) => self.checkpoints.extend(Checkpoint::decode(&opened.payload)),
                     Err(error) => {
                         if let Some(found) = error.newer_schema() {
                             return Err(StoreError::Newer { found, known: frame::SCHEMA });
@@ -137,17 +131,20 @@ impl Contents {
         self.regions.get(&at)?.iter().find(|record| record.revision == revision)
     }
 
-    /// The checkpoint to start from: the database's, or else that of a segment which most regions agree with.
+    /// The checkpoint to start from: that which most regions agree with, the database's or a segment's.
     pub fn choose_checkpoint(&self) -> Option<Checkpoint> {
-        if let Some(own) = &self.checkpoint {
-            return Some(own.clone());
-        }
         let heads = self.segments.iter().filter_map(|found| Checkpoint::decode(found.checkpoint.as_deref()?));
-        let missing = |checkpoint: &Checkpoint| {
-            checkpoint.regions.iter().filter(|(at, revision)| self.region(**at, **revision).is_none()).count()
-        };
+        let all = self.checkpoints.iter().cloned().chain(heads);
         // Among equals the newest, after which least has to be replayed.
-        heads.min_by_key(|checkpoint| (missing(checkpoint), std::cmp::Reverse(checkpoint.frame)))
+        all.min_by_key(|checkpoint| (self.disagreeing(checkpoint), Reverse(checkpoint.frame)))
+    }
+
+    /// How many regions are not as a checkpoint says.
+    fn disagreeing(&self, checkpoint: &Checkpoint) -> usize {
+        let said = |(at, revision): &(&RegionPos, &u64)| self.region(**at, **revision).is_none();
+        let found = self.regions.keys().chain(self.invalid.keys());
+        let unknown: BTreeSet<_> = found.filter(|at| !checkpoint.regions.contains_key(at)).collect();
+        checkpoint.regions.iter().filter(said).count() + unknown.len()
     }
 
     /// The frames from a number on for as long as none is missing.

@@ -40,6 +40,8 @@ pub(super) struct Segment {
 pub(super) struct Journal {
     files: Arc<dyn Files>,
     world: WorldId,
+    /// The [base](segment::base) of its frames.
+    base: u64,
     current: Option<Current>,
     waiting: VecDeque<Waiting>,
     waiting_bytes: usize,
@@ -57,6 +59,7 @@ impl Journal {
     pub fn new(
         files: Arc<dyn Files>,
         world: WorldId,
+        base: u64,
         segments: Vec<Segment>,
         next_frame: u64,
         head: (u64, Vec<u8>),
@@ -66,6 +69,7 @@ impl Journal {
         Self {
             files,
             world,
+            base,
             current,
             waiting,
             waiting_bytes: 0,
@@ -91,7 +95,7 @@ impl Journal {
     pub fn push(&mut self, revision: u64, payload: &[u8]) {
         let frame = self.next_frame;
         self.next_frame += 1;
-        let entry = segment::entry(self.world, frame, revision, payload);
+        let entry = segment::entry(self.world, self.base, frame, revision, payload);
         self.waiting_bytes += entry.len();
         self.waiting.push_back(Waiting { frame, revision, entry });
     }

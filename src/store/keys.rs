@@ -4,8 +4,8 @@ use glam::IVec3;
 
 use crate::lattice::RegionPos;
 
-/// The key of the checkpoint.
-pub(super) const CHECKPOINT: &[u8] = b"c";
+/// The keys of the checkpoint, which is stored twice: without it, intact regions could not be told from older ones.
+pub(super) const CHECKPOINTS: [&[u8]; 2] = [b"c", b"d"];
 
 /// What a record holds.
 pub(super) enum Key {
@@ -16,7 +16,7 @@ pub(super) enum Key {
 impl Key {
     /// What the record with this key holds.
     pub fn of(key: &[u8]) -> Option<Self> {
-        if key == CHECKPOINT {
+        if CHECKPOINTS.contains(&key) {
             return Some(Self::Checkpoint);
         }
         let at: &[u8; 12] = key.strip_prefix(b"r")?.try_into().ok()?;

@@ -155,22 +155,4 @@ impl Mirror {
     pub fn mark_all(&mut self) {
         self.dirty.extend(self.regions.keys());
     }
-
-    /// All of it as parts of a world.
-    pub fn parts(&self) -> WorldParts {
-        let mut change = WorldChange { next_field: self.next_field, ..WorldChange::default() };
-        for region in self.regions.values() {
-            change.bricks.extend(region.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))));
-            change.fields.extend(region.fields.iter().map(|(chunk, fields)| (*chunk, fields.clone())));
-        }
-        change.bricks.sort_unstable_by_key(|(pos, _)| *pos);
-        change.fields.sort_unstable_by_key(|(chunk, _)| *chunk);
-        WorldParts {
-            change,
-            chunk_size: self.grid.size() as u32,
-            revision: self.revision,
-            rules: self.rules.clone(),
-            loose: self.loose,
-        }
-    }
 }

@@ -11,7 +11,7 @@ use super::found::Contents;
 use super::keys;
 use super::mirror::Mirror;
 use super::options::BaseChanged;
-use super::segment::Frame;
+use super::segment::{self, Frame};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
 use crate::terrain::{
@@ -69,7 +69,8 @@ pub(super) fn recover(
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     let is_contiguous = last >= checkpoint.frame;
-    let is_log_whole = is_contiguous && is_of_one_ground(contents, ground) && begins_empty(contents);
+    let base = segment::base(ground.hash());
+    let is_log_whole = is_contiguous && whole.iter().all(|frame| frame.base == base);
     let is_same_ground = checkpoint.metadata.ground == ground.hash();
     if !is_same_ground && base_changed == BaseChanged::Refuse {
         return Err(StoreError::BaseChanged {
@@ -77,7 +78,7 @@ pub(super) fn recover(
         });
     }
     let settings = checkpoint.metadata.settings;
-    if !is_same_ground && base_changed == BaseChanged::Replay && is_contiguous && begins_empty(contents) {
+    if !is_same_ground && base_changed == BaseChanged::Replay && is_contiguous {
         let empty =
             Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
         let replayed = replay(empty, GameData::new(), &whole, false)?;
@@ -151,6 +152,11 @@ pub(super) fn recover(
 }
 
 impl Recovered {
+    /// The sizes of its chunks and voxels.
+    pub fn settings(&self) -> TerrainSettings {
+        TerrainSettings { chunk_size: self.mirror.chunk_size(), voxel_size: self.terrain.voxel_size() }
+    }
+
     /// A world that was replayed from its first commit.
     fn whole(replayed: Replayed) -> Self {
         let world = replayed.terrain.world();
@@ -171,20 +177,22 @@ impl Recovered {
     }
 }
 
-/// Were all segments that were found written over this ground, by this simulation?
-fn is_of_one_ground(contents: &Contents, ground: &Ground) -> bool {
-    let heads = contents.segments.iter().map(|found| Checkpoint::decode(found.checkpoint.as_deref()?));
-    heads.into_iter().all(|head| {
-        head.is_some_and(|head| {
-            head.metadata.ground == ground.hash() && head.metadata.simulation == crate::terrain::SIMULATION
-        })
-    })
-}
-
-/// Does the log begin with a world that nobody has edited?
-fn begins_empty(contents: &Contents) -> bool {
-    let first = contents.segments.iter().find_map(|found| Checkpoint::decode(found.checkpoint.as_deref()?));
-    first.is_none_or(|head| head.frame == 0 && head.metadata.revision == 0 && head.regions.is_empty())
+/// Replays the whole log from the first commit on, and verifies it.
+pub(super) fn replay_all(
+    contents: &Contents,
+    ground: &Arc<Ground>,
+    settings: TerrainSettings,
+) -> Result<Terrain, StoreError> {
+    let whole = contents.frames_from(1);
+    if whole.last().map_or(0, |last| last.number) < contents.greatest_frame() {
+        return Err(StoreError::Unreadable("the log does not reach back to the first commit".into()));
+    }
+    let empty = Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
+    let replayed = replay(empty, GameData::new(), &whole, true)?;
+    match replayed.refused {
+        Some(why) => Err(StoreError::Unreadable(format!("the log can't be replayed: {why}"))),
+        None => Ok(replayed.terrain),
+    }
 }
 
 /// The regions whose heights below are not those that they were saved with.

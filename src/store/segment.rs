@@ -11,6 +11,7 @@ use std::ops::Range;
 
 use super::files::Files;
 use super::format::frame::{self, Kind, WorldId};
+use crate::terrain::SIMULATION;
 
 /// The folder of segments.
 pub(super) const FOLDER: &str = "journal";
@@ -43,9 +44,15 @@ fn key(frame: u64) -> [u8; 8] {
     frame.to_be_bytes()
 }
 
+/// Names a ground and how edits change it: frames that were written under another name can't be replayed exactly.
+pub(super) fn base(ground: u64) -> u64 {
+    // Any odd number keeps simulations apart.
+    ground ^ u64::from(SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+}
+
 /// An entry of a segment.
-pub(super) fn entry(world: WorldId, frame: u64, revision: u64, payload: &[u8]) -> Vec<u8> {
-    sealed_entry(frame, &frame::seal(Kind::Journal, world, &key(frame), revision, 0, payload))
+pub(super) fn entry(world: WorldId, base: u64, frame: u64, revision: u64, payload: &[u8]) -> Vec<u8> {
+    sealed_entry(frame, &frame::seal(Kind::Journal, world, &key(frame), revision, base, payload))
 }
 
 /// The first entry of a segment: a checkpoint, from whose state on its frames lead.
@@ -66,10 +73,10 @@ fn sealed_entry(number: u64, sealed: &[u8]) -> Vec<u8> {
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub number: u64,
-    pub revision: u64,
+    /// The [base] that it was written on.
+    pub base: u64,
     pub payload: Vec<u8>,
-    /// Where its entry is.
-    pub segment: u64,
+    /// Where its entry is in its segment.
     pub range: Range<usize>,
 }
 
@@ -142,9 +149,8 @@ fn read_entry(bytes: &[u8], at: usize, found: &mut Found) -> Option<usize> {
             if frame_number == 0 {
                 found.checkpoint = Some(opened.payload);
             } else {
-                let (revision, payload) = (opened.revision, opened.payload);
-                let segment = found.number;
-                found.frames.push(Frame { number: frame_number, revision, payload, segment, range: at..end });
+                let (base, payload) = (opened.ground_hash, opened.payload);
+                found.frames.push(Frame { number: frame_number, base, payload, range: at..end });
             }
             Some(end)
         }

@@ -230,6 +230,13 @@ impl Batch {
             .collect();
         postcard::to_stdvec(&(commits, &self.game)).unwrap()
     }
+    pub fn summary(
+        bytes: &[u8],
+    ) -> Result<(Option<(u64, u64)>, Vec<(String, Option<Vec<u8>>)>), frame::FormatError> {
+        let bad = || frame::FormatError("batch".into());
+        let (raw, game): (Vec<RawCommit>, _) = postcard::from_bytes(bytes).map_err(|_| bad())?;
+        Ok((raw.last().map(|raw| (raw.0, raw.1)), game))
+    }
     pub fn decode(bytes: &[u8], ground: &Ground) -> Result<Self, frame::FormatError> {
         let bad = || frame::FormatError("batch".into());
         let (raw, game): (Vec<RawCommit>, _) = postcard::from_bytes(bytes).map_err(|_| bad())?;

@@ -15,6 +15,7 @@ use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
 use super::recover::{GameData, recover};
+use super::segment::base;
 use super::settle::settle;
 use super::writer::{Answer, GameChange, Message, Shared, Writer, apply_game};
 use crate::ground::Ground;
@@ -117,7 +118,14 @@ impl Store {
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
         let mirror = Mirror::new(terrain.world().grid(), parts, hash, GameData::new());
         let shared = Arc::new(Shared::default());
-        let journal = Journal::new(Arc::clone(&files), world, Vec::new(), frame + 1, (0, Vec::new()));
+        let journal = Journal::new(
+            Arc::clone(&files),
+            world,
+            base(ground.hash()),
+            Vec::new(),
+            frame + 1,
+            (0, Vec::new()),
+        );
         let saved = Arc::clone(&shared);
         let mut writer =
             Writer::new(files, options, saved, world, ground, settings, mirror, journal, None, frame);
@@ -165,13 +173,19 @@ impl Store {
             recovered.replayed,
             recovered.is_new || settled.is_unfinished || contents.damaged.is_some(),
         );
+        let settings = recovered.settings();
         let (mut terrain, mirror) = (recovered.terrain, recovered.mirror);
         let (revision, game) = (mirror.revision, mirror.game.clone());
-        let settings = TerrainSettings { chunk_size: mirror.chunk_size(), voxel_size: terrain.voxel_size() };
         let shared = Arc::new(Shared::default());
         let (world, database) = (contents.world, contents.database.take());
-        let journal =
-            Journal::new(Arc::clone(&files), world, settled.segments, settled.next_frame, (0, Vec::new()));
+        let journal = Journal::new(
+            Arc::clone(&files),
+            world,
+            base(ground.hash()),
+            settled.segments,
+            settled.next_frame,
+            (0, Vec::new()),
+        );
         let mut writer = Writer::new(
             files,
             options,
@@ -380,7 +394,7 @@ impl Drop for Store {
     }
 }
 
-fn has_world(files: &dyn Files) -> std::io::Result<bool> {
+pub(super) fn has_world(files: &dyn Files) -> std::io::Result<bool> {
     Ok(files.exists(super::database::DATABASE)? || !super::segment::list(files)?.is_empty())
 }
 

@@ -374,8 +374,10 @@ impl Writer {
                 self.listen(messages);
             }
         }
-        let head = frame::seal(Kind::Checkpoint, self.world, keys::CHECKPOINT, revision, 0, &checkpoint);
-        records.push((keys::CHECKPOINT.to_vec(), Some(head)));
+        for key in keys::CHECKPOINTS {
+            let sealed = frame::seal(Kind::Checkpoint, self.world, key, revision, 0, &checkpoint);
+            records.push((key.to_vec(), Some(sealed)));
+        }
         let written = self.write_records(&records);
         let after_gap = std::mem::take(&mut self.state.after_gap);
         if let Err(error) = written {
