@@ -46,6 +46,7 @@ impl Plugin for SavePlugin {
             .add_message::<StoreTroubleFound>()
             .add_observer(opening::hold)
             .add_observer(opening::close)
+            .add_observer(opening::follow_discarded)
             .configure_sets(Update, SaveSystems.after(BurrowSystems::Begin))
             .add_systems(
                 Update,

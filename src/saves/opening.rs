@@ -4,10 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use bevy::ecs::lifecycle::Discard;
 use bevy::prelude::*;
 
 use super::components::{SavedWorld, WorldStore};
 use super::messages::{StoreTroubleFound, WorldOpened};
+use super::saving::follow;
 use crate::ground::Ground;
 use crate::plugin::{Held, ThreadTask, Threads, free_later};
 use crate::store::{Opened, Store, StoreError, StoreOptions, StoreTrouble};
@@ -45,7 +47,7 @@ pub(super) fn close(
     mut worlds: Query<(&mut Terrain, &mut WorldStore)>,
 ) {
     if let Ok((mut terrain, mut world)) = worlds.get_mut(gone.entity) {
-        super::saving::follow(&mut terrain, &mut world);
+        follow(&mut terrain, &mut world);
     }
     close_later(&mut commands, gone.entity);
     commands.entity(gone.entity).try_remove::<(OpeningWorld, Unopened, Held)>();
@@ -57,6 +59,16 @@ fn close_later(commands: &mut Commands, entity: Entity) {
         let store = world.get_entity_mut(entity).ok().and_then(|mut entity| entity.take::<WorldStore>());
         store.into_iter().for_each(free_later);
     });
+}
+
+/// Hands over the last commits of a terrain that another one replaces, or that goes.
+pub(super) fn follow_discarded(
+    gone: On<Discard, Terrain>,
+    mut worlds: Query<(&mut Terrain, &mut WorldStore)>,
+) {
+    if let Ok((mut terrain, mut world)) = worlds.get_mut(gone.entity) {
+        follow(&mut terrain, &mut world);
+    }
 }
 
 /// Starts to read the worlds of new terrains.

@@ -44,14 +44,17 @@ fn hear(
     heard.receipts += receipts.read().filter(|message| message.receipt.outcome.is_ok()).count();
 }
 
+fn terrain() -> Terrain {
+    let ground = Ground::from_fn(96, 96, |x, z| f64::from((x * 5 + z * 3) % 17) / 4.0 + 10.0);
+    Terrain::new(ground.expect("valid"), &TerrainSettings::default()).expect("valid")
+}
+
 /// An app with a saved terrain.
 fn app(path: &Path) -> (App, Entity) {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, BurrowPlugins)).init_resource::<Heard>().add_systems(Last, hear);
-    let ground = Ground::from_fn(96, 96, |x, z| f64::from((x * 5 + z * 3) % 17) / 4.0 + 10.0);
-    let terrain = Terrain::new(ground.expect("valid"), &TerrainSettings::default()).expect("valid");
     let saved = SavedWorld { loss_window: Duration::from_millis(20), ..SavedWorld::new(path) };
-    let entity = app.world_mut().spawn((terrain, saved)).id();
+    let entity = app.world_mut().spawn((terrain(), saved)).id();
     (app, entity)
 }
 
@@ -150,6 +153,25 @@ fn a_terrain_that_goes_is_saved_and_its_world_can_be_opened_again() {
     let (mut again, entity) = app(&folder.0);
     run_until(&mut again, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
     assert_eq!(hash(&again, entity), before);
+}
+
+#[test]
+fn another_terrain_in_its_place_is_saved_in_its_stead() {
+    let folder = Folder::new("replaced");
+    let (mut first, entity) = app(&folder.0);
+    dig(&mut first, 30.0);
+    run_until(&mut first, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    let mut new = terrain();
+    new.apply([Brush::dig(Shape::sphere(Vec3::new(60.0, 11.0, 20.0), 6.0))]);
+    let expected = new.world().hash();
+    first.world_mut().entity_mut(entity).insert(new);
+    run_until_saved(&mut first, 1);
+    first.world_mut().write_message(AppExit::Success);
+    first.update();
+    drop(first);
+    let (mut second, entity) = app(&folder.0);
+    run_until(&mut second, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+    assert_eq!(hash(&second, entity), expected);
 }
 
 #[test]
