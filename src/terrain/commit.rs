@@ -109,7 +109,7 @@ impl Commit {
         }
         for chunk in self.outdated {
             world.surfaces.remove(&chunk);
-            world.unmeshed.insert(chunk);
+            world.unmeshed.insert(chunk, ());
         }
         for (chunk, surface) in self.surfaces {
             world.unmeshed.remove(&chunk);
