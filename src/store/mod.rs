@@ -5,6 +5,7 @@ mod database;
 mod disk;
 mod error;
 mod files;
+mod format;
 mod found;
 mod inspect;
 mod journal;
@@ -16,10 +17,8 @@ mod recover;
 mod salvage;
 mod segment;
 mod settle;
-mod shim;
 mod store;
 mod writer;
-use shim as format;
 
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
 pub use error::{StoreError, StoreTrouble};

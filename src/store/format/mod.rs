@@ -1,5 +1,4 @@
 //! The bytes of records: bricks, regions, journal entries. Everything that is read is checked.
-#![allow(missing_docs, dead_code, unused)]
 
 pub mod batch;
 pub mod bricks;
