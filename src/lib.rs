@@ -359,7 +359,8 @@ pub mod prelude {
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{
-        SaveNow, SaveSystems, SavedWorld, StoreTroubleFound, WorldOpened, WorldSaved, WorldStore,
+        BurrowLevel, SaveNow, SaveSystems, SavedWorld, StartLevel, StoreTroubleFound, WorldOpened,
+        WorldSaved, WorldStore,
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,

@@ -18,11 +18,13 @@
 //! ```
 
 mod components;
+mod level;
 mod messages;
 mod opening;
 mod saving;
 
 pub use components::{SavedWorld, WorldStore};
+pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
 pub use messages::{SaveNow, StoreTroubleFound, WorldOpened, WorldSaved};
 
 use bevy::prelude::*;
@@ -45,16 +47,22 @@ impl Plugin for SavePlugin {
             .add_message::<WorldSaved>()
             .add_message::<StoreTroubleFound>()
             .add_observer(opening::hold)
+            .add_observer(level::hold)
             .add_observer(opening::close)
             .add_observer(opening::follow_discarded)
             .configure_sets(Update, SaveSystems.after(BurrowSystems::Begin))
             .add_systems(
                 Update,
                 (
-                    (opening::finish_opening, opening::start_opening).chain().before(BurrowSystems::Load),
+                    (level::start_levels, opening::finish_opening, opening::start_opening)
+                        .chain()
+                        .before(BurrowSystems::Load),
                     (saving::save_commits, saving::save_now, saving::tell).chain().in_set(SaveSystems),
                 ),
             )
             .add_systems(Last, saving::finish_at_exit);
+        if app.world().contains_resource::<AssetServer>() {
+            app.init_asset::<BurrowLevel>().init_asset_loader::<LevelLoader>();
+        }
     }
 }

@@ -8,6 +8,7 @@ use bevy::ecs::lifecycle::Discard;
 use bevy::prelude::*;
 
 use super::components::{SavedWorld, WorldStore};
+use super::level::{MakingLevel, Waiting};
 use super::messages::{StoreTroubleFound, WorldOpened};
 use super::saving::follow;
 use crate::ground::Ground;
@@ -74,7 +75,7 @@ pub(super) fn follow_discarded(
 /// Starts to read the worlds of new terrains.
 pub(super) fn start_opening(
     mut commands: Commands,
-    worlds: Query<(Entity, &SavedWorld, &Terrain), With<Unopened>>,
+    worlds: Query<(Entity, &SavedWorld, &Terrain), (With<Unopened>, Without<Waiting>, Without<MakingLevel>)>,
 ) {
     for (entity, saved, terrain) in &worlds {
         let (path, options) = (saved.path.clone(), saved.options());

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{StoreError, StoreOptions};
+use bevy_burrow::store::{Level, StoreError, StoreOptions, load_level, pack_level, save_level, write_level};
 
 /// A folder that is removed with this.
 struct Folder(PathBuf);
@@ -44,9 +44,12 @@ fn hear(
     heard.receipts += receipts.read().filter(|message| message.receipt.outcome.is_ok()).count();
 }
 
+fn ground() -> Ground {
+    Ground::from_fn(96, 96, |x, z| f64::from((x * 5 + z * 3) % 17) / 4.0 + 10.0).expect("valid")
+}
+
 fn terrain() -> Terrain {
-    let ground = Ground::from_fn(96, 96, |x, z| f64::from((x * 5 + z * 3) % 17) / 4.0 + 10.0);
-    Terrain::new(ground.expect("valid"), &TerrainSettings::default()).expect("valid")
+    Terrain::new(ground(), &TerrainSettings::default()).expect("valid")
 }
 
 /// An app with a saved terrain.
@@ -198,6 +201,80 @@ fn a_world_that_is_open_already_is_played_in_memory() {
     assert!(second.world().get::<WorldStore>(entity).is_none());
     dig(&mut second, 30.0);
     run_until(&mut second, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+}
+
+/// A level of the terrain with a pit.
+fn level() -> (Level, u64) {
+    let mut terrain = terrain();
+    terrain.apply([Brush::dig(Shape::sphere(Vec3::new(48.0, 11.0, 48.0), 7.0))]);
+    (Level::of(&terrain), terrain.world().hash())
+}
+
+#[test]
+fn a_terrain_begins_as_the_level_that_is_loaded() {
+    let folder = Folder::new("level");
+    let (level, expected) = level();
+    std::fs::create_dir_all(&folder.0).expect("a new folder");
+    let packed = pack_level(&write_level(&level).expect("it can be written"));
+    std::fs::write(folder.0.join("pit.burrow_level"), packed).expect("a new file");
+
+    let mut app = App::new();
+    let assets = AssetPlugin { file_path: folder.0.display().to_string(), ..default() };
+    app.add_plugins((MinimalPlugins, assets, BurrowPlugins)).init_resource::<Heard>().add_systems(Last, hear);
+    let handle = app.world().resource::<AssetServer>().load("pit.burrow_level");
+    let entity = app.world_mut().spawn((terrain(), StartLevel(handle))).id();
+    dig(&mut app, 20.0);
+    let pit =
+        move |world: &World| world.get::<Terrain>(entity).is_some_and(|own| own.world().hash() == expected);
+    run_until(&mut app, "the level is there", pit);
+    // What was sent meanwhile comes on top of it.
+    run_until(&mut app, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    assert_ne!(hash(&app, entity), expected);
+}
+
+#[test]
+fn a_save_begins_as_a_level_and_goes_on_as_itself() {
+    let folder = Folder::new("save-of-level");
+    let (level, pit) = level();
+    let play = |digs: usize| {
+        let (mut app, entity) = app(&folder.0);
+        app.insert_resource(Assets::<BurrowLevel>::default());
+        let asset = BurrowLevel::new(&level).expect("it can be written");
+        let handle = app.world_mut().resource_mut::<Assets<BurrowLevel>>().add(asset);
+        app.world_mut().entity_mut(entity).insert(StartLevel(handle));
+        run_until(&mut app, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+        let first = hash(&app, entity);
+        for number in 0..digs {
+            dig(&mut app, 20.0);
+            run_until(&mut app, "it is dug", move |world| world.resource::<Heard>().receipts > number);
+        }
+        app.world_mut().write_message(AppExit::Success);
+        app.update();
+        (first, hash(&app, entity))
+    };
+    let (first, dug) = play(1);
+    assert_eq!(first, pit);
+    let (again, _) = play(0);
+    assert_eq!(again, dug);
+}
+
+#[test]
+fn a_folder_of_a_level_changes_only_where_the_level_does() {
+    let folder = Folder::new("level-folder");
+    let (level, expected) = level();
+    save_level(&folder.0, &level).expect("a new folder");
+    let files = || {
+        let entries = std::fs::read_dir(&folder.0).expect("a folder").flatten();
+        entries
+            .map(|entry| (entry.file_name(), std::fs::read(entry.path()).expect("a file")))
+            .collect::<Vec<_>>()
+    };
+    let before = files();
+    save_level(&folder.0, &level).expect("the same again");
+    assert_eq!(files(), before);
+    let ground = std::sync::Arc::new(ground());
+    let loaded = load_level(&folder.0, &ground).expect("it was just written");
+    assert_eq!(loaded.terrain(ground).expect("the same ground").world().hash(), expected);
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub mod residuals;
 pub use batch::Batch;
 pub use error::FormatError;
 pub use metadata::Metadata;
-pub use region::{REGION_LIMIT, decode_region, encode_region};
+pub use region::{decode_region, encode_region};
 
 #[cfg(test)]
 mod tests;
