@@ -329,6 +329,8 @@ pub mod panel;
 pub mod physics;
 #[cfg(feature = "plugin")]
 pub mod plugin;
+#[cfg(all(feature = "plugin", feature = "store"))]
+pub mod saves;
 #[cfg(feature = "store")]
 pub mod store;
 pub mod surface;
@@ -354,6 +356,11 @@ pub mod prelude {
         Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
         MaterialColors, Redo, ShownLevels, SlimVertices, TargetedBrush, TerrainHit, TerrainReady, Terrains,
         Tile, Undo,
+    };
+    #[cfg(all(feature = "plugin", feature = "store"))]
+    pub use crate::saves::{
+        BurrowLevel, SaveNow, SaveSystems, SavedWorld, StartLevel, StoreTroubleFound, WorldOpened,
+        WorldSaved, WorldStore,
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,

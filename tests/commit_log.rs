@@ -16,7 +16,7 @@ use glam::{IVec3, Vec3};
 
 mod worlds;
 
-use worlds::{any_random_brush, random_ground, world_count};
+use worlds::{any_random_brush, change_towards, random_ground, world_count};
 
 /// Bytes that no test's log exceeds.
 const PLENTY: usize = 1 << 30;
@@ -154,15 +154,7 @@ fn a_world_can_be_put_in_place_of_another() {
             terrain
         });
         let [from, to] = &mut terrains;
-        // Every brick and field of either one.
-        let mut change = from.parts().change;
-        let (own, theirs) = (to.parts().change, from.world());
-        let gone = own.bricks.iter().filter(|(pos, _)| theirs.bricks().all(|(other, _)| other != *pos));
-        change.bricks.extend(gone.map(|(pos, _)| (*pos, None)));
-        change.bricks.sort_by_key(|(pos, _)| *pos);
-        let gone = own.fields.iter().filter(|(chunk, _)| theirs.fields_of(*chunk).is_none());
-        change.fields.extend(gone.map(|(chunk, _)| (*chunk, Default::default())));
-
+        let change = change_towards(to, &from.parts());
         let before = (to.world().hash(), meshes(to.world()));
         let hash = from.world().hash();
         if hash != before.0 {

@@ -132,7 +132,19 @@ fn after_each_commit_what_is_drawn_is_closed_and_as_if_made_from_scratch() {
         let rng = &mut Rng::with_seed(index);
         let (ground, chunk_size) = worlds::random_ground(rng, index);
         let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
-        let mut terrain = Terrain::new(ground, &settings).expect("a valid size");
+        let ground = Arc::new(ground);
+        let mut terrain = Terrain::new(Arc::clone(&ground), &settings).expect("a valid size");
+        // Of a restored one, no chunk has been meshed.
+        let is_restored = index % 2 == 1;
+        if is_restored {
+            terrain.apply(
+                (0..rng.usize(1..8))
+                    .map(|_| random_brush(rng, &ground, terrain.world().grid()))
+                    .collect::<Vec<_>>(),
+            );
+            terrain = Terrain::restore(Arc::clone(&ground), &settings, terrain.parts()).expect("its own");
+        }
+        let mut saved = vec![terrain.parts()];
         let grid = terrain.world().level_grid(rng.u8(1..6));
         let (drawn, nodes) = terrain.world().draw_cut(Cut::coarsest(grid));
         let mut display = Display::default();
@@ -144,6 +156,10 @@ fn after_each_commit_what_is_drawn_is_closed_and_as_if_made_from_scratch() {
             let transaction = if is_edit {
                 if rng.u32(0..6) == 0 {
                     terrain.submit_undo();
+                } else if rng.u32(0..6) == 0 {
+                    let change = worlds::change_towards(&terrain, &saved[rng.usize(0..saved.len())]);
+                    saved.push(terrain.parts());
+                    terrain.submit_change(change, None).expect("there is room");
                 } else {
                     let count = rng.usize(1..3);
                     for _ in 0..count {

@@ -22,6 +22,9 @@
 //!
 //! Keys are bound by their position on an American keyboard. The menus show the letters of the player's own layout.
 //!
+//! What is dug is saved as it is dug, with the inventory and the player's place: the title continues the world that was played
+//! last, and `--world NAME` another one, or a new one of that name. Scripts save only with `--world`.
+//!
 //! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows into
 //! mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
 //!
@@ -36,7 +39,7 @@
 //! | --- | --- |
 //! | `player` | input and bindings, the character, the camera, the headlamp, the game's states |
 //! | `tools` | what the player holds: digging, building, bombs, balls and lamps, and the inventory |
-//! | `world` | the landscape and its ore, day and night, the sky, particles and debris |
+//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, particles and debris |
 //! | `ui` | menus, settings, and the heads-up display |
 //! | `film` | scripts that play the game for pictures and films |
 
@@ -61,6 +64,7 @@ use bevy_burrow::prelude::*;
 use clap::Parser;
 
 use crate::ui::settings::SettingsFile;
+use crate::world::saves::PlayedWorld;
 
 /// A first-person game on a landscape that can be dug.
 #[derive(Parser, Clone, Debug)]
@@ -93,9 +97,19 @@ pub struct Options {
     /// Log events to standard output, for programs that play the game.
     #[arg(long)]
     tell: bool,
+    /// The saved world to play: its name, or its folder. By default the one that was played last; scripts save nothing.
+    #[arg(long, value_name = "NAME")]
+    world: Option<String>,
     /// Where edits are computed.
     #[arg(long, value_enum, default_value_t = Computer::Auto)]
     backend: Computer,
+}
+
+impl Options {
+    /// The folder of the world that was asked for.
+    fn saved_world(&self) -> Option<PathBuf> {
+        self.world.as_deref().and_then(PlayedWorld::named)
+    }
 }
 
 /// A [`Backend`] on the command line.
@@ -137,7 +151,7 @@ fn main() -> ExitCode {
 }
 
 /// Adds the whole game to an app with or without a window.
-pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
+pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile, world: Option<PathBuf>) {
     app.insert_resource(engine)
         .add_plugins((BurrowPlugins, ui::settings::SettingsPlugin(settings)))
         .add_plugins((
@@ -163,6 +177,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
         ))
         .add_plugins((
             world::landscape::LandscapePlugin,
+            world::saves::SavesPlugin(world),
             world::sky::SkyPlugin,
             world::day::DayPlugin,
             world::light::LightPlugin,
@@ -185,7 +200,8 @@ fn open_window(options: &Options) -> App {
         Window { title: "Digger".into(), resolution: (options.width, options.height).into(), ..default() };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
-    game(&mut app, options.backend.engine(), SettingsFile::of_user());
+    let world = options.saved_world().or_else(PlayedWorld::latest);
+    game(&mut app, options.backend.engine(), SettingsFile::of_user(), world);
     if options.tell {
         app.add_plugins(film::event_log::EventLogPlugin);
     }
@@ -208,6 +224,7 @@ mod tests {
             ("digger --headless --draw-all --backend cpu", true),
             ("digger --draw-all", false),
             ("digger --tour --draw-all", false),
+            ("digger --headless --world mine", true),
         ] {
             assert_eq!(Options::try_parse_from(line.split(' ')).is_ok(), is_understood, "{line}");
         }

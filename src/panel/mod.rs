@@ -25,6 +25,7 @@
 mod brush_column;
 mod context;
 mod lengths;
+mod level;
 mod look_section;
 mod operations;
 mod picture;
@@ -85,6 +86,7 @@ impl Plugin for BurrowPanelPlugin {
                     survey::count_terrain,
                     survey::finish_seam_check,
                     picture::finish,
+                    level::finish,
                     picture::give_up,
                     perform_actions,
                     note_rejection,
@@ -119,6 +121,14 @@ fn perform_actions(
                 }
             }
             PanelAction::SavePicture => picture::save(&mut commands, &mut panel, cameras.iter().next()),
+            PanelAction::SaveLevel => {
+                let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
+                terrain.into_iter().for_each(|(_, terrain)| level::save(&mut commands, &mut panel, terrain));
+            }
+            PanelAction::LoadLevel => {
+                let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
+                terrain.into_iter().for_each(|own| level::load(&mut commands, &mut panel, own));
+            }
         }
     }
 }

@@ -25,6 +25,8 @@ pub struct BurrowPanel {
     pub materials: Vec<String>,
     /// Folder in which pictures are saved, as `burrow_0001.png` and so on.
     pub pictures: PathBuf,
+    /// Folder in which levels are saved and from which they are loaded; it can be typed into the panel.
+    pub level: PathBuf,
     /// Index of the material whose rules are shown.
     pub(super) material: usize,
     /// The current message: the last seam check or picture.
@@ -57,6 +59,7 @@ impl Default for BurrowPanel {
             terrain: None,
             materials: names.map(String::from).to_vec(),
             pictures: PathBuf::from("pictures"),
+            level: PathBuf::from("level"),
             material: 0,
             note: None,
             rejection: None,
@@ -109,6 +112,10 @@ pub enum PanelAction {
     Redo,
     /// Saves a screenshot of the camera that draws the panel, including the panel.
     SavePicture,
+    /// Saves the terrain as a [level](crate::store::Level) in the [folder](BurrowPanel::level), in a task.
+    SaveLevel,
+    /// Puts the level of that folder, or packed file, in the terrain's place; it must have been made on the same ground.
+    LoadLevel,
 }
 
 /// Whether the panel, or any other egui context, uses the pointer or the keyboard in this frame. Contexts of all

@@ -52,6 +52,7 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
             look_section::show(ui, look);
         }
     }
+    section(ui, "Level", false, |ui| level(ui, panel, content.actions, chosen.is_some()));
     let undo_budget = chosen.is_some().then_some(&mut content.controls.undo_budget);
     section(ui, "Settings", false, |ui| settings(ui, undo_budget, content.settings));
 }
@@ -77,6 +78,26 @@ fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, cho
         }
         if button(ui, "Save picture", width, true).clicked() {
             actions.push(PanelAction::SavePicture);
+        }
+    });
+}
+
+/// Where levels are saved and loaded.
+fn level(ui: &mut Ui, panel: &mut BurrowPanel, actions: &mut Vec<PanelAction>, has_terrain: bool) {
+    let is_free = has_terrain && !matches!(panel.note, Some(Note::Busy(_)));
+    let mut folder = panel.level.display().to_string();
+    if ui.text_edit_singleline(&mut folder).changed() {
+        panel.level = folder.into();
+    }
+    let width = share(ui, 2);
+    ui.horizontal(|ui| {
+        let save = button(ui, "Save level", width, is_free);
+        if save.on_hover_text("One file for each region, for version control").clicked() {
+            actions.push(PanelAction::SaveLevel);
+        }
+        let load = button(ui, "Load level", width, is_free);
+        if load.on_hover_text("From a folder or a packed file, over the same ground").clicked() {
+            actions.push(PanelAction::LoadLevel);
         }
     });
 }

@@ -16,8 +16,8 @@ use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
-    BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, HistoryMoved,
-    LoosePieceFound, MaterialColors, SlimVertices, SurfaceProcessors, free_later,
+    BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
+    HistoryMoved, LoosePieceFound, MaterialColors, SlimVertices, SurfaceProcessors, free_later,
 };
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, FieldNews, Rejection, Terrain, World as Ground};
@@ -34,7 +34,7 @@ pub(super) fn begin_transactions(
             Has<SlimVertices>,
             Option<&mut LevelState>,
         ),
-        (Without<Loading>, Without<InFlight>),
+        (Without<Loading>, Without<InFlight>, Without<Held>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
     processors: Res<SurfaceProcessors>,

@@ -156,6 +156,12 @@ impl From<&volume::Field> for Field {
     }
 }
 
+/// A terrain that waits: it is not loaded, and begins no transaction; what is sent to it stays queued. Say because the world that
+/// it is to show is still on its way. A `SavedWorld` brings it until its world is read.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default)]
+pub struct Held;
+
 /// The meshes of this terrain have vertices of 32 bytes: positions, normals, materials; no colours and no depth in the ground,
 /// which take 20 more. A `GroundLook` brings it and takes it away again; insert it for materials of your own that need neither.
 ///

@@ -15,7 +15,7 @@ use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{InFlight, TaskCounter};
 use super::threads::{ThreadTask, Threads};
-use super::{BurrowSettings, ChunkCreated, MaterialColors, SlimVertices, SurfaceProcessors};
+use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SlimVertices, SurfaceProcessors};
 use crate::lattice::ChunkPos;
 use crate::levels::Cut;
 use crate::terrain::{Drawn, DrawnCut, KnownNodes, Terrain, World};
@@ -55,8 +55,8 @@ struct Loaded {
     built: BuiltSurface,
 }
 
-/// Terrains without a task.
-type Idle = (Without<Loading>, Without<InFlight>);
+/// Terrains without a task that are not held.
+type Idle = (Without<Loading>, Without<InFlight>, Without<Held>);
 
 /// Scales the entities of terrains to the size of their voxels.
 pub(super) fn scale_terrains(

@@ -42,7 +42,7 @@ mod threads;
 mod times;
 
 pub use components::{
-    Chunk, Field, GroundPiece, GroundPieces, MaterialColors, ShownSurface, SlimVertices, Tile,
+    Chunk, Field, GroundPiece, GroundPieces, Held, MaterialColors, ShownSurface, SlimVertices, Tile,
 };
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, trigger_if_alive};
@@ -63,7 +63,7 @@ pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 pub(crate) use threads::free_later;
-#[cfg(any(feature = "render", feature = "avian"))]
+#[cfg(any(feature = "render", feature = "avian", feature = "store"))]
 pub(crate) use threads::{ThreadTask, Threads};
 pub use times::Times;
 
@@ -83,6 +83,7 @@ use crate::terrain::Terrain;
 /// | --- | --- |
 /// | [`TerrainPlugin`] | transactions, entities, messages |
 /// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
+/// | `SavePlugin` | saves worlds of terrains with a `SavedWorld` (feature `store`) |
 /// | `TerrainMaterialPlugin<StandardMaterial>` | propagates materials to tiles, chunks and pieces (feature `render`) |
 /// | `GroundPlugin` | texture layers for terrains with a `GroundLook` (feature `render`) |
 #[derive(Default)]
@@ -91,6 +92,8 @@ pub struct BurrowPlugins;
 impl PluginGroup for BurrowPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>().add(TerrainPlugin).add(HeightmapPlugin);
+        #[cfg(feature = "store")]
+        let group = group.add(crate::saves::SavePlugin);
         #[cfg(feature = "render")]
         let group = group
             .add(crate::view::TerrainMaterialPlugin::<StandardMaterial>::default())

@@ -1,3 +1,36 @@
 //! Worlds on disk: a journal of commits, checkpoints of regions, recovery after a crash.
 
+mod checkpoint;
+mod database;
+mod disk;
+mod error;
+mod files;
 mod format;
+mod found;
+mod inspect;
+mod journal;
+mod keys;
+mod levels;
+mod mirror;
+mod options;
+mod quarantine;
+mod recover;
+mod salvage;
+mod segment;
+mod settle;
+mod store;
+mod writer;
+
+pub use disk::{DiskFault, DiskImage, SimulatedDisk};
+pub use error::{StoreError, StoreTrouble};
+pub use files::{Files, Folder, Lock, OpenFile, Opening};
+pub use format::frame::WorldId;
+pub use format::level::{Level, LevelFiles, pack_level, read_level, unpack_level, write_level};
+pub use format::portable::{
+    PortableHead, PortableWorld, SavedRegion, read_portable, read_portable_head, write_portable,
+};
+pub use format::{Batch, FormatError, Metadata};
+pub use inspect::{WorldCheck, WorldInfo, check, check_in, inspect, inspect_in, replay};
+pub use levels::{RestoreLevelError, load_level, read_level_files, save_level};
+pub use options::{BaseChanged, StoreOptions};
+pub use store::{Opened, Store};

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use super::drawn_cut::DrawnCut;
 use super::field_log::FieldNews;
 use super::history::{HistoryReceipt, Restored, UndoDelta};
+use super::log::RecordDraft;
 use super::put::ChangeError;
 use super::receipt::Receipt;
-use super::record::WorldChange;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;
 use super::surface::ChunkSurface;
@@ -31,8 +31,8 @@ pub struct Commit {
     pub(super) step: Option<HistoryReceipt>,
     /// What became of parts that it puts in place.
     pub(super) put: Option<Result<Restored, ChangeError>>,
-    /// The bricks and fields that it leads to, where a log is kept.
-    pub(super) logged: Option<WorldChange>,
+    /// Its record, where a log is kept.
+    pub(super) record: Option<RecordDraft>,
     pub(super) news: Vec<(ChunkPos, FieldNews)>,
     pub(super) surfaces: Vec<(ChunkPos, Arc<ChunkSurface>)>,
     pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
@@ -109,7 +109,7 @@ impl Commit {
         }
         for chunk in self.outdated {
             world.surfaces.remove(&chunk);
-            world.unmeshed.insert(chunk);
+            world.unmeshed.insert(chunk, ());
         }
         for (chunk, surface) in self.surfaces {
             world.unmeshed.remove(&chunk);

@@ -85,6 +85,21 @@ impl Terrain {
         self.drawn_cut = drawn;
     }
 
+    /// Takes the place of a terrain: takes over what waits in it, its engine, limits and budget of history.
+    #[cfg(feature = "store")]
+    pub(crate) fn take_over(&mut self, old: &mut Self) {
+        old.abandon();
+        self.queue.take_over(&mut old.queue);
+        self.answered.append(&mut old.answered);
+        self.step_receipts.append(&mut old.step_receipts);
+        self.change_receipts.append(&mut old.change_receipts);
+        if let Some(engine) = old.engine() {
+            self.set_engine(engine.clone());
+        }
+        self.set_undo_budget(old.undo_budget());
+        self.set_meshing(old.meshing());
+    }
+
     /// Commits a transaction of the plugin's, which shows it by itself. The caller may drop what is no longer needed elsewhere.
     pub(crate) fn commit_shown(
         &mut self,

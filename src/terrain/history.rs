@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::change::{Change, ChangedBrick};
+use super::record::CommitRecord;
 use super::world::World;
 use crate::lattice::LatticeBox;
 use crate::volume::MaterialCounts;
@@ -127,11 +128,12 @@ impl UndoDelta {
     }
 }
 
-/// What a terrain no longer needs: steps, bricks, and a copy of the world. Dropping these is slow; do it off the main thread.
+/// What a terrain no longer needs: steps, bricks, records of the log, and a copy of the world. Dropping these is slow; do it off the main thread.
 #[derive(Default)]
 pub(crate) struct DeferredDrop {
     steps: Vec<Arc<UndoDelta>>,
     bricks: Vec<Vec<ChangedBrick>>,
+    pub(super) records: Vec<CommitRecord>,
     pub(super) copy: Option<Arc<World>>,
 }
 
@@ -139,7 +141,13 @@ impl DeferredDrop {
     /// Is there nothing to drop?
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
-        self.steps.is_empty() && self.bricks.is_empty() && self.copy.is_none()
+        let Self { steps, bricks, records, copy } = self;
+        steps.is_empty() && bricks.is_empty() && records.is_empty() && copy.is_none()
+    }
+
+    /// Adds what a change replaced.
+    pub(super) fn add(&mut self, replaced: UndoDelta) {
+        self.steps.push(Arc::new(replaced));
     }
 }
 
@@ -207,7 +215,8 @@ impl UndoStack {
     }
 
     /// Forgets all steps.
-    pub fn clear(&mut self) {
+    pub fn clear(&mut self, dropped: &mut DeferredDrop) {
+        dropped.steps.extend(self.undo.drain(..).chain(self.redo.drain(..)));
         (self.undo, self.redo, self.step_bytes) = Default::default();
     }
 
@@ -226,7 +235,7 @@ impl UndoStack {
         } else if replaced.group > self.last_dropped {
             self.keep(HistoryStep::Undo, replaced);
         } else {
-            dropped.steps.push(Arc::new(replaced));
+            dropped.add(replaced);
         }
         self.trim(dropped);
     }

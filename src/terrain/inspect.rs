@@ -116,7 +116,7 @@ impl World {
     /// The chunks whose positions lie in a box that draw something, or may.
     fn maybe_drawn_in(&self, places: LatticeBox) -> Vec<ChunkPos> {
         let mut chunks = found_in(&self.surfaces, places);
-        chunks.extend(self.unmeshed.iter().copied().filter(|chunk| places.contains(chunk.as_ivec3())));
+        chunks.append(&mut found_in(&self.unmeshed, places));
         chunks
     }
 

@@ -4,98 +4,193 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::change::brick_bytes;
+use super::commit::Commit;
 use super::loose::LooseSettings;
 use super::model::Terrain;
-use super::receipt::Receipt;
 use super::record::{CommitRecord, LogEntry, WorldChange};
 use super::transaction::Work;
 use super::world::World;
-use crate::brush::Edit;
 use crate::volume::DiggingRules;
 
 /// Rules and settings of loose pieces.
 type Terms = (Option<Arc<DiggingRules>>, Option<LooseSettings>);
 
-/// Records that wait to be taken.
-pub(super) struct CommitLog {
-    records: VecDeque<CommitRecord>,
-    bytes: usize,
-    limit: usize,
-    /// The terms that hold after the last record; `None` at first.
-    terms: Option<Terms>,
+/// The entries that lead from some terms to others; without terms before, all of them.
+fn changed_terms(before: Option<&Terms>, after: &Terms) -> impl Iterator<Item = LogEntry> + use<> {
+    let rules = before.is_none_or(|before| before.0 != after.0).then(|| LogEntry::Rules(after.0.clone()));
+    let loose = before.is_none_or(|before| before.1 != after.1).then_some(LogEntry::Loose(after.1));
+    rules.into_iter().chain(loose)
 }
 
-impl CommitLog {
-    fn new(limit: usize) -> Self {
-        Self { records: VecDeque::new(), bytes: 0, limit, terms: None }
-    }
+/// A record as its transaction makes it: all but what only the commit knows.
+#[derive(Default)]
+pub(super) struct RecordDraft {
+    /// The terms of the first and of the last edit that was applied. Entries say how those in between differ.
+    terms: Option<[Terms; 2]>,
+    entries: Vec<LogEntry>,
+    change: WorldChange,
+    /// Bytes that the record may hold alone.
+    bytes: usize,
+}
 
-    /// Enters a commit that led to this world.
-    pub fn enter(&mut self, world: &World, work: &Work, receipts: &[Receipt], mut change: WorldChange) {
-        change.next_field = world.next_field;
-        let mut entries = Vec::new();
+impl RecordDraft {
+    /// The record of a commit, by what it was asked for.
+    pub fn new(work: &Work, commit: &Commit) -> Self {
+        let (mut terms, mut entries) = (None::<[Terms; 2]>, Vec::new());
         match work {
             Work::Edits(submissions) => {
-                entries.reserve_exact(submissions.len());
-                for (submission, receipt) in submissions.iter().zip(receipts) {
+                // With room for the first terms, if those before were others.
+                entries.reserve_exact(submissions.len() + 2);
+                for (submission, receipt) in submissions.iter().zip(&commit.receipts) {
                     let (Ok(edit), Ok(_)) = (&submission.edit, &receipt.outcome) else { continue };
-                    let terms = (submission.terms.rules.clone(), submission.terms.loose);
-                    self.enter_terms(terms, &mut entries);
+                    let own = (submission.terms.rules.clone(), submission.terms.loose);
+                    let first = match terms.take() {
+                        Some([first, last]) => {
+                            entries.extend(changed_terms(Some(&last), &own));
+                            first
+                        }
+                        None => own.clone(),
+                    };
+                    terms = Some([first, own]);
                     entries.push(LogEntry::Edit(edit.clone()));
                 }
             }
             Work::Step(..) | Work::Put(_) => entries.push(LogEntry::Change),
-            Work::Cut(_) => return,
+            Work::Cut(_) => {}
         }
-        self.push(CommitRecord { revision: world.revision(), hash: world.hash(), entries, change });
-    }
-
-    /// Enters that these terms hold from now on, if others did.
-    fn enter_terms(&mut self, terms: Terms, entries: &mut Vec<LogEntry>) {
-        let before = self.terms.as_ref();
-        if before.is_none_or(|(rules, _)| *rules != terms.0) {
-            entries.push(LogEntry::Rules(terms.0.clone()));
-        }
-        if before.is_none_or(|(_, loose)| *loose != terms.1) {
-            entries.push(LogEntry::Loose(terms.1));
-        }
-        self.terms = Some(terms);
-    }
-
-    fn push(&mut self, record: CommitRecord) {
-        self.bytes += bytes_of(&record);
-        self.records.push_back(record);
-        while self.bytes > self.limit {
-            let Some(oldest) = self.records.pop_front() else { break };
-            self.bytes -= bytes_of(&oldest);
-        }
+        let change = change_of(commit);
+        let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
+        let bytes = bytes_of(&entries, &change) + room;
+        Self { terms, entries, change, bytes }
     }
 }
 
-/// Bytes that a record may hold alone.
-fn bytes_of(record: &CommitRecord) -> usize {
-    let CommitRecord { entries, change, .. } = record;
+/// The bricks and fields that a commit leads to, as its record lists them.
+fn change_of(commit: &Commit) -> WorldChange {
+    let (mut bricks, mut fields) = (Vec::new(), Vec::new());
+    // Of several groups the last one holds.
+    for change in commit.changes.iter().rev().map(|own| &own.change) {
+        bricks.extend(change.bricks.iter().cloned());
+        fields.extend(change.fields.iter().cloned());
+    }
+    bricks.sort_by_key(|(pos, _)| *pos);
+    bricks.dedup_by_key(|(pos, _)| *pos);
+    fields.sort_by_key(|(chunk, _)| *chunk);
+    fields.dedup_by_key(|(chunk, _)| *chunk);
+    WorldChange { bricks, fields, next_field: commit.next_field }
+}
+
+/// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main thread.
+fn bytes_of(entries: &[LogEntry], change: &WorldChange) -> usize {
+    let rules = entries.iter().map(rule_bytes);
     let bricks = change.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));
     let fields = change.fields.iter().map(|(_, fields)| fields.bytes());
     size_of::<CommitRecord>()
-        + entries.capacity() * size_of::<LogEntry>()
-        + entries.iter().filter(|entry| matches!(entry, LogEntry::Edit(_))).count() * size_of::<Edit>()
+        + size_of_val(entries)
         + size_of_val(&change.bricks[..])
         + size_of_val(&change.fields[..])
-        + bricks.chain(fields).sum::<usize>()
+        + rules.chain(bricks).chain(fields).sum::<usize>()
+}
+
+/// Bytes of the rules that an entry tells of.
+fn rule_bytes(entry: &LogEntry) -> usize {
+    match entry {
+        LogEntry::Rules(Some(rules)) => rules.bytes(),
+        _ => 0,
+    }
+}
+
+/// Records that wait to be taken.
+pub(super) struct CommitLog {
+    records: VecDeque<CommitRecord>,
+    /// Bytes of each of them.
+    sizes: VecDeque<usize>,
+    /// Bytes of all of them.
+    bytes: usize,
+    limit: usize,
+    /// The terms that hold after the last record; `None` if nothing is known of them.
+    terms: Option<Terms>,
+    /// Was a commit dropped after the last record that was taken? The first record that waits is a commit then: any other has
+    /// the same revision as the one that was dropped, and would hide the gap.
+    has_gap: bool,
+}
+
+impl CommitLog {
+    fn new(limit: usize) -> Self {
+        let (records, sizes) = Default::default();
+        Self { records, sizes, bytes: 0, limit, terms: None, has_gap: false }
+    }
+
+    /// Enters the commit that led to this world. What has to be dropped for it is added to `dropped`.
+    pub fn enter(&mut self, world: &World, draft: RecordDraft, dropped: &mut Vec<CommitRecord>) {
+        let RecordDraft { terms, mut entries, mut change, mut bytes } = draft;
+        change.next_field = world.next_field;
+        if let Some([first, last]) = terms {
+            let told = changed_terms(self.terms.as_ref(), &first);
+            drop(entries.splice(0..0, told.inspect(|entry| bytes += rule_bytes(entry))));
+            self.terms = Some(last);
+        }
+        let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
+        self.push(record, bytes, dropped);
+    }
+
+    /// Enters that these terms hold from now on, if others did.
+    fn enter_terms(&mut self, world: &World, terms: Terms) {
+        // The next edit tells them.
+        if self.has_gap && self.records.is_empty() {
+            return;
+        }
+        let entries: Vec<LogEntry> = changed_terms(self.terms.as_ref(), &terms).collect();
+        if !entries.is_empty() {
+            self.terms = Some(terms);
+            let change = WorldChange { next_field: world.next_field, ..WorldChange::default() };
+            let bytes = bytes_of(&entries, &change);
+            let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
+            self.push(record, bytes, &mut Vec::new());
+        }
+    }
+
+    fn push(&mut self, record: CommitRecord, bytes: usize, dropped: &mut Vec<CommitRecord>) {
+        self.records.push_back(record);
+        self.sizes.push_back(bytes);
+        self.bytes += bytes;
+        self.trim(dropped);
+    }
+
+    /// Drops the oldest records until the others are within the limit, and the gap shows in their revisions.
+    fn trim(&mut self, dropped: &mut Vec<CommitRecord>) {
+        let mut has_lost = false;
+        while let Some(first) = self.records.front() {
+            let hides_gap = if self.has_gap { !first.is_commit() } else { has_lost };
+            if self.bytes <= self.limit && !hides_gap {
+                return;
+            }
+            self.has_gap |= first.is_commit();
+            has_lost = true;
+            self.bytes -= self.sizes.pop_front().unwrap_or_default();
+            dropped.extend(self.records.pop_front());
+        }
+        // Those that the dropped ones told of are told again.
+        self.terms = None;
+    }
 }
 
 impl Terrain {
     /// From now on a record of each commit is kept until it is [taken](Self::take_log); `None` keeps none and drops those that
-    /// wait. Once they hold more than so many bytes, the oldest are dropped: whoever finds a gap between
-    /// [revisions](CommitRecord::revision) has to read [all of the world](Self::parts).
+    /// wait. Once they hold more than so many bytes, images of stamps not counted, the oldest are dropped: whoever finds a gap
+    /// between [revisions](CommitRecord::revision), or another revision after the last of them than the
+    /// [world's](super::World::revision), has to read [all of the world](Self::parts).
     ///
     /// Rules and settings of loose pieces are told with the first edit that obeys them, or once nothing waits.
     pub fn keep_log(&mut self, bytes: Option<usize>) {
         match (&mut self.log, bytes) {
-            (Some(log), Some(limit)) => log.limit = limit,
-            (log, limit) => {
-                *log = limit.map(CommitLog::new);
+            (_, None) => self.log = None,
+            (Some(log), Some(limit)) => {
+                log.limit = limit;
+                log.trim(&mut Vec::new());
+            }
+            (None, Some(limit)) => {
+                self.log = Some(CommitLog::new(limit));
                 // Its commit would hold no record.
                 self.abandon();
             }
@@ -106,6 +201,9 @@ impl Terrain {
     /// The records of the commits since the last call, in order; each is returned once.
     pub fn take_log(&mut self) -> Vec<CommitRecord> {
         let Some(log) = &mut self.log else { return Vec::new() };
+        // Whoever takes them sees the gap.
+        log.has_gap &= log.records.is_empty();
+        log.sizes.clear();
         log.bytes = 0;
         std::mem::take(&mut log.records).into()
     }
@@ -120,13 +218,8 @@ impl Terrain {
         if self.is_busy() || self.queue.len() > 0 {
             return;
         }
-        let Some(log) = &mut self.log else { return };
-        let mut entries = Vec::new();
-        log.enter_terms((self.rules.clone(), self.loose), &mut entries);
-        if !entries.is_empty() {
-            let (revision, hash) = (self.world.revision(), self.world.hash());
-            let change = WorldChange { next_field: self.world.next_field, ..WorldChange::default() };
-            log.push(CommitRecord { revision, hash, entries, change });
+        if let Some(log) = &mut self.log {
+            log.enter_terms(&self.world, (self.rules.clone(), self.loose));
         }
     }
 }

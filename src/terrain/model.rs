@@ -207,7 +207,12 @@ impl Terrain {
             return None;
         }
         let (work, estimate) = loop {
-            match self.queue.take()? {
+            let Some(taken) = self.queue.take() else {
+                // Steps that found nothing may have been the last that waited.
+                self.log_terms();
+                return None;
+            };
+            match taken {
                 (Taken::Edits(edits), estimate) => break (Work::Edits(edits), estimate),
                 (Taken::Put(put), estimate) => break (Work::Put(put), estimate),
                 (Taken::Step(step), estimate) => match self.undo_stack.next(step) {
@@ -280,22 +285,27 @@ impl Terrain {
         {
             self.world = copy;
         }
-        let logged = commit.logged.take();
+        let record = commit.record.take();
         let installed = commit.install(Arc::make_mut(&mut self.world));
         self.queue.finish(done.estimate);
         installed.step.into_iter().for_each(|receipt| self.answer_step(receipt));
+        let mut dropped = DeferredDrop::default();
         if let Some(log) = &mut self.log {
-            log.enter(&self.world, &done.work, &installed.receipts, logged.unwrap_or_default());
+            log.enter(&self.world, record.unwrap_or_default(), &mut dropped.records);
         }
         self.log_terms();
-        let mut dropped = DeferredDrop::default();
         dropped.copy = copy;
+        // Steps of before hold parts that are gone.
+        if let (Work::Put(put), Some(Ok(_))) = (&done.work, &installed.put)
+            && !put.is_empty()
+        {
+            self.undo_stack.clear(&mut dropped);
+        }
         for replaced in installed.replaced {
             match &done.work {
                 Work::Edits(_) => self.undo_stack.record(replaced, &mut dropped),
                 Work::Step(step, used) => self.undo_stack.record_step(*step, used, replaced, &mut dropped),
-                Work::Put(_) => self.undo_stack.clear(),
-                Work::Cut(_) => {}
+                Work::Put(_) | Work::Cut(_) => dropped.add(replaced),
             }
         }
         if let Some(receipt) = installed.put {

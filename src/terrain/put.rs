@@ -24,7 +24,7 @@ use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::layers::{self, offset};
-use crate::volume::{Brick, UniformBricks, column_hash, pristine_layers};
+use crate::volume::{Brick, Field, FieldId, UniformBricks, column_hash, pristine_layers};
 
 /// Why parts were not put in place; nothing changed then.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -33,15 +33,18 @@ pub enum ChangeError {
     /// Bricks come twice or out of order.
     #[error("the brick {0:?} comes twice or out of order")]
     Order(BrickPos),
-    /// A brick has edited samples that the world has not.
+    /// A brick, or one of its edited samples, lies outside the world.
     #[error("the brick {0:?} reaches out of the world")]
     OutsideWorld(BrickPos),
     /// A brick says of a pristine sample that it is solid where this ground is air, or the other way round.
     #[error("the brick {0:?} belongs to another ground")]
     OtherGround(BrickPos),
-    /// Fields of a chunk reach out of it.
-    #[error("fields of the chunk {0:?} reach out of it")]
+    /// Fields of a chunk reach out of it, it comes twice, or one of its fields has the name of another.
+    #[error("fields of the chunk {0:?} reach out of it, come twice or share a name")]
     Fields(ChunkPos),
+    /// A revision or the name of a field is so great that no others could follow.
+    #[error("{0} is too great for a revision or the name of a field")]
+    Number(u64),
     /// The world would not have the hash that was expected.
     #[error("the world would have the hash {found:#018x}, not {expected:#018x}")]
     Hash {
@@ -69,6 +72,11 @@ pub(super) struct Put {
 }
 
 impl Put {
+    /// Does it certainly change nothing?
+    pub fn is_empty(&self) -> bool {
+        self.change.bricks.is_empty() && self.change.fields.is_empty()
+    }
+
     /// Does it certainly change none of these samples?
     pub fn misses(&self, samples: LatticeBox) -> bool {
         self.change.bricks.iter().all(|(pos, _)| pos.samples().intersection(samples).is_none())
@@ -93,8 +101,12 @@ impl NewBrick {
         counts: bool,
     ) -> Result<Self, ChangeError> {
         let mut brick = brick.map(Arc::clone);
+        let (bounds, own) = (world.grid.edit_bounds(), pos.samples());
+        // Far out, lattice points do not fit 32 bits, and those that wrap around may seem to lie in the world.
+        if BrickPos::of(own.min) != pos || own.intersection(bounds).is_none() {
+            return Err(ChangeError::OutsideWorld(pos));
+        }
         if let Some(new) = &brick {
-            let (bounds, own) = (world.grid.edit_bounds(), pos.samples());
             let is_inside = |index| bounds.contains(pos.origin() + offset(index));
             if !bounds.encloses(own) && !layers::indices(new.edited()).all(is_inside) {
                 return Err(ChangeError::OutsideWorld(pos));
@@ -145,7 +157,7 @@ pub(super) fn put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -
 fn checked_put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> Result<Commit, ChangeError> {
     let (world, change, mut stages) = (&*transaction.world, &put.change, Stages::default());
     check_order(&change.bricks)?;
-    check_fields(world, change)?;
+    let next_field = check_fields(world, change)?;
     let all = change.bricks.par_iter().with_min_len(64);
     let all = all.map(|(pos, brick)| NewBrick::new(world, *pos, brick.as_ref(), put.counts));
     let mut new = Stages::time(&mut stages.edit, || all.collect::<Result<Vec<NewBrick>, ChangeError>>())?;
@@ -182,7 +194,7 @@ fn checked_put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> R
         put: Some(Ok(restored)),
         news,
         uniform,
-        next_field: world.next_field.max(put.change.next_field),
+        next_field,
         stages,
         ..transaction.commit(vec![delta], sample_hash, meshes)
     })
@@ -193,16 +205,29 @@ fn check_order(bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> Result<(), ChangeEr
     wrong.map_or(Ok(()), |pair| Err(ChangeError::Order(pair[1].0)))
 }
 
-fn check_fields(world: &World, change: &WorldChange) -> Result<(), ChangeError> {
+/// Checks the fields of a change; returns the greatest name that a field will have had.
+fn check_fields(world: &World, change: &WorldChange) -> Result<u64, ChangeError> {
+    let (mut chunks, mut names) = (FxHashSet::default(), FxHashSet::default());
+    let mut greatest = check_number(world.next_field.max(change.next_field))?;
     for (chunk, fields) in &change.fields {
-        let own = world.grid.chunk_samples(*chunk);
-        let is_inside =
-            world.grid.has_tile(chunk.tile()) && fields.iter().all(|field| own.encloses(field.bounds));
-        if !is_inside {
+        let own = world.grid.chunk_samples(*chunk).intersection(world.grid.edit_bounds());
+        let is_inside = |field: &Field| own.is_some_and(|own| own.encloses(field.bounds));
+        if !world.grid.has_tile(chunk.tile()) || !chunks.insert(*chunk) || !fields.iter().all(is_inside) {
             return Err(ChangeError::Fields(*chunk));
         }
+        for FieldId(name) in fields.iter().map(|field| field.id) {
+            greatest = greatest.max(check_number(name)?);
+            if !names.insert(name) {
+                return Err(ChangeError::Fields(*chunk));
+            }
+        }
     }
-    Ok(())
+    Ok(greatest)
+}
+
+/// Checks that a revision or the name of a field leaves room for those that follow.
+pub(super) fn check_number(number: u64) -> Result<u64, ChangeError> {
+    if number > u64::MAX / 2 { Err(ChangeError::Number(number)) } else { Ok(number) }
 }
 
 /// Lets uniform bricks of one kind be one; returns the pool, if it has grown.

@@ -239,6 +239,12 @@ impl Queue {
         requests.rev().for_each(|request| self.requests.push_front(request));
     }
 
+    /// Takes over what waits in another queue, and its limits; nothing waits in this one.
+    #[cfg(all(feature = "plugin", feature = "store"))]
+    pub fn take_over(&mut self, other: &mut Self) {
+        *self = Self { limits: other.limits, ..std::mem::take(other) };
+    }
+
     /// Drops all requests.
     #[cfg(feature = "plugin")]
     pub fn clear(&mut self) {

@@ -44,10 +44,18 @@ pub struct CommitRecord {
     pub revision: u64,
     /// The world's [hash](super::World::hash) after it.
     pub hash: u64,
-    /// What was asked for, in order. Edits that were rejected are left out.
+    /// What was asked for, in order. Edits that were rejected are left out; a commit of such edits alone has no entry.
     pub entries: Vec<LogEntry>,
     /// What changed.
     pub change: WorldChange,
+}
+
+impl CommitRecord {
+    /// Is it a commit? Otherwise it only says which rules and settings hold from here on, and the revision stays.
+    pub fn is_commit(&self) -> bool {
+        let changes = |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change);
+        self.entries.is_empty() || self.entries.iter().any(changes)
+    }
 }
 
 /// All of a world but its ground, as it is saved: [`Terrain::restore`](super::Terrain::restore) makes a terrain of it.

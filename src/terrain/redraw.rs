@@ -198,7 +198,7 @@ fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn Mes
         let nothing = ChunkSurface::default();
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
         // That nothing is drawn is news of a chunk whose surface was not kept.
-        let empty = || world.unmeshed.contains(&chunk).then(ChunkSurface::default);
+        let empty = || world.unmeshed.contains_key(&chunk).then(ChunkSurface::default);
         Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh)).or_else(empty)?)))
     };
     if !ItemCost::Lookup.is_shared(blocks.len()) {

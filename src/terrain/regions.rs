@@ -11,11 +11,7 @@ use crate::volume::Brick;
 impl World {
     /// The regions that hold bricks, in order.
     pub fn regions(&self) -> impl Iterator<Item = RegionPos> {
-        let of_stack = |(&(x, z), ys): (&(i32, i32), &Vec<i32>)| {
-            let region = move |&y: &i32| RegionPos::of(BrickPos(glam::IVec3::new(x, y, z)));
-            ys.iter().map(region).collect::<Vec<_>>()
-        };
-        self.stacks.iter().flat_map(of_stack).collect::<BTreeSet<_>>().into_iter()
+        self.bricks.keys().map(|&pos| RegionPos::of(pos)).collect::<BTreeSet<_>>().into_iter()
     }
 
     /// The stored bricks of a region, in order.

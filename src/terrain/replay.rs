@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::model::Terrain;
-use super::put::{ChangeError, Put};
+use super::put::{ChangeError, Put, check_number};
 use super::queue::WorkLimits;
 use super::receipt::Receipt;
 use super::record::{CommitRecord, LogEntry, WorldChange, WorldParts};
@@ -32,7 +32,7 @@ pub enum RestoreError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
-    /// The record does not follow the world's revision.
+    /// The record does not follow the world's revision, or makes more than one commit.
     #[error("the record leads to revision {found}, but the world is at {at}")]
     Revision {
         /// The world's.
@@ -97,6 +97,7 @@ impl Terrain {
     ) -> Result<Self, RestoreError> {
         let mut terrain = Self::new(ground, settings)?;
         let WorldParts { mut change, chunk_size, revision, rules, loose } = parts;
+        check_number(revision)?;
         if chunk_size != settings.chunk_size {
             (change.fields, change.next_field) = fields_of(terrain.world.grid(), &change);
         }
@@ -110,27 +111,29 @@ impl Terrain {
     }
 
     /// Applies a record of a [log](Self::take_log) at once, after everything that waits, and compares the world with it: its
-    /// revision, and its hash. Returns the receipts of its edits.
+    /// revision, and its hash. Returns the receipts of its edits. A log that this terrain keeps
+    /// tells of it too.
+    ///
+    /// Fields of steps and of parts belong to the chunk size of the terrain that they were logged by, which this one needs too.
+    ///
+    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as [stale](super::StaleCommit).
     ///
     /// # Errors
     /// When the record does not follow, or does not lead to the world that it says.
     pub fn replay(&mut self, record: &CommitRecord) -> Result<Vec<Receipt>, ReplayError> {
+        self.abandon();
         let waiting = self.finish();
         waiting.into_iter().for_each(|receipt| self.answer(receipt));
         let at = self.world.revision;
-        let is_commit = record.revision == at + 1;
-        let changes =
-            record.entries.iter().any(|entry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change));
-        if !is_commit && (changes || record.revision != at) {
+        if record.revision != at + u64::from(record.is_commit()) {
             return Err(ReplayError::Revision { at, found: record.revision });
         }
         let limits = std::mem::replace(&mut self.queue.limits, WorkLimits::UNBOUNDED);
         let receipts = self.replay_entries(record);
         self.queue.limits = limits;
-        let receipts = receipts?;
-        if is_commit {
-            // A commit may have changed nothing.
-            Arc::make_mut(&mut self.world).revision = record.revision;
+        let (receipts, at) = (receipts?, self.world.revision);
+        if record.revision != at {
+            return Err(ReplayError::Revision { at, found: record.revision });
         }
         let (found, expected) = (self.world.hash(), record.hash);
         if found != expected {
@@ -152,6 +155,10 @@ impl Terrain {
                 }
             }
         }
+        if record.entries.is_empty() {
+            // All of its edits were rejected.
+            self.apply_change(WorldChange::default(), Some(record.hash))?;
+        }
         let receipts = self.finish();
         match receipts.iter().any(|receipt| receipt.outcome.is_err()) {
             true => Err(ReplayError::Rejected(record.revision)),
@@ -169,7 +176,7 @@ fn fields_of(grid: ChunkGrid, change: &WorldChange) -> (Vec<(ChunkPos, Fields)>,
         for chunk in grid.chunks_of(edited) {
             let Some(own) = grid.chunk_samples(chunk).intersection(edited) else { continue };
             fields.entry(chunk).or_default().absorb(own, || {
-                next += 1;
+                next = next.saturating_add(1);
                 FieldId(next)
             });
         }

@@ -16,10 +16,10 @@ use super::commit::Commit;
 use super::drawn_cut::ChooseCut;
 use super::history::{HistoryReceipt, HistoryRejection};
 use super::levels;
+use super::log::RecordDraft;
 use super::put::{self, ChangeError};
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
-use super::record::WorldChange;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;
 use super::transaction::{Transaction, Work};
@@ -74,8 +74,8 @@ impl Transaction {
         let mut stages = commit.stages;
         let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
         let copy = Stages::time(&mut stages.whole, copy);
-        let logged = self.is_logged.then(|| logged(&commit));
-        Commit { copy, logged, stages, ..commit }
+        let record = self.is_logged.then(|| RecordDraft::new(&self.work, &commit));
+        Commit { copy, record, stages, ..commit }
     }
 
     /// May it reach so many bricks that several threads will work on them?
@@ -165,21 +165,6 @@ impl Transaction {
             Work::Cut(_) => commit,
         }
     }
-}
-
-/// The bricks and fields that a commit leads to, as its record lists them.
-fn logged(commit: &Commit) -> WorldChange {
-    let (mut bricks, mut fields) = (Vec::new(), Vec::new());
-    // Of several groups the last one holds.
-    for change in commit.changes.iter().rev().map(|own| &own.change) {
-        bricks.extend(change.bricks.iter().cloned());
-        fields.extend(change.fields.iter().cloned());
-    }
-    bricks.sort_by_key(|(pos, _)| *pos);
-    bricks.dedup_by_key(|(pos, _)| *pos);
-    fields.sort_by_key(|(chunk, _)| *chunk);
-    fields.dedup_by_key(|(chunk, _)| *chunk);
-    WorldChange { bricks, fields, next_field: commit.next_field }
 }
 
 /// The tag of an edit that panics in tests has this bit.

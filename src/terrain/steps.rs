@@ -72,7 +72,7 @@ impl Terrain {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn clear_history(&mut self) {
-        self.undo_stack.clear();
+        self.undo_stack.clear(&mut DeferredDrop::default());
         // A stroke that goes on begins anew.
         self.queue.close_group();
     }

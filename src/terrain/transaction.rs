@@ -82,7 +82,7 @@ impl Transaction {
             receipts: Vec::new(),
             step: None,
             put: None,
-            logged: None,
+            record: None,
             news: Vec::new(),
             copy: None,
             drawn_cut: meshes.drawn_cut.clone(),

@@ -117,7 +117,7 @@ pub(super) fn complete(world: &World, view: &WorldView, blocks: &mut Vec<Block>)
         return;
     }
     let chunks: FxHashSet<ChunkPos> =
-        blocks.iter().map(|block| block.chunk).filter(|chunk| world.unmeshed.contains(chunk)).collect();
+        blocks.iter().map(|block| block.chunk).filter(|chunk| world.unmeshed.contains_key(chunk)).collect();
     blocks.extend(chunks.into_iter().flat_map(|chunk| blocks_of(world, view.mask, chunk)));
     blocks.sort_unstable_by_key(|block| (block.brick, block.chunk));
     blocks.dedup();
@@ -126,22 +126,22 @@ pub(super) fn complete(world: &World, view: &WorldView, blocks: &mut Vec<Block>)
 impl World {
     /// All that the surface of a chunk is made from; `None` unless it is one whose surface is not kept.
     pub(super) fn unmeshed(&self, chunk: ChunkPos) -> Option<UnmeshedChunk> {
-        self.unmeshed.contains(&chunk).then(|| UnmeshedChunk::new(self, chunk))
+        self.unmeshed.contains_key(&chunk).then(|| UnmeshedChunk::new(self, chunk))
     }
 
     /// The chunks that draw something and those that may, as their surface is not kept: in no order.
     pub(super) fn maybe_drawn(&self) -> impl Iterator<Item = ChunkPos> {
-        self.surfaces.keys().chain(&self.unmeshed).copied()
+        self.surfaces.keys().chain(self.unmeshed.keys()).copied()
     }
 
     /// Does the chunk draw something, or may it?
     pub(crate) fn may_draw(&self, chunk: ChunkPos) -> bool {
-        self.surfaces.contains_key(&chunk) || self.unmeshed.contains(&chunk)
+        self.surfaces.contains_key(&chunk) || self.unmeshed.contains_key(&chunk)
     }
 
     /// Forgets all surfaces; they are made when they are asked for.
     fn forget_surfaces(&mut self) {
-        self.unmeshed.extend(std::mem::take(&mut self.surfaces).into_keys());
+        self.unmeshed.extend(std::mem::take(&mut self.surfaces).into_keys().map(|chunk| (chunk, ())));
         self.rings = Default::default();
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::IVec3;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 use super::surface::ChunkSurface;
 use crate::ground::Ground;
@@ -88,8 +88,8 @@ pub struct World {
     pub(super) fields: FxHashMap<ChunkPos, Fields>,
     pub(super) mask: Mask,
     pub(super) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
-    /// Chunks that may draw something and whose surface is not kept.
-    pub(super) unmeshed: FxHashSet<ChunkPos>,
+    /// Chunks that may draw something and whose surface is not kept: a table without values, counted and shrunk like the others.
+    pub(super) unmeshed: FxHashMap<ChunkPos, ()>,
     /// Of tiles that bordered on the mask when they were last drawn; some may have none. Those of a tile that is not among them
     /// are made when they are needed.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
@@ -141,7 +141,7 @@ impl World {
             fields: FxHashMap::default(),
             mask: Mask::default(),
             surfaces: FxHashMap::default(),
-            unmeshed: FxHashSet::default(),
+            unmeshed: FxHashMap::default(),
             rings: FxHashMap::default(),
             uniform: UniformBricks::default(),
             many_kinds: FEW_KINDS,
@@ -158,7 +158,7 @@ impl World {
     }
 
     /// The same, shared.
-    #[cfg(feature = "plugin")]
+    #[cfg(any(feature = "plugin", feature = "store"))]
     pub(crate) fn shared_ground(&self) -> Arc<Ground> {
         Arc::clone(&self.ground)
     }
@@ -291,7 +291,7 @@ impl World {
         give_back(&mut self.fields);
         give_back(&mut self.surfaces);
         give_back(&mut self.rings);
-        self.unmeshed.shrink_to(2 * self.unmeshed.len());
+        give_back(&mut self.unmeshed);
         self.mask.give_back();
     }
 
@@ -313,6 +313,7 @@ impl World {
         memory.parts += self.rings.values().map(|rings| rings.bytes()).sum::<usize>();
         memory.index += table_bytes(&self.bricks) + table_bytes(&self.surfaces) + table_bytes(&self.rings);
         memory.index += table_bytes(&self.fields) + table_bytes(&self.stacks) + table_bytes(&self.uniform);
+        memory.index += table_bytes(&self.unmeshed);
         memory.index += self.fields.values().map(Fields::bytes).sum::<usize>();
         memory.index += self.stacks.values().map(|stack| stack.capacity() * size_of::<i32>()).sum::<usize>();
         memory

@@ -8,11 +8,15 @@ use crate::ground::MaterialId;
 pub struct MaterialCounts(Vec<(MaterialId, u64)>);
 
 impl From<Vec<(MaterialId, u64)>> for MaterialCounts {
-    /// Counts of one material are added up; a sum stays within 64 bits.
+    /// Counts of one material are added up; the sum of all stays within 64 bits.
     fn from(list: Vec<(MaterialId, u64)>) -> Self {
-        let mut counts = Self::default();
-        for (material, voxels) in list.into_iter().filter(|entry| entry.1 > 0) {
-            counts.count_many(material, voxels.min(u64::MAX - counts.of(material)));
+        let (mut counts, mut room) = (Self::default(), u64::MAX);
+        for (material, voxels) in list {
+            let counted = voxels.min(room);
+            if counted > 0 {
+                counts.count_many(material, counted);
+                room -= counted;
+            }
         }
         counts
     }
@@ -22,7 +26,7 @@ impl MaterialCounts {
     /// Counts more voxels of one material.
     pub(crate) fn count_many(&mut self, material: MaterialId, voxels: u64) {
         match self.0.binary_search_by_key(&material, |entry| entry.0) {
-            Ok(at) => self.0[at].1 += voxels,
+            Ok(at) => self.0[at].1 = self.0[at].1.saturating_add(voxels),
             Err(at) => self.0.insert(at, (material, voxels)),
         }
     }
@@ -46,7 +50,7 @@ impl MaterialCounts {
 
     /// Voxels of all materials.
     pub fn total(&self) -> u64 {
-        self.0.iter().map(|entry| entry.1).sum()
+        self.0.iter().fold(0, |sum, entry| sum.saturating_add(entry.1))
     }
 
     /// Materials that were counted, with their voxels.

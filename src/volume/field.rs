@@ -85,7 +85,7 @@ impl Fields {
     /// Takes in the box of an edit's changed samples. Of fields that merge the oldest goes on; `fresh` names a new one.
     pub(crate) fn absorb(&mut self, edit: LatticeBox, fresh: impl FnOnce() -> FieldId) -> Absorbed {
         if let Some(field) = self.0.iter_mut().find(|field| field.bounds.encloses(edit)) {
-            field.revision += 1;
+            field.revision = field.revision.saturating_add(1);
             return Absorbed { scenario: Scenario::Changed, field: field.id, gone: Vec::new() };
         }
         let mut bounds = edit;
@@ -102,7 +102,8 @@ impl Fields {
             fields => Scenario::Merged { fields },
         };
         let id = met.first().map_or_else(fresh, |oldest| oldest.id);
-        let revision = met.iter().map(|field| field.revision).max().map_or(0, |newest| newest + 1);
+        let revision =
+            met.iter().map(|field| field.revision).max().map_or(0, |newest| newest.saturating_add(1));
         self.0.reserve_exact(1);
         self.0.push(Field { id, bounds, revision });
         if met.len() > 1 {

@@ -87,6 +87,13 @@ impl DiggingRules {
         *self == Self::default()
     }
 
+    /// Bytes of its lists.
+    pub(crate) fn bytes(&self) -> usize {
+        // Trees have room for some more entries than they hold.
+        let trees = 4 * (self.hardness.len() + self.unbreakable.len());
+        trees + self.protected.capacity() * size_of::<LatticeBox>()
+    }
+
     pub(crate) fn is_unbreakable(&self, material: MaterialId) -> bool {
         self.unbreakable.contains(&material)
     }

@@ -20,6 +20,7 @@ mod propagate;
 mod queries;
 mod receipts;
 mod replacing;
+mod saves;
 mod server;
 mod several_terrains;
 mod shown;

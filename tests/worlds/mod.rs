@@ -8,8 +8,9 @@ use bevy_burrow::ground::{
     Bedding, GreyImage, Ground, ImageLimits, ImageScale, Interval, MaterialControl, MaterialRule, Strata,
     Stratum, StratumBounds,
 };
-use bevy_burrow::lattice::LatticeBox;
+use bevy_burrow::lattice::{BrickPos, ChunkPos, LatticeBox};
 use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::{WorldChange, WorldParts};
 use fastrand::Rng;
 use glam::{IVec3, Quat, Vec2, Vec3};
 
@@ -388,4 +389,16 @@ pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
         terrain.apply([brush]);
     }
     terrain
+}
+
+/// The change that makes a terrain's world what these parts were saved of.
+pub fn change_towards(terrain: &Terrain, parts: &WorldParts) -> WorldChange {
+    let (mut change, now) = (parts.change.clone(), terrain.parts().change);
+    let gone = |pos: &BrickPos| parts.change.bricks.binary_search_by_key(pos, |own| own.0).is_err();
+    change.bricks.extend(now.bricks.iter().filter(|(pos, _)| gone(pos)).map(|(pos, _)| (*pos, None)));
+    change.bricks.sort_by_key(|(pos, _)| *pos);
+    let gone = |chunk: &ChunkPos| parts.change.fields.iter().all(|own| own.0 != *chunk);
+    let gone = now.fields.iter().filter(|(chunk, _)| gone(chunk));
+    change.fields.extend(gone.map(|(chunk, _)| (*chunk, Default::default())));
+    change
 }

@@ -24,6 +24,8 @@ pub enum MenuPage {
     /// The menu of the title or of the pause.
     #[default]
     Menu,
+    /// The saved worlds.
+    Worlds,
     Settings,
     Controls,
     Help,

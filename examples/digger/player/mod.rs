@@ -17,6 +17,7 @@ use self::input::{Action, Actions};
 use crate::film::places::Places;
 use crate::ui::settings::Settings;
 use crate::world::landscape::DespawnOnNewGame;
+use crate::world::saves::SavedPlace;
 
 /// The player's body and the direction of its head.
 #[derive(Component, Clone, Copy, Debug, Default)]
@@ -72,9 +73,14 @@ fn spawn_player(
     terrains: Terrains,
     places: Res<Places>,
     players: Query<(), With<Player>>,
+    saved: Option<Res<SavedPlace>>,
 ) {
     // The event comes again whenever the terrain has loaded anew.
     if !players.is_empty() {
+        return;
+    }
+    if let Some(&SavedPlace { feet, yaw, pitch }) = saved.as_deref() {
+        commands.spawn((Name::new("player"), Player { yaw, pitch }, body::standing_at(feet)));
         return;
     }
     let feet = start(&places, |place| terrains.height(place.x, place.y));

@@ -14,6 +14,7 @@ use bevy::prelude::*;
 use bevy_burrow::plugin::{HistoryMoved, Redo, Undo};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{HistoryStep, PieceFate};
+use serde::{Deserialize, Serialize};
 
 use crate::player::PlayerControlSystems;
 use crate::player::game_state::GameState;
@@ -32,6 +33,13 @@ const INITIAL_CONCRETE: i64 = 600;
 
 /// Voxels by material, positive or negative.
 type Amounts = [i64; MATERIALS.len()];
+
+/// An inventory as it is saved: changes of single brushes are left out, as the terrain's history is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SavedInventory {
+    amounts: Vec<i64>,
+    next_tag: u64,
+}
 
 #[derive(Resource, Clone, Debug)]
 pub struct Inventory {
@@ -134,6 +142,18 @@ impl Inventory {
         self.apply(&total)
     }
 
+    /// What is saved of it.
+    pub fn saved(&self) -> SavedInventory {
+        SavedInventory { amounts: self.amounts.to_vec(), next_tag: self.next_tag }
+    }
+
+    /// Takes over what was saved. Materials that came later than the save are not there.
+    pub fn restore(&mut self, saved: &SavedInventory) {
+        let next_tag = self.next_tag.max(saved.next_tag);
+        *self = Self { amounts: default(), next_tag, ..default() };
+        self.amounts.iter_mut().zip(&saved.amounts).for_each(|(amount, saved)| *amount = *saved);
+    }
+
     /// Empties the inventory for a new game. Tags go on counting, because receipts of the old game may still arrive.
     pub fn reset(&mut self) {
         *self = Self { next_tag: self.next_tag, ..default() };
@@ -204,7 +224,7 @@ fn read_receipts(
     }
 }
 
-fn read_history(
+pub fn read_history(
     mut steps: MessageReader<HistoryMoved>,
     mut inventory: ResMut<Inventory>,
     mut changes: MessageWriter<AmountChanged>,

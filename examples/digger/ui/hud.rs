@@ -295,9 +295,16 @@ fn fade_crosshair(hand: Res<Hand>, mut dot: Single<&mut BackgroundColor, With<Cr
     dot.set_if_neq(BackgroundColor(WHITE.with_alpha(if reaches { 0.95 } else { 0.30 })));
 }
 
-fn show_time(clock: Res<Clock>, lamp: Res<HeadlampSwitch>, mut time: Single<&mut Text, With<TimeOfDay>>) {
+fn show_time(
+    clock: Res<Clock>,
+    lamp: Res<HeadlampSwitch>,
+    worlds: Query<(&Terrain, &WorldStore)>,
+    mut time: Single<&mut Text, With<TimeOfDay>>,
+) {
     let lamp = if lamp.0 { "lamp on   " } else { "" };
-    time.set_if_neq(Text::new(format!("{lamp}{}", clock.text())));
+    let is_behind = |(terrain, world): (&Terrain, &WorldStore)| world.durable() < terrain.world().revision();
+    let saving = if worlds.iter().any(is_behind) { "saving   " } else { "" };
+    time.set_if_neq(Text::new(format!("{lamp}{saving}{}", clock.text())));
 }
 
 fn show_hints(

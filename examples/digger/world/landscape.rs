@@ -18,6 +18,7 @@ use bevy_burrow::prelude::*;
 
 use crate::film::places::Places;
 use crate::tools::hardness;
+use crate::world::saves::PlayedWorld;
 use crate::world::strata::strata;
 
 pub const ROCK: MaterialId = MaterialId(0);
@@ -190,9 +191,18 @@ fn replace_terrain(
     mut commands: Commands,
     ground: Res<OriginalGround>,
     terrain: Single<Entity, With<GroundLook>>,
+    played: Res<PlayedWorld>,
 ) -> Result {
-    commands.entity(*terrain).insert(new_terrain(&ground.0)?);
+    insert_terrain(&mut commands.entity(*terrain), new_terrain(&ground.0)?, &played);
     Ok(())
+}
+
+/// Puts a terrain on its entity; where the world is saved, what is there takes its place.
+fn insert_terrain(entity: &mut EntityCommands, terrain: Terrain, played: &PlayedWorld) {
+    entity.insert(terrain);
+    if let Some(saved) = played.saved() {
+        entity.insert(saved);
+    }
 }
 
 fn despawn_on_new_game(
@@ -209,6 +219,7 @@ fn spawn_terrain(
     mut commands: Commands,
     generation: Option<ResMut<Generation>>,
     terrain: Single<Entity, With<GroundLook>>,
+    played: Res<PlayedWorld>,
     mut exit: MessageWriter<AppExit>,
 ) {
     let Some(result) = generation.and_then(|mut task| check_ready(&mut task.0)) else { return };
@@ -217,7 +228,8 @@ fn spawn_terrain(
         Ok((ground, model, places)) => {
             commands.insert_resource(places);
             commands.insert_resource(OriginalGround(ground));
-            commands.entity(*terrain).insert((model, EdgeWalls::default()));
+            commands.entity(*terrain).insert(EdgeWalls::default());
+            insert_terrain(&mut commands.entity(*terrain), model, &played);
         }
         Err(reason) => {
             error!("the landscape can't be generated: {reason}");

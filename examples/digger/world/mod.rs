@@ -5,5 +5,6 @@ pub mod debris;
 pub mod landscape;
 pub mod light;
 pub mod particles;
+pub mod saves;
 pub mod sky;
 pub mod strata;

@@ -1,10 +1,11 @@
-//! The pages of the menu: title, pause, settings, controls and help.
+//! The pages of the menu: title, worlds, pause, settings, controls and help.
 
 mod controls;
 mod help;
 mod pause;
 mod settings_page;
 mod title;
+mod worlds;
 
 use bevy::prelude::*;
 
@@ -22,6 +23,7 @@ impl Plugin for MenuPlugin {
             settings_page::SettingsPagePlugin,
             controls::ControlsPlugin,
             help::HelpPlugin,
+            worlds::WorldsPlugin,
         ));
     }
 }

@@ -13,6 +13,7 @@ use crate::player::game_state::{GameState, MenuPage};
 use crate::ui::images::Images;
 use crate::ui::widgets::{self, Activated, GOLD, GREY};
 use crate::world::landscape::NewGame;
+use crate::world::saves::{self, PlayedWorld};
 
 /// Seconds for one turn around the landscape.
 const TURN: f32 = 150.0;
@@ -43,11 +44,11 @@ impl Plugin for TitlePlugin {
 }
 
 #[derive(Resource, Clone, Copy, Debug, Default)]
-struct Start {
+pub struct Start {
     /// Is there a game to continue?
     has_begun: bool,
     /// Does the player want to start as soon as the landscape has loaded?
-    is_wanted: bool,
+    pub is_wanted: bool,
 }
 
 /// The progress of loading. It is hidden when everything has loaded.
@@ -61,7 +62,7 @@ struct ProgressText;
 #[derive(Component)]
 struct ProgressBar;
 
-fn open(mut commands: Commands, images: Option<Res<Images>>, game: Res<Start>) {
+fn open(mut commands: Commands, images: Option<Res<Images>>, game: Res<Start>, played: Res<PlayedWorld>) {
     let Some(images) = images else { return };
     let left = Node {
         padding: UiRect::left(px(84)),
@@ -79,12 +80,22 @@ fn open(mut commands: Commands, images: Option<Res<Images>>, game: Res<Start>) {
         left.spawn((ImageNode::new(images.logo.clone()), logo));
         let below = Node { margin: UiRect::bottom(px(34)), ..default() };
         left.spawn((widgets::text("a real landscape that you can dig", 17.0, GREY), below));
-        let first = if game.has_begun { "Continue" } else { "Dig" };
-        left.spawn(widgets::button(0, first, WIDTH)).observe(start);
-        if game.has_begun {
-            left.spawn(widgets::button(1, "New game", WIDTH)).observe(start_new_game);
+        let saved = played.0.as_deref().filter(|folder| folder.exists());
+        let first = match saved {
+            Some(folder) => format!("Continue {}", saves::name(folder)),
+            None if game.has_begun => "Continue".into(),
+            None => "Dig".into(),
+        };
+        left.spawn(widgets::button(0, &first, WIDTH)).observe(start);
+        let mut next = 1;
+        if game.has_begun || saved.is_some() {
+            left.spawn(widgets::button(next, "New game", WIDTH)).observe(start_new_game);
+            next += 1;
         }
-        let next = 1 + usize::from(game.has_begun);
+        if played.0.is_some() {
+            left.spawn(widgets::button(next, "Worlds", WIDTH)).observe(super::go_to(MenuPage::Worlds));
+            next += 1;
+        }
         spawn_common_buttons(left, next, WIDTH);
         left.spawn(widgets::button(next + 3, "Quit", WIDTH)).observe(quit);
         left.spawn(progress());
@@ -103,7 +114,16 @@ fn start(_: On<Activated>, mut game: ResMut<Start>) {
     game.is_wanted = true;
 }
 
-fn start_new_game(_: On<Activated>, mut commands: Commands, mut game: ResMut<Start>) {
+fn start_new_game(
+    _: On<Activated>,
+    mut commands: Commands,
+    mut game: ResMut<Start>,
+    mut played: ResMut<PlayedWorld>,
+) {
+    // Where games are saved, each has a folder of its own.
+    if played.0.is_some() {
+        played.0 = saves::new_world();
+    }
     commands.trigger(NewGame);
     game.is_wanted = true;
 }

@@ -1,0 +1,174 @@
+//! `burrow`: looks at saved worlds, checks and repairs them. Does not use Bevy.
+//!
+//! ```text
+//! cargo run --release --no-default-features --features store --example burrow -- info WORLD
+//! cargo run --release --no-default-features --features store --example burrow -- check WORLD --side 512
+//! ```
+//!
+//! | command | does | needs the ground |
+//! | --- | --- | --- |
+//! | `info` | prints what is known of a world | no |
+//! | `check` | reads all of it, and replays its log from the first commit on; changes nothing | to do so in full |
+//! | `repair` | opens it as a game would, which rebuilds what is damaged, and saves it | yes |
+//! | `compact` | makes the file of regions as small as it can be | yes |
+//! | `replay` | replays the log alone, and verifies each commit | yes |
+//! | `export` | writes the world to one file | yes |
+//! | `import` | makes a world of such a file | yes |
+//!
+//! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights` and the
+//! options beside it name it as for the example `export`, `--side` as for the example `server`.
+//!
+//! | exit code | when |
+//! | --- | --- |
+//! | 0 | all is well |
+//! | 1 | the world is damaged, or was; what was found is in `troubles` |
+//! | 2 | it could not be done: the reason goes to stderr |
+
+mod ground;
+#[path = "../shared/noise_ground.rs"]
+mod noise_ground;
+#[path = "../shared/output.rs"]
+mod output;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use bevy_burrow::store::{self, Store, StoreOptions};
+use bevy_burrow::terrain::World;
+use clap::{Parser, Subcommand};
+use serde_json::{Map, Value, json};
+
+use ground::GroundArgs;
+use output::{complain, say};
+
+/// Looks at saved worlds, checks and repairs them.
+#[derive(Parser)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    ground: GroundArgs,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Prints what is known of a world
+    Info {
+        /// The world's folder
+        world: PathBuf,
+    },
+    /// Reads all of a world, and changes nothing
+    Check {
+        /// The world's folder
+        world: PathBuf,
+    },
+    /// Opens a world, which rebuilds what is damaged, and saves it
+    Repair {
+        /// The world's folder
+        world: PathBuf,
+    },
+    /// Makes the file of regions as small as it can be
+    Compact {
+        /// The world's folder
+        world: PathBuf,
+    },
+    /// Replays the log alone, and verifies each commit
+    Replay {
+        /// The world's folder
+        world: PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match run(&args) {
+        Ok((answer, is_sound)) => {
+            say(format_args!("{answer}"));
+            ExitCode::from(u8::from(!is_sound))
+        }
+        Err(why) => {
+            complain(format_args!("burrow: {why}"));
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// What to print, and whether all is well.
+fn run(args: &Args) -> Result<(Value, bool), String> {
+    match &args.command {
+        Command::Info { world } => info(world),
+        Command::Check { world } => check(world, &args.ground),
+        Command::Repair { world } => opened(world, &args.ground, |_| Ok(())),
+        Command::Compact { world } => {
+            opened(world, &args.ground, |store| store.compact().map(drop).map_err(|why| why.to_string()))
+        }
+        Command::Replay { world } => {
+            let terrain = store::replay(world, args.ground.required()?).map_err(|why| why.to_string())?;
+            Ok((Value::Object(state(terrain.world())), true))
+        }
+    }
+}
+
+fn hex(hash: u64) -> String {
+    format!("{hash:#018x}")
+}
+
+/// Revision and hash of a world.
+fn state(world: &World) -> Map<String, Value> {
+    let mut state = Map::new();
+    state.insert("revision".into(), world.revision().into());
+    state.insert("hash".into(), hex(world.hash()).into());
+    state
+}
+
+fn info(world: &Path) -> Result<(Value, bool), String> {
+    let info = store::inspect(world).map_err(|why| why.to_string())?;
+    let game: Map<String, Value> =
+        info.game.iter().map(|(key, bytes)| (key.clone(), (*bytes).into())).collect();
+    let answer = json!({
+        "revision": info.revision,
+        "hash": hex(info.hash),
+        "world": info.world.to_string(),
+        "chunk_size": info.settings.chunk_size,
+        "voxel_size": info.settings.voxel_size,
+        "simulation": info.simulation,
+        "ground": hex(info.ground),
+        "checkpoint": info.checkpoint,
+        "regions": info.regions,
+        "region_bytes": info.region_bytes,
+        "segments": info.segments,
+        "log_bytes": info.log_bytes,
+        "is_log_whole": info.is_log_whole,
+        "game": game,
+        "troubles": info.damage,
+    });
+    Ok((answer, info.damage.is_empty()))
+}
+
+fn check(world: &Path, ground: &GroundArgs) -> Result<(Value, bool), String> {
+    let Some(ground) = ground.build()? else { return info(world) };
+    let check = store::check(world, ground).map_err(|why| why.to_string())?;
+    let is_sound = check.troubles.is_empty() && check.replays != Some(false);
+    let mut answer = state(check.terrain.world());
+    answer.insert("troubles".into(), check.troubles.into());
+    answer.insert("replays".into(), check.replays.into());
+    Ok((Value::Object(answer), is_sound))
+}
+
+/// Opens a world as a game would, does something to it, and saves it.
+fn opened(
+    world: &Path,
+    ground: &GroundArgs,
+    work: impl FnOnce(&mut Store) -> Result<(), String>,
+) -> Result<(Value, bool), String> {
+    let opened = Store::open(world, ground.required()?, StoreOptions::default());
+    let (mut store, opened) = opened.map_err(|why| why.to_string())?;
+    work(&mut store)?;
+    store.checkpoint().map_err(|why| why.to_string())?;
+    let troubles: Vec<String> =
+        opened.troubles.iter().chain(&store.take_troubles()).map(ToString::to_string).collect();
+    let (mut answer, is_sound) = (state(opened.terrain.world()), troubles.is_empty());
+    answer.insert("troubles".into(), troubles.into());
+    answer.insert("is_log_whole".into(), opened.is_log_whole.into());
+    Ok((Value::Object(answer), is_sound))
+}

@@ -1,0 +1,81 @@
+//! The page of saved worlds: each continues where it was left.
+
+use std::time::SystemTime;
+
+use bevy::prelude::*;
+
+use super::spawn_page;
+use super::title::Start;
+use crate::player::game_state::{GameState, MenuPage};
+use crate::ui::widgets::{self, Activated, GREY};
+use crate::world::landscape::NewGame;
+use crate::world::saves::{self, PlayedWorld};
+
+/// Width of the buttons.
+const WIDTH: f32 = 330.0;
+
+/// The page of saved worlds.
+pub struct WorldsPlugin;
+
+impl Plugin for WorldsPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_systems(OnEnter(MenuPage::Worlds), open);
+    }
+}
+
+fn open(mut commands: Commands, played: Res<PlayedWorld>) {
+    let worlds = saves::worlds();
+    let played = played.0.clone();
+    spawn_page(&mut commands, MenuPage::Worlds, "Worlds", 384.0, |column| {
+        let count = worlds.len();
+        for (at, world) in worlds.into_iter().enumerate() {
+            let mark = if played.as_ref() == Some(&world.folder) { "*" } else { "" };
+            let words = format!("{}{mark}, {}", world.name(), ago(world.saved));
+            let folder = world.folder;
+            column.spawn(widgets::button(at, &words, WIDTH)).observe(
+                move |_: On<Activated>, mut commands: Commands, mut start: ResMut<Start>| {
+                    commands.insert_resource(PlayedWorld(Some(folder.clone())));
+                    begin(&mut commands, &mut start);
+                },
+            );
+        }
+        if count == 0 {
+            column.spawn(widgets::text("nothing has been saved yet", 15.0, GREY));
+        }
+        column.spawn(widgets::button(count, "Back", WIDTH)).observe(super::go_to(MenuPage::Menu));
+    });
+}
+
+/// Plays the world that is set now.
+fn begin(commands: &mut Commands, start: &mut Start) {
+    commands.trigger(NewGame);
+    start.is_wanted = true;
+    commands.set_state(GameState::Title);
+    commands.set_state(MenuPage::Menu);
+}
+
+/// How long ago something was.
+fn ago(time: SystemTime) -> String {
+    let minutes = time.elapsed().map_or(0, |passed| passed.as_secs() / 60);
+    match minutes {
+        0 => "just now".into(),
+        1..60 => format!("{minutes} min ago"),
+        60..2880 => format!("{} h ago", minutes / 60),
+        _ => format!("{} days ago", minutes / 1440),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn times_are_told_in_words() {
+        for (minutes, words) in [(0, "just now"), (59, "59 min ago"), (180, "3 h ago"), (5000, "3 days ago")]
+        {
+            assert_eq!(ago(SystemTime::now() - Duration::from_secs(minutes * 60)), words);
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Saved worlds in Bevy: a component names the folder, everything else happens by itself.
+//!
+//! Put a [`SavedWorld`] beside a [`Terrain`](crate::terrain::Terrain). The world in its folder, if there is one, takes the place
+//! of that terrain; else it is created. From then on each commit is handed to the store's own thread, and is durable after the
+//! [loss window](SavedWorld::loss_window) at the latest. Until the world is read, the terrain is [`Held`](crate::plugin::Held):
+//! brushes that are sent meanwhile wait, and apply to the world that was read.
+//!
+//! ```no_run
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::prelude::*;
+//! fn continue_game(mut commands: Commands) -> Result {
+//!     let ground = Ground::from_noise(512, 512, &NoiseHeights::default())?;
+//!     let terrain = Terrain::new(ground, &TerrainSettings::default())?;
+//!     commands.spawn((terrain, SavedWorld::new("saves/first")));
+//!     Ok(())
+//! }
+//! # let _ = continue_game;
+//! ```
+
+mod components;
+mod level;
+mod messages;
+mod opening;
+mod saving;
+
+pub use components::{SavedWorld, WorldStore};
+pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
+pub use messages::{SaveNow, StoreTroubleFound, WorldOpened, WorldSaved};
+
+use bevy::prelude::*;
+
+use crate::plugin::BurrowSystems;
+
+/// Commits are handed to the store, in `Update`. What a game [puts](WorldStore::put) before this is saved with the commits of this
+/// frame.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SaveSystems;
+
+/// Opens and saves the worlds of terrains with a [`SavedWorld`]; part of [`BurrowPlugins`](crate::plugin::BurrowPlugins).
+#[derive(Default)]
+pub struct SavePlugin;
+
+impl Plugin for SavePlugin {
+    fn build(&self, app: &mut App) {
+        app.add_message::<SaveNow>()
+            .add_message::<WorldOpened>()
+            .add_message::<WorldSaved>()
+            .add_message::<StoreTroubleFound>()
+            .add_observer(opening::hold)
+            .add_observer(level::hold)
+            .add_observer(opening::close)
+            .add_observer(opening::follow_discarded)
+            .configure_sets(Update, SaveSystems.after(BurrowSystems::Begin))
+            .add_systems(
+                Update,
+                (
+                    (level::start_levels, opening::finish_opening, opening::start_opening)
+                        .chain()
+                        .before(BurrowSystems::Load),
+                    (saving::save_commits, saving::save_now, saving::tell).chain().in_set(SaveSystems),
+                ),
+            )
+            .add_systems(Last, saving::finish_at_exit);
+        if app.world().contains_resource::<AssetServer>() {
+            app.init_asset::<BurrowLevel>().init_asset_loader::<LevelLoader>();
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Reads a world from its folder while its terrain is held, and puts it in the terrain's place.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy::ecs::lifecycle::Discard;
+use bevy::prelude::*;
+
+use super::components::{SavedWorld, WorldStore};
+use super::level::{MakingLevel, Waiting};
+use super::messages::{StoreTroubleFound, WorldOpened};
+use super::saving::follow;
+use crate::ground::Ground;
+use crate::plugin::{Held, ThreadTask, Threads, free_later};
+use crate::store::{Opened, Store, StoreError, StoreOptions, StoreTrouble};
+use crate::terrain::{Terrain, TerrainSettings, WorldParts};
+
+/// How often, and how long, a locked world is waited for.
+const LOCK_TRIES: usize = 20;
+const LOCK_WAIT: Duration = Duration::from_millis(50);
+
+/// A world that nobody has begun to read.
+#[derive(Component)]
+pub(super) struct Unopened;
+
+/// A world that is being read.
+#[derive(Component)]
+pub(super) struct OpeningWorld(ThreadTask<Result<Read, StoreError>>);
+
+/// A world that was read or made.
+struct Read {
+    store: Store,
+    terrain: Terrain,
+    troubles: Vec<StoreTrouble>,
+}
+
+/// Holds a terrain until its world is read.
+pub(super) fn hold(new: On<Insert, SavedWorld>, mut commands: Commands) {
+    close_later(&mut commands, new.entity);
+    commands.entity(new.entity).try_remove::<OpeningWorld>().try_insert((Held, Unopened));
+}
+
+/// Saves and closes a world that is no longer wanted.
+pub(super) fn close(
+    gone: On<Remove, SavedWorld>,
+    mut commands: Commands,
+    mut worlds: Query<(&mut Terrain, &mut WorldStore)>,
+) {
+    if let Ok((mut terrain, mut world)) = worlds.get_mut(gone.entity) {
+        follow(&mut terrain, &mut world);
+    }
+    close_later(&mut commands, gone.entity);
+    commands.entity(gone.entity).try_remove::<(OpeningWorld, Unopened, Held)>();
+}
+
+/// Closes the store of an entity on another thread, since that waits for the disk.
+fn close_later(commands: &mut Commands, entity: Entity) {
+    commands.queue(move |world: &mut World| {
+        let store = world.get_entity_mut(entity).ok().and_then(|mut entity| entity.take::<WorldStore>());
+        store.into_iter().for_each(free_later);
+    });
+}
+
+/// Hands over the last commits of a terrain that another one replaces, or that goes.
+pub(super) fn follow_discarded(
+    gone: On<Discard, Terrain>,
+    mut worlds: Query<(&mut Terrain, &mut WorldStore)>,
+) {
+    if let Ok((mut terrain, mut world)) = worlds.get_mut(gone.entity) {
+        follow(&mut terrain, &mut world);
+    }
+}
+
+/// Starts to read the worlds of new terrains.
+pub(super) fn start_opening(
+    mut commands: Commands,
+    worlds: Query<(Entity, &SavedWorld, &Terrain), (With<Unopened>, Without<Waiting>, Without<MakingLevel>)>,
+) {
+    for (entity, saved, terrain) in &worlds {
+        let (path, options) = (saved.path.clone(), saved.options());
+        let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
+        let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
+        let open = move || read(&path, options, ground, &settings, parts);
+        let task = ThreadTask::start(Threads::Background, open);
+        commands.entity(entity).try_remove::<Unopened>().try_insert(OpeningWorld(task));
+    }
+}
+
+/// Reads the world of a folder, or makes one there of these parts.
+fn read(
+    path: &Path,
+    options: StoreOptions,
+    ground: Arc<Ground>,
+    settings: &TerrainSettings,
+    parts: WorldParts,
+) -> Result<Read, StoreError> {
+    if Store::is_in(path) {
+        let (store, opened) = open_unlocked(path, &ground, &options)?;
+        return Ok(Read { store, terrain: opened.terrain, troubles: opened.troubles });
+    }
+    let mut terrain = Terrain::restore(ground, settings, parts)?;
+    let store = Store::create(path, &mut terrain, options)?;
+    Ok(Read { store, terrain, troubles: Vec::new() })
+}
+
+/// Opens a world. This app may be about to close it: then it is waited for a little.
+fn open_unlocked(
+    path: &Path,
+    ground: &Arc<Ground>,
+    options: &StoreOptions,
+) -> Result<(Store, Opened), StoreError> {
+    for _ in 0..LOCK_TRIES {
+        match Store::open(path, Arc::clone(ground), options.clone()) {
+            Err(StoreError::Locked(_)) => std::thread::sleep(LOCK_WAIT),
+            other => return other,
+        }
+    }
+    Store::open(path, Arc::clone(ground), options.clone())
+}
+
+/// Puts worlds that were read in place of their terrains.
+pub(super) fn finish_opening(
+    mut commands: Commands,
+    mut worlds: Query<(Entity, &mut Terrain, &mut OpeningWorld)>,
+    mut opened: MessageWriter<WorldOpened>,
+    mut troubles: MessageWriter<StoreTroubleFound>,
+) {
+    for (entity, mut terrain, mut opening) in &mut worlds {
+        let Some(outcome) = opening.0.finish() else { continue };
+        commands.entity(entity).try_remove::<(OpeningWorld, Held)>();
+        let outcome = outcome.map(|Read { store, terrain: mut read, troubles: found }| {
+            troubles
+                .write_batch(found.into_iter().map(|trouble| StoreTroubleFound { terrain: entity, trouble }));
+            let revision = read.world().revision();
+            read.take_over(&mut terrain);
+            free_later(std::mem::replace(&mut *terrain, read));
+            let version = terrain.world().version();
+            commands.entity(entity).try_insert(WorldStore { store, version, told: None });
+            revision
+        });
+        if let Err(why) = &outcome {
+            error!("the world of {entity} is not saved: {why}");
+        }
+        opened.write(WorldOpened { terrain: entity, outcome: outcome.map_err(Arc::new) });
+    }
+}

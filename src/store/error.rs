@@ -1,0 +1,147 @@
+//! What may be wrong with a stored world, in one message each.
+
+use std::io;
+
+use crate::terrain::{ReplayError, RestoreError};
+
+/// Why a world can't be opened, created or read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// There is no world.
+    #[error("there is no world in {0}")]
+    Missing(String),
+    /// There is a world already.
+    #[error("there is a world in {0} already")]
+    Exists(String),
+    /// Another process has it open, or this one twice.
+    #[error("the world in {0} is open already: close the game or server that has it open")]
+    Locked(String),
+    /// A newer version of the crate wrote it.
+    #[error(
+        "the world was saved by a newer version: it has schema {found}, and this version reads up to {known}"
+    )]
+    Newer {
+        /// The schema of what was read.
+        found: u32,
+        /// The greatest schema that this version reads.
+        known: u32,
+    },
+    /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
+    #[error("the ground has changed below {regions} saved regions")]
+    BaseChanged {
+        /// Regions with edits over changed ground; 0 if only materials or places without edits changed.
+        regions: usize,
+    },
+    /// Nothing of it can be read, and there is no log from which to rebuild it.
+    #[error("the world can't be read: {0}")]
+    Unreadable(String),
+    /// The files can't be read or written.
+    #[error("{doing}: {error}")]
+    Files {
+        /// What was being done.
+        doing: &'static str,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// A terrain can't be made of what was saved.
+    #[error("the saved world does not fit its ground or settings: {0}")]
+    Restore(#[from] RestoreError),
+    /// A log that is replayed does not lead to the world that it says.
+    #[error("the log can't be replayed: {0}")]
+    Replay(#[from] ReplayError),
+    /// Records do not follow those that were taken before.
+    #[error("a record leads to revision {found}, but the store is at {at}")]
+    Gap {
+        /// The store's revision.
+        at: u64,
+        /// The record's.
+        found: u64,
+    },
+    /// What was read is damaged, or something else.
+    #[error(transparent)]
+    Format(#[from] super::format::FormatError),
+    /// The store's thread is gone.
+    #[error("the store's thread has ended")]
+    Ended,
+    /// What has to be written can't be for now; it is kept in memory, and tried again.
+    #[error("the world can't be saved for now: {0}")]
+    NotSaved(String),
+}
+
+impl StoreError {
+    /// Says what was being done when the system refused.
+    pub(super) fn files(doing: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |error| Self::Files { doing, error }
+    }
+}
+
+/// Something that a player or an operator should be told of. Play goes on.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StoreTrouble {
+    /// The world can't be saved for now. Everything is kept in memory and tried again.
+    #[error("saving fails, and is tried again: {0}")]
+    NotSaved(String),
+    /// Saving works again.
+    #[error("saving works again")]
+    SavedAgain,
+    /// So much waited to be saved that the log got a gap: it can no longer rebuild damaged regions. The world is saved whole
+    /// instead.
+    #[error("the log has a gap at revision {revision}, since saving failed for too long")]
+    LogGap {
+        /// The last revision before the gap.
+        revision: u64,
+    },
+    /// The log ends in something that is no record: commits that were not durable yet when the power or the process went,
+    /// or damage. A copy of it is kept.
+    #[error(
+        "the log ends with {bytes} bytes that can't be read after revision {revision}; a copy is in {quarantine}"
+    )]
+    LogCut {
+        /// The last revision that was read.
+        revision: u64,
+        /// How much was left out.
+        bytes: u64,
+        /// Where the copy is.
+        quarantine: String,
+    },
+    /// The log leads to another world than it says, so what comes after was left out.
+    #[error("the log can't be replayed behind revision {revision}: {why}; a copy is in {quarantine}")]
+    LogRefused {
+        /// The last revision that was replayed.
+        revision: u64,
+        /// What does not fit.
+        why: String,
+        /// Where the copy is.
+        quarantine: String,
+    },
+    /// A damaged part was rebuilt from the log; nothing is lost.
+    #[error(
+        "{what} was damaged and has been rebuilt from the log; a copy of the damaged one is in {quarantine}"
+    )]
+    Rebuilt {
+        /// What was damaged.
+        what: String,
+        /// Where the copy is.
+        quarantine: String,
+    },
+    /// A damaged region is lost: the ground there is as if nobody had ever dug.
+    #[error(
+        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is pristine again; a copy is in {quarantine}"
+    )]
+    RegionLost {
+        /// The region, as `x y z` in units of 64 voxels.
+        region: String,
+        /// Where the copy is.
+        quarantine: String,
+    },
+    /// The ground is another one than the world was saved with; edits were kept or replayed.
+    #[error("the ground has changed below {regions} saved regions; the edits were {kept}")]
+    BaseChanged {
+        /// Regions with edits over changed ground.
+        regions: usize,
+        /// What became of the edits: "kept" or "replayed".
+        kept: &'static str,
+    },
+}

@@ -1,0 +1,209 @@
+//! Writing the journal: frames that wait until they are durable, in segments that are kept up to a cap.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::Arc;
+
+use super::files::{Files, OpenFile, Opening};
+use super::format::frame::WorldId;
+use super::segment::{self, FOLDER};
+
+/// A frame that is not durable yet.
+#[derive(Debug)]
+struct Waiting {
+    frame: u64,
+    revision: u64,
+    entry: Vec<u8>,
+}
+
+/// The segment that is written.
+#[derive(Debug)]
+struct Current {
+    number: u64,
+    file: Box<dyn OpenFile>,
+    end: u64,
+    /// Is no frame in it durable yet?
+    is_fresh: bool,
+}
+
+/// A segment on the disk.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Segment {
+    pub number: u64,
+    /// The greatest number of its frames, 0 if it has none.
+    pub last_frame: u64,
+    pub bytes: u64,
+}
+
+/// The journal as it is written.
+#[derive(Debug)]
+pub(super) struct Journal {
+    files: Arc<dyn Files>,
+    world: WorldId,
+    /// The [base](segment::base) of its frames.
+    base: u64,
+    current: Option<Current>,
+    waiting: VecDeque<Waiting>,
+    waiting_bytes: usize,
+    segments: Vec<Segment>,
+    next_frame: u64,
+    next_segment: u64,
+    /// The head of the next segment: a revision and its checkpoint.
+    head: (u64, Vec<u8>),
+    /// The revision of the last frame that was written.
+    written: Option<u64>,
+}
+
+impl Journal {
+    /// Goes on behind these segments with this frame. The next segment begins with a checkpoint.
+    pub fn new(
+        files: Arc<dyn Files>,
+        world: WorldId,
+        base: u64,
+        segments: Vec<Segment>,
+        next_frame: u64,
+        head: (u64, Vec<u8>),
+    ) -> Self {
+        let next_segment = segments.last().map_or(1, |last| last.number + 1);
+        let (current, waiting) = (None, VecDeque::new());
+        Self {
+            files,
+            world,
+            base,
+            current,
+            waiting,
+            waiting_bytes: 0,
+            segments,
+            next_frame,
+            next_segment,
+            head,
+            written: None,
+        }
+    }
+
+    /// The number of the last frame.
+    pub fn last_frame(&self) -> u64 {
+        self.next_frame - 1
+    }
+
+    /// Bytes of frames that are not durable yet.
+    pub fn waiting_bytes(&self) -> usize {
+        self.waiting_bytes
+    }
+
+    /// Enters a frame; it is durable after the next [`write`](Self::write) that succeeds.
+    pub fn push(&mut self, revision: u64, payload: &[u8]) {
+        let frame = self.next_frame;
+        self.next_frame += 1;
+        let entry = segment::entry(self.world, self.base, frame, revision, payload);
+        self.waiting_bytes += entry.len();
+        self.waiting.push_back(Waiting { frame, revision, entry });
+    }
+
+    /// Drops the frames that are not durable yet, and leaves a gap in their numbers.
+    pub fn drop_waiting(&mut self) {
+        self.waiting.clear();
+        self.waiting_bytes = 0;
+        self.next_frame += 1;
+    }
+
+    /// Makes all frames durable. Returns the revision of the last one if there was any.
+    pub fn write(&mut self) -> io::Result<Option<u64>> {
+        let Some(last) = self.waiting.back() else { return Ok(None) };
+        let (frame, revision) = (last.frame, last.revision);
+        let written = self.write_waiting(frame);
+        if written.is_err() {
+            // Nothing is known of what it holds: all goes into another one.
+            if let Some(current) = self.current.take().filter(|current| current.is_fresh) {
+                // It may stay, as frames that come twice are harmless.
+                drop(self.files.remove(&segment::path(current.number)));
+            }
+            return written.map(|()| None);
+        }
+        self.waiting.clear();
+        self.waiting_bytes = 0;
+        self.written = Some(revision);
+        Ok(Some(revision))
+    }
+
+    /// The revision of the last frame that was made durable.
+    pub fn written(&self) -> Option<u64> {
+        self.written
+    }
+
+    fn write_waiting(&mut self, last_frame: u64) -> io::Result<()> {
+        let is_there = |files: &dyn Files, current: &Current| files.exists(&segment::path(current.number));
+        if let Some(current) = &self.current
+            && !is_there(&*self.files, current)?
+        {
+            return Err(io::Error::new(io::ErrorKind::NotFound, "the journal's file has been removed"));
+        }
+        let current = match &mut self.current {
+            Some(current) => current,
+            none => none.insert(begin(&*self.files, self.world, &mut self.next_segment, &self.head)?),
+        };
+        let (number, start) = (current.number, current.end);
+        let bytes: Vec<u8> = self.waiting.iter().flat_map(|waiting| &waiting.entry).copied().collect();
+        current.file.write_at(start, &bytes)?;
+        current.file.sync()?;
+        if current.is_fresh {
+            self.files.sync_folder(FOLDER)?;
+            current.is_fresh = false;
+        }
+        current.end = start + bytes.len() as u64;
+        let segment = Segment { number, last_frame, bytes: current.end };
+        match self.segments.last_mut().filter(|last| last.number == number) {
+            Some(last) => *last = segment,
+            None => self.segments.push(segment),
+        }
+        Ok(())
+    }
+
+    /// Lets the next frame begin a segment, whose head is this checkpoint of a revision.
+    pub fn begin_segment(&mut self, revision: u64, checkpoint: Vec<u8>) {
+        self.current = None;
+        self.head = (revision, checkpoint);
+    }
+
+    /// Removes the oldest segments until the rest takes no more than so many bytes, but none with frames after `needed`.
+    pub fn trim(&mut self, bytes: u64, needed: u64) -> io::Result<()> {
+        let mut total: u64 = self.segments.iter().map(|segment| segment.bytes).sum();
+        let own = self.current.as_ref().map(|current| current.number);
+        while let Some(&oldest) = self.segments.first() {
+            if total <= bytes || oldest.last_frame > needed || own == Some(oldest.number) {
+                break;
+            }
+            match self.files.remove(&segment::path(oldest.number)) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+            total -= oldest.bytes;
+            self.segments.remove(0);
+        }
+        Ok(())
+    }
+}
+
+/// Creates a segment and writes its head; the number that it gets is counted up.
+fn begin(
+    files: &dyn Files,
+    world: WorldId,
+    next_segment: &mut u64,
+    (revision, checkpoint): &(u64, Vec<u8>),
+) -> io::Result<Current> {
+    files.create_folder(FOLDER)?;
+    let (number, file) = loop {
+        let number = *next_segment;
+        *next_segment += 1;
+        match files.open(&segment::path(number), Opening::New) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            file => break (number, file?),
+        }
+    };
+    let head = segment::head(world, number, *revision, checkpoint);
+    if let Err(error) = file.write_at(0, &head) {
+        drop(files.remove(&segment::path(number)));
+        return Err(error);
+    }
+    Ok(Current { number, file, end: head.len() as u64, is_fresh: true })
+}

@@ -1,0 +1,158 @@
+//! The world as the store knows it from records: the same bricks, shared, so that no checkpoint needs the world itself.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, RegionPos};
+use crate::terrain::{CommitRecord, LogEntry, LooseSettings, WorldChange, WorldParts};
+use crate::volume::{Brick, DiggingRules, Fields};
+
+/// What is saved of a region in one record.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Region {
+    /// Its bricks.
+    pub bricks: BTreeMap<BrickPos, Arc<Brick>>,
+    /// The fields of the chunks whose lowest corners lie in it.
+    pub fields: BTreeMap<ChunkPos, Fields>,
+    /// The revision that changed it last.
+    pub revision: u64,
+}
+
+impl Region {
+    fn is_empty(&self) -> bool {
+        self.bricks.is_empty() && self.fields.is_empty()
+    }
+}
+
+/// A world by regions.
+#[derive(Clone, Debug)]
+pub(super) struct Mirror {
+    grid: ChunkGrid,
+    /// Those that hold anything.
+    pub regions: BTreeMap<RegionPos, Region>,
+    /// Those that changed since they were last taken, gone ones included.
+    dirty: BTreeSet<RegionPos>,
+    pub revision: u64,
+    pub hash: u64,
+    pub next_field: u64,
+    pub rules: Option<DiggingRules>,
+    pub loose: Option<LooseSettings>,
+    /// What the game put there.
+    pub game: BTreeMap<String, Vec<u8>>,
+}
+
+impl Mirror {
+    /// A mirror of these parts of a world with this hash; all of it counts as changed.
+    pub fn new(grid: ChunkGrid, parts: WorldParts, hash: u64, game: BTreeMap<String, Vec<u8>>) -> Self {
+        let WorldParts { change, revision, rules, loose, .. } = parts;
+        let mut mirror = Self {
+            grid,
+            regions: BTreeMap::new(),
+            dirty: BTreeSet::new(),
+            revision,
+            hash,
+            next_field: change.next_field,
+            rules,
+            loose,
+            game,
+        };
+        mirror.apply_change(&change, revision);
+        mirror
+    }
+
+    /// Takes other parts in place of all that it holds.
+    pub fn replace(&mut self, parts: WorldParts, hash: u64) {
+        let mut new = Self::new(self.grid, parts, hash, std::mem::take(&mut self.game));
+        new.dirty.extend(self.regions.keys());
+        new.dirty.append(&mut self.dirty);
+        *self = new;
+    }
+
+    /// Takes over what a commit changed.
+    pub fn apply(&mut self, record: &CommitRecord) {
+        for entry in &record.entries {
+            match entry {
+                LogEntry::Rules(rules) => self.rules = rules.as_deref().cloned(),
+                LogEntry::Loose(loose) => self.loose = *loose,
+                _ => {}
+            }
+        }
+        self.apply_change(&record.change, record.revision);
+        (self.revision, self.hash) = (record.revision, record.hash);
+    }
+
+    fn apply_change(&mut self, change: &WorldChange, revision: u64) {
+        let mut touched = BTreeSet::new();
+        for (pos, brick) in &change.bricks {
+            let at = RegionPos::of(*pos);
+            let region = self.regions.entry(at).or_default();
+            match brick {
+                Some(brick) => drop(region.bricks.insert(*pos, Arc::clone(brick))),
+                None => drop(region.bricks.remove(pos)),
+            }
+            touched.insert(at);
+        }
+        for (chunk, fields) in &change.fields {
+            let at = self.region_of(*chunk);
+            let region = self.regions.entry(at).or_default();
+            match fields.is_empty() {
+                false => drop(region.fields.insert(*chunk, fields.clone())),
+                true => drop(region.fields.remove(chunk)),
+            }
+            touched.insert(at);
+        }
+        for at in touched {
+            if let Some(region) = self.regions.get_mut(&at) {
+                region.revision = revision;
+                if region.is_empty() {
+                    self.regions.remove(&at);
+                }
+            }
+            self.dirty.insert(at);
+        }
+        self.next_field = self.next_field.max(change.next_field);
+    }
+
+    /// Cells along a chunk's side.
+    pub fn chunk_size(&self) -> u32 {
+        self.grid.size() as u32
+    }
+
+    /// Sets the revisions that changed regions last, as their records say.
+    pub fn set_revisions(&mut self, revisions: &BTreeMap<RegionPos, u64>) {
+        for (at, region) in &mut self.regions {
+            region.revision = revisions.get(at).copied().unwrap_or(region.revision);
+        }
+    }
+
+    /// The region whose record holds the fields of a chunk.
+    pub fn region_of(&self, chunk: ChunkPos) -> RegionPos {
+        RegionPos::of(BrickPos::of(self.grid.origin(chunk)))
+    }
+
+    /// Did anything change since the last [`take_dirty`](Self::take_dirty)?
+    pub fn is_dirty(&self) -> bool {
+        !self.dirty.is_empty()
+    }
+
+    /// The regions that changed since the last call; those that hold nothing any more are `None`.
+    pub fn take_dirty(&mut self) -> Vec<(RegionPos, Option<Region>)> {
+        let dirty = std::mem::take(&mut self.dirty);
+        dirty.into_iter().map(|at| (at, self.regions.get(&at).cloned())).collect()
+    }
+
+    /// Counts regions as changed, since saving them failed.
+    pub fn put_back(&mut self, regions: impl IntoIterator<Item = RegionPos>) {
+        self.dirty.extend(regions);
+    }
+
+    /// Counts all regions as saved, but for those that a record changes.
+    pub fn mark_saved(&mut self) {
+        self.dirty.clear();
+    }
+
+    /// Counts all regions as changed.
+    pub fn mark_all(&mut self) {
+        self.dirty.extend(self.regions.keys());
+    }
+}

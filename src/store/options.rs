@@ -1,0 +1,49 @@
+//! How a store saves, and what it does where the ground has changed.
+
+use std::time::Duration;
+
+/// What to do with edits where the ground is another one than they were made on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BaseChanged {
+    /// Edited samples stay as they are: a hole stays where it is. What was pristine is that of the new ground.
+    #[default]
+    Keep,
+    /// All edits are made again on the new ground, if the log has all of them; else they are kept.
+    Replay,
+    /// The world is not opened.
+    Refuse,
+}
+
+/// How a store saves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoreOptions {
+    /// Commits are durable this long after they were appended, and a little more for the disk: what is lost at most when the
+    /// power goes. 0 writes each batch at once.
+    pub loss_window: Duration,
+    /// Bytes that the log may take on the disk; then the oldest part of it goes. Without a whole log, a damaged region can't be
+    /// rebuilt. What the last two checkpoints need stays in any case.
+    pub log_bytes: u64,
+    /// Commits after which a checkpoint is made.
+    pub checkpoint_commits: u64,
+    /// Time after which a checkpoint is made, if anything changed.
+    pub checkpoint_after: Duration,
+    /// Bytes of records that wait in memory while saving fails; beyond it they are dropped, and the world is saved whole once
+    /// that works.
+    pub waiting_bytes: usize,
+    /// Where the ground has changed.
+    pub base_changed: BaseChanged,
+}
+
+impl Default for StoreOptions {
+    /// A loss window of a second, 64 MiB of log, checkpoints each minute or 4096 commits.
+    fn default() -> Self {
+        Self {
+            loss_window: Duration::from_secs(1),
+            log_bytes: 64 << 20,
+            checkpoint_commits: 4096,
+            checkpoint_after: Duration::from_secs(60),
+            waiting_bytes: 32 << 20,
+            base_changed: BaseChanged::default(),
+        }
+    }
+}

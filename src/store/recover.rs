@@ -1,0 +1,327 @@
+//! A world from what was found of it: regions of the last checkpoint, then the journal's tail, verified frame by frame.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::checkpoint::Checkpoint;
+use super::error::{StoreError, StoreTrouble};
+use super::format;
+use super::format::Batch;
+use super::found::Contents;
+use super::keys;
+use super::mirror::Mirror;
+use super::options::BaseChanged;
+use super::segment::{self, Frame};
+use crate::ground::Ground;
+use crate::lattice::RegionPos;
+use crate::terrain::{
+    CommitRecord, LogEntry, Meshing, ReplayError, Terrain, TerrainSettings, WorkLimits, WorldChange,
+    WorldParts,
+};
+use crate::volume::DiggingRules;
+
+/// What the game put into a world, by key.
+pub(super) type GameData = BTreeMap<String, Vec<u8>>;
+
+/// A world as it was recovered.
+pub(super) struct Recovered {
+    pub terrain: Terrain,
+    /// Says which regions differ from their records.
+    pub mirror: Mirror,
+    /// The last frame that it contains.
+    pub frame: u64,
+    /// The frame of the checkpoint it began with; 0 if none of its records is used.
+    pub checkpoint: u64,
+    /// Commits that were replayed.
+    pub replayed: u64,
+    /// Can damaged regions be rebuilt from the log?
+    pub is_log_whole: bool,
+    /// Are its records, or its log, those of another world than it is now?
+    pub is_new: bool,
+    /// Damaged regions that were rebuilt or lost, and whether they are lost.
+    pub damaged: Vec<RegionPos>,
+    pub is_lossy: bool,
+    /// Regions over another ground than they were saved with, if the ground is another one, and whether edits were made anew.
+    pub base_changed: Option<(usize, &'static str)>,
+    /// Why the frame after the last one was refused.
+    pub refused: Option<String>,
+}
+
+/// How far a world is replayed, and whether it is compared with the log.
+struct Replayed {
+    terrain: Terrain,
+    game: GameData,
+    records: Vec<CommitRecord>,
+    frame: u64,
+    commits: u64,
+    refused: Option<String>,
+}
+
+/// Makes a world of what was found.
+pub(super) fn recover(
+    contents: &Contents,
+    ground: &Arc<Ground>,
+    base_changed: BaseChanged,
+) -> Result<Recovered, StoreError> {
+    let Some(checkpoint) = contents.choose_checkpoint() else {
+        return Err(StoreError::Unreadable("neither journal nor database hold a valid checkpoint".into()));
+    };
+    let whole = contents.frames_from(1);
+    let last = whole.last().map_or(0, |last| last.number);
+    let is_contiguous = last >= checkpoint.frame;
+    let base = segment::base(ground.hash());
+    let is_log_whole = is_contiguous && whole.iter().all(|frame| frame.base == base);
+    let is_same_ground = checkpoint.metadata.ground == ground.hash();
+    if !is_same_ground && base_changed == BaseChanged::Refuse {
+        return Err(StoreError::BaseChanged {
+            regions: changed_regions(contents, &checkpoint, ground).len(),
+        });
+    }
+    let settings = checkpoint.metadata.settings;
+    if !is_same_ground && base_changed == BaseChanged::Replay && is_contiguous {
+        let empty =
+            Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
+        let replayed = replay(empty, GameData::new(), &whole, false)?;
+        let regions = changed_regions(contents, &checkpoint, ground).len();
+        let mut recovered = Recovered::whole(replayed);
+        recovered.base_changed = Some((regions, "replayed"));
+        return Ok(recovered);
+    }
+
+    let (parts, damaged) = load_regions(contents, &checkpoint, ground);
+    let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
+    let restored = restore(parts.clone());
+    let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
+    if is_same_ground && !is_exact && is_log_whole {
+        let empty =
+            Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
+        let replayed = replay(empty, GameData::new(), &whole, true)?;
+        // Behind what can't be replayed, the checkpoint may know more.
+        if replayed.frame >= checkpoint.frame {
+            let mut recovered = Recovered::whole(replayed);
+            recovered.is_log_whole = true;
+            recovered.damaged = damaged;
+            return Ok(recovered);
+        }
+    }
+    let terrain = restored?;
+    let is_checked = is_same_ground && is_exact;
+    let tail = contents.frames_from(checkpoint.frame + 1);
+    let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
+    let begin = |terrain: &Terrain| {
+        let (parts, hash) = (terrain.parts(), terrain.world().hash());
+        Mirror::new(terrain.world().grid(), parts, hash, game.clone())
+    };
+    let mut mirror = begin(&terrain);
+    let mut replayed = replay(terrain, game.clone(), &tail, is_checked)?;
+    if replayed.refused.is_some() {
+        // It holds a part of what was refused.
+        let good = replayed.frame;
+        let tail: Vec<&Frame> = tail.into_iter().filter(|frame| frame.number <= good).collect();
+        let refused = replayed.refused.take();
+        replayed = Replayed { refused, ..replay(restore(parts)?, game.clone(), &tail, is_checked)? };
+    }
+    let frame = replayed.frame.max(checkpoint.frame);
+    let regions = changed_regions(contents, &checkpoint, ground).len();
+    if is_checked {
+        mirror.set_revisions(&checkpoint.regions);
+        mirror.mark_saved();
+        replayed.records.iter().for_each(|record| mirror.apply(record));
+        mirror.game = replayed.game;
+    } else {
+        mirror = Mirror::new(
+            replayed.terrain.world().grid(),
+            replayed.terrain.parts(),
+            replayed.terrain.world().hash(),
+            replayed.game,
+        );
+    }
+    Ok(Recovered {
+        terrain: replayed.terrain,
+        mirror,
+        frame,
+        checkpoint: if is_checked { checkpoint.frame } else { 0 },
+        replayed: replayed.commits,
+        is_log_whole: is_log_whole && is_checked,
+        is_new: !is_checked,
+        is_lossy: is_same_ground && !is_exact,
+        damaged,
+        base_changed: (!is_same_ground).then_some((regions, "kept")),
+        refused: replayed.refused,
+    })
+}
+
+impl Recovered {
+    /// The sizes of its chunks and voxels.
+    pub fn settings(&self) -> TerrainSettings {
+        TerrainSettings { chunk_size: self.mirror.chunk_size(), voxel_size: self.terrain.voxel_size() }
+    }
+
+    /// A world that was replayed from its first commit.
+    fn whole(replayed: Replayed) -> Self {
+        let world = replayed.terrain.world();
+        let mirror = Mirror::new(world.grid(), replayed.terrain.parts(), world.hash(), replayed.game);
+        Self {
+            mirror,
+            terrain: replayed.terrain,
+            frame: replayed.frame,
+            checkpoint: 0,
+            replayed: replayed.commits,
+            is_log_whole: false,
+            is_new: true,
+            damaged: Vec::new(),
+            is_lossy: false,
+            base_changed: None,
+            refused: replayed.refused,
+        }
+    }
+}
+
+/// Replays the whole log from the first commit on, and verifies it.
+pub(super) fn replay_all(
+    contents: &Contents,
+    ground: &Arc<Ground>,
+    settings: TerrainSettings,
+) -> Result<Terrain, StoreError> {
+    let whole = contents.frames_from(1);
+    if whole.last().map_or(0, |last| last.number) < contents.greatest_frame() {
+        return Err(StoreError::Unreadable("the log does not reach back to the first commit".into()));
+    }
+    let empty = Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
+    let replayed = replay(empty, GameData::new(), &whole, true)?;
+    match replayed.refused {
+        Some(why) => Err(StoreError::Unreadable(format!("the log can't be replayed: {why}"))),
+        None => Ok(replayed.terrain),
+    }
+}
+
+/// The regions whose heights below are not those that they were saved with.
+fn changed_regions(contents: &Contents, checkpoint: &Checkpoint, ground: &Ground) -> BTreeSet<RegionPos> {
+    if checkpoint.metadata.ground == ground.hash() {
+        return BTreeSet::new();
+    }
+    let mut hashes = BTreeMap::new();
+    let mut is_changed = |(at, revision): &(&RegionPos, &u64)| {
+        let now = *hashes.entry(at.column()).or_insert_with(|| ground.region_hash(at.column()));
+        contents.region(**at, **revision).is_some_and(|record| record.ground != now)
+    };
+    checkpoint.regions.iter().filter(|own| is_changed(own)).map(|(at, _)| *at).collect()
+}
+
+/// The parts of a world that a checkpoint has, and the regions that can't be read.
+fn load_regions(
+    contents: &Contents,
+    checkpoint: &Checkpoint,
+    ground: &Ground,
+) -> (WorldParts, Vec<RegionPos>) {
+    let metadata = &checkpoint.metadata;
+    let mut change = WorldChange { next_field: metadata.next_field, ..WorldChange::default() };
+    let mut damaged = Vec::new();
+    for (at, revision) in &checkpoint.regions {
+        let record = contents.region(*at, *revision);
+        let decoded = record.and_then(|record| format::decode_region(&record.payload, *at, ground).ok());
+        match decoded {
+            Some((bricks, fields)) => {
+                change.bricks.extend(bricks.into_iter().map(|(pos, brick)| (pos, Some(brick))));
+                change.fields.extend(fields);
+            }
+            None => damaged.push(*at),
+        }
+    }
+    change.bricks.sort_unstable_by_key(|(pos, _)| *pos);
+    change.fields.sort_unstable_by_key(|(chunk, _)| *chunk);
+    let parts = WorldParts {
+        change,
+        chunk_size: metadata.settings.chunk_size,
+        revision: metadata.revision,
+        rules: metadata.rules.clone(),
+        loose: metadata.loose,
+    };
+    (parts, damaged)
+}
+
+/// Replays frames, and compares the world with each commit if `is_checked`. Stops before the first frame that does not fit.
+fn replay(
+    mut terrain: Terrain,
+    mut game: GameData,
+    frames: &[&Frame],
+    is_checked: bool,
+) -> Result<Replayed, StoreError> {
+    terrain.set_meshing(Meshing::Never);
+    terrain.keep_log(Some(usize::MAX));
+    drop(terrain.take_log());
+    let (mut records, mut commits, mut refused, mut last, mut revision) = (Vec::new(), 0, None, 0, None);
+    let limits = terrain.work_limits();
+    terrain.set_work_limits(WorkLimits::UNBOUNDED);
+    for frame in frames {
+        let batch = match Batch::decode(&frame.payload, terrain.world().ground()) {
+            Ok(batch) => batch,
+            Err(why) => {
+                refused = Some(why.to_string());
+                break;
+            }
+        };
+        let replayed = batch.commits.iter().try_for_each(|record| match is_checked {
+            true => terrain.replay(record).map(drop),
+            false => replay_unchecked(&mut terrain, record),
+        });
+        if let Err(why) = replayed {
+            refused = Some(why.to_string());
+            break;
+        }
+        commits += batch.commits.len() as u64;
+        revision = batch.commits.last().map(|record| record.revision).or(revision);
+        records.append(&mut terrain.take_log());
+        for (key, value) in batch.game {
+            match value {
+                Some(value) => drop(game.insert(key, value)),
+                None => drop(game.remove(&key)),
+            }
+        }
+        last = frame.number;
+    }
+    terrain.clear_history();
+    terrain.set_work_limits(limits);
+    terrain.set_meshing(Meshing::All);
+    terrain.keep_log(None);
+    // Other transactions than those of the records may have led here.
+    if revision.is_some_and(|revision| revision != terrain.world().revision()) {
+        let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
+        let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
+        let revision = revision.unwrap_or(parts.revision);
+        terrain = Terrain::restore(ground, &settings, WorldParts { revision, ..parts })?;
+    }
+    Ok(Replayed { terrain, game, records, frame: last, commits, refused })
+}
+
+/// Does again what a record was asked for, on a world that is not the one it was made on.
+fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), ReplayError> {
+    for entry in &record.entries {
+        match entry {
+            LogEntry::Rules(rules) => {
+                terrain.set_rules(rules.as_deref().map_or_else(DiggingRules::default, Clone::clone))?;
+            }
+            LogEntry::Loose(settings) => terrain.set_loose(*settings),
+            LogEntry::Edit(edit) => terrain.submit_edit(edit),
+            LogEntry::Change => drop(terrain.apply_change(record.change.clone(), None)?),
+        }
+    }
+    // Edits that this world rejects are left out.
+    terrain.apply::<crate::brush::Brush>([]);
+    Ok(())
+}
+
+/// What to tell of a recovery, given where copies of damaged parts are.
+pub(super) fn troubles(recovered: &Recovered, copies: &BTreeMap<RegionPos, String>) -> Vec<StoreTrouble> {
+    let mut troubles = Vec::new();
+    for at in &recovered.damaged {
+        let quarantine = copies.get(at).cloned().unwrap_or_else(|| "no file, as nothing was left".into());
+        troubles.push(match recovered.is_lossy {
+            true => StoreTrouble::RegionLost { region: keys::name(*at), quarantine },
+            false => StoreTrouble::Rebuilt { what: format!("the region {}", keys::name(*at)), quarantine },
+        });
+    }
+    troubles
+        .extend(recovered.base_changed.map(|(regions, kept)| StoreTrouble::BaseChanged { regions, kept }));
+    troubles
+}

@@ -1,0 +1,164 @@
+//! Segments of the journal: files of frames, one after the other. Frames are numbered from 1 on through all segments.
+//!
+//! | bytes | of each entry |
+//! | --- | --- |
+//! | 4 | length of the frame, little-endian |
+//! | 8 | number of the frame, little-endian; 0 is the segment's head |
+//! | length | the frame, which is sealed with its number as its key |
+
+use std::io;
+use std::ops::Range;
+
+use super::files::Files;
+use super::format::frame::{self, Kind, WorldId};
+use crate::terrain::SIMULATION;
+
+/// The folder of segments.
+pub(super) const FOLDER: &str = "journal";
+
+/// Bytes before each frame.
+const PREFIX: usize = 12;
+
+/// The most bytes that a frame may hold once it is unpacked.
+pub(super) const FRAME_LIMIT: usize = 256 << 20;
+
+/// The path of a segment.
+pub(super) fn path(segment: u64) -> String {
+    format!("{FOLDER}/{segment:08}.log")
+}
+
+/// The segment with this file name.
+fn number_of(name: &str) -> Option<u64> {
+    name.strip_suffix(".log")?.parse().ok()
+}
+
+/// The numbers of all segments, in order.
+pub(super) fn list(files: &dyn Files) -> io::Result<Vec<u64>> {
+    let mut numbers: Vec<u64> = files.list(FOLDER)?.iter().filter_map(|name| number_of(name)).collect();
+    numbers.sort_unstable();
+    Ok(numbers)
+}
+
+/// The key with which a frame is sealed; heads have the number of their segment in place of the frame's.
+fn key(frame: u64) -> [u8; 8] {
+    frame.to_be_bytes()
+}
+
+/// Names a ground and how edits change it: frames that were written under another name can't be replayed exactly.
+pub(super) fn base(ground: u64) -> u64 {
+    // Any odd number keeps simulations apart.
+    ground ^ u64::from(SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+}
+
+/// An entry of a segment.
+pub(super) fn entry(world: WorldId, base: u64, frame: u64, revision: u64, payload: &[u8]) -> Vec<u8> {
+    sealed_entry(frame, &frame::seal(Kind::Journal, world, &key(frame), revision, base, payload))
+}
+
+/// The first entry of a segment: a checkpoint, from whose state on its frames lead.
+pub(super) fn head(world: WorldId, segment: u64, revision: u64, checkpoint: &[u8]) -> Vec<u8> {
+    sealed_entry(0, &frame::seal(Kind::Checkpoint, world, &key(segment), revision, 0, checkpoint))
+}
+
+fn sealed_entry(number: u64, sealed: &[u8]) -> Vec<u8> {
+    let mut entry = Vec::with_capacity(PREFIX + sealed.len());
+    // Frames are shorter than their limit.
+    entry.extend_from_slice(&(sealed.len() as u32).to_le_bytes());
+    entry.extend_from_slice(&number.to_le_bytes());
+    entry.extend_from_slice(sealed);
+    entry
+}
+
+/// A frame as it was found.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub number: u64,
+    /// The [base] that it was written on.
+    pub base: u64,
+    pub payload: Vec<u8>,
+    /// Where its entry is in its segment.
+    pub range: Range<usize>,
+}
+
+/// A segment as it was found.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Found {
+    pub number: u64,
+    /// The world that it says it belongs to.
+    pub world: Option<WorldId>,
+    /// The checkpoint of its head.
+    pub checkpoint: Option<Vec<u8>>,
+    pub frames: Vec<Frame>,
+    /// What is no entry.
+    pub bad: Vec<Range<usize>>,
+    pub length: usize,
+    /// The schema of a frame that is newer than what can be read.
+    pub newer: Option<u32>,
+}
+
+/// Reads a segment of a world, or of whatever world its head names.
+pub(super) fn read(files: &dyn Files, world: Option<WorldId>, number: u64) -> io::Result<Found> {
+    let bytes = files.read(&path(number))?;
+    let mut found = Found { number, world, length: bytes.len(), ..Found::default() };
+    let mut at = 0;
+    let mut bad = 0;
+    while at < bytes.len() {
+        match read_entry(&bytes, at, &mut found) {
+            Some(end) => {
+                if bad < at {
+                    found.bad.push(bad..at);
+                }
+                (at, bad) = (end, end);
+            }
+            None => at = next_magic(&bytes, at + 1),
+        }
+    }
+    if bad < bytes.len() {
+        found.bad.push(bad..bytes.len());
+    }
+    Ok(found)
+}
+
+/// Where the next entry may begin.
+fn next_magic(bytes: &[u8], from: usize) -> usize {
+    let magic = &frame::MAGIC;
+    let rest = bytes.get(from + PREFIX..).unwrap_or_default();
+    rest.windows(magic.len()).position(|window| window == magic).map_or(bytes.len(), |at| from + at)
+}
+
+/// Reads the entry at an offset; returns its end.
+fn read_entry(bytes: &[u8], at: usize, found: &mut Found) -> Option<usize> {
+    let prefix: &[u8; PREFIX] = bytes.get(at..)?.first_chunk()?;
+    let (length, number) = prefix.split_first_chunk::<4>()?;
+    let length = u32::from_le_bytes(*length) as usize;
+    let frame_number = u64::from_le_bytes(number.try_into().ok()?);
+    let start = at + PREFIX;
+    let end = start.checked_add(length)?;
+    let sealed = bytes.get(start..end)?;
+    let (kind, own) = match frame_number {
+        0 => (Kind::Checkpoint, key(found.number)),
+        _ => (Kind::Journal, key(frame_number)),
+    };
+    let world = match found.world {
+        Some(world) => world,
+        None => frame::peek(sealed)?.world,
+    };
+    match frame::open(sealed, kind, world, &own, FRAME_LIMIT) {
+        Ok(opened) => {
+            found.world = Some(world);
+            if frame_number == 0 {
+                found.checkpoint = Some(opened.payload);
+            } else {
+                let (base, payload) = (opened.ground_hash, opened.payload);
+                found.frames.push(Frame { number: frame_number, base, payload, range: at..end });
+            }
+            Some(end)
+        }
+        Err(error) => {
+            if let Some(schema) = error.newer_schema() {
+                found.newer = Some(schema);
+            }
+            None
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Getting a journal ready to go on behind the last frame that is part of the world.
+
+use std::collections::BTreeMap;
+use std::io;
+
+use super::error::StoreTrouble;
+use super::files::{Files, Opening};
+use super::found::Contents;
+use super::journal::Segment;
+use super::keys;
+use super::quarantine;
+use super::recover::{Recovered, troubles};
+use super::segment::{self, Found};
+use crate::lattice::RegionPos;
+
+/// A journal that can go on.
+pub(super) struct Settled {
+    pub segments: Vec<Segment>,
+    pub next_frame: u64,
+    /// Something could not be done: only a checkpoint makes the world durable.
+    pub is_unfinished: bool,
+    pub troubles: Vec<StoreTrouble>,
+}
+
+/// Puts aside what is not part of a world, and makes sure that the rest is durable.
+pub(super) fn settle(files: &dyn Files, contents: &mut Contents, recovered: &Recovered) -> Settled {
+    let mut copies = BTreeMap::<RegionPos, String>::new();
+    let mut failed = None;
+    for at in &recovered.damaged {
+        let Some(record) = contents.invalid.get(at) else { continue };
+        let name = format!("region.{}.record", keys::name(*at).replace(' ', "."));
+        match quarantine::copy(files, &name, record) {
+            Ok(path) => drop(copies.insert(*at, path)),
+            Err(error) => failed = Some(error),
+        }
+    }
+    let mut told = troubles(recovered, &copies);
+    if let Some(what) = &contents.damaged {
+        let quarantine = quarantine::FOLDER.to_string();
+        if recovered.damaged.is_empty() {
+            told.push(StoreTrouble::Rebuilt { what: what.clone(), quarantine });
+        }
+    }
+    let mut segments = Vec::new();
+    let cut = cut_journal(files, contents, recovered, &mut told, &mut segments);
+    if let Err(error) = cut.and_then(|()| sync_tail(files, &segments, recovered.checkpoint)) {
+        failed = Some(error);
+    }
+    let next_frame = match &failed {
+        None => recovered.frame + 1,
+        // Frames that are no part of the world may still be there.
+        Some(error) => {
+            told.push(StoreTrouble::NotSaved(error.to_string()));
+            recovered.frame.max(contents.greatest_frame()) + 2
+        }
+    };
+    Settled { segments, next_frame, is_unfinished: failed.is_some(), troubles: told }
+}
+
+/// Copies or moves aside all that lies behind the last frame.
+fn cut_journal(
+    files: &dyn Files,
+    contents: &Contents,
+    recovered: &Recovered,
+    told: &mut Vec<StoreTrouble>,
+    segments: &mut Vec<Segment>,
+) -> io::Result<()> {
+    let is_kept = |found: &&Found| found.frames.iter().any(|frame| frame.number <= recovered.frame);
+    let last_kept = contents.segments.iter().filter(is_kept).map(|found| found.number).max().unwrap_or(0);
+    let (mut bytes, mut place) = (0, None);
+    let mut moved = Vec::new();
+    for found in &contents.segments {
+        let kept = found.frames.iter().filter(|frame| frame.number <= recovered.frame);
+        let (last_frame, end) = kept.fold((0, 0), |(last, end): (u64, usize), frame| {
+            (last.max(frame.number), end.max(frame.range.end))
+        });
+        let all = found.length as u64;
+        if found.number < last_kept {
+            // What is bad there did not matter, since later frames follow.
+            segments.push(Segment { number: found.number, last_frame, bytes: all });
+        } else if found.number == last_kept {
+            segments.push(Segment { number: found.number, last_frame, bytes: end as u64 });
+            if end < found.length {
+                let path = segment::path(found.number);
+                let rest = files.read(&path)?.split_off(end);
+                let name = path.rsplit('/').next().unwrap_or_default();
+                bytes += rest.len() as u64;
+                place = Some(quarantine::copy(files, name, &rest)?);
+                let file = files.open(&path, Opening::Existing)?;
+                file.set_length(end as u64)?;
+                file.sync()?;
+            }
+        } else if found.frames.is_empty() && found.bad.is_empty() {
+            segments.push(Segment { number: found.number, last_frame: 0, bytes: all });
+        } else {
+            moved.push(found);
+        }
+    }
+    for found in moved {
+        bytes += found.length as u64;
+        place = Some(quarantine::file(files, &segment::path(found.number))?);
+    }
+    let (Some(quarantine), revision) = (place, recovered.mirror.revision) else { return Ok(()) };
+    told.push(match &recovered.refused {
+        Some(why) => StoreTrouble::LogRefused { revision, why: why.clone(), quarantine },
+        None => StoreTrouble::LogCut { revision, bytes, quarantine },
+    });
+    Ok(())
+}
+
+/// What was read may be in the system's memory only, if the process was killed but the power stayed.
+fn sync_tail(files: &dyn Files, segments: &[Segment], checkpoint: u64) -> io::Result<()> {
+    for tail in segments.iter().filter(|segment| segment.last_frame > checkpoint) {
+        files.open(&segment::path(tail.number), Opening::Existing)?.sync()?;
+    }
+    if segments.is_empty() { Ok(()) } else { files.sync_folder(segment::FOLDER) }
+}

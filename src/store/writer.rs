@@ -1,0 +1,508 @@
+//! The store's thread: collects records, writes frames and checkpoints, and tries again what fails.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use rustc_hash::FxHashMap;
+
+use super::checkpoint::Checkpoint;
+use super::database::{Change, DATABASE, DatabaseError, Records};
+use super::error::{StoreError, StoreTrouble};
+use super::files::Files;
+use super::format;
+use super::format::Batch;
+use super::format::frame::{self, Kind, WorldId};
+use super::journal::Journal;
+use super::keys;
+use super::mirror::{Mirror, Region};
+use super::options::StoreOptions;
+use super::quarantine;
+use super::recover::GameData;
+use crate::ground::Ground;
+use crate::lattice::RegionPos;
+use crate::terrain::{CommitRecord, LogEntry, TerrainSettings, WorldChange, WorldParts};
+
+/// The first wait before something that failed is tried again, and the longest.
+const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
+
+/// A value of the game's that changes; `None` removes it.
+pub(super) type GameChange = (String, Option<Vec<u8>>);
+
+/// Where the answer to a request goes: the revision that is durable then.
+pub(super) type Answer = Sender<Result<u64, StoreError>>;
+
+/// What the thread is told.
+pub(super) enum Message {
+    /// Commits, and what the game puts beside them, in one frame.
+    Commits(Vec<CommitRecord>, Vec<GameChange>),
+    /// All of the world, since records are missing, and its hash.
+    Whole(Box<WorldParts>, u64, Vec<GameChange>),
+    /// Makes all that was told so far durable.
+    Flush(Answer),
+    /// Makes a checkpoint of all that was told so far.
+    Checkpoint(Answer),
+    /// The same, and makes the database as small as it can be.
+    Compact(Answer),
+}
+
+/// What the thread tells.
+#[derive(Debug, Default)]
+pub(super) struct Shared {
+    durable: AtomicU64,
+    troubles: Mutex<VecDeque<StoreTrouble>>,
+}
+
+/// Troubles that are kept until they are taken.
+const MOST_TROUBLES: usize = 256;
+
+impl Shared {
+    /// The revision up to which everything is durable.
+    pub fn durable(&self) -> u64 {
+        self.durable.load(Ordering::Acquire)
+    }
+
+    /// Says that everything up to a revision is durable.
+    pub fn set_durable(&self, revision: u64) {
+        self.durable.store(revision, Ordering::Release);
+    }
+
+    pub fn tell(&self, trouble: StoreTrouble) {
+        let mut troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
+        if troubles.len() == MOST_TROUBLES {
+            troubles.pop_front();
+        }
+        troubles.push_back(trouble);
+    }
+
+    pub fn take_troubles(&self) -> Vec<StoreTrouble> {
+        std::mem::take(&mut *self.troubles.lock().unwrap_or_else(PoisonError::into_inner)).into()
+    }
+}
+
+/// What fails, and when it is tried again.
+struct Failing {
+    wait: Duration,
+    again: Instant,
+    why: String,
+}
+
+/// Records that are not in a frame yet.
+#[derive(Default)]
+struct Pending {
+    batch: Batch,
+    bytes: usize,
+    /// When they have to be written.
+    due: Option<Instant>,
+}
+
+/// The store's thread.
+pub(super) struct Writer {
+    pub files: Arc<dyn Files>,
+    pub options: StoreOptions,
+    pub shared: Arc<Shared>,
+    pub world: WorldId,
+    pub ground: Arc<Ground>,
+    pub settings: TerrainSettings,
+    pub mirror: Mirror,
+    pub journal: Journal,
+    pub database: Option<Records>,
+    /// The frames of the last checkpoint and of the one before.
+    pub checkpoints: [u64; 2],
+    state: State,
+}
+
+/// What changes while the thread runs.
+#[derive(Default)]
+struct State {
+    pending: Pending,
+    /// Commits since the last checkpoint, and when the first of them came.
+    commits: u64,
+    changed: Option<Instant>,
+    /// Are commits missing in the journal since the last checkpoint, so that only a checkpoint makes them durable?
+    has_gap: bool,
+    /// Is a checkpoint being made that ends a gap? Frames are durable with it only.
+    after_gap: bool,
+    failing: Option<Failing>,
+    /// Requests that came during a checkpoint.
+    later: VecDeque<Message>,
+    /// Hashes of the ground by columns of regions.
+    ground_hashes: FxHashMap<(i32, i32), u64>,
+}
+
+impl Writer {
+    #[allow(clippy::too_many_arguments)]
+    pub fn new(
+        files: Arc<dyn Files>,
+        options: StoreOptions,
+        shared: Arc<Shared>,
+        world: WorldId,
+        ground: Arc<Ground>,
+        settings: TerrainSettings,
+        mirror: Mirror,
+        journal: Journal,
+        database: Option<Records>,
+        checkpoint: u64,
+    ) -> Self {
+        let (checkpoints, state) = ([checkpoint; 2], State::default());
+        Self {
+            files,
+            options,
+            shared,
+            world,
+            ground,
+            settings,
+            mirror,
+            journal,
+            database,
+            checkpoints,
+            state,
+        }
+    }
+
+    /// Makes a world durable of which nothing is on the disk, or only an older or damaged state.
+    pub fn save_all(&mut self) -> Result<(), StoreError> {
+        self.mirror.mark_all();
+        self.checkpoint(None)
+    }
+
+    /// The same, or else as soon as it can be done.
+    pub fn save_all_or_later(&mut self) {
+        self.mirror.mark_all();
+        if self.checkpoint(None).is_err() {
+            self.give_up_waiting();
+        }
+    }
+
+    /// Lets the journal's next segment begin with the state of now.
+    pub fn begin_segment(&mut self) {
+        let frame = self.journal.last_frame();
+        let checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
+        self.journal.begin_segment(self.mirror.revision, checkpoint);
+    }
+
+    /// Does what it is told until nobody can tell it anything any more, and then makes a last checkpoint.
+    pub fn run(mut self, messages: &Receiver<Message>) {
+        loop {
+            let message = match self.state.later.pop_front() {
+                Some(message) => Ok(message),
+                None => match self.next_time() {
+                    Some(at) => messages.recv_timeout(at.saturating_duration_since(Instant::now())),
+                    None => messages.recv().map_err(|_| RecvTimeoutError::Disconnected),
+                },
+            };
+            match message {
+                Ok(message) => self.take(message, messages),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            self.tick(messages);
+        }
+        // What can't be saved now is lost with the process; the game was told.
+        if self.flush().is_ok() && self.is_changed() {
+            drop(self.checkpoint(None));
+        }
+    }
+
+    /// Is there anything that the database does not hold?
+    fn is_changed(&self) -> bool {
+        self.mirror.is_dirty() || self.state.has_gap || self.journal.last_frame() > self.checkpoints[1]
+    }
+
+    /// When there is something to do.
+    fn next_time(&self) -> Option<Instant> {
+        if let Some(failing) = &self.state.failing {
+            return Some(failing.again);
+        }
+        let checkpoint = self.state.changed.map(|since| since + self.options.checkpoint_after);
+        [self.state.pending.due, checkpoint].into_iter().flatten().min()
+    }
+
+    /// Does what is due.
+    fn tick(&mut self, messages: &Receiver<Message>) {
+        let now = Instant::now();
+        if let Some(failing) = &self.state.failing {
+            if failing.again <= now {
+                let done = if self.state.has_gap { self.checkpoint(Some(messages)) } else { self.flush() };
+                drop(done);
+            }
+            return;
+        }
+        if self.state.pending.due.is_some_and(|due| due <= now) {
+            drop(self.flush());
+        }
+        let is_old = self.state.changed.is_some_and(|since| since + self.options.checkpoint_after <= now);
+        if self.state.failing.is_none() && (is_old || self.state.commits >= self.options.checkpoint_commits) {
+            drop(self.checkpoint(Some(messages)));
+        }
+    }
+
+    fn take(&mut self, message: Message, messages: &Receiver<Message>) {
+        match message {
+            Message::Commits(records, game) => self.enter(records, game),
+            Message::Whole(parts, hash, game) => {
+                self.enter(Vec::new(), game);
+                self.mirror.replace(*parts, hash);
+                self.leave_gap();
+            }
+            Message::Flush(answer) => {
+                let done = match self.state.has_gap {
+                    true => self.checkpoint(Some(messages)),
+                    false => self.flush(),
+                };
+                drop(answer.send(done.map(|()| self.shared.durable())));
+            }
+            Message::Checkpoint(answer) => {
+                let done = self.checkpoint(Some(messages));
+                drop(answer.send(done.map(|()| self.shared.durable())));
+            }
+            Message::Compact(answer) => {
+                let done = self.checkpoint(Some(messages)).and_then(|()| self.compact());
+                drop(answer.send(done.map(|()| self.shared.durable())));
+            }
+        }
+    }
+
+    fn compact(&mut self) -> Result<(), StoreError> {
+        let done = self.database.as_mut().map_or(Ok(()), Records::compact);
+        done.map_err(|why| StoreError::NotSaved(why.to_string()))
+    }
+
+    /// Takes in what has to be saved.
+    fn enter(&mut self, records: Vec<CommitRecord>, game: Vec<GameChange>) {
+        let now = Instant::now();
+        let pending = &mut self.state.pending;
+        pending.due.get_or_insert(now + self.options.loss_window);
+        self.state.changed.get_or_insert(now);
+        for mut record in records {
+            self.mirror.apply(&record);
+            self.state.commits += 1;
+            // Edits lead to the same bricks again.
+            if !record.entries.contains(&LogEntry::Change) {
+                record.change = WorldChange::default();
+            }
+            pending.bytes += 64 + record.entries.len() * 64 + record.change.bricks.len() * 1024;
+            pending.batch.commits.push(record);
+        }
+        for (key, value) in game {
+            pending.bytes += key.len() + value.as_ref().map_or(0, Vec::len);
+            match &value {
+                Some(value) => drop(self.mirror.game.insert(key.clone(), value.clone())),
+                None => drop(self.mirror.game.remove(&key)),
+            }
+            pending.batch.game.push((key, value));
+        }
+        if self.state.has_gap {
+            // A checkpoint saves them, since the journal can't.
+            self.state.pending = Pending::default();
+        } else if self.state.pending.bytes + self.journal.waiting_bytes() > self.options.waiting_bytes {
+            match self.state.failing {
+                Some(_) => self.leave_gap(),
+                None => drop(self.flush()),
+            }
+        }
+    }
+
+    /// Gives up what waits for the journal: only a checkpoint makes it durable now.
+    fn leave_gap(&mut self) {
+        if !self.state.has_gap {
+            self.shared.tell(StoreTrouble::LogGap { revision: self.shared.durable() });
+        }
+        self.give_up_waiting();
+        self.state.changed.get_or_insert_with(Instant::now);
+        if self.state.failing.is_none() {
+            let (wait, again) = (RETRY.0, Instant::now());
+            self.state.failing = Some(Failing { wait, again, why: String::new() });
+        }
+    }
+
+    fn give_up_waiting(&mut self) {
+        self.state.pending = Pending::default();
+        self.journal.drop_waiting();
+        self.state.has_gap = true;
+    }
+
+    /// Puts what waits into a frame, and makes all frames durable.
+    fn flush(&mut self) -> Result<(), StoreError> {
+        let pending = std::mem::take(&mut self.state.pending);
+        if !pending.batch.is_empty() {
+            self.journal.push(self.mirror.revision, &pending.batch.encode());
+        }
+        match self.journal.write() {
+            Ok(written) => {
+                let counts = !self.state.has_gap && !self.state.after_gap;
+                if let (Some(revision), true) = (written, counts) {
+                    self.shared.set_durable(revision);
+                }
+                if counts {
+                    self.succeed();
+                }
+                Ok(())
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                // What was durable is gone with the file.
+                self.leave_gap();
+                Err(self.fail(&error.to_string()))
+            }
+            Err(error) => Err(self.fail(&error.to_string())),
+        }
+    }
+
+    /// Makes a checkpoint; takes in what comes meanwhile.
+    fn checkpoint(&mut self, messages: Option<&Receiver<Message>>) -> Result<(), StoreError> {
+        if !self.state.has_gap {
+            self.flush()?;
+        }
+        if let Err(error) = self.ready_database() {
+            return Err(self.fail(&error.to_string()));
+        }
+        let (revision, frame, commits) =
+            (self.mirror.revision, self.journal.last_frame(), self.state.commits);
+        let checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
+        let dirty = self.mirror.take_dirty();
+        let positions: Vec<RegionPos> = dirty.iter().map(|(at, _)| *at).collect();
+        // What comes from now on is in frames again.
+        let had_gap = std::mem::take(&mut self.state.has_gap);
+        self.state.after_gap = had_gap;
+        self.state.changed = None;
+        let mut records = Vec::with_capacity(dirty.len() + 1);
+        for (at, region) in dirty {
+            records.push((keys::region(at), region.map(|region| self.encode(at, &region))));
+            if let Some(messages) = messages {
+                self.listen(messages);
+            }
+        }
+        for key in keys::CHECKPOINTS {
+            let sealed = frame::seal(Kind::Checkpoint, self.world, key, revision, 0, &checkpoint);
+            records.push((key.to_vec(), Some(sealed)));
+        }
+        let written = self.write_records(&records);
+        let after_gap = std::mem::take(&mut self.state.after_gap);
+        if let Err(error) = written {
+            self.mirror.put_back(positions);
+            self.state.changed.get_or_insert_with(Instant::now);
+            if had_gap || self.state.has_gap {
+                self.give_up_waiting();
+            }
+            return Err(self.fail(&error.to_string()));
+        }
+        self.state.commits -= commits.min(self.state.commits);
+        let durable = if after_gap { self.journal.written().unwrap_or_default() } else { 0 };
+        self.shared.set_durable(self.shared.durable().max(revision).max(durable));
+        self.journal.begin_segment(revision, checkpoint);
+        self.checkpoints = [self.checkpoints[1], frame];
+        if !self.state.has_gap {
+            self.succeed();
+        }
+        if let Err(error) = self.journal.trim(self.options.log_bytes, self.checkpoints[0]) {
+            return Err(self.fail(&error.to_string()));
+        }
+        Ok(())
+    }
+
+    /// Opens the database where it is not open, or sees to it that a new one gets all regions.
+    fn ready_database(&mut self) -> Result<(), DatabaseError> {
+        if !self.files.exists(DATABASE)? {
+            self.database = None;
+            self.mirror.mark_all();
+            return Ok(());
+        }
+        if self.database.is_some() {
+            return Ok(());
+        }
+        match Records::open(&*self.files) {
+            Ok(open) => self.database = Some(open),
+            Err(DatabaseError::Files(error)) => return Err(error.into()),
+            Err(DatabaseError::Missing | DatabaseError::Damaged(_)) => {
+                quarantine::file(&*self.files, DATABASE)?;
+                self.mirror.mark_all();
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes in what came during a checkpoint, and writes it in time.
+    fn listen(&mut self, messages: &Receiver<Message>) {
+        loop {
+            match messages.try_recv() {
+                Ok(Message::Commits(records, game)) if self.state.later.is_empty() => {
+                    self.enter(records, game)
+                }
+                Ok(message) => self.state.later.push_back(message),
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
+            }
+        }
+        let is_due = self.state.pending.due.is_some_and(|due| due <= Instant::now());
+        if is_due && self.state.failing.is_none() && !self.state.has_gap {
+            drop(self.flush());
+        }
+    }
+
+    fn write_records(&mut self, records: &[Change]) -> Result<(), DatabaseError> {
+        let Some(database) = &self.database else {
+            self.files.create_folder("")?;
+            self.database = Some(Records::create(&*self.files, records)?);
+            return Ok(());
+        };
+        let written = database.write(records);
+        if written.is_err() {
+            // It takes nothing more after an error, and has to be opened anew.
+            self.database = None;
+        }
+        written
+    }
+
+    fn encode(&mut self, at: RegionPos, region: &Region) -> Vec<u8> {
+        let ground = &self.ground;
+        let hash = self.state.ground_hashes.entry(at.column());
+        let hash = *hash.or_insert_with(|| ground.region_hash(at.column()));
+        let payload = format::encode_region(&region.bricks, &region.fields);
+        frame::seal(Kind::Region, self.world, &keys::region(at), region.revision, hash, &payload)
+    }
+
+    fn metadata(&self) -> format::Metadata {
+        let Mirror { revision, hash, next_field, rules, loose, game, .. } = &self.mirror;
+        format::Metadata {
+            settings: self.settings,
+            revision: *revision,
+            hash: *hash,
+            next_field: *next_field,
+            rules: rules.clone(),
+            loose: *loose,
+            simulation: crate::terrain::SIMULATION,
+            ground: self.ground.hash(),
+            game: game.iter().map(|(key, value)| (key.clone(), value.clone())).collect(),
+        }
+    }
+
+    /// Tells of a failure once, and waits longer each time.
+    fn fail(&mut self, why: &str) -> StoreError {
+        let wait = match &self.state.failing {
+            Some(failing) => (failing.wait * 2).min(RETRY.1),
+            None => RETRY.0,
+        };
+        if self.state.failing.as_ref().is_none_or(|failing| failing.why != why) {
+            self.shared.tell(StoreTrouble::NotSaved(why.into()));
+        }
+        self.state.failing = Some(Failing { wait, again: Instant::now() + wait, why: why.into() });
+        StoreError::NotSaved(why.into())
+    }
+
+    fn succeed(&mut self) {
+        if self.state.failing.take().is_some_and(|failing| !failing.why.is_empty()) {
+            self.shared.tell(StoreTrouble::SavedAgain);
+        }
+    }
+}
+
+/// What the game has put, changed by these.
+pub(super) fn apply_game(data: &mut GameData, changes: &[GameChange]) {
+    for (key, value) in changes {
+        match value {
+            Some(value) => drop(data.insert(key.clone(), value.clone())),
+            None => drop(data.remove(key)),
+        }
+    }
+}

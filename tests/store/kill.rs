@@ -1,0 +1,183 @@
+//! A process that digs is killed at random, also while it makes checkpoints and while it recovers. `BURROW_KILLS` is how often.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use bevy_burrow::store::{Store, StoreOptions};
+use bevy_burrow::terrain::Meshing;
+use fastrand::Rng;
+
+use crate::play::{TURN, act, count, ground, save, terrain};
+
+const FOLDER: &str = "BURROW_KILLED_WORLD";
+const SEED: &str = "BURROW_KILLED_SEED";
+
+fn options() -> StoreOptions {
+    StoreOptions { loss_window: Duration::from_millis(5), checkpoint_commits: 60, ..StoreOptions::default() }
+}
+
+fn say(line: std::fmt::Arguments) {
+    let mut out = std::io::stdout().lock();
+    // Whoever listened may be gone.
+    drop(out.write_fmt(format_args!("{line}\n")).and_then(|()| out.flush()));
+}
+
+/// What the killed process does; run by the other test only.
+#[test]
+#[ignore = "it is run by another test, and killed"]
+fn child() {
+    let (Ok(folder), Ok(seed)) = (std::env::var(FOLDER), std::env::var(SEED)) else { return };
+    let mut rng = Rng::with_seed(seed.parse().expect("a number"));
+    let ground = ground(3);
+    say(format_args!("\nopening"));
+    let (mut store, mut terrain) = if Store::is_in(&folder) {
+        let (store, opened) = Store::open(&folder, ground, options()).expect("it can be opened");
+        (store, opened.terrain)
+    } else {
+        let mut terrain = terrain(&ground);
+        (Store::create(&folder, &mut terrain, options()).expect("a new world"), terrain)
+    };
+    terrain.set_meshing(Meshing::Never);
+    let mut durable = store.durable();
+    say(format_args!("durable {durable}"));
+    loop {
+        act(&mut terrain, &mut rng);
+        say(format_args!("asked {} {}", terrain.world().revision(), terrain.world().hash()));
+        save(&mut store, &mut terrain).expect("the thread runs");
+        if store.durable() != durable {
+            durable = store.durable();
+            say(format_args!("durable {durable}"));
+        }
+        match rng.u32(0..60) {
+            0 => {
+                say(format_args!("checkpoint"));
+                let durable = store.checkpoint().expect("the disk works");
+                say(format_args!("durable {durable}"));
+            }
+            1 => say(format_args!("durable {}", store.flush().expect("the disk works"))),
+            _ => {}
+        }
+    }
+}
+
+/// What is known of a world whose process is killed.
+#[derive(Default)]
+struct Known {
+    hashes: BTreeMap<u64, Vec<u64>>,
+    acknowledged: u64,
+    latest: u64,
+}
+
+impl Known {
+    fn hear(&mut self, line: &str) {
+        let mut words = line.split(' ');
+        let (word, mut numbers) = (words.next(), words.filter_map(|word| word.parse().ok()));
+        match (word, numbers.next(), numbers.next()) {
+            (Some("durable"), Some(revision), _) => self.acknowledged = self.acknowledged.max(revision),
+            (Some("asked"), Some(revision), Some(hash)) => {
+                self.hashes.entry(revision).or_default().push(hash);
+                self.latest = revision;
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Hears a process until something else is to be done, or a time is over.
+fn hear(lines: &Receiver<String>, known: &mut Known, until: Instant, stop: &str) {
+    loop {
+        match lines.recv_timeout(until.saturating_duration_since(Instant::now())) {
+            Ok(line) => {
+                known.hear(&line);
+                if line == stop {
+                    return;
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => return,
+            Err(RecvTimeoutError::Disconnected) => panic!("the process ended by itself"),
+        }
+    }
+}
+
+fn kill_once(folder: &Path, rng: &mut Rng, known: &mut Known) -> &'static str {
+    let program = std::env::current_exe().expect("it runs");
+    let mut child = Command::new(program)
+        .args(["kill::child", "--exact", "--ignored", "--nocapture"])
+        .env(FOLDER, folder)
+        .env(SEED, rng.u64(..).to_string())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("it can be started");
+    let out = BufReader::new(child.stdout.take().expect("it is piped"));
+    let (sender, lines) = channel();
+    let listener = std::thread::spawn(move || {
+        out.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)).ok();
+    });
+    let soon = |rng: &mut Rng, most: u64| Instant::now() + Duration::from_micros(rng.u64(0..most));
+    let long = Instant::now() + Duration::from_secs(20);
+    let during = match rng.u32(0..8) {
+        0 => {
+            hear(&lines, known, long, "opening");
+            hear(&lines, known, soon(rng, 12_000), "");
+            "recovery"
+        }
+        1 => {
+            hear(&lines, known, long, "checkpoint");
+            hear(&lines, known, soon(rng, 15_000), "");
+            "checkpoint"
+        }
+        _ => {
+            hear(&lines, known, long, "opening");
+            hear(&lines, known, soon(rng, 150_000), "");
+            "anything"
+        }
+    };
+    child.kill().expect("it runs");
+    child.wait().expect("it was started");
+    listener.join().expect("no panic");
+    lines.try_iter().for_each(|line| known.hear(&line));
+    during
+}
+
+#[test]
+fn a_killed_process_loses_nothing_that_was_acknowledged() {
+    let kills = count("BURROW_KILLS", 20);
+    let mut rng = Rng::with_seed(count("BURROW_SEED", 26));
+    let place = std::env::temp_dir().join(format!("bevy_burrow_kill_{}", std::process::id()));
+    let (mut known, mut folder) = (Known::default(), PathBuf::new());
+    let (mut when, mut lost, mut in_flight) = (BTreeMap::<&str, u64>::new(), 0, 0);
+    for kill in 0..kills {
+        if kill % 50 == 0 {
+            drop(std::fs::remove_dir_all(&place));
+            (known, folder) = (Known::default(), place.join(kill.to_string()));
+            known.hashes.insert(0, vec![terrain(&ground(3)).world().hash()]);
+        }
+        *when.entry(kill_once(&folder, &mut rng, &mut known)).or_default() += 1;
+        if !Store::is_in(&folder) {
+            assert!(known.acknowledged == 0 && known.latest == 0, "kill {kill}: the world is gone");
+            continue;
+        }
+        let opened = Store::open(&folder, ground(3), options());
+        let (store, opened) = opened.unwrap_or_else(|why| panic!("kill {kill} in {folder:?}: {why}"));
+        let (revision, hash) = (opened.terrain.world().revision(), opened.terrain.world().hash());
+        let bounds = known.acknowledged..=known.latest;
+        assert!(
+            bounds.contains(&revision),
+            "kill {kill}: {revision}, not in {bounds:?}: {:?}",
+            opened.troubles
+        );
+        assert!(known.hashes[&revision].contains(&hash), "kill {kill}: {revision}, {:?}", opened.troubles);
+        let turn = store.get(TURN).map_or(0, |turn| u64::from_le_bytes(turn.try_into().expect("8 bytes")));
+        assert_eq!(turn, revision, "kill {kill}: game data is of another revision");
+        lost += known.latest - revision;
+        in_flight += known.latest - known.acknowledged;
+        (known.acknowledged, known.latest) = (revision, revision);
+        known.hashes = BTreeMap::from([(revision, vec![hash])]);
+    }
+    drop(std::fs::remove_dir_all(&place));
+    println!("{kills} kills during {when:?}; of {in_flight} revisions in flight {lost} were lost");
+}

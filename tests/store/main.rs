@@ -1,0 +1,12 @@
+//! Worlds on disk: nothing that was acknowledged is ever lost, whatever happens to the process, the power or the files.
+#![cfg(feature = "store")]
+
+mod damage;
+mod faults;
+mod kill;
+mod opening;
+mod play;
+mod power;
+mod random;
+#[path = "../worlds/mod.rs"]
+mod worlds;

@@ -1,0 +1,199 @@
+//! Creating, opening, and what is told where that can't be.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use bevy_burrow::prelude::*;
+use bevy_burrow::store::{BaseChanged, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble};
+use bevy_burrow::terrain::Meshing;
+use fastrand::Rng;
+use glam::Vec3;
+
+use crate::play::{act, ground, open, options, save, state, terrain};
+
+/// A folder that is removed at the end.
+struct Place(PathBuf);
+
+impl Place {
+    fn new(name: &str) -> Self {
+        let place = std::env::temp_dir().join(format!("bevy_burrow_{name}_{}", std::process::id()));
+        drop(std::fs::remove_dir_all(&place));
+        Self(place)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        drop(std::fs::remove_dir_all(&self.0));
+    }
+}
+
+#[test]
+fn a_world_is_created_once_and_opened_by_one() {
+    let place = Place::new("once");
+    let ground = ground(1);
+    let missing = Store::open(&place.0, Arc::clone(&ground), options(9)).expect_err("there is none");
+    assert!(matches!(missing, StoreError::Missing(_)), "{missing}");
+    let mut first = terrain(&ground);
+    let store = Store::create(&place.0, &mut first, options(9)).expect("a new world");
+    let locked = Store::open(&place.0, Arc::clone(&ground), options(9)).expect_err("it is open");
+    assert!(matches!(locked, StoreError::Locked(_)), "{locked}");
+    let locked = Store::create(&place.0, &mut terrain(&ground), options(9)).expect_err("it is open");
+    assert!(matches!(locked, StoreError::Locked(_)), "{locked}");
+    drop(store);
+    let exists = Store::create(&place.0, &mut terrain(&ground), options(9)).expect_err("it exists");
+    assert!(matches!(exists, StoreError::Exists(_)), "{exists}");
+    let (_, opened) = Store::open(&place.0, ground, options(9)).expect("it can be opened");
+    assert_eq!(state(&opened.terrain), state(&first));
+    assert!(opened.troubles.is_empty() && opened.replayed == 0 && opened.is_log_whole);
+}
+
+#[test]
+fn a_terrain_that_was_dug_before_is_saved_with_rules_and_all() {
+    for is_dug in [false, true] {
+        let (disk, ground) = (SimulatedDisk::new(), ground(3));
+        let (mut first, mut rng) = (terrain(&ground), Rng::with_seed(2));
+        first.set_rules(DiggingRules::default().with_unbreakable(MaterialId(3))).expect("valid");
+        first.set_loose(Some(LooseSettings::default()));
+        if is_dug {
+            (0..30).for_each(|_| act(&mut first, &mut rng));
+        }
+        let mut store =
+            Store::create_in(Arc::new(disk.clone()), &mut first, options(9)).expect("a new world");
+        store.flush().expect("the disk works");
+        let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
+        assert_eq!(state(&opened.terrain), state(&first));
+        assert_eq!(opened.is_log_whole, !is_dug);
+        (0..30).for_each(|_| act(&mut first, &mut rng));
+        save(&mut store, &mut first).expect("the thread runs");
+        drop(store);
+        let (_, opened) = open(&disk, &ground).expect("it can be opened");
+        assert_eq!(state(&opened.terrain), state(&first));
+    }
+}
+
+#[test]
+fn records_that_are_missing_are_noticed() {
+    let (disk, ground) = (SimulatedDisk::new(), ground(3));
+    let (mut first, mut rng) = (terrain(&ground), Rng::with_seed(2));
+    let mut store = Store::create_in(Arc::new(disk.clone()), &mut first, options(9)).expect("a new world");
+    while first.world().revision() < 9 {
+        act(&mut first, &mut rng);
+    }
+    let mut records = first.take_log();
+    records.drain(..3);
+    assert!(matches!(store.append(records), Err(StoreError::Gap { at: 0, .. })));
+    first.apply([Brush::dig(Shape::sphere(Vec3::splat(20.0), 3.0))]);
+    save(&mut store, &mut first).expect("the thread runs");
+    store.flush().expect("the disk works");
+    let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
+    assert_eq!(state(&opened.terrain), state(&first));
+    assert!(!opened.is_log_whole);
+}
+
+#[test]
+fn undo_goes_on_after_a_checkpoint_and_is_gone_after_a_restart() {
+    let (disk, ground) = (SimulatedDisk::new(), ground(3));
+    let mut first = terrain(&ground);
+    let mut store = Store::create_in(Arc::new(disk.clone()), &mut first, options(2)).expect("a new world");
+    for x in 0..9 {
+        first.apply([Brush::dig(Shape::sphere(Vec3::new(8.0 * x as f32, 4.0, 30.0), 9.0))]);
+        save(&mut store, &mut first).expect("the thread runs");
+    }
+    store.checkpoint().expect("the disk works");
+    (0..9).for_each(|_| drop(first.undo()));
+    save(&mut store, &mut first).expect("the thread runs");
+    assert_eq!(first.world().bricks().count(), 0);
+    drop(store);
+    let (_, opened) = open(&disk, &ground).expect("it can be opened");
+    assert_eq!(state(&opened.terrain), state(&first));
+    assert_eq!(opened.terrain.history(), History::default());
+}
+
+/// Two grounds that differ over one column of regions, and a world that was dug everywhere on the first.
+fn changed_base(disk: &SimulatedDisk, tail: bool) -> (Arc<Ground>, Terrain) {
+    let ground = |raised: f64| {
+        let height = |x: i32, z: i32| 20.0 + f64::from((x * 3 + z) % 5) + if x > 140 { raised } else { 0.0 };
+        Arc::new(Ground::from_fn(200, 60, height).expect("valid heights"))
+    };
+    let mut first = Terrain::new(ground(0.0), &TerrainSettings::default()).expect("valid");
+    let mut store = Store::create_in(Arc::new(disk.clone()), &mut first, options(99)).expect("a new world");
+    for x in 0..20 {
+        first.apply([Brush::dig(Shape::sphere(Vec3::new(10.0 * x as f32, 20.0, 30.0), 4.0))]);
+        save(&mut store, &mut first).expect("the thread runs");
+    }
+    if tail {
+        store.flush().expect("the disk works");
+        let image = disk.image();
+        drop(store);
+        let before = image.lose_process();
+        for path in before.paths() {
+            let bytes = bevy_burrow::store::Files::read(&before, &path).expect("it is there");
+            disk.damage(&path, |own| *own = bytes);
+        }
+    }
+    (ground(3.0), first)
+}
+
+#[test]
+fn a_changed_ground_keeps_the_edits() {
+    for tail in [false, true] {
+        let disk = SimulatedDisk::new();
+        let (other, first) = changed_base(&disk, tail);
+        let open = |disk: &SimulatedDisk, base_changed| {
+            let options = StoreOptions { base_changed, ..options(99) };
+            Store::open_in(Arc::new(disk.clone()), Arc::clone(&other), options)
+        };
+        let refused = open(&disk, BaseChanged::Refuse).expect_err("it refuses");
+        assert!(matches!(refused, StoreError::BaseChanged { .. }), "{refused}");
+        // Refusing changes nothing.
+        let (store, replayed) = open(&disk.image().lose_process(), BaseChanged::Replay).expect("it replays");
+        assert_eq!(replayed.terrain.world().revision(), first.world().revision());
+        let mut again = Terrain::new(Arc::clone(&other), &TerrainSettings::default()).expect("valid");
+        for x in 0..20 {
+            again.apply([Brush::dig(Shape::sphere(Vec3::new(10.0 * x as f32, 20.0, 30.0), 4.0))]);
+        }
+        assert_eq!(replayed.terrain.world().hash(), again.world().hash());
+        drop(store);
+
+        let (store, kept) = open(&disk, BaseChanged::Keep).expect("it keeps");
+        let told = |own: &StoreTrouble| matches!(own, StoreTrouble::BaseChanged { .. });
+        assert!(kept.troubles.iter().any(told), "{:?}", kept.troubles);
+        assert_eq!(kept.terrain.world().revision(), first.world().revision());
+        for (pos, brick) in first.world().bricks().filter(|_| !tail) {
+            let now: Vec<_> = kept.terrain.world().bricks().filter(|(own, _)| *own == pos).collect();
+            let samples: Vec<_> = brick.edited_samples(pos).collect();
+            assert_eq!(now[0].1.edited_samples(pos).collect::<Vec<_>>(), samples);
+        }
+        let hash = kept.terrain.world().hash();
+        drop(store);
+        // From now on it is the world of the other ground.
+        let (_, same) = open(&disk, BaseChanged::Refuse).expect("the ground is the same now");
+        assert_eq!(same.terrain.world().hash(), hash);
+        assert!(same.troubles.is_empty(), "{:?}", same.troubles);
+    }
+}
+
+#[test]
+fn game_data_is_there_by_its_keys() {
+    let (disk, ground) = (SimulatedDisk::new(), ground(3));
+    let mut first = terrain(&ground);
+    first.set_meshing(Meshing::Never);
+    let mut store = Store::create_in(Arc::new(disk.clone()), &mut first, options(9)).expect("a new world");
+    store.put("inventory", b"three shovels".to_vec());
+    store.put("time", [7; 4]);
+    store.flush().expect("the disk works");
+    store.put("time", [8; 4]);
+    store.remove("inventory");
+    store.put("weather", []);
+    assert_eq!((store.get("inventory"), store.get("time")), (None, Some(&[8; 4][..])));
+    let (before, _) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
+    assert_eq!(
+        (before.get("inventory"), before.get("time")),
+        (Some(&b"three shovels"[..]), Some(&[7; 4][..]))
+    );
+    drop(store);
+    let (after, _) = open(&disk, &ground).expect("it can be opened");
+    let keys: Vec<&str> = after.game_data().keys().map(String::as_str).collect();
+    assert_eq!((keys, after.get("time")), (vec!["time", "weather"], Some(&[8; 4][..])));
+}

@@ -1,0 +1,116 @@
+//! A player who digs, undoes and changes rules at random, and what every revision of the world was.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy_burrow::lattice::ChunkPos;
+use bevy_burrow::prelude::*;
+use bevy_burrow::store::{Opened, SimulatedDisk, Store, StoreError, StoreOptions};
+use bevy_burrow::terrain::Meshing;
+use bevy_burrow::volume::Field;
+use fastrand::Rng;
+
+use crate::worlds::{any_random_brush, random_ground_of_size};
+
+/// A count from the environment, or the default.
+pub fn count(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
+}
+
+/// A small ground.
+pub fn ground(seed: u64) -> Arc<Ground> {
+    Arc::new(random_ground_of_size(&mut Rng::with_seed(seed), seed, 70 + seed as u32 % 60, 80))
+}
+
+/// A terrain that nobody looks at.
+pub fn terrain(ground: &Arc<Ground>) -> Terrain {
+    let settings = TerrainSettings { chunk_size: 25, ..TerrainSettings::default() };
+    let mut terrain = Terrain::new(Arc::clone(ground), &settings).expect("valid settings");
+    terrain.set_meshing(Meshing::Never);
+    terrain
+}
+
+/// Saves at once, and makes checkpoints after so many commits.
+pub fn options(checkpoint_commits: u64) -> StoreOptions {
+    StoreOptions { loss_window: Duration::ZERO, checkpoint_commits, ..StoreOptions::default() }
+}
+
+/// All that a save must bring back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    pub hash: u64,
+    pub fields: BTreeMap<ChunkPos, Vec<Field>>,
+    pub next_field: u64,
+    pub rules: Option<DiggingRules>,
+    pub loose: Option<LooseSettings>,
+}
+
+/// What a terrain is like.
+pub fn state(terrain: &Terrain) -> State {
+    let world = terrain.world();
+    State {
+        hash: world.hash(),
+        fields: world.fields().map(|(chunk, fields)| (chunk, fields.iter().copied().collect())).collect(),
+        next_field: terrain.parts().change.next_field,
+        rules: terrain.rules().cloned(),
+        loose: terrain.loose().copied(),
+    }
+}
+
+/// Does something at random: mostly digs.
+pub fn act(terrain: &mut Terrain, rng: &mut Rng) {
+    match rng.u32(0..14) {
+        0 => drop(terrain.undo()),
+        1 => drop(terrain.redo()),
+        2 => {
+            let rules = DiggingRules::default().with_unbreakable(MaterialId(rng.u8(0..4)));
+            let rules = if rng.bool() { rules } else { DiggingRules::default() };
+            terrain.set_rules(rules).expect("valid rules");
+        }
+        3 => {
+            let loose = LooseSettings { largest: 4096, crumbs: rng.u32(0..40), debris: rng.u32(0..400) };
+            terrain.set_loose(rng.bool().then_some(loose));
+        }
+        _ => {
+            let brush = any_random_brush(rng, terrain.world().ground());
+            drop(terrain.apply([brush]));
+        }
+    }
+}
+
+/// The key under which the revision is put, so that game data and ground can be compared.
+pub const TURN: &str = "turn";
+
+/// Puts the revision beside the commits that lead to it, and hands both over.
+pub fn save(store: &mut Store, terrain: &mut Terrain) -> Result<(), StoreError> {
+    store.put(TURN, terrain.world().revision().to_le_bytes());
+    store.follow(terrain)
+}
+
+/// Checks that a world that was opened is one that was, between two revisions; returns its revision.
+pub fn check_opened(
+    (store, opened): &(Store, Opened),
+    states: &BTreeMap<u64, Vec<State>>,
+    acknowledged: u64,
+    latest: u64,
+) -> u64 {
+    let revision = opened.terrain.world().revision();
+    assert!(
+        (acknowledged..=latest).contains(&revision),
+        "revision {revision}, but {acknowledged} was acknowledged and {latest} the last: {:?}",
+        opened.troubles
+    );
+    let found = state(&opened.terrain);
+    let was = states.get(&revision).is_some_and(|states| states.contains(&found));
+    assert!(was, "revision {revision} was never like {found:?}: {:?}", opened.troubles);
+    let turn = store.get(TURN).map(|turn| u64::from_le_bytes(turn.try_into().expect("8 bytes")));
+    assert_eq!(turn.unwrap_or_default(), revision, "game data is of another revision");
+    assert_eq!((store.revision(), store.durable()), (revision, revision));
+    revision
+}
+
+/// Opens the world of a simulated disk.
+pub fn open(disk: &SimulatedDisk, ground: &Arc<Ground>) -> Result<(Store, Opened), StoreError> {
+    Store::open_in(Arc::new(disk.clone()), Arc::clone(ground), options(16))
+}
