@@ -1,0 +1,88 @@
+//! Why bytes are not what they should be.
+
+use thiserror::Error;
+
+use super::frame::{Kind, WorldId};
+use crate::lattice::{BrickPos, ChunkPos};
+
+/// Why bytes can't be read as a part of a saved world.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum FormatError {
+    /// They don't begin like a record.
+    #[error("this is no record of a saved world")]
+    Magic,
+    /// They end too early.
+    #[error("the record is cut off")]
+    Truncated,
+    /// They changed since they were written.
+    #[error("the record is damaged: its checksum differs")]
+    Checksum,
+    /// They were written by a newer version of the crate.
+    #[error(
+        "the record has schema {found}, but this version knows schemas up to {known}: use a newer version"
+    )]
+    Newer {
+        /// The record's schema.
+        found: u32,
+        /// The newest that this version knows.
+        known: u32,
+    },
+    /// They hold something else.
+    #[error("the record is of kind {found}, not {expected:?}")]
+    Kind {
+        /// The number of the record's kind.
+        found: u8,
+        /// What was asked for.
+        expected: Kind,
+    },
+    /// They belong to another world.
+    #[error("the record belongs to the world {found}, not to {expected}")]
+    World {
+        /// The record's world.
+        found: WorldId,
+        /// The one that was asked for.
+        expected: WorldId,
+    },
+    /// They belong in another place of the same world.
+    #[error("the record belongs in another place: it has another key")]
+    Key,
+    /// They declare more content than is allowed.
+    #[error("the record declares {length} bytes, but {limit} are allowed")]
+    TooLarge {
+        /// Bytes of the content.
+        length: u64,
+        /// The most allowed.
+        limit: u64,
+    },
+    /// They are valid by their checksum, but what they hold is not.
+    #[error("the record holds an invalid {0}")]
+    Invalid(&'static str),
+    /// A brick is invalid.
+    #[error("the record holds an invalid brick at {0:?}")]
+    Brick(BrickPos),
+    /// The fields of a chunk are invalid.
+    #[error("the record holds invalid fields of {0:?}")]
+    Fields(ChunkPos),
+    /// An edit is invalid.
+    #[error("the record holds an invalid edit: {0}")]
+    Edit(String),
+    /// A file of a level is missing, or is none of a level's.
+    #[error("`{name}`: {why}")]
+    File {
+        /// The file's name.
+        name: String,
+        /// What is wrong with it.
+        why: String,
+    },
+}
+
+impl FormatError {
+    /// The schema of a record that is newer than what this version can read.
+    pub fn newer_schema(&self) -> Option<u32> {
+        match self {
+            Self::Newer { found, .. } => Some(*found),
+            _ => None,
+        }
+    }
+}

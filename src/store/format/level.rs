@@ -1,0 +1,204 @@
+//! A designer's level: a folder of files that version control compares well, and the same packed into one file to ship.
+//!
+//! - `level.json` says what the level is, and names its regions.
+//! - `r.X.Y.Z.region` holds a region's bricks and fields. It has neither revision nor time, so it changes only with its content,
+//!   and is not packed, so that version control can store differences.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use super::container;
+use super::error::FormatError;
+use super::frame::{self, Kind, WorldId};
+use super::portable::{SavedRegion, by_region, of_regions};
+use super::region::{REGION_LIMIT, region_key};
+use crate::ground::Ground;
+use crate::lattice::RegionPos;
+use crate::terrain::{LooseSettings, SIMULATION, TerrainSettings, WorldParts};
+use crate::volume::DiggingRules;
+
+/// The file that says what a level is.
+pub const LEVEL_JSON: &str = "level.json";
+
+/// The most bytes of a file of a packed level.
+const FILE_LIMIT: usize = 64 << 20;
+
+/// The files of a level by name.
+pub type LevelFiles = BTreeMap<String, Vec<u8>>;
+
+/// A designer's level: a world without history.
+#[derive(Clone, Debug, Default)]
+pub struct Level {
+    /// Chunk and voxel size.
+    pub settings: TerrainSettings,
+    /// The [hash](Ground::hash) of the ground that it was made on.
+    pub ground: u64,
+    /// The greatest name that a field has had.
+    pub next_field: u64,
+    /// Rules for edits.
+    pub rules: Option<DiggingRules>,
+    /// The search for loose pieces.
+    pub loose: Option<LooseSettings>,
+    /// The game's data, by key.
+    pub game: BTreeMap<String, Vec<u8>>,
+    /// Regions that hold anything; their revisions are 0.
+    pub regions: BTreeMap<RegionPos, SavedRegion>,
+}
+
+/// What `level.json` holds.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Description {
+    burrow_level: u32,
+    simulation: u32,
+    settings: TerrainSettings,
+    ground: String,
+    next_field: u64,
+    rules: Option<DiggingRules>,
+    loose: Option<LooseSettings>,
+    /// In hexadecimal.
+    game: BTreeMap<String, String>,
+    regions: BTreeSet<String>,
+}
+
+impl Level {
+    /// A level of the parts of a world over this ground.
+    pub fn new(parts: WorldParts, voxel_size: f32, game: BTreeMap<String, Vec<u8>>, ground: &Ground) -> Self {
+        let WorldParts { change, chunk_size, rules, loose, .. } = parts;
+        let (settings, next_field) = (TerrainSettings { chunk_size, voxel_size }, change.next_field);
+        let regions = by_region(change, chunk_size, 0, ground);
+        Self { settings, ground: ground.hash(), next_field, rules, loose, game, regions }
+    }
+
+    /// Its parts, of which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
+    pub fn parts(&self) -> WorldParts {
+        let change = of_regions(&self.regions, self.next_field);
+        let (chunk_size, rules) = (self.settings.chunk_size, self.rules.clone());
+        WorldParts { change, chunk_size, revision: 0, rules, loose: self.loose }
+    }
+}
+
+/// The name of a region's file.
+pub fn region_name(RegionPos(at): RegionPos) -> String {
+    format!("r.{}.{}.{}.region", at.x, at.y, at.z)
+}
+
+/// The region whose file has this name.
+pub fn region_of_name(name: &str) -> Option<RegionPos> {
+    let mut parts = name.strip_prefix("r.")?.strip_suffix(".region")?.split('.');
+    let mut next = || parts.next()?.parse().ok();
+    let at = RegionPos([next()?, next()?, next()?].into());
+    // Each region has one name: no leading zeros, no plus signs, no more parts.
+    (region_name(at) == name).then_some(at)
+}
+
+fn file_error(name: &str, why: impl ToString) -> FormatError {
+    FormatError::File { name: name.into(), why: why.to_string() }
+}
+
+/// The files of a level. The same content gives the same bytes, file by file.
+///
+/// # Errors
+/// When settings hold numbers that JSON can't.
+pub fn write_level(level: &Level) -> Result<LevelFiles, FormatError> {
+    let description = Description {
+        burrow_level: frame::SCHEMA,
+        simulation: SIMULATION,
+        settings: level.settings,
+        ground: format!("{:016x}", level.ground),
+        next_field: level.next_field,
+        rules: level.rules.clone(),
+        loose: level.loose,
+        game: level.game.iter().map(|(key, value)| (key.clone(), to_hex(value))).collect(),
+        regions: level.regions.keys().map(|at| region_name(*at)).collect(),
+    };
+    let json = serde_json::to_string_pretty(&description).map_err(|error| file_error(LEVEL_JSON, error))?;
+    let mut files = LevelFiles::from([(LEVEL_JSON.to_owned(), (json + "\n").into_bytes())]);
+    for (at, region) in &level.regions {
+        let (key, hash) = (region_key(*at), region.ground_hash);
+        let sealed = frame::seal_unpacked(Kind::Region, WorldId::default(), &key, hash, &region.encode());
+        files.insert(region_name(*at), sealed);
+    }
+    Ok(files)
+}
+
+/// Reads the files of a level over its ground, or over another one: [`Level::ground`] and the regions' hashes tell.
+///
+/// # Errors
+/// When a file is damaged, missing, or none of the level's.
+pub fn read_level(files: &LevelFiles, ground: &Ground) -> Result<Level, FormatError> {
+    let json = files.get(LEVEL_JSON).ok_or_else(|| file_error(LEVEL_JSON, "it is missing"))?;
+    let of: Description = read_description(json)?;
+    let hash = u64::from_str_radix(&of.ground, 16).map_err(|error| file_error(LEVEL_JSON, error))?;
+    if let Some(other) = files.keys().find(|name| *name != LEVEL_JSON && !of.regions.contains(*name)) {
+        return Err(file_error(other, format!("`{LEVEL_JSON}` does not name it")));
+    }
+    let mut regions = BTreeMap::new();
+    for name in &of.regions {
+        let at = region_of_name(name).ok_or_else(|| file_error(name, "no region has this name"))?;
+        let file = files.get(name).ok_or_else(|| file_error(name, "it is missing"))?;
+        let opened = frame::open(file, Kind::Region, WorldId::default(), &region_key(at), REGION_LIMIT);
+        let region = opened.and_then(|opened| SavedRegion::decode(&opened, at, ground));
+        regions.insert(at, region.map_err(|error| file_error(name, error))?);
+    }
+    let value = |(key, hex): (&String, &String)| Some((key.clone(), of_hex(hex)?));
+    let game = of.game.iter().map(value).collect::<Option<_>>();
+    let game = game.ok_or_else(|| file_error(LEVEL_JSON, "game data is not hexadecimal"))?;
+    let Description { settings, next_field, rules, loose, .. } = of;
+    Ok(Level { settings, ground: hash, next_field, rules, loose, game, regions })
+}
+
+fn to_hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn of_hex(hex: &str) -> Option<Vec<u8>> {
+    let digit = |digit: u8| char::from(digit).to_digit(16).map(|digit| digit as u8);
+    let (pairs, rest) = hex.as_bytes().as_chunks();
+    let bytes = pairs.iter().map(|&[high, low]| Some(digit(high)? << 4 | digit(low)?));
+    bytes.collect::<Option<_>>().filter(|_| rest.is_empty())
+}
+
+fn read_description(json: &[u8]) -> Result<Description, FormatError> {
+    /// What all schemas have.
+    #[derive(Deserialize)]
+    struct Schema {
+        burrow_level: u32,
+    }
+    let invalid = |error| file_error(LEVEL_JSON, error);
+    let Schema { burrow_level: found } = serde_json::from_slice(json).map_err(invalid)?;
+    if found > frame::SCHEMA {
+        return Err(FormatError::Newer { found, known: frame::SCHEMA });
+    }
+    serde_json::from_slice(json).map_err(invalid)
+}
+
+/// A level's files in one, to ship.
+pub fn pack_level(files: &LevelFiles) -> Vec<u8> {
+    let file = |(name, bytes): (&String, &Vec<u8>)| {
+        frame::seal(Kind::LevelFile, WorldId::default(), name.as_bytes(), 0, 0, bytes)
+    };
+    let frames: Vec<Vec<u8>> = files.iter().map(file).collect();
+    container::write(Kind::Level, WorldId::default(), &[], &frames)
+}
+
+/// Reads what [`pack_level`] wrote; no ground is needed.
+///
+/// # Errors
+/// When it is damaged, or holds a file whose name none of a level's has.
+pub fn unpack_level(packed: &[u8]) -> Result<LevelFiles, FormatError> {
+    let mut files = LevelFiles::new();
+    for sealed in container::read(Kind::Level, packed)?.frames {
+        let key = frame::peek(sealed).ok_or(FormatError::Invalid("file"))?.key;
+        let name = String::from_utf8(key).map_err(|_| FormatError::Key)?;
+        if name != LEVEL_JSON && region_of_name(&name).is_none() {
+            return Err(file_error(&name, "no file of a level has this name"));
+        }
+        let opened = frame::open(sealed, Kind::LevelFile, WorldId::default(), name.as_bytes(), FILE_LIMIT)?;
+        if files.insert(name.clone(), opened.payload).is_some() {
+            return Err(file_error(&name, "it comes twice"));
+        }
+    }
+    Ok(files)
+}

@@ -1,0 +1,46 @@
+//! What is saved of a world beside its regions.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::FormatError;
+use super::plain;
+use crate::terrain::{LooseSettings, TerrainSettings};
+use crate::volume::DiggingRules;
+
+/// A world without its regions.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Metadata {
+    /// Chunk and voxel size.
+    pub settings: TerrainSettings,
+    /// The world's revision.
+    pub revision: u64,
+    /// Its hash.
+    pub hash: u64,
+    /// The greatest name that a field has had so far.
+    pub next_field: u64,
+    /// Rules for edits.
+    pub rules: Option<DiggingRules>,
+    /// The search for loose pieces.
+    pub loose: Option<LooseSettings>,
+    /// The [`SIMULATION`](crate::terrain::SIMULATION) that made it.
+    pub simulation: u32,
+    /// The hash of the whole ground, as [`Ground::hash`](crate::ground::Ground::hash) gives it.
+    pub ground: u64,
+    /// What the game put, by key.
+    pub game: Vec<(String, Vec<u8>)>,
+}
+
+impl Metadata {
+    /// Its bytes.
+    pub fn encode(&self) -> Vec<u8> {
+        plain::to_bytes(self)
+    }
+
+    /// Reads what [`encode`](Self::encode) wrote.
+    ///
+    /// # Errors
+    /// When the bytes are not exactly that.
+    pub fn decode(bytes: &[u8]) -> Result<Self, FormatError> {
+        plain::from_bytes(bytes, "description of a world")
+    }
+}

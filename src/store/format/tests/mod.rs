@@ -1,0 +1,14 @@
+//! Laws of the formats: what is written can be read again, bit for bit; what is damaged is told; nothing panics.
+
+mod compare;
+mod damage;
+mod fixtures;
+mod fuzz;
+mod round_trips;
+mod sizes;
+mod worlds;
+
+/// A count from the environment, or the default.
+fn count(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
+}
