@@ -30,6 +30,7 @@ mod noise_ground;
 #[path = "../shared/output.rs"]
 mod output;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -72,6 +73,20 @@ enum Command {
         /// The world's folder
         world: PathBuf,
     },
+    /// Writes a world to one file
+    Export {
+        /// The world's folder
+        world: PathBuf,
+        /// The file, which must not exist
+        file: PathBuf,
+    },
+    /// Makes a world of such a file
+    Import {
+        /// The file
+        file: PathBuf,
+        /// The world's folder, in which there is none yet
+        world: PathBuf,
+    },
     /// Replays the log alone, and verifies each commit
     Replay {
         /// The world's folder
@@ -102,6 +117,8 @@ fn run(args: &Args) -> Result<(Value, bool), String> {
         Command::Compact { world } => {
             opened(world, &args.ground, |store| store.compact().map(drop).map_err(|why| why.to_string()))
         }
+        Command::Export { world, file } => export(world, file, &args.ground),
+        Command::Import { file, world } => import(file, world, &args.ground),
         Command::Replay { world } => {
             let terrain = store::replay(world, args.ground.required()?).map_err(|why| why.to_string())?;
             Ok((Value::Object(state(terrain.world())), true))
@@ -171,4 +188,30 @@ fn opened(
     answer.insert("troubles".into(), troubles.into());
     answer.insert("is_log_whole".into(), opened.is_log_whole.into());
     Ok((Value::Object(answer), is_sound))
+}
+
+fn export(world: &Path, file: &Path, ground: &GroundArgs) -> Result<(Value, bool), String> {
+    let opened = Store::open(world, ground.required()?, StoreOptions::default());
+    let (store, opened) = opened.map_err(|why| why.to_string())?;
+    let bytes = store::to_bytes(&opened.terrain, store.world_id(), store.game_data());
+    let at = |error: std::io::Error| format!("{}: {error}", file.display());
+    let mut out = std::fs::File::create_new(file).map_err(at)?;
+    out.write_all(&bytes).and_then(|()| out.sync_all()).map_err(at)?;
+    let mut answer = state(opened.terrain.world());
+    answer.insert("bytes".into(), bytes.len().into());
+    Ok((Value::Object(answer), opened.troubles.is_empty()))
+}
+
+fn import(file: &Path, world: &Path, ground: &GroundArgs) -> Result<(Value, bool), String> {
+    let at = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
+    let bytes = std::fs::read(file).map_err(|error| at(&error))?;
+    let imported = store::from_bytes(&bytes, ground.required()?).map_err(|error| at(&error))?;
+    let mut terrain = imported.terrain;
+    let created = Store::create(world, &mut terrain, StoreOptions::default());
+    let mut store = created.map_err(|why| why.to_string())?;
+    imported.game.into_iter().for_each(|(key, bytes)| store.put(key, bytes));
+    store.checkpoint().map_err(|why| why.to_string())?;
+    let mut answer = state(terrain.world());
+    answer.insert("is_base_changed".into(), imported.is_base_changed.into());
+    Ok((Value::Object(answer), true))
 }

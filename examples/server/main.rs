@@ -4,6 +4,7 @@
 //! cargo run --release --features examples --example server
 //! cargo run --release --features examples --example server -- --script examples/server/brushes.jsonl
 //! some_game | cargo run --release --features examples --example server -- --script -
+//! some_game | cargo run --release --features examples --example server -- --world out/world --script -
 //! ```
 //!
 //! It runs Bevy's `MinimalPlugins` and `BurrowPlugins`, so it needs no window, no graphics and no assets. A script has a
@@ -17,16 +18,24 @@
 //! `"stroke"` they are; then it undoes a stroke, however many ticks that took. From standard input each brush is a
 //! batch of its own.
 //!
+//! With `--world` the world is kept in a folder: it goes on where it was. Then standard output holds JSON lines only:
+//! `{"revision":7,"hash":"0x..."}` for each commit, and `{"durable":7}` once everything up to it would survive a crash or
+//! a loss of power.
+//!
 //! | file | subject |
 //! | --- | --- |
 //! | `script.rs` | where brushes come from |
 //! | `report.rs` | what is printed |
+//! | `saving.rs` | the world on disk |
 
 #[path = "../shared/brush_lines.rs"]
 mod brush_lines;
+#[path = "../shared/noise_ground.rs"]
+mod noise_ground;
 #[path = "../shared/output.rs"]
 mod output;
 mod report;
+mod saving;
 mod script;
 
 use std::path::PathBuf;
@@ -39,6 +48,9 @@ use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::WorkLimits;
 use clap::Parser;
+
+use noise_ground::noise_ground;
+use output::complain;
 
 /// The world without rendering: brushes in, receipts and a hash out.
 #[derive(Parser, Clone, Debug)]
@@ -61,6 +73,9 @@ pub struct Options {
     /// Cells along a chunk's side.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(8..=128))]
     chunk: u32,
+    /// Keeps the world in this folder.
+    #[arg(long, value_name = "DIR")]
+    world: Option<PathBuf>,
     /// Prints no receipts, only the end.
     #[arg(long)]
     quiet: bool,
@@ -75,15 +90,23 @@ fn ticks(text: &str) -> Result<f64, String> {
 fn main() -> ExitCode {
     let options = Options::parse();
     // The script first: what is wrong with it should not have to wait for the ground.
-    let opened = script::open(&options).and_then(|source| Ok((source, terrain(&options)?)));
-    let (source, terrain) = match opened {
-        Ok(both) => both,
+    match script::open(&options).and_then(|source| make(&options, source)) {
+        Ok(mut app) => app.run().report(),
         Err(error) => {
-            eprintln!("server: {error}");
-            return ExitCode::FAILURE;
+            complain(format_args!("server: {error}"));
+            ExitCode::FAILURE
         }
-    };
-    app(&options, source, terrain).run().report()
+    }
+}
+
+/// The server with its world, new or from its folder.
+fn make(options: &Options, source: script::Source) -> Result<App> {
+    let untouched = terrain(options)?;
+    let Some(folder) = &options.world else { return Ok(app(options, source, untouched)) };
+    let (saving, terrain) = saving::open(folder, options, untouched)?;
+    let mut app = app(options, source, terrain);
+    saving::add(&mut app, saving);
+    Ok(app)
 }
 
 fn app(options: &Options, source: script::Source, terrain: Terrain) -> App {
@@ -92,7 +115,7 @@ fn app(options: &Options, source: script::Source, terrain: Terrain) -> App {
     app.add_plugins(MinimalPlugins.set(ScheduleRunnerPlugin::run_loop(period)))
         .insert_resource(BurrowEngine(Engine::new(Backend::Cpu)))
         .add_plugins(BurrowPlugins);
-    report::add(&mut app, options.quiet);
+    report::add(&mut app, options.quiet, options.world.is_some());
     script::add(&mut app, source);
     app.world_mut().spawn(terrain);
     app
@@ -100,8 +123,7 @@ fn app(options: &Options, source: script::Source, terrain: Terrain) -> App {
 
 /// Hills in chunks, not touched yet.
 fn terrain(options: &Options) -> Result<Terrain> {
-    let noise = NoiseHeights { seed: 4, amplitude: 40.0, scale: 180.0, octaves: 5, ..default() };
-    let ground = Ground::from_noise(options.side, options.side, &noise)?;
+    let ground = noise_ground(options.side)?;
     let settings = TerrainSettings { chunk_size: options.chunk, voxel_size: 1.0 };
     let mut terrain = Terrain::new(ground, &settings)?;
     // All of a tick is taken, or the world would depend on how much that is.

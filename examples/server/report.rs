@@ -28,13 +28,13 @@ pub struct Report {
     start: Instant,
 }
 
-/// Prints what comes in, and the summary when the program ends.
-pub fn add(app: &mut App, quiet: bool) {
+/// Prints what comes in unless `quiet`, and the summary when the program ends unless `silent`.
+pub fn add(app: &mut App, quiet: bool, silent: bool) {
     let report = Report {
         answered: 0,
         faults: 0,
         is_done: false,
-        quiet,
+        quiet: quiet || silent,
         rejected: 0,
         scenarios: ScenarioCounts::default(),
         moved: (0, 0),
@@ -42,7 +42,7 @@ pub fn add(app: &mut App, quiet: bool) {
     };
     app.insert_resource(report)
         .add_systems(Update, (enter_receipts, enter_steps).after(BurrowSystems::Commit))
-        .add_systems(Last, sum_up.run_if(on_message::<AppExit>));
+        .add_systems(Last, sum_up.run_if(on_message::<AppExit>.and_then(move || !silent)));
 }
 
 fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut report: ResMut<Report>) {

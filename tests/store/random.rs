@@ -4,12 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store};
+use bevy_burrow::store::{SimulatedDisk, Store, from_bytes, to_bytes};
 use bevy_burrow::terrain::{Meshing, WorldParts};
 use fastrand::Rng;
 
 use crate::play::{State, check_opened, count, ground, open, options, save, state, terrain};
 use crate::worlds::any_random_brush;
+
+/// Those of every terrain here.
+fn settings() -> TerrainSettings {
+    TerrainSettings { chunk_size: 25, ..TerrainSettings::default() }
+}
 
 /// A world in memory, and what it was since it was last known to be durable.
 struct Model {
@@ -56,7 +61,7 @@ impl Model {
     }
 }
 
-fn play(seed: u64, operations: u64) -> [u64; 4] {
+fn play(seed: u64, operations: u64) -> [u64; 5] {
     let mut rng = Rng::with_seed(seed);
     let ground = ground(seed % 40);
     let mut disk = SimulatedDisk::new();
@@ -64,7 +69,7 @@ fn play(seed: u64, operations: u64) -> [u64; 4] {
     let mut model = Model::new(terrain(&ground));
     let store = Store::create_in(Arc::new(disk.clone()), &mut saved, options(rng.u64(3..40)));
     let mut store = Some(store.expect("a new world"));
-    let mut done = [0; 4];
+    let mut done = [0; 5];
     for _ in 0..operations {
         let open_store = store.as_mut().expect("it is open");
         match rng.u32(0..40) {
@@ -100,6 +105,24 @@ fn play(seed: u64, operations: u64) -> [u64; 4] {
                 saved.set_meshing(Meshing::Never);
                 assert_eq!(state(&saved), state(&model.terrain), "seed {seed}");
                 store = Some(opened.0);
+            }
+            39 => {
+                // The world goes through one piece of bytes into another folder.
+                let bytes = to_bytes(&saved, open_store.world_id(), open_store.game_data());
+                drop(store.take());
+                let imported = from_bytes(&bytes, Arc::clone(&ground)).expect("its own bytes");
+                saved = imported.terrain;
+                assert_eq!(state(&saved), state(&model.terrain), "seed {seed}");
+                saved.set_meshing(Meshing::Never);
+                disk = SimulatedDisk::new();
+                let new = Store::create_in(Arc::new(disk.clone()), &mut saved, options(20));
+                let mut new = new.expect("a new world");
+                imported.game.into_iter().for_each(|(key, bytes)| new.put(key, bytes));
+                new.flush().expect("the disk works");
+                store = Some(new);
+                let same = Terrain::restore(Arc::clone(&ground), &settings(), saved.parts());
+                model.go_back(&ground, &same.expect("its own parts"));
+                done[4] += 1;
             }
             6..=8 => {
                 let receipts = [&mut saved, &mut model.terrain].map(|own| own.undo());
@@ -141,13 +164,14 @@ fn play(seed: u64, operations: u64) -> [u64; 4] {
 #[test]
 fn a_saved_world_is_the_world_in_memory() {
     let operations = count("BURROW_OPERATIONS", 1_500);
-    let (each, mut total) = (150, [0; 4]);
+    let (each, mut total) = (150, [0; 5]);
     for seed in 0..operations.div_ceil(each) {
         let done = play(seed, each);
         total = std::array::from_fn(|at| total[at] + done[at]);
     }
-    let [checkpoints, flushes, reopened, crashed] = total;
+    let [checkpoints, flushes, reopened, crashed, imported] = total;
     println!(
-        "{operations} operations: {checkpoints} checkpoints, {flushes} flushes, {reopened} closed, {crashed} crashed"
+        "{operations} operations: {checkpoints} checkpoints, {flushes} flushes, {reopened} closed, {crashed} crashed, \
+         {imported} exported and imported"
     );
 }

@@ -1,0 +1,81 @@
+//! The world on disk: each commit is told on a line, and so is what would survive a crash by now.
+
+use std::path::Path;
+
+use bevy::prelude::*;
+use bevy_burrow::plugin::BurrowSystems;
+use bevy_burrow::prelude::Terrain;
+use bevy_burrow::store::{Store, StoreOptions};
+use bevy_burrow::terrain::LogEntry;
+
+use crate::Options;
+use crate::noise_ground::noise_ground;
+use crate::output::{complain, say};
+
+/// The world that is saved.
+#[derive(Resource)]
+pub struct Saving {
+    store: Store,
+    /// The last revision that was said to be durable.
+    durable: Option<u64>,
+}
+
+/// Opens the world in a folder, or makes one of an untouched terrain.
+pub fn open(folder: &Path, options: &Options, untouched: Terrain) -> Result<(Saving, Terrain)> {
+    let (store, terrain) = if Store::is_in(folder) {
+        let ground = noise_ground(options.side)?;
+        let (store, opened) = Store::open(folder, ground, StoreOptions::default())?;
+        opened.troubles.iter().for_each(|trouble| complain(format_args!("server: {trouble}")));
+        (store, opened.terrain)
+    } else {
+        let mut terrain = untouched;
+        (Store::create(folder, &mut terrain, StoreOptions::default())?, terrain)
+    };
+    Ok((Saving { store, durable: None }, terrain))
+}
+
+/// Saves what is committed, and tells of it.
+pub fn add(app: &mut App, saving: Saving) {
+    app.insert_resource(saving)
+        .add_systems(Update, save.after(BurrowSystems::Commit))
+        .add_systems(Last, end.run_if(on_message::<AppExit>));
+}
+
+fn save(mut saving: ResMut<Saving>, mut terrains: Query<&mut Terrain>) {
+    for mut terrain in &mut terrains {
+        if !terrain.has_log() {
+            continue;
+        }
+        let records = terrain.take_log();
+        let is_commit = |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change);
+        for record in &records {
+            // The first record may only say what rules hold.
+            if record.entries.is_empty() || record.entries.iter().any(is_commit) {
+                say(format_args!(r#"{{"revision":{},"hash":"{:#018x}"}}"#, record.revision, record.hash));
+            }
+        }
+        if let Err(why) = saving.store.append(records) {
+            complain(format_args!("server: {why}"));
+        }
+    }
+    tell(&mut saving);
+}
+
+/// Says what is durable, if that changed, and what is wrong.
+fn tell(saving: &mut Saving) {
+    let durable = saving.store.durable();
+    if saving.durable != Some(durable) {
+        saving.durable = Some(durable);
+        say(format_args!(r#"{{"durable":{durable}}}"#));
+    }
+    let troubles = saving.store.take_troubles();
+    troubles.iter().for_each(|trouble| complain(format_args!("server: {trouble}")));
+}
+
+/// Makes the last commits durable.
+fn end(mut saving: ResMut<Saving>) {
+    if let Err(why) = saving.store.checkpoint() {
+        complain(format_args!("server: {why}"));
+    }
+    tell(&mut saving);
+}

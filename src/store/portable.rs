@@ -1,0 +1,66 @@
+//! A world in one piece: to share it as a `.burrow` file, and to keep it where there are no files.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::error::StoreError;
+use super::format::frame::WorldId;
+use super::format::portable::{PortableWorld, read_portable, write_portable};
+use super::format::{FormatError, Metadata};
+use crate::ground::Ground;
+use crate::terrain::{SIMULATION, Terrain, TerrainSettings};
+
+/// The bytes of a terrain's world, with data of the game's by key. The same world under the same name gives the same bytes.
+/// Neither the ground nor history are part of it.
+pub fn to_bytes(terrain: &Terrain, world: WorldId, game: &BTreeMap<String, Vec<u8>>) -> Vec<u8> {
+    let (parts, ground) = (terrain.parts(), terrain.world().ground());
+    let metadata = Metadata {
+        settings: TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() },
+        hash: terrain.world().hash(),
+        simulation: SIMULATION,
+        ground: ground.hash(),
+        game: game.iter().map(|(key, bytes)| (key.clone(), bytes.clone())).collect(),
+        ..Metadata::default()
+    };
+    write_portable(&PortableWorld::new(world, metadata, parts, ground))
+}
+
+/// A world that was read from bytes.
+#[derive(Debug)]
+pub struct Imported {
+    /// Its terrain. Nothing is meshed, and there is no history.
+    pub terrain: Terrain,
+    /// The name of the world that it is a copy of.
+    pub world: WorldId,
+    /// Data of the game's, by key.
+    pub game: BTreeMap<String, Vec<u8>>,
+    /// Is the ground another one than it was saved with? Edited samples are as they were, in any case.
+    pub is_base_changed: bool,
+}
+
+/// The world that [`to_bytes`] made bytes of, over its ground, or over another one.
+///
+/// # Errors
+/// When they are damaged or none of a world's, when a newer version wrote them, and when they do not fit the ground.
+pub fn from_bytes(bytes: &[u8], ground: impl Into<Arc<Ground>>) -> Result<Imported, StoreError> {
+    let ground = ground.into();
+    let portable = read_portable(bytes, &ground)?;
+    let metadata = &portable.metadata;
+    let is_base_changed = metadata.ground != ground.hash();
+    let (hash, is_known) = (metadata.hash, !is_base_changed && metadata.simulation == SIMULATION);
+    let terrain = Terrain::restore(ground, &metadata.settings, portable.parts())?;
+    if is_known && terrain.world().hash() != hash {
+        return Err(StoreError::Unreadable("it has another hash than it says".into()));
+    }
+    let (world, game) = (portable.world, portable.metadata.game.into_iter().collect());
+    Ok(Imported { terrain, world, game, is_base_changed })
+}
+
+impl From<FormatError> for StoreError {
+    fn from(error: FormatError) -> Self {
+        match error {
+            FormatError::Newer { found, known } => Self::Newer { found, known },
+            error => Self::Unreadable(error.to_string()),
+        }
+    }
+}
