@@ -78,8 +78,12 @@ impl Cut {
 
     /// The node that draws a tile; `None` where the world has no such tile.
     pub fn node_at(&self, tile: TilePos) -> Option<Node> {
-        let nodes = (0..=self.grid.top()).rev().map(|level| Node::over(tile, level));
-        nodes.into_iter().find(|&node| !self.is_split(node)).filter(|_| self.grid.chunks().has_tile(tile))
+        if !self.grid.chunks().has_tile(tile) {
+            return None;
+        }
+        // From below: whoever is split has parents that are, and fine nodes are asked for most often.
+        let nodes = (0..=self.grid.top()).map(|level| Node::over(tile, level));
+        nodes.into_iter().find(|node| node.level == self.grid.top() || self.is_split(node.parent()))
     }
 
     /// Every node that is drawn, in no order.

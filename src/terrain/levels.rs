@@ -111,6 +111,10 @@ fn redraw(
 ) -> NodeChanges {
     let mut nodes: Vec<Node> =
         merged(areas).into_iter().flat_map(|(low, high)| level::nodes_near(&drawn.cut, low, high)).collect();
+    // Where no coarser node is near, nodes that are drawn by their parts stay so. Most digs are there.
+    if nodes.iter().all(|node| node.level == 0 && shows_parts(node.tile())) {
+        return (Arc::clone(drawn), Vec::new());
+    }
     nodes.sort_unstable();
     nodes.dedup();
     let updates = state.updates(&drawn.cut, &nodes, shows_parts);

@@ -1,12 +1,16 @@
-//! Levels of detail by their figures, without drawing: `cargo bench --no-default-features --bench horizon [-- KILOMETRES]`.
+//! Levels of detail by their figures, without drawing:
+//! `cargo bench --no-default-features --bench horizon [-- KILOMETRES] [PART...]`, where parts are `views`, `cdlod`, `load`, `nodes`,
+//! `digs` and `flight`; all of them unless some are named.
 //!
 //! A world of 16 x 16 km (or so many) whose mountains are computed on demand, seen by an eye on a summit at 1440 lines and 45
 //! degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the whole cut take;
 //! what a node costs in a task, from noise and from an image; what a flight at 100 m/s with 20 digs a second needs; and the
-//! bytes that the ground and the meshes take, as a card gets them.
+//! bytes that the ground and the meshes take, as a card gets them. `cdlod` sets triangles beside those of a published scheme.
 
-#[path = "../examples/shared/mountains.rs"]
+#[path = "../../examples/shared/mountains.rs"]
 mod mountains;
+
+mod cdlod;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -45,39 +49,57 @@ fn main() {
     let middle = side as f32 / 2.0 + 137.0;
     let summit = summit(terrain().world(), middle);
     println!("{side} x {side} cells; eye at {summit}, {} threads", rayon::current_num_threads());
-    views(terrain().world(), summit);
-    load(terrain(), summit);
-    nodes(terrain().world(), summit);
-    digs([terrain(), terrain()], summit);
-    flight(terrain(), summit);
+    let parts: Vec<String> = std::env::args().skip(1).filter(|arg| PARTS.contains(&&**arg)).collect();
+    for part in PARTS.iter().filter(|part| parts.is_empty() || parts.iter().any(|own| own == *part)) {
+        match *part {
+            "views" => views(terrain().world(), summit),
+            "cdlod" => cdlod::compare(terrain().world(), summit),
+            "load" => load(terrain(), summit),
+            "nodes" => nodes(terrain().world(), summit),
+            "digs" => digs([terrain(), terrain()], summit),
+            _ => flight(terrain(), summit),
+        }
+    }
 }
 
-/// Digs of radius 4 near the eye, with a cut drawn and without, in turns.
+const PARTS: [&str; 6] = ["views", "cdlod", "load", "nodes", "digs", "flight"];
+
+/// Digs of radius 4 near the eye, with a cut drawn and without, in turns. The first round computes the ground that both share, and
+/// shows where edits are: the cut is the one that they lead to, as in a game. It is not counted.
 fn digs(mut terrains: [Terrain; 2], summit: Vec3) {
-    let cut = cut_for(terrains[0].world(), &Choice::default(), eye(summit));
-    let (drawn, _) = terrains[0].world().draw_cut(cut);
-    terrains[0].set_drawn_cut(Some(Arc::new(drawn)));
     let mut times = [Vec::new(), Vec::new()];
-    for number in 0..600 {
+    for (round, number) in (0..3).flat_map(|round| (0..600).map(move |number| (round, number))) {
+        if round == 1 && number == 0 {
+            let cut = cut_for(terrains[0].world(), &Choice::default(), eye(summit));
+            let (drawn, _) = terrains[0].world().draw_cut(cut);
+            terrains[0].set_drawn_cut(Some(Arc::new(drawn)));
+        }
         let (x, z) = ((number * 37 % 100) as f32 - 50.0, (number * 61 % 100) as f32 - 50.0);
         let (x, z) = (summit.x + x, summit.z + z);
         let height = terrains[0].world().height(x.into(), z.into()).unwrap_or_default() as f32;
-        for (terrain, times) in terrains.iter_mut().zip(&mut times) {
-            terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(x, height, z), 4.0)));
+        let shape = Shape::sphere(Vec3::new(x, height - round as f32 * 3.0, z), 4.0);
+        for at in [(number + round) % 2, (number + round + 1) % 2] {
+            let terrain = &mut terrains[at];
+            terrain.submit(&Brush::dig(shape.clone()));
             let transaction = terrain.begin().expect("a dig waits");
             let start = Instant::now();
             let commit = transaction.run();
-            times.push(start.elapsed());
+            if round > 0 {
+                times[at].push(start.elapsed());
+            }
             terrain.commit(commit).expect("the one under way");
         }
     }
+    let sums = times.each_ref().map(|times| times.iter().sum::<Duration>().as_secs_f64());
     let [with, without] = times.map(|mut times| {
         times.sort_unstable();
         times[times.len() / 2]
     });
     let ratio = with.as_secs_f64() / without.as_secs_f64();
     println!(
-        "\na dig of radius 4 near the eye: {with:.1?} with levels, {without:.1?} without, {ratio:.3} times"
+        "\na dig of radius 4 near the eye: {with:.1?} with levels, {without:.1?} without, {ratio:.3} times; all digs together {:.3} \
+         times",
+        sums[0] / sums[1]
     );
 }
 
