@@ -80,7 +80,7 @@ fn digs(mut terrains: [Terrain; 2], summit: Vec3) {
         let shape = Shape::sphere(Vec3::new(x, height - round as f32 * 3.0, z), 4.0);
         for at in [(number + round) % 2, (number + round + 1) % 2] {
             let terrain = &mut terrains[at];
-            terrain.submit(&Brush::dig(shape.clone()));
+            terrain.submit(&Brush::dig(shape));
             let transaction = terrain.begin().expect("a dig waits");
             let start = Instant::now();
             let commit = transaction.run();

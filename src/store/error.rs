@@ -58,9 +58,6 @@ pub enum StoreError {
         /// The record's.
         found: u64,
     },
-    /// What was read is damaged, or something else.
-    #[error(transparent)]
-    Format(#[from] super::format::FormatError),
     /// The store's thread is gone.
     #[error("the store's thread has ended")]
     Ended,

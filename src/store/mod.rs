@@ -12,6 +12,7 @@ mod journal;
 mod keys;
 mod levels;
 mod mirror;
+mod open_store;
 mod options;
 mod portable;
 mod quarantine;
@@ -19,7 +20,6 @@ mod recover;
 mod salvage;
 mod segment;
 mod settle;
-mod store;
 mod writer;
 
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
@@ -33,6 +33,6 @@ pub use format::portable::{
 pub use format::{Batch, FormatError, Metadata};
 pub use inspect::{WorldCheck, WorldInfo, check, check_in, inspect, inspect_in, replay};
 pub use levels::{RestoreLevelError, load_level, read_level_files, save_level};
+pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};
 pub use portable::{Imported, from_bytes, to_bytes};
-pub use store::{Opened, Store};
