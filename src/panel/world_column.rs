@@ -52,9 +52,11 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
             look_section::show(ui, look);
         }
     }
-    section(ui, "Level", false, |ui| level(ui, panel, content.actions, chosen.is_some()));
     let undo_budget = chosen.is_some().then_some(&mut content.controls.undo_budget);
-    section(ui, "Settings", false, |ui| settings(ui, undo_budget, content.settings));
+    section(ui, "Settings", false, |ui| {
+        settings(ui, undo_budget, content.settings);
+        level(ui, panel, content.actions, chosen.is_some());
+    });
 }
 
 fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, chosen: Option<&TerrainLine>) {
