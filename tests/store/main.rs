@@ -8,5 +8,6 @@ mod opening;
 mod play;
 mod power;
 mod random;
+mod times;
 #[path = "../worlds/mod.rs"]
 mod worlds;
