@@ -12,8 +12,8 @@ use super::keys;
 use super::options::BaseChanged;
 use super::recover::{self, recover};
 use super::segment;
+use super::shared::apply_game;
 use super::store::{has_world, take_lock};
-use super::writer::apply_game;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
 
