@@ -1,5 +1,4 @@
 //! Worlds on disk: nothing that was acknowledged is ever lost, whatever happens to the process, the power or the files.
-#![cfg(feature = "store")]
 
 mod damage;
 mod faults;
@@ -8,5 +7,6 @@ mod opening;
 mod play;
 mod power;
 mod random;
+mod times;
 #[path = "../worlds/mod.rs"]
 mod worlds;
