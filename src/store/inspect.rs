@@ -13,7 +13,7 @@ use super::open_store::{has_world, take_lock};
 use super::options::BaseChanged;
 use super::recover::{self, recover};
 use super::segment;
-use super::writer::apply_game;
+use super::shared::apply_game;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
 

@@ -1,6 +1,7 @@
 //! Worlds on disk: a journal of commits, checkpoints of regions, recovery after a crash.
 
 mod checkpoint;
+mod checkpointing;
 mod database;
 mod disk;
 mod error;
@@ -20,6 +21,7 @@ mod recover;
 mod salvage;
 mod segment;
 mod settle;
+mod shared;
 mod writer;
 
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};

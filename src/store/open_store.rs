@@ -14,10 +14,11 @@ use super::found::Contents;
 use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
-use super::recover::{GameData, recover};
+use super::recover::recover;
 use super::segment::base;
 use super::settle::settle;
-use super::writer::{Answer, GameChange, Message, Shared, Writer, apply_game};
+use super::shared::{GameChange, GameData, Shared, apply_game};
+use super::writer::{Answer, Message, Writer};
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, Terrain, TerrainSettings, WorldChange};
 

@@ -12,16 +12,14 @@ use super::keys;
 use super::mirror::Mirror;
 use super::options::BaseChanged;
 use super::segment::{self, Frame};
+use super::shared::{GameData, apply_game};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
 use crate::terrain::{
-    CommitRecord, LogEntry, Meshing, ReplayError, Terrain, TerrainSettings, WorkLimits, WorldChange,
-    WorldParts,
+    CommitRecord, LogEntry, Meshing, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
+    WorldChange, WorldParts,
 };
 use crate::volume::DiggingRules;
-
-/// What the game put into a world, by key.
-pub(super) type GameData = BTreeMap<String, Vec<u8>>;
 
 /// A world as it was recovered.
 pub(super) struct Recovered {
@@ -78,10 +76,11 @@ pub(super) fn recover(
         });
     }
     let settings = checkpoint.metadata.settings;
+    let empty = || -> Result<Terrain, StoreError> {
+        Ok(Terrain::new(Arc::clone(ground), &settings).map_err(RestoreError::from)?)
+    };
     if !is_same_ground && base_changed == BaseChanged::Replay && is_contiguous {
-        let empty =
-            Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
-        let replayed = replay(empty, GameData::new(), &whole, false)?;
+        let replayed = replay_good(empty, &GameData::new(), &whole, false)?;
         let regions = changed_regions(contents, &checkpoint, ground).len();
         let mut recovered = Recovered::whole(replayed);
         recovered.base_changed = Some((regions, "replayed"));
@@ -93,9 +92,7 @@ pub(super) fn recover(
     let restored = restore(parts.clone());
     let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
     if is_same_ground && !is_exact && is_log_whole {
-        let empty =
-            Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
-        let replayed = replay(empty, GameData::new(), &whole, true)?;
+        let replayed = replay_good(empty, &GameData::new(), &whole, true)?;
         // Behind what can't be replayed, the checkpoint may know more.
         if replayed.frame >= checkpoint.frame {
             let mut recovered = Recovered::whole(replayed);
@@ -108,19 +105,16 @@ pub(super) fn recover(
     let is_checked = is_same_ground && is_exact;
     let tail = contents.frames_from(checkpoint.frame + 1);
     let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
-    let begin = |terrain: &Terrain| {
-        let (parts, hash) = (terrain.parts(), terrain.world().hash());
-        Mirror::new(terrain.world().grid(), parts, hash, game.clone())
+    let (grid, hash) = (terrain.world().grid(), terrain.world().hash());
+    let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone());
+    let mut restored = Some(terrain);
+    let begin = || -> Result<Terrain, StoreError> {
+        match restored.take() {
+            Some(terrain) => Ok(terrain),
+            None => Ok(restore(parts.clone())?),
+        }
     };
-    let mut mirror = begin(&terrain);
-    let mut replayed = replay(terrain, game.clone(), &tail, is_checked)?;
-    if replayed.refused.is_some() {
-        // It holds a part of what was refused.
-        let good = replayed.frame;
-        let tail: Vec<&Frame> = tail.into_iter().filter(|frame| frame.number <= good).collect();
-        let refused = replayed.refused.take();
-        replayed = Replayed { refused, ..replay(restore(parts)?, game.clone(), &tail, is_checked)? };
-    }
+    let replayed = replay_good(begin, &game, &tail, is_checked)?;
     let frame = replayed.frame.max(checkpoint.frame);
     let regions = changed_regions(contents, &checkpoint, ground).len();
     if is_checked {
@@ -240,6 +234,22 @@ fn load_regions(
     (parts, damaged)
 }
 
+/// Replays frames up to the first that does not fit, from the world that `begin` makes, and again without it: a world that was
+/// given a part of it can't be used.
+fn replay_good(
+    mut begin: impl FnMut() -> Result<Terrain, StoreError>,
+    game: &GameData,
+    frames: &[&Frame],
+    is_checked: bool,
+) -> Result<Replayed, StoreError> {
+    let replayed = replay(begin()?, game.clone(), frames, is_checked)?;
+    if replayed.refused.is_none() {
+        return Ok(replayed);
+    }
+    let good: Vec<&Frame> = frames.iter().copied().filter(|frame| frame.number <= replayed.frame).collect();
+    Ok(Replayed { refused: replayed.refused, ..replay(begin()?, game.clone(), &good, is_checked)? })
+}
+
 /// Replays frames, and compares the world with each commit if `is_checked`. Stops before the first frame that does not fit.
 fn replay(
     mut terrain: Terrain,
@@ -272,12 +282,7 @@ fn replay(
         commits += batch.commits.len() as u64;
         revision = batch.commits.last().map(|record| record.revision).or(revision);
         records.append(&mut terrain.take_log());
-        for (key, value) in batch.game {
-            match value {
-                Some(value) => drop(game.insert(key, value)),
-                None => drop(game.remove(&key)),
-            }
-        }
+        apply_game(&mut game, &batch.game);
         last = frame.number;
     }
     terrain.clear_history();

@@ -1,35 +1,27 @@
 //! The store's thread: collects records, writes frames and checkpoints, and tries again what fails.
 
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use rustc_hash::FxHashMap;
 
 use super::checkpoint::Checkpoint;
-use super::database::{Change, DATABASE, DatabaseError, Records};
+use super::database::Records;
 use super::error::{StoreError, StoreTrouble};
 use super::files::Files;
-use super::format;
 use super::format::Batch;
-use super::format::frame::{self, Kind, WorldId};
+use super::format::frame::WorldId;
 use super::journal::Journal;
-use super::keys;
-use super::mirror::{Mirror, Region};
+use super::mirror::Mirror;
 use super::options::StoreOptions;
-use super::quarantine;
-use super::recover::GameData;
+use super::shared::{GameChange, Shared, apply_game};
 use crate::ground::Ground;
-use crate::lattice::RegionPos;
 use crate::terrain::{CommitRecord, LogEntry, TerrainSettings, WorldChange, WorldParts};
 
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
-
-/// A value of the game's that changes; `None` removes it.
-pub(super) type GameChange = (String, Option<Vec<u8>>);
 
 /// Where the answer to a request goes: the revision that is durable then.
 pub(super) type Answer = Sender<Result<u64, StoreError>>;
@@ -46,40 +38,6 @@ pub(super) enum Message {
     Checkpoint(Answer),
     /// The same, and makes the database as small as it can be.
     Compact(Answer),
-}
-
-/// What the thread tells.
-#[derive(Debug, Default)]
-pub(super) struct Shared {
-    durable: AtomicU64,
-    troubles: Mutex<VecDeque<StoreTrouble>>,
-}
-
-/// Troubles that are kept until they are taken.
-const MOST_TROUBLES: usize = 256;
-
-impl Shared {
-    /// The revision up to which everything is durable.
-    pub fn durable(&self) -> u64 {
-        self.durable.load(Ordering::Acquire)
-    }
-
-    /// Says that everything up to a revision is durable.
-    pub fn set_durable(&self, revision: u64) {
-        self.durable.store(revision, Ordering::Release);
-    }
-
-    pub fn tell(&self, trouble: StoreTrouble) {
-        let mut troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
-        if troubles.len() == MOST_TROUBLES {
-            troubles.pop_front();
-        }
-        troubles.push_back(trouble);
-    }
-
-    pub fn take_troubles(&self) -> Vec<StoreTrouble> {
-        std::mem::take(&mut *self.troubles.lock().unwrap_or_else(PoisonError::into_inner)).into()
-    }
 }
 
 /// What fails, and when it is tried again.
@@ -111,25 +69,25 @@ pub(super) struct Writer {
     pub database: Option<Records>,
     /// The frames of the last checkpoint and of the one before.
     pub checkpoints: [u64; 2],
-    state: State,
+    pub(super) state: State,
 }
 
 /// What changes while the thread runs.
 #[derive(Default)]
-struct State {
+pub(super) struct State {
     pending: Pending,
     /// Commits since the last checkpoint, and when the first of them came.
-    commits: u64,
-    changed: Option<Instant>,
+    pub commits: u64,
+    pub changed: Option<Instant>,
     /// Are commits missing in the journal since the last checkpoint, so that only a checkpoint makes them durable?
-    has_gap: bool,
+    pub has_gap: bool,
     /// Is a checkpoint being made that ends a gap? Frames are durable with it only.
-    after_gap: bool,
+    pub after_gap: bool,
     failing: Option<Failing>,
     /// Requests that came during a checkpoint.
     later: VecDeque<Message>,
     /// Hashes of the ground by columns of regions.
-    ground_hashes: FxHashMap<(i32, i32), u64>,
+    pub ground_hashes: FxHashMap<(i32, i32), u64>,
 }
 
 impl Writer {
@@ -286,14 +244,10 @@ impl Writer {
             pending.bytes += 64 + record.entries.len() * 64 + record.change.bricks.len() * 1024;
             pending.batch.commits.push(record);
         }
-        for (key, value) in game {
-            pending.bytes += key.len() + value.as_ref().map_or(0, Vec::len);
-            match &value {
-                Some(value) => drop(self.mirror.game.insert(key.clone(), value.clone())),
-                None => drop(self.mirror.game.remove(&key)),
-            }
-            pending.batch.game.push((key, value));
-        }
+        apply_game(&mut self.mirror.game, &game);
+        let bytes = |(key, value): &GameChange| key.len() + value.as_ref().map_or(0, Vec::len);
+        pending.bytes += game.iter().map(bytes).sum::<usize>();
+        pending.batch.game.extend(game);
         if self.state.has_gap {
             // A checkpoint saves them, since the journal can't.
             self.state.pending = Pending::default();
@@ -318,14 +272,14 @@ impl Writer {
         }
     }
 
-    fn give_up_waiting(&mut self) {
+    pub(super) fn give_up_waiting(&mut self) {
         self.state.pending = Pending::default();
         self.journal.drop_waiting();
         self.state.has_gap = true;
     }
 
     /// Puts what waits into a frame, and makes all frames durable.
-    fn flush(&mut self) -> Result<(), StoreError> {
+    pub(super) fn flush(&mut self) -> Result<(), StoreError> {
         let pending = std::mem::take(&mut self.state.pending);
         if !pending.batch.is_empty() {
             self.journal.push(self.mirror.revision, &pending.batch.encode());
@@ -350,81 +304,8 @@ impl Writer {
         }
     }
 
-    /// Makes a checkpoint; takes in what comes meanwhile.
-    fn checkpoint(&mut self, messages: Option<&Receiver<Message>>) -> Result<(), StoreError> {
-        if !self.state.has_gap {
-            self.flush()?;
-        }
-        if let Err(error) = self.ready_database() {
-            return Err(self.fail(&error.to_string()));
-        }
-        let (revision, frame, commits) =
-            (self.mirror.revision, self.journal.last_frame(), self.state.commits);
-        let checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
-        let dirty = self.mirror.take_dirty();
-        let positions: Vec<RegionPos> = dirty.iter().map(|(at, _)| *at).collect();
-        // What comes from now on is in frames again.
-        let had_gap = std::mem::take(&mut self.state.has_gap);
-        self.state.after_gap = had_gap;
-        self.state.changed = None;
-        let mut records = Vec::with_capacity(dirty.len() + 1);
-        for (at, region) in dirty {
-            records.push((keys::region(at), region.map(|region| self.encode(at, &region))));
-            if let Some(messages) = messages {
-                self.listen(messages);
-            }
-        }
-        for key in keys::CHECKPOINTS {
-            let sealed = frame::seal(Kind::Checkpoint, self.world, key, revision, 0, &checkpoint);
-            records.push((key.to_vec(), Some(sealed)));
-        }
-        let written = self.write_records(&records);
-        let after_gap = std::mem::take(&mut self.state.after_gap);
-        if let Err(error) = written {
-            self.mirror.put_back(positions);
-            self.state.changed.get_or_insert_with(Instant::now);
-            if had_gap || self.state.has_gap {
-                self.give_up_waiting();
-            }
-            return Err(self.fail(&error.to_string()));
-        }
-        self.state.commits -= commits.min(self.state.commits);
-        let durable = if after_gap { self.journal.written().unwrap_or_default() } else { 0 };
-        self.shared.set_durable(self.shared.durable().max(revision).max(durable));
-        self.journal.begin_segment(revision, checkpoint);
-        self.checkpoints = [self.checkpoints[1], frame];
-        if !self.state.has_gap {
-            self.succeed();
-        }
-        if let Err(error) = self.journal.trim(self.options.log_bytes, self.checkpoints[0]) {
-            return Err(self.fail(&error.to_string()));
-        }
-        Ok(())
-    }
-
-    /// Opens the database where it is not open, or sees to it that a new one gets all regions.
-    fn ready_database(&mut self) -> Result<(), DatabaseError> {
-        if !self.files.exists(DATABASE)? {
-            self.database = None;
-            self.mirror.mark_all();
-            return Ok(());
-        }
-        if self.database.is_some() {
-            return Ok(());
-        }
-        match Records::open(&*self.files) {
-            Ok(open) => self.database = Some(open),
-            Err(DatabaseError::Files(error)) => return Err(error.into()),
-            Err(DatabaseError::Missing | DatabaseError::Damaged(_)) => {
-                quarantine::file(&*self.files, DATABASE)?;
-                self.mirror.mark_all();
-            }
-        }
-        Ok(())
-    }
-
     /// Takes in what came during a checkpoint, and writes it in time.
-    fn listen(&mut self, messages: &Receiver<Message>) {
+    pub(super) fn listen(&mut self, messages: &Receiver<Message>) {
         loop {
             match messages.try_recv() {
                 Ok(Message::Commits(records, game)) if self.state.later.is_empty() => {
@@ -440,45 +321,8 @@ impl Writer {
         }
     }
 
-    fn write_records(&mut self, records: &[Change]) -> Result<(), DatabaseError> {
-        let Some(database) = &self.database else {
-            self.files.create_folder("")?;
-            self.database = Some(Records::create(&*self.files, records)?);
-            return Ok(());
-        };
-        let written = database.write(records);
-        if written.is_err() {
-            // It takes nothing more after an error, and has to be opened anew.
-            self.database = None;
-        }
-        written
-    }
-
-    fn encode(&mut self, at: RegionPos, region: &Region) -> Vec<u8> {
-        let ground = &self.ground;
-        let hash = self.state.ground_hashes.entry(at.column());
-        let hash = *hash.or_insert_with(|| ground.region_hash(at.column()));
-        let payload = format::encode_region(&region.bricks, &region.fields);
-        frame::seal(Kind::Region, self.world, &keys::region(at), region.revision, hash, &payload)
-    }
-
-    fn metadata(&self) -> format::Metadata {
-        let Mirror { revision, hash, next_field, rules, loose, game, .. } = &self.mirror;
-        format::Metadata {
-            settings: self.settings,
-            revision: *revision,
-            hash: *hash,
-            next_field: *next_field,
-            rules: rules.clone(),
-            loose: *loose,
-            simulation: crate::terrain::SIMULATION,
-            ground: self.ground.hash(),
-            game: game.iter().map(|(key, value)| (key.clone(), value.clone())).collect(),
-        }
-    }
-
     /// Tells of a failure once, and waits longer each time.
-    fn fail(&mut self, why: &str) -> StoreError {
+    pub(super) fn fail(&mut self, why: &str) -> StoreError {
         let wait = match &self.state.failing {
             Some(failing) => (failing.wait * 2).min(RETRY.1),
             None => RETRY.0,
@@ -490,19 +334,9 @@ impl Writer {
         StoreError::NotSaved(why.into())
     }
 
-    fn succeed(&mut self) {
+    pub(super) fn succeed(&mut self) {
         if self.state.failing.take().is_some_and(|failing| !failing.why.is_empty()) {
             self.shared.tell(StoreTrouble::SavedAgain);
-        }
-    }
-}
-
-/// What the game has put, changed by these.
-pub(super) fn apply_game(data: &mut GameData, changes: &[GameChange]) {
-    for (key, value) in changes {
-        match value {
-            Some(value) => drop(data.insert(key.clone(), value.clone())),
-            None => drop(data.remove(key)),
         }
     }
 }

@@ -7,5 +7,6 @@ mod opening;
 mod play;
 mod power;
 mod random;
+mod times;
 #[path = "../worlds/mod.rs"]
 mod worlds;

@@ -1,0 +1,128 @@
+//! Making checkpoints: changed regions, in one transaction of the database, while commits go on.
+
+use std::sync::mpsc::Receiver;
+use std::time::Instant;
+
+use super::checkpoint::Checkpoint;
+use super::database::{Change, DATABASE, DatabaseError, Records};
+use super::error::StoreError;
+use super::format;
+use super::format::frame::{self, Kind};
+use super::keys;
+use super::mirror::{Mirror, Region};
+use super::quarantine;
+use super::writer::{Message, Writer};
+use crate::lattice::RegionPos;
+use crate::terrain::SIMULATION;
+
+impl Writer {
+    /// Makes a checkpoint; takes in what comes meanwhile.
+    pub(super) fn checkpoint(&mut self, messages: Option<&Receiver<Message>>) -> Result<(), StoreError> {
+        if !self.state.has_gap {
+            self.flush()?;
+        }
+        if let Err(error) = self.ready_database() {
+            return Err(self.fail(&error.to_string()));
+        }
+        let (revision, frame, commits) =
+            (self.mirror.revision, self.journal.last_frame(), self.state.commits);
+        let checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
+        let dirty = self.mirror.take_dirty();
+        let positions: Vec<RegionPos> = dirty.iter().map(|(at, _)| *at).collect();
+        // What comes from now on is in frames again.
+        let had_gap = std::mem::take(&mut self.state.has_gap);
+        self.state.after_gap = had_gap;
+        self.state.changed = None;
+        let mut records = Vec::with_capacity(dirty.len() + 1);
+        for (at, region) in dirty {
+            records.push((keys::region(at), region.map(|region| self.encode(at, &region))));
+            if let Some(messages) = messages {
+                self.listen(messages);
+            }
+        }
+        for key in keys::CHECKPOINTS {
+            let sealed = frame::seal(Kind::Checkpoint, self.world, key, revision, 0, &checkpoint);
+            records.push((key.to_vec(), Some(sealed)));
+        }
+        let written = self.write_records(&records);
+        let after_gap = std::mem::take(&mut self.state.after_gap);
+        if let Err(error) = written {
+            self.mirror.put_back(positions);
+            self.state.changed.get_or_insert_with(Instant::now);
+            if had_gap || self.state.has_gap {
+                self.give_up_waiting();
+            }
+            return Err(self.fail(&error.to_string()));
+        }
+        self.state.commits -= commits.min(self.state.commits);
+        let durable = if after_gap { self.journal.written().unwrap_or_default() } else { 0 };
+        self.shared.set_durable(self.shared.durable().max(revision).max(durable));
+        self.journal.begin_segment(revision, checkpoint);
+        self.checkpoints = [self.checkpoints[1], frame];
+        if !self.state.has_gap {
+            self.succeed();
+        }
+        if let Err(error) = self.journal.trim(self.options.log_bytes, self.checkpoints[0]) {
+            return Err(self.fail(&error.to_string()));
+        }
+        Ok(())
+    }
+
+    /// Opens the database where it is not open, or sees to it that a new one gets all regions.
+    fn ready_database(&mut self) -> Result<(), DatabaseError> {
+        if !self.files.exists(DATABASE)? {
+            self.database = None;
+            self.mirror.mark_all();
+            return Ok(());
+        }
+        if self.database.is_some() {
+            return Ok(());
+        }
+        match Records::open(&*self.files) {
+            Ok(open) => self.database = Some(open),
+            Err(DatabaseError::Files(error)) => return Err(error.into()),
+            Err(DatabaseError::Missing | DatabaseError::Damaged(_)) => {
+                quarantine::file(&*self.files, DATABASE)?;
+                self.mirror.mark_all();
+            }
+        }
+        Ok(())
+    }
+
+    fn write_records(&mut self, records: &[Change]) -> Result<(), DatabaseError> {
+        let Some(database) = &self.database else {
+            self.files.create_folder("")?;
+            self.database = Some(Records::create(&*self.files, records)?);
+            return Ok(());
+        };
+        let written = database.write(records);
+        if written.is_err() {
+            // It takes nothing more after an error, and has to be opened anew.
+            self.database = None;
+        }
+        written
+    }
+
+    fn encode(&mut self, at: RegionPos, region: &Region) -> Vec<u8> {
+        let ground = &self.ground;
+        let hash = self.state.ground_hashes.entry(at.column());
+        let hash = *hash.or_insert_with(|| ground.region_hash(at.column()));
+        let payload = format::encode_region(&region.bricks, &region.fields);
+        frame::seal(Kind::Region, self.world, &keys::region(at), region.revision, hash, &payload)
+    }
+
+    pub(super) fn metadata(&self) -> format::Metadata {
+        let Mirror { revision, hash, next_field, rules, loose, game, .. } = &self.mirror;
+        format::Metadata {
+            settings: self.settings,
+            revision: *revision,
+            hash: *hash,
+            next_field: *next_field,
+            rules: rules.clone(),
+            loose: *loose,
+            simulation: SIMULATION,
+            ground: self.ground.hash(),
+            game: game.iter().map(|(key, value)| (key.clone(), value.clone())).collect(),
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! How long saving and opening take, and how many bytes: printed, not asserted. Run with `--ignored --nocapture times`.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bevy_burrow::prelude::*;
+use bevy_burrow::store::{Files, Folder, SimulatedDisk, Store, StoreOptions};
+use bevy_burrow::terrain::Meshing;
+use glam::Vec3;
+
+use crate::worlds::real_ground;
+
+fn digger(ground: &Arc<Ground>) -> Terrain {
+    let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
+    terrain.set_meshing(Meshing::Never);
+    terrain
+}
+
+/// A dig of a player who walks all over the landscape.
+fn dig(number: u32) -> Brush {
+    let (at, turn) = (f64::from(number) * 1.3, f64::from(number) * 0.013);
+    let (x, z) = (500.0 + (at * 0.31).min(400.0) * turn.cos(), 500.0 + (at * 0.31).min(400.0) * turn.sin());
+    Brush::dig(Shape::sphere(Vec3::new(x as f32, 60.0 + (turn.sin() * 20.0) as f32, z as f32), 2.5))
+}
+
+fn percentile(times: &mut [Duration], percent: usize) -> f64 {
+    times.sort();
+    times.get((times.len() * percent / 100).min(times.len() - 1)).map_or(0.0, |time| time.as_secs_f64() * 1e3)
+}
+
+#[test]
+#[ignore = "it prints times"]
+fn times() {
+    let ground = Arc::new(real_ground());
+    let place = std::env::temp_dir().join(format!("bevy_burrow_times_{}", std::process::id()));
+    drop(std::fs::remove_dir_all(&place));
+
+    // How much later than the window a dig is durable, at 20 digs a second.
+    let window = Duration::from_millis(200);
+    let options = StoreOptions { loss_window: window, ..StoreOptions::default() };
+    let mut terrain = digger(&ground);
+    let mut store = Store::create(&place, &mut terrain, options.clone()).expect("a new world");
+    let (mut late, mut main, mut waiting) = (Vec::new(), Vec::new(), std::collections::VecDeque::new());
+    let start = Instant::now();
+    for number in 0..400 {
+        terrain.apply([dig(number)]);
+        let before = Instant::now();
+        store.put("time", number.to_le_bytes());
+        store.follow(&mut terrain).expect("the thread runs");
+        main.push(before.elapsed());
+        waiting.push_back((terrain.world().revision(), before));
+        while start.elapsed() < Duration::from_millis(50) * (number + 1) {
+            std::thread::sleep(Duration::from_micros(500));
+            while waiting.front().is_some_and(|(revision, _)| *revision <= store.durable()) {
+                late.extend(waiting.pop_front().map(|(_, since)| since.elapsed().saturating_sub(window)));
+            }
+        }
+    }
+    println!(
+        "durable after the window: p50 {:.1}, p99 {:.1} ms; main thread: p50 {:.4}, p99 {:.4} ms",
+        percentile(&mut late, 50),
+        percentile(&mut late, 99),
+        percentile(&mut main, 50),
+        percentile(&mut main, 99)
+    );
+    drop(store);
+    let files = Folder::new(&place);
+    let journal = files.list("journal").expect("it is there");
+    let bytes: usize =
+        journal.iter().map(|name| files.read(&format!("journal/{name}")).map_or(0, |all| all.len())).sum();
+    println!("journal: {:.1} bytes a sphere, heads included", bytes as f64 / 400.0);
+    drop(std::fs::remove_dir_all(&place));
+
+    // A world of many chunks with a tail of 5000 edits, after its process was killed.
+    let disk = SimulatedDisk::new();
+    let options = StoreOptions {
+        loss_window: Duration::from_millis(250),
+        checkpoint_commits: u64::MAX,
+        checkpoint_after: Duration::from_secs(3600),
+        ..options
+    };
+    let mut terrain = digger(&ground);
+    let mut store =
+        Store::create_in(Arc::new(disk.clone()), &mut terrain, options.clone()).expect("a new world");
+    let far = |number: u32| {
+        let (x, z) = (number % 45, number / 45);
+        Brush::dig(Shape::sphere(Vec3::new(12.0 + 22.0 * x as f32, 50.0, 12.0 + 22.0 * z as f32), 6.0))
+    };
+    let start = Instant::now();
+    (0..2025).for_each(|number| drop(terrain.apply([far(number)])));
+    let first = start.elapsed();
+    store.follow(&mut terrain).expect("the thread runs");
+    let start = Instant::now();
+    store.checkpoint().expect("the disk works");
+    let checkpoint = start.elapsed();
+    let start = Instant::now();
+    for number in 0..5000 {
+        terrain.apply([dig(number)]);
+        store.follow(&mut terrain).expect("the thread runs");
+    }
+    let tail = start.elapsed();
+    store.flush().expect("the disk works");
+    let killed = disk.image().lose_process();
+    let chunks = terrain.world().fields().count();
+    let start = Instant::now();
+    let (_store, opened) =
+        Store::open_in(Arc::new(killed.clone()), Arc::clone(&ground), options).expect("it opens");
+    println!(
+        "{chunks} chunks with fields; digging {:.0} + {:.0} ms, checkpoint {:.0} ms; opened with a tail of {} in {:.0} ms",
+        first.as_secs_f64() * 1e3,
+        tail.as_secs_f64() * 1e3,
+        checkpoint.as_secs_f64() * 1e3,
+        opened.replayed,
+        start.elapsed().as_secs_f64() * 1e3
+    );
+    assert_eq!(opened.terrain.world().hash(), terrain.world().hash());
+}
