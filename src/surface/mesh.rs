@@ -127,7 +127,7 @@ impl TryFrom<Unchecked> for SurfaceMesh {
 
     fn try_from(of: Unchecked) -> Result<Self, Self::Error> {
         let vertices = of.vertices.len();
-        if of.indices.len() % 3 != 0 {
+        if !of.indices.len().is_multiple_of(3) {
             return Err("the indices of the mesh are no triangles");
         }
         if of.indices.iter().any(|&index| index as usize >= vertices) {
