@@ -94,6 +94,7 @@ impl Said {
 /// Plays a script with irregular transactions. Returns which requests were accepted, and the results.
 fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rng) -> (Vec<Ask>, Said) {
     let (mut taken, mut said) = (Vec::new(), Said::default());
+    terrain.keep_log(Some(1 << 30));
     let mut frames: BTreeMap<usize, Together> = BTreeMap::new();
     let mut under_way: Option<Transaction> = None;
     let run = |transaction: Transaction, rng: &mut Rng| {
@@ -151,7 +152,22 @@ fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rn
     said.hear(terrain.take_answered());
     said.steps = terrain.take_history_receipts();
     (said.hash, said.history) = (terrain.world().hash(), terrain.history());
+    check_log(&mut terrain);
     (taken, said)
+}
+
+/// Checks that what a terrain logged since it was new leads to its world. Edits that panicked are not part of that.
+fn check_log(terrain: &mut Terrain) {
+    let settings = TerrainSettings { chunk_size: terrain.world.grid.size() as u32, ..Default::default() };
+    let mut replayed = Terrain::new(Arc::clone(&terrain.world.ground), &settings).expect("valid settings");
+    for record in terrain.take_log() {
+        replayed.replay(&record).expect("its own record");
+    }
+    let now = |terrain: &Terrain| {
+        let parts = terrain.parts();
+        (terrain.world().hash(), parts.revision, parts.change.fields, parts.rules, parts.loose)
+    };
+    assert_eq!(now(&replayed), now(terrain));
 }
 
 /// Plays a script with the simple model: one edit after the other, each a step by itself. A group is a list of edits that changed

@@ -9,7 +9,7 @@ use super::{Brick, Sample};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, LatticeBox};
 
-/// Bricks by position; a missing brick is all pristine.
+/// Bricks by position; a missing brick is all pristine, so none with edited samples may be left out to save memory.
 pub type Bricks = FxHashMap<BrickPos, Arc<Brick>>;
 
 /// Bricks in order of their positions.
