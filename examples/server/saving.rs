@@ -5,8 +5,7 @@ use std::path::Path;
 use bevy::prelude::*;
 use bevy_burrow::plugin::BurrowSystems;
 use bevy_burrow::prelude::Terrain;
-use bevy_burrow::store::{Store, StoreOptions};
-use bevy_burrow::terrain::LogEntry;
+use bevy_burrow::store::{Store, StoreError, StoreOptions};
 
 use crate::Options;
 use crate::noise_ground::noise_ground;
@@ -47,14 +46,16 @@ fn save(mut saving: ResMut<Saving>, mut terrains: Query<&mut Terrain>) {
             continue;
         }
         let records = terrain.take_log();
-        let is_commit = |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change);
-        for record in &records {
-            // The first record may only say what rules hold.
-            if record.entries.is_empty() || record.entries.iter().any(is_commit) {
-                say(format_args!(r#"{{"revision":{},"hash":"{:#018x}"}}"#, record.revision, record.hash));
-            }
+        // Others only say what rules hold.
+        for record in records.iter().filter(|record| record.is_commit()) {
+            say(format_args!(r#"{{"revision":{},"hash":"{:#018x}"}}"#, record.revision, record.hash));
         }
-        if let Err(why) = saving.store.append(records) {
+        let saved = match saving.store.append(records) {
+            // Records are missing.
+            Err(StoreError::Gap { .. }) => saving.store.append_whole(&terrain),
+            other => other,
+        };
+        if let Err(why) = saved {
             complain(format_args!("server: {why}"));
         }
     }

@@ -236,11 +236,13 @@ impl Store {
     /// # Errors
     /// [`StoreError::Ended`] when the store's thread has panicked.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
-        if !terrain.has_log() && self.unsent.is_empty() {
+        let now = terrain.world().revision();
+        if !terrain.has_log() && self.unsent.is_empty() && now == self.revision {
             return Ok(());
         }
         let records = terrain.take_log();
-        if self.continues(&records) {
+        let last = records.last().map_or(self.revision, |record| record.revision);
+        if last == now && self.continues(&records) {
             return self.append(records);
         }
         // Records were dropped, or never kept.
@@ -252,7 +254,7 @@ impl Store {
     fn continues(&self, records: &[CommitRecord]) -> bool {
         let mut at = self.revision;
         records.iter().all(|record| {
-            let follows = record.revision == at || record.revision == at + 1;
+            let follows = record.revision == at.saturating_add(record.is_commit().into());
             at = record.revision;
             follows
         })
