@@ -393,6 +393,8 @@ mod guide {
         Materials "docs/guide/src/materials.md"
         Physics "docs/guide/src/physics.md"
         Undo "docs/guide/src/undo.md"
+        Saving "docs/guide/src/saving.md"
+        LevelAssets "docs/guide/src/level-assets.md"
         Determinism "docs/guide/src/determinism.md"
         Servers "docs/guide/src/servers.md"
         Cuda "docs/guide/src/cuda.md"
