@@ -211,9 +211,10 @@ impl SimulatedDisk {
         *self.watch.lock().unwrap_or_else(PoisonError::into_inner) = watch;
     }
 
-    /// What it refuses from now on.
+    /// What it refuses from now on. A fault that was to [begin later](Self::fail_at) does not come any more.
     pub fn set_fault(&self, fault: DiskFault) {
-        self.state().fault = fault;
+        let mut state = self.state();
+        (state.fault, state.fault_at) = (fault, None);
     }
 
     /// Lets a fault begin with a later operation, counted like [`operations`](Self::operations).
