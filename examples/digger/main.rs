@@ -178,6 +178,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile, world: 
         .add_plugins((
             world::landscape::LandscapePlugin,
             world::saves::SavesPlugin(world),
+            world::thumbnails::ThumbnailsPlugin,
             world::sky::SkyPlugin,
             world::day::DayPlugin,
             world::light::LightPlugin,

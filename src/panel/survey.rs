@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use super::plot::Line;
 use super::state::{BurrowPanel, Note, Verdict};
 use crate::backend::{Choice, EngineState};
-use crate::plugin::{BurrowEngine, BurrowFigures, ThreadTask, Threads};
+use crate::plugin::{BurrowEngine, BurrowFigures, MeshBytes, ThreadTask, Threads};
 use crate::surface::SeamReport;
 use crate::terrain::{Memory, Terrain, Version, World};
 
@@ -26,6 +26,9 @@ pub struct Counts {
     pub hash: u64,
 }
 
+/// Meshes that are on the card.
+type Drawn<'w, 's> = Query<'w, 's, (&'static MeshBytes, &'static ChildOf), With<Mesh3d>>;
+
 /// All statistics on the panel.
 #[derive(Resource, Default)]
 pub struct Survey {
@@ -34,6 +37,8 @@ pub struct Survey {
     counting: Option<(Entity, Version, ThreadTask<Counts>)>,
     since: Duration,
     pub counts: Option<Counts>,
+    /// Bytes of the chosen terrain's meshes on the card.
+    pub mesh_bytes: usize,
     /// The engine's state, its stages on CPU and GPU, and its last choice.
     pub engine: Option<(EngineState, [u64; 2], Option<Choice>)>,
     /// One value per frame.
@@ -73,6 +78,7 @@ pub(super) fn count_terrain(
     panel: Res<BurrowPanel>,
     engine: Res<BurrowEngine>,
     terrains: Query<(Entity, &Terrain)>,
+    meshes: Drawn,
     mut survey: ResMut<Survey>,
 ) {
     let survey = &mut *survey;
@@ -94,6 +100,8 @@ pub(super) fn count_terrain(
     let engine = chosen.and_then(|(_, terrain)| terrain.engine()).unwrap_or(&engine);
     let figures = engine.figures();
     survey.engine = Some((engine.state(), [figures.cpu, figures.cuda], figures.choices.back().copied()));
+    let own = meshes.iter().filter(|(_, parent)| chosen.is_some_and(|(entity, _)| parent.parent() == entity));
+    survey.mesh_bytes = own.map(|(bytes, _)| bytes.0).sum();
     let Some((entity, terrain)) = chosen.filter(|_| survey.counting.is_none()) else { return };
     let version = terrain.world().version();
     if survey.of == Some((entity, version)) {

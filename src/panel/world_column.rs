@@ -40,7 +40,7 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     section(ui, "Terrain", true, |ui| terrain(ui, panel, content.terrains, chosen));
     section(ui, "Live", true, |ui| live(ui, content.figures, content.survey));
     if let Some(counts) = &content.survey.counts {
-        section(ui, "Memory", true, |ui| memory(ui, counts));
+        section(ui, "Memory", true, |ui| memory(ui, counts, content.survey.mesh_bytes));
     }
     if let Some((state, stages, last)) = &content.survey.engine {
         section(ui, "Engine", true, |ui| engine(ui, state, *stages, last.as_ref()));
@@ -172,7 +172,7 @@ fn percentiles(times: &Times) -> String {
     [50, 95, 99].map(|percent| time(times.percentile(percent))).join(", ")
 }
 
-fn memory(ui: &mut Ui, counts: &Counts) {
+fn memory(ui: &mut Ui, counts: &Counts, mesh_bytes: usize) {
     let memory = counts.memory;
     let kinds = [
         ("Ground", memory.ground),
@@ -197,6 +197,7 @@ fn memory(ui: &mut Ui, counts: &Counts) {
         });
     }
     figure(ui, "All, edits", format!("{}, {}", bytes(memory.total()), bytes(memory.edits())));
+    figure(ui, "Meshes on the card", bytes(mesh_bytes));
     figure(ui, "Fields, chunks", format!("{}, {}", count(counts.fields), count(counts.chunks)));
     figure(ui, "Bricks, mask cells", format!("{}, {}", count(counts.bricks), count(counts.cells)));
     figure(ui, "Hash", format!("{:016x}", counts.hash));

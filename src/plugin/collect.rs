@@ -5,8 +5,8 @@ use bevy::prelude::*;
 
 use super::reach::reaches;
 use super::{
-    BrushApplied, BurrowFigures, HistoryMoved, LooseGround, LoosePieceFound, Redo, TargetedBrush, Undo,
-    free_later,
+    BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LooseGround, LoosePieceFound, Redo, TargetedBrush,
+    Undo, free_later,
 };
 use crate::brush::{Brush, BrushError, Edit, Operation};
 use crate::lattice::ChunkGrid;
@@ -15,18 +15,18 @@ use crate::terrain::{
 };
 
 /// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected at
-/// once, and so is a brush that reaches no terrain.
+/// once, and so is a brush that reaches no terrain. Edits of a terrain with an [`EditOutbox`] are put there instead.
 pub(super) fn collect_brushes(
     mut brushes: MessageReader<Brush>,
     mut targeted: MessageReader<TargetedBrush>,
-    mut terrains: Query<(Entity, &mut Terrain, Option<&LooseGround>)>,
+    mut terrains: Query<(Entity, &mut Terrain, Option<&LooseGround>, Option<&mut EditOutbox>)>,
     places: TransformHelper,
     mut answers: MessageWriter<BrushApplied>,
     mut found: MessageWriter<LoosePieceFound>,
     mut figures: ResMut<BurrowFigures>,
 ) {
     let start = Instant::now();
-    for (entity, mut terrain, loose) in &mut terrains {
+    for (entity, mut terrain, loose, _) in &mut terrains {
         let loose = loose.map(|&loose| loose.into());
         if loose.is_some() && loose.as_ref() != terrain.loose() {
             terrain.set_loose(loose);
@@ -47,13 +47,14 @@ pub(super) fn collect_brushes(
         // The rejection that is sent if no terrain answers.
         let mut unanswered = Some(Rejection::OutsideWorld);
         // Only terrains that queue a brush are borrowed mutably, so that others do not count as changed.
-        for (entity, mut terrain, _) in &mut terrains {
+        for (entity, mut terrain, _, outbox) in &mut terrains {
             let Ok(place) = places.compute_global_transform(entity) else { continue };
             match Effect::of(brush, &place, terrain.world().grid()) {
                 Effect::Taken(edit) => {
-                    match terrain.admit(Some(&edit)) {
-                        Ok(()) => terrain.queue_edit(brush.tag, Ok(edit), brush.stroke, together),
-                        Err(rejection) => reject(brush, Some(entity), rejection),
+                    match (outbox, terrain.admit(Some(&edit))) {
+                        (Some(mut outbox), _) => outbox.edits.push(edit),
+                        (None, Ok(())) => terrain.queue_edit(brush.tag, Ok(edit), brush.stroke, together),
+                        (None, Err(rejection)) => reject(brush, Some(entity), rejection),
                     }
                     unanswered = None;
                 }
@@ -71,11 +72,14 @@ pub(super) fn collect_brushes(
     }
     for &TargetedBrush { terrain: entity, ref brush } in targeted.read() {
         match (terrains.get_mut(entity), places.compute_global_transform(entity)) {
-            (Ok((_, mut terrain, _)), Ok(place)) => {
+            (Ok((_, mut terrain, _, outbox)), Ok(place)) => {
                 let edit = Edit::quantize(&to_terrain(brush, &place)).map_err(Rejection::from);
-                match terrain.admit(edit.as_ref().ok()) {
-                    Ok(()) => terrain.queue_edit(brush.tag, edit, brush.stroke, together),
-                    Err(rejection) => reject(brush, Some(entity), rejection),
+                match (outbox, terrain.admit(edit.as_ref().ok()), edit) {
+                    (Some(mut outbox), _, Ok(edit)) => outbox.edits.push(edit),
+                    (Some(_), _, Err(rejection)) | (None, Err(rejection), _) => {
+                        reject(brush, Some(entity), rejection);
+                    }
+                    (None, Ok(()), edit) => terrain.queue_edit(brush.tag, edit, brush.stroke, together),
                 }
             }
             _ => reject(brush, Some(entity), Rejection::TerrainGone),
@@ -115,7 +119,7 @@ impl Effect {
 pub(super) fn collect_steps(
     mut undos: MessageReader<Undo>,
     mut redos: MessageReader<Redo>,
-    mut terrains: Query<(Entity, &mut Terrain)>,
+    mut terrains: Query<(Entity, &mut Terrain, Option<&mut EditOutbox>)>,
     mut moved: MessageWriter<HistoryMoved>,
     mut figures: ResMut<BurrowFigures>,
 ) {
@@ -124,23 +128,26 @@ pub(super) fn collect_steps(
     let redos = redos.read().map(|&Redo { terrain }| (HistoryStep::Redo, terrain));
     for (step, target) in undos.chain(redos) {
         let mut is_taken = false;
-        let mut submit = |mut terrain: Mut<Terrain>| {
+        let mut submit = |mut terrain: Mut<Terrain>, outbox: Option<Mut<EditOutbox>>| {
             is_taken = true;
-            match step {
-                HistoryStep::Undo => terrain.submit_undo(),
-                HistoryStep::Redo => terrain.submit_redo(),
+            match (outbox, step) {
+                (Some(mut outbox), step) => outbox.steps.push(step),
+                (None, HistoryStep::Undo) => terrain.submit_undo(),
+                (None, HistoryStep::Redo) => terrain.submit_redo(),
             }
         };
         match target {
-            Some(entity) => terrains.get_mut(entity).into_iter().for_each(|(_, terrain)| submit(terrain)),
-            None => terrains.iter_mut().for_each(|(_, terrain)| submit(terrain)),
+            Some(entity) => {
+                terrains.get_mut(entity).into_iter().for_each(|(_, terrain, outbox)| submit(terrain, outbox));
+            }
+            None => terrains.iter_mut().for_each(|(_, terrain, outbox)| submit(terrain, outbox)),
         }
         if !is_taken {
             moved.write(gone(target, step));
         }
     }
     // Results of steps that the queue had no room for, and of steps that the game took itself.
-    for (entity, mut terrain) in &mut terrains {
+    for (entity, mut terrain, _) in &mut terrains {
         send_history(entity, &mut terrain, &mut moved);
     }
     figures.main_thread += start.elapsed();

@@ -1,6 +1,5 @@
 //! Starts transactions, and commits each of them whole in one frame.
 
-use bevy::camera::visibility::NoAutoAabb;
 use bevy::diagnostic::Diagnostics;
 use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
@@ -347,7 +346,7 @@ fn swap(
         (None, _) => {
             child.try_remove::<Mesh3d>();
         }
-        (Some((mesh, bounds)), shown) => {
+        (Some((mesh, facts)), shown) => {
             let mut new = Some(mesh);
             if let Some(Mesh3d(handle)) = shown
                 && let Some(mesh) = new.take()
@@ -358,7 +357,7 @@ fn swap(
             if let Some(mesh) = new {
                 child.try_insert(Mesh3d(assets.add(mesh))).queue_silenced(refresh_material);
             }
-            child.try_insert((bounds, NoAutoAabb));
+            child.try_insert(facts);
         }
     }
 }

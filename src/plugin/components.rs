@@ -3,9 +3,10 @@
 use bevy::ecs::component::{Component, Mutable, StorageType};
 use bevy::prelude::*;
 
+use crate::brush::Edit;
 use crate::lattice::{ChunkPos, TilePos};
 use crate::levels::Node;
-use crate::terrain::Terrain;
+use crate::terrain::{HistoryStep, Terrain};
 use crate::volume;
 
 /// The model itself is the component; see [`Terrain`].
@@ -57,6 +58,11 @@ pub struct ShownSurface {
     /// Is it known to have no triangles?
     pub is_empty: bool,
 }
+
+/// How many bytes the vertices and indices of a tile's or chunk's mesh take on the card, while it has a `Mesh3d`.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
+pub struct MeshBytes(pub usize);
 
 /// A region of edits: child of its [`Chunk`]. It is data; the chunk draws it.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,6 +167,17 @@ impl From<&volume::Field> for Field {
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct Held;
+
+/// What brushes, undos and redos ask of this terrain is put here and not done: somebody else decides about it, say a server, and
+/// puts what came of it in the terrain with [`Terrain::submit_change`]. Whoever inserts this takes the lists and answers what is
+/// in them.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+pub struct EditOutbox {
+    /// Edits, in the order in which they were asked for.
+    pub edits: Vec<Edit>,
+    /// Undos and redos, which come behind the edits of their frame.
+    pub steps: Vec<HistoryStep>,
+}
 
 /// The meshes of this terrain have vertices of 32 bytes: positions, normals, materials; no colours and no depth in the ground,
 /// which take 20 more. A `GroundLook` brings it and takes it away again; insert it for materials of your own that need neither.

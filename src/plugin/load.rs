@@ -3,15 +3,13 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use bevy::camera::primitives::Aabb;
-use bevy::camera::visibility::NoAutoAabb;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
 use super::level_state::{LevelState, LevelsOfDetail, ShownLevels};
-use super::meshes::{BuiltMesh, VertexExtras};
+use super::meshes::{BuiltMesh, MeshFacts, VertexExtras};
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{InFlight, TaskCounter};
 use super::threads::{ThreadTask, Threads};
@@ -51,7 +49,7 @@ impl Loading {
 
 /// A surface whose mesh, if it has one, was passed to the renderer.
 struct Loaded {
-    mesh: Option<(Handle<Mesh>, Aabb)>,
+    mesh: Option<(Handle<Mesh>, MeshFacts)>,
     built: BuiltSurface,
 }
 
@@ -292,7 +290,7 @@ pub(super) fn finish_loading(
         for mut built in loading.waiting.split_off(rest) {
             let mesh = assets
                 .as_mut()
-                .and_then(|assets| built.mesh.take().map(|(mesh, bounds)| (assets.add(mesh), bounds)));
+                .and_then(|assets| built.mesh.take().map(|(mesh, facts)| (assets.add(mesh), facts)));
             loading.ready.insert(built.drawn, Loaded { mesh, built });
         }
         if !loading.waiting.is_empty() {
@@ -346,8 +344,8 @@ fn show(
     for drawn in tiles.chain(chunks.into_iter().map(Drawn::Chunk)) {
         let child = entities.spawn(commands, terrain, &world, drawn);
         if let Some(Loaded { mesh, built }) = loading.ready.remove(&drawn) {
-            if let Some((handle, bounds)) = mesh {
-                commands.entity(child).try_insert((Mesh3d(handle), bounds, NoAutoAabb));
+            if let Some((handle, facts)) = mesh {
+                commands.entity(child).try_insert((Mesh3d(handle), facts));
             }
             apply_actions(commands, child, built.shown, built.actions);
         }
@@ -372,8 +370,8 @@ fn show_nodes(
     nodes: Vec<BuiltNode>,
 ) {
     let mut add = |mesh: BuiltMesh| {
-        let (mesh, bounds) = mesh?;
-        Some((Mesh3d(assets.as_mut()?.add(mesh)), bounds, NoAutoAabb))
+        let (mesh, facts) = mesh?;
+        Some((Mesh3d(assets.as_mut()?.add(mesh)), facts))
     };
     for BuiltNode { node, mesh, shown, .. } in nodes {
         if let Some(mesh) = mesh {

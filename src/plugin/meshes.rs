@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::primitives::Aabb;
+use bevy::camera::visibility::NoAutoAabb;
 use bevy::color::{ColorToComponents, LinearRgba};
 use bevy::math::{IVec3, Vec3};
 use bevy::mesh::{
     Indices, Mesh, MeshVertexAttribute, PrimitiveTopology, VertexAttributeValues, VertexFormat,
 };
 
-use super::MaterialColors;
 use super::palettes::{Arranged, Palettes};
+use super::{MaterialColors, MeshBytes};
 use crate::ground::{ColumnMaterial, Ground, RowBuffer};
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
@@ -31,8 +32,11 @@ pub const ATTRIBUTE_MATERIAL_WEIGHTS: MeshVertexAttribute =
 pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
 
-/// A mesh ready to be swapped in, with its bounds; `None` where nothing is to be drawn.
-pub(crate) type BuiltMesh = Option<(Mesh, Aabb)>;
+/// What an entity has beside its mesh: bounds that Bevy need not compute, and bytes.
+pub(crate) type MeshFacts = (Aabb, NoAutoAabb, MeshBytes);
+
+/// A mesh ready to be swapped in; `None` where nothing is to be drawn.
+pub(crate) type BuiltMesh = Option<(Mesh, MeshFacts)>;
 
 /// What the vertices of a terrain's meshes have beside positions, normals and materials.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -193,7 +197,12 @@ impl<'a> Arrays<'a> {
         if !self.mesh_builder.extras.colors.is_empty() {
             mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, self.colors);
         }
-        Some((mesh, Aabb::from_min_max(min, max)))
+        let indices = mesh.indices().map_or(0, |indices| match indices {
+            Indices::U16(list) => size_of_val(&list[..]),
+            Indices::U32(list) => size_of_val(&list[..]),
+        });
+        let bytes = MeshBytes(mesh.get_vertex_buffer_size() + indices);
+        Some((mesh, (Aabb::from_min_max(min, max), NoAutoAabb, bytes)))
     }
 }
 
@@ -312,7 +321,7 @@ mod tests {
 
     /// All data of a Bevy mesh, as bytes.
     fn bytes_of(ready: BuiltMesh) -> Option<(Vec<Vec<u8>>, Option<Indices>, Aabb)> {
-        let (mesh, bounds) = ready?;
+        let (mesh, (bounds, ..)) = ready?;
         let attributes = mesh.attributes().map(|(_, values)| values.get_bytes().to_vec());
         Some((attributes.collect(), mesh.indices().cloned(), bounds))
     }

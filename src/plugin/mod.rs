@@ -42,7 +42,8 @@ mod threads;
 mod times;
 
 pub use components::{
-    Chunk, Field, GroundPiece, GroundPieces, Held, MaterialColors, ShownSurface, SlimVertices, Tile,
+    Chunk, EditOutbox, Field, GroundPiece, GroundPieces, Held, MaterialColors, MeshBytes, ShownSurface,
+    SlimVertices, Tile,
 };
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, trigger_if_alive};

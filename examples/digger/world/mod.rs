@@ -8,3 +8,4 @@ pub mod particles;
 pub mod saves;
 pub mod sky;
 pub mod strata;
+pub mod thumbnails;

@@ -7,12 +7,15 @@ use bevy::prelude::*;
 use super::spawn_page;
 use super::title::Start;
 use crate::player::game_state::{GameState, MenuPage};
-use crate::ui::widgets::{self, Activated, GREY};
+use crate::ui::widgets::{self, Activated, GREY, WHITE};
 use crate::world::landscape::NewGame;
-use crate::world::saves::{self, PlayedWorld};
+use crate::world::saves::{self, FoundWorld, PlayedWorld};
+use crate::world::thumbnails;
 
 /// Width of the buttons.
-const WIDTH: f32 = 330.0;
+const WIDTH: f32 = 420.0;
+/// Size of the pictures.
+const PICTURE: Vec2 = Vec2::new(96.0, 54.0);
 
 /// The page of saved worlds.
 pub struct WorldsPlugin;
@@ -23,16 +26,17 @@ impl Plugin for WorldsPlugin {
     }
 }
 
-fn open(mut commands: Commands, played: Res<PlayedWorld>) {
+fn open(mut commands: Commands, played: Res<PlayedWorld>, mut images: ResMut<Assets<Image>>) {
     let worlds = saves::worlds();
     let played = played.0.clone();
-    spawn_page(&mut commands, MenuPage::Worlds, "Worlds", 384.0, |column| {
+    spawn_page(&mut commands, MenuPage::Worlds, "Worlds", WIDTH + 54.0, |column| {
         let count = worlds.len();
         for (at, world) in worlds.into_iter().enumerate() {
-            let mark = if played.as_ref() == Some(&world.folder) { "*" } else { "" };
-            let words = format!("{}{mark}, {}", world.name(), ago(world.saved));
+            let is_played = played.as_ref() == Some(&world.folder);
+            let picture = thumbnails::read(&world.folder).map(|picture| images.add(picture));
+            let button = slot(at, &world, is_played, picture);
             let folder = world.folder;
-            column.spawn(widgets::button(at, &words, WIDTH)).observe(
+            column.spawn(button).observe(
                 move |_: On<Activated>, mut commands: Commands, mut start: ResMut<Start>| {
                     commands.insert_resource(PlayedWorld(Some(folder.clone())));
                     begin(&mut commands, &mut start);
@@ -44,6 +48,28 @@ fn open(mut commands: Commands, played: Res<PlayedWorld>) {
         }
         column.spawn(widgets::button(count, "Back", WIDTH)).observe(super::go_to(MenuPage::Menu));
     });
+}
+
+/// A button with a world's picture, its name, and when it was saved.
+fn slot(at: usize, world: &FoundWorld, is_played: bool, picture: Option<Handle<Image>>) -> impl Bundle {
+    let node = Node {
+        width: px(WIDTH),
+        padding: UiRect::axes(px(12), px(4)),
+        column_gap: px(16),
+        align_items: AlignItems::Center,
+        ..default()
+    };
+    let frame = Node { width: px(PICTURE.x), height: px(PICTURE.y), ..default() };
+    let picture = picture.map_or(ImageNode::solid_color(Color::BLACK), ImageNode::new);
+    let mark = if is_played { " *" } else { "" };
+    let words = (
+        widgets::column(px(2)),
+        children![
+            widgets::text(format!("{}{mark}", world.name()), 20.0, WHITE),
+            widgets::text(ago(world.saved), 14.0, GREY)
+        ],
+    );
+    (widgets::item(at, node), children![(picture, frame), words])
 }
 
 /// Plays the world that is set now.
