@@ -47,7 +47,7 @@ const LOG: u8 = 0;
 const REGIONS: u8 = 1;
 const COMPARE: u8 = 2;
 
-const REFUSALS: [Refusal; 8] = [
+const REFUSALS: [Refusal; 9] = [
     Refusal::TooFar,
     Refusal::Cost,
     Refusal::Forbidden,
@@ -55,6 +55,7 @@ const REFUSALS: [Refusal; 8] = [
     Refusal::Overloaded,
     Refusal::Nothing,
     Refusal::Touched,
+    Refusal::TooLarge,
     Refusal::NotJoined,
 ];
 
@@ -330,6 +331,44 @@ fn put_entry(to: &mut Vec<u8>, entry: &Entry, sequence: &mut EditSequence) {
             put_change(to, change);
         }
         Entry::Mark => to.push(MARK),
+    }
+}
+
+/// Bytes of an entry by itself.
+pub(super) fn entry_bytes(entry: &Entry) -> usize {
+    let mut bytes = Vec::new();
+    put_entry(&mut bytes, entry, &mut EditSequence::default());
+    bytes.len()
+}
+
+/// Writes entries as they are ordered into one message.
+#[derive(Debug, Default)]
+pub(super) struct OrderWriter {
+    bytes: Vec<u8>,
+    count: u64,
+    sequence: EditSequence,
+}
+
+impl OrderWriter {
+    pub fn put(&mut self, entry: &Entry) {
+        put_entry(&mut self.bytes, entry, &mut self.sequence);
+        self.count += 1;
+    }
+
+    /// Bytes so far.
+    pub fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// The number of the first entry and the message, if there is one. `last` is the number of the last entry.
+    pub fn take(&mut self, last: u64) -> Option<(u64, Vec<u8>)> {
+        let Self { bytes, count, .. } = std::mem::take(self);
+        let first = last.checked_sub(count)? + 1;
+        let mut message = vec![ENTRIES];
+        put_number(&mut message, first);
+        put_number(&mut message, count);
+        message.extend(bytes);
+        (count > 0).then_some((first, message))
     }
 }
 

@@ -44,6 +44,11 @@ pub const MOST_REGIONS: usize = 4096;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ClientId(pub u64);
 
+impl ClientId {
+    /// The author of what the server does of its own.
+    pub const SERVER: Self = Self(u64::MAX);
+}
+
 /// What a message is sent in. The transport delivers each lane completely and in order; between them there is no order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lane {
@@ -296,6 +301,9 @@ pub enum Refusal {
     /// Others have changed since what would be undone.
     #[error("others have dug there since")]
     Touched,
+    /// What it would put back is too much for a message.
+    #[error("too large")]
+    TooLarge,
     /// The edit came before the client had begun.
     #[error("the client has not joined")]
     NotJoined,

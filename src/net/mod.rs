@@ -15,11 +15,15 @@
 mod bulk;
 mod encoding;
 pub mod message;
+mod server;
 mod stamps;
 
 pub use bulk::BulkReader;
 pub use message::{
     ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent, RegionHashes,
     ToClient, ToServer, Welcome,
+};
+pub use server::{
+    Outgoing, Permission, Rate, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
 };
 pub use stamps::{StampId, Stamps};
