@@ -295,6 +295,7 @@
 //! | `render` | materials on tiles and chunks | yes |
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
 //! | `store` | worlds on disk: a commit journal, checkpoints, portable files | |
+//! | `net` | digging together: server and client without transport | |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
@@ -324,6 +325,8 @@ mod edits;
 pub mod ground;
 pub mod lattice;
 pub mod levels;
+#[cfg(feature = "net")]
+pub mod net;
 #[cfg(feature = "egui")]
 pub mod panel;
 #[cfg(feature = "avian")]

@@ -1,5 +1,7 @@
 //! The edit: a brush in integers, which the world obeys.
 
+use std::sync::Arc;
+
 use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +11,7 @@ use super::roughness::QuantizedRoughness;
 use super::sculpt_kernel::SculptKernel;
 use super::shapes::QuantizedShape;
 use super::{BAND, Blend, Brush, BrushError, Evaluator, FULL_POWER, Kind, Operation, Roughness, Shape};
+use crate::ground::GreyImage;
 use crate::lattice::{LatticeBox, ONE};
 
 /// A brush in integers: the same edit changes the same samples to the same bits on every machine.
@@ -139,6 +142,25 @@ impl Edit {
     /// The stroke that the brush was part of.
     pub fn stroke(&self) -> Option<u64> {
         self.stroke
+    }
+
+    /// The edit with another tag, as part of another stroke or of none. It changes the same samples.
+    #[must_use]
+    pub fn with_labels(self, tag: u64, stroke: Option<u64>) -> Self {
+        Self { tag, stroke, ..self }
+    }
+
+    /// The image that it presses onto the ground, if it is a stamp.
+    pub fn stamp_image(&self) -> Option<&Arc<GreyImage>> {
+        self.operation.stamp_image()
+    }
+
+    /// The edit with another image, if it is a stamp; otherwise as it is.
+    ///
+    /// # Errors
+    /// When the image has a size that no stamp may have.
+    pub fn with_stamp_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        Ok(Self { operation: self.operation.with_stamp_image(image)?, ..self })
     }
 
     /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6).

@@ -1,5 +1,7 @@
 //! An operation in integers, as edits hold it.
 
+use std::sync::Arc;
+
 use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +11,7 @@ use super::quantize::{
 };
 use super::stamp::QuantizedStamp;
 use super::{BrushError, Kind, Operation};
-use crate::ground::MaterialId;
+use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::{LIMIT, ONE};
 
 /// Most voxels that a raise or a lower moves the surface.
@@ -92,6 +94,22 @@ impl QuantizedOperation {
             Self::Lower { amount } => Operation::Lower { amount: voxels(*amount) },
             Self::Stamp { stamp } => Operation::Stamp { stamp: stamp.stamp() },
             Self::Terrace { step, base } => Operation::Terrace { step: voxels(*step), base: voxels(*base) },
+        }
+    }
+
+    /// The image of a stamp.
+    pub fn stamp_image(&self) -> Option<&Arc<GreyImage>> {
+        match self {
+            Self::Stamp { stamp } => Some(stamp.image()),
+            _ => None,
+        }
+    }
+
+    /// With another image, if it is a stamp.
+    pub fn with_stamp_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        match self {
+            Self::Stamp { stamp } => Ok(Self::Stamp { stamp: stamp.with_image(image)? }),
+            other => Ok(other),
         }
     }
 

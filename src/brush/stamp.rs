@@ -163,6 +163,15 @@ impl QuantizedStamp {
         })
     }
 
+    pub fn image(&self) -> &Arc<GreyImage> {
+        &self.relief.0
+    }
+
+    pub fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        check_sides(image.width(), image.height())?;
+        Ok(Self { relief: Relief(image), ..self })
+    }
+
     pub fn check(&self) -> Result<(), BrushError> {
         check_sides(self.relief.0.width(), self.relief.0.height())?;
         check_point("stamp center", self.center)?;

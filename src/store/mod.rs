@@ -6,7 +6,7 @@ mod database;
 mod disk;
 mod error;
 mod files;
-mod format;
+pub(crate) mod format;
 mod found;
 mod inspect;
 mod journal;

@@ -58,26 +58,28 @@ impl RecordDraft {
             Work::Step(..) | Work::Put(_) => entries.push(LogEntry::Change),
             Work::Cut(_) => {}
         }
-        let change = change_of(commit);
+        let change = commit.change();
         let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
         let bytes = bytes_of(&entries, &change) + room;
         Self { terms, entries, change, bytes }
     }
 }
 
-/// The bricks and fields that a commit leads to, as its record lists them.
-fn change_of(commit: &Commit) -> WorldChange {
-    let (mut bricks, mut fields) = (Vec::new(), Vec::new());
-    // Of several groups the last one holds.
-    for change in commit.changes.iter().rev().map(|own| &own.change) {
-        bricks.extend(change.bricks.iter().cloned());
-        fields.extend(change.fields.iter().cloned());
+impl Commit {
+    /// The bricks and fields that it leads to, as its [record](CommitRecord) lists them.
+    pub fn change(&self) -> WorldChange {
+        let (mut bricks, mut fields) = (Vec::new(), Vec::new());
+        // Of several groups the last one holds.
+        for change in self.changes.iter().rev().map(|own| &own.change) {
+            bricks.extend(change.bricks.iter().cloned());
+            fields.extend(change.fields.iter().cloned());
+        }
+        bricks.sort_by_key(|(pos, _)| *pos);
+        bricks.dedup_by_key(|(pos, _)| *pos);
+        fields.sort_by_key(|(chunk, _)| *chunk);
+        fields.dedup_by_key(|(chunk, _)| *chunk);
+        WorldChange { bricks, fields, next_field: self.next_field }
     }
-    bricks.sort_by_key(|(pos, _)| *pos);
-    bricks.dedup_by_key(|(pos, _)| *pos);
-    fields.sort_by_key(|(chunk, _)| *chunk);
-    fields.dedup_by_key(|(chunk, _)| *chunk);
-    WorldChange { bricks, fields, next_field: commit.next_field }
 }
 
 /// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main thread.

@@ -29,6 +29,16 @@ impl World {
             .map(|(pos, brick)| (*pos, brick))
     }
 
+    /// A stored brick; `None` where nothing was edited.
+    pub fn brick(&self, pos: BrickPos) -> Option<&Arc<Brick>> {
+        self.bricks.get(&pos)
+    }
+
+    /// The greatest name that a field has had so far.
+    pub fn next_field(&self) -> u64 {
+        self.next_field
+    }
+
     /// Hash of the edited samples of a region; 0 where nothing was edited. The sum of all, which wraps around, is that of the
     /// world: see [`hash_of`](Self::hash_of).
     pub fn region_hash(&self, region: RegionPos) -> u64 {

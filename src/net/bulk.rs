@@ -1,0 +1,56 @@
+//! The bulk lane: messages one after the other as one stream of bytes, which the server cuts into pieces as it may send them.
+
+use super::message::{MOST_TO_CLIENT, ToClient};
+use super::stamps::Stamps;
+use crate::ground::Ground;
+use crate::store::FormatError;
+use crate::store::format::bytes::{Reader, put_bytes};
+
+/// Appends a message to a stream.
+pub(super) fn put_message(to: &mut Vec<u8>, message: &[u8]) {
+    put_bytes(to, message);
+}
+
+/// Puts pieces together.
+#[derive(Clone, Debug, Default)]
+pub struct BulkReader {
+    bytes: Vec<u8>,
+    received: u64,
+}
+
+impl BulkReader {
+    /// Adds the bytes of a [`ToClient::Piece`].
+    pub fn add(&mut self, piece: &[u8]) {
+        self.bytes.extend_from_slice(piece);
+        self.received += piece.len() as u64;
+    }
+
+    /// Bytes that have come, as they are [acknowledged](super::ToServer::Ack).
+    pub fn received(&self) -> u64 {
+        self.received
+    }
+
+    /// The next message that is there as a whole. It is never a piece itself.
+    ///
+    /// # Errors
+    /// When it is invalid, or longer than a message may be. Nothing more can be read then.
+    pub fn next(&mut self, ground: &Ground, stamps: &Stamps) -> Result<Option<ToClient>, FormatError> {
+        let mut reader = Reader(&self.bytes);
+        let length = match reader.number() {
+            Ok(length) => length,
+            Err(FormatError::Truncated) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        if length > MOST_TO_CLIENT as u64 {
+            return Err(FormatError::TooLarge { length, limit: MOST_TO_CLIENT as u64 });
+        }
+        let Ok(message) = reader.take(length as usize) else { return Ok(None) };
+        let message = ToClient::from_bytes(message, ground, stamps)?;
+        let left = reader.0.len();
+        self.bytes.drain(..self.bytes.len() - left);
+        match message {
+            ToClient::Piece(_) => Err(FormatError::Invalid("piece inside a stream")),
+            message => Ok(Some(message)),
+        }
+    }
+}

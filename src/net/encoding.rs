@@ -1,0 +1,510 @@
+//! Messages in bytes: a tag, then integers of [variable length](crate::store::format::bytes), edits as differences to the one before
+//! in the same message, bricks as saves have them.
+//!
+//! Whatever bytes are read, the result is a message or a [`FormatError`]: nothing panics, and memory is taken by the length of
+//! the input, which has limits of its own.
+
+use std::sync::Arc;
+
+use super::message::*;
+use super::stamps::{StampId, Stamps};
+use crate::brush::Edit;
+use crate::ground::{GreyImage, Ground};
+use crate::lattice::RegionPos;
+use crate::store::format::bytes::{Reader, put_bytes, put_number};
+use crate::store::format::change::{put_change, read_change};
+use crate::store::format::edits::EditSequence;
+use crate::store::format::fields::{point, put_point};
+use crate::store::format::{decode_region, encode_region, plain};
+use crate::store::{FormatError, WorldId};
+use crate::volume::DiggingRules;
+
+const HELLO: u8 = 0;
+const EDITS: u8 = 1;
+const UNDO: u8 = 2;
+const FETCH: u8 = 3;
+const ACK: u8 = 4;
+
+const WELCOME: u8 = 0;
+const KICKED: u8 = 1;
+const ENTRIES: u8 = 2;
+const VOID: u8 = 3;
+const REFUSED: u8 = 4;
+const HASHES: u8 = 5;
+const TABLE: u8 = 6;
+const REGION: u8 = 7;
+const DURABLE: u8 = 8;
+const PIECE: u8 = 9;
+
+/// Heads of edits are smaller.
+const RULES: u8 = 128;
+const LOOSE: u8 = 129;
+const PARTS: u8 = 130;
+const MARK: u8 = 131;
+const STAMP: u8 = 132;
+
+const LOG: u8 = 0;
+const REGIONS: u8 = 1;
+const COMPARE: u8 = 2;
+
+const REFUSALS: [Refusal; 9] = [
+    Refusal::TooFar,
+    Refusal::Cost,
+    Refusal::Forbidden,
+    Refusal::OutsideWorld,
+    Refusal::Overloaded,
+    Refusal::Nothing,
+    Refusal::Touched,
+    Refusal::TooLarge,
+    Refusal::NotJoined,
+];
+
+const KICKS: [Kick; 7] = [
+    Kick::Protocol,
+    Kick::Simulation,
+    Kick::Ground,
+    Kick::ChunkSize,
+    Kick::Malformed,
+    Kick::Flood,
+    Kick::ByGame,
+];
+
+impl ToServer {
+    /// Its bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut to = Vec::new();
+        match self {
+            Self::Hello(hello) => {
+                to.push(HELLO);
+                put_number(&mut to, hello.protocol.into());
+                put_number(&mut to, hello.simulation.into());
+                to.extend_from_slice(&hello.ground.to_le_bytes());
+                put_number(&mut to, hello.chunk_size.into());
+                put_point(&mut to, hello.place);
+                to.push(hello.epoch.is_some().into());
+                hello.epoch.iter().for_each(|epoch| put_epoch(&mut to, epoch));
+            }
+            Self::Edits { first, edits } => {
+                to.push(EDITS);
+                put_number(&mut to, *first);
+                put_number(&mut to, edits.len() as u64);
+                let mut sequence = EditSequence::default();
+                edits.iter().for_each(|edit| put_edit(&mut to, &[], edit, &mut sequence));
+            }
+            Self::Undo { own, of } => {
+                to.push(UNDO);
+                put_number(&mut to, *own);
+                put_number(&mut to, of.0);
+            }
+            Self::Fetch { number, regions } => {
+                to.push(FETCH);
+                put_number(&mut to, *number);
+                put_regions(&mut to, regions.iter().copied(), |_, _| {});
+            }
+            Self::Ack { bulk, number } => {
+                to.push(ACK);
+                put_number(&mut to, *bulk);
+                put_number(&mut to, *number);
+            }
+        }
+        to
+    }
+
+    /// Reads a message from a client. Images of stamps are those of the list.
+    ///
+    /// # Errors
+    /// When anything is invalid, longer than it may be, or a stamp has an image that the list lacks.
+    pub fn from_bytes(bytes: &[u8], stamps: &Stamps) -> Result<Self, FormatError> {
+        within(bytes.len(), MOST_TO_SERVER)?;
+        let mut reader = Reader(bytes);
+        let message = match reader.byte()? {
+            HELLO => Self::Hello(Hello {
+                protocol: small(&mut reader)?,
+                simulation: small(&mut reader)?,
+                ground: u64::from_le_bytes(reader.array()?),
+                chunk_size: small(&mut reader)?,
+                place: point(&mut reader)?,
+                epoch: if flag(&mut reader)? { Some(epoch(&mut reader)?) } else { None },
+            }),
+            EDITS => {
+                let (first, count) = (reader.number()?, reader.count()?);
+                within(count, MOST_EDITS)?;
+                let (mut edits, mut sequence) = (Vec::with_capacity(count), EditSequence::default());
+                for _ in 0..count {
+                    let head = reader.byte()?;
+                    edits.push(read_edit(&mut reader, head, stamps, &mut sequence, |_| Ok(()))?.1);
+                }
+                Self::Edits { first, edits }
+            }
+            UNDO => Self::Undo { own: reader.number()?, of: ClientId(reader.number()?) },
+            FETCH => {
+                let number = reader.number()?;
+                let regions = read_regions(&mut reader, MOST_REGIONS, |_| Ok(()))?;
+                Self::Fetch { number, regions: regions.into_iter().map(|(pos, ())| pos).collect() }
+            }
+            ACK => Self::Ack { bulk: reader.number()?, number: reader.number()? },
+            _ => return Err(FormatError::Invalid("tag of a message")),
+        };
+        reader.end()?;
+        Ok(message)
+    }
+}
+
+impl ToClient {
+    /// Its bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut to = Vec::new();
+        match self {
+            Self::Welcome(welcome) => {
+                to.push(WELCOME);
+                put_welcome(&mut to, welcome);
+            }
+            Self::Kicked(why) => to.extend([KICKED, place_in(&KICKS, why)]),
+            Self::Entries(Entries { first, entries }) => {
+                to.push(ENTRIES);
+                put_number(&mut to, *first);
+                put_number(&mut to, entries.len() as u64);
+                let mut sequence = EditSequence::default();
+                entries.iter().for_each(|entry| put_entry(&mut to, entry, &mut sequence));
+            }
+            Self::Void { number } => {
+                to.push(VOID);
+                put_number(&mut to, *number);
+            }
+            Self::Refused { own, why } => {
+                to.extend([REFUSED, place_in(&REFUSALS, why)]);
+                put_number(&mut to, *own);
+            }
+            Self::Hashes { number, regions } => put_hashes(&mut to, HASHES, *number, regions),
+            Self::Table { number, regions } => put_hashes(&mut to, TABLE, *number, regions),
+            Self::Region(content) => {
+                to.push(REGION);
+                put_number(&mut to, content.number);
+                put_point(&mut to, content.pos.0);
+                put_number(&mut to, content.left.into());
+                put_number(&mut to, content.next_field);
+                let (bricks, fields) = (content.bricks.iter(), content.fields.iter());
+                to.extend(encode_region(bricks.map(|(p, b)| (p, b)), fields.map(|(c, f)| (c, f))));
+            }
+            Self::Durable { number } => {
+                to.push(DURABLE);
+                put_number(&mut to, *number);
+            }
+            Self::Piece(bytes) => {
+                to.push(PIECE);
+                to.extend_from_slice(bytes);
+            }
+        }
+        to
+    }
+
+    /// Reads a message from a server, for a world over this ground. Images of stamps are those of the list.
+    ///
+    /// # Errors
+    /// When anything is invalid, longer than it may be, or a stamp has an image that the list lacks.
+    pub fn from_bytes(bytes: &[u8], ground: &Ground, stamps: &Stamps) -> Result<Self, FormatError> {
+        within(bytes.len(), MOST_TO_CLIENT)?;
+        let mut reader = Reader(bytes);
+        let message = match reader.byte()? {
+            WELCOME => Self::Welcome(read_welcome(&mut reader)?),
+            KICKED => Self::Kicked(at_place(&KICKS, reader.byte()?)?),
+            ENTRIES => {
+                let (first, count) = (reader.number()?, reader.count()?);
+                let (mut entries, mut sequence) = (Vec::new(), EditSequence::default());
+                for _ in 0..count {
+                    entries.push(read_entry(&mut reader, ground, stamps, &mut sequence)?);
+                }
+                Self::Entries(Entries { first, entries })
+            }
+            VOID => Self::Void { number: reader.number()? },
+            REFUSED => {
+                let why = at_place(&REFUSALS, reader.byte()?)?;
+                Self::Refused { own: reader.number()?, why }
+            }
+            HASHES => Self::Hashes { number: reader.number()?, regions: read_hashes(&mut reader)? },
+            TABLE => Self::Table { number: reader.number()?, regions: read_hashes(&mut reader)? },
+            REGION => {
+                let (number, pos) = (reader.number()?, RegionPos(point(&mut reader)?));
+                let (left, next_field) = (small(&mut reader)?, reader.number()?);
+                let (bricks, fields) = decode_region(std::mem::take(&mut reader.0), pos, ground)?;
+                Self::Region(RegionContent { number, pos, left, next_field, bricks, fields })
+            }
+            DURABLE => Self::Durable { number: reader.number()? },
+            PIECE => Self::Piece(std::mem::take(&mut reader.0).to_vec()),
+            _ => return Err(FormatError::Invalid("tag of a message")),
+        };
+        reader.end()?;
+        Ok(message)
+    }
+}
+
+fn within(length: usize, limit: usize) -> Result<(), FormatError> {
+    if length <= limit {
+        Ok(())
+    } else {
+        Err(FormatError::TooLarge { length: length as u64, limit: limit as u64 })
+    }
+}
+
+fn small(reader: &mut Reader) -> Result<u32, FormatError> {
+    u32::try_from(reader.number()?).map_err(|_| FormatError::Invalid("number"))
+}
+
+fn flag(reader: &mut Reader) -> Result<bool, FormatError> {
+    match reader.byte()? {
+        0 => Ok(false),
+        1 => Ok(true),
+        _ => Err(FormatError::Invalid("flag")),
+    }
+}
+
+fn place_in<T: PartialEq>(all: &[T], one: &T) -> u8 {
+    all.iter().position(|other| other == one).unwrap_or_default() as u8
+}
+
+fn at_place<T: Copy>(all: &[T], place: u8) -> Result<T, FormatError> {
+    all.get(usize::from(place)).copied().ok_or(FormatError::Invalid("reason"))
+}
+
+/// Appends an edit; `before` stands between its head and the rest.
+fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, sequence: &mut EditSequence) {
+    let unnamed = edit.stamp_image().and_then(|image| {
+        to.push(STAMP);
+        to.extend_from_slice(&StampId::of(image).0.to_le_bytes());
+        edit.clone().with_stamp_image(no_image()?).ok()
+    });
+    let at = to.len();
+    to.push(0);
+    before.iter().for_each(|&number| put_number(to, number));
+    let head = sequence.put(to, unnamed.as_ref().unwrap_or(edit));
+    if let Some(place) = to.get_mut(at) {
+        *place = head;
+    }
+}
+
+/// Reads what [`put_edit`] appended after the first byte; `before` reads what stands between.
+fn read_edit<T>(
+    reader: &mut Reader,
+    head: u8,
+    stamps: &Stamps,
+    sequence: &mut EditSequence,
+    before: impl FnOnce(&mut Reader) -> Result<T, FormatError>,
+) -> Result<(T, Edit), FormatError> {
+    let stamp = (head == STAMP).then(|| reader.array().map(u64::from_le_bytes)).transpose()?;
+    let head = if stamp.is_some() { reader.byte()? } else { head };
+    let first = before(reader)?;
+    let edit = sequence.read(head, reader)?;
+    let edit = match (stamp.map(StampId), edit.stamp_image()) {
+        (None, None) => edit,
+        (Some(id), Some(_)) => {
+            let image = stamps.get(id).ok_or(FormatError::Invalid("image of a stamp"))?;
+            let error = |error| FormatError::Edit(format!("{error}"));
+            edit.with_stamp_image(Arc::clone(image)).map_err(error)?
+        }
+        _ => return Err(FormatError::Invalid("image of a stamp")),
+    };
+    Ok((first, edit))
+}
+
+/// What stands for an image that is named.
+fn no_image() -> Option<Arc<GreyImage>> {
+    GreyImage::from_samples(2, 2, vec![0; 4]).ok().map(Arc::new)
+}
+
+fn put_entry(to: &mut Vec<u8>, entry: &Entry, sequence: &mut EditSequence) {
+    match entry {
+        Entry::Edit { author, own, edit } => put_edit(to, &[author.0, *own], edit, sequence),
+        Entry::Rules(rules) => {
+            to.push(RULES);
+            put_bytes(to, &plain::to_bytes(&rules.as_deref()));
+        }
+        Entry::Loose(loose) => {
+            to.push(LOOSE);
+            put_bytes(to, &plain::to_bytes(loose));
+        }
+        Entry::Parts { by, change } => {
+            to.extend([PARTS, by.is_some().into()]);
+            if let Some((client, own)) = by {
+                put_number(to, client.0);
+                put_number(to, *own);
+            }
+            put_change(to, change);
+        }
+        Entry::Mark => to.push(MARK),
+    }
+}
+
+/// Bytes of an entry by itself.
+pub(super) fn entry_bytes(entry: &Entry) -> usize {
+    let mut bytes = Vec::new();
+    put_entry(&mut bytes, entry, &mut EditSequence::default());
+    bytes.len()
+}
+
+/// Writes entries as they are ordered into one message.
+#[derive(Debug, Default)]
+pub(super) struct OrderWriter {
+    bytes: Vec<u8>,
+    count: u64,
+    sequence: EditSequence,
+}
+
+impl OrderWriter {
+    pub fn put(&mut self, entry: &Entry) {
+        put_entry(&mut self.bytes, entry, &mut self.sequence);
+        self.count += 1;
+    }
+
+    /// Bytes so far.
+    pub fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// The number of the first entry and the message, if there is one. `last` is the number of the last entry.
+    pub fn take(&mut self, last: u64) -> Option<(u64, Vec<u8>)> {
+        let Self { bytes, count, .. } = std::mem::take(self);
+        let first = last.checked_sub(count)? + 1;
+        let mut message = vec![ENTRIES];
+        put_number(&mut message, first);
+        put_number(&mut message, count);
+        message.extend(bytes);
+        (count > 0).then_some((first, message))
+    }
+}
+
+fn read_entry(
+    reader: &mut Reader,
+    ground: &Ground,
+    stamps: &Stamps,
+    sequence: &mut EditSequence,
+) -> Result<Entry, FormatError> {
+    Ok(match reader.byte()? {
+        RULES => Entry::Rules(read_rules(reader.bytes()?)?.map(Arc::new)),
+        LOOSE => Entry::Loose(plain::from_bytes(reader.bytes()?, "search for loose pieces")?),
+        PARTS => {
+            let by = match flag(reader)? {
+                true => Some((ClientId(reader.number()?), reader.number()?)),
+                false => None,
+            };
+            Entry::Parts { by, change: Arc::new(read_change(reader, ground)?) }
+        }
+        MARK => Entry::Mark,
+        head => {
+            let from = |reader: &mut Reader| Ok((ClientId(reader.number()?), reader.number()?));
+            let ((author, own), edit) = read_edit(reader, head, stamps, sequence, from)?;
+            Entry::Edit { author, own, edit }
+        }
+    })
+}
+
+fn read_rules(bytes: &[u8]) -> Result<Option<DiggingRules>, FormatError> {
+    let rules: Option<DiggingRules> = plain::from_bytes(bytes, "rules")?;
+    match rules.as_ref().map_or(Ok(()), DiggingRules::check) {
+        Ok(()) => Ok(rules),
+        Err(_) => Err(FormatError::Invalid("rules")),
+    }
+}
+
+fn put_epoch(to: &mut Vec<u8>, epoch: &Epoch) {
+    to.extend_from_slice(&epoch.world.0.to_le_bytes());
+    to.extend_from_slice(&epoch.run.to_le_bytes());
+    put_number(to, epoch.number);
+}
+
+fn epoch(reader: &mut Reader) -> Result<Epoch, FormatError> {
+    let world = WorldId(u128::from_le_bytes(reader.array()?));
+    Ok(Epoch { world, run: u64::from_le_bytes(reader.array()?), number: reader.number()? })
+}
+
+fn put_welcome(to: &mut Vec<u8>, welcome: &Welcome) {
+    put_number(to, welcome.client.0);
+    put_epoch(to, &welcome.epoch);
+    put_number(to, welcome.own);
+    // No distance is as great as `u32::MAX + 1`.
+    put_number(to, welcome.reach.map_or(0, |reach| u64::from(reach) + 1));
+    welcome.cost.iter().for_each(|&number| put_number(to, number));
+    match &welcome.join {
+        Join::Log => to.push(LOG),
+        Join::Regions { regions, terms } => {
+            to.push(REGIONS);
+            put_number(to, (*regions).into());
+            put_terms(to, terms);
+        }
+        Join::Compare { terms } => {
+            to.push(COMPARE);
+            put_terms(to, terms);
+        }
+    }
+}
+
+fn read_welcome(reader: &mut Reader) -> Result<Welcome, FormatError> {
+    let (client, epoch, own) = (ClientId(reader.number()?), epoch(reader)?, reader.number()?);
+    let reach = match reader.number()? {
+        0 => None,
+        more => Some(u32::try_from(more - 1).map_err(|_| FormatError::Invalid("reach"))?),
+    };
+    let cost = [reader.number()?, reader.number()?];
+    let join = match reader.byte()? {
+        LOG => Join::Log,
+        REGIONS => Join::Regions { regions: small(reader)?, terms: read_terms(reader)? },
+        COMPARE => Join::Compare { terms: read_terms(reader)? },
+        _ => return Err(FormatError::Invalid("way to join")),
+    };
+    Ok(Welcome { client, epoch, own, reach, cost, join })
+}
+
+fn put_terms(to: &mut Vec<u8>, terms: &Terms) {
+    put_bytes(to, &plain::to_bytes(&terms.rules));
+    put_bytes(to, &plain::to_bytes(&terms.loose));
+    put_number(to, terms.next_field);
+}
+
+fn read_terms(reader: &mut Reader) -> Result<Box<Terms>, FormatError> {
+    let rules = read_rules(reader.bytes()?)?;
+    let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
+    Ok(Box::new(Terms { rules, loose, next_field: reader.number()? }))
+}
+
+/// Appends regions, each as the step from the one before, and something beside each.
+fn put_regions(
+    to: &mut Vec<u8>,
+    regions: impl ExactSizeIterator<Item = RegionPos>,
+    mut beside: impl FnMut(&mut Vec<u8>, usize),
+) {
+    put_number(to, regions.len() as u64);
+    let mut last = glam::IVec3::ZERO;
+    for (at, region) in regions.enumerate() {
+        put_point(to, region.0.wrapping_sub(last));
+        last = region.0;
+        beside(to, at);
+    }
+}
+
+fn read_regions<T>(
+    reader: &mut Reader,
+    most: usize,
+    mut beside: impl FnMut(&mut Reader) -> Result<T, FormatError>,
+) -> Result<Vec<(RegionPos, T)>, FormatError> {
+    let count = reader.count()?;
+    within(count, most)?;
+    let (mut regions, mut last) = (Vec::new(), glam::IVec3::ZERO);
+    for _ in 0..count {
+        last = last.wrapping_add(point(reader)?);
+        regions.push((RegionPos(last), beside(reader)?));
+    }
+    Ok(regions)
+}
+
+fn put_hashes(to: &mut Vec<u8>, tag: u8, number: u64, hashes: &RegionHashes) {
+    to.push(tag);
+    put_number(to, number);
+    let hash = |to: &mut Vec<u8>, at: usize| {
+        let hash = hashes.get(at).map_or(0, |(_, hash)| *hash);
+        to.extend_from_slice(&hash.to_le_bytes());
+    };
+    put_regions(to, hashes.iter().map(|(pos, _)| *pos), hash);
+}
+
+fn read_hashes(reader: &mut Reader) -> Result<RegionHashes, FormatError> {
+    read_regions(reader, usize::MAX, |reader| reader.array().map(u64::from_le_bytes))
+}

@@ -1,0 +1,337 @@
+//! What client and server tell each other.
+//!
+//! ```text
+//! client                                   server
+//!   Hello                             ->
+//!                                     <-   Welcome: the number n that it starts from, and what comes in the bulk lane
+//!                                     <-   Piece ...      (bulk) regions or old entries, up to n
+//!                                     <-   Entries ...    (order) all that is ordered after n
+//!   Ack                               ->                  what has come
+//!   Edits, Undo                       ->
+//!                                     <-   Entries with these, or Refused
+//!                                     <-   Hashes after a mark
+//!   Fetch, where hashes differ        ->
+//!                                     <-   Piece ...      (bulk) these regions at a later number
+//! ```
+//!
+//! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the pristine world
+//! after the entries 1 to n. Whoever has applied them in order has the same world.
+
+use std::sync::Arc;
+
+use glam::IVec3;
+
+use crate::brush::Edit;
+use crate::lattice::{BrickPos, ChunkPos, RegionPos};
+use crate::store::WorldId;
+use crate::terrain::{LooseSettings, WorldChange};
+use crate::volume::{Brick, DiggingRules, Fields};
+
+/// Changes when messages are no longer what they were.
+pub const PROTOCOL: u32 = 1;
+
+/// Most bytes of a message to a server.
+pub const MOST_TO_SERVER: usize = 64 << 10;
+/// Most bytes of a message to a client, in either lane.
+pub const MOST_TO_CLIENT: usize = 8 << 20;
+/// Most edits in a message.
+pub const MOST_EDITS: usize = 256;
+/// Most regions that a message names.
+pub const MOST_REGIONS: usize = 4096;
+
+/// Names a player. The caller gives these numbers: whoever comes back with the same one is the same player, and small ones are
+/// short in messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ClientId(pub u64);
+
+impl ClientId {
+    /// The author of what the server does of its own.
+    pub const SERVER: Self = Self(u64::MAX);
+}
+
+/// What a message is sent in. The transport delivers each lane completely and in order; between them there is no order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Lane {
+    /// What has to come soon.
+    Order,
+    /// What takes long, paced by the server.
+    Bulk,
+}
+
+/// One step of the order.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Entry {
+    /// An edit of a client's, under the rules and settings of the entries before.
+    Edit {
+        /// Who sent it.
+        author: ClientId,
+        /// The number that it had there.
+        own: u64,
+        /// The edit. Its tag is 0 and it has no stroke: these concern its author and the server.
+        edit: Edit,
+    },
+    /// From here on edits obey these rules.
+    Rules(Option<Arc<DiggingRules>>),
+    /// From here on loose pieces are searched for like this.
+    Loose(Option<LooseSettings>),
+    /// Parts take the place of others: what an undo put back, or what the game's server put.
+    Parts {
+        /// The client that asked for it, and the number that it had there.
+        by: Option<(ClientId, u64)>,
+        /// The parts.
+        change: Arc<WorldChange>,
+    },
+    /// Changes nothing. The hashes of regions that were touched since the mark before are compared here.
+    Mark,
+}
+
+/// Entries with consecutive numbers.
+#[derive(Clone, Debug)]
+pub struct Entries {
+    /// The number of the first.
+    pub first: u64,
+    /// All of them.
+    pub entries: Vec<Entry>,
+}
+
+/// A place in an order: of a world, as one run of a server continued it. Entries after a server's restart may differ from those
+/// that it had sent before, as what was not saved is lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Epoch {
+    /// The world.
+    pub world: WorldId,
+    /// The server's run, a random number.
+    pub run: u64,
+    /// The number up to which all entries are applied.
+    pub number: u64,
+}
+
+/// How a client begins, and begins again after a gap.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Hello {
+    /// [`PROTOCOL`].
+    pub protocol: u32,
+    /// [`SIMULATION`](crate::terrain::SIMULATION).
+    pub simulation: u32,
+    /// [`Ground::hash`](crate::ground::Ground::hash).
+    pub ground: u64,
+    /// Cells along the side of a chunk.
+    pub chunk_size: u32,
+    /// What it has, if it was here before.
+    pub epoch: Option<Epoch>,
+    /// Where its player is, in voxels: regions come from there outwards.
+    pub place: IVec3,
+}
+
+/// A message to the server.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ToServer {
+    /// The client begins.
+    Hello(Hello),
+    /// Edits, numbered on from `first`. A client numbers its edits and undos together, from 1, one after the other.
+    Edits {
+        /// The number of the first.
+        first: u64,
+        /// At most [`MOST_EDITS`].
+        edits: Vec<Edit>,
+    },
+    /// Takes back the last stroke of a client.
+    Undo {
+        /// Its number among the client's edits and undos.
+        own: u64,
+        /// Whose stroke.
+        of: ClientId,
+    },
+    /// Asks for regions, because they differ.
+    Fetch {
+        /// The number that the client's world is at.
+        number: u64,
+        /// At most [`MOST_REGIONS`].
+        regions: Vec<RegionPos>,
+    },
+    /// What has come.
+    Ack {
+        /// Bytes of the bulk lane's stream, from the beginning of the connection.
+        bulk: u64,
+        /// The number that the client's world is at.
+        number: u64,
+    },
+}
+
+/// How a client gets from what it has to the number that it [starts](Welcome::number) from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Join {
+    /// [Entries](ToClient::Entries) come in the bulk lane, from its own number on or earlier, up to the start.
+    Log,
+    /// All regions come in the bulk lane, as many as said. What else it has is pristine.
+    Regions {
+        /// How many.
+        regions: u32,
+        /// Rules, settings, names at the start.
+        terms: Box<Terms>,
+    },
+    /// The [table](ToClient::Table) of all regions comes in the bulk lane. It fetches those that differ, all others that it has
+    /// are pristine.
+    Compare {
+        /// Rules, settings, names at the start.
+        terms: Box<Terms>,
+    },
+}
+
+/// What holds at a number beside bricks and fields.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Terms {
+    /// The rules.
+    pub rules: Option<DiggingRules>,
+    /// How loose pieces are searched for.
+    pub loose: Option<LooseSettings>,
+    /// The greatest name that a field has had.
+    pub next_field: u64,
+}
+
+/// The server's answer to a [`Hello`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Welcome {
+    /// Who the client is.
+    pub client: ClientId,
+    /// The world, the server's run, and the number n that the client starts from: entries after it come in the order lane.
+    pub epoch: Epoch,
+    /// The last number of the client's own edits that the server has seen. Those up to it have an entry, or were refused.
+    pub own: u64,
+    /// How far from its player a client may dig, in voxels; `None` if that is not checked.
+    pub reach: Option<u32>,
+    /// The client's cost bucket: what comes back each second, and the most that it holds. An edit costs 20, and 1 for
+    /// each brick that it reaches, or 4 if it sculpts.
+    pub cost: [u64; 2],
+    /// What comes in the bulk lane.
+    pub join: Join,
+}
+
+/// Hashes of regions; 0 is a pristine one.
+pub type RegionHashes = Vec<(RegionPos, u64)>;
+
+/// A region at a number: whatever it does not name is pristine.
+#[derive(Clone, Debug)]
+pub struct RegionContent {
+    /// The number that the world is at.
+    pub number: u64,
+    /// The region.
+    pub pos: RegionPos,
+    /// Regions that follow for the same number.
+    pub left: u32,
+    /// The greatest name that a field has had.
+    pub next_field: u64,
+    /// Its bricks.
+    pub bricks: Vec<(BrickPos, Arc<Brick>)>,
+    /// The fields of all chunks that have a sample in it; chunks that are not named have none.
+    pub fields: Vec<(ChunkPos, Fields)>,
+}
+
+/// A message to a client.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum ToClient {
+    /// The client may begin.
+    Welcome(Welcome),
+    /// The client has to go.
+    Kicked(Kick),
+    /// Entries of the order.
+    Entries(Entries),
+    /// The server could not apply this entry: the regions that it reaches may differ.
+    Void {
+        /// The entry's number.
+        number: u64,
+    },
+    /// An edit or undo of the client's that does not get into the order.
+    Refused {
+        /// Its number there.
+        own: u64,
+        /// Why.
+        why: Refusal,
+    },
+    /// At this mark the regions that were touched since the mark before have these hashes, by region.
+    Hashes {
+        /// The number of the mark.
+        number: u64,
+        /// In order.
+        regions: RegionHashes,
+    },
+    /// All regions of the world at this number, by region.
+    Table {
+        /// The number.
+        number: u64,
+        /// In order.
+        regions: RegionHashes,
+    },
+    /// A region.
+    Region(RegionContent),
+    /// Everything up to this number is saved.
+    Durable {
+        /// The number.
+        number: u64,
+    },
+    /// Bytes of the bulk lane's stream: see [`BulkReader`](super::BulkReader).
+    Piece(Vec<u8>),
+}
+
+/// Why an edit or an undo was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The player is too far away, or the server does not know where it is.
+    #[error("too far away")]
+    TooFar,
+    /// The client's cost bucket is empty.
+    #[error("too much at once")]
+    Cost,
+    /// The game forbids it.
+    #[error("not allowed")]
+    Forbidden,
+    /// It lies outside the world.
+    #[error("outside the world")]
+    OutsideWorld,
+    /// The server has too much to do.
+    #[error("too much work waits")]
+    Overloaded,
+    /// There is nothing to undo.
+    #[error("nothing to undo")]
+    Nothing,
+    /// Others have changed since what would be undone.
+    #[error("others have dug there since")]
+    Touched,
+    /// What it would put back is too much for a message.
+    #[error("too large")]
+    TooLarge,
+    /// The edit came before the client had begun.
+    #[error("the client has not joined")]
+    NotJoined,
+}
+
+/// Why a client has to go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Kick {
+    /// It speaks another [`PROTOCOL`].
+    #[error("another version of the protocol")]
+    Protocol,
+    /// It has another [`SIMULATION`](crate::terrain::SIMULATION).
+    #[error("another version of the simulation")]
+    Simulation,
+    /// It has another ground.
+    #[error("another ground")]
+    Ground,
+    /// It has another chunk size.
+    #[error("another chunk size")]
+    ChunkSize,
+    /// It sent too many messages that mean nothing.
+    #[error("too many invalid messages")]
+    Malformed,
+    /// It sent far more than it may.
+    #[error("flooding")]
+    Flood,
+    /// The game wants it.
+    #[error("kicked")]
+    ByGame,
+}

@@ -1,0 +1,29 @@
+//! Digging together: one server owns the order of all edits, and clients see their own at once. Without Bevy and without
+//! transport: bytes in, bytes out, and a clock that the caller gives.
+//!
+//! Edits are integers and their results are equal on every machine, so the order of edits is all that has to be sent. The
+//! [`Server`] numbers what clients ask for and sends it on before it has applied it itself.
+//!
+//! | file | what it holds |
+//! | --- | --- |
+//! | [`message`] | what client and server tell each other |
+//! | `encoding` | these in bytes |
+//! | `stamps` | images of stamps, which are named and not sent |
+//! | `bulk` | the lane of what takes long: regions and old entries, as one stream that is cut into pieces |
+//! | `server` | the server: order, validation, undo, joins |
+
+mod bulk;
+mod encoding;
+pub mod message;
+mod server;
+mod stamps;
+
+pub use bulk::BulkReader;
+pub use message::{
+    ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent, RegionHashes,
+    ToClient, ToServer, Welcome,
+};
+pub use server::{
+    Outgoing, Permission, Rate, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
+};
+pub use stamps::{StampId, Stamps};

@@ -1,0 +1,161 @@
+//! Entries become the world.
+
+use std::sync::Arc;
+
+use super::super::message::{Entry, Refusal, ToClient};
+use super::strokes::NoUndo;
+use super::{Ordered, Server, ServerEvent, UndoPolicy, UndoRequest};
+use crate::brush::Edit;
+use crate::lattice::RegionPos;
+use crate::terrain::{ChangeError, Receipt, Rejection, WorldChange};
+
+/// Most bytes of what an undo puts back: it goes to all clients in one message.
+const MOST_PARTS: usize = 1 << 20;
+
+impl Server {
+    /// Applies entries, as much as one call may.
+    pub(super) fn apply(&mut self) {
+        let mut left = self.settings.work;
+        let mut is_first = true;
+        while !self.waiting.is_empty() && (is_first || left > 0) {
+            left = left.saturating_sub(self.apply_some(left));
+            is_first = false;
+        }
+        while self.waiting.is_empty()
+            && let Some(request) = self.undos.pop_front()
+        {
+            self.undo(&request);
+        }
+    }
+
+    /// Applies the next entry, or edits that go into one transaction; returns their work.
+    fn apply_some(&mut self, most: u64) -> u64 {
+        let count = self.edits_together(most);
+        if count > 0 {
+            return self.apply_edits(count);
+        }
+        let Some(Ordered { entry, .. }) = self.waiting.pop_front() else { return 0 };
+        let number = self.applied + 1;
+        match entry {
+            Entry::Rules(rules) => {
+                // They were checked when they were ordered.
+                let rules = rules.map(|rules| (*rules).clone()).unwrap_or_default();
+                self.terrain.set_rules(rules).unwrap_or_default();
+            }
+            Entry::Loose(loose) => self.terrain.set_loose(loose),
+            Entry::Parts { change, .. } => self.put_parts(number, &change),
+            Entry::Mark => self.tell_hashes(number),
+            Entry::Edit { .. } => {}
+        }
+        self.applied = number;
+        1
+    }
+
+    /// How many edits at the front go into one transaction: all in a row, or where strokes are kept, those of one stroke.
+    fn edits_together(&self, most: u64) -> usize {
+        let keeps_strokes = self.settings.undo != UndoPolicy::Nobody;
+        let (mut work, mut first) = (0_u64, None);
+        let goes_on = |ordered: &&Ordered| {
+            let Entry::Edit { author, .. } = &ordered.entry else { return false };
+            let stroke = (*author, ordered.labels.1);
+            let goes_with = |first| !keeps_strokes || (stroke.1.is_some() && stroke == first);
+            let fits = first.is_none_or(|first| goes_with(first) && work + ordered.cost <= most);
+            work += ordered.cost;
+            first = first.or(Some(stroke));
+            fits
+        };
+        self.waiting.iter().take_while(goes_on).count()
+    }
+
+    fn apply_edits(&mut self, count: usize) -> u64 {
+        let (mut edits, mut work, mut stroke) = (Vec::with_capacity(count), 0, None);
+        for Ordered { entry, labels: (tag, label), cost } in self.waiting.drain(..count) {
+            if let Entry::Edit { author, edit, .. } = entry {
+                stroke = Some((author, label));
+                edits.push(edit.with_labels(tag, label));
+                work += cost;
+            }
+        }
+        self.waiting_cost = self.waiting_cost.saturating_sub(work);
+        let receipts = self.transact(&edits, stroke.filter(|_| self.settings.undo != UndoPolicy::Nobody));
+        let first = self.applied + 1;
+        self.applied += count as u64;
+        for (number, receipt) in (first..).zip(receipts) {
+            if is_void(&receipt) {
+                self.void(number);
+            }
+        }
+        work.max(1)
+    }
+
+    /// Applies edits, and notes what they touch.
+    fn transact(&mut self, edits: &[Edit], stroke: Option<(super::ClientId, Option<u64>)>) -> Vec<Receipt> {
+        self.terrain.submit_edits(edits);
+        let mut receipts = self.terrain.take_answered();
+        while let Some(transaction) = self.terrain.begin() {
+            let commit = transaction.run();
+            let change = commit.change();
+            if let Some((player, label)) = stroke
+                && !change.bricks.is_empty()
+            {
+                self.strokes.record(player, label, self.terrain.world(), &change);
+            }
+            // This terrain is waiting for it.
+            receipts.extend(self.terrain.commit(commit).unwrap_or_default());
+            self.touch(&change);
+        }
+        receipts
+    }
+
+    fn touch(&mut self, change: &WorldChange) {
+        let number = self.applied + 1;
+        for (pos, _) in &change.bricks {
+            let region = RegionPos::of(*pos);
+            self.touched.insert(region);
+            self.changed.insert(region, number);
+        }
+    }
+
+    fn put_parts(&mut self, number: u64, change: &WorldChange) {
+        match self.terrain.apply_change(change.clone(), None) {
+            Ok(_) => self.touch(change),
+            Err(ChangeError::Panicked | ChangeError::Overloaded) => self.void(number),
+            // Nothing changed, and so it is everywhere.
+            Err(_) => {}
+        }
+    }
+
+    fn void(&mut self, number: u64) {
+        self.figures.voids += 1;
+        self.tell(ServerEvent::Void(number));
+        self.send_to_all(&ToClient::Void { number });
+    }
+
+    fn tell_hashes(&mut self, number: u64) {
+        let world = self.terrain.world();
+        let touched = std::mem::take(&mut self.touched);
+        let regions = touched.into_iter().map(|region| (region, world.region_hash(region))).collect();
+        self.send_to_all(&ToClient::Hashes { number, regions });
+    }
+
+    /// Takes a stroke back in the world as it is, with all entries applied.
+    fn undo(&mut self, request: &UndoRequest) {
+        let undone = self.strokes.undo(request.of, self.terrain.world());
+        let change = match undone {
+            Ok(change) => Arc::new(change),
+            Err(NoUndo::Nothing) => return self.refuse(request.by, request.own, Refusal::Nothing),
+            Err(NoUndo::Touched) => return self.refuse(request.by, request.own, Refusal::Touched),
+        };
+        let entry = Entry::Parts { by: Some((request.by, request.own)), change };
+        if super::super::encoding::entry_bytes(&entry) > MOST_PARTS {
+            return self.refuse(request.by, request.own, Refusal::TooLarge);
+        }
+        self.order(entry);
+        self.apply_some(u64::MAX);
+    }
+}
+
+/// Does the receipt tell of what may be otherwise on another machine?
+fn is_void(receipt: &Receipt) -> bool {
+    matches!(receipt.outcome, Err(Rejection::Panicked | Rejection::Overloaded | Rejection::TerrainGone))
+}

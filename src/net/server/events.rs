@@ -1,0 +1,46 @@
+//! What a server tells the game, and what it counts.
+
+use crate::lattice::RegionPos;
+
+use super::super::message::{ClientId, Kick};
+
+/// What a game or an operator may want to know.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ServerEvent {
+    /// A client has joined, or has come back after a gap.
+    Joined(ClientId),
+    /// A client was kicked: its connection should be closed once what waits for it is sent.
+    Kicked(ClientId, Kick),
+    /// A client's world differed, and it fetched these regions. This is a bug: of the plugin's, of the client's, or of its machine.
+    Repaired(ClientId, Vec<RegionPos>),
+    /// An entry could not be applied. This is a bug of the plugin's.
+    Void(u64),
+}
+
+/// What a server has counted since it began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ServerFigures {
+    /// Messages that came.
+    pub messages: u64,
+    /// Those of clients that are not connected.
+    pub strays: u64,
+    /// Those that meant nothing.
+    pub malformed: u64,
+    /// Edits that came.
+    pub edits: u64,
+    /// Edits and undos that were refused.
+    pub refused: u64,
+    /// Entries that were ordered.
+    pub ordered: u64,
+    /// Entries that could not be applied.
+    pub voids: u64,
+    /// Clients that were kicked.
+    pub kicked: u64,
+    /// Regions that clients fetched because they differed.
+    pub repairs: u64,
+    /// Bytes of the order lane to all clients.
+    pub order_bytes: u64,
+    /// Bytes of the bulk lane to all clients.
+    pub bulk_bytes: u64,
+}

@@ -1,0 +1,381 @@
+//! The server: it owns the order. It numbers what clients ask for, sends it on, and applies it to its own terrain, which nobody
+//! looks at.
+//!
+//! | file | what it does |
+//! | --- | --- |
+//! | `settings`, `events` | what it allows, what it tells and counts |
+//! | `session` | a client that is connected |
+//! | `receive`, `validation`, `bucket` | messages that come, and what is refused |
+//! | `order_log` | the latest entries, as they were sent |
+//! | `apply` | entries become the world |
+//! | `strokes` | what may be taken back |
+//! | `join`, `sender` | clients that come, come back, or differ; the bulk lane |
+//! | `save` | a server that survives a restart |
+
+mod apply;
+mod bucket;
+mod events;
+mod join;
+mod order_log;
+mod receive;
+mod save;
+mod sender;
+mod session;
+mod settings;
+mod strokes;
+mod validation;
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
+
+use glam::IVec3;
+
+use super::encoding::OrderWriter;
+use super::message::{ClientId, Entry, Epoch, Kick, Lane, ToClient};
+use super::stamps::Stamps;
+use crate::brush::Edit;
+use crate::lattice::RegionPos;
+use crate::store::WorldId;
+use crate::terrain::{LooseSettings, Meshing, Terrain, WorkLimits, WorldChange};
+use crate::volume::{DiggingRules, RulesError};
+pub use bucket::Rate;
+pub use events::{ServerEvent, ServerFigures};
+use join::Fetch;
+use order_log::OrderLog;
+use session::Session;
+pub use settings::{Reach, ServerSettings, UndoPolicy};
+use strokes::Strokes;
+
+/// Says whether a client may do an edit.
+pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
+
+/// The most events that wait to be taken.
+const MOST_EVENTS: usize = 4096;
+
+/// Clients whose numbers are remembered, at most, beside those that are connected.
+const MOST_REMEMBERED: usize = 1 << 16;
+
+/// A message with entries is sent once it has so many bytes, even if more are ordered at the same time.
+const FULL_MESSAGE: usize = 16 << 10;
+
+/// A message that waits to be sent.
+pub type Outgoing = (ClientId, Lane, Vec<u8>);
+
+/// An entry that was ordered and not yet applied.
+struct Ordered {
+    entry: Entry,
+    /// Of an edit: the tag and the stroke that it had at its author's.
+    labels: (u64, Option<u64>),
+    /// Of an edit.
+    cost: u64,
+}
+
+/// An undo that waits until all entries before it are applied.
+struct UndoRequest {
+    by: ClientId,
+    own: u64,
+    of: ClientId,
+}
+
+/// The server of a world: bytes in, bytes out.
+///
+/// In each frame: [`receive`](Self::receive) every message that came, send what [`take_outgoing`](Self::take_outgoing) returns, then
+/// [`advance`](Self::advance), which takes as long as edits take, and send again. Times count from any start and never run back.
+pub struct Server {
+    terrain: Terrain,
+    settings: ServerSettings,
+    stamps: Stamps,
+    permission: Permission,
+    /// The world, this run, and the number of the last entry.
+    epoch: Epoch,
+    /// The number of the last entry that is applied.
+    applied: u64,
+    waiting: VecDeque<Ordered>,
+    waiting_cost: u64,
+    writer: OrderWriter,
+    log: OrderLog,
+    undos: VecDeque<UndoRequest>,
+    strokes: Strokes,
+    /// Regions that were touched since the last mark.
+    touched: BTreeSet<RegionPos>,
+    /// The number at which each region changed last, as far as this run knows.
+    changed: BTreeMap<RegionPos, u64>,
+    last_mark: Duration,
+    /// The number of the last mark.
+    marked: u64,
+    sessions: BTreeMap<ClientId, Session>,
+    /// The last number of each client's edits that was seen.
+    own_numbers: BTreeMap<ClientId, u64>,
+    fetches: Vec<Fetch>,
+    durable: u64,
+    /// Revisions of a store, and the numbers that are durable with them.
+    saved: VecDeque<(u64, u64)>,
+    /// The revision of the last commit that was handed over.
+    saved_revision: u64,
+    /// The last number that was handed over to a store.
+    saved_number: u64,
+    outgoing: Vec<Outgoing>,
+    events: VecDeque<ServerEvent>,
+    figures: ServerFigures,
+}
+
+impl fmt::Debug for Server {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Server")
+            .field("epoch", &self.epoch)
+            .field("applied", &self.applied)
+            .field("clients", &self.sessions.len())
+            .field("figures", &self.figures)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Server {
+    /// A server of a world that is not saved.
+    pub fn new(terrain: Terrain, settings: ServerSettings) -> Self {
+        Self::at(terrain, WorldId::random(), 0, settings)
+    }
+
+    /// A server of a terrain that is at this number of its world's order.
+    fn at(mut terrain: Terrain, world: WorldId, number: u64, settings: ServerSettings) -> Self {
+        terrain.set_meshing(Meshing::Never);
+        terrain.set_undo_budget(0);
+        terrain.set_work_limits(WorkLimits::UNBOUNDED);
+        let run = WorldId::random().0 as u64;
+        Self {
+            terrain,
+            settings,
+            stamps: Stamps::default(),
+            permission: Box::new(|_, _| true),
+            epoch: Epoch { world, run, number },
+            applied: number,
+            waiting: VecDeque::new(),
+            waiting_cost: 0,
+            writer: OrderWriter::default(),
+            log: OrderLog::new(settings.log_bytes),
+            undos: VecDeque::new(),
+            strokes: Strokes::new(settings.undo_bytes),
+            touched: BTreeSet::new(),
+            changed: BTreeMap::new(),
+            last_mark: Duration::ZERO,
+            marked: number,
+            sessions: BTreeMap::new(),
+            own_numbers: BTreeMap::new(),
+            fetches: Vec::new(),
+            durable: number,
+            saved: VecDeque::new(),
+            saved_revision: 0,
+            saved_number: number,
+            outgoing: Vec::new(),
+            events: VecDeque::new(),
+            figures: ServerFigures::default(),
+        }
+    }
+
+    /// The terrain, with all entries up to [`applied`](Self::applied).
+    pub fn terrain(&self) -> &Terrain {
+        &self.terrain
+    }
+
+    /// The world, this run of the server, and the number of the last entry.
+    pub fn epoch(&self) -> Epoch {
+        self.epoch
+    }
+
+    /// The number of the last entry that the server has applied itself.
+    pub fn applied(&self) -> u64 {
+        self.applied
+    }
+
+    /// Everything up to this number is saved.
+    pub fn durable(&self) -> u64 {
+        self.durable
+    }
+
+    /// What was counted so far.
+    pub fn figures(&self) -> ServerFigures {
+        self.figures
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &ServerSettings {
+        &self.settings
+    }
+
+    /// The images that stamps may have: the same as those of the clients.
+    pub fn stamps_mut(&mut self) -> &mut Stamps {
+        &mut self.stamps
+    }
+
+    /// Sets who may do which edit; asked for each, after all other checks. By default everybody may do everything.
+    pub fn set_permission(&mut self, permission: impl Fn(ClientId, &Edit) -> bool + Send + Sync + 'static) {
+        self.permission = Box::new(permission);
+    }
+
+    /// Enters that a client is connected. If it was so already, it begins anew.
+    pub fn connect(&mut self, client: ClientId, now: Duration) {
+        self.disconnect(client);
+        self.sessions.insert(client, Session::new(&self.settings, now));
+        if self.own_numbers.len() > MOST_REMEMBERED {
+            let sessions = &self.sessions;
+            self.own_numbers.retain(|client, _| sessions.contains_key(client));
+        }
+    }
+
+    /// Enters that a client is gone. What was to be sent to it is dropped.
+    pub fn disconnect(&mut self, client: ClientId) {
+        self.sessions.remove(&client);
+        self.fetches.retain(|fetch| fetch.client != client);
+        self.outgoing.retain(|(to, ..)| *to != client);
+    }
+
+    /// Sends a client away. It is told so; close its connection then.
+    pub fn kick(&mut self, client: ClientId) {
+        self.kick_for(client, Kick::ByGame);
+    }
+
+    fn kick_for(&mut self, client: ClientId, why: Kick) {
+        if self.sessions.remove(&client).is_some() {
+            self.figures.kicked += 1;
+            self.outgoing.retain(|(to, ..)| *to != client);
+            self.send(client, &ToClient::Kicked(why));
+            self.tell(ServerEvent::Kicked(client, why));
+        }
+    }
+
+    /// The clients that are connected, in order.
+    pub fn clients(&self) -> impl Iterator<Item = ClientId> {
+        self.sessions.keys().copied()
+    }
+
+    /// The number that a client's world is at, as it has acknowledged; `None` if it has not joined.
+    pub fn acknowledged(&self, client: ClientId) -> Option<u64> {
+        let session = self.sessions.get(&client).filter(|session| session.has_joined());
+        session.map(|session| session.acknowledged)
+    }
+
+    /// Says where a client's player is, in voxels: from there its [reach](ServerSettings::reach) counts. `None`: nowhere.
+    pub fn set_place(&mut self, client: ClientId, place: Option<IVec3>) {
+        if let Some(session) = self.sessions.get_mut(&client) {
+            session.place = place;
+        }
+    }
+
+    /// Says whether a client may take back what others did: see [`UndoPolicy`].
+    pub fn set_administrator(&mut self, client: ClientId, is_one: bool) {
+        if let Some(session) = self.sessions.get_mut(&client) {
+            session.is_administrator = is_one;
+        }
+    }
+
+    /// Sets the rules for edits that come later.
+    ///
+    /// # Errors
+    /// When they are for a material that nothing has.
+    pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
+        rules.check()?;
+        let rules = (!rules.is_empty()).then(|| Arc::new(rules));
+        self.order(Entry::Rules(rules));
+        Ok(())
+    }
+
+    /// Sets how edits that come later search for loose pieces.
+    pub fn set_loose(&mut self, loose: Option<LooseSettings>) {
+        self.order(Entry::Loose(loose));
+    }
+
+    /// Orders an edit of the game's own, which is not checked. Its author is [`ClientId::SERVER`].
+    pub fn edit(&mut self, edit: Edit) {
+        self.order_edit(ClientId::SERVER, 0, edit, 0);
+    }
+
+    /// Orders that parts take the place of others.
+    pub fn put(&mut self, change: WorldChange) {
+        self.order(Entry::Parts { by: None, change: Arc::new(change) });
+    }
+
+    fn order_edit(&mut self, author: ClientId, own: u64, edit: Edit, cost: u64) {
+        let labels = (edit.tag(), edit.stroke());
+        let entry = Entry::Edit { author, own, edit: edit.with_labels(0, None) };
+        self.enter(Ordered { entry, labels, cost });
+    }
+
+    /// Gives an entry the next number.
+    fn order(&mut self, entry: Entry) {
+        self.enter(Ordered { entry, labels: (0, None), cost: 0 });
+    }
+
+    fn enter(&mut self, ordered: Ordered) {
+        self.epoch.number += 1;
+        self.figures.ordered += 1;
+        self.waiting_cost += ordered.cost;
+        self.writer.put(&ordered.entry);
+        self.waiting.push_back(ordered);
+        if self.writer.len() >= FULL_MESSAGE {
+            self.flush();
+        }
+    }
+
+    /// Sends what was ordered.
+    fn flush(&mut self) {
+        let last = self.epoch.number;
+        let Some((first, message)) = self.writer.take(last) else { return };
+        for (client, session) in &self.sessions {
+            if session.has_joined() {
+                self.figures.order_bytes += message.len() as u64;
+                self.outgoing.push((*client, Lane::Order, message.clone()));
+            }
+        }
+        self.log.push(first, last, message.into(), self.applied);
+    }
+
+    fn send(&mut self, client: ClientId, message: &ToClient) {
+        let bytes = message.to_bytes();
+        self.figures.order_bytes += bytes.len() as u64;
+        self.outgoing.push((client, Lane::Order, bytes));
+    }
+
+    /// Sends a message to all clients that have joined, after what was ordered.
+    fn send_to_all(&mut self, message: &ToClient) {
+        self.flush();
+        let bytes = message.to_bytes();
+        for (client, session) in &self.sessions {
+            if session.has_joined() {
+                self.figures.order_bytes += bytes.len() as u64;
+                self.outgoing.push((*client, Lane::Order, bytes.clone()));
+            }
+        }
+    }
+
+    fn tell(&mut self, event: ServerEvent) {
+        if self.events.len() == MOST_EVENTS {
+            self.events.pop_front();
+        }
+        self.events.push_back(event);
+    }
+
+    /// Applies what was ordered, welcomes clients that have come, and sends what takes long, as much as may be sent by now.
+    pub fn advance(&mut self, now: Duration) {
+        if now.saturating_sub(self.last_mark) >= self.settings.mark && self.epoch.number > self.marked {
+            self.order(Entry::Mark);
+            (self.last_mark, self.marked) = (now, self.epoch.number);
+        }
+        self.apply();
+        self.welcome_all();
+        self.send_bulk(now);
+    }
+
+    /// Messages that are to be sent, in order; each is returned once. Each lane of each client has to deliver all of them in
+    /// order.
+    pub fn take_outgoing(&mut self) -> Vec<Outgoing> {
+        self.flush();
+        std::mem::take(&mut self.outgoing)
+    }
+
+    /// What happened since the last call; if nobody asks, the latest 4096 are kept.
+    pub fn take_events(&mut self) -> Vec<ServerEvent> {
+        std::mem::take(&mut self.events).into()
+    }
+}

@@ -1,0 +1,91 @@
+//! What a server allows and how much it sends.
+
+use std::time::Duration;
+
+use super::bucket::Rate;
+
+/// How far from its player a client may dig, measured to the middle of the edit. A player that moves is where the server knows it
+/// to be, or as far from there as it comes in the latency.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reach {
+    /// In voxels.
+    pub distance: u32,
+    /// The fastest player, in voxels a second.
+    pub speed: u32,
+    /// The greatest latency that is allowed for.
+    pub latency: Duration,
+}
+
+impl Reach {
+    /// In voxels, with the slack for latency.
+    pub fn allowed(&self) -> u32 {
+        let slack = u128::from(self.speed) * self.latency.as_millis() / 1000;
+        self.distance.saturating_add(u32::try_from(slack).unwrap_or(u32::MAX))
+    }
+}
+
+/// Who may take back strokes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UndoPolicy {
+    /// Nobody: nothing is kept for it.
+    #[default]
+    Nobody,
+    /// [Administrators](super::Server::set_administrator) take back the last stroke of any player.
+    Administrators,
+    /// Each player takes back their own, and administrators those of all.
+    Own,
+}
+
+/// What a server allows and how much it sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ServerSettings {
+    /// How far from its player a client may dig; `None` does not check it. Otherwise a client whose
+    /// [place](super::Server::set_place) is not known may not dig.
+    pub reach: Option<Reach>,
+    /// What a client's edits may cost. An edit costs 20 and 1 for each brick that it reaches, or 4 if it sculpts; those that cost more
+    /// are refused.
+    pub cost: Rate,
+    /// A client is kicked once its messages cost so many times as much as `cost` allows, accepted or not.
+    pub flood: u64,
+    /// Invalid messages: a client with more is kicked.
+    pub malformed: Rate,
+    /// Who may take back strokes. Anything but [`UndoPolicy::Nobody`] makes a transaction of each stroke.
+    pub undo: UndoPolicy,
+    /// Bytes of strokes that may be taken back.
+    pub undo_bytes: usize,
+    /// Bytes of old entries that are kept for clients that come back.
+    pub log_bytes: usize,
+    /// Bytes of the bulk lane for each client.
+    pub bulk: Rate,
+    /// Bytes of the bulk lane that a client may not have acknowledged.
+    pub window: u64,
+    /// Most bytes of a piece of the bulk lane.
+    pub piece: usize,
+    /// Most work of an [`advance`](super::Server::advance), in costs of edits; one edit is applied in any case.
+    pub work: u64,
+    /// Most work that may wait; edits beyond are refused.
+    pub waiting: u64,
+    /// The time between marks.
+    pub mark: Duration,
+}
+
+impl Default for ServerSettings {
+    /// For some 64 players who dig by hand on a server of one core.
+    fn default() -> Self {
+        Self {
+            reach: None,
+            cost: Rate { per_second: 4_000, burst: 16_000 },
+            flood: 4,
+            malformed: Rate { per_second: 1, burst: 20 },
+            undo: UndoPolicy::Nobody,
+            undo_bytes: 64 << 20,
+            log_bytes: 8 << 20,
+            bulk: Rate { per_second: 256 << 10, burst: 32 << 10 },
+            window: 192 << 10,
+            piece: 1 << 10,
+            work: 100_000,
+            waiting: 6_000_000,
+            mark: Duration::from_secs(1),
+        }
+    }
+}

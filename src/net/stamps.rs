@@ -1,0 +1,52 @@
+//! Images of stamps: both sides have them, messages name them.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+use xxhash_rust::xxh3::Xxh3Default;
+
+use crate::brush::Edit;
+use crate::ground::GreyImage;
+
+/// Names an image by its content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct StampId(pub u64);
+
+impl StampId {
+    /// The name of an image: a hash of its size and samples.
+    pub fn of(image: &GreyImage) -> Self {
+        let mut hash = Xxh3Default::new();
+        hash.update(&image.width().to_le_bytes());
+        hash.update(&image.height().to_le_bytes());
+        let samples = image.samples().chunks(256);
+        samples.for_each(|some| {
+            let bytes: Vec<u8> = some.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+            hash.update(&bytes);
+        });
+        Self(hash.digest())
+    }
+}
+
+/// The images that stamps may have. Edits with other images are not sent, and refused where they come.
+#[derive(Clone, Debug, Default)]
+pub struct Stamps(FxHashMap<StampId, Arc<GreyImage>>);
+
+impl Stamps {
+    /// Adds an image.
+    pub fn add(&mut self, image: impl Into<Arc<GreyImage>>) -> StampId {
+        let image = image.into();
+        let id = StampId::of(&image);
+        self.0.insert(id, image);
+        id
+    }
+
+    /// The image of this name.
+    pub fn get(&self, id: StampId) -> Option<&Arc<GreyImage>> {
+        self.0.get(&id)
+    }
+
+    /// Can the edit be sent? It can unless it is a stamp whose image is not here.
+    pub fn can_send(&self, edit: &Edit) -> bool {
+        edit.stamp_image().is_none_or(|image| self.0.contains_key(&StampId::of(image)))
+    }
+}

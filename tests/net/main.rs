@@ -1,0 +1,4 @@
+//! Digging together: one order, the same world everywhere.
+
+// mod hostile;
+// mod server;
