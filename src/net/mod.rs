@@ -10,19 +10,25 @@
 //! | `encoding` | these in bytes |
 //! | `stamps` | images of stamps, which are named and not sent |
 //! | `bulk` | the lane of what takes long: regions and old entries, as one stream that is cut into pieces |
+//! | `client` | the client: prediction, joins, repair |
+//! | `replica` | the world of the order, and what is shown of it |
 //! | `server` | the server: order, validation, undo, joins |
 
 mod bulk;
+mod client;
 mod encoding;
 pub mod message;
+mod replica;
 mod server;
 mod stamps;
 
 pub use bulk::BulkReader;
+pub use client::{Client, ClientEvent, ClientFigures};
 pub use message::{
     ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent, RegionHashes,
     ToClient, ToServer, Welcome,
 };
+pub use replica::ShownChange;
 pub use server::{
     Outgoing, Permission, Rate, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
 };

@@ -17,6 +17,7 @@ mod by_brick;
 mod change;
 mod commit;
 mod dirty;
+mod draft;
 mod draft_group;
 mod drawn_cut;
 mod field_log;
@@ -61,6 +62,7 @@ mod unseen;
 mod world;
 
 pub use commit::Commit;
+pub use draft::Draft;
 pub use drawn_cut::{ChooseCut, DrawnCut, NodeUpdate};
 pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};

@@ -1,0 +1,201 @@
+//! Getting to where the server is.
+
+use std::time::Duration;
+
+use glam::IVec3;
+
+use super::super::message::{
+    Join, MOST_EDITS, MOST_REGIONS, RegionContent, RegionHashes, Terms, ToServer, Welcome,
+};
+use super::{Client, ClientEvent};
+use crate::brush::Edit;
+use crate::lattice::RegionPos;
+use crate::terrain::WorldChange;
+
+/// How far a client has come.
+pub(super) enum Stage {
+    /// There is no connection.
+    Apart,
+    /// It waits for its welcome.
+    Greeting { since: Duration },
+    /// Old entries come, up to a number. The server has seen own edits up to `own`.
+    ByLog { to: u64, own: u64 },
+    /// Regions at a number come, so many more.
+    ByRegions { to: u64, left: usize },
+    /// The table of regions at a number comes.
+    ByTable { to: u64 },
+    /// It follows the order.
+    Following,
+}
+
+impl Client {
+    /// The server has welcomed it.
+    pub(super) fn begin(&mut self, welcome: Welcome) {
+        let Welcome { client, epoch, own, reach, join, .. } = welcome;
+        self.repair = None;
+        self.marks.clear();
+        if self.epoch.is_some_and(|known| known.run != epoch.run || known.world != epoch.world) {
+            self.waiting.clear();
+        }
+        self.id = Some(client);
+        self.received = epoch.number;
+        self.next_own = self.next_own.max(own.saturating_add(1));
+        let to = epoch.number;
+        // Until it is there, it has what it had.
+        let known = self.epoch.map_or(0, |known| known.number);
+        match join {
+            Join::Log => {
+                self.epoch = Some(super::Epoch { number: known, ..epoch });
+                self.stage = Stage::ByLog { to, own };
+            }
+            Join::Regions { regions, terms } => {
+                self.epoch = Some(super::Epoch { number: to, ..epoch });
+                self.waiting.retain(|number, _| *number > to);
+                self.restart(&terms, false, own);
+                self.stage = Stage::ByRegions { to, left: regions as usize };
+            }
+            Join::Compare { terms } => {
+                self.epoch = Some(super::Epoch { number: to, ..epoch });
+                self.waiting.retain(|number, _| *number > to);
+                self.restart(&terms, true, own);
+                self.stage = Stage::ByTable { to };
+            }
+        }
+        self.events.push(ClientEvent::Welcomed { client, reach });
+        self.send_again(own);
+        self.finish_log();
+        self.finish_regions();
+    }
+
+    /// Goes on from another place of the order.
+    fn restart(&mut self, terms: &Terms, keeps_world: bool, own: u64) {
+        if self.replica.restart(terms, keeps_world).is_err() {
+            self.figures.malformed += 1;
+        }
+        // What became of these was told while the client was away; if they were done, the world holds them.
+        for tag in self.take_answered(own) {
+            self.events.push(ClientEvent::Confirmed { tag, receipt: None });
+        }
+    }
+
+    /// Takes back own edits up to a number; returns their tags.
+    fn take_answered(&mut self, own: u64) -> Vec<u64> {
+        let answered: Vec<u64> =
+            self.replica.pending().map(|(number, _)| number).filter(|number| *number <= own).collect();
+        answered.into_iter().filter_map(|number| Some(self.replica.take_back(number)?.tag())).collect()
+    }
+
+    /// Sends own edits that the server has not seen, and those from before the first welcome.
+    fn send_again(&mut self, own: u64) {
+        self.unsent.clear();
+        let pending: Vec<(u64, Edit)> = self
+            .replica
+            .pending()
+            .filter(|(number, _)| *number > own)
+            .map(|(number, edit)| (number, edit.clone()))
+            .collect();
+        let mut rest = pending.as_slice();
+        while let Some((first, _)) = rest.first() {
+            let in_row = rest.iter().zip(*first..).take_while(|((number, _), expected)| number == expected);
+            let count = in_row.count().min(MOST_EDITS);
+            let (row, others) = rest.split_at(count);
+            let edits = row.iter().map(|(_, edit)| edit.clone()).collect();
+            self.outgoing.push(ToServer::Edits { first: *first, edits }.to_bytes());
+            rest = others;
+        }
+        std::mem::take(&mut self.early).into_iter().for_each(|edit| self.dig(edit));
+    }
+
+    /// Has it come to the end of old entries?
+    pub(super) fn finish_log(&mut self) {
+        if let Stage::ByLog { to, own } = self.stage
+            && self.number() >= to
+        {
+            // They were refused while the client was away.
+            for tag in self.take_answered(own) {
+                self.events.push(ClientEvent::Refused { tag, why: None });
+            }
+            self.follow_from_now();
+        }
+    }
+
+    /// Have all regions come?
+    fn finish_regions(&mut self) {
+        if let Stage::ByRegions { left: 0, .. } = self.stage {
+            self.follow_from_now();
+        }
+    }
+
+    fn follow_from_now(&mut self) {
+        self.stage = Stage::Following;
+        if !self.is_playable {
+            self.is_playable = true;
+            self.events.push(ClientEvent::Playable);
+        }
+        self.events.push(ClientEvent::Joined);
+    }
+
+    /// The table of all regions: those that differ are fetched, and what the server has not is pristine.
+    pub(super) fn take_table(&mut self, number: u64, regions: &RegionHashes) {
+        let Stage::ByTable { to } = self.stage else { return };
+        if number != to {
+            return;
+        }
+        let world = self.replica.world();
+        let differs =
+            |&(region, hash): &(RegionPos, u64)| (world.region_hash(region) != hash).then_some(region);
+        let wanted: Vec<RegionPos> = regions.iter().filter_map(differs).collect();
+        let is_known = |region: &RegionPos| regions.binary_search_by_key(region, |(pos, _)| *pos).is_ok();
+        let gone: Vec<RegionPos> = world.regions().filter(|region| !is_known(region)).collect();
+        let next_field = world.next_field();
+        for region in gone {
+            let change = self.replica.region_change(region, Vec::new(), Vec::new(), next_field);
+            self.put(change);
+        }
+        for regions in wanted.chunks(MOST_REGIONS) {
+            self.outgoing.push(ToServer::Fetch { number, regions: regions.to_vec() }.to_bytes());
+        }
+        self.stage = Stage::ByRegions { to, left: wanted.len() };
+        self.finish_regions();
+    }
+
+    fn put(&mut self, change: WorldChange) {
+        match self.replica.put(change) {
+            Ok(applied) => self.marks.touch(applied.bricks),
+            Err(_) => self.figures.malformed += 1,
+        }
+    }
+
+    /// A region that it waits for.
+    pub(super) fn take_region(&mut self, content: RegionContent) {
+        if let Some(repair) = &mut self.repair {
+            repair.add(content);
+            return;
+        }
+        let Stage::ByRegions { to, left } = self.stage else { return };
+        if content.number != to || left == 0 {
+            return;
+        }
+        if distance(content.pos, self.place) > i64::from(self.near) && !self.is_playable {
+            self.is_playable = true;
+            self.events.push(ClientEvent::Playable);
+        }
+        self.put_region(content);
+        self.stage = Stage::ByRegions { to, left: left - 1 };
+        self.finish_regions();
+    }
+
+    pub(super) fn put_region(&mut self, content: RegionContent) {
+        let RegionContent { pos, next_field, bricks, fields, .. } = content;
+        let change = self.replica.region_change(pos, bricks, fields, next_field);
+        self.put(change);
+    }
+}
+
+/// From a place to a region along the axis on which it is farthest, in voxels.
+fn distance(region: RegionPos, place: IVec3) -> i64 {
+    let samples = region.samples();
+    let (low, high) = (samples.min.as_i64vec3(), samples.max.as_i64vec3());
+    let place = place.as_i64vec3();
+    (low - place).max(place - high).max_element().max(0)
+}

@@ -1,0 +1,448 @@
+//! The client: its edits show at once, and what the server orders follows.
+//!
+//! | file | what it does |
+//! | --- | --- |
+//! | `client` | what a game calls, and messages that come |
+//! | `join` | getting to where the server is: old entries, regions, a comparison |
+//! | `repair` | marks, and regions that differ |
+//! | `replica` | the world of the order, and what is shown of it |
+
+mod events;
+mod join;
+mod repair;
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+use std::time::Duration;
+
+use glam::IVec3;
+
+use super::bulk::BulkReader;
+use super::message::{
+    ClientId, Entries, Entry, Epoch, Hello, Kick, Lane, MOST_EDITS, PROTOCOL, ToClient, ToServer,
+};
+use super::replica::{Replica, ShownChange};
+use super::stamps::Stamps;
+use crate::brush::Edit;
+use crate::ground::Ground;
+use crate::lattice::RegionPos;
+use crate::terrain::{Receipt, SIMULATION, TerrainError, TerrainSettings, World};
+pub use events::{ClientEvent, ClientFigures};
+use join::Stage;
+use repair::{Marks, Reaches, Repair};
+
+/// Most entries that one [`advance`](Client::advance) applies.
+const BATCH: usize = 2048;
+
+/// The time between acknowledgements, and the bytes of the bulk lane after which one is sent sooner.
+const ACK: Duration = Duration::from_millis(100);
+const ACK_BYTES: u64 = 16 << 10;
+
+/// The time that a greeting has to be answered in, before it is sent again.
+const GREETING: Duration = Duration::from_secs(3);
+
+/// A client: bytes in, bytes out.
+///
+/// In each frame: [`receive`](Self::receive) what came, [`dig`](Self::dig) what the player digs, send what
+/// [`take_outgoing`](Self::take_outgoing) returns, then [`advance`](Self::advance), which takes as long as edits take, put what
+/// [`take_shown`](Self::take_shown) returns into the terrain that is shown, and look at [events](Self::take_events).
+pub struct Client {
+    replica: Replica,
+    stamps: Stamps,
+    chunk_size: u32,
+    place: IVec3,
+    /// Regions so near, in voxels, have to be there before play begins.
+    near: u32,
+    id: Option<ClientId>,
+    /// Where the world is; `None` before the first welcome.
+    epoch: Option<Epoch>,
+    stage: Stage,
+    inbox: VecDeque<(Lane, Vec<u8>)>,
+    bulk: BulkReader,
+    acknowledged: (u64, u64, Duration),
+    /// Entries that came and are not applied yet.
+    waiting: BTreeMap<u64, Entry>,
+    /// The number of the last entry that came in the order lane.
+    received: u64,
+    marks: Marks,
+    reaches: Reaches,
+    repair: Option<Repair>,
+    /// Regions that are to be fetched, whatever their hashes are.
+    doubtful: BTreeSet<RegionPos>,
+    /// Was the ground around the player there once?
+    is_playable: bool,
+    /// The number of the next own edit.
+    next_own: u64,
+    /// The last own edit whose prediction was told.
+    told: u64,
+    /// Edits from before the first welcome.
+    early: Vec<Edit>,
+    unsent: Vec<Edit>,
+    outgoing: Vec<Vec<u8>>,
+    shown: Vec<ShownChange>,
+    events: Vec<ClientEvent>,
+    figures: ClientFigures,
+}
+
+impl Client {
+    /// A client with the same ground as the server.
+    ///
+    /// # Errors
+    /// When the chunk size or the voxel size is out of range.
+    pub fn new(ground: impl Into<Arc<Ground>>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
+        let replica = Replica::new(ground.into(), settings)?;
+        let (inbox, bulk, waiting, marks, reaches, early, unsent, outgoing) = Default::default();
+        Ok(Self {
+            replica,
+            stamps: Stamps::default(),
+            chunk_size: settings.chunk_size,
+            place: IVec3::ZERO,
+            near: 96,
+            id: None,
+            epoch: None,
+            stage: Stage::Apart,
+            inbox,
+            bulk,
+            acknowledged: (0, 0, Duration::ZERO),
+            waiting,
+            received: 0,
+            marks,
+            reaches,
+            repair: None,
+            doubtful: BTreeSet::new(),
+            is_playable: false,
+            next_own: 1,
+            told: 0,
+            early,
+            unsent,
+            outgoing,
+            shown: Vec::new(),
+            events: Vec::new(),
+            figures: ClientFigures::default(),
+        })
+    }
+
+    /// The images that stamps may have: the same as those of the server.
+    pub fn stamps_mut(&mut self) -> &mut Stamps {
+        &mut self.stamps
+    }
+
+    /// Says where the player is, in voxels: regions come from there outwards.
+    pub fn set_place(&mut self, place: IVec3) {
+        self.place = place;
+    }
+
+    /// Sets how far around the player the ground has to be there before play begins, in voxels; 96 by default.
+    pub fn set_near(&mut self, near: u32) {
+        self.near = near;
+    }
+
+    /// Greets the server, over a connection that has just begun. What was under way on another one is forgotten; the world, and edits
+    /// that the server has not answered, stay.
+    pub fn connect(&mut self, now: Duration) {
+        self.inbox.clear();
+        self.bulk = BulkReader::default();
+        self.acknowledged = (0, 0, now);
+        self.outgoing.clear();
+        self.greet(now);
+    }
+
+    /// Enters that the connection is gone. Edits go on to be shown.
+    pub fn disconnect(&mut self) {
+        self.stage = Stage::Apart;
+        self.inbox.clear();
+    }
+
+    fn greet(&mut self, now: Duration) {
+        self.stage = Stage::Greeting { since: now };
+        self.repair = None;
+        let hello = Hello {
+            protocol: PROTOCOL,
+            simulation: SIMULATION,
+            ground: self.replica.world().ground().hash(),
+            chunk_size: self.chunk_size,
+            epoch: self.epoch,
+            place: self.place,
+        };
+        self.outgoing.push(ToServer::Hello(hello).to_bytes());
+    }
+
+    /// The world after the entries up to [`number`](Self::number). While regions come, it is a part of it.
+    pub fn world(&self) -> &World {
+        self.replica.world()
+    }
+
+    /// The number of the last entry that is applied.
+    pub fn number(&self) -> u64 {
+        self.epoch.map_or(0, |epoch| epoch.number)
+    }
+
+    /// Who this client is; `None` before the server has welcomed it.
+    pub fn id(&self) -> Option<ClientId> {
+        self.id
+    }
+
+    /// Does it follow the order, with all of the world there?
+    pub fn has_joined(&self) -> bool {
+        matches!(self.stage, Stage::Following)
+    }
+
+    /// The [hash](World::hash) that the shown terrain has once everything from [`take_shown`](Self::take_shown) is put.
+    pub fn shown_hash(&self) -> u64 {
+        self.replica.shown_hash()
+    }
+
+    /// All that is to be put into a terrain that does not hold what it should, say because a change was refused there.
+    pub fn show_whole(&self, shown: &World) -> ShownChange {
+        self.replica.whole(shown)
+    }
+
+    /// What was counted so far.
+    pub fn figures(&self) -> ClientFigures {
+        self.figures
+    }
+
+    /// Edits of the player that the server has not answered.
+    pub fn pending(&self) -> usize {
+        self.replica.pending().count() + self.early.len()
+    }
+
+    /// An edit of the player: it is sent, and shown after the next [`advance`](Self::advance). [Events](ClientEvent) tell by its tag
+    /// what becomes of it.
+    pub fn dig(&mut self, edit: Edit) {
+        if self.epoch.is_none() {
+            self.early.push(edit);
+        } else if !self.stamps.can_send(&edit) {
+            self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
+        } else {
+            self.replica.predict(self.next_own, edit.clone());
+            self.next_own += 1;
+            self.unsent.push(edit);
+            if self.unsent.len() == MOST_EDITS {
+                self.flush();
+            }
+        }
+    }
+
+    /// Asks the server to take back the last stroke of a player, by default the own one. If it may be, it comes as an entry;
+    /// [`ClientEvent::Undone`] or [`ClientEvent::UndoRefused`] tell of it.
+    pub fn undo(&mut self, of: Option<ClientId>) {
+        let Some(of) = of.or(self.id) else { return };
+        self.flush();
+        self.outgoing.push(ToServer::Undo { own: self.next_own, of }.to_bytes());
+        self.next_own += 1;
+    }
+
+    /// Makes a message of edits that were not sent.
+    fn flush(&mut self) {
+        let edits = std::mem::take(&mut self.unsent);
+        if !edits.is_empty() && self.is_welcome() {
+            let first = self.next_own - edits.len() as u64;
+            self.outgoing.push(ToServer::Edits { first, edits }.to_bytes());
+        }
+    }
+
+    /// Has the server welcomed it on this connection?
+    fn is_welcome(&self) -> bool {
+        !matches!(self.stage, Stage::Apart | Stage::Greeting { .. })
+    }
+
+    /// Messages to the server, in order; each is returned once.
+    pub fn take_outgoing(&mut self) -> Vec<Vec<u8>> {
+        self.flush();
+        std::mem::take(&mut self.outgoing)
+    }
+
+    /// A message from the server. It is looked at in [`advance`](Self::advance).
+    pub fn receive(&mut self, lane: Lane, bytes: Vec<u8>) {
+        self.inbox.push_back((lane, bytes));
+    }
+
+    /// What is to be put into the shown terrain, in order, with [`Terrain::submit_change`](crate::terrain::Terrain::submit_change);
+    /// each is returned once.
+    pub fn take_shown(&mut self) -> Vec<ShownChange> {
+        std::mem::take(&mut self.shown)
+    }
+
+    /// What happened since the last call.
+    pub fn take_events(&mut self) -> Vec<ClientEvent> {
+        std::mem::take(&mut self.events)
+    }
+
+    /// Looks at what came, applies entries, and brings what is shown up to date. Returns whether there is more to do at once.
+    pub fn advance(&mut self, now: Duration) -> bool {
+        while let Some((lane, bytes)) = self.inbox.pop_front() {
+            let ground = self.replica.world().shared_ground();
+            match ToClient::from_bytes(&bytes, &ground, &self.stamps) {
+                Ok(message) => self.take(lane, message, now),
+                Err(_) => self.figures.malformed += 1,
+            }
+        }
+        if let Stage::Greeting { since } = self.stage
+            && now.saturating_sub(since) > GREETING
+        {
+            self.greet(now);
+        }
+        let is_busy = self.follow();
+        let (shown, receipts) = self.replica.update();
+        self.shown.extend(shown);
+        self.tell_predictions(receipts.unwrap_or_default());
+        self.acknowledge(now);
+        is_busy
+    }
+
+    fn tell_predictions(&mut self, receipts: Vec<Receipt>) {
+        for ((own, _), receipt) in self.replica.pending().zip(receipts) {
+            if own > self.told {
+                self.told = own;
+                self.events.push(ClientEvent::Predicted(receipt));
+            }
+        }
+    }
+
+    fn take(&mut self, lane: Lane, message: ToClient, now: Duration) {
+        match message {
+            ToClient::Welcome(welcome) => self.begin(welcome),
+            ToClient::Kicked(why) => self.leave(why),
+            ToClient::Entries(entries) => self.take_entries(lane, entries, now),
+            ToClient::Void { number } => self.take_void(number),
+            ToClient::Refused { own, why } => {
+                let event = match self.replica.take_back(own) {
+                    Some(edit) => ClientEvent::Refused { tag: edit.tag(), why: Some(why) },
+                    None => ClientEvent::UndoRefused(why),
+                };
+                self.events.push(event);
+            }
+            ToClient::Hashes { number, regions } => self.marks.take_theirs(number, regions),
+            ToClient::Table { number, regions } => self.take_table(number, &regions),
+            ToClient::Region(content) => self.take_region(content),
+            ToClient::Durable { number } => self.events.push(ClientEvent::Durable(number)),
+            ToClient::Piece(piece) => self.take_piece(&piece, now),
+        }
+    }
+
+    fn leave(&mut self, why: Kick) {
+        self.stage = Stage::Apart;
+        self.events.push(ClientEvent::Kicked(why));
+    }
+
+    fn take_piece(&mut self, piece: &[u8], now: Duration) {
+        self.bulk.add(piece);
+        let ground = self.replica.world().shared_ground();
+        loop {
+            match self.bulk.next(&ground, &self.stamps) {
+                Ok(Some(message)) => self.take(Lane::Bulk, message, now),
+                Ok(None) => return,
+                Err(_) => {
+                    self.figures.malformed += 1;
+                    return;
+                }
+            }
+        }
+    }
+
+    fn take_entries(&mut self, lane: Lane, Entries { first, entries }: Entries, now: Duration) {
+        let last = first.saturating_add(entries.len() as u64).saturating_sub(1);
+        if lane == Lane::Order && self.is_welcome() {
+            if first > self.received.saturating_add(1) {
+                // Something is missing: what follows waits until it has come.
+                self.figures.gaps += 1;
+                self.greet(now);
+            }
+            self.received = self.received.max(last);
+        }
+        let from = self.number();
+        self.waiting.extend((first..).zip(entries).filter(|(number, _)| *number > from));
+    }
+
+    /// Applies entries that have come, as many as one call may; returns whether more could be.
+    fn follow(&mut self) -> bool {
+        let mut left = BATCH;
+        loop {
+            self.finish_repair();
+            self.begin_repair();
+            let Some(end) = self.applicable() else { return false };
+            let batch = self.next_batch(end, left);
+            if batch.is_empty() {
+                return left == 0;
+            }
+            left -= batch.len();
+            self.apply(batch);
+        }
+    }
+
+    /// The number up to which entries may be applied now; `None` if none may.
+    fn applicable(&self) -> Option<u64> {
+        match self.stage {
+            Stage::ByLog { to, .. } => Some(to),
+            Stage::Following => self.repair.as_ref().map_or(Some(u64::MAX), Repair::number),
+            _ => None,
+        }
+    }
+
+    /// The next entries up to a number, at most so many. A mark ends them.
+    fn next_batch(&mut self, end: u64, most: usize) -> Vec<Entry> {
+        let (mut batch, mut number) = (Vec::new(), self.number());
+        while number < end
+            && batch.len() < most
+            && let Some(entry) = self.waiting.remove(&(number + 1))
+        {
+            number += 1;
+            let is_mark = matches!(entry, Entry::Mark);
+            batch.push(entry);
+            if is_mark {
+                break;
+            }
+        }
+        batch
+    }
+
+    fn apply(&mut self, batch: Vec<Entry>) {
+        let Some(mut epoch) = self.epoch else { return };
+        let id = self.id;
+        let own = |entry: &Entry| match entry {
+            Entry::Edit { author, own, .. } if Some(*author) == id => Some(*own),
+            _ => None,
+        };
+        let tags: BTreeMap<u64, u64> = self.replica.pending().map(|(own, edit)| (own, edit.tag())).collect();
+        let applied = self.replica.apply(&batch, own);
+        let mut receipts = applied.receipts.into_iter();
+        for entry in &batch {
+            epoch.number += 1;
+            match entry {
+                Entry::Edit { author, edit, .. } => {
+                    self.reaches.note(epoch.number, edit.reach());
+                    let Some(receipt) = receipts.next() else { continue };
+                    self.events.push(match own(entry) {
+                        Some(own) => {
+                            let tag = tags.get(&own).copied().unwrap_or_default();
+                            ClientEvent::Confirmed { tag, receipt: Some(Receipt { tag, ..receipt }) }
+                        }
+                        None => ClientEvent::Others { author: *author, receipt },
+                    });
+                }
+                Entry::Parts { by: Some((by, _)), .. } if Some(*by) == id => {
+                    self.events.push(ClientEvent::Undone);
+                }
+                _ => {}
+            }
+        }
+        self.figures.applied += batch.len() as u64;
+        self.epoch = Some(epoch);
+        self.marks.touch(applied.bricks);
+        if matches!(batch.last(), Some(Entry::Mark)) {
+            self.marks.mark(epoch.number, self.replica.world());
+        }
+        self.finish_log();
+    }
+
+    fn acknowledge(&mut self, now: Duration) {
+        let (bulk, number, last) = self.acknowledged;
+        let new = (self.bulk.received(), self.number());
+        let is_due = now.saturating_sub(last) >= ACK || new.0 >= bulk + ACK_BYTES;
+        if self.is_welcome() && new != (bulk, number) && is_due {
+            self.acknowledged = (new.0, new.1, now);
+            self.outgoing.push(ToServer::Ack { bulk: new.0, number: new.1 }.to_bytes());
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Marks: places of the order at which the hashes of regions are compared, and the repair of those that differ.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use super::super::message::{Entry, MOST_REGIONS, RegionContent, RegionHashes, ToServer};
+use super::join::Stage;
+use super::{Client, ClientEvent};
+use crate::lattice::{BrickPos, LatticeBox, RegionPos};
+use crate::terrain::World;
+
+/// Marks that wait for the other side, at most.
+const MOST_MARKS: usize = 256;
+
+/// Edits whose reach is remembered, in case that the server voids one.
+const MOST_REACHES: usize = 4096;
+
+/// The most regions that are fetched because of one void entry.
+const MOST_VOID: usize = 512;
+
+/// What both sides have at marks.
+#[derive(Default)]
+pub(super) struct Marks {
+    /// Regions that were touched since the last mark.
+    touched: BTreeSet<RegionPos>,
+    ours: BTreeMap<u64, RegionHashes>,
+    theirs: BTreeMap<u64, RegionHashes>,
+}
+
+impl Marks {
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    pub fn touch(&mut self, bricks: BTreeSet<BrickPos>) {
+        self.touched.extend(bricks.into_iter().map(RegionPos::of));
+    }
+
+    /// Notes the hashes of a world at a mark.
+    pub fn mark(&mut self, number: u64, world: &World) {
+        let touched = std::mem::take(&mut self.touched);
+        let hashes = touched.into_iter().map(|region| (region, world.region_hash(region))).collect();
+        self.ours.insert(number, hashes);
+        while self.ours.len() > MOST_MARKS {
+            self.ours.pop_first();
+        }
+    }
+
+    pub fn take_theirs(&mut self, number: u64, regions: RegionHashes) {
+        self.theirs.insert(number, regions);
+        while self.theirs.len() > MOST_MARKS {
+            self.theirs.pop_first();
+        }
+    }
+
+    /// Compares marks that both sides have; returns how many, and the regions that differ.
+    fn compare(&mut self, world: &World) -> (u64, BTreeSet<RegionPos>) {
+        let (mut count, mut differing) = (0, BTreeSet::new());
+        let both: Vec<u64> =
+            self.theirs.keys().filter(|number| self.ours.contains_key(number)).copied().collect();
+        for number in both {
+            let ours: BTreeMap<RegionPos, u64> =
+                self.ours.remove(&number).unwrap_or_default().into_iter().collect();
+            let theirs: BTreeMap<RegionPos, u64> =
+                self.theirs.remove(&number).unwrap_or_default().into_iter().collect();
+            count += 1;
+            for (&region, &hash) in &theirs {
+                // One that was not touched here before the mark is as it was then, unless it was touched later: the next mark
+                // tells.
+                let own = ours.get(&region).copied();
+                let own = own
+                    .or_else(|| (!self.is_touched_after(number, region)).then(|| world.region_hash(region)));
+                if own.is_some_and(|own| own != hash) {
+                    differing.insert(region);
+                }
+            }
+            differing.extend(ours.keys().filter(|region| !theirs.contains_key(region)));
+        }
+        (count, differing)
+    }
+
+    fn is_touched_after(&self, number: u64, region: RegionPos) -> bool {
+        let later = self.ours.range(number + 1..);
+        self.touched.contains(&region)
+            || later.into_iter().any(|(_, hashes)| hashes.iter().any(|(other, _)| *other == region))
+    }
+}
+
+/// What the latest edits reach, by number.
+#[derive(Default)]
+pub(super) struct Reaches(VecDeque<(u64, LatticeBox)>);
+
+impl Reaches {
+    pub fn note(&mut self, number: u64, reach: LatticeBox) {
+        if self.0.len() == MOST_REACHES {
+            self.0.pop_front();
+        }
+        self.0.push_back((number, reach));
+    }
+
+    fn of(&self, number: u64) -> Option<LatticeBox> {
+        self.0.iter().find(|(other, _)| *other == number).map(|(_, reach)| *reach)
+    }
+}
+
+/// Regions that are fetched. Until all of them have come, no entries are applied; then those up to their number are, and the
+/// regions take their places.
+pub(super) struct Repair {
+    wanted: BTreeSet<RegionPos>,
+    contents: Vec<RegionContent>,
+}
+
+impl Repair {
+    pub fn add(&mut self, content: RegionContent) {
+        self.contents.push(content);
+    }
+
+    /// The number up to which entries may be applied: that of the regions, once all are there.
+    pub fn number(&self) -> Option<u64> {
+        let is_complete = self.contents.len() >= self.wanted.len();
+        self.contents.last().filter(|_| is_complete).map(|content| content.number)
+    }
+}
+
+impl Client {
+    /// Fetches regions that differ.
+    pub(super) fn begin_repair(&mut self) {
+        if !matches!(self.stage, Stage::Following) || self.repair.is_some() {
+            return;
+        }
+        let (count, mut differing) = self.marks.compare(self.replica.world());
+        self.figures.marks += count;
+        differing.append(&mut self.doubtful);
+        if differing.is_empty() {
+            return;
+        }
+        let wanted: BTreeSet<RegionPos> = differing.iter().take(MOST_REGIONS).copied().collect();
+        self.doubtful = differing.difference(&wanted).copied().collect();
+        let regions = wanted.iter().copied().collect();
+        self.outgoing.push(ToServer::Fetch { number: self.number(), regions }.to_bytes());
+        self.repair = Some(Repair { wanted, contents: Vec::new() });
+    }
+
+    /// Puts regions that were fetched into their places, once the world is at their number.
+    pub(super) fn finish_repair(&mut self) {
+        let at = self.number();
+        let Some(repair) = self.repair.take_if(|repair| repair.number().is_some_and(|number| number <= at))
+        else {
+            return;
+        };
+        self.figures.repairs += repair.wanted.len() as u64;
+        repair.contents.into_iter().for_each(|content| self.put_region(content));
+        self.events.push(ClientEvent::Repaired(repair.wanted.into_iter().collect()));
+    }
+
+    /// The server could not apply an entry.
+    pub(super) fn take_void(&mut self, number: u64) {
+        if number > self.number() {
+            let nothing = Entry::Loose(self.replica.loose());
+            if let Some(entry) = self.waiting.get_mut(&number)
+                && let Entry::Edit { author, own, .. } = std::mem::replace(entry, nothing)
+                && Some(author) == self.id
+                && let Some(edit) = self.replica.take_back(own)
+            {
+                self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
+            }
+        } else if let Some(reach) = self.reaches.of(number) {
+            let low = RegionPos::of(BrickPos::of(reach.min)).0;
+            let high = RegionPos::of(BrickPos::of(reach.max)).0;
+            let regions = (low.x..=high.x)
+                .flat_map(|x| (low.y..=high.y).map(move |y| (x, y)))
+                .flat_map(|(x, y)| (low.z..=high.z).map(move |z| RegionPos(glam::IVec3::new(x, y, z))));
+            self.doubtful.extend(regions.take(MOST_VOID));
+        }
+    }
+}

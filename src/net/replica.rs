@@ -1,0 +1,349 @@
+//! A world that follows the order, and beside it what is shown: the same with the own edits that have no number yet.
+//!
+//! Both share their bricks. What is shown is never edited, only put: whatever the order brings, the difference to what is shown
+//! goes there in one piece.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+
+use super::message::{Entry, Terms};
+use crate::brush::Edit;
+use crate::ground::Ground;
+use crate::lattice::{BrickPos, ChunkPos, RegionPos};
+use crate::terrain::{
+    ChangeError, LooseSettings, Meshing, Receipt, RestoreError, Terrain, TerrainError, TerrainSettings,
+    WorkLimits, World, WorldChange, WorldParts,
+};
+use crate::volume::layers::NONE;
+use crate::volume::{Brick, Fields};
+
+type Stored = Option<Arc<Brick>>;
+
+/// What is to be put into the world that is shown.
+#[derive(Clone, Debug)]
+pub struct ShownChange {
+    /// Bricks and fields.
+    pub change: WorldChange,
+    /// The hash that the shown world has afterwards.
+    pub hash: u64,
+}
+
+/// An own edit that has no number yet.
+#[derive(Clone, Debug)]
+struct Pending {
+    own: u64,
+    edit: Edit,
+}
+
+/// What the order's entries came to.
+#[derive(Debug, Default)]
+pub(super) struct Applied {
+    /// A receipt for each edit among them, in order.
+    pub receipts: Vec<Receipt>,
+    /// The bricks that changed.
+    pub bricks: BTreeSet<BrickPos>,
+    /// Was anything not applied that may be applied elsewhere?
+    pub is_void: bool,
+}
+
+/// A world that follows the order, and what is shown of it.
+pub(super) struct Replica {
+    /// The world after the order's entries. It is never meshed.
+    confirmed: Terrain,
+    pending: VecDeque<Pending>,
+    /// Bricks that are shown otherwise than confirmed.
+    bricks: BTreeMap<BrickPos, Stored>,
+    /// Fields of chunks that are shown otherwise than confirmed.
+    fields: BTreeMap<ChunkPos, Fields>,
+    /// The hash of what is shown.
+    hash: u64,
+    /// What has changed of the confirmed world since it was compared with what is shown, as it was then.
+    before: Before,
+    /// May what is shown differ from the confirmed world with the pending edits?
+    is_outdated: bool,
+}
+
+/// Parts of a world before they changed.
+#[derive(Default)]
+struct Before {
+    bricks: BTreeMap<BrickPos, Stored>,
+    fields: BTreeMap<ChunkPos, Fields>,
+}
+
+impl Before {
+    /// Notes how those parts are in this world that will change; those that are noted already stay as they are.
+    fn note(&mut self, world: &World, change: &WorldChange) {
+        for (pos, _) in &change.bricks {
+            self.bricks.entry(*pos).or_insert_with(|| world.brick(*pos).cloned());
+        }
+        for (chunk, _) in &change.fields {
+            self.fields.entry(*chunk).or_insert_with(|| fields_of(world, *chunk));
+        }
+    }
+}
+
+impl Replica {
+    /// The pristine world.
+    pub fn new(ground: Arc<Ground>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
+        let mut confirmed = Terrain::new(ground, settings)?;
+        prepare(&mut confirmed);
+        let hash = confirmed.world().hash();
+        let (pending, bricks, fields, before) = Default::default();
+        Ok(Self { confirmed, pending, bricks, fields, hash, before, is_outdated: false })
+    }
+
+    /// The world after the order's entries.
+    pub fn world(&self) -> &World {
+        self.confirmed.world()
+    }
+
+    /// How the order searches for loose pieces now.
+    pub fn loose(&self) -> Option<LooseSettings> {
+        self.confirmed.loose().copied()
+    }
+
+    /// The hash of what is shown, once all that was returned is put.
+    pub fn shown_hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// Adds an own edit.
+    pub fn predict(&mut self, own: u64, edit: Edit) {
+        self.pending.push_back(Pending { own, edit });
+        self.is_outdated = true;
+    }
+
+    /// The own edits that have no number yet.
+    pub fn pending(&self) -> impl Iterator<Item = (u64, &Edit)> {
+        self.pending.iter().map(|pending| (pending.own, &pending.edit))
+    }
+
+    /// Takes an own edit back, say because it was refused; returns it if it was pending.
+    pub fn take_back(&mut self, own: u64) -> Option<Edit> {
+        let at = self.pending.iter().position(|pending| pending.own == own)?;
+        self.is_outdated = true;
+        self.pending.remove(at).map(|pending| pending.edit)
+    }
+
+    /// Applies entries of the order. Own edits among them are no longer pending; `own` tells their numbers.
+    pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
+        let mut edits = Vec::new();
+        for entry in entries {
+            match entry {
+                Entry::Rules(rules) => {
+                    // The server checked them.
+                    let _ = self.confirmed.set_rules(rules.as_deref().cloned().unwrap_or_default());
+                }
+                Entry::Loose(loose) => self.confirmed.set_loose(*loose),
+                Entry::Edit { edit, .. } => {
+                    self.confirmed.submit_edit(edit);
+                    edits.push(edit);
+                }
+                // There is room: the limits are unbounded.
+                Entry::Parts { change, .. } => {
+                    let _ = self.confirmed.submit_change(WorldChange::clone(change), None);
+                }
+                Entry::Mark => {}
+            }
+            match own(entry) {
+                // What is shown contains it already.
+                Some(number) if self.pending.front().is_some_and(|first| first.own == number) => {
+                    self.pending.pop_front();
+                }
+                Some(number) => {
+                    self.is_outdated = true;
+                    self.pending.retain(|pending| pending.own != number);
+                }
+                None => self.is_outdated |= !matches!(entry, Entry::Mark),
+            }
+        }
+        let mut applied = self.run();
+        let changes = self.confirmed.take_change_receipts();
+        let failed = |change: &Result<_, ChangeError>| matches!(change, Err(ChangeError::Panicked));
+        applied.is_void = changes.iter().any(failed);
+        // What is deterministic fails everywhere; with it, what is shown is drafted anew.
+        self.is_outdated |= applied.receipts.iter().any(|receipt| receipt.outcome.is_err());
+        self.share();
+        applied
+    }
+
+    /// Runs all that is submitted.
+    fn run(&mut self) -> Applied {
+        let mut applied = Applied { receipts: self.confirmed.take_answered(), ..Applied::default() };
+        while let Some(transaction) = self.confirmed.begin() {
+            let commit = transaction.run();
+            let change = commit.change();
+            self.before.note(self.confirmed.world(), &change);
+            applied.bricks.extend(change.bricks.iter().map(|(pos, _)| *pos));
+            // It is the one under way.
+            applied.receipts.extend(self.confirmed.commit(commit).unwrap_or_default());
+        }
+        applied
+    }
+
+    /// Lets the confirmed world have the bricks that are shown, where they are equal, and forgets these differences.
+    fn share(&mut self) {
+        let shown = |pos: &BrickPos| self.bricks.get(pos).and_then(Option::as_ref);
+        let changed = self.before.bricks.keys().filter_map(|pos| Some((*pos, Arc::clone(shown(pos)?))));
+        let changed: Vec<(BrickPos, Arc<Brick>)> = changed.collect();
+        self.confirmed.share_bricks(changed.iter().map(|(pos, brick)| (*pos, brick)));
+        if self.is_outdated {
+            return;
+        }
+        // What is shown stays as it is: all that changed was shown before.
+        let before = std::mem::take(&mut self.before);
+        let world = self.confirmed.world();
+        for (pos, old) in before.bricks {
+            let shown = self.bricks.remove(&pos).unwrap_or(old);
+            if !is_same(shown.as_ref(), world.brick(pos)) {
+                self.bricks.insert(pos, shown);
+            }
+        }
+        for (chunk, old) in before.fields {
+            let shown = self.fields.remove(&chunk).unwrap_or(old);
+            if shown != fields_of(world, chunk) {
+                self.fields.insert(chunk, shown);
+            }
+        }
+    }
+
+    /// Puts parts into the confirmed world, as another machine has them.
+    ///
+    /// # Errors
+    /// When they do not fit.
+    pub fn put(&mut self, change: WorldChange) -> Result<Applied, ChangeError> {
+        self.confirmed.submit_change(change, None)?;
+        let applied = self.run();
+        self.is_outdated = true;
+        // It was the only one.
+        self.confirmed.take_change_receipts().pop().unwrap_or(Err(ChangeError::Panicked)).map(|_| applied)
+    }
+
+    /// Goes on from another place of an order, under the terms that hold there: with the world as it is, or from the pristine one.
+    ///
+    /// # Errors
+    /// When the terms are invalid.
+    pub fn restart(&mut self, terms: &Terms, keeps_world: bool) -> Result<(), RestoreError> {
+        let WorldParts { change, chunk_size, .. } = self.confirmed.parts();
+        if !keeps_world {
+            self.before.note(self.confirmed.world(), &change);
+        }
+        let kept = if keeps_world { change } else { WorldChange::default() };
+        let change = WorldChange { next_field: terms.next_field, ..kept };
+        let (rules, loose) = (terms.rules.clone(), terms.loose);
+        let parts = WorldParts { change, chunk_size, revision: 0, rules, loose };
+        let settings = TerrainSettings { chunk_size, voxel_size: self.confirmed.voxel_size() };
+        self.confirmed = Terrain::restore(self.confirmed.world().shared_ground(), &settings, parts)?;
+        prepare(&mut self.confirmed);
+        self.is_outdated = true;
+        Ok(())
+    }
+
+    /// All of a region of the confirmed world as it is to be, where these are its bricks and fields.
+    pub fn region_change(
+        &self,
+        region: RegionPos,
+        bricks: Vec<(BrickPos, Arc<Brick>)>,
+        fields: Vec<(ChunkPos, Fields)>,
+        next_field: u64,
+    ) -> WorldChange {
+        let world = self.confirmed.world();
+        let mut all: BTreeMap<BrickPos, Stored> =
+            world.bricks_in(region).map(|(pos, _)| (pos, None)).collect();
+        all.extend(bricks.into_iter().map(|(pos, brick)| (pos, Some(brick))));
+        let samples = region.samples().intersection(world.grid().edit_bounds());
+        let chunks = samples.into_iter().flat_map(|samples| world.grid().chunks_of(samples));
+        let mut chunks: BTreeMap<ChunkPos, Fields> = chunks
+            .filter(|chunk| world.fields_of(*chunk).is_some())
+            .map(|chunk| (chunk, Fields::default()))
+            .collect();
+        chunks.extend(fields);
+        WorldChange { bricks: all.into_iter().collect(), fields: chunks.into_iter().collect(), next_field }
+    }
+
+    /// Brings what is shown up to date: the change that is to be put there, if there is one, and the receipts of pending edits,
+    /// in order, if they were drafted.
+    pub fn update(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
+        if !self.is_outdated {
+            return (None, None);
+        }
+        self.is_outdated = false;
+        let edits: Vec<Edit> = self.pending.iter().map(|pending| pending.edit.clone()).collect();
+        let draft = self.confirmed.draft(&edits);
+        let (world, before) = (self.confirmed.world(), std::mem::take(&mut self.before));
+        let drafted = |pos: BrickPos, brick: &Stored| !is_same(brick.as_ref(), world.brick(pos));
+        let mut bricks: BTreeMap<BrickPos, Stored> = draft.change.bricks.into_iter().collect();
+        bricks.retain(|pos, brick| drafted(*pos, brick));
+        let mut fields: BTreeMap<ChunkPos, Fields> = draft.change.fields.into_iter().collect();
+        fields.retain(|chunk, fields| *fields != fields_of(world, *chunk));
+        let mut change = WorldChange { next_field: draft.change.next_field, ..WorldChange::default() };
+        let places: BTreeSet<BrickPos> =
+            before.bricks.keys().chain(self.bricks.keys()).chain(bricks.keys()).copied().collect();
+        for pos in places {
+            let old = self.bricks.get(&pos).or(before.bricks.get(&pos)).map(Option::as_ref);
+            let old = old.unwrap_or_else(|| world.brick(pos));
+            let new = bricks.get(&pos).map_or_else(|| world.brick(pos), Option::as_ref);
+            if !is_same(old, new) {
+                change.bricks.push((pos, new.cloned()));
+            }
+        }
+        let chunks: BTreeSet<ChunkPos> =
+            before.fields.keys().chain(self.fields.keys()).chain(fields.keys()).copied().collect();
+        for chunk in chunks {
+            let old = self.fields.get(&chunk).or(before.fields.get(&chunk)).cloned();
+            let old = old.unwrap_or_else(|| fields_of(world, chunk));
+            let new = fields.get(&chunk).cloned().unwrap_or_else(|| fields_of(world, chunk));
+            if old != new {
+                change.fields.push((chunk, new));
+            }
+        }
+        (self.bricks, self.fields, self.hash) = (bricks, fields, draft.hash);
+        let is_empty = change.bricks.is_empty() && change.fields.is_empty();
+        let shown = (!is_empty).then_some(ShownChange { change, hash: draft.hash });
+        (shown, Some(draft.receipts))
+    }
+
+    /// All that is to be put into a world, whatever it holds, so that it is what is to be shown.
+    pub fn whole(&self, shown: &World) -> ShownChange {
+        let world = self.confirmed.world();
+        let own = |pos: BrickPos| self.bricks.get(&pos).map_or_else(|| world.brick(pos), Option::as_ref);
+        let places: BTreeSet<BrickPos> = world
+            .bricks()
+            .map(|(pos, _)| pos)
+            .chain(self.bricks.keys().copied())
+            .chain(shown.bricks().map(|(pos, _)| pos))
+            .collect();
+        let chunks: BTreeSet<ChunkPos> = world
+            .fields()
+            .map(|(chunk, _)| chunk)
+            .chain(self.fields.keys().copied())
+            .chain(shown.fields().map(|(chunk, _)| chunk))
+            .collect();
+        let fields =
+            |chunk: ChunkPos| self.fields.get(&chunk).cloned().unwrap_or_else(|| fields_of(world, chunk));
+        let change = WorldChange {
+            bricks: places.into_iter().map(|pos| (pos, own(pos).cloned())).collect(),
+            fields: chunks.into_iter().map(|chunk| (chunk, fields(chunk))).collect(),
+            next_field: world.next_field(),
+        };
+        ShownChange { change, hash: self.hash }
+    }
+}
+
+fn prepare(confirmed: &mut Terrain) {
+    confirmed.set_meshing(Meshing::Never);
+    confirmed.set_undo_budget(0);
+    confirmed.set_work_limits(WorkLimits::UNBOUNDED);
+}
+
+fn fields_of(world: &World, chunk: ChunkPos) -> Fields {
+    world.fields_of(chunk).cloned().unwrap_or_default()
+}
+
+fn is_same(a: Option<&Arc<Brick>>, b: Option<&Arc<Brick>>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) if Arc::ptr_eq(a, b) => true,
+        (None, None) => true,
+        (a, b) => Brick::differences([a.map(Arc::as_ref), b.map(Arc::as_ref)]) == NONE,
+    }
+}

@@ -1,0 +1,162 @@
+//! Drafts: what edits would make of a world that stays as it is.
+
+use std::sync::Arc;
+
+use super::model::Terrain;
+use super::queue::{Queue, Taken, Together, WorkLimits};
+use super::receipt::Receipt;
+use super::record::WorldChange;
+use super::transaction::{Transaction, Work};
+use super::unmeshed::Meshing;
+use super::world::{World, unique};
+use crate::brush::Edit;
+use crate::lattice::BrickPos;
+use crate::volume::Brick;
+use crate::volume::layers::NONE;
+
+/// What edits would come to.
+#[derive(Clone, Debug, Default)]
+pub struct Draft {
+    /// A receipt for each edit.
+    pub receipts: Vec<Receipt>,
+    /// What would change.
+    pub change: WorldChange,
+    /// The [hash](World::hash) that the world would have.
+    pub hash: u64,
+}
+
+impl Terrain {
+    /// What these edits would make of the world as last committed, under the rules and settings of edits that are submitted now.
+    /// Nothing changes. It takes as long as their transaction on a terrain that [never meshes](Meshing::Never).
+    pub fn draft(&self, edits: &[Edit]) -> Draft {
+        let mut queue = Queue::default();
+        queue.limits = WorkLimits::UNBOUNDED;
+        let together = Together::Batch(unique());
+        for edit in edits {
+            let checked = edit.check().map(|()| edit.clone()).map_err(Into::into);
+            let terms = (self.rules.clone(), self.loose);
+            queue.push_edit(self.world.grid(), edit.tag(), checked, together, terms);
+        }
+        let Some((Taken::Edits(edits), _)) = queue.take() else {
+            let change = WorldChange { next_field: self.world.next_field, ..WorldChange::default() };
+            return Draft { receipts: Vec::new(), change, hash: self.world.hash() };
+        };
+        let transaction = self.transaction(unique(), Work::Edits(edits));
+        let transaction =
+            Transaction { meshing: Meshing::Never, drawn_cut: None, is_logged: false, ..transaction };
+        let commit = transaction.run();
+        let hash = World::hash_of(self.world.ground().hash(), commit.sample_hash());
+        let change = commit.change();
+        Draft { receipts: commit.receipts, change, hash }
+    }
+
+    /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as they are.
+    pub fn share_bricks<'a>(&mut self, bricks: impl IntoIterator<Item = (BrickPos, &'a Arc<Brick>)>) {
+        for (pos, brick) in bricks {
+            let Some(own) = self.world.bricks.get(&pos) else { continue };
+            if !Arc::ptr_eq(own, brick) && Brick::differences([Some(own), Some(brick)]) == NONE {
+                Arc::make_mut(&mut self.world).bricks.insert(pos, Arc::clone(brick));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+    use glam::Vec3;
+
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::{Ground, MaterialId, NoiseHeights};
+    use crate::terrain::{LooseSettings, TerrainSettings};
+    use crate::volume::DiggingRules;
+
+    fn terrain() -> Terrain {
+        let noise = NoiseHeights { seed: 3, scale: 20.0, amplitude: 8.0, base: 20.0, ..Default::default() };
+        let ground = Ground::from_noise(64, 64, &noise).expect("valid ground");
+        let settings = TerrainSettings { chunk_size: 16, ..TerrainSettings::default() };
+        Terrain::new(ground, &settings).expect("valid settings")
+    }
+
+    fn edits(rng: &mut Rng, count: usize) -> Vec<Edit> {
+        let mut part = |low: f32, high: f32| low + rng.f32() * (high - low);
+        let brushes = (0..count).map(|number| {
+            let at = Vec3::new(part(4.0, 60.0), part(12.0, 30.0), part(4.0, 60.0));
+            let shape = Shape::sphere(at, part(1.0, 7.0));
+            match number % 4 {
+                0 => Brush::add(shape, MaterialId(2)),
+                1 => Brush::smooth(shape),
+                _ => Brush::dig(shape),
+            }
+        });
+        brushes.map(|brush| Edit::quantize(&brush).expect("a valid brush")).collect()
+    }
+
+    /// Hash, fields and names.
+    fn state(terrain: &Terrain) -> (u64, Vec<(crate::lattice::ChunkPos, crate::volume::Fields)>, u64) {
+        let parts = terrain.parts();
+        (terrain.world().hash(), parts.change.fields, parts.change.next_field)
+    }
+
+    #[test]
+    fn a_draft_is_what_the_edits_come_to_and_changes_nothing() {
+        let mut rng = Rng::with_seed(5);
+        for round in 0..40 {
+            let (mut edited, mut put) = (terrain(), terrain());
+            for own in [&mut edited, &mut put] {
+                let mut rng = Rng::with_seed(round);
+                own.submit_edits(edits(&mut rng, 6));
+                own.finish();
+                if round % 3 == 0 {
+                    own.set_loose(Some(LooseSettings::default()));
+                    let rules = DiggingRules::default().with_unbreakable(MaterialId(2));
+                    own.set_rules(rules).expect("valid rules");
+                }
+            }
+            let edits = edits(&mut rng, 5);
+            let before = state(&put);
+            let draft = put.draft(&edits);
+            assert_eq!(state(&put), before, "a draft changes nothing");
+            edited.submit_edits(&edits);
+            let receipts = edited.finish();
+            assert_eq!(draft.receipts, receipts);
+            assert_eq!(draft.hash, edited.world().hash());
+            put.apply_change(draft.change, Some(draft.hash)).expect("it fits");
+            assert_eq!(state(&put), state(&edited));
+            assert!(put.world().check_seams().is_flawless());
+        }
+    }
+
+    #[test]
+    fn nothing_drafted_is_the_world_as_it_is() {
+        let terrain = terrain();
+        let draft = terrain.draft(&[]);
+        assert_eq!((draft.receipts.len(), draft.hash), (0, terrain.world().hash()));
+        assert!(draft.change.bricks.is_empty() && draft.change.fields.is_empty());
+    }
+
+    #[test]
+    fn equal_bricks_are_shared_and_others_stay() {
+        let mut rng = Rng::with_seed(1);
+        let edits = edits(&mut rng, 8);
+        let (mut a, mut b) = (terrain(), terrain());
+        for own in [&mut a, &mut b] {
+            own.submit_edits(&edits);
+            own.finish();
+        }
+        b.submit_edits(&edits[2..3]);
+        b.finish();
+        let hash = a.world().hash();
+        let parts = b.parts();
+        a.share_bricks(parts.change.bricks.iter().filter_map(|(pos, brick)| Some((*pos, brick.as_ref()?))));
+        assert_eq!(a.world().hash(), hash);
+        let is_shared = |pos| {
+            let [own, other] = [&a, &b].map(|terrain| terrain.world().brick(pos));
+            own.zip(other).is_some_and(|(own, other)| Arc::ptr_eq(own, other))
+        };
+        let shared = a.world().bricks().filter(|(pos, _)| is_shared(*pos));
+        let (shared, all) = (shared.count(), a.world().bricks().count());
+        assert!(shared > all / 2, "{shared} of {all}");
+    }
+}
