@@ -339,6 +339,8 @@ pub mod saves;
 pub mod store;
 pub mod surface;
 pub mod terrain;
+#[cfg(feature = "replicon")]
+pub mod together;
 #[cfg(feature = "render")]
 pub mod view;
 pub mod volume;

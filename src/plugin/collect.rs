@@ -154,7 +154,7 @@ pub(super) fn collect_steps(
 }
 
 /// The pieces that the brushes of these receipts cut off.
-pub(super) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Item = LoosePieceFound> {
+pub(crate) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Item = LoosePieceFound> {
     receipts.iter().flat_map(move |receipt| {
         let pieces = receipt.outcome.iter().flat_map(|applied| &applied.loose);
         pieces.map(move |piece| LoosePieceFound {

@@ -41,6 +41,8 @@ mod task;
 mod threads;
 mod times;
 
+#[cfg(feature = "replicon")]
+pub(crate) use collect::pieces;
 pub use components::{
     Chunk, EditOutbox, Field, GroundPiece, GroundPieces, Held, MaterialColors, MeshBytes, ShownSurface,
     SlimVertices, Tile,

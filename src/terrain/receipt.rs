@@ -68,6 +68,9 @@ pub enum Rejection {
     /// Too much work is [waiting](super::WorkLimits::waiting).
     #[error("too much work waits already")]
     Overloaded,
+    /// Whoever decides about the edits of a shared terrain, say a server, refused it.
+    #[error("the server refused it")]
+    Refused,
     /// Applying it panicked. The others of its transaction were applied without it.
     #[error("applying the brush panicked; this is a bug of the plugin's")]
     Panicked,

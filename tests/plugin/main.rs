@@ -26,5 +26,7 @@ mod several_terrains;
 mod shown;
 mod stage;
 mod swap_budget;
+#[cfg(feature = "replicon")]
+mod together;
 #[path = "../worlds/mod.rs"]
 mod worlds;

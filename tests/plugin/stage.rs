@@ -49,9 +49,15 @@ impl Stage {
 
     /// An app with these plugins besides those of the crate.
     pub fn with<M>(plugins: impl bevy::app::Plugins<M>) -> Self {
+        Self::with_all(plugins, |_: &mut App| {})
+    }
+
+    /// An app with these plugins besides those of the crate, and some after them.
+    pub fn with_all<M, N>(before: impl bevy::app::Plugins<M>, after: impl bevy::app::Plugins<N>) -> Self {
         let mut app = App::new();
-        app.add_plugins(plugins)
+        app.add_plugins(before)
             .add_plugins(BurrowPlugins)
+            .add_plugins(after)
             .init_resource::<Receipts>()
             .init_resource::<ReadyTerrains>()
             .add_observer(|ready: On<TerrainReady>, mut terrains: ResMut<ReadyTerrains>| {

@@ -1,0 +1,108 @@
+//! The dedicated server: no window, no meshes.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
+
+use bevy::prelude::*;
+use bevy::state::app::StatesPlugin;
+use bevy_burrow::net::{Server, ServerSettings};
+use bevy_burrow::plugin::BurrowPlugins;
+use bevy_burrow::store::{Store, StoreOptions};
+use bevy_burrow::together::{GroundServer, TogetherPlugin};
+use bevy_replicon::prelude::*;
+use bevy_replicon_renet::RepliconRenetPlugins;
+
+use crate::party;
+
+/// Time between two frames.
+const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
+
+/// Most players.
+const PLAYERS: usize = 64;
+
+/// A server without a window.
+pub struct Dedicated {
+    app: App,
+    /// Where it listens.
+    pub address: SocketAddr,
+    next_line: Instant,
+}
+
+impl Dedicated {
+    pub fn new(address: SocketAddr, world: Option<&Path>) -> Result<Self> {
+        let settings = ServerSettings::default();
+        let ground = match world {
+            Some(folder) if Store::is_in(folder) => {
+                let ground = crate::terrain()?.world().shared_ground();
+                let (store, opened) = Store::open(folder, ground, StoreOptions::default())?;
+                GroundServer::with_store(Server::open(opened.terrain, &store, settings), store)
+            }
+            Some(folder) => {
+                let mut terrain = crate::terrain()?;
+                let store = Store::create(folder, &mut terrain, StoreOptions::default())?;
+                GroundServer::with_store(Server::open(terrain, &store, settings), store)
+            }
+            None => GroundServer::new(Server::new(crate::terrain()?, settings)),
+        };
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, RepliconRenetPlugins))
+            .add_plugins((BurrowPlugins, TogetherPlugin))
+            .insert_resource(ground);
+        app.finish();
+        app.cleanup();
+        let address = party::listen(app.world_mut(), address, PLAYERS)?;
+        Ok(Self { app, address, next_line: Instant::now() + Duration::from_secs(1) })
+    }
+
+    /// A frame.
+    pub fn update(&mut self) {
+        self.app.update();
+        if Instant::now() >= self.next_line {
+            self.next_line += Duration::from_secs(1);
+            self.app.world_mut().resource_mut::<GroundServer>().with(|server| {
+                let (figures, hash) = (server.figures(), server.terrain().world().hash());
+                println!(
+                    "{{\"number\":{},\"hash\":\"{hash:#018x}\",\"durable\":{},\"players\":{},\"order_bytes\":{},\"bulk_bytes\":{},\"repairs\":{}}}",
+                    server.applied(),
+                    server.durable(),
+                    server.clients().count(),
+                    figures.order_bytes,
+                    figures.bulk_bytes,
+                    figures.repairs
+                );
+            });
+        }
+    }
+
+    /// Runs for a while, or for ever.
+    pub fn run_for(&mut self, length: Option<Duration>) {
+        let start = Instant::now();
+        while length.is_none_or(|length| start.elapsed() < length) {
+            let frame = Instant::now();
+            self.update();
+            std::thread::sleep(FRAME.saturating_sub(frame.elapsed()));
+        }
+    }
+
+    /// The hash of the world.
+    pub fn hash(&mut self) -> Option<u64> {
+        let (sender, receiver) = channel();
+        let send = move |server: &mut Server| drop(sender.send(server.terrain().world().hash()));
+        self.app.world_mut().resource_mut::<GroundServer>().with(send);
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(10) {
+            self.app.update();
+            if let Ok(hash) = receiver.try_recv() {
+                return Some(hash);
+            }
+        }
+        None
+    }
+
+    /// Saves everything.
+    pub fn finish(mut self) {
+        self.app.world_mut().resource_mut::<GroundServer>().finish();
+    }
+}
