@@ -21,7 +21,7 @@ mod stamps;
 pub use bulk::BulkReader;
 pub use message::{
     ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent, RegionHashes,
-    ToClient, ToServer, Welcome,
+    Terms, ToClient, ToServer, Welcome,
 };
 pub use server::{
     Outgoing, Permission, Rate, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
