@@ -26,7 +26,7 @@ pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
 pub use message::{
     ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent, RegionHashes,
-    ToClient, ToServer, Welcome,
+    Terms, ToClient, ToServer, Welcome,
 };
 pub use replica::ShownChange;
 pub use server::{

@@ -1,4 +1,8 @@
 //! Digging together: one order, the same world everywhere.
 
-// mod hostile;
-// mod server;
+mod follower;
+mod hostile;
+mod load;
+mod server;
+#[path = "../worlds/mod.rs"]
+mod worlds;
