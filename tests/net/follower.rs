@@ -193,6 +193,8 @@ impl Follower {
         self.marks.clear();
         self.hashes.clear();
         self.touched.clear();
+        self.awaited.clear();
+        self.regions.clear();
         let terms = match welcome.join {
             Join::Log => {
                 self.joins.push("log");
@@ -310,10 +312,17 @@ impl Follower {
             let noted = self.marks.remove(number).unwrap_or_default();
             let told: BTreeMap<RegionPos, u64> = hashes.iter().copied().collect();
             let world = self.terrain.world();
-            let own = |at: &RegionPos| noted.get(at).copied().unwrap_or_else(|| world.region_hash(*at));
+            // What was touched before it came and again since the mark is told with the next mark.
+            let later: BTreeSet<RegionPos> =
+                self.marks.values().flat_map(BTreeMap::keys).chain(&self.touched).copied().collect();
+            let own = |at: &RegionPos| match noted.get(at) {
+                None if later.contains(at) => None,
+                None => Some(world.region_hash(*at)),
+                known => known.copied(),
+            };
             let all: BTreeSet<RegionPos> = noted.keys().chain(told.keys()).copied().collect();
-            let different: Vec<RegionPos> =
-                all.into_iter().filter(|at| told.get(at).copied() != Some(own(at))).collect();
+            let differs = |at: &RegionPos| own(at).is_some_and(|own| told.get(at) != Some(&own));
+            let different: Vec<RegionPos> = all.into_iter().filter(differs).collect();
             self.hashes.pop_front();
             if !different.is_empty() && self.awaited.is_empty() {
                 self.repairs += different.len();

@@ -289,6 +289,25 @@ fn what_others_touched_is_not_undone() {
 }
 
 #[test]
+fn strokes_are_forgotten_from_the_oldest_on() {
+    let settings = ServerSettings { undo: UndoPolicy::Own, undo_bytes: 100_000, ..generous() };
+    let mut scene = Scene::new(settings);
+    let mut a = scene.join(1);
+    for x in 0..12 {
+        a.edit([dig(8.0 + 9.0 * x as f32, 30.0)]);
+        scene.play(&mut [&mut a], 1);
+    }
+    for _ in 0..12 {
+        a.undo(1);
+    }
+    scene.play(&mut [&mut a], 2);
+    let forgotten = a.refused.len();
+    assert!((1..11).contains(&forgotten), "{forgotten} are forgotten");
+    assert!(a.refused.iter().all(|(_, why)| *why == Refusal::Nothing));
+    agreed(&scene.server, &[&a]);
+}
+
+#[test]
 fn an_undo_is_of_what_was_ordered_before_it() {
     // One edit at a time is applied, so that the undo has to wait.
     let mut scene = Scene::new(ServerSettings { undo: UndoPolicy::Own, work: 1, ..generous() });
