@@ -1,7 +1,10 @@
 //! Digging together: one order, the same world everywhere.
 
+mod bots;
 mod follower;
 mod hostile;
+mod laws;
+mod link;
 mod load;
 mod server;
 #[path = "../worlds/mod.rs"]
