@@ -6,6 +6,7 @@ mod hostile;
 mod laws;
 mod link;
 mod load;
+mod one_hash;
 mod server;
 #[path = "../worlds/mod.rs"]
 mod worlds;
