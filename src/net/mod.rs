@@ -13,6 +13,45 @@
 //! | `client` | the client: prediction, joins, repair |
 //! | `replica` | the world of the order, and what is shown of it |
 //! | `server` | the server: order, validation, undo, joins |
+//!
+//! A server that lets one client in and orders its dig:
+//!
+//! ```
+//! use bevy_burrow::net::{ClientId, Hello, PROTOCOL, Server, ServerSettings, Stamps, ToClient, ToServer};
+//! use bevy_burrow::prelude::*;
+//! use bevy_burrow::terrain::SIMULATION;
+//! use glam::{IVec3, Vec3};
+//! use std::sync::Arc;
+//! use std::time::Duration;
+//!
+//! let ground = Arc::new(Ground::flat(64, 64, 10.0)?);
+//! let terrain = Terrain::new(Arc::clone(&ground), &TerrainSettings::default())?;
+//! let mut server = Server::new(terrain, ServerSettings::default());
+//! let (client, now) = (ClientId(1), Duration::ZERO);
+//!
+//! // What a client sends, as bytes.
+//! let hello = Hello {
+//!     protocol: PROTOCOL,
+//!     simulation: SIMULATION,
+//!     ground: ground.hash(),
+//!     chunk_size: 32,
+//!     epoch: None,
+//!     place: IVec3::new(32, 10, 32),
+//! };
+//! let dig = Edit::quantize(&Brush::dig(Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0)))?;
+//! server.connect(client, now);
+//! server.receive(client, &ToServer::Hello(hello).to_bytes(), now);
+//! server.advance(now);
+//! server.receive(client, &ToServer::Edits { first: 1, edits: vec![dig] }.to_bytes(), now);
+//!
+//! let sent: Vec<ToClient> = server
+//!     .take_outgoing()
+//!     .iter()
+//!     .map(|(_, _, bytes)| ToClient::from_bytes(bytes, &ground, &Stamps::default()))
+//!     .collect::<Result<_, _>>()?;
+//! assert!(matches!(&sent[..], [ToClient::Welcome(_), ToClient::Entries(_)]));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod bulk;
 mod client;
@@ -26,7 +65,7 @@ pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
 pub use message::{
     ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent, RegionHashes,
-    ToClient, ToServer, Welcome,
+    Terms, ToClient, ToServer, Welcome,
 };
 pub use replica::ShownChange;
 pub use server::{

@@ -285,6 +285,9 @@ impl Replica {
             let new = bricks.get(&pos).map_or_else(|| world.brick(pos), Option::as_ref);
             if !is_same(old, new) {
                 change.bricks.push((pos, new.cloned()));
+            } else if let Some(drafted) = bricks.get_mut(&pos) {
+                // The one that is shown stays, so that it is held once.
+                *drafted = old.cloned();
             }
         }
         let chunks: BTreeSet<ChunkPos> =
@@ -347,3 +350,7 @@ fn is_same(a: Option<&Arc<Brick>>, b: Option<&Arc<Brick>>) -> bool {
         (a, b) => Brick::differences([a.map(Arc::as_ref), b.map(Arc::as_ref)]) == NONE,
     }
 }
+
+#[cfg(test)]
+#[path = "replica_tests.rs"]
+mod tests;

@@ -86,7 +86,7 @@ mod tests {
             let shape = Shape::sphere(at, part(1.0, 7.0));
             match number % 4 {
                 0 => Brush::add(shape, MaterialId(2)),
-                1 => Brush::smooth(shape),
+                1 => Brush::smooth(shape, 0.7),
                 _ => Brush::dig(shape),
             }
         });

@@ -1,4 +1,12 @@
 //! Digging together: one order, the same world everywhere.
 
-// mod hostile;
-// mod server;
+mod bots;
+mod follower;
+mod hostile;
+mod laws;
+mod link;
+mod load;
+mod one_hash;
+mod server;
+#[path = "../worlds/mod.rs"]
+mod worlds;

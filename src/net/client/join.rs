@@ -1,7 +1,5 @@
 //! Getting to where the server is.
 
-use std::time::Duration;
-
 use glam::IVec3;
 
 use super::super::message::{
@@ -17,7 +15,7 @@ pub(super) enum Stage {
     /// There is no connection.
     Apart,
     /// It waits for its welcome.
-    Greeting { since: Duration },
+    Greeting,
     /// Old entries come, up to a number. The server has seen own edits up to `own`.
     ByLog { to: u64, own: u64 },
     /// Regions at a number come, so many more.
@@ -41,6 +39,7 @@ impl Client {
         self.received = epoch.number;
         self.next_own = self.next_own.max(own.saturating_add(1));
         let to = epoch.number;
+        self.is_part = join != Join::Log;
         // Until it is there, it has what it had.
         let known = self.epoch.map_or(0, |known| known.number);
         match join {
@@ -128,6 +127,7 @@ impl Client {
 
     fn follow_from_now(&mut self) {
         self.stage = Stage::Following;
+        self.is_part = false;
         if !self.is_playable {
             self.is_playable = true;
             self.events.push(ClientEvent::Playable);
@@ -160,9 +160,8 @@ impl Client {
     }
 
     fn put(&mut self, change: WorldChange) {
-        match self.replica.put(change) {
-            Ok(applied) => self.marks.touch(applied.bricks),
-            Err(_) => self.figures.malformed += 1,
+        if self.replica.put(change).is_err() {
+            self.figures.malformed += 1;
         }
     }
 

@@ -19,7 +19,7 @@ use glam::IVec3;
 
 use super::bulk::BulkReader;
 use super::message::{
-    ClientId, Entries, Entry, Epoch, Hello, Kick, Lane, MOST_EDITS, PROTOCOL, ToClient, ToServer,
+    ClientId, Entries, Entry, Epoch, Hello, Kick, Lane, MOST_EDITS, PROTOCOL, Refusal, ToClient, ToServer,
 };
 use super::replica::{Replica, ShownChange};
 use super::stamps::Stamps;
@@ -38,9 +38,6 @@ const BATCH: usize = 2048;
 const ACK: Duration = Duration::from_millis(100);
 const ACK_BYTES: u64 = 16 << 10;
 
-/// The time that a greeting has to be answered in, before it is sent again.
-const GREETING: Duration = Duration::from_secs(3);
-
 /// A client: bytes in, bytes out.
 ///
 /// In each frame: [`receive`](Self::receive) what came, [`dig`](Self::dig) what the player digs, send what
@@ -56,6 +53,8 @@ pub struct Client {
     id: Option<ClientId>,
     /// Where the world is; `None` before the first welcome.
     epoch: Option<Epoch>,
+    /// Does the world lack regions of its number?
+    is_part: bool,
     stage: Stage,
     inbox: VecDeque<(Lane, Vec<u8>)>,
     bulk: BulkReader,
@@ -100,6 +99,7 @@ impl Client {
             near: 96,
             id: None,
             epoch: None,
+            is_part: false,
             stage: Stage::Apart,
             inbox,
             bulk,
@@ -144,7 +144,7 @@ impl Client {
         self.bulk = BulkReader::default();
         self.acknowledged = (0, 0, now);
         self.outgoing.clear();
-        self.greet(now);
+        self.greet();
     }
 
     /// Enters that the connection is gone. Edits go on to be shown.
@@ -153,15 +153,18 @@ impl Client {
         self.inbox.clear();
     }
 
-    fn greet(&mut self, now: Duration) {
-        self.stage = Stage::Greeting { since: now };
+    fn greet(&mut self) {
+        self.stage = Stage::Greeting;
         self.repair = None;
         let hello = Hello {
             protocol: PROTOCOL,
             simulation: SIMULATION,
             ground: self.replica.world().ground().hash(),
             chunk_size: self.chunk_size,
-            epoch: self.epoch,
+            // No number is that of a part of a world: the server tells what is missing.
+            epoch: self
+                .epoch
+                .map(|epoch| if self.is_part { Epoch { number: u64::MAX, ..epoch } } else { epoch }),
             place: self.place,
         };
         self.outgoing.push(ToServer::Hello(hello).to_bytes());
@@ -227,7 +230,10 @@ impl Client {
     /// Asks the server to take back the last stroke of a player, by default the own one. If it may be, it comes as an entry;
     /// [`ClientEvent::Undone`] or [`ClientEvent::UndoRefused`] tell of it.
     pub fn undo(&mut self, of: Option<ClientId>) {
-        let Some(of) = of.or(self.id) else { return };
+        let Some(of) = of.or(self.id).filter(|_| self.is_welcome()) else {
+            // Its number would hide those of edits that are sent again.
+            return self.events.push(ClientEvent::UndoRefused(Refusal::NotJoined));
+        };
         self.flush();
         self.outgoing.push(ToServer::Undo { own: self.next_own, of }.to_bytes());
         self.next_own += 1;
@@ -244,7 +250,7 @@ impl Client {
 
     /// Has the server welcomed it on this connection?
     fn is_welcome(&self) -> bool {
-        !matches!(self.stage, Stage::Apart | Stage::Greeting { .. })
+        !matches!(self.stage, Stage::Apart | Stage::Greeting)
     }
 
     /// Messages to the server, in order; each is returned once.
@@ -274,14 +280,9 @@ impl Client {
         while let Some((lane, bytes)) = self.inbox.pop_front() {
             let ground = self.replica.world().shared_ground();
             match ToClient::from_bytes(&bytes, &ground, &self.stamps) {
-                Ok(message) => self.take(lane, message, now),
+                Ok(message) => self.take(lane, message),
                 Err(_) => self.figures.malformed += 1,
             }
-        }
-        if let Stage::Greeting { since } = self.stage
-            && now.saturating_sub(since) > GREETING
-        {
-            self.greet(now);
         }
         let is_busy = self.follow();
         let (shown, receipts) = self.replica.update();
@@ -300,11 +301,11 @@ impl Client {
         }
     }
 
-    fn take(&mut self, lane: Lane, message: ToClient, now: Duration) {
+    fn take(&mut self, lane: Lane, message: ToClient) {
         match message {
             ToClient::Welcome(welcome) => self.begin(welcome),
             ToClient::Kicked(why) => self.leave(why),
-            ToClient::Entries(entries) => self.take_entries(lane, entries, now),
+            ToClient::Entries(entries) => self.take_entries(lane, entries),
             ToClient::Void { number } => self.take_void(number),
             ToClient::Refused { own, why } => {
                 let event = match self.replica.take_back(own) {
@@ -317,7 +318,7 @@ impl Client {
             ToClient::Table { number, regions } => self.take_table(number, &regions),
             ToClient::Region(content) => self.take_region(content),
             ToClient::Durable { number } => self.events.push(ClientEvent::Durable(number)),
-            ToClient::Piece(piece) => self.take_piece(&piece, now),
+            ToClient::Piece(piece) => self.take_piece(&piece),
         }
     }
 
@@ -326,12 +327,12 @@ impl Client {
         self.events.push(ClientEvent::Kicked(why));
     }
 
-    fn take_piece(&mut self, piece: &[u8], now: Duration) {
+    fn take_piece(&mut self, piece: &[u8]) {
         self.bulk.add(piece);
         let ground = self.replica.world().shared_ground();
         loop {
             match self.bulk.next(&ground, &self.stamps) {
-                Ok(Some(message)) => self.take(Lane::Bulk, message, now),
+                Ok(Some(message)) => self.take(Lane::Bulk, message),
                 Ok(None) => return,
                 Err(_) => {
                     self.figures.malformed += 1;
@@ -341,13 +342,13 @@ impl Client {
         }
     }
 
-    fn take_entries(&mut self, lane: Lane, Entries { first, entries }: Entries, now: Duration) {
+    fn take_entries(&mut self, lane: Lane, Entries { first, entries }: Entries) {
         let last = first.saturating_add(entries.len() as u64).saturating_sub(1);
         if lane == Lane::Order && self.is_welcome() {
             if first > self.received.saturating_add(1) {
                 // Something is missing: what follows waits until it has come.
                 self.figures.gaps += 1;
-                self.greet(now);
+                self.greet();
             }
             self.received = self.received.max(last);
         }

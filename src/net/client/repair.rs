@@ -52,6 +52,12 @@ impl Marks {
         }
     }
 
+    /// Forgets what was noted of regions before they were repaired.
+    fn forget(&mut self, repaired: &BTreeSet<RegionPos>) {
+        self.touched.retain(|region| !repaired.contains(region));
+        self.ours.values_mut().for_each(|hashes| hashes.retain(|(region, _)| !repaired.contains(region)));
+    }
+
     /// Compares marks that both sides have; returns how many, and the regions that differ.
     fn compare(&mut self, world: &World) -> (u64, BTreeSet<RegionPos>) {
         let (mut count, mut differing) = (0, BTreeSet::new());
@@ -106,18 +112,24 @@ impl Reaches {
 /// regions take their places.
 pub(super) struct Repair {
     wanted: BTreeSet<RegionPos>,
-    contents: Vec<RegionContent>,
+    /// The number that the world was at when they were asked for.
+    from: u64,
+    /// Those that have come, all of one number.
+    contents: BTreeMap<RegionPos, RegionContent>,
 }
 
 impl Repair {
     pub fn add(&mut self, content: RegionContent) {
-        self.contents.push(content);
+        if content.number >= self.from && self.wanted.contains(&content.pos) {
+            self.contents.retain(|_, other| other.number == content.number);
+            self.contents.insert(content.pos, content);
+        }
     }
 
     /// The number up to which entries may be applied: that of the regions, once all are there.
     pub fn number(&self) -> Option<u64> {
-        let is_complete = self.contents.len() >= self.wanted.len();
-        self.contents.last().filter(|_| is_complete).map(|content| content.number)
+        let is_complete = self.contents.len() == self.wanted.len();
+        self.contents.values().next().filter(|_| is_complete).map(|content| content.number)
     }
 }
 
@@ -136,8 +148,9 @@ impl Client {
         let wanted: BTreeSet<RegionPos> = differing.iter().take(MOST_REGIONS).copied().collect();
         self.doubtful = differing.difference(&wanted).copied().collect();
         let regions = wanted.iter().copied().collect();
-        self.outgoing.push(ToServer::Fetch { number: self.number(), regions }.to_bytes());
-        self.repair = Some(Repair { wanted, contents: Vec::new() });
+        let from = self.number();
+        self.outgoing.push(ToServer::Fetch { number: from, regions }.to_bytes());
+        self.repair = Some(Repair { wanted, from, contents: BTreeMap::new() });
     }
 
     /// Puts regions that were fetched into their places, once the world is at their number.
@@ -148,7 +161,8 @@ impl Client {
             return;
         };
         self.figures.repairs += repair.wanted.len() as u64;
-        repair.contents.into_iter().for_each(|content| self.put_region(content));
+        repair.contents.into_values().for_each(|content| self.put_region(content));
+        self.marks.forget(&repair.wanted);
         self.events.push(ClientEvent::Repaired(repair.wanted.into_iter().collect()));
     }
 

@@ -1,8 +1,10 @@
 //! Entries become the world.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::super::message::{Entry, Refusal, ToClient};
+use super::super::encoding::entry_bytes;
+use super::super::message::{Entry, Refusal, RegionHashes, ToClient};
 use super::strokes::NoUndo;
 use super::{Ordered, Server, ServerEvent, UndoPolicy, UndoRequest};
 use crate::brush::Edit;
@@ -15,16 +17,16 @@ const MOST_PARTS: usize = 1 << 20;
 impl Server {
     /// Applies entries, as much as one call may.
     pub(super) fn apply(&mut self) {
-        let mut left = self.settings.work;
-        let mut is_first = true;
-        while !self.waiting.is_empty() && (is_first || left > 0) {
-            left = left.saturating_sub(self.apply_some(left));
-            is_first = false;
-        }
-        while self.waiting.is_empty()
-            && let Some(request) = self.undos.pop_front()
-        {
-            self.undo(&request);
+        let mut left = self.settings.work.max(1);
+        while left > 0 {
+            let work = if !self.waiting.is_empty() {
+                self.apply_some(left)
+            } else if let Some(request) = self.undos.pop_front() {
+                self.undo(&request)
+            } else {
+                return;
+            };
+            left = left.saturating_sub(work);
         }
     }
 
@@ -43,7 +45,11 @@ impl Server {
                 self.terrain.set_rules(rules).unwrap_or_default();
             }
             Entry::Loose(loose) => self.terrain.set_loose(loose),
-            Entry::Parts { change, .. } => self.put_parts(number, &change),
+            Entry::Parts { change, .. } => {
+                self.put_parts(number, &change);
+                self.applied = number;
+                return change.bricks.len() as u64 + 1;
+            }
             Entry::Mark => self.tell_hashes(number),
             Entry::Edit { .. } => {}
         }
@@ -113,6 +119,7 @@ impl Server {
             let region = RegionPos::of(*pos);
             self.touched.insert(region);
             self.changed.insert(region, number);
+            self.known_hashes.remove(&region);
         }
     }
 
@@ -132,26 +139,38 @@ impl Server {
     }
 
     fn tell_hashes(&mut self, number: u64) {
-        let world = self.terrain.world();
         let touched = std::mem::take(&mut self.touched);
-        let regions = touched.into_iter().map(|region| (region, world.region_hash(region))).collect();
+        let regions = self.hashes_of(touched);
         self.send_to_all(&ToClient::Hashes { number, regions });
     }
 
-    /// Takes a stroke back in the world as it is, with all entries applied.
-    fn undo(&mut self, request: &UndoRequest) {
-        let undone = self.strokes.undo(request.of, self.terrain.world());
-        let change = match undone {
-            Ok(change) => Arc::new(change),
-            Err(NoUndo::Nothing) => return self.refuse(request.by, request.own, Refusal::Nothing),
-            Err(NoUndo::Touched) => return self.refuse(request.by, request.own, Refusal::Touched),
-        };
-        let entry = Entry::Parts { by: Some((request.by, request.own)), change };
-        if super::super::encoding::entry_bytes(&entry) > MOST_PARTS {
-            return self.refuse(request.by, request.own, Refusal::TooLarge);
+    /// The hashes of regions as they are; those that are known are not computed again.
+    pub(super) fn hashes_of(&mut self, regions: BTreeSet<RegionPos>) -> RegionHashes {
+        let (world, known) = (self.terrain.world(), &mut self.known_hashes);
+        let mut hash = |region| *known.entry(region).or_insert_with(|| world.region_hash(region));
+        regions.into_iter().map(|region| (region, hash(region))).collect()
+    }
+
+    /// Takes a stroke back in the world as it is, with all entries applied; returns the work.
+    fn undo(&mut self, request: &UndoRequest) -> u64 {
+        let change = self.strokes.undo(request.of, self.terrain.world()).map_err(|why| match why {
+            NoUndo::Nothing => Refusal::Nothing,
+            NoUndo::Touched => Refusal::Touched,
+        });
+        let entry = change.and_then(|change| {
+            let entry = Entry::Parts { by: Some((request.by, request.own)), change: Arc::new(change) };
+            if entry_bytes(&entry) <= MOST_PARTS { Ok(entry) } else { Err(Refusal::TooLarge) }
+        });
+        match entry {
+            Ok(entry) => {
+                self.order(entry);
+                self.apply_some(u64::MAX)
+            }
+            Err(why) => {
+                self.refuse(request.by, request.own, why);
+                1
+            }
         }
-        self.order(entry);
-        self.apply_some(u64::MAX);
     }
 }
 

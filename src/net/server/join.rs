@@ -111,8 +111,7 @@ impl Server {
     /// The table of all regions. The world stays as it is for the client, until it goes on.
     fn compare(&mut self, client: ClientId) -> (Join, Vec<Job>) {
         let (world, number) = (self.terrain.snapshot(), self.applied);
-        let regions =
-            regions_of(&world).into_iter().map(|region| (region, world.region_hash(region))).collect();
+        let regions = self.hashes_of(regions_of(&world));
         let table = ToClient::Table { number, regions }.to_bytes();
         if let Some(session) = self.sessions.get_mut(&client) {
             session.compared = Some((number, world));
@@ -142,16 +141,11 @@ impl Server {
     fn answer(&mut self, fetch: Fetch) {
         let Some(session) = self.sessions.get_mut(&fetch.client) else { return };
         let compared = session.compared.as_ref().filter(|(number, _)| *number == fetch.number);
-        let (number, world) = match compared {
-            Some((number, world)) => (*number, Arc::clone(world)),
-            None => {
-                self.figures.repairs += fetch.regions.len() as u64;
-                (self.applied, self.terrain.snapshot())
-            }
-        };
         let is_repair = compared.is_none();
+        let (number, world) = compared.cloned().unwrap_or_else(|| (self.applied, self.terrain.snapshot()));
         jobs(&world, number, &fetch.regions).into_iter().for_each(|job| session.bulk.push(job));
         if is_repair {
+            self.figures.repairs += fetch.regions.len() as u64;
             self.tell(ServerEvent::Repaired(fetch.client, fetch.regions));
         }
     }

@@ -31,13 +31,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use glam::IVec3;
+use rustc_hash::FxHashMap;
 
-use super::encoding::OrderWriter;
-use super::message::{ClientId, Entry, Epoch, Kick, Lane, ToClient};
+use super::encoding::{OrderWriter, entry_bytes};
+use super::message::{ClientId, Entry, Epoch, Kick, Lane, MOST_TO_CLIENT, ToClient};
 use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
-use crate::store::WorldId;
+use crate::store::{FormatError, WorldId};
 use crate::terrain::{LooseSettings, Meshing, Terrain, WorkLimits, WorldChange};
 use crate::volume::{DiggingRules, RulesError};
 pub use bucket::Rate;
@@ -102,6 +103,8 @@ pub struct Server {
     touched: BTreeSet<RegionPos>,
     /// The number at which each region changed last, as far as this run knows.
     changed: BTreeMap<RegionPos, u64>,
+    /// Hashes of regions that have not changed since they were computed.
+    known_hashes: FxHashMap<RegionPos, u64>,
     last_mark: Duration,
     /// The number of the last mark.
     marked: u64,
@@ -159,6 +162,7 @@ impl Server {
             strokes: Strokes::new(settings.undo_bytes),
             touched: BTreeSet::new(),
             changed: BTreeMap::new(),
+            known_hashes: FxHashMap::default(),
             last_mark: Duration::ZERO,
             marked: number,
             sessions: BTreeMap::new(),
@@ -292,8 +296,17 @@ impl Server {
     }
 
     /// Orders that parts take the place of others.
-    pub fn put(&mut self, change: WorldChange) {
-        self.order(Entry::Parts { by: None, change: Arc::new(change) });
+    ///
+    /// # Errors
+    /// When they take more bytes than a message may; put them in smaller parts then.
+    pub fn put(&mut self, change: WorldChange) -> Result<(), FormatError> {
+        let entry = Entry::Parts { by: None, change: Arc::new(change) };
+        let (length, limit) = (entry_bytes(&entry) as u64, MOST_TO_CLIENT as u64 / 2);
+        if length > limit {
+            return Err(FormatError::TooLarge { length, limit });
+        }
+        self.order(entry);
+        Ok(())
     }
 
     fn order_edit(&mut self, author: ClientId, own: u64, edit: Edit, cost: u64) {

@@ -12,9 +12,9 @@ use crate::store::format::bricks::is_possible;
 use crate::terrain::SIMULATION;
 
 /// What beginning costs, as flooding is counted: regions are listed, or hashed.
-const HELLO: u64 = 1000;
+const HELLO: u64 = 4000;
 /// What each region costs that is fetched.
-const REGION: u64 = 20;
+const REGION: u64 = 1;
 /// Bytes of a message that cost 1.
 const BYTES: u64 = 64;
 
@@ -90,8 +90,10 @@ impl Server {
             if !self.is_new(client, own) {
                 continue;
             }
+            // One that is too large is refused, however often it comes: that is no flood.
             let cost = cost(self.terrain.world().grid(), &edit).unwrap_or_default();
-            if !self.may_go_on(client, cost, now) {
+            let counted = cost.min(self.settings.cost.burst / 16);
+            if !self.may_go_on(client, counted, now) {
                 return true;
             }
             match self.validate(client, &edit, now) {

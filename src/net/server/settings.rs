@@ -45,7 +45,8 @@ pub struct ServerSettings {
     /// What a client's edits may cost. An edit costs 20 and 1 for each brick that it reaches, or 4 if it sculpts; those that cost more
     /// are refused.
     pub cost: Rate,
-    /// A client is kicked once its messages cost so many times as much as `cost` allows, accepted or not.
+    /// A client is kicked once its messages cost so many times as much as `cost` allows, accepted or not. An edit counts as a
+    /// sixteenth of the burst at most.
     pub flood: u64,
     /// Invalid messages: a client with more is kicked.
     pub malformed: Rate,

@@ -1,0 +1,254 @@
+//! A replica against a world that obeys the order one entry at a time, with the pending edits on top.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use fastrand::Rng;
+use glam::{Vec2, Vec3};
+
+use super::*;
+use crate::brush::{Brush, Shape, Stamp};
+use crate::ground::{GreyImage, MaterialId};
+use crate::net::ClientId;
+use crate::volume::DiggingRules;
+
+const SIDE: u32 = 72;
+const OWN: ClientId = ClientId(1);
+
+fn ground() -> Arc<Ground> {
+    let height = |x: i32, z: i32| 20.0 + 3.0 * (f64::from(x) * 0.2).sin() + (f64::from(z) * 0.3).cos();
+    Arc::new(Ground::from_fn(SIDE, SIDE, height).expect("valid heights"))
+}
+
+fn settings() -> TerrainSettings {
+    TerrainSettings { chunk_size: 16, ..TerrainSettings::default() }
+}
+
+fn terrain(ground: &Arc<Ground>) -> Terrain {
+    let mut terrain = Terrain::new(Arc::clone(ground), &settings()).expect("valid settings");
+    prepare(&mut terrain);
+    terrain
+}
+
+/// An edit of any operation, near to all others.
+fn edit(rng: &mut Rng, image: &Arc<GreyImage>) -> Edit {
+    let mut within = |low: f32, high: f32| low + rng.f32() * (high - low);
+    let at = Vec3::new(within(8.0, 48.0), within(12.0, 26.0), within(8.0, 48.0));
+    let size = within(1.0, 6.0);
+    let shape = match rng.u32(0..3) {
+        0 => Shape::cuboid(at, Vec3::new(size, 1.5, size)),
+        _ => Shape::sphere(at, size),
+    };
+    let material = MaterialId(rng.u8(0..4));
+    let brush = match rng.u32(0..14) {
+        0 | 1 => Brush::add(shape, material),
+        2 => Brush::paint(shape, material),
+        3 => Brush::smooth(shape, 0.7),
+        4 => Brush::sharpen(shape, 0.7),
+        5 => Brush::flatten(shape, at, Vec3::new(0.1, 1.0, 0.2)),
+        6 => Brush::level(shape, at.y),
+        7 => Brush::raise(shape, 1.5),
+        8 => Brush::lower(shape, 1.5),
+        9 => Brush::terrace(shape, 3.0),
+        10 => Brush::stamp(shape, Stamp::new(Arc::clone(image), at, Vec2::splat(8.0), 3.0)),
+        _ => Brush::dig(shape),
+    };
+    Edit::quantize(&brush.with_power(rng.u8(100..=255))).expect("a valid brush")
+}
+
+/// Something that is no client's edit.
+fn turn(rng: &mut Rng, reference: &Terrain) -> Entry {
+    match rng.u32(0..4) {
+        0 => {
+            let rules = DiggingRules::default().with_unbreakable(MaterialId(rng.u8(0..4)));
+            Entry::Rules(rng.bool().then(|| Arc::new(rules.with_hardness(MaterialId(2), 180))))
+        }
+        1 => {
+            let loose = LooseSettings { largest: 2000, crumbs: rng.u32(0..40), debris: rng.u32(0..400) };
+            Entry::Loose(rng.bool().then_some(loose))
+        }
+        2 => Entry::Mark,
+        _ => {
+            let world = reference.world();
+            let mut bricks: Vec<BrickPos> = world.bricks().map(|(pos, _)| pos).collect();
+            rng.shuffle(&mut bricks);
+            bricks.truncate(4);
+            bricks.sort_unstable();
+            let fields = world.fields().take(1).map(|(chunk, _)| (chunk, Fields::default())).collect();
+            let bricks = bricks.into_iter().map(|pos| (pos, None)).collect();
+            let change = WorldChange { bricks, fields, next_field: world.next_field() };
+            Entry::Parts { by: None, change: Arc::new(change) }
+        }
+    }
+}
+
+fn obey(terrain: &mut Terrain, entry: &Entry) {
+    match entry {
+        Entry::Edit { edit, .. } => {
+            terrain.submit_edit(edit);
+            while let Some(transaction) = terrain.begin() {
+                terrain.commit(transaction.run()).expect("it waits for it");
+            }
+        }
+        Entry::Rules(rules) => {
+            terrain.set_rules(rules.as_deref().cloned().unwrap_or_default()).expect("valid rules");
+        }
+        Entry::Loose(loose) => terrain.set_loose(*loose),
+        Entry::Parts { change, .. } => {
+            terrain.apply_change(WorldChange::clone(change), None).expect("they fit");
+        }
+        Entry::Mark => {}
+    }
+}
+
+fn own_number(entry: &Entry) -> Option<u64> {
+    match entry {
+        Entry::Edit { author: OWN, own, .. } => Some(*own),
+        _ => None,
+    }
+}
+
+fn fields(world: &World) -> BTreeMap<ChunkPos, Fields> {
+    let fields = world.fields().filter(|(_, fields)| !fields.is_empty());
+    fields.map(|(chunk, fields)| (chunk, fields.clone())).collect()
+}
+
+struct Play {
+    replica: Replica,
+    /// Only put.
+    shown: Terrain,
+    /// Obeys the order one entry at a time.
+    reference: Terrain,
+    /// How much of the order it has obeyed.
+    obeyed: usize,
+    order: Vec<Entry>,
+    /// How much of the order the replica has.
+    given: usize,
+    /// Own edits that the server has not answered.
+    sent: VecDeque<(u64, Edit)>,
+    /// Updates where nothing was to be done.
+    quiet: usize,
+    shared: usize,
+}
+
+impl Play {
+    fn new() -> Self {
+        let ground = ground();
+        let replica = Replica::new(Arc::clone(&ground), &settings()).expect("valid settings");
+        let (shown, reference) = (terrain(&ground), terrain(&ground));
+        let (order, sent) = Default::default();
+        Self { replica, shown, reference, obeyed: 0, order, given: 0, sent, quiet: 0, shared: 0 }
+    }
+
+    /// Gives the replica some entries, and checks whether it has to do anything.
+    fn give(&mut self, count: usize) {
+        let was_outdated = self.replica.is_outdated;
+        let batch = &self.order[self.given..self.order.len().min(self.given + count)];
+        let mut pending: VecDeque<u64> = self.replica.pending().map(|(own, _)| own).collect();
+        let is_echo = |entry: &Entry| match own_number(entry) {
+            Some(own) => pending.pop_front() == Some(own),
+            None => matches!(entry, Entry::Mark),
+        };
+        let is_quiet = batch.iter().all(is_echo);
+        let applied = self.replica.apply(batch, own_number);
+        self.given += batch.len();
+        let edits = batch.iter().filter(|entry| matches!(entry, Entry::Edit { .. })).count();
+        assert_eq!(applied.receipts.len(), edits);
+        assert!(!applied.is_void);
+        if is_quiet && !was_outdated && applied.receipts.iter().all(|receipt| receipt.outcome.is_ok()) {
+            let (change, receipts) = self.replica.update();
+            assert!(change.is_none() && receipts.is_none(), "what was predicted came");
+            self.quiet += usize::from(edits > 0);
+        }
+    }
+
+    fn check(&mut self) {
+        if let (Some(ShownChange { change, hash }), _) = self.replica.update() {
+            self.shown.apply_change(change, Some(hash)).expect("it fits");
+        }
+        while self.obeyed < self.given {
+            obey(&mut self.reference, &self.order[self.obeyed]);
+            self.obeyed += 1;
+        }
+        let pending: Vec<Edit> = self.replica.pending().map(|(_, edit)| edit.clone()).collect();
+        let draft = self.reference.draft(&pending);
+        assert_eq!(self.replica.world().hash(), self.reference.world().hash(), "of what is confirmed");
+        assert_eq!(fields(self.replica.world()), fields(self.reference.world()), "of what is confirmed");
+        assert_eq!(self.replica.shown_hash(), draft.hash);
+        assert_eq!(self.shown.world().hash(), draft.hash, "of what is shown");
+        let mut expected = fields(self.reference.world());
+        expected.extend(draft.change.fields);
+        expected.retain(|_, fields| !fields.is_empty());
+        assert_eq!(fields(self.shown.world()), expected, "of what is shown");
+        self.check_sharing();
+    }
+
+    fn check_sharing(&mut self) {
+        let (confirmed, shown) = (self.replica.world(), self.shown.world());
+        for (pos, _) in confirmed.bricks() {
+            let (own, other) = (confirmed.brick(pos), shown.brick(pos));
+            let Some((own, other)) = own.zip(other) else { continue };
+            // Each world has one brick of each uniform kind.
+            if own.uniform().is_none() && is_same(Some(own), Some(other)) {
+                assert!(Arc::ptr_eq(own, other), "{pos:?} is held twice");
+                self.shared += 1;
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_shown_is_the_order_with_the_pending_edits() {
+    let rounds = std::env::var("BURROW_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(12);
+    let image =
+        Arc::new(GreyImage::from_samples(4, 4, (0..16).map(|at| at * 4000).collect()).expect("an image"));
+    let (mut quiet, mut shared) = (0, 0);
+    for round in 0..rounds {
+        let mut rng = Rng::with_seed(round);
+        let mut play = Play::new();
+        for own in 1..=40 {
+            if rng.u32(0..3) > 0 {
+                let edit = edit(&mut rng, &image);
+                play.replica.predict(own, edit.clone());
+                play.sent.push_back((own, edit));
+            }
+            if rng.u32(0..3) == 0 {
+                play.check();
+            }
+            // In some rounds others dig much, in some nobody does.
+            if rng.u64(0..6) < round % 4 {
+                let edit = edit(&mut rng, &image);
+                play.order.push(Entry::Edit { author: ClientId(2), own, edit });
+            }
+            if round % 3 > 0 && rng.u32(0..6) == 0 {
+                let turn = turn(&mut rng, &play.reference);
+                play.order.push(turn);
+            }
+            for _ in 0..rng.usize(0..=2) {
+                let Some((own, edit)) = play.sent.pop_front() else { break };
+                if rng.u32(0..8) == 0 {
+                    assert_eq!(play.replica.take_back(own), Some(edit));
+                } else {
+                    play.order.push(Entry::Edit { author: OWN, own, edit });
+                }
+            }
+            if rng.bool() {
+                play.give(rng.usize(1..6));
+            }
+            if rng.bool() {
+                play.check();
+            }
+        }
+        play.check();
+        let whole = play.replica.whole(play.shown.world());
+        let mut other = terrain(&ground());
+        obey(&mut other, &Entry::Edit { author: OWN, own: 0, edit: edit(&mut rng, &image) });
+        let ShownChange { change, hash } = play.replica.whole(other.world());
+        other.apply_change(change, Some(hash)).expect("it fits");
+        assert_eq!((hash, other.world().hash()), (whole.hash, play.shown.world().hash()));
+        assert_eq!(fields(other.world()), fields(play.shown.world()));
+        (quiet, shared) = (quiet + play.quiet, shared + play.shared);
+    }
+    assert!(quiet >= 10, "{quiet} predictions came as they were");
+    assert!(shared >= 1000, "{shared} bricks are shared");
+}

@@ -1,0 +1,428 @@
+//! A server, players who dig at random, and the lines between them; what everybody has is checked in every frame.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy_burrow::brush::Edit;
+use bevy_burrow::net::{
+    Client, ClientEvent, ClientId, Entries, Entry, Lane, Server, ServerSettings, ShownChange, Stamps,
+    ToClient,
+};
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::WorldChange;
+use fastrand::Rng;
+use glam::{IVec3, Vec2, Vec3};
+
+use crate::follower::terrain;
+use crate::link::{Line, Way};
+use crate::worlds::{any_random_brush, random_rules};
+
+/// A frame of a player; every other one is one of the server.
+pub const FRAME: Duration = Duration::from_micros(16_667);
+/// A frame of the server.
+pub const TICK: Duration = Duration::from_micros(2 * 16_667);
+/// Frames between two edits of a player.
+const EDIT: u64 = 12;
+
+/// The world as the order says, one entry after the other, and the hash at every number.
+pub struct Reference {
+    terrain: Terrain,
+    ground: Arc<Ground>,
+    stamps: Stamps,
+    pub number: u64,
+    pub hashes: BTreeMap<u64, u64>,
+    pub loose: usize,
+    pub undone: usize,
+    pub terms: usize,
+}
+
+impl Reference {
+    fn new(ground: &Arc<Ground>, stamps: Stamps) -> Self {
+        let terrain = terrain(ground);
+        let hashes = BTreeMap::from([(0, terrain.world().hash())]);
+        let ground = Arc::clone(ground);
+        Self { terrain, ground, stamps, number: 0, hashes, loose: 0, undone: 0, terms: 0 }
+    }
+
+    /// Goes back to what a server has that was restarted.
+    pub fn begin_again(&mut self, terrain: Terrain, number: u64) {
+        self.terrain = terrain;
+        self.number = number;
+        self.hashes.retain(|at, _| *at <= number);
+        self.hashes.insert(number, self.terrain.world().hash());
+    }
+
+    /// Obeys what is new in a message; returns the edits of players among it.
+    fn obey(&mut self, message: &[u8]) -> Vec<(ClientId, u64)> {
+        let mut own_numbers = Vec::new();
+        let message = ToClient::from_bytes(message, &self.ground, &self.stamps).expect("a message");
+        let ToClient::Entries(Entries { first, entries }) = message else { return own_numbers };
+        for (number, entry) in (first..).zip(entries) {
+            if number != self.number + 1 {
+                continue;
+            }
+            match entry {
+                Entry::Edit { author, own, edit } => {
+                    self.terrain.submit_edit(&edit);
+                    while let Some(transaction) = self.terrain.begin() {
+                        for receipt in self.terrain.commit(transaction.run()).expect("it waits for it") {
+                            self.loose += receipt.outcome.map_or(0, |applied| applied.loose.len());
+                        }
+                    }
+                    own_numbers.push((author, own));
+                }
+                Entry::Rules(rules) => {
+                    let rules = rules.as_deref().cloned().unwrap_or_default();
+                    self.terrain.set_rules(rules).expect("valid rules");
+                    self.terms += 1;
+                }
+                Entry::Loose(loose) => {
+                    self.terrain.set_loose(loose);
+                    self.terms += 1;
+                }
+                Entry::Parts { change, by } => {
+                    self.terrain.apply_change(WorldChange::clone(&change), None).expect("they fit");
+                    self.undone += usize::from(by.is_some());
+                }
+                _ => {}
+            }
+            self.number = number;
+            self.hashes.insert(number, self.terrain.world().hash());
+        }
+        own_numbers
+    }
+}
+
+/// A player.
+pub struct Bot {
+    pub id: ClientId,
+    pub client: Client,
+    /// What the player sees. It is only put.
+    pub shown: Terrain,
+    up: Way,
+    pub order: Way,
+    pub bulk: Way,
+    free: [Duration; 2],
+    rng: Rng,
+    pub is_digging: bool,
+    pub is_connected: bool,
+    /// May its world differ from the others'? So it is where it is lied to.
+    pub may_differ: bool,
+    edits: u64,
+    /// When edits were dug that are not shown yet, by tag.
+    dug: BTreeMap<u64, u64>,
+    /// When the last entry of messages came that are not applied yet.
+    arrived: VecDeque<(Duration, u64)>,
+    /// The most frames until an own edit was shown.
+    pub own_frames: u64,
+    /// The longest time from the arrival of an entry until it was shown.
+    pub lag: Duration,
+    pub events: BTreeMap<&'static str, u64>,
+    pub playable_at: Option<Duration>,
+    pub joined_at: Option<Duration>,
+    pub durable: u64,
+    pub bytes: [u64; 2],
+    /// Numbers of tags that came to an end.
+    pub answered: u64,
+}
+
+impl Bot {
+    fn new(id: u64, ground: &Arc<Ground>, image: &Arc<GreyImage>, now: Duration) -> Self {
+        let mut client =
+            Client::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
+        client.stamps_mut().add(Arc::clone(image));
+        client.set_place(IVec3::new(20, 20, 20));
+        client.connect(now);
+        let (up, order, bulk, free, dug, arrived, events) = Default::default();
+        Self {
+            id: ClientId(id),
+            client,
+            shown: terrain(ground),
+            up,
+            order,
+            bulk,
+            free,
+            rng: Rng::with_seed(id),
+            is_digging: true,
+            is_connected: true,
+            may_differ: false,
+            edits: 0,
+            dug,
+            arrived,
+            own_frames: 0,
+            lag: Duration::ZERO,
+            events,
+            playable_at: None,
+            joined_at: None,
+            durable: 0,
+            bytes: [0; 2],
+            answered: 0,
+        }
+    }
+
+    pub fn event(&self, name: &str) -> u64 {
+        self.events.get(name).copied().unwrap_or_default()
+    }
+
+    pub fn edits(&self) -> u64 {
+        self.edits
+    }
+
+    fn dig(&mut self, ground: &Ground, image: &Arc<GreyImage>, frame: u64) {
+        let brush = match self.rng.u32(0..12) {
+            0 => {
+                let at = Vec3::new(self.rng.f32() * 90.0, 20.0, self.rng.f32() * 90.0);
+                let stamp = Stamp::new(Arc::clone(image), at, Vec2::splat(9.0), 3.0);
+                Brush::stamp(Shape::sphere(at, 6.0), stamp)
+            }
+            _ => any_random_brush(&mut self.rng, ground),
+        };
+        self.edits += 1;
+        let brush = brush.with_tag(self.edits).with_stroke(self.edits / 4);
+        let Ok(edit) = Edit::quantize(&brush) else { return self.edits -= 1 };
+        self.dug.insert(self.edits, frame);
+        self.client.dig(edit);
+        if self.rng.u32(0..30) == 0 {
+            self.client.undo(None);
+        }
+    }
+
+    fn look(&mut self, frame: u64, now: Duration) {
+        for ShownChange { change, hash } in self.client.take_shown() {
+            self.shown.apply_change(change, Some(hash)).expect("it fits");
+        }
+        for event in self.client.take_events() {
+            let name = match event {
+                ClientEvent::Predicted(receipt) => {
+                    if let Some(dug) = self.dug.remove(&receipt.tag) {
+                        self.own_frames = self.own_frames.max(frame - dug);
+                    }
+                    "predicted"
+                }
+                ClientEvent::Confirmed { .. } => {
+                    self.answered += 1;
+                    "confirmed"
+                }
+                ClientEvent::Refused { tag, .. } => {
+                    self.dug.remove(&tag);
+                    self.answered += 1;
+                    "refused"
+                }
+                ClientEvent::Playable => {
+                    self.playable_at.get_or_insert(now);
+                    "playable"
+                }
+                ClientEvent::Joined => {
+                    self.joined_at = Some(now);
+                    "joined"
+                }
+                ClientEvent::Durable(number) => {
+                    self.durable = number;
+                    "durable"
+                }
+                ClientEvent::Undone => "undone",
+                ClientEvent::Others { .. } => "others",
+                ClientEvent::Repaired(_) => "repaired",
+                ClientEvent::Kicked(why) => panic!("{:?} was kicked: {why}", self.id),
+                _ => "other",
+            };
+            *self.events.entry(name).or_default() += 1;
+        }
+    }
+}
+
+/// Changes or drops messages to clients.
+type Tamper = Box<dyn FnMut(ClientId, Lane, Vec<u8>) -> Option<Vec<u8>>>;
+
+/// Everything.
+pub struct Play {
+    pub server: Server,
+    pub ground: Arc<Ground>,
+    pub image: Arc<GreyImage>,
+    pub reference: Reference,
+    pub bots: Vec<Bot>,
+    pub line: Line,
+    pub now: Duration,
+    frame: u64,
+    rng: Rng,
+    pub tamper: Option<Tamper>,
+    /// Does the server change rules and settings?
+    pub changes_terms: bool,
+    /// When edits came to the server that have no number yet.
+    pub up_lag: Duration,
+}
+
+impl Play {
+    pub fn new(ground: &Arc<Ground>, bots: u64, settings: ServerSettings) -> Self {
+        let samples = (0..64).map(|at: u16| at * 900).collect();
+        let image = Arc::new(GreyImage::from_samples(8, 8, samples).expect("an image"));
+        let mut server = Server::new(terrain(ground), settings);
+        server.stamps_mut().add(Arc::clone(&image));
+        let mut stamps = Stamps::default();
+        stamps.add(Arc::clone(&image));
+        let reference = Reference::new(ground, stamps);
+        let mut play = Self {
+            server,
+            ground: Arc::clone(ground),
+            image,
+            reference,
+            bots: Vec::new(),
+            line: Line::BAD,
+            now: Duration::from_secs(1),
+            frame: 0,
+            rng: Rng::with_seed(bots),
+            tamper: None,
+            changes_terms: false,
+            up_lag: Duration::ZERO,
+        };
+        (0..bots).for_each(|_| play.join());
+        play
+    }
+
+    /// One player more.
+    pub fn join(&mut self) {
+        let bot = Bot::new(self.bots.len() as u64 + 1, &self.ground, &self.image, self.now);
+        self.server.connect(bot.id, self.now);
+        self.bots.push(bot);
+    }
+
+    /// The connection of a player breaks.
+    pub fn cut(&mut self, at: usize) {
+        let bot = &mut self.bots[at];
+        bot.client.disconnect();
+        (bot.up, bot.order, bot.bulk) = Default::default();
+        bot.arrived.clear();
+        bot.is_connected = false;
+        self.server.disconnect(bot.id);
+    }
+
+    /// It is there again.
+    pub fn reconnect(&mut self, at: usize) {
+        let bot = &mut self.bots[at];
+        bot.is_connected = true;
+        bot.joined_at = None;
+        bot.client.connect(self.now);
+        self.server.connect(bot.id, self.now);
+    }
+
+    /// Sends what the server says.
+    pub fn send(&mut self) {
+        for (to, lane, message) in self.server.take_outgoing() {
+            if lane == Lane::Order {
+                drop(self.reference.obey(&message));
+            }
+            let Some(bot) = self.bots.iter_mut().find(|bot| bot.id == to && bot.is_connected) else {
+                continue;
+            };
+            let message = match &mut self.tamper {
+                Some(tamper) => tamper(to, lane, message),
+                None => Some(message),
+            };
+            let Some(message) = message else { continue };
+            bot.bytes[lane as usize] += message.len() as u64;
+            let way = if lane == Lane::Order { &mut bot.order } else { &mut bot.bulk };
+            way.send(message, self.now, &mut bot.free[0], &self.line, &mut self.rng);
+        }
+    }
+
+    fn serve(&mut self) {
+        if self.changes_terms && self.frame % 180 == 0 {
+            let rules = if self.rng.bool() {
+                random_rules(&mut self.rng, &self.ground)
+            } else {
+                DiggingRules::default()
+            };
+            self.server.set_rules(rules).expect("valid rules");
+        }
+        if self.changes_terms && self.frame % 240 == 120 {
+            let loose = LooseSettings { largest: 4000, crumbs: 9, debris: self.rng.u32(0..4000) };
+            self.server.set_loose(self.rng.u32(0..4).gt(&0).then_some(loose));
+        }
+        for bot in &mut self.bots {
+            while let Some((at, message)) = bot.up.next(self.now) {
+                self.up_lag = self.up_lag.max(self.now - at);
+                self.server.receive(bot.id, &message, self.now);
+            }
+        }
+        self.send();
+        self.server.advance(self.now);
+        self.send();
+        assert_eq!(self.reference.number, self.server.epoch().number, "everything is sent at once");
+        let applied = self.server.applied();
+        assert_eq!(self.reference.hashes[&applied], self.server.terrain().world().hash(), "at {applied}");
+    }
+
+    /// A frame of everybody's.
+    pub fn step(&mut self) {
+        self.now += FRAME;
+        self.frame += 1;
+        if self.frame % 2 == 0 {
+            self.serve();
+        }
+        for bot in &mut self.bots {
+            if bot.is_connected {
+                for (lane, way) in [(Lane::Order, &mut bot.order), (Lane::Bulk, &mut bot.bulk)] {
+                    while let Some((at, message)) = way.next(self.now) {
+                        if let Ok(ToClient::Entries(Entries { first, entries })) =
+                            ToClient::from_bytes(&message, &self.ground, &self.reference.stamps)
+                        {
+                            bot.arrived.push_back((at, first + entries.len() as u64 - 1));
+                        }
+                        bot.client.receive(lane, message);
+                    }
+                }
+            }
+            let is_due = (self.frame + bot.id.0) % EDIT == 0;
+            if bot.is_digging && is_due && bot.client.id().is_some() {
+                bot.dig(&self.ground, &self.image, self.frame);
+            }
+            let is_busy = bot.client.advance(self.now);
+            bot.look(self.frame, self.now);
+            for message in bot.client.take_outgoing() {
+                bot.up.send(message, self.now, &mut bot.free[1], &self.line, &mut self.rng);
+            }
+            let number = bot.client.number();
+            if bot.client.has_joined() && !bot.may_differ {
+                let hash = bot.client.world().hash();
+                assert_eq!(self.reference.hashes.get(&number), Some(&hash), "{:?} at {number}", bot.id);
+            }
+            assert_eq!(bot.shown.world().hash(), bot.client.shown_hash(), "{:?} at {number}", bot.id);
+            while let Some((at, _)) = bot.arrived.pop_front_if(|(_, last)| *last <= number) {
+                if bot.joined_at.is_some_and(|joined| joined < at) && !is_busy {
+                    bot.lag = bot.lag.max(self.now - at);
+                }
+            }
+        }
+    }
+
+    pub fn seconds(&mut self, seconds: f64) {
+        (0..(seconds / FRAME.as_secs_f64()) as u64).for_each(|_| self.step());
+    }
+
+    /// Nobody digs any more: until everybody has the same.
+    pub fn settle(&mut self) {
+        self.bots.iter_mut().for_each(|bot| bot.is_digging = false);
+        self.changes_terms = false;
+        for _ in 0..40 {
+            self.seconds(0.5);
+            let last = self.server.epoch().number;
+            let is_done = |bot: &Bot| bot.client.number() == last && bot.client.pending() == 0;
+            if self.bots.iter().filter(|bot| bot.is_connected).all(is_done) && self.server.applied() == last {
+                break;
+            }
+        }
+        // Marks come and are compared.
+        self.seconds(3.0);
+        let hash = self.server.terrain().world().hash();
+        for bot in self.bots.iter().filter(|bot| bot.is_connected) {
+            assert_eq!(bot.client.number(), self.server.epoch().number, "{:?}", bot.id);
+            assert_eq!(bot.client.pending(), 0, "{:?}", bot.id);
+            assert_eq!(bot.client.world().hash(), hash, "{:?}", bot.id);
+            assert_eq!(bot.shown.world().hash(), hash, "{:?}", bot.id);
+            assert_eq!(bot.client.figures().malformed, 0, "{:?}", bot.id);
+        }
+        let figures = self.server.figures();
+        assert_eq!((figures.malformed, figures.voids, figures.kicked), (0, 0, 0));
+    }
+}

@@ -1,0 +1,380 @@
+//! The plainest client: it obeys the order, predicts nothing, and fetches what differs. What the server says is tested with it.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy_burrow::brush::Edit;
+use bevy_burrow::lattice::RegionPos;
+use bevy_burrow::net::{
+    BulkReader, ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent,
+    RegionHashes, Server, Stamps, Terms, ToClient, ToServer, Welcome,
+};
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::{Meshing, SIMULATION, WorldChange};
+use glam::IVec3;
+
+/// A frame of the tests.
+pub const FRAME: Duration = Duration::from_millis(50);
+
+/// A count from the environment, or the default.
+pub fn count(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
+}
+
+/// A ground of gentle hills.
+pub fn hills(side: u32) -> Arc<Ground> {
+    let height = |x: i32, z: i32| 20.0 + (f64::from(x) * 0.11).sin() + (f64::from(z) * 0.07).cos();
+    Arc::new(Ground::from_fn(side, side, height).expect("valid heights"))
+}
+
+/// A terrain that nobody looks at.
+pub fn terrain(ground: &Arc<Ground>) -> Terrain {
+    let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
+    terrain.set_meshing(Meshing::Never);
+    terrain.set_undo_budget(0);
+    terrain
+}
+
+/// A client that obeys the order.
+pub struct Follower {
+    pub id: ClientId,
+    ground: Arc<Ground>,
+    pub stamps: Stamps,
+    pub terrain: Terrain,
+    pub epoch: Option<Epoch>,
+    /// The number that the terrain is at.
+    pub number: u64,
+    pub last_own: u64,
+    pub place: IVec3,
+    /// What is to be sent.
+    pub out: Vec<ToServer>,
+    /// Entries that came and can't be applied yet.
+    waiting: VecDeque<(u64, Entry)>,
+    /// Regions that are awaited; nothing is applied meanwhile.
+    awaited: BTreeSet<RegionPos>,
+    /// Are the awaited ones those of a join?
+    is_joining: bool,
+    /// Regions that came for a number that is not reached yet.
+    regions: Vec<RegionContent>,
+    table: Option<Box<Terms>>,
+    touched: BTreeSet<RegionPos>,
+    /// Hashes of what was touched before each mark whose hashes have not come.
+    marks: BTreeMap<u64, BTreeMap<RegionPos, u64>>,
+    hashes: VecDeque<(u64, RegionHashes)>,
+    bulk: BulkReader,
+    bulk_told: u64,
+    pub refused: Vec<(u64, Refusal)>,
+    pub voids: Vec<u64>,
+    pub durable: u64,
+    pub kicked: Option<Kick>,
+    /// How it was let in, each time.
+    pub joins: Vec<&'static str>,
+    /// Regions that differed and were fetched.
+    pub repairs: usize,
+    /// Numbers of its own edits and undos that came back.
+    pub confirmed: Vec<u64>,
+    /// Bytes that came, by lane.
+    pub bytes: [u64; 2],
+}
+
+impl Follower {
+    pub fn new(id: u64, ground: &Arc<Ground>) -> Self {
+        Self {
+            id: ClientId(id),
+            ground: Arc::clone(ground),
+            stamps: Stamps::default(),
+            terrain: terrain(ground),
+            epoch: None,
+            number: 0,
+            last_own: 0,
+            place: IVec3::ZERO,
+            out: Vec::new(),
+            waiting: VecDeque::new(),
+            awaited: BTreeSet::new(),
+            is_joining: false,
+            regions: Vec::new(),
+            table: None,
+            touched: BTreeSet::new(),
+            marks: BTreeMap::new(),
+            hashes: VecDeque::new(),
+            bulk: BulkReader::default(),
+            bulk_told: 0,
+            refused: Vec::new(),
+            voids: Vec::new(),
+            durable: 0,
+            kicked: None,
+            joins: Vec::new(),
+            repairs: 0,
+            confirmed: Vec::new(),
+            bytes: [0; 2],
+        }
+    }
+
+    pub fn hello(&self) -> Hello {
+        Hello {
+            protocol: PROTOCOL,
+            simulation: SIMULATION,
+            ground: self.ground.hash(),
+            chunk_size: 32,
+            epoch: self.epoch.map(|epoch| Epoch { number: self.number, ..epoch }),
+            place: self.place,
+        }
+    }
+
+    /// A new connection.
+    pub fn connect(&mut self, server: &mut Server, now: Duration) {
+        server.connect(self.id, now);
+        (self.bulk, self.bulk_told, self.is_joining) = (BulkReader::default(), 0, true);
+        self.out = vec![ToServer::Hello(self.hello())];
+    }
+
+    pub fn edit(&mut self, brushes: impl IntoIterator<Item = Brush>) {
+        let edits: Vec<Edit> =
+            brushes.into_iter().map(|brush| Edit::quantize(&brush).expect("a valid brush")).collect();
+        let first = self.last_own + 1;
+        self.last_own += edits.len() as u64;
+        self.out.push(ToServer::Edits { first, edits });
+    }
+
+    pub fn undo(&mut self, of: u64) -> u64 {
+        self.last_own += 1;
+        self.out.push(ToServer::Undo { own: self.last_own, of: ClientId(of) });
+        self.last_own
+    }
+
+    /// Sends what it has to say.
+    pub fn send(&mut self, server: &mut Server, now: Duration) {
+        if self.bulk.received() != self.bulk_told {
+            self.bulk_told = self.bulk.received();
+            self.out.push(ToServer::Ack { bulk: self.bulk_told, number: self.number });
+        }
+        for message in std::mem::take(&mut self.out) {
+            server.receive(self.id, &message.to_bytes(), now);
+        }
+    }
+
+    pub fn receive(&mut self, lane: Lane, bytes: &[u8]) {
+        self.bytes[(lane == Lane::Bulk) as usize] += bytes.len() as u64;
+        let message = ToClient::from_bytes(bytes, &self.ground, &self.stamps).expect("a valid message");
+        assert_eq!(matches!(message, ToClient::Piece(_)), lane == Lane::Bulk);
+        self.take(message);
+        while let Some(message) = self.bulk.next(&self.ground, &self.stamps).expect("a valid stream") {
+            self.take(message);
+        }
+        self.go_on();
+    }
+
+    fn take(&mut self, message: ToClient) {
+        match message {
+            ToClient::Welcome(welcome) => self.begin(welcome),
+            ToClient::Kicked(why) => self.kicked = Some(why),
+            ToClient::Entries(Entries { first, entries }) => {
+                self.waiting.extend((first..).zip(entries));
+                // Old ones come in the other lane.
+                self.waiting.make_contiguous().sort_by_key(|(number, _)| *number);
+            }
+            ToClient::Void { number } => self.voids.push(number),
+            ToClient::Refused { own, why } => self.refused.push((own, why)),
+            ToClient::Hashes { number, regions } => self.hashes.push_back((number, regions)),
+            ToClient::Table { regions, .. } => self.compare(&regions),
+            ToClient::Region(content) => self.regions.push(content),
+            ToClient::Durable { number } => self.durable = number,
+            ToClient::Piece(piece) => self.bulk.add(&piece),
+            other => panic!("unknown: {other:?}"),
+        }
+    }
+
+    fn begin(&mut self, welcome: Welcome) {
+        assert_eq!(welcome.client, self.id);
+        self.last_own = self.last_own.max(welcome.own);
+        self.epoch = Some(welcome.epoch);
+        self.waiting.clear();
+        self.marks.clear();
+        self.hashes.clear();
+        self.touched.clear();
+        self.awaited.clear();
+        self.regions.clear();
+        let terms = match welcome.join {
+            Join::Log => {
+                self.joins.push("log");
+                self.is_joining = false;
+                return;
+            }
+            Join::Regions { regions, terms } => {
+                self.joins.push("regions");
+                self.terrain = terrain(&self.ground);
+                self.is_joining = regions > 0;
+                terms
+            }
+            Join::Compare { terms } => {
+                self.joins.push("compare");
+                self.table = Some(terms.clone());
+                terms
+            }
+        };
+        self.number = welcome.epoch.number;
+        self.terrain.set_rules(terms.rules.unwrap_or_default()).expect("valid rules");
+        self.terrain.set_loose(terms.loose);
+    }
+
+    fn compare(&mut self, regions: &RegionHashes) {
+        let world = self.terrain.world();
+        let table: BTreeMap<RegionPos, u64> = regions.iter().copied().collect();
+        let all: BTreeSet<RegionPos> = world.regions().chain(table.keys().copied()).collect();
+        let differs = |at: &RegionPos| world.region_hash(*at) != table.get(at).copied().unwrap_or(0);
+        self.awaited = all.into_iter().filter(differs).collect();
+        self.is_joining = false;
+        if !self.awaited.is_empty() {
+            let regions = self.awaited.iter().copied().collect();
+            self.out.push(ToServer::Fetch { number: self.number, regions });
+        }
+    }
+
+    fn go_on(&mut self) {
+        loop {
+            if self.is_joining {
+                // In the order in which they come, the last one ends it.
+                for content in std::mem::take(&mut self.regions) {
+                    self.is_joining &= content.left > 0;
+                    self.put(&content);
+                }
+                if self.is_joining {
+                    return;
+                }
+            }
+            self.check_hashes();
+            let target = if self.awaited.is_empty() {
+                u64::MAX
+            } else {
+                match self.regions.first() {
+                    Some(content) if self.regions.len() == self.awaited.len() => content.number,
+                    _ => return,
+                }
+            };
+            if self.number >= target {
+                assert_eq!(self.number, target, "a region of the past");
+                std::mem::take(&mut self.regions).iter().for_each(|content| self.put(content));
+                self.awaited.clear();
+                continue;
+            }
+            match self.waiting.front() {
+                Some((number, _)) if *number <= self.number => drop(self.waiting.pop_front()),
+                Some((number, _)) if *number == self.number + 1 => {
+                    if let Some((number, entry)) = self.waiting.pop_front() {
+                        self.number = number;
+                        self.apply(entry);
+                    }
+                }
+                _ => return,
+            }
+        }
+    }
+
+    /// Applies an entry.
+    fn apply(&mut self, entry: Entry) {
+        match entry {
+            Entry::Edit { author, own, edit } => {
+                self.terrain.submit_edit(&edit);
+                self.confirmed.extend((author == self.id).then_some(own));
+            }
+            Entry::Rules(rules) => {
+                let rules = rules.map(|rules| (*rules).clone()).unwrap_or_default();
+                self.terrain.set_rules(rules).expect("valid rules");
+            }
+            Entry::Loose(loose) => self.terrain.set_loose(loose),
+            Entry::Parts { by, change } => {
+                self.confirmed.extend(by.filter(|(by, _)| *by == self.id).map(|(_, own)| own));
+                self.terrain.submit_change((*change).clone(), None).expect("room");
+            }
+            Entry::Mark => {
+                let world = self.terrain.world();
+                let touched = std::mem::take(&mut self.touched).into_iter();
+                let hashes = touched.map(|at| (at, world.region_hash(at))).collect();
+                self.marks.insert(self.number, hashes);
+            }
+            other => panic!("unknown: {other:?}"),
+        }
+        while let Some(transaction) = self.terrain.begin() {
+            let commit = transaction.run();
+            let bricks = commit.change().bricks;
+            self.touched.extend(bricks.iter().map(|(pos, _)| RegionPos::of(*pos)));
+            self.terrain.commit(commit).expect("its own commit");
+        }
+    }
+
+    /// Compares what it noted at marks with what the server says.
+    fn check_hashes(&mut self) {
+        while let Some((number, hashes)) = self.hashes.front() {
+            if *number > self.number {
+                return;
+            }
+            let noted = self.marks.remove(number).unwrap_or_default();
+            let told: BTreeMap<RegionPos, u64> = hashes.iter().copied().collect();
+            let world = self.terrain.world();
+            // What was touched before it came and again since the mark is told with the next mark.
+            let later: BTreeSet<RegionPos> =
+                self.marks.values().flat_map(BTreeMap::keys).chain(&self.touched).copied().collect();
+            let own = |at: &RegionPos| match noted.get(at) {
+                None if later.contains(at) => None,
+                None => Some(world.region_hash(*at)),
+                known => known.copied(),
+            };
+            let all: BTreeSet<RegionPos> = noted.keys().chain(told.keys()).copied().collect();
+            let differs = |at: &RegionPos| own(at).is_some_and(|own| told.get(at) != Some(&own));
+            let different: Vec<RegionPos> = all.into_iter().filter(differs).collect();
+            self.hashes.pop_front();
+            if !different.is_empty() && self.awaited.is_empty() {
+                self.repairs += different.len();
+                self.awaited = different.iter().copied().collect();
+                self.out.push(ToServer::Fetch { number: self.number, regions: different });
+            }
+        }
+    }
+
+    /// Puts a region in place as a whole.
+    fn put(&mut self, content: &RegionContent) {
+        let world = self.terrain.world();
+        let mut bricks: BTreeMap<_, _> = world.bricks_in(content.pos).map(|(pos, _)| (pos, None)).collect();
+        bricks.extend(content.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))));
+        let change = WorldChange {
+            bricks: bricks.into_iter().collect(),
+            fields: content.fields.clone(),
+            next_field: content.next_field,
+        };
+        self.terrain.apply_change(change, None).expect("a valid region");
+    }
+
+    /// Breaks its world, as a bug would.
+    pub fn spoil(&mut self, at: glam::Vec3) {
+        self.terrain.apply([Brush::dig(Shape::sphere(at, 3.0))]);
+    }
+}
+
+/// Carries messages at once, for so many frames.
+pub fn play(server: &mut Server, followers: &mut [&mut Follower], now: &mut Duration, frames: u32) {
+    for _ in 0..frames {
+        *now += FRAME;
+        for follower in followers.iter_mut() {
+            follower.send(server, *now);
+        }
+        server.advance(*now);
+        for (to, lane, bytes) in server.take_outgoing() {
+            if let Some(follower) = followers.iter_mut().find(|follower| follower.id == to) {
+                follower.receive(lane, &bytes);
+            }
+        }
+    }
+}
+
+/// The hash of a server's world, which all of these must have.
+pub fn agreed(server: &Server, followers: &[&Follower]) -> u64 {
+    let hash = server.terrain().world().hash();
+    for follower in followers {
+        assert_eq!(follower.number, server.epoch().number, "{:?} is behind", follower.id);
+        assert_eq!(follower.terrain.world().hash(), hash, "{:?} has another world", follower.id);
+        assert_eq!(follower.terrain.rules(), server.terrain().rules());
+        assert_eq!(follower.terrain.loose(), server.terrain().loose());
+    }
+    hash
+}

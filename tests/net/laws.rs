@@ -1,0 +1,315 @@
+//! Everybody has the same world: while they dig over bad lines, when they come late or come back, after the server's restart, and
+//! after lies that are found out.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy_burrow::brush::Edit;
+use bevy_burrow::net::{ClientId, Entries, Entry, Lane, Server, ServerSettings, ToClient, UndoPolicy};
+use bevy_burrow::prelude::*;
+use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
+use bevy_burrow::terrain::WorldChange;
+use fastrand::Rng;
+use glam::Vec3;
+
+use crate::bots::{Play, TICK};
+use crate::follower::{count, hills, terrain};
+use crate::worlds::any_random_brush;
+
+fn settings() -> ServerSettings {
+    ServerSettings { undo: UndoPolicy::Own, ..ServerSettings::default() }
+}
+
+/// Digs until so many edits were ordered.
+fn dig(play: &mut Play, edits: u64) {
+    let end = play.server.figures().ordered + edits;
+    while play.server.figures().ordered < end {
+        play.seconds(1.0);
+    }
+}
+
+#[test]
+fn all_have_the_same_world_at_every_number() {
+    let mut play = Play::new(&hills(96), 8, settings());
+    play.changes_terms = true;
+    dig(&mut play, count("BURROW_EDITS", 600));
+    play.settle();
+    let reference = &play.reference;
+    println!(
+        "{} entries, {} undone, {} terms, {} loose pieces, {:?} of virtual time",
+        reference.number, reference.undone, reference.terms, reference.loose, play.now
+    );
+    assert!(reference.undone > 0 && reference.terms > 3 && reference.loose > 0);
+    assert!(play.up_lag <= TICK);
+    for bot in &play.bots {
+        let figures = bot.client.figures();
+        println!(
+            "{:?} own {} frames, lag {:?}, {figures:?} {:?}",
+            bot.id, bot.own_frames, bot.lag, bot.events
+        );
+        assert_eq!((figures.repairs, figures.gaps), (0, 0));
+        assert!(figures.marks > 5);
+        assert!(bot.own_frames <= 2, "an own edit was shown after {} frames", bot.own_frames);
+        assert!(bot.lag <= 2 * TICK, "an edit of others was shown {:?} after it came", bot.lag);
+        assert_eq!(bot.answered, bot.edits(), "every edit is answered once");
+        assert_eq!(bot.event("predicted"), bot.edits());
+    }
+}
+
+/// Calls something for the entries that are sent to the first player, until it has done its work; it may drop them.
+fn lie(play: &mut Play, mut change: impl FnMut(&mut Vec<Entry>) -> Lie + 'static) {
+    let (ground, stamps) = (Arc::clone(&play.ground), Arc::clone(&play.image));
+    let mut known = bevy_burrow::net::Stamps::default();
+    known.add(stamps);
+    let mut is_done = false;
+    play.tamper = Some(Box::new(move |to, lane, bytes| {
+        if is_done || to != ClientId(1) || lane != Lane::Order {
+            return Some(bytes);
+        }
+        match ToClient::from_bytes(&bytes, &ground, &known) {
+            Ok(ToClient::Entries(Entries { first, mut entries })) => {
+                let lie = change(&mut entries);
+                is_done = !matches!(lie, Lie::Not);
+                let message = ToClient::Entries(Entries { first, entries });
+                (!matches!(lie, Lie::Dropped)).then(|| message.to_bytes())
+            }
+            _ => Some(bytes),
+        }
+    }));
+    play.bots[0].may_differ = true;
+}
+
+enum Lie {
+    Not,
+    Told,
+    Dropped,
+}
+
+fn sphere(x: f32, z: f32) -> Brush {
+    Brush::dig(Shape::sphere(Vec3::new(x, 20.0, z), 4.0))
+}
+
+fn edit(brush: &Brush) -> Edit {
+    Edit::quantize(brush).expect("a valid brush")
+}
+
+#[test]
+fn a_lost_message_is_noticed_and_what_it_held_comes_again() {
+    let mut play = Play::new(&hills(96), 3, settings());
+    play.seconds(3.0);
+    let mut after = 10;
+    lie(&mut play, move |_| {
+        after -= 1;
+        if after == 0 { Lie::Dropped } else { Lie::Not }
+    });
+    play.seconds(8.0);
+    play.settle();
+    let figures = play.bots[0].client.figures();
+    assert_eq!((figures.gaps, figures.repairs), (1, 0));
+    assert_eq!(play.bots[0].event("joined"), 2);
+    assert_eq!(play.bots[1].client.figures().gaps, 0);
+}
+
+/// Only the first player has something to mend, and has mended it once.
+fn check_mended(play: &Play) {
+    let repairs: Vec<u64> = play.bots.iter().map(|bot| bot.client.figures().repairs).collect();
+    assert!(repairs[0] > 0, "nothing was noticed");
+    assert_eq!((play.bots[0].event("repaired"), &repairs[1..]), (1, &[0, 0][..]));
+    assert_eq!(play.server.figures().repairs, repairs[0]);
+}
+
+#[test]
+fn rules_that_come_one_edit_late_are_noticed_at_the_next_mark_and_mended() {
+    let mut play = Play::new(&hills(96), 3, settings());
+    play.bots.iter_mut().for_each(|bot| bot.is_digging = false);
+    play.seconds(3.0);
+    play.server.set_rules(DiggingRules::default().with_bedrock(60)).expect("valid rules");
+    play.server.edit(edit(&sphere(40.0, 40.0)));
+    play.server.set_rules(DiggingRules::default()).expect("valid rules");
+    play.server.edit(edit(&sphere(80.0, 80.0)));
+    lie(&mut play, |entries| {
+        entries.swap(0, 1);
+        Lie::Told
+    });
+    play.settle();
+    check_mended(&play);
+}
+
+#[test]
+fn a_brick_that_is_missing_is_noticed_at_the_next_mark_and_mended() {
+    let mut play = Play::new(&hills(96), 3, settings());
+    play.seconds(3.0);
+    let mut other = terrain(&play.ground);
+    other.apply([sphere(40.0, 40.0)]);
+    play.server.put(other.parts().change);
+    lie(&mut play, |entries| {
+        for entry in entries {
+            if let Entry::Parts { change, .. } = entry {
+                let mut bricks = change.bricks.clone();
+                let at = bricks.iter().position(|(_, brick)| brick.is_some()).expect("a brick");
+                bricks.remove(at);
+                *change = Arc::new(WorldChange { bricks, ..WorldChange::clone(change) });
+                return Lie::Told;
+            }
+        }
+        Lie::Not
+    });
+    play.settle();
+    check_mended(&play);
+}
+
+/// Has so many edits ordered by the server itself.
+fn dig_before(play: &mut Play, edits: u64) {
+    let mut rng = Rng::with_seed(3);
+    for done in 0..edits {
+        if let Ok(edit) = Edit::quantize(&any_random_brush(&mut rng, &play.ground)) {
+            play.server.edit(edit);
+        }
+        if done % 500 == 499 {
+            play.server.advance(play.now);
+            play.send();
+        }
+    }
+    play.server.advance(play.now);
+    play.send();
+}
+
+#[test]
+fn who_comes_late_plays_soon() {
+    // Without undo, edits that wait go into one transaction.
+    let settings = ServerSettings { log_bytes: 1 << 20, ..ServerSettings::default() };
+    let edits = count("BURROW_EDITS", 2000);
+    let mut play = Play::new(&hills(if edits > 20_000 { 512 } else { 160 }), 8, settings);
+    play.seconds(2.0);
+    dig_before(&mut play, edits);
+    play.seconds(20.0);
+    let before = play.now;
+    play.line.rate = 256 << 10;
+    play.join();
+    play.bots[8].client.set_near(64);
+    for _ in 0..120 {
+        play.seconds(0.5);
+        if play.bots[8].client.has_joined() {
+            break;
+        }
+    }
+    let late = &play.bots[8];
+    let [playable, joined] = [late.playable_at, late.joined_at].map(|at| at.expect("it is there") - before);
+    println!(
+        "{edits} edits: {:?} bytes by lane, playable after {playable:?}, joined after {joined:?}",
+        late.bytes
+    );
+    assert!(playable <= joined && playable <= Duration::from_secs(15));
+    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000);
+    assert!(play.bots.iter().all(|bot| bot.order.most.max(bot.bulk.most) <= 5 << 20));
+    play.settle();
+    assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+}
+
+/// Cuts the first player's line for some seconds while others dig, and lets it come back.
+fn come_back(settings: ServerSettings, away: f64) -> Play {
+    let mut play = Play::new(&hills(96), 3, settings);
+    play.seconds(6.0);
+    play.cut(0);
+    play.seconds(away);
+    let before = play.bots[0].bytes;
+    play.reconnect(0);
+    play.seconds(4.0);
+    assert!(play.bots[0].client.has_joined());
+    println!("away {away} s: {:?} bytes by lane, before {before:?}", play.bots[0].bytes);
+    play.settle();
+    for bot in &play.bots {
+        let figures = bot.client.figures();
+        assert_eq!((figures.repairs, figures.gaps), (0, 0));
+        assert_eq!(bot.answered, bot.edits(), "every edit of {:?} is answered once", bot.id);
+    }
+    play
+}
+
+#[test]
+fn who_comes_back_gets_the_entries_since() {
+    come_back(settings(), 3.0);
+}
+
+#[test]
+fn who_comes_back_after_a_long_time_gets_the_regions_that_differ() {
+    come_back(ServerSettings { log_bytes: 0, ..settings() }, 6.0);
+}
+
+#[test]
+fn who_is_cut_off_while_regions_come_gets_all_of_them_later() {
+    let slow = bevy_burrow::net::Rate { per_second: 8 << 10, burst: 4 << 10 };
+    let mut play = Play::new(&hills(160), 2, ServerSettings { bulk: slow, ..settings() });
+    play.seconds(2.0);
+    dig_before(&mut play, 600);
+    play.join();
+    play.seconds(2.0);
+    assert!(!play.bots[2].client.has_joined());
+    play.cut(2);
+    play.seconds(1.0);
+    play.reconnect(2);
+    for _ in 0..200 {
+        play.seconds(0.5);
+        if play.bots[2].client.has_joined() {
+            break;
+        }
+    }
+    play.settle();
+    assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+}
+
+fn options() -> StoreOptions {
+    StoreOptions { loss_window: Duration::ZERO, ..StoreOptions::default() }
+}
+
+#[test]
+fn a_server_that_was_killed_goes_on_where_it_was_saved() {
+    let ground = hills(96);
+    let mut play = Play::new(&ground, 3, settings());
+    let mut disk = SimulatedDisk::new();
+    let mut saved = terrain(&ground);
+    let mut store = Store::create_in(Arc::new(disk.clone()), &mut saved, options()).expect("a new world");
+    for run in 0..3 {
+        let stamps = play.server.stamps_mut().clone();
+        play.server = Server::open(saved, &store, settings());
+        *play.server.stamps_mut() = stamps;
+        for at in 0..3 {
+            if run > 0 {
+                let bot = &play.bots[at];
+                assert!(bot.durable <= play.server.epoch().number, "what is durable is there");
+            }
+            play.cut(at);
+        }
+        let number = play.server.epoch().number;
+        assert_eq!(play.reference.hashes[&number], play.server.terrain().world().hash());
+        let parts = play.server.terrain().parts();
+        let mut reference =
+            Terrain::restore(Arc::clone(&ground), &TerrainSettings::default(), parts).expect("valid parts");
+        reference.set_meshing(bevy_burrow::terrain::Meshing::Never);
+        play.reference.begin_again(reference, number);
+        play.seconds(0.5);
+        (0..3).for_each(|at| play.reconnect(at));
+        play.changes_terms = run == 1;
+        for _ in 0..600 {
+            play.step();
+            play.server.save(&mut store).expect("the store's thread runs");
+        }
+        assert!(play.bots.iter().all(|bot| bot.durable > number), "nothing became durable");
+        // It is killed: the store does not save what waits.
+        disk = disk.image().lose_process();
+        drop(store);
+        let (again, opened) =
+            Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), options()).expect("it can be opened");
+        assert!(opened.troubles.is_empty(), "{:?}", opened.troubles);
+        // Later runs are saved there.
+        if run == 2 {
+            let number = play.bots.iter().map(|bot| bot.durable).max().unwrap_or_default();
+            let server = Server::open(opened.terrain, &again, settings());
+            assert!(server.epoch().number >= number);
+            break;
+        }
+        (store, saved) = (again, opened.terrain);
+    }
+    play.settle();
+    assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+}

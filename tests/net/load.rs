@@ -1,0 +1,162 @@
+//! What many players cost: bytes for each edit and client, and the server's time.
+//!
+//! ```text
+//! cargo test --release --no-default-features --features net --test net -- --ignored --nocapture load
+//! ```
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy_burrow::brush::Edit;
+use bevy_burrow::net::{ClientId, Hello, Lane, PROTOCOL, Server, ServerSettings, ToServer, UndoPolicy};
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::SIMULATION;
+use fastrand::Rng;
+use glam::{IVec3, Vec3};
+
+use crate::follower::{hills, terrain};
+
+/// Frames of a server in a second.
+const FRAMES: u64 = 30;
+/// Edits of a player in a second.
+const EDITS: u64 = 5;
+/// About what UDP, IP and a transport put before the messages of a frame.
+const HEADERS: u64 = 40;
+
+/// A player who walks and digs.
+struct Player {
+    id: ClientId,
+    at: Vec3,
+    own: u64,
+}
+
+impl Player {
+    fn edit(&mut self, rng: &mut Rng, side: f32) -> ToServer {
+        self.own += 1;
+        let step = Vec3::new(rng.f32() - 0.5, 0.2 * (rng.f32() - 0.5), rng.f32() - 0.5);
+        self.at =
+            (self.at + 3.0 * step).clamp(Vec3::new(4.0, 14.0, 4.0), Vec3::new(side - 4.0, 24.0, side - 4.0));
+        let shape = Shape::sphere(self.at, 2.0 + 0.5 * (self.own / 20 % 3) as f32);
+        // A tool is kept for a while.
+        let brush = match self.own / 10 % 8 {
+            0..5 => Brush::dig(shape),
+            5 | 6 => Brush::add(shape, MaterialId(2)),
+            _ => Brush::smooth(shape, 0.5),
+        };
+        let brush = brush.with_tag(self.own).with_stroke(self.own / 10);
+        ToServer::Edits { first: self.own, edits: vec![Edit::quantize(&brush).expect("a valid brush")] }
+    }
+}
+
+struct Load {
+    /// To a client, in the order lane, for each edit.
+    bytes: f64,
+    with_headers: f64,
+    /// From a client, for each edit.
+    up: f64,
+    cpu: Duration,
+    longest: Duration,
+}
+
+/// So many players dig for so many seconds.
+fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) -> Load {
+    let mut rng = Rng::with_seed(clients);
+    let side = ground.width() as f32;
+    let mut server = Server::new(terrain(ground), ServerSettings { undo, ..ServerSettings::default() });
+    let mut players: Vec<Player> = (1..=clients)
+        .map(|id| {
+            let at = Vec3::new(rng.f32() * side, 20.0, rng.f32() * side);
+            Player { id: ClientId(id), at, own: 0 }
+        })
+        .collect();
+    let hello = Hello {
+        protocol: PROTOCOL,
+        simulation: SIMULATION,
+        ground: ground.hash(),
+        chunk_size: 32,
+        epoch: None,
+        place: IVec3::ZERO,
+    };
+    let mut now = Duration::from_secs(1);
+    for player in &players {
+        server.connect(player.id, now);
+        server.receive(player.id, &ToServer::Hello(hello.clone()).to_bytes(), now);
+    }
+    server.advance(now);
+    drop(server.take_outgoing());
+    let (mut bytes, mut packets, mut up, mut edits) = (0, 0, 0, 0);
+    let (mut cpu, mut longest) = (Duration::ZERO, Duration::ZERO);
+    for frame in 0..seconds * FRAMES {
+        now += Duration::from_secs(1) / FRAMES as u32;
+        let mut messages = Vec::new();
+        for player in &mut players {
+            // Everybody begins at another time.
+            let id = player.id.0;
+            let phase = |frame: u64| (frame * EDITS + id * 7) / FRAMES;
+            if phase(frame + 1) != phase(frame) {
+                let message = player.edit(&mut rng, side).to_bytes();
+                up += message.len() as u64;
+                edits += 1;
+                messages.push((player.id, message));
+            }
+            if (frame + player.id.0) % FRAMES == 0 {
+                let number = server.applied();
+                messages.push((player.id, ToServer::Ack { bulk: 0, number }.to_bytes()));
+            }
+        }
+        let before = cpu_time();
+        for (client, message) in &messages {
+            server.receive(*client, message, now);
+        }
+        let mut outgoing = server.take_outgoing();
+        server.advance(now);
+        outgoing.extend(server.take_outgoing());
+        let took = cpu_time() - before;
+        (cpu, longest) = (cpu + took, longest.max(took));
+        let first = outgoing.iter().filter(|(to, lane, _)| (*to, *lane) == (ClientId(1), Lane::Order));
+        let own: u64 = first.map(|(.., message)| message.len() as u64).sum();
+        bytes += own;
+        packets += u64::from(own > 0);
+    }
+    let figures = server.figures();
+    assert_eq!((figures.edits, figures.refused, figures.malformed), (edits, 0, 0));
+    let each = |bytes: u64| bytes as f64 / edits as f64;
+    Load { bytes: each(bytes), with_headers: each(bytes + packets * HEADERS), up: each(up), cpu, longest }
+}
+
+/// The time that the process has worked, all its threads together.
+fn cpu_time() -> Duration {
+    #[cfg(target_os = "linux")]
+    {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+    }
+    #[cfg(not(target_os = "linux"))]
+    Duration::ZERO
+}
+
+#[test]
+fn an_edit_takes_few_bytes_for_each_client() {
+    let load = load(64, 4, UndoPolicy::Nobody, &hills(512));
+    assert!(load.bytes <= 26.0, "{} bytes", load.bytes);
+}
+
+#[test]
+#[ignore = "prints a table of 60 seconds each"]
+fn load_table() {
+    let ground = hills(512);
+    println!(
+        "| clients | undo | bytes an edit | with headers | bytes up | server CPU, s of 60 | longest frame, ms |"
+    );
+    println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: |");
+    for undo in [UndoPolicy::Nobody, UndoPolicy::Own] {
+        for clients in [1, 8, 16, 32, 64] {
+            let Load { bytes, with_headers, up, cpu, longest } = load(clients, 60, undo, &ground);
+            println!(
+                "| {clients} | {undo:?} | {bytes:.1} | {with_headers:.1} | {up:.1} | {:.2} | {:.1} |",
+                cpu.as_secs_f64(),
+                longest.as_secs_f64() * 1000.0
+            );
+        }
+    }
+}
