@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use glam::IVec3;
 
-use super::super::message::{ClientId, Refusal};
 use super::{Server, UndoPolicy};
 use crate::brush::Edit;
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
+use crate::net::message::{ClientId, Refusal};
 
 /// What every edit costs.
 const EDIT: u64 = 20;
