@@ -55,7 +55,10 @@ impl RecordDraft {
                     entries.push(LogEntry::Edit(edit.clone()));
                 }
             }
-            Work::Step(..) | Work::Put(_) => entries.push(LogEntry::Change),
+            Work::Put(put) => {
+                entries.push(put.ground.clone().map_or(LogEntry::Change, LogEntry::Ground));
+            }
+            Work::Step(..) => entries.push(LogEntry::Change),
             Work::Cut(_) => {}
         }
         let change = change_of(commit);
@@ -67,6 +70,9 @@ impl RecordDraft {
 
 /// The bricks and fields that a commit leads to, as its record lists them.
 fn change_of(commit: &Commit) -> WorldChange {
+    if let Some(whole) = &commit.whole {
+        return whole.all_parts();
+    }
     let (mut bricks, mut fields) = (Vec::new(), Vec::new());
     // Of several groups the last one holds.
     for change in commit.changes.iter().rev().map(|own| &own.change) {
