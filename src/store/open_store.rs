@@ -105,22 +105,20 @@ impl Store {
         }
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
-        let (mut parts, hash) = (terrain.parts(), terrain.world().hash());
+        let (parts, hash) = (terrain.parts(), terrain.world().hash());
         let revision = parts.revision;
         let world = WorldId::random();
         let ground = terrain.world().shared_ground();
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let terms = (parts.rules.take(), parts.loose.take());
+        let terms = (parts.rules.clone(), parts.loose);
         let (grid, level) = (terrain.world().grid(), options.level.clone());
-        let mut mirror = Mirror::new(grid, parts, hash, GameData::new(), level);
-        // A log that begins with the level, or with a pristine world, is whole. Rules are in it, then.
+        let mirror = Mirror::new(grid, parts, hash, GameData::new(), level);
+        // A log that begins with the level, or with a pristine world, is whole. Rules are in it too, then.
         let is_whole = revision == 0 && mirror.is_as_level();
         let mut entries = Vec::new();
         if is_whole {
             entries.extend(terms.0.map(|rules| LogEntry::Rules(Some(Arc::new(rules)))));
             entries.extend(terms.1.map(|loose| LogEntry::Loose(Some(loose))));
-        } else {
-            (mirror.rules, mirror.loose) = terms;
         }
         let frame = u64::from(!is_whole);
         let shared = Arc::new(Shared::default());
@@ -140,6 +138,7 @@ impl Store {
         if !entries.is_empty() {
             let change = WorldChange::default();
             store.append(vec![CommitRecord { revision, hash, entries, change }])?;
+            store.flush()?;
         }
         Ok(store)
     }

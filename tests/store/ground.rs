@@ -136,7 +136,7 @@ fn a_saved_world_goes_on_on_its_new_ground() {
             }
         }
         assert_eq!(store.take_troubles(), []);
-        assert_eq!(store.flush().expect("the disk works"), world.world().revision());
+        assert_eq!(store.checkpoint().expect("the disk works"), world.world().revision());
         // The other ground is one that has changed.
         let now = world.world().ground().hash();
         let other = grounds.iter().find(|own| own.hash() != now).expect("one of the two");
