@@ -120,7 +120,8 @@ fn run(args: &Args) -> Result<(Value, bool), String> {
         Command::Export { world, file } => export(world, file, &args.ground),
         Command::Import { file, world } => import(file, world, &args.ground),
         Command::Replay { world } => {
-            let terrain = store::replay(world, args.ground.required()?).map_err(|why| why.to_string())?;
+            let terrain =
+                store::replay(world, args.ground.required()?, None).map_err(|why| why.to_string())?;
             Ok((Value::Object(state(terrain.world())), true))
         }
     }
@@ -164,7 +165,7 @@ fn info(world: &Path) -> Result<(Value, bool), String> {
 
 fn check(world: &Path, ground: &GroundArgs) -> Result<(Value, bool), String> {
     let Some(ground) = ground.build()? else { return info(world) };
-    let check = store::check(world, ground).map_err(|why| why.to_string())?;
+    let check = store::check(world, ground, None).map_err(|why| why.to_string())?;
     let is_sound = check.troubles.is_empty() && check.replays != Some(false);
     let mut answer = state(check.terrain.world());
     answer.insert("troubles".into(), check.troubles.into());

@@ -184,6 +184,7 @@ fn commit(
         display.figures.main_thread += start.elapsed();
         return true;
     }
+    let is_whole = commit.is_whole();
     let fields = commit.field_news().to_vec();
     let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return false };
     if !waste.is_empty() {
@@ -191,7 +192,10 @@ fn commit(
     }
     let is_step = terrain.has_history_receipts();
     send_history(entity, &mut terrain, &mut messages.moved);
-    entities.shown = terrain.world().version();
+    // Another world is loaded like a new terrain; until then the old one is shown.
+    if !is_whole {
+        entities.shown = terrain.world().version();
+    }
     let triangles = surfaces.iter().map(BuiltSurface::triangles).sum();
     display.show((entity, terrain.world()), &mut entities, surfaces, &fields, is_step);
     display.show_nodes((entity, terrain.world()), &mut entities, nodes);

@@ -8,12 +8,12 @@ use bevy::ecs::lifecycle::Discard;
 use bevy::prelude::*;
 
 use super::components::{SavedWorld, WorldStore};
-use super::level::{MakingLevel, Waiting};
+use super::level::{BurrowLevel, MakingLevel, StartLevel, Waiting};
 use super::messages::{StoreTroubleFound, WorldOpened};
 use super::saving::follow;
 use crate::ground::Ground;
 use crate::plugin::{Held, ThreadTask, Threads, free_later};
-use crate::store::{Opened, Store, StoreError, StoreOptions, StoreTrouble};
+use crate::store::{BaseLevel, Opened, Store, StoreError, StoreOptions, StoreTrouble, read_level};
 use crate::terrain::{Terrain, TerrainSettings, WorldParts};
 
 /// How often, and how long, a locked world is waited for.
@@ -75,26 +75,39 @@ pub(super) fn follow_discarded(
 /// Starts to read the worlds of new terrains.
 pub(super) fn start_opening(
     mut commands: Commands,
-    worlds: Query<(Entity, &SavedWorld, &Terrain), (With<Unopened>, Without<Waiting>, Without<MakingLevel>)>,
+    levels: Option<Res<Assets<BurrowLevel>>>,
+    worlds: Query<
+        (Entity, &SavedWorld, &Terrain, Option<&StartLevel>),
+        (With<Unopened>, Without<Waiting>, Without<MakingLevel>),
+    >,
 ) {
-    for (entity, saved, terrain) in &worlds {
+    for (entity, saved, terrain, start) in &worlds {
+        let level = start.and_then(|start| {
+            let level = levels.as_ref()?.get(&start.0)?.clone();
+            Some((level, start.0.path().map(ToString::to_string).unwrap_or_default()))
+        });
         let (path, options) = (saved.path.clone(), saved.options());
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let open = move || read(&path, options, ground, &settings, parts);
+        let open = move || read(&path, options, level, ground, &settings, parts);
         let task = ThreadTask::start(Threads::Background, open);
         commands.entity(entity).try_remove::<Unopened>().try_insert(OpeningWorld(task));
     }
 }
 
-/// Reads the world of a folder, or makes one there of these parts.
+/// Reads the world of a folder, or makes one there of these parts, on a level and its path if there is one.
 fn read(
     path: &Path,
     options: StoreOptions,
+    level: Option<(BurrowLevel, String)>,
     ground: Arc<Ground>,
     settings: &TerrainSettings,
     parts: WorldParts,
 ) -> Result<Read, StoreError> {
+    // One that can't be read was told of when the terrain was made of it.
+    let level =
+        level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, &ground).ok()?, path)));
+    let options = StoreOptions { level, ..options };
     if Store::is_in(path) {
         let (store, opened) = open_unlocked(path, &ground, &options)?;
         return Ok(Read { store, terrain: opened.terrain, troubles: opened.troubles });

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::IVec3;
 
+use super::base_level::LevelName;
 use super::format::Metadata;
 use super::mirror::Mirror;
 use crate::lattice::RegionPos;
@@ -16,6 +17,8 @@ pub(super) struct Checkpoint {
     pub metadata: Metadata,
     /// The regions that hold anything, and the revision that changed each last: that of its record.
     pub regions: BTreeMap<RegionPos, u64>,
+    /// The level below, from which the regions differ.
+    pub level: Option<LevelName>,
 }
 
 /// A region and its revision as they are stored.
@@ -24,21 +27,28 @@ type Entry = ([i32; 3], u64);
 impl Checkpoint {
     /// Of a world at this frame.
     pub fn of(mirror: &Mirror, frame: u64, metadata: Metadata) -> Self {
-        let regions = mirror.regions.iter().map(|(at, region)| (*at, region.revision)).collect();
-        Self { frame, metadata, regions }
+        let stored = mirror.regions.iter().filter(|(_, region)| region.is_stored);
+        let regions = stored.map(|(at, region)| (*at, region.revision)).collect();
+        Self { frame, metadata, regions, level: mirror.level.as_ref().map(|level| level.name().clone()) }
     }
 
     /// Its bytes; none if it can't be encoded, which is never so.
     pub fn encode(&self) -> Vec<u8> {
         let regions: Vec<Entry> =
             self.regions.iter().map(|(at, revision)| (at.0.to_array(), *revision)).collect();
-        postcard::to_stdvec(&(self.frame, &regions, &self.metadata)).unwrap_or_default()
+        let mut bytes = postcard::to_stdvec(&(self.frame, &regions, &self.metadata)).unwrap_or_default();
+        if let Some(level) = &self.level {
+            bytes.append(&mut postcard::to_stdvec(level).unwrap_or_default());
+        }
+        bytes
     }
 
     /// The checkpoint of these bytes, if they are one.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
-        let (frame, regions, metadata): (u64, Vec<Entry>, Metadata) = postcard::from_bytes(bytes).ok()?;
+        type Parts = (u64, Vec<Entry>, Metadata);
+        let ((frame, regions, metadata), rest): (Parts, _) = postcard::take_from_bytes(bytes).ok()?;
+        let level = (!rest.is_empty()).then(|| postcard::from_bytes(rest)).transpose().ok()?;
         let region = |(at, revision)| (RegionPos(IVec3::from_array(at)), revision);
-        Some(Self { frame, metadata, regions: regions.into_iter().map(region).collect() })
+        Some(Self { frame, metadata, regions: regions.into_iter().map(region).collect(), level })
     }
 }

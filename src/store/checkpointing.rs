@@ -7,10 +7,12 @@ use super::checkpoint::Checkpoint;
 use super::database::{Change, DATABASE, DatabaseError, Records};
 use super::error::StoreError;
 use super::format;
+use super::format::change::put_change;
 use super::format::frame::{self, Kind};
 use super::keys;
 use super::mirror::{Mirror, Region};
 use super::quarantine;
+use super::segment::FRAME_LIMIT;
 use super::writer::{Message, Writer};
 use crate::lattice::RegionPos;
 use crate::terrain::SIMULATION;
@@ -27,6 +29,9 @@ impl Writer {
         let (revision, frame, commits) =
             (self.mirror.revision, self.journal.last_frame(), self.state.commits);
         let checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
+        if checkpoint.len() > FRAME_LIMIT {
+            return Err(self.fail(&format!("the game's data takes more than {FRAME_LIMIT} bytes")));
+        }
         let dirty = self.mirror.take_dirty();
         let positions: Vec<RegionPos> = dirty.iter().map(|(at, _)| *at).collect();
         // What comes from now on is in frames again.
@@ -107,8 +112,15 @@ impl Writer {
         let ground = &self.ground;
         let hash = self.state.ground_hashes.entry(at.column());
         let hash = *hash.or_insert_with(|| ground.region_hash(at.column()));
-        let payload = format::encode_region(&region.bricks, &region.fields);
-        frame::seal(Kind::Region, self.world, &keys::region(at), region.revision, hash, &payload)
+        let (kind, payload) = match &self.mirror.level {
+            Some(level) => {
+                let mut payload = Vec::new();
+                put_change(&mut payload, &level.difference(at, region, self.mirror.chunk_size()));
+                (Kind::RegionChange, payload)
+            }
+            None => (Kind::Region, format::encode_region(&region.bricks, &region.fields)),
+        };
+        frame::seal(kind, self.world, &keys::region(at), region.revision, hash, &payload)
     }
 
     pub(super) fn metadata(&self) -> format::Metadata {

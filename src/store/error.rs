@@ -33,6 +33,25 @@ pub enum StoreError {
         /// Regions with edits over changed ground; 0 if only materials or places without edits changed.
         regions: usize,
     },
+    /// The world was begun on a level, which is not given. Nothing is lost.
+    #[error("the world was begun on the level `{label}`, without which it can't be opened")]
+    LevelMissing {
+        /// What the game called the level.
+        label: String,
+    },
+    /// The world was begun on another level than the one that is given, or the level has changed since. Nothing is lost: with
+    /// the level of then, the world can be opened.
+    #[error(
+        "the world was begun on the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}"
+    )]
+    LevelChanged {
+        /// What the game called the level.
+        label: String,
+        /// The [hash](super::LevelName::hash) of the level of then.
+        expected: u64,
+        /// That of the level that is given.
+        found: u64,
+    },
     /// Nothing of it can be read, and there is no log from which to rebuild it.
     #[error("the world can't be read: {0}")]
     Unreadable(String),
@@ -83,9 +102,9 @@ pub enum StoreTrouble {
     /// Saving works again.
     #[error("saving works again")]
     SavedAgain,
-    /// So much waited to be saved that the log got a gap: it can no longer rebuild damaged regions. The world is saved whole
-    /// instead.
-    #[error("the log has a gap at revision {revision}, since saving failed for too long")]
+    /// The log got a gap, as too much waited to be saved, or came at once, or another world took the place of this one: it can no
+    /// longer rebuild damaged regions. The world is saved whole instead.
+    #[error("the log has a gap at revision {revision}, so the world is saved whole")]
     LogGap {
         /// The last revision before the gap.
         revision: u64,
@@ -123,9 +142,9 @@ pub enum StoreTrouble {
         /// Where the copy is.
         quarantine: String,
     },
-    /// A damaged region is lost: the ground there is as if nobody had ever dug.
+    /// A damaged region is lost: the ground there is as the world began.
     #[error(
-        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is pristine again; a copy is in {quarantine}"
+        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is as before anybody dug; a copy is in {quarantine}"
     )]
     RegionLost {
         /// The region, as `x y z` in units of 64 voxels.

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::base_level::{BaseLevel, LevelName};
 use super::error::StoreError;
 use super::files::{Files, Folder};
 use super::format::Batch;
@@ -33,6 +34,8 @@ pub struct WorldInfo {
     pub simulation: u32,
     /// Hash of its ground.
     pub ground: u64,
+    /// The level that it was begun on, from which its regions differ.
+    pub level: Option<LevelName>,
     /// The revision of its last checkpoint.
     pub checkpoint: u64,
     /// Regions that hold edits.
@@ -105,6 +108,7 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
         settings: metadata.settings,
         simulation: metadata.simulation,
         ground: metadata.ground,
+        level: checkpoint.level.clone(),
         checkpoint: metadata.revision,
         regions: checkpoint.regions.len(),
         region_bytes,
@@ -137,23 +141,31 @@ pub struct WorldCheck {
     pub replays: Option<bool>,
 }
 
-/// Reads all of the world in a folder, over its ground, without changing it: regions, the journal's tail, and, if it is whole,
-/// the log from the first commit on.
+/// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the journal's
+/// tail, and, if it is whole, the log from the first commit on.
 ///
 /// # Errors
 /// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.
-pub fn check(folder: impl AsRef<Path>, ground: impl Into<Arc<Ground>>) -> Result<WorldCheck, StoreError> {
-    check_in(&Folder::new(folder.as_ref()), ground)
+pub fn check(
+    folder: impl AsRef<Path>,
+    ground: impl Into<Arc<Ground>>,
+    level: Option<&BaseLevel>,
+) -> Result<WorldCheck, StoreError> {
+    check_in(&Folder::new(folder.as_ref()), ground, level)
 }
 
 /// The same in other [files](Files).
 ///
 /// # Errors
 /// As for a folder.
-pub fn check_in(files: &dyn Files, ground: impl Into<Arc<Ground>>) -> Result<WorldCheck, StoreError> {
+pub fn check_in(
+    files: &dyn Files,
+    ground: impl Into<Arc<Ground>>,
+    level: Option<&BaseLevel>,
+) -> Result<WorldCheck, StoreError> {
     let ground = ground.into();
     let (_lock, contents) = read(files)?;
-    let recovered = recover(&contents, &ground, BaseChanged::Refuse)?;
+    let recovered = recover(&contents, &ground, BaseChanged::Refuse, level)?;
     let told = recover::troubles(&recovered, &std::collections::BTreeMap::new());
     let mut troubles: Vec<String> = contents.damaged.iter().cloned().collect();
     troubles.extend(told.iter().map(ToString::to_string));
@@ -170,7 +182,8 @@ pub fn check_in(files: &dyn Files, ground: impl Into<Arc<Ground>>) -> Result<Wor
     }
     let world = recovered.terrain.world();
     let replays = recovered.is_log_whole.then(|| {
-        let replayed = recover::replay_all(&contents, &ground, recovered.settings());
+        let replayed =
+            recover::replay_all(&contents, &ground, recovered.settings(), recovered.mirror.level.as_ref());
         replayed.is_ok_and(|other| {
             let other = other.world();
             (other.hash(), other.revision()) == (world.hash(), world.revision())
@@ -179,15 +192,21 @@ pub fn check_in(files: &dyn Files, ground: impl Into<Arc<Ground>>) -> Result<Wor
     Ok(WorldCheck { terrain: recovered.terrain, troubles, replays })
 }
 
-/// Replays the log of the world in a folder from the first commit on, over this ground, and verifies each commit. Returns the
-/// terrain.
+/// Replays the log of the world in a folder from the first commit on, over this ground and its level if it has one, and verifies
+/// each commit. Returns the terrain.
 ///
 /// # Errors
 /// When there is none, when it is open, and when the log does not reach back to the first commit or can't be replayed.
-pub fn replay(folder: impl AsRef<Path>, ground: impl Into<Arc<Ground>>) -> Result<Terrain, StoreError> {
+pub fn replay(
+    folder: impl AsRef<Path>,
+    ground: impl Into<Arc<Ground>>,
+    level: Option<&BaseLevel>,
+) -> Result<Terrain, StoreError> {
     let files = Folder::new(folder.as_ref());
     let (_lock, contents) = read(&files)?;
     let checkpoint = contents.choose_checkpoint();
-    let settings = checkpoint.map_or_else(TerrainSettings::default, |own| own.metadata.settings);
-    recover::replay_all(&contents, &ground.into(), settings)
+    let name = checkpoint.as_ref().and_then(|own| own.level.as_ref());
+    let level = BaseLevel::needed(name, level)?;
+    let settings = checkpoint.as_ref().map_or_else(TerrainSettings::default, |own| own.metadata.settings);
+    recover::replay_all(&contents, &ground.into(), settings, level)
 }

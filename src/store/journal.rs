@@ -81,6 +81,11 @@ impl Journal {
         }
     }
 
+    /// The [base](segment::base) of later frames.
+    pub fn set_base(&mut self, base: u64) {
+        self.base = base;
+    }
+
     /// The number of the last frame.
     pub fn last_frame(&self) -> u64 {
         self.next_frame - 1

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use super::base_level::BaseLevel;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, RegionPos};
 use crate::terrain::{CommitRecord, LogEntry, LooseSettings, WorldChange, WorldParts};
 use crate::volume::{Brick, DiggingRules, Fields};
@@ -16,6 +17,8 @@ pub(super) struct Region {
     pub fields: BTreeMap<ChunkPos, Fields>,
     /// The revision that changed it last.
     pub revision: u64,
+    /// Has it a record? Not where it is as in the level below.
+    pub is_stored: bool,
 }
 
 impl Region {
@@ -28,7 +31,7 @@ impl Region {
 #[derive(Clone, Debug)]
 pub(super) struct Mirror {
     grid: ChunkGrid,
-    /// Those that hold anything.
+    /// Those that hold anything, or differ from the level.
     pub regions: BTreeMap<RegionPos, Region>,
     /// Those that changed since they were last taken, gone ones included.
     dirty: BTreeSet<RegionPos>,
@@ -39,11 +42,20 @@ pub(super) struct Mirror {
     pub loose: Option<LooseSettings>,
     /// What the game put there.
     pub game: BTreeMap<String, Vec<u8>>,
+    /// The level below.
+    pub level: Option<BaseLevel>,
 }
 
 impl Mirror {
-    /// A mirror of these parts of a world with this hash; all of it counts as changed.
-    pub fn new(grid: ChunkGrid, parts: WorldParts, hash: u64, game: BTreeMap<String, Vec<u8>>) -> Self {
+    /// A mirror of these parts of a world on a level with this hash; all of it counts as changed.
+    pub fn new(
+        grid: ChunkGrid,
+        parts: WorldParts,
+        hash: u64,
+        game: BTreeMap<String, Vec<u8>>,
+        level: Option<BaseLevel>,
+    ) -> Self {
+        let of_level: Vec<RegionPos> = level.iter().flat_map(BaseLevel::regions).collect();
         let WorldParts { change, revision, rules, loose, .. } = parts;
         let mut mirror = Self {
             grid,
@@ -55,14 +67,17 @@ impl Mirror {
             rules,
             loose,
             game,
+            level,
         };
         mirror.apply_change(&change, revision);
+        // Also where nothing is left of the level.
+        mirror.settle(of_level, revision);
         mirror
     }
 
     /// Takes other parts in place of all that it holds.
     pub fn replace(&mut self, parts: WorldParts, hash: u64) {
-        let mut new = Self::new(self.grid, parts, hash, std::mem::take(&mut self.game));
+        let mut new = Self::new(self.grid, parts, hash, std::mem::take(&mut self.game), self.level.take());
         new.dirty.extend(self.regions.keys());
         new.dirty.append(&mut self.dirty);
         *self = new;
@@ -101,16 +116,34 @@ impl Mirror {
             }
             touched.insert(at);
         }
+        self.settle(touched, revision);
+        self.next_field = self.next_field.max(change.next_field);
+    }
+
+    /// Enters which regions changed, and compares them with the level.
+    fn settle(&mut self, touched: impl IntoIterator<Item = RegionPos>, revision: u64) {
+        let chunk_size = self.chunk_size();
         for at in touched {
-            if let Some(region) = self.regions.get_mut(&at) {
-                region.revision = revision;
-                if region.is_empty() {
-                    self.regions.remove(&at);
+            let region = self.regions.entry(at).or_default();
+            region.revision = revision;
+            region.is_stored = match &self.level {
+                Some(level) => {
+                    let change = level.difference(at, region, chunk_size);
+                    !change.bricks.is_empty() || !change.fields.is_empty()
                 }
+                None => true,
+            };
+            if region.is_empty() && self.level.as_ref().is_none_or(|level| !level.holds(at)) {
+                self.regions.remove(&at);
             }
             self.dirty.insert(at);
         }
-        self.next_field = self.next_field.max(change.next_field);
+    }
+
+    /// Is all as in the level below, or pristine without one?
+    pub fn is_as_level(&self) -> bool {
+        let next_field = self.level.as_ref().map_or(0, |level| level.level().next_field);
+        self.next_field == next_field && self.regions.values().all(|region| !region.is_stored)
     }
 
     /// Cells along a chunk's side.
@@ -135,10 +168,11 @@ impl Mirror {
         !self.dirty.is_empty()
     }
 
-    /// The regions that changed since the last call; those that hold nothing any more are `None`.
+    /// The regions that changed since the last call; those without a record are `None`.
     pub fn take_dirty(&mut self) -> Vec<(RegionPos, Option<Region>)> {
         let dirty = std::mem::take(&mut self.dirty);
-        dirty.into_iter().map(|at| (at, self.regions.get(&at).cloned())).collect()
+        let stored = |at: &RegionPos| self.regions.get(at).filter(|region| region.is_stored);
+        dirty.into_iter().map(|at| (at, stored(&at).cloned())).collect()
     }
 
     /// Counts regions as changed, since saving them failed.

@@ -1,5 +1,6 @@
 //! Worlds on disk: a journal of commits, checkpoints of regions, recovery after a crash.
 
+mod base_level;
 mod checkpoint;
 mod checkpointing;
 mod database;
@@ -24,6 +25,7 @@ mod settle;
 mod shared;
 mod writer;
 
+pub use base_level::{BaseLevel, LevelName};
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
 pub use error::{StoreError, StoreTrouble};
 pub use files::{Files, Folder, Lock, OpenFile, Opening};

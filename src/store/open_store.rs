@@ -76,7 +76,8 @@ impl Store {
         has_world(&files).unwrap_or(false)
     }
 
-    /// Saves a terrain as a new world in a folder, and lets the terrain [log](Terrain::keep_log) its commits from now on.
+    /// Saves a terrain as a new world in a folder, on its [level](StoreOptions::level) if that is given, and lets the terrain
+    /// [log](Terrain::keep_log) its commits from now on.
     ///
     /// # Errors
     /// When there is a world already, and when the folder can't be written.
@@ -104,20 +105,22 @@ impl Store {
         }
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
-        let (mut parts, hash) = (terrain.parts(), terrain.world().hash());
+        let (parts, hash) = (terrain.parts(), terrain.world().hash());
         let revision = parts.revision;
-        // A log that begins with a pristine world is whole. Rules are in it, then.
-        let is_pristine = revision == 0 && parts.change.bricks.is_empty();
-        let mut terms = Vec::new();
-        if is_pristine {
-            terms.extend(parts.rules.take().map(|rules| LogEntry::Rules(Some(Arc::new(rules)))));
-            terms.extend(parts.loose.take().map(|loose| LogEntry::Loose(Some(loose))));
-        }
-        let frame = u64::from(!is_pristine);
         let world = WorldId::random();
         let ground = terrain.world().shared_ground();
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let mirror = Mirror::new(terrain.world().grid(), parts, hash, GameData::new());
+        let terms = (parts.rules.clone(), parts.loose);
+        let (grid, level) = (terrain.world().grid(), options.level.clone());
+        let mirror = Mirror::new(grid, parts, hash, GameData::new(), level);
+        // A log that begins with the level, or with a pristine world, is whole. Rules are in it too, then.
+        let is_whole = revision == 0 && mirror.is_as_level();
+        let mut entries = Vec::new();
+        if is_whole {
+            entries.extend(terms.0.map(|rules| LogEntry::Rules(Some(Arc::new(rules)))));
+            entries.extend(terms.1.map(|loose| LogEntry::Loose(Some(loose))));
+        }
+        let frame = u64::from(!is_whole);
         let shared = Arc::new(Shared::default());
         let journal = Journal::new(
             Arc::clone(&files),
@@ -132,9 +135,10 @@ impl Store {
             Writer::new(files, options, saved, world, ground, settings, mirror, journal, None, frame);
         writer.save_all()?;
         let mut store = Self::start(writer, shared, lock, world, revision, GameData::new())?;
-        if !terms.is_empty() {
+        if !entries.is_empty() {
             let change = WorldChange::default();
-            store.append(vec![CommitRecord { revision, hash, entries: terms, change }])?;
+            store.append(vec![CommitRecord { revision, hash, entries, change }])?;
+            store.flush()?;
         }
         Ok(store)
     }
@@ -143,7 +147,8 @@ impl Store {
     ///
     /// # Errors
     /// When there is none, when it is open already, when a newer version saved it, when the ground has changed and the options
-    /// [say so](super::BaseChanged::Refuse), and when nothing of it can be read. Whatever else is wrong is told in [`Opened::troubles`].
+    /// [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing or another one, and when
+    /// nothing of it can be read. Whatever else is wrong is told in [`Opened::troubles`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -167,7 +172,7 @@ impl Store {
         let lock = take_lock(&*files)?;
         let ground = ground.into();
         let mut contents = Contents::read(&*files)?;
-        let recovered = recover(&contents, &ground, options.base_changed)?;
+        let recovered = recover(&contents, &ground, options.base_changed, options.level.as_ref())?;
         let settled = settle(&*files, &mut contents, &recovered);
         let (is_log_whole, replayed, is_new) = (
             recovered.is_log_whole,
@@ -283,7 +288,7 @@ impl Store {
         let (parts, hash) = (Box::new(terrain.parts()), terrain.world().hash());
         self.revision = parts.revision;
         let game = std::mem::take(&mut self.unsent);
-        self.send(Message::Whole(parts, hash, game))
+        self.send(Message::Whole(parts, terrain.world().shared_ground(), hash, game))
     }
 
     fn send(&self, message: Message) -> Result<(), StoreError> {

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use super::base_level::BaseLevel;
+
 /// What to do with edits where the ground is another one than they were made on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BaseChanged {
@@ -30,12 +32,18 @@ pub struct StoreOptions {
     /// Bytes of records that wait in memory while saving fails; beyond it they are dropped, and the world is saved whole once
     /// that works.
     pub waiting_bytes: usize,
+    /// Bytes that a frame of the log may hold, 256 MiB at most. Commits and game data of more that come at once are saved by a
+    /// checkpoint instead, which leaves a gap in the log.
+    pub frame_bytes: usize,
     /// Where the ground has changed.
     pub base_changed: BaseChanged,
+    /// The level that the world begins as. A new world saves only what differs from it, and can be opened with the same level
+    /// only. Worlds that were created without one ignore it.
+    pub level: Option<BaseLevel>,
 }
 
 impl Default for StoreOptions {
-    /// A loss window of a second, 64 MiB of log, checkpoints each minute or 4096 commits.
+    /// A loss window of a second, 64 MiB of log and of a frame, checkpoints each minute or 4096 commits.
     fn default() -> Self {
         Self {
             loss_window: Duration::from_secs(1),
@@ -43,7 +51,9 @@ impl Default for StoreOptions {
             checkpoint_commits: 4096,
             checkpoint_after: Duration::from_secs(60),
             waiting_bytes: 32 << 20,
+            frame_bytes: 64 << 20,
             base_changed: BaseChanged::default(),
+            level: None,
         }
     }
 }

@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
+use super::base_level::BaseLevel;
 use super::checkpoint::Checkpoint;
 use super::error::{StoreError, StoreTrouble};
-use super::format;
 use super::format::Batch;
 use super::found::Contents;
 use super::keys;
@@ -16,8 +18,8 @@ use super::shared::{GameData, apply_game};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
 use crate::terrain::{
-    CommitRecord, LogEntry, Meshing, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
-    WorldChange, WorldParts,
+    CommitRecord, LogEntry, Meshing, ReplayError, Terrain, TerrainSettings, WorkLimits, WorldChange,
+    WorldParts,
 };
 use crate::volume::DiggingRules;
 
@@ -60,10 +62,12 @@ pub(super) fn recover(
     contents: &Contents,
     ground: &Arc<Ground>,
     base_changed: BaseChanged,
+    level: Option<&BaseLevel>,
 ) -> Result<Recovered, StoreError> {
     let Some(checkpoint) = contents.choose_checkpoint() else {
         return Err(StoreError::Unreadable("neither journal nor database hold a valid checkpoint".into()));
     };
+    let level = BaseLevel::needed(checkpoint.level.as_ref(), level)?;
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     let is_contiguous = last >= checkpoint.frame;
@@ -76,18 +80,16 @@ pub(super) fn recover(
         });
     }
     let settings = checkpoint.metadata.settings;
-    let empty = || -> Result<Terrain, StoreError> {
-        Ok(Terrain::new(Arc::clone(ground), &settings).map_err(RestoreError::from)?)
-    };
+    let empty = || -> Result<Terrain, StoreError> { Ok(BaseLevel::first(level, ground, &settings)?) };
     if !is_same_ground && base_changed == BaseChanged::Replay && is_contiguous {
         let replayed = replay_good(empty, &GameData::new(), &whole, false)?;
         let regions = changed_regions(contents, &checkpoint, ground).len();
-        let mut recovered = Recovered::whole(replayed);
+        let mut recovered = Recovered::whole(replayed, level);
         recovered.base_changed = Some((regions, "replayed"));
         return Ok(recovered);
     }
 
-    let (parts, damaged) = load_regions(contents, &checkpoint, ground);
+    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level);
     let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
     let restored = restore(parts.clone());
     let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
@@ -95,7 +97,7 @@ pub(super) fn recover(
         let replayed = replay_good(empty, &GameData::new(), &whole, true)?;
         // Behind what can't be replayed, the checkpoint may know more.
         if replayed.frame >= checkpoint.frame {
-            let mut recovered = Recovered::whole(replayed);
+            let mut recovered = Recovered::whole(replayed, level);
             recovered.is_log_whole = true;
             recovered.damaged = damaged;
             return Ok(recovered);
@@ -106,7 +108,7 @@ pub(super) fn recover(
     let tail = contents.frames_from(checkpoint.frame + 1);
     let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
     let (grid, hash) = (terrain.world().grid(), terrain.world().hash());
-    let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone());
+    let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone(), level.cloned());
     let mut restored = Some(terrain);
     let begin = || -> Result<Terrain, StoreError> {
         match restored.take() {
@@ -128,6 +130,7 @@ pub(super) fn recover(
             replayed.terrain.parts(),
             replayed.terrain.world().hash(),
             replayed.game,
+            level.cloned(),
         );
     }
     Ok(Recovered {
@@ -152,9 +155,10 @@ impl Recovered {
     }
 
     /// A world that was replayed from its first commit.
-    fn whole(replayed: Replayed) -> Self {
+    fn whole(replayed: Replayed, level: Option<&BaseLevel>) -> Self {
         let world = replayed.terrain.world();
-        let mirror = Mirror::new(world.grid(), replayed.terrain.parts(), world.hash(), replayed.game);
+        let parts = replayed.terrain.parts();
+        let mirror = Mirror::new(world.grid(), parts, world.hash(), replayed.game, level.cloned());
         Self {
             mirror,
             terrain: replayed.terrain,
@@ -176,12 +180,13 @@ pub(super) fn replay_all(
     contents: &Contents,
     ground: &Arc<Ground>,
     settings: TerrainSettings,
+    level: Option<&BaseLevel>,
 ) -> Result<Terrain, StoreError> {
     let whole = contents.frames_from(1);
     if whole.last().map_or(0, |last| last.number) < contents.greatest_frame() {
         return Err(StoreError::Unreadable("the log does not reach back to the first commit".into()));
     }
-    let empty = Terrain::new(Arc::clone(ground), &settings).map_err(|why| StoreError::Restore(why.into()))?;
+    let empty = BaseLevel::first(level, ground, &settings)?;
     let replayed = replay(empty, GameData::new(), &whole, true)?;
     match replayed.refused {
         Some(why) => Err(StoreError::Unreadable(format!("the log can't be replayed: {why}"))),
@@ -207,23 +212,36 @@ fn load_regions(
     contents: &Contents,
     checkpoint: &Checkpoint,
     ground: &Ground,
+    level: Option<&BaseLevel>,
 ) -> (WorldParts, Vec<RegionPos>) {
     let metadata = &checkpoint.metadata;
-    let mut change = WorldChange { next_field: metadata.next_field, ..WorldChange::default() };
-    let mut damaged = Vec::new();
-    for (at, revision) in &checkpoint.regions {
+    let below = level.map(|level| level.parts(ground)).unwrap_or_default();
+    let (mut bricks, mut fields) = (below.change.bricks, below.change.fields);
+    if below.chunk_size != metadata.settings.chunk_size {
+        fields.clear();
+    }
+    let decode = |(at, revision): &(RegionPos, u64)| {
         let record = contents.region(*at, *revision);
-        let decoded = record.and_then(|record| format::decode_region(&record.payload, *at, ground).ok());
-        match decoded {
-            Some((bricks, fields)) => {
-                change.bricks.extend(bricks.into_iter().map(|(pos, brick)| (pos, Some(brick))));
-                change.fields.extend(fields);
+        (*at, record.and_then(|record| record.decode(*at, ground).ok()))
+    };
+    let regions: Vec<(RegionPos, u64)> =
+        checkpoint.regions.iter().map(|(at, revision)| (*at, *revision)).collect();
+    let decoded: Vec<_> = regions.par_iter().map(decode).collect();
+    let mut damaged = Vec::new();
+    for (at, change) in decoded {
+        match change {
+            Some(change) => {
+                bricks.extend(change.bricks);
+                fields.extend(change.fields);
             }
-            None => damaged.push(*at),
+            None => damaged.push(at),
         }
     }
-    change.bricks.sort_unstable_by_key(|(pos, _)| *pos);
-    change.fields.sort_unstable_by_key(|(chunk, _)| *chunk);
+    keep_latest(&mut bricks);
+    keep_latest(&mut fields);
+    bricks.retain(|(_, brick)| brick.is_some());
+    fields.retain(|(_, fields)| !fields.is_empty());
+    let change = WorldChange { bricks, fields, next_field: metadata.next_field };
     let parts = WorldParts {
         change,
         chunk_size: metadata.settings.chunk_size,
@@ -232,6 +250,18 @@ fn load_regions(
         loose: metadata.loose,
     };
     (parts, damaged)
+}
+
+/// Sorts a list by key; of those with the same key the last stays.
+fn keep_latest<K: Copy + Ord, V>(list: &mut Vec<(K, V)>) {
+    list.sort_by_key(|(key, _)| *key);
+    list.dedup_by(|later, kept| {
+        let is_same = later.0 == kept.0;
+        if is_same {
+            std::mem::swap(later, kept);
+        }
+        is_same
+    });
 }
 
 /// Replays frames up to the first that does not fit, from the world that `begin` makes, and again without it: a world that was
@@ -308,6 +338,7 @@ fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), 
             }
             LogEntry::Loose(settings) => terrain.set_loose(*settings),
             LogEntry::Edit(edit) => terrain.submit_edit(edit),
+            LogEntry::Ground(ground) => terrain.set_ground(Arc::clone(ground))?,
             LogEntry::Change => drop(terrain.apply_change(record.change.clone(), None)?),
         }
     }

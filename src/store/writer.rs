@@ -16,6 +16,7 @@ use super::format::frame::WorldId;
 use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
+use super::segment::{FRAME_LIMIT, base};
 use super::shared::{GameChange, Shared, apply_game};
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, TerrainSettings, WorldChange, WorldParts};
@@ -30,8 +31,8 @@ pub(super) type Answer = Sender<Result<u64, StoreError>>;
 pub(super) enum Message {
     /// Commits, and what the game puts beside them, in one frame.
     Commits(Vec<CommitRecord>, Vec<GameChange>),
-    /// All of the world, since records are missing, and its hash.
-    Whole(Box<WorldParts>, u64, Vec<GameChange>),
+    /// All of the world, since records are missing, its ground, and its hash.
+    Whole(Box<WorldParts>, Arc<Ground>, u64, Vec<GameChange>),
     /// Makes all that was told so far durable.
     Flush(Answer),
     /// Makes a checkpoint of all that was told so far.
@@ -183,8 +184,7 @@ impl Writer {
         let now = Instant::now();
         if let Some(failing) = &self.state.failing {
             if failing.again <= now {
-                let done = if self.state.has_gap { self.checkpoint(Some(messages)) } else { self.flush() };
-                drop(done);
+                drop(self.make_durable(messages));
             }
             return;
         }
@@ -200,16 +200,14 @@ impl Writer {
     fn take(&mut self, message: Message, messages: &Receiver<Message>) {
         match message {
             Message::Commits(records, game) => self.enter(records, game),
-            Message::Whole(parts, hash, game) => {
+            Message::Whole(parts, ground, hash, game) => {
                 self.enter(Vec::new(), game);
                 self.mirror.replace(*parts, hash);
+                self.take_ground(ground);
                 self.leave_gap();
             }
             Message::Flush(answer) => {
-                let done = match self.state.has_gap {
-                    true => self.checkpoint(Some(messages)),
-                    false => self.flush(),
-                };
+                let done = self.make_durable(messages);
                 drop(answer.send(done.map(|()| self.shared.durable())));
             }
             Message::Checkpoint(answer) => {
@@ -223,6 +221,14 @@ impl Writer {
         }
     }
 
+    /// Makes all that came so far durable, by the log if that has no gap.
+    fn make_durable(&mut self, messages: &Receiver<Message>) -> Result<(), StoreError> {
+        if !self.state.has_gap {
+            self.flush()?;
+        }
+        if self.state.has_gap { self.checkpoint(Some(messages)) } else { Ok(()) }
+    }
+
     fn compact(&mut self) -> Result<(), StoreError> {
         let done = self.database.as_mut().map_or(Ok(()), Records::compact);
         done.map_err(|why| StoreError::NotSaved(why.to_string()))
@@ -231,23 +237,30 @@ impl Writer {
     /// Takes in what has to be saved.
     fn enter(&mut self, records: Vec<CommitRecord>, game: Vec<GameChange>) {
         let now = Instant::now();
-        let pending = &mut self.state.pending;
-        pending.due.get_or_insert(now + self.options.loss_window);
+        self.state.pending.due.get_or_insert(now + self.options.loss_window);
         self.state.changed.get_or_insert(now);
         for mut record in records {
+            if let Some(ground) = new_ground(&record) {
+                // The log that follows can't be replayed on the old ground.
+                drop(self.flush());
+                self.take_ground(ground);
+                self.give_up_waiting();
+                self.checkpoint_soon();
+            }
             self.mirror.apply(&record);
             self.state.commits += 1;
             // Edits lead to the same bricks again.
             if !record.entries.contains(&LogEntry::Change) {
                 record.change = WorldChange::default();
             }
+            let pending = &mut self.state.pending;
             pending.bytes += 64 + record.entries.len() * 64 + record.change.bricks.len() * 1024;
             pending.batch.commits.push(record);
         }
         apply_game(&mut self.mirror.game, &game);
         let bytes = |(key, value): &GameChange| key.len() + value.as_ref().map_or(0, Vec::len);
-        pending.bytes += game.iter().map(bytes).sum::<usize>();
-        pending.batch.game.extend(game);
+        self.state.pending.bytes += game.iter().map(bytes).sum::<usize>();
+        self.state.pending.batch.game.extend(game);
         if self.state.has_gap {
             // A checkpoint saves them, since the journal can't.
             self.state.pending = Pending::default();
@@ -265,11 +278,26 @@ impl Writer {
             self.shared.tell(StoreTrouble::LogGap { revision: self.shared.durable() });
         }
         self.give_up_waiting();
+        self.checkpoint_soon();
+    }
+
+    /// Lets the next tick make a checkpoint, since only that makes durable what came.
+    fn checkpoint_soon(&mut self) {
         self.state.changed.get_or_insert_with(Instant::now);
         if self.state.failing.is_none() {
             let (wait, again) = (RETRY.0, Instant::now());
             self.state.failing = Some(Failing { wait, again, why: String::new() });
         }
+    }
+
+    /// Lets the world stand on another ground from now on.
+    fn take_ground(&mut self, ground: Arc<Ground>) {
+        if ground.hash() != self.ground.hash() {
+            self.journal.set_base(base(ground.hash()));
+            self.state.ground_hashes.clear();
+            self.mirror.mark_all();
+        }
+        self.ground = ground;
     }
 
     pub(super) fn give_up_waiting(&mut self) {
@@ -278,11 +306,16 @@ impl Writer {
         self.state.has_gap = true;
     }
 
-    /// Puts what waits into a frame, and makes all frames durable.
+    /// Puts what waits into a frame, and makes all frames durable; or leaves a gap, if it is too much for a frame.
     pub(super) fn flush(&mut self) -> Result<(), StoreError> {
         let pending = std::mem::take(&mut self.state.pending);
         if !pending.batch.is_empty() {
-            self.journal.push(self.mirror.revision, &pending.batch.encode());
+            let payload = pending.batch.encode();
+            if payload.len() > self.options.frame_bytes.min(FRAME_LIMIT) {
+                self.leave_gap();
+                return Ok(());
+            }
+            self.journal.push(self.mirror.revision, &payload);
         }
         match self.journal.write() {
             Ok(written) => {
@@ -339,4 +372,12 @@ impl Writer {
             self.shared.tell(StoreTrouble::SavedAgain);
         }
     }
+}
+
+/// The ground that a commit set, if it is one that did.
+fn new_ground(record: &CommitRecord) -> Option<Arc<Ground>> {
+    record.entries.iter().rev().find_map(|entry| match entry {
+        LogEntry::Ground(ground) => Some(Arc::clone(ground)),
+        _ => None,
+    })
 }

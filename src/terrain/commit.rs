@@ -42,6 +42,8 @@ pub struct Commit {
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Does it change only what is drawn?
     pub(super) is_cut: bool,
+    /// The world that takes the place of the one that was there, if all of it changes.
+    pub(super) whole: Option<Arc<World>>,
     /// The world that this changes, if it is held elsewhere too.
     pub(super) copy: Option<Arc<World>>,
     /// Meshes to be swapped together with this commit. The world keeps its own.
@@ -91,6 +93,11 @@ impl Commit {
     /// Does it change only what is drawn?
     pub fn is_cut(&self) -> bool {
         self.is_cut
+    }
+
+    /// Does another world take the place of this one, so that all of it has to be drawn anew?
+    pub fn is_whole(&self) -> bool {
+        self.whole.is_some()
     }
 
     /// The receipts of its edits.

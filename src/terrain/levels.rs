@@ -1,10 +1,10 @@
 //! Draws the nodes of a cut: all of them, those that lead to another cut, and those that show an edit.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::IVec3;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::drawn_cut::{ChooseCut, DrawnCut, NodeUpdate};
 use super::surface::ChunkSurface;
@@ -99,7 +99,7 @@ pub(super) fn redraw_changed(
     changed: &[(Column, Column)],
 ) -> NodeChanges {
     let stacks = world.edited_stacks().over(bricks);
-    let state = State { world, view: *view, stacks, parts };
+    let state = State { world, view: *view, stacks, parts, by_tile: OnceLock::new() };
     redraw(&state, drawn, changed.iter().copied(), |tile| drawn.shows_parts(tile))
 }
 
@@ -156,11 +156,42 @@ struct State<'a> {
     stacks: Stacks<'a>,
     /// None of them where all is committed.
     parts: NewParts<'a>,
+    /// The same by tile, once that is needed: most edits draw no node.
+    by_tile: OnceLock<FxHashMap<TilePos, NewOver<'a>>>,
+}
+
+/// The parts over one tile that a running transaction changes.
+#[derive(Default)]
+struct NewOver<'a> {
+    tile: Option<&'a TileUpdate>,
+    chunks: Vec<(ChunkPos, &'a Arc<ChunkSurface>)>,
 }
 
 impl<'a> State<'a> {
     fn committed(world: &'a World) -> Self {
-        Self { world, view: world.view(), stacks: world.edited_stacks(), parts: (&[], &[]) }
+        Self {
+            world,
+            view: world.view(),
+            stacks: world.edited_stacks(),
+            parts: (&[], &[]),
+            by_tile: OnceLock::new(),
+        }
+    }
+
+    /// What the running transaction changes over a tile.
+    fn new_over(&self, tile: TilePos) -> Option<&NewOver<'a>> {
+        let by_tile = self.by_tile.get_or_init(|| {
+            let (tiles, chunks) = self.parts;
+            let mut by_tile = FxHashMap::<TilePos, NewOver<'a>>::default();
+            for (tile, update) in tiles {
+                by_tile.entry(*tile).or_default().tile = Some(update);
+            }
+            for (chunk, surface) in chunks {
+                by_tile.entry(chunk.tile()).or_default().chunks.push((*chunk, surface));
+            }
+            by_tile
+        });
+        by_tile.get(&tile)
     }
 
     /// What these nodes of a cut are drawn with. Nodes of level 0 that were and are drawn by their parts are left out, as parts
@@ -193,8 +224,7 @@ impl<'a> State<'a> {
             let places = ys.map(|y| ChunkPos { x: tile.x, y, z: tile.z });
             chunks.extend(places.filter(|chunk| self.world.may_draw(*chunk)));
         }
-        let (_, new) = self.parts;
-        chunks.extend(new.iter().map(|(chunk, _)| *chunk).filter(|chunk| chunk.tile() == tile));
+        chunks.extend(self.new_over(tile).iter().flat_map(|new| &new.chunks).map(|(chunk, _)| *chunk));
         chunks.sort_unstable();
         chunks.dedup();
         std::iter::once(Drawn::Tile(tile)).chain(chunks.into_iter().map(Drawn::Chunk)).collect()
@@ -202,21 +232,24 @@ impl<'a> State<'a> {
 
     /// What a tile or chunk is made from.
     fn draft(&self, drawn: Drawn) -> SurfaceDraft {
-        let (tiles, chunks) = self.parts;
+        let new = self.new_over(drawn.tile());
         match drawn {
             Drawn::Tile(tile) => {
-                let new = tiles.iter().find(|(other, _)| *other == tile);
+                let new = new.and_then(|new| new.tile);
                 let old = || {
                     TileUpdate::new(self.world, &self.view, tile, |borders| {
                         self.world.tile_rings(tile, borders)
                     })
                 };
-                SurfaceDraft::Tile(new.map_or_else(old, |(_, update)| update.clone()))
+                SurfaceDraft::Tile(new.cloned().unwrap_or_else(old))
             }
-            Drawn::Chunk(chunk) => match chunks.iter().find(|(other, _)| *other == chunk) {
-                Some((_, surface)) => SurfaceDraft::Chunk(Arc::clone(surface)),
-                None => self.world.draft(drawn),
-            },
+            Drawn::Chunk(chunk) => {
+                let new = new.and_then(|new| new.chunks.iter().find(|(other, _)| *other == chunk));
+                match new {
+                    Some((_, surface)) => SurfaceDraft::Chunk(Arc::clone(surface)),
+                    None => self.world.draft(drawn),
+                }
+            }
         }
     }
 }

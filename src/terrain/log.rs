@@ -55,7 +55,10 @@ impl RecordDraft {
                     entries.push(LogEntry::Edit(edit.clone()));
                 }
             }
-            Work::Step(..) | Work::Put(_) => entries.push(LogEntry::Change),
+            Work::Put(put) => {
+                entries.push(put.ground.clone().map_or(LogEntry::Change, LogEntry::Ground));
+            }
+            Work::Step(..) => entries.push(LogEntry::Change),
             Work::Cut(_) => {}
         }
         let change = commit.change();
@@ -68,6 +71,9 @@ impl RecordDraft {
 impl Commit {
     /// The bricks and fields that it leads to, as its [record](CommitRecord) lists them.
     pub fn change(&self) -> WorldChange {
+        if let Some(whole) = &self.whole {
+            return whole.all_parts();
+        }
         let (mut bricks, mut fields) = (Vec::new(), Vec::new());
         // Of several groups the last one holds.
         for change in self.changes.iter().rev().map(|own| &own.change) {

@@ -23,6 +23,7 @@ mod drawn_cut;
 mod field_log;
 #[cfg(feature = "plugin")]
 mod for_plugin;
+mod ground;
 mod groups;
 mod history;
 mod inspect;
@@ -65,6 +66,8 @@ pub use commit::Commit;
 pub use draft::Draft;
 pub use drawn_cut::{ChooseCut, DrawnCut, NodeUpdate};
 pub use field_log::FieldNews;
+#[cfg(feature = "store")]
+pub(crate) use ground::brick_over;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
 pub use known_nodes::KnownNodes;
 pub use level_meshes::GroundFacts;

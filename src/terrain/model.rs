@@ -280,6 +280,12 @@ impl Terrain {
             return Ok(Default::default());
         }
         let mut copy = commit.copy.take();
+        if let Some(whole) = commit.whole.take() {
+            copy = Some(std::mem::replace(&mut self.world, whole));
+            self.drawn_cut = None;
+            #[cfg(feature = "plugin")]
+            self.forget_unseen();
+        }
         if Arc::get_mut(&mut self.world).is_none()
             && let Some(copy) = copy.take_if(|copy| copy.version() == self.world.version())
         {

@@ -10,6 +10,7 @@ use web_time::Instant;
 use super::change::{Change, replaced_bytes};
 use super::commit::Commit;
 use super::dirty::{dirty_cells, joined_mask};
+use super::ground::put_on;
 use super::history::{Restored, UndoDelta};
 use super::model::Terrain;
 use super::record::WorldChange;
@@ -20,6 +21,7 @@ use super::transaction::Transaction;
 use super::world::World;
 use crate::backend::Compute;
 use crate::edits::{EditEffect, count_replaced};
+use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
@@ -53,6 +55,14 @@ pub enum ChangeError {
         /// What it should have.
         expected: u64,
     },
+    /// The ground has another size, in cells.
+    #[error("the ground has {found:?} cells, but that of the world has {expected:?}")]
+    GroundSize {
+        /// Width and depth of the new one.
+        found: (i32, i32),
+        /// Those of the world's.
+        expected: (i32, i32),
+    },
     /// Too much work [waits](super::WorkLimits::waiting).
     #[error("too much work waits already")]
     Overloaded,
@@ -69,17 +79,20 @@ pub(super) struct Put {
     pub hash: Option<u64>,
     /// Does its receipt count voxels?
     pub counts: bool,
+    /// Another ground below all edits; nothing else changes then.
+    pub ground: Option<Arc<Ground>>,
 }
 
 impl Put {
     /// Does it certainly change nothing?
     pub fn is_empty(&self) -> bool {
-        self.change.bricks.is_empty() && self.change.fields.is_empty()
+        self.change.bricks.is_empty() && self.change.fields.is_empty() && self.ground.is_none()
     }
 
     /// Does it certainly change none of these samples?
     pub fn misses(&self, samples: LatticeBox) -> bool {
-        self.change.bricks.iter().all(|(pos, _)| pos.samples().intersection(samples).is_none())
+        let misses = |pos: &BrickPos| pos.samples().intersection(samples).is_none();
+        self.ground.is_none() && self.change.bricks.iter().all(|(pos, _)| misses(pos))
     }
 }
 
@@ -144,7 +157,10 @@ pub(super) fn columns_of(pos: BrickPos) -> [u64; 64] {
 /// Puts parts in place.
 pub(super) fn put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> Commit {
     let start = Instant::now();
-    let commit = checked_put(transaction, put, backend);
+    let commit = match &put.ground {
+        Some(ground) => put_on(transaction, ground),
+        None => checked_put(transaction, put, backend),
+    };
     let failed = |error| {
         let commit = transaction.commit(Vec::new(), transaction.world.sample_hash, MeshUpdates::default());
         Commit { put: Some(Err(error)), ..commit }
@@ -291,7 +307,7 @@ impl Terrain {
         if !self.queue.has_room_for_step() {
             return Err(ChangeError::Overloaded);
         }
-        self.queue.push_put(Put { change, hash, counts: true });
+        self.queue.push_put(Put { change, hash, counts: true, ground: None });
         Ok(())
     }
 
@@ -301,7 +317,7 @@ impl Terrain {
     /// Says what is wrong with them; nothing changed then.
     pub fn apply_change(&mut self, change: WorldChange, hash: Option<u64>) -> Result<Restored, ChangeError> {
         self.abandon();
-        self.put_now(Put { change, hash, counts: true })
+        self.put_now(Put { change, hash, counts: true, ground: None })
     }
 
     pub(super) fn put_now(&mut self, put: Put) -> Result<Restored, ChangeError> {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::loose::LooseSettings;
 use crate::brush::Edit;
+use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos};
 use crate::volume::{Brick, DiggingRules, Fields};
 
@@ -34,6 +35,8 @@ pub enum LogEntry {
     Edit(Edit),
     /// A step through history, or parts that were put in place: what the record's [change](CommitRecord::change) holds.
     Change,
+    /// Another ground was [set](super::Terrain::set_ground) below all edits.
+    Ground(Arc<Ground>),
 }
 
 /// A commit: what was asked for, and what came of it.
@@ -53,7 +56,8 @@ pub struct CommitRecord {
 impl CommitRecord {
     /// Is it a commit? Otherwise it only says which rules and settings hold from here on, and the revision stays.
     pub fn is_commit(&self) -> bool {
-        let changes = |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change);
+        let changes =
+            |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change | LogEntry::Ground(_));
         self.entries.is_empty() || self.entries.iter().any(changes)
     }
 }

@@ -10,8 +10,8 @@ use super::record::{CommitRecord, LogEntry, WorldChange, WorldParts};
 use super::settings::{TerrainError, TerrainSettings};
 use super::unmeshed::Meshing;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos};
-use crate::volume::{Brick, DiggingRules, FieldId, Fields, RulesError};
+use crate::lattice::{ChunkGrid, ChunkPos};
+use crate::volume::{DiggingRules, FieldId, Fields, RulesError};
 
 /// Why a terrain can't be restored.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -67,14 +67,8 @@ impl Terrain {
     /// waits are not part of it.
     pub fn parts(&self) -> WorldParts {
         let world = &self.world;
-        let mut bricks: Vec<(BrickPos, Option<Arc<Brick>>)> =
-            world.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))).collect();
-        bricks.sort_unstable_by_key(|(pos, _)| *pos);
-        let mut fields: Vec<(ChunkPos, Fields)> =
-            world.fields.iter().map(|(chunk, fields)| (*chunk, fields.clone())).collect();
-        fields.sort_unstable_by_key(|(chunk, _)| *chunk);
         WorldParts {
-            change: WorldChange { bricks, fields, next_field: world.next_field },
+            change: world.all_parts(),
             chunk_size: world.grid.size() as u32,
             revision: world.revision,
             rules: self.rules().cloned(),
@@ -102,7 +96,7 @@ impl Terrain {
             (change.fields, change.next_field) = fields_of(terrain.world.grid(), &change);
         }
         terrain.meshing = Meshing::Never;
-        terrain.put_now(Put { change, hash: None, counts: false })?;
+        terrain.put_now(Put { change, hash: None, counts: false, ground: None })?;
         terrain.meshing = Meshing::All;
         terrain.set_rules(rules.unwrap_or_default())?;
         terrain.loose = loose;
@@ -150,6 +144,7 @@ impl Terrain {
                 }
                 LogEntry::Loose(settings) => self.set_loose(*settings),
                 LogEntry::Edit(edit) => self.submit_edit(edit),
+                LogEntry::Ground(ground) => self.set_ground(Arc::clone(ground))?,
                 LogEntry::Change => {
                     self.apply_change(record.change.clone(), Some(record.hash))?;
                 }

@@ -70,7 +70,8 @@ impl Transaction {
         // A large one runs on a thread of the pool: entering the pool for each stage would take longer.
         let commit = if self.is_large() { rayon::scope(|_| run()) } else { run() };
         // Terrain and transaction hold the world. If others do too, the commit changes a copy, which is made here.
-        let is_shared = Arc::strong_count(&self.world) > 2 && !matches!(self.work, Work::Cut(_));
+        let is_changed = !matches!(self.work, Work::Cut(_)) && commit.whole.is_none();
+        let is_shared = Arc::strong_count(&self.world) > 2 && is_changed;
         let mut stages = commit.stages;
         let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
         let copy = Stages::time(&mut stages.whole, copy);
@@ -90,7 +91,11 @@ impl Transaction {
                     .is_shared(usize::try_from(bricks.fold(0, u64::saturating_add)).unwrap_or(usize::MAX))
             }
             Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.bricks.len()),
-            Work::Put(put) => ItemCost::Lookup.is_shared(put.change.bricks.len()),
+            Work::Put(put) => {
+                let bricks =
+                    if put.ground.is_some() { self.world.bricks.len() } else { put.change.bricks.len() };
+                ItemCost::Lookup.is_shared(bricks)
+            }
             Work::Cut(_) => true,
         }
     }

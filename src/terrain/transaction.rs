@@ -84,6 +84,7 @@ impl Transaction {
             put: None,
             record: None,
             news: Vec::new(),
+            whole: None,
             copy: None,
             drawn_cut: meshes.drawn_cut.clone(),
             is_cut: matches!(self.work, Work::Cut(_)),

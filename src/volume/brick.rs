@@ -164,6 +164,15 @@ impl Brick {
         Some(brick)
     }
 
+    /// The same edited samples, where these pristine ones are solid.
+    pub(crate) fn on_pristine(&self, solid: &Layers) -> Self {
+        let mut brick = self.clone();
+        for (y, edited) in self.edited.iter().enumerate() {
+            brick.solid[y] = self.solid[y] & edited | solid[y] & !edited;
+        }
+        brick
+    }
+
     /// A brick of samples, bits that agree with them, and materials.
     #[cfg(feature = "cuda")]
     pub(crate) fn of_parts(

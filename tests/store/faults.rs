@@ -118,6 +118,35 @@ fn when_too_much_waits_the_world_is_saved_whole() {
 }
 
 #[test]
+fn a_commit_that_is_too_much_for_a_frame_is_saved_whole() {
+    let data: Vec<u8> = (0..9_000u32).map(|at| (at * at >> 3) as u8).collect();
+    for frame_bytes in [800, 1 << 20] {
+        let is_too_much = frame_bytes < data.len();
+        let disk = SimulatedDisk::new();
+        let mut player = Player::new(&disk, 2, StoreOptions { frame_bytes, ..options(1_000) });
+        player.play(5);
+        player.store().flush().expect("the disk works");
+        assert_eq!(player.store().take_troubles(), []);
+        player.store().put("map", data.clone());
+        player.play(1);
+        let durable = player.store().flush().expect("the disk works");
+        assert_eq!(durable, player.terrain.world().revision());
+        let troubles = player.store().take_troubles();
+        let is_gap = |own: &StoreTrouble| matches!(own, StoreTrouble::LogGap { .. });
+        assert!(troubles.iter().all(is_gap) && troubles.is_empty() != is_too_much, "{troubles:?}");
+        for _ in 0..3 {
+            for image in [disk.image().lose_power(|| false), disk.image().lose_process()] {
+                assert_eq!(player.check(&image, 2), !is_too_much, "the log is whole without a gap");
+                let (store, _) = open(&image, &ground(2)).expect("it can be opened");
+                assert_eq!(store.get("map"), Some(&data[..]));
+            }
+            player.play(6);
+            player.store().flush().expect("the disk works");
+        }
+    }
+}
+
+#[test]
 fn files_that_are_removed_are_written_again() {
     for removed in ["journal", "regions", "all"] {
         let disk = SimulatedDisk::new();

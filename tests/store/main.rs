@@ -2,7 +2,9 @@
 
 mod damage;
 mod faults;
+mod ground;
 mod kill;
+mod levels;
 mod opening;
 mod play;
 mod power;

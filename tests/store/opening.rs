@@ -60,7 +60,6 @@ fn a_terrain_that_was_dug_before_is_saved_with_rules_and_all() {
         }
         let mut store =
             Store::create_in(Arc::new(disk.clone()), &mut first, options(9)).expect("a new world");
-        store.flush().expect("the disk works");
         let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
         assert_eq!(state(&opened.terrain), state(&first));
         assert_eq!(opened.is_log_whole, !is_dug);

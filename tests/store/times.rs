@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{Files, Folder, SimulatedDisk, Store, StoreOptions};
 use bevy_burrow::terrain::Meshing;
@@ -16,11 +17,17 @@ fn digger(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
+/// A dig into the surface at a place.
+fn dig_at(ground: &Ground, [x, z]: [f32; 2], radius: f32) -> Brush {
+    let height = ground.height(Column::new(x as i32, z as i32)) as f32 / 256.0;
+    Brush::dig(Shape::sphere(Vec3::new(x, height, z), radius))
+}
+
 /// A dig of a player who walks all over the landscape.
-fn dig(number: u32) -> Brush {
+fn dig(ground: &Ground, number: u32) -> Brush {
     let (at, turn) = (f64::from(number) * 1.3, f64::from(number) * 0.013);
-    let (x, z) = (500.0 + (at * 0.31).min(400.0) * turn.cos(), 500.0 + (at * 0.31).min(400.0) * turn.sin());
-    Brush::dig(Shape::sphere(Vec3::new(x as f32, 60.0 + (turn.sin() * 20.0) as f32, z as f32), 2.5))
+    let place = [turn.cos(), turn.sin()].map(|part| (500.0 + (at * 0.31).min(400.0) * part) as f32);
+    dig_at(ground, place, 2.5)
 }
 
 fn percentile(times: &mut [Duration], percent: usize) -> f64 {
@@ -43,7 +50,7 @@ fn times() {
     let (mut late, mut main, mut waiting) = (Vec::new(), Vec::new(), std::collections::VecDeque::new());
     let start = Instant::now();
     for number in 0..400 {
-        terrain.apply([dig(number)]);
+        terrain.apply([dig(&ground, number)]);
         let before = Instant::now();
         store.put("time", number.to_le_bytes());
         store.follow(&mut terrain).expect("the thread runs");
@@ -83,35 +90,44 @@ fn times() {
     let mut store =
         Store::create_in(Arc::new(disk.clone()), &mut terrain, options.clone()).expect("a new world");
     let far = |number: u32| {
-        let (x, z) = (number % 45, number / 45);
-        Brush::dig(Shape::sphere(Vec3::new(12.0 + 22.0 * x as f32, 50.0, 12.0 + 22.0 * z as f32), 6.0))
+        let (chunk, round) = (number % 2025, (number / 2025) as f32);
+        dig_at(&ground, [chunk % 45, chunk / 45].map(|part| 12.0 + 22.0 * part as f32 + round * 0.4), 6.0)
     };
     let start = Instant::now();
-    (0..2025).for_each(|number| drop(terrain.apply([far(number)])));
+    for number in 0..2025 * 10 {
+        terrain.apply([far(number)]);
+        store.follow(&mut terrain).expect("the thread runs");
+    }
     let first = start.elapsed();
-    store.follow(&mut terrain).expect("the thread runs");
+    store.flush().expect("the disk works");
     let start = Instant::now();
     store.checkpoint().expect("the disk works");
     let checkpoint = start.elapsed();
     let start = Instant::now();
     for number in 0..5000 {
-        terrain.apply([dig(number)]);
+        terrain.apply([dig(&ground, number)]);
         store.follow(&mut terrain).expect("the thread runs");
     }
     let tail = start.elapsed();
     store.flush().expect("the disk works");
     let killed = disk.image().lose_process();
     let chunks = terrain.world().fields().count();
-    let start = Instant::now();
-    let (_store, opened) =
-        Store::open_in(Arc::new(killed.clone()), Arc::clone(&ground), options).expect("it opens");
+    let ms = |time: Duration| time.as_secs_f64() * 1e3;
     println!(
-        "{chunks} chunks with fields; digging {:.0} + {:.0} ms, checkpoint {:.0} ms; opened with a tail of {} in {:.0} ms",
-        first.as_secs_f64() * 1e3,
-        tail.as_secs_f64() * 1e3,
-        checkpoint.as_secs_f64() * 1e3,
-        opened.replayed,
-        start.elapsed().as_secs_f64() * 1e3
+        "{chunks} chunks with fields; digging {:.0} + {:.0} ms, checkpoint {:.0} ms",
+        ms(first),
+        ms(tail),
+        ms(checkpoint)
     );
-    assert_eq!(opened.terrain.world().hash(), terrain.world().hash());
+    let damaged = killed.image().lose_process();
+    damaged.remove("regions.redb").expect("it is there");
+    for (disk, what) in [(killed, "opened"), (damaged, "by the log alone")] {
+        let start = Instant::now();
+        let opened = Store::open_in(Arc::new(disk), Arc::clone(&ground), options.clone());
+        let (_store, opened) = opened.expect("it opens");
+        let took = start.elapsed();
+        assert!(!opened.terrain.world().is_solid(glam::DVec3::new(500.0, 900.0, 500.0)));
+        println!("{what} with {} commits replayed: {:.0} ms to the first query", opened.replayed, ms(took));
+        assert_eq!(opened.terrain.world().hash(), terrain.world().hash());
+    }
 }

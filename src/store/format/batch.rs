@@ -19,6 +19,7 @@ const RULES: u8 = 0;
 const LOOSE: u8 = 1;
 const EDIT: u8 = 2;
 const CHANGE: u8 = 3;
+const GROUND: u8 = 4;
 
 /// Commits one after the other, and what the game put up to the last of them.
 #[derive(Clone, Debug, Default)]
@@ -35,7 +36,7 @@ impl Batch {
         self.commits.is_empty() && self.game.is_empty()
     }
 
-    /// Its bytes.
+    /// Its bytes. Those of a commit that sets another [ground](LogEntry::Ground) can't be read again: a log ends there.
     pub fn encode(&self) -> Vec<u8> {
         let (mut bytes, mut edits) = (Vec::new(), EditSequence::default());
         put_number(&mut bytes, self.commits.len() as u64);
@@ -121,6 +122,10 @@ fn put_commit(to: &mut Vec<u8>, commit: &CommitRecord, before: u64, edits: &mut 
                 put_edit(to, edit, edits);
             }
             LogEntry::Change => to.push(CHANGE),
+            LogEntry::Ground(ground) => {
+                to.push(GROUND);
+                to.extend_from_slice(&ground.hash().to_le_bytes());
+            }
         }
     }
     if commit.entries.contains(&LogEntry::Change) {
@@ -146,6 +151,7 @@ fn read_commit(
             LOOSE => LogEntry::Loose(plain::from_bytes(reader.bytes()?, "search for loose pieces")?),
             EDIT => LogEntry::Edit(read_edit(reader, edits)?),
             CHANGE => LogEntry::Change,
+            GROUND => return Err(FormatError::Invalid("commit: it sets another ground, which no log holds")),
             _ => return Err(FormatError::Invalid("entry of a commit")),
         });
     }

@@ -59,6 +59,8 @@ pub enum Kind {
     Level,
     /// A file of a level.
     LevelFile,
+    /// What a region holds otherwise than the level below.
+    RegionChange,
 }
 
 /// Names a world: no two have the same.

@@ -34,7 +34,7 @@ pub struct SavedRegion {
 }
 
 impl SavedRegion {
-    pub(super) fn encode(&self) -> Vec<u8> {
+    pub(in crate::store) fn encode(&self) -> Vec<u8> {
         let bricks = self.bricks.iter().map(|(pos, brick)| (pos, brick));
         encode_region(bricks, self.fields.iter().map(|(chunk, fields)| (chunk, fields)))
     }

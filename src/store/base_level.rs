@@ -1,0 +1,155 @@
+//! A level below a world: the world begins as the level, and saves only what differs from it.
+
+use std::fmt;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::Xxh3;
+
+use super::error::StoreError;
+use super::format::level::Level;
+use super::format::portable::SavedRegion;
+use super::format::region::region_key;
+use super::mirror::Region;
+use crate::ground::Ground;
+use crate::lattice::{BrickPos, RegionPos};
+use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldChange, WorldParts, brick_over};
+use crate::volume::{Brick, Fields, layers};
+
+/// A level below a world, for [`StoreOptions::level`](super::StoreOptions::level).
+#[derive(Clone)]
+pub struct BaseLevel {
+    name: LevelName,
+    level: Arc<Level>,
+}
+
+/// Which level a world was begun on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LevelName {
+    /// What the game calls it: a path, say. It is only told, never compared.
+    pub label: String,
+    /// Hash of the level's bricks and fields.
+    pub hash: u64,
+}
+
+impl fmt::Debug for BaseLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("BaseLevel").field(&self.name).finish()
+    }
+}
+
+/// Only their names are compared.
+impl PartialEq for BaseLevel {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl BaseLevel {
+    /// A level, and what the game calls it. Encodes all of the level for its hash.
+    pub fn new(level: impl Into<Arc<Level>>, label: impl Into<String>) -> Self {
+        let (level, mut hash): (Arc<Level>, Xxh3) = (level.into(), Xxh3::new());
+        hash.update(&level.settings.chunk_size.to_le_bytes());
+        hash.update(&level.next_field.to_le_bytes());
+        for (at, region) in &level.regions {
+            let content = region.encode();
+            hash.update(&region_key(*at));
+            hash.update(&(content.len() as u64).to_le_bytes());
+            hash.update(&content);
+        }
+        Self { name: LevelName { label: label.into(), hash: hash.digest() }, level }
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &LevelName {
+        &self.name
+    }
+
+    /// The level itself.
+    pub fn level(&self) -> &Level {
+        &self.level
+    }
+
+    /// The level that a world needs, if it is this one.
+    pub(super) fn needed<'a>(
+        name: Option<&LevelName>,
+        given: Option<&'a Self>,
+    ) -> Result<Option<&'a Self>, StoreError> {
+        match (name, given) {
+            (None, _) => Ok(None),
+            (Some(name), None) => Err(StoreError::LevelMissing { label: name.label.clone() }),
+            (Some(name), Some(given)) if given.name.hash == name.hash => Ok(Some(given)),
+            (Some(name), Some(given)) => Err(StoreError::LevelChanged {
+                label: name.label.clone(),
+                expected: name.hash,
+                found: given.name.hash,
+            }),
+        }
+    }
+
+    /// The first state of a world on this level, or of one without a level.
+    pub(super) fn first(
+        level: Option<&Self>,
+        ground: &Arc<Ground>,
+        settings: &TerrainSettings,
+    ) -> Result<Terrain, RestoreError> {
+        match level {
+            Some(level) => Terrain::restore(Arc::clone(ground), settings, level.parts(ground)),
+            None => Ok(Terrain::new(Arc::clone(ground), settings)?),
+        }
+    }
+
+    /// The level's bricks and fields on a ground, which may be another one than it was read on.
+    pub(super) fn parts(&self, ground: &Ground) -> WorldParts {
+        let mut parts = WorldParts { rules: None, loose: None, ..self.level.parts() };
+        for (pos, brick) in &mut parts.change.bricks {
+            *brick = brick.take().map(|brick| brick_over(ground, *pos, brick));
+        }
+        parts
+    }
+
+    /// The regions in which the level holds anything.
+    pub(super) fn regions(&self) -> impl Iterator<Item = RegionPos> {
+        self.level.regions.keys().copied()
+    }
+
+    /// Does the level hold anything in a region?
+    pub(super) fn holds(&self, at: RegionPos) -> bool {
+        self.level.regions.contains_key(&at)
+    }
+
+    /// What a region of a world with such chunks holds otherwise than the level; `None` stands for bricks that are pristine again.
+    pub(super) fn difference(&self, at: RegionPos, now: &Region, chunk_size: u32) -> WorldChange {
+        let nothing = SavedRegion::default();
+        let below = self.level.regions.get(&at).unwrap_or(&nothing);
+        let mut change = WorldChange::default();
+        let is_new = |(pos, brick): &(&BrickPos, &Arc<Brick>)| {
+            find(&below.bricks, pos).is_none_or(|old| !is_same(old, brick))
+        };
+        let new = now.bricks.iter().filter(is_new).map(|(pos, brick)| (*pos, Some(Arc::clone(brick))));
+        change.bricks.extend(new);
+        let gone = below.bricks.iter().filter(|(pos, _)| !now.bricks.contains_key(pos));
+        change.bricks.extend(gone.map(|(pos, _)| (*pos, None)));
+        change.bricks.sort_unstable_by_key(|(pos, _)| *pos);
+        // Fields of other chunks are other fields.
+        let is_alike = self.level.settings.chunk_size == chunk_size;
+        let fields = if is_alike { &below.fields[..] } else { &[] };
+        let new = now.fields.iter().filter(|(chunk, own)| find(fields, chunk) != Some(*own));
+        change.fields.extend(new.map(|(chunk, own)| (*chunk, own.clone())));
+        let gone = fields.iter().filter(|(chunk, _)| !now.fields.contains_key(chunk));
+        change.fields.extend(gone.map(|(chunk, _)| (*chunk, Fields::default())));
+        change.fields.sort_unstable_by_key(|(chunk, _)| *chunk);
+        change
+    }
+}
+
+/// The value of a key in a list by keys.
+fn find<'a, K: Ord, V>(list: &'a [(K, V)], key: &K) -> Option<&'a V> {
+    let at = list.binary_search_by(|(own, _)| own.cmp(key)).ok()?;
+    list.get(at).map(|(_, value)| value)
+}
+
+/// Do two bricks hold the same edited samples?
+fn is_same(one: &Arc<Brick>, other: &Arc<Brick>) -> bool {
+    Arc::ptr_eq(one, other) || Brick::differences([Some(one), Some(other)]) == layers::NONE
+}
