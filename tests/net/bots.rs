@@ -337,7 +337,7 @@ impl Play {
         }
         if self.changes_terms && self.frame % 240 == 120 {
             let loose = LooseSettings { largest: 4000, crumbs: 9, debris: self.rng.u32(0..4000) };
-            self.server.set_loose(self.rng.u32(0..4).gt(&0).then_some(loose));
+            self.server.set_loose((self.rng.u32(0..4) > 0).then_some(loose));
         }
         for bot in &mut self.bots {
             while let Some((at, message)) = bot.up.next(self.now) {
