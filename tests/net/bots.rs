@@ -181,6 +181,9 @@ impl Bot {
         self.edits += 1;
         let brush = brush.with_tag(self.edits).with_stroke(self.edits / 4);
         let Ok(edit) = Edit::quantize(&brush) else { return self.edits -= 1 };
+        if !self.client.stamps_mut().can_send(&edit) {
+            return self.edits -= 1;
+        }
         self.dug.insert(self.edits, frame);
         self.client.dig(edit);
         if self.rng.u32(0..30) == 0 {
