@@ -127,6 +127,13 @@ pub struct Bot {
     pub answered: u64,
 }
 
+impl std::fmt::Debug for Bot {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?} {:?} {:?} joined {:?}", self.id, self.client.figures(), self.events, self.joined_at)?;
+        write!(f, ", on the way {:?}", [self.up.bytes, self.order.bytes, self.bulk.bytes])
+    }
+}
+
 impl Bot {
     fn new(id: u64, ground: &Arc<Ground>, image: &Arc<GreyImage>, now: Duration) -> Self {
         let mut client =
@@ -419,7 +426,7 @@ impl Play {
         self.seconds(3.0);
         let hash = self.server.terrain().world().hash();
         for bot in self.bots.iter().filter(|bot| bot.is_connected) {
-            assert_eq!(bot.client.number(), self.server.epoch().number, "{:?}", bot.id);
+            assert_eq!(bot.client.number(), self.server.epoch().number, "{bot:?}");
             assert_eq!(bot.client.pending(), 0, "{:?}", bot.id);
             assert_eq!(bot.client.world().hash(), hash, "{:?}", bot.id);
             assert_eq!(bot.shown.world().hash(), hash, "{:?}", bot.id);

@@ -45,7 +45,7 @@ impl Line {
 pub struct Way {
     messages: VecDeque<(Duration, Vec<u8>)>,
     last: Duration,
-    bytes: usize,
+    pub bytes: usize,
     /// The most bytes that were on their way at once.
     pub most: usize,
 }
