@@ -192,7 +192,7 @@ fn dig_before(play: &mut Play, edits: u64) {
 fn who_comes_late_plays_soon() {
     // Without undo, edits that wait go into one transaction.
     let settings = ServerSettings { log_bytes: 1 << 20, ..ServerSettings::default() };
-    let edits = count("BURROW_EDITS", 2000);
+    let edits = count("BURROW_EDITS", 1000);
     let mut play = Play::new(&hills(if edits > 20_000 { 512 } else { 160 }), 8, settings);
     play.seconds(2.0);
     dig_before(&mut play, edits);
