@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use allocation_counter::measure;
+use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
     BulkReader, ClientId, Entries, Entry, Epoch, Hello, Kick, Lane, PROTOCOL, Rate, Reach, Refusal, Server,
@@ -267,7 +268,7 @@ fn a_server_takes_any_messages() {
         ..Default::default()
     };
     let mut server = Server::new(terrain(&ground), settings);
-    *server.stamps_mut() = stamps;
+    *server.stamps_mut() = stamps.clone();
     let mut now = Duration::from_secs(1);
     let begin = |server: &mut Server, client: ClientId, now: Duration| {
         server.connect(client, now);
@@ -275,14 +276,31 @@ fn a_server_takes_any_messages() {
         server.receive(client, &hello(&ground), now);
     };
     let mut honest = Follower::new(99, &ground);
+    honest.stamps = stamps.clone();
     honest.connect(&mut server, now);
     server.set_place(honest.id, Some(IVec3::new(64, 20, 64)));
-    let attackers: Vec<ClientId> = (0..8).map(ClientId).collect();
-    attackers.iter().for_each(|&client| begin(&mut server, client, now));
+    let mut attackers: Vec<(ClientId, u64)> = (0..8).map(|id| (ClientId(1000 + id), 1)).collect();
+    let edits: Vec<Vec<Edit>> = to_server
+        .iter()
+        .filter_map(|bytes| match ToServer::from_bytes(bytes, &stamps) {
+            Ok(ToServer::Edits { edits, .. }) => Some(edits),
+            _ => None,
+        })
+        .collect();
+    attackers.iter().for_each(|&(client, _)| begin(&mut server, client, now));
     let (runs, mut most, mut begun, mut kicks) = (count("BURROW_FUZZ", 20_000), 0, 8, [0_u64; 2]);
     for run in 0..runs {
-        let client = attackers[rng.usize(0..8)];
-        let bytes = hostile(&mut rng, &to_server);
+        let (client, own) = &mut attackers[rng.usize(0..8)];
+        let mut bytes = hostile(&mut rng, &to_server);
+        if rng.bool() {
+            // With a number that was not seen before, so that it is not taken for one that comes again.
+            let edits = edits[rng.usize(0..edits.len())].clone();
+            let first = *own;
+            *own += edits.len() as u64;
+            bytes = ToServer::Edits { first, edits }.to_bytes();
+            (0..rng.u8(0..3)).for_each(|_| damage(&mut rng, &mut bytes));
+        }
+        let client = *client;
         let memory = measure(|| server.receive(client, &bytes, now)).bytes_max;
         assert!(memory < ANYWAY + TO_SERVER * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
         most = memory.max(most);
@@ -301,8 +319,11 @@ fn a_server_takes_any_messages() {
                     && let Ok(ToClient::Kicked(why)) = ToClient::from_bytes(&bytes, &ground, &honest.stamps)
                 {
                     kicks[usize::from(why == Kick::Flood)] += 1;
-                    begin(&mut server, to, now);
                     begun += 1;
+                    // Whoever comes back does so as somebody else.
+                    let again = ClientId(1000 + begun);
+                    attackers.iter_mut().filter(|own| own.0 == to).for_each(|own| *own = (again, 1));
+                    begin(&mut server, again, now);
                 }
             }
         }
@@ -320,6 +341,7 @@ fn a_server_takes_any_messages() {
     assert!(memory < 128 << 20, "{memory} bytes");
     assert!(figures.messages >= runs + begun);
     assert!(figures.malformed > runs / 10 && figures.kicked >= kicks[0] + kicks[1] && kicks[0] > 0);
+    assert!(figures.ordered > runs / 1000, "few of them get so far that they are ordered");
     assert_eq!(figures.voids, 0);
     assert!(server.clients().any(|client| client == honest.id), "an honest client was kicked");
     assert_eq!(honest.confirmed, (1..=honest.last_own).collect::<Vec<_>>());

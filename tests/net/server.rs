@@ -290,7 +290,7 @@ fn what_others_touched_is_not_undone() {
 
 #[test]
 fn strokes_are_forgotten_from_the_oldest_on() {
-    let settings = ServerSettings { undo: UndoPolicy::Own, undo_bytes: 100_000, ..generous() };
+    let settings = ServerSettings { undo: UndoPolicy::Own, undo_bytes: 40_000, ..generous() };
     let mut scene = Scene::new(settings);
     let mut a = scene.join(1);
     for x in 0..12 {

@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::super::encoding::entry_bytes;
-use super::super::message::{Entry, Refusal, RegionHashes, ToClient};
 use super::strokes::NoUndo;
 use super::{Ordered, Server, ServerEvent, UndoPolicy, UndoRequest};
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
+use crate::net::encoding::entry_bytes;
+use crate::net::message::{Entry, Refusal, RegionHashes, ToClient};
 use crate::terrain::{ChangeError, Receipt, Rejection, WorldChange};
 
 /// Most bytes of what an undo puts back: it goes to all clients in one message.

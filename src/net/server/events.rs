@@ -2,7 +2,7 @@
 
 use crate::lattice::RegionPos;
 
-use super::super::message::{ClientId, Kick};
+use crate::net::message::{ClientId, Kick};
 
 /// What a game or an operator may want to know.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use glam::IVec3;
 
-use super::super::message::{ClientId, Epoch, Hello, Join, Lane, Terms, ToClient, Welcome};
 use super::sender::Job;
 use super::session::Stage;
 use super::{Server, ServerEvent};
 use crate::lattice::RegionPos;
+use crate::net::message::{ClientId, Epoch, Hello, Join, Lane, Terms, ToClient, Welcome};
 use crate::terrain::World;
 
 /// Bytes that a brick of a region takes in messages, about.

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use super::super::message::{ClientId, Hello, Kick, PROTOCOL, Refusal, ToClient, ToServer};
 use super::session::Stage;
 use super::validation::{UNDO, cost};
 use super::{Server, UndoRequest};
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
+use crate::net::message::{ClientId, Hello, Kick, PROTOCOL, Refusal, ToClient, ToServer};
 use crate::store::format::bricks::is_possible;
 use crate::terrain::SIMULATION;
 
@@ -21,7 +21,7 @@ const BYTES: u64 = 64;
 /// Most undos that wait.
 const MOST_UNDOS: usize = 256;
 /// Most messages and regions that wait in a client's bulk lane before it may fetch more.
-const MOST_JOBS: usize = 2 * super::super::message::MOST_REGIONS;
+const MOST_JOBS: usize = 2 * crate::net::message::MOST_REGIONS;
 
 impl Server {
     /// Takes a message of a client's. Whatever its bytes are, it is answered, or counted as invalid.

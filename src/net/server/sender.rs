@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::super::bulk::put_message;
-use super::super::message::{RegionContent, ToClient};
 use super::bucket::Bucket;
 use super::settings::ServerSettings;
 use crate::lattice::RegionPos;
+use crate::net::bulk::put_message;
+use crate::net::message::{RegionContent, ToClient};
 use crate::terrain::World;
 
 /// What is to be sent.

@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use glam::IVec3;
 
-use super::super::message::Hello;
 use super::bucket::Bucket;
 use super::sender::BulkSender;
 use super::settings::ServerSettings;
+use crate::net::message::Hello;
 use crate::terrain::World;
 
 /// How far a client has come.

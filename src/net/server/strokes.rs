@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use super::super::message::ClientId;
 use crate::lattice::{BrickPos, ChunkPos};
+use crate::net::message::ClientId;
 use crate::terrain::{World, WorldChange};
 use crate::volume::layers::NONE;
 use crate::volume::{Brick, Fields};

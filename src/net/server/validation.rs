@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use glam::IVec3;
 
-use super::super::message::{ClientId, Refusal};
 use super::{Server, UndoPolicy};
 use crate::brush::Edit;
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
+use crate::net::message::{ClientId, Refusal};
 
 /// What every edit costs.
 const EDIT: u64 = 20;
@@ -95,6 +95,7 @@ mod tests {
             (IVec3::new(1, 2, 0), 10, false),
             (IVec3::new(1, 2, 0), 11, true),
             (IVec3::splat(i32::MIN), u32::MAX, true),
+            (IVec3::splat(i32::MIN), i32::MAX as u32, false),
             (IVec3::splat(i32::MAX), 9, false),
         ] {
             assert_eq!(is_near(place, samples, allowed), near, "{place} {allowed}");
