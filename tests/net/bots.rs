@@ -337,7 +337,7 @@ impl Play {
     }
 
     fn serve(&mut self) {
-        if self.changes_terms && self.frame % 180 == 0 {
+        if self.changes_terms && self.frame.is_multiple_of(180) {
             let rules = if self.rng.bool() {
                 random_rules(&mut self.rng, &self.ground)
             } else {
@@ -367,7 +367,7 @@ impl Play {
     pub fn step(&mut self) {
         self.now += FRAME;
         self.frame += 1;
-        if self.frame % 2 == 0 {
+        if self.frame.is_multiple_of(2) {
             self.serve();
         }
         for bot in &mut self.bots {
@@ -383,7 +383,7 @@ impl Play {
                     }
                 }
             }
-            let is_due = (self.frame + bot.id.0) % EDIT == 0;
+            let is_due = (self.frame + bot.id.0).is_multiple_of(EDIT);
             if bot.is_digging && is_due && bot.client.id().is_some() {
                 bot.dig(&self.ground, &self.image, self.frame);
             }
