@@ -127,6 +127,13 @@ pub struct Bot {
     pub answered: u64,
 }
 
+impl std::fmt::Debug for Bot {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?} {:?} {:?} joined {:?}", self.id, self.client.figures(), self.events, self.joined_at)?;
+        write!(f, ", on the way {:?}", [self.up.bytes, self.order.bytes, self.bulk.bytes])
+    }
+}
+
 impl Bot {
     fn new(id: u64, ground: &Arc<Ground>, image: &Arc<GreyImage>, now: Duration) -> Self {
         let mut client =
@@ -181,6 +188,9 @@ impl Bot {
         self.edits += 1;
         let brush = brush.with_tag(self.edits).with_stroke(self.edits / 4);
         let Ok(edit) = Edit::quantize(&brush) else { return self.edits -= 1 };
+        if !self.client.stamps_mut().can_send(&edit) {
+            return self.edits -= 1;
+        }
         self.dug.insert(self.edits, frame);
         self.client.dig(edit);
         if self.rng.u32(0..30) == 0 {
@@ -327,7 +337,7 @@ impl Play {
     }
 
     fn serve(&mut self) {
-        if self.changes_terms && self.frame % 180 == 0 {
+        if self.changes_terms && self.frame.is_multiple_of(180) {
             let rules = if self.rng.bool() {
                 random_rules(&mut self.rng, &self.ground)
             } else {
@@ -337,7 +347,7 @@ impl Play {
         }
         if self.changes_terms && self.frame % 240 == 120 {
             let loose = LooseSettings { largest: 4000, crumbs: 9, debris: self.rng.u32(0..4000) };
-            self.server.set_loose(self.rng.u32(0..4).gt(&0).then_some(loose));
+            self.server.set_loose((self.rng.u32(0..4) > 0).then_some(loose));
         }
         for bot in &mut self.bots {
             while let Some((at, message)) = bot.up.next(self.now) {
@@ -357,7 +367,7 @@ impl Play {
     pub fn step(&mut self) {
         self.now += FRAME;
         self.frame += 1;
-        if self.frame % 2 == 0 {
+        if self.frame.is_multiple_of(2) {
             self.serve();
         }
         for bot in &mut self.bots {
@@ -373,7 +383,7 @@ impl Play {
                     }
                 }
             }
-            let is_due = (self.frame + bot.id.0) % EDIT == 0;
+            let is_due = (self.frame + bot.id.0).is_multiple_of(EDIT);
             if bot.is_digging && is_due && bot.client.id().is_some() {
                 bot.dig(&self.ground, &self.image, self.frame);
             }
@@ -416,7 +426,7 @@ impl Play {
         self.seconds(3.0);
         let hash = self.server.terrain().world().hash();
         for bot in self.bots.iter().filter(|bot| bot.is_connected) {
-            assert_eq!(bot.client.number(), self.server.epoch().number, "{:?}", bot.id);
+            assert_eq!(bot.client.number(), self.server.epoch().number, "{bot:?}");
             assert_eq!(bot.client.pending(), 0, "{:?}", bot.id);
             assert_eq!(bot.client.world().hash(), hash, "{:?}", bot.id);
             assert_eq!(bot.shown.world().hash(), hash, "{:?}", bot.id);

@@ -45,7 +45,7 @@ impl Line {
 pub struct Way {
     messages: VecDeque<(Duration, Vec<u8>)>,
     last: Duration,
-    bytes: usize,
+    pub bytes: usize,
     /// The most bytes that were on their way at once.
     pub most: usize,
 }
@@ -74,7 +74,7 @@ fn messages_arrive_in_order_and_some_late() {
     let (mut rng, mut way, mut free) = (Rng::with_seed(1), Way::default(), Duration::ZERO);
     let sent = |number: u32| Duration::from_millis(u64::from(number) * 20);
     let (mut arrived, mut late) = (Vec::new(), 0);
-    for number in 0..2000 {
+    for number in 0..2000_u32 {
         way.send(number.to_le_bytes().to_vec(), sent(number), &mut free, &Line::BAD, &mut rng);
         while let Some((at, message)) = way.next(sent(number)) {
             arrived.push(u32::from_le_bytes(message.try_into().expect("four bytes")));

@@ -284,6 +284,7 @@ impl Client {
                 Err(_) => self.figures.malformed += 1,
             }
         }
+        self.read_bulk();
         let is_busy = self.follow();
         let (shown, receipts) = self.replica.update();
         self.shown.extend(shown);
@@ -318,7 +319,7 @@ impl Client {
             ToClient::Table { number, regions } => self.take_table(number, &regions),
             ToClient::Region(content) => self.take_region(content),
             ToClient::Durable { number } => self.events.push(ClientEvent::Durable(number)),
-            ToClient::Piece(piece) => self.take_piece(&piece),
+            ToClient::Piece(piece) => self.bulk.add(&piece),
         }
     }
 
@@ -327,10 +328,10 @@ impl Client {
         self.events.push(ClientEvent::Kicked(why));
     }
 
-    fn take_piece(&mut self, piece: &[u8]) {
-        self.bulk.add(piece);
+    /// Looks at what has come in the bulk lane. What comes there before the welcome waits for it: there is no order between lanes.
+    fn read_bulk(&mut self) {
         let ground = self.replica.world().shared_ground();
-        loop {
+        while self.is_welcome() {
             match self.bulk.next(&ground, &self.stamps) {
                 Ok(Some(message)) => self.take(Lane::Bulk, message),
                 Ok(None) => return,

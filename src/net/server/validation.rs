@@ -94,7 +94,8 @@ mod tests {
             (IVec3::new(11, 2, 0), 1, true),
             (IVec3::new(1, 2, 0), 10, false),
             (IVec3::new(1, 2, 0), 11, true),
-            (IVec3::splat(i32::MIN), u32::MAX, false),
+            (IVec3::splat(i32::MIN), u32::MAX, true),
+            (IVec3::splat(i32::MIN), i32::MAX as u32, false),
             (IVec3::splat(i32::MAX), 9, false),
         ] {
             assert_eq!(is_near(place, samples, allowed), near, "{place} {allowed}");
