@@ -1,7 +1,7 @@
 # bevy_burrow: diggable ground for Bevy. `make help` lists what can be done.
 #
 # One feature set and one profile for everything that compiles Bevy, so that it is compiled once:
-#   without Bevy   cargo ... --no-default-features --features cuda,store   the model: tests, soak
+#   without Bevy   cargo ... --no-default-features --features cuda,net   the model: tests, soak
 #   with Bevy      cargo ... --release --features examples           the plugin and the examples
 #
 # What is built goes to CARGO_TARGET_DIR, outside the clone unless set otherwise.
@@ -10,11 +10,11 @@ SHELL := /bin/sh
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
 
-WITHOUT_BEVY := --no-default-features --features cuda,store
+WITHOUT_BEVY := --no-default-features --features cuda,net
 comma := ,
 # What somebody may choose besides. Each set with Bevy has other features of Bevy's crates, so that much is checked anew.
-SETS_WITHOUT_BEVY := '' cuda,store
-SETS_WITH_BEVY := default plugin render avian egui debug examples,gamepad
+SETS_WITHOUT_BEVY := '' store net cuda,net
+SETS_WITH_BEVY := default plugin replicon render avian egui debug examples,gamepad
 # Features besides: `make run MORE=gamepad` compiles some crates more.
 WITH_BEVY := --release --features examples$(MORE:%=$(comma)%)
 
@@ -64,7 +64,7 @@ test-model:
 
 test-plugin:
 	cargo test $(WITH_BEVY) --lib -- plugin:: view:: physics:: panel:: debug::
-	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example physics --example sculpt --example server
+	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example physics --example sculpt --example server --example together
 	cargo test $(WITH_BEVY) --doc
 
 # The examples as a user starts them. Those that draw are looked at by a test: do pictures come in time, and show ground?
@@ -75,6 +75,7 @@ test-examples:
 	cargo run $(WITH_BEVY) --example server -- --script examples/server/brushes.jsonl
 	@cargo run $(WITH_BEVY) --example server -- --brushes 2000 2>'$(PROOF)/server.txt' | head -n 1 && \
 		! grep panicked '$(PROOF)/server.txt' && echo 'server: ends where nobody reads on'
+	cargo run $(WITH_BEVY) --example together -- loopback --count 4 --seconds 5
 	cargo run $(WITHOUT_BEVY) --example export -- --heights assets/jacksboro_fault.png --voxels-per-sample 3 \
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'

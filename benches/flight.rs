@@ -20,8 +20,8 @@ use bevy_burrow::prelude::*;
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 const DIG: Duration = Duration::from_millis(50);
 
-/// The flight is a circle around the middle: its radius, metres a second, and metres above the ground.
-const RADIUS: f32 = 4000.0;
+/// The flight is a circle around the middle, once a minute: its radius, metres a second, and metres above the ground.
+const RADIUS: f32 = 955.0;
 const SPEED: f32 = 100.0;
 const HEIGHT: f32 = 60.0;
 
@@ -62,7 +62,7 @@ impl Flight {
         let projection = Projection::from(PerspectiveProjection { fov, far: 20_000.0, ..default() });
         let levels = LevelsOfDetail { view_distance: 8000.0, ..default() };
         let camera = app.world_mut().spawn((Camera::default(), projection, Transform::default())).id();
-        let terrain = app.world_mut().spawn((terrain, levels)).id();
+        let terrain = app.world_mut().spawn((terrain, levels, SlimVertices)).id();
         let mut flight = Self { app, camera, terrain, time: Duration::ZERO };
         let start = Instant::now();
         while !flight.is_complete() {

@@ -296,6 +296,7 @@
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
 //! | `store` | worlds on disk: a commit journal, checkpoints, portable files | |
 //! | `net` | digging together: server and client without transport | |
+//! | `replicon` | digging together over bevy_replicon | |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
@@ -402,6 +403,7 @@ mod guide {
         LevelAssets "docs/guide/src/level-assets.md"
         Determinism "docs/guide/src/determinism.md"
         Servers "docs/guide/src/servers.md"
+        Together "docs/guide/src/together.md"
         Cuda "docs/guide/src/cuda.md"
         Performance "docs/guide/src/performance.md"
         Mining "docs/guide/src/recipes/mining.md"

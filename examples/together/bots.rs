@@ -129,7 +129,7 @@ impl Bot {
         let shape = Shape::sphere(Vec3::new(x, height, z), 2.0 + rng.f32() * 3.0);
         let brush = match rng.u32(0..6) {
             0 => Brush::add(shape, MaterialId(5)),
-            1 => Brush::smooth(shape),
+            1 => Brush::smooth(shape, 0.5),
             2 => Brush::paint(shape, MaterialId(3)),
             _ => Brush::dig(shape),
         };

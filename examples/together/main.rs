@@ -90,10 +90,13 @@ pub struct Digging {
 }
 
 /// The ground that all of them have.
-fn terrain() -> Result<Terrain> {
+fn ground() -> Result<Ground> {
     let noise = NoiseHeights { seed: 12, scale: 90.0, amplitude: 30.0, base: 40.0, ..default() };
-    let ground = Ground::from_noise(512, 512, &noise)?;
-    Ok(Terrain::new(ground, &TerrainSettings::default())?)
+    Ok(Ground::from_noise(512, 512, &noise)?)
+}
+
+fn terrain() -> Result<Terrain> {
+    Ok(Terrain::new(ground()?, &TerrainSettings::default())?)
 }
 
 fn main() -> ExitCode {

@@ -35,8 +35,7 @@ impl Dedicated {
         let settings = ServerSettings::default();
         let ground = match world {
             Some(folder) if Store::is_in(folder) => {
-                let ground = crate::terrain()?.world().shared_ground();
-                let (store, opened) = Store::open(folder, ground, StoreOptions::default())?;
+                let (store, opened) = Store::open(folder, crate::ground()?, StoreOptions::default())?;
                 GroundServer::with_store(Server::open(opened.terrain, &store, settings), store)
             }
             Some(folder) => {
@@ -89,7 +88,10 @@ impl Dedicated {
     /// The hash of the world.
     pub fn hash(&mut self) -> Option<u64> {
         let (sender, receiver) = channel();
-        let send = move |server: &mut Server| drop(sender.send(server.terrain().world().hash()));
+        let send = move |server: &mut Server| {
+            // Nobody may wait any more.
+            let _ = sender.send(server.terrain().world().hash());
+        };
         self.app.world_mut().resource_mut::<GroundServer>().with(send);
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(10) {

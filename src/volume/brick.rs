@@ -268,7 +268,7 @@ impl Brick {
     }
 
     /// The materials in order of the samples, `None` while all are [`MaterialId::GROUND`].
-    #[cfg(any(feature = "cuda", feature = "store"))]
+    #[cfg(feature = "cuda")]
     pub(crate) fn materials(&self) -> Option<&[MaterialId; LEN]> {
         self.materials.as_deref()
     }

@@ -119,7 +119,7 @@ fn when_too_much_waits_the_world_is_saved_whole() {
 
 #[test]
 fn a_commit_that_is_too_much_for_a_frame_is_saved_whole() {
-    let data: Vec<u8> = (0..9_000u32).map(|at| (at * at >> 3) as u8).collect();
+    let data: Vec<u8> = (0..9_000u32).map(|at| ((at * at) >> 3) as u8).collect();
     for frame_bytes in [800, 1 << 20] {
         let is_too_much = frame_bytes < data.len();
         let disk = SimulatedDisk::new();
