@@ -160,7 +160,7 @@ pub enum ToServer {
     },
 }
 
-/// How a client gets from what it has to the number that it [starts](Welcome::number) from.
+/// How a client gets from what it has to the number that it [starts](Welcome::epoch) from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Join {
     /// [Entries](ToClient::Entries) come in the bulk lane, from its own number on or earlier, up to the start.
