@@ -67,6 +67,14 @@ impl Ground {
         self.read_page(column, Page::height).unwrap_or_default()
     }
 
+    /// [Height](Self::height) of a column whose neighbours nobody asks for: no page is made for it.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn lone_height(&self, column: Column) -> i32 {
+        let Column { x, z } = self.extent().clamp(column);
+        let point = self.pages().and_then(|pages| pages.points([&[x], &[z]], 1).first().copied());
+        point.unwrap_or_else(|| self.height(column))
+    }
+
     /// Heights of `N` x `N` columns from `low` on.
     pub(super) fn heights_on_demand<const N: usize>(&self, low: Column) -> [[i32; N]; N] {
         let height = |x: usize, z: usize| self.height(low.offset(x as i32, z as i32));

@@ -89,6 +89,17 @@ impl MeshBuilder {
         arrays.finish(&surface.indices)
     }
 
+    /// Builds the mesh of a node of level 1 or above. Its vertices lie far apart.
+    pub(crate) fn build_node(&self, origin: IVec3, surface: &SurfaceMesh) -> BuiltMesh {
+        if surface.is_empty() {
+            return None;
+        }
+        let mut arrays = Arrays::with_capacity(surface.vertices.len(), self);
+        arrays.height = Ground::lone_height;
+        arrays.push(&surface.vertices, origin);
+        arrays.finish(&surface.indices)
+    }
+
     /// Builds the mesh of a tile straight from the ground: only its rings and indices depend on digging.
     fn build_tile(&self, origin: IVec3, draft: &TileUpdate) -> BuiltMesh {
         if draft.indices().is_empty() {
@@ -110,6 +121,8 @@ impl MeshBuilder {
 /// The attributes of a mesh while it is built.
 struct Arrays<'a> {
     mesh_builder: &'a MeshBuilder,
+    /// How the pristine surface is asked for.
+    height: fn(&Ground, Column) -> i32,
     positions: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
     materials: Palettes,
@@ -127,6 +140,7 @@ impl<'a> Arrays<'a> {
         let room = |is_there: bool| if is_there { vertices } else { 0 };
         Self {
             mesh_builder,
+            height: Ground::height,
             positions: Vec::with_capacity(vertices),
             normals: Vec::with_capacity(vertices),
             materials: Palettes::with_capacity(vertices),
@@ -141,7 +155,8 @@ impl<'a> Arrays<'a> {
         self.positions.extend(vertices.iter().map(Vertex::position_f32));
         self.normals.extend(vertices.iter().map(|vertex| vertex.normal.to_array()));
         if self.mesh_builder.extras.has_depth {
-            let depth = |vertex: &Vertex| depth(&self.mesh_builder.ground, origin * SNAP + vertex.position);
+            let height = |column| (self.height)(&self.mesh_builder.ground, column);
+            let depth = |vertex: &Vertex| depth(origin * SNAP + vertex.position, height);
             self.depths.extend(vertices.iter().map(depth));
         }
         vertices.iter().for_each(|vertex| self.push_mix(vertex.materials));
@@ -214,12 +229,12 @@ fn copy<T: Copy>(values: &mut Vec<T>, of: &[u32]) {
 
 /// How many voxels a vertex, in 1/4096 voxel of the terrain, lies below the pristine surface; above it less than 0. It depends
 /// on the position alone, so both sides of a seam get the same bits.
-fn depth(ground: &Ground, place: IVec3) -> f32 {
+fn depth(place: IVec3, height: impl Fn(Column) -> i32) -> f32 {
     let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
     // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are the same.
     let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
     let next = column.offset(i32::from(x > 0), i32::from(z > 0));
-    let [here, there] = [column, next].map(|column| i64::from(ground.height(column)));
+    let [here, there] = [column, next].map(|column| i64::from(height(column)));
     let height = here * i64::from(SNAP) + (there - here) * i64::from(x.max(z));
     (height - i64::from(place.y) * i64::from(ONE)) as f32 / (SNAP * ONE) as f32
 }
@@ -243,7 +258,7 @@ fn blend(mix: MaterialMix, colors: &[LinearRgba]) -> [f32; 4] {
 mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
-    use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights};
+    use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights, NoiseSource};
     use crate::terrain::{Drawn, Terrain, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
@@ -278,7 +293,7 @@ mod tests {
         );
         let mut deepest: f32 = 0.0;
         for (is_tile, origin, vertex) in drawn(terrain.world()) {
-            let found = depth(terrain.world().ground(), origin + vertex.position);
+            let found = depth(origin + vertex.position, |column| terrain.world().ground().height(column));
             let y = (origin.y + vertex.position.y) as f32 / SNAP as f32;
             assert_eq!(found, 10.5 - y);
             assert!(!is_tile || found == 0.0);
@@ -297,7 +312,7 @@ mod tests {
         let of = |wanted: bool| {
             vertices.iter().filter(move |(is_tile, ..)| *is_tile == wanted).map(|(_, origin, vertex)| {
                 let place = *origin + vertex.position;
-                (place.to_array(), depth(terrain.world().ground(), place))
+                (place.to_array(), depth(place, |column| terrain.world().ground().height(column)))
             })
         };
         let tiles: std::collections::BTreeMap<[i32; 3], f32> = of(true).collect();
@@ -307,6 +322,19 @@ mod tests {
         for (own, other) in shared {
             assert_eq!(own.to_bits(), other.to_bits());
             assert!(own.abs() < 1.0 / 64.0, "{own} is on the surface");
+        }
+    }
+
+    #[test]
+    fn a_lone_height_is_the_height() {
+        let noise = NoiseHeights { seed: 2, scale: 40.0, amplitude: 30.0, ..NoiseHeights::default() };
+        let source = NoiseSource::new(&noise).unwrap();
+        for ground in [Ground::from_noise(90, 70, &noise), Ground::from_source(90, 70, source)] {
+            let ground = ground.unwrap();
+            for (x, z) in (-3..95).flat_map(|x| (-3..75).map(move |z| (x, z))) {
+                let column = Column::new(x, z);
+                assert_eq!(ground.lone_height(column), ground.height(column), "{column:?}");
+            }
         }
     }
 

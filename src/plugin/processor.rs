@@ -218,7 +218,7 @@ impl SurfaceBuilder {
             let NodeUpdate { node, mesh, shown, hidden } = update;
             let origin = node_origin(self.grid, node);
             let build = |mesh: Arc<SurfaceMesh>| {
-                self.mesh_builder.as_ref().and_then(|builder| builder.build_whole(origin, &mesh))
+                self.mesh_builder.as_ref().and_then(|builder| builder.build_node(origin, &mesh))
             };
             let shown = shown.into_iter();
             let shown = shown.map(|(drawn, draft)| self.build((drawn, true), draft.is_empty(), || draft));
