@@ -1,8 +1,9 @@
-//! A long flight without a renderer: `cargo bench --features examples --bench flight [-- MINUTES] [looking|digging]`, by default one minute.
+//! A long flight without a renderer: `cargo bench --features examples --bench flight [-- MINUTES] [looking|digging] [plain]`, by default one minute.
 //!
 //! A camera flies at 100 m/s and 60 frames a second, 60 m above a world of 16 x 16 km whose mountains are computed on demand, with
 //! 8 km of view on a picture 1440 high at 45 degrees: first without edits, then with 20 digs a second below it, each for so many
-//! minutes, or only one of both. Printed are the plugin's time on the main thread in each frame, and every tenth of the flight what the ground and
+//! minutes, or only one of both. Vertices are
+//! slim, as with a look, or with `plain` those of other materials. Printed are the plugin's time on the main thread in each frame, and every tenth of the flight what the ground and
 //! the meshes take.
 
 #[path = "../examples/shared/mountains.rs"]
@@ -50,7 +51,7 @@ struct Bytes {
 }
 
 impl Flight {
-    fn new() -> Self {
+    fn new(is_slim: bool) -> Self {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, BurrowPlugins));
         app.finish();
@@ -62,7 +63,10 @@ impl Flight {
         let projection = Projection::from(PerspectiveProjection { fov, far: 20_000.0, ..default() });
         let levels = LevelsOfDetail { view_distance: 8000.0, ..default() };
         let camera = app.world_mut().spawn((Camera::default(), projection, Transform::default())).id();
-        let terrain = app.world_mut().spawn((terrain, levels, SlimVertices)).id();
+        let terrain = app.world_mut().spawn((terrain, levels)).id();
+        if is_slim {
+            app.world_mut().entity_mut(terrain).insert(SlimVertices);
+        }
         let mut flight = Self { app, camera, terrain, time: Duration::ZERO };
         let start = Instant::now();
         while !flight.is_complete() {
@@ -161,8 +165,8 @@ fn main() {
     let minutes =
         std::env::args().skip(1).find_map(|arg| arg.parse().ok()).unwrap_or(1.0f64).clamp(0.01, 600.0);
     let length = Duration::from_secs_f64(minutes * 60.0);
-    let mut flight = Flight::new();
     let is_named = |name: &str| std::env::args().any(|arg| arg == name);
+    let mut flight = Flight::new(!is_named("plain"));
     for (name, is_digging) in [("looking", false), ("digging", true)] {
         if is_named(name) || !is_named("looking") && !is_named("digging") {
             flight.fly(length, is_digging);
