@@ -9,7 +9,7 @@
 //! # use bevy_burrow::prelude::*;
 //! use bevy_burrow::net::{Server, ServerSettings};
 //! use bevy_burrow::together::{GroundServer, SharedTerrain, TogetherPlugin};
-//! # fn ground() -> Result<Ground, Box<dyn std::error::Error>> {
+//! # fn ground() -> Result<Ground> {
 //! #     Ok(Ground::from_noise(512, 512, &NoiseHeights::default())?)
 //! # }
 //!
