@@ -61,6 +61,7 @@ mod replica;
 mod server;
 mod stamps;
 
+use crate::terrain::{Meshing, Terrain, WorkLimits};
 pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
 pub use message::{
@@ -72,3 +73,10 @@ pub use server::{
     Outgoing, Permission, Rate, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
 };
 pub use stamps::{StampId, Stamps};
+
+/// Prepares a terrain that nobody looks at: it meshes nothing, keeps no history, and takes all work.
+fn never_shown(terrain: &mut Terrain) {
+    terrain.set_meshing(Meshing::Never);
+    terrain.set_undo_budget(0);
+    terrain.set_work_limits(WorkLimits::UNBOUNDED);
+}

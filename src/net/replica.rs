@@ -7,14 +7,14 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use super::message::{Entry, Terms};
+use super::never_shown;
 use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
 use crate::terrain::{
-    ChangeError, LooseSettings, Meshing, Receipt, RestoreError, Terrain, TerrainError, TerrainSettings,
-    WorkLimits, World, WorldChange, WorldParts,
+    ChangeError, LooseSettings, Receipt, RestoreError, Terrain, TerrainError, TerrainSettings, World,
+    WorldChange, WorldParts,
 };
-use crate::volume::layers::NONE;
 use crate::volume::{Brick, Fields};
 
 type Stored = Option<Arc<Brick>>;
@@ -86,7 +86,7 @@ impl Replica {
     /// The pristine world.
     pub fn new(ground: Arc<Ground>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
         let mut confirmed = Terrain::new(ground, settings)?;
-        prepare(&mut confirmed);
+        never_shown(&mut confirmed);
         let hash = confirmed.world().hash();
         let (pending, bricks, fields, before) = Default::default();
         Ok(Self { confirmed, pending, bricks, fields, hash, before, is_outdated: false })
@@ -127,7 +127,6 @@ impl Replica {
 
     /// Applies entries of the order. Own edits among them are no longer pending; `own` tells their numbers.
     pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
-        let mut edits = Vec::new();
         for entry in entries {
             match entry {
                 Entry::Rules(rules) => {
@@ -135,10 +134,7 @@ impl Replica {
                     let _ = self.confirmed.set_rules(rules.as_deref().cloned().unwrap_or_default());
                 }
                 Entry::Loose(loose) => self.confirmed.set_loose(*loose),
-                Entry::Edit { edit, .. } => {
-                    self.confirmed.submit_edit(edit);
-                    edits.push(edit);
-                }
+                Entry::Edit { edit, .. } => self.confirmed.submit_edit(edit),
                 // There is room: the limits are unbounded.
                 Entry::Parts { change, .. } => {
                     let _ = self.confirmed.submit_change(WorldChange::clone(change), None);
@@ -195,7 +191,7 @@ impl Replica {
         let world = self.confirmed.world();
         for (pos, old) in before.bricks {
             let shown = self.bricks.remove(&pos).unwrap_or(old);
-            if !is_same(shown.as_ref(), world.brick(pos)) {
+            if !Brick::is_same(shown.as_ref(), world.brick(pos)) {
                 self.bricks.insert(pos, shown);
             }
         }
@@ -234,7 +230,7 @@ impl Replica {
         let parts = WorldParts { change, chunk_size, revision: 0, rules, loose };
         let settings = TerrainSettings { chunk_size, voxel_size: self.confirmed.voxel_size() };
         self.confirmed = Terrain::restore(self.confirmed.world().shared_ground(), &settings, parts)?;
-        prepare(&mut self.confirmed);
+        never_shown(&mut self.confirmed);
         self.is_outdated = true;
         Ok(())
     }
@@ -271,7 +267,7 @@ impl Replica {
         let edits: Vec<Edit> = self.pending.iter().map(|pending| pending.edit.clone()).collect();
         let draft = self.confirmed.draft(&edits);
         let (world, before) = (self.confirmed.world(), std::mem::take(&mut self.before));
-        let drafted = |pos: BrickPos, brick: &Stored| !is_same(brick.as_ref(), world.brick(pos));
+        let drafted = |pos: BrickPos, brick: &Stored| !Brick::is_same(brick.as_ref(), world.brick(pos));
         let mut bricks: BTreeMap<BrickPos, Stored> = draft.change.bricks.into_iter().collect();
         bricks.retain(|pos, brick| drafted(*pos, brick));
         let mut fields: BTreeMap<ChunkPos, Fields> = draft.change.fields.into_iter().collect();
@@ -283,7 +279,7 @@ impl Replica {
             let old = self.bricks.get(&pos).or(before.bricks.get(&pos)).map(Option::as_ref);
             let old = old.unwrap_or_else(|| world.brick(pos));
             let new = bricks.get(&pos).map_or_else(|| world.brick(pos), Option::as_ref);
-            if !is_same(old, new) {
+            if !Brick::is_same(old, new) {
                 change.bricks.push((pos, new.cloned()));
             } else if let Some(drafted) = bricks.get_mut(&pos) {
                 // The one that is shown stays, so that it is held once.
@@ -333,22 +329,8 @@ impl Replica {
     }
 }
 
-fn prepare(confirmed: &mut Terrain) {
-    confirmed.set_meshing(Meshing::Never);
-    confirmed.set_undo_budget(0);
-    confirmed.set_work_limits(WorkLimits::UNBOUNDED);
-}
-
 fn fields_of(world: &World, chunk: ChunkPos) -> Fields {
     world.fields_of(chunk).cloned().unwrap_or_default()
-}
-
-fn is_same(a: Option<&Arc<Brick>>, b: Option<&Arc<Brick>>) -> bool {
-    match (a, b) {
-        (Some(a), Some(b)) if Arc::ptr_eq(a, b) => true,
-        (None, None) => true,
-        (a, b) => Brick::differences([a.map(Arc::as_ref), b.map(Arc::as_ref)]) == NONE,
-    }
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ fn settings() -> TerrainSettings {
 
 fn terrain(ground: &Arc<Ground>) -> Terrain {
     let mut terrain = Terrain::new(Arc::clone(ground), &settings()).expect("valid settings");
-    prepare(&mut terrain);
+    never_shown(&mut terrain);
     terrain
 }
 
@@ -189,7 +189,7 @@ impl Play {
             let (own, other) = (confirmed.brick(pos), shown.brick(pos));
             let Some((own, other)) = own.zip(other) else { continue };
             // Each world has one brick of each uniform kind.
-            if own.uniform().is_none() && is_same(Some(own), Some(other)) {
+            if own.uniform().is_none() && Brick::is_same(Some(own), Some(other)) {
                 assert!(Arc::ptr_eq(own, other), "{pos:?} is held twice");
                 self.shared += 1;
             }

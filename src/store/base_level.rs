@@ -14,7 +14,7 @@ use super::mirror::Region;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, RegionPos};
 use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldChange, WorldParts, brick_over};
-use crate::volume::{Brick, Fields, layers};
+use crate::volume::{Brick, Fields};
 
 /// A level below a world, for [`StoreOptions::level`](super::StoreOptions::level).
 #[derive(Clone)]
@@ -124,7 +124,7 @@ impl BaseLevel {
         let below = self.level.regions.get(&at).unwrap_or(&nothing);
         let mut change = WorldChange::default();
         let is_new = |(pos, brick): &(&BrickPos, &Arc<Brick>)| {
-            find(&below.bricks, pos).is_none_or(|old| !is_same(old, brick))
+            find(&below.bricks, pos).is_none_or(|old| !Brick::is_same(Some(old), Some(brick)))
         };
         let new = now.bricks.iter().filter(is_new).map(|(pos, brick)| (*pos, Some(Arc::clone(brick))));
         change.bricks.extend(new);
@@ -147,9 +147,4 @@ impl BaseLevel {
 fn find<'a, K: Ord, V>(list: &'a [(K, V)], key: &K) -> Option<&'a V> {
     let at = list.binary_search_by(|(own, _)| own.cmp(key)).ok()?;
     list.get(at).map(|(_, value)| value)
-}
-
-/// Do two bricks hold the same edited samples?
-fn is_same(one: &Arc<Brick>, other: &Arc<Brick>) -> bool {
-    Arc::ptr_eq(one, other) || Brick::differences([Some(one), Some(other)]) == layers::NONE
 }

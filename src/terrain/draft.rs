@@ -12,7 +12,6 @@ use super::world::{World, unique};
 use crate::brush::Edit;
 use crate::lattice::BrickPos;
 use crate::volume::Brick;
-use crate::volume::layers::NONE;
 
 /// What edits would come to.
 #[derive(Clone, Debug, Default)]
@@ -54,7 +53,7 @@ impl Terrain {
     pub fn share_bricks<'a>(&mut self, bricks: impl IntoIterator<Item = (BrickPos, &'a Arc<Brick>)>) {
         for (pos, brick) in bricks {
             let Some(own) = self.world.bricks.get(&pos) else { continue };
-            if !Arc::ptr_eq(own, brick) && Brick::differences([Some(own), Some(brick)]) == NONE {
+            if !Arc::ptr_eq(own, brick) && Brick::is_same(Some(own), Some(brick)) {
                 Arc::make_mut(&mut self.world).bricks.insert(pos, Arc::clone(brick));
             }
         }

@@ -249,9 +249,13 @@ pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
         let Some(client) = &mut link.client else { continue };
         let mut changes = client.take_shown();
-        if link.is_broken && link.waiting == 0 {
-            link.is_broken = false;
-            changes = vec![client.show_whole(terrain.world())];
+        if link.is_broken {
+            // All of it comes once those that wait are answered.
+            changes.clear();
+            if link.waiting == 0 {
+                link.is_broken = false;
+                changes.push(client.show_whole(terrain.world()));
+            }
         }
         for ShownChange { change, hash } in changes {
             // One that finds no room comes again with all others.

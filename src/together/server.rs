@@ -42,8 +42,12 @@ pub struct GroundServerEvent(pub ServerEvent);
 impl GroundServer {
     /// Serves a world that is not saved.
     pub fn new(server: Server) -> Self {
+        Self { parts: Some(Parts { server, store: None }), ..Self::empty() }
+    }
+
+    fn empty() -> Self {
         Self {
-            parts: Some(Parts { server, store: None }),
+            parts: None,
             under_way: None,
             waiting: Vec::new(),
             start: Instant::now(),
@@ -53,12 +57,7 @@ impl GroundServer {
 
     /// Serves a world that is saved in this store: [`Server::open`] made the server of it.
     pub fn with_store(server: Server, store: Store) -> Self {
-        let mut own = Self::new(server);
-        own.parts.iter_mut().for_each(|parts| parts.store = None);
-        if let Some(parts) = &mut own.parts {
-            parts.store = Some(store);
-        }
-        own
+        Self { parts: Some(Parts { server, store: Some(store) }), ..Self::empty() }
     }
 
     /// Does something with the server as soon as it is not at work, in the order of these calls: sets where a player is, changes
@@ -67,10 +66,11 @@ impl GroundServer {
         self.waiting.push(Box::new(move |server, _| work(server)));
     }
 
-    /// The number of a player on the server: it stays over connections where the transport knows players by numbers. A
-    /// player on the server's own machine has the number 0.
+    /// The number of a player on the server: one more than the transport's, so it stays over connections. A player on the
+    /// server's own machine has the number 0.
     pub fn player(client: ClientId, ids: &Query<&NetworkId>) -> net::ClientId {
-        let known = client.entity().and_then(|entity| ids.get(entity).ok()).map(NetworkId::get);
+        let known =
+            client.entity().and_then(|entity| ids.get(entity).ok()).map(|id| id.get().saturating_add(1));
         let unknown = client.entity().map_or(0, Entity::to_bits);
         // The greatest number is the server's own.
         net::ClientId(known.unwrap_or(unknown).min(u64::MAX - 1))
@@ -118,7 +118,7 @@ pub(super) fn serve(
     let ground = &mut *ground;
     for FromClient { client_id, message } in messages.read() {
         let player = GroundServer::player(*client_id, &ids);
-        if ground.players.insert(player, *client_id).is_none() {
+        if ground.players.insert(player, *client_id) != Some(*client_id) {
             ground.waiting.push(Box::new(move |server, now| server.connect(player, now)));
         }
         let bytes = message.0.clone();

@@ -311,6 +311,15 @@ impl Brick {
         samples.iter().enumerate().map(of_layer).fold(0, u64::wrapping_add)
     }
 
+    /// Do two bricks hold the same? `None` stands for a pristine one.
+    pub(crate) fn is_same(a: Option<&Arc<Self>>, b: Option<&Arc<Self>>) -> bool {
+        match (a, b) {
+            (Some(a), Some(b)) if Arc::ptr_eq(a, b) => true,
+            (None, None) => true,
+            (a, b) => Self::differences([a.map(Arc::as_ref), b.map(Arc::as_ref)]) == layers::NONE,
+        }
+    }
+
     /// The samples in which two bricks differ; `None` stands for a pristine one.
     pub(crate) fn differences([a, b]: [Option<&Self>; 2]) -> Layers {
         let material =

@@ -423,8 +423,14 @@ impl Client {
                         None => ClientEvent::Others { author: *author, receipt },
                     });
                 }
-                Entry::Parts { by: Some((by, _)), .. } if Some(*by) == id => {
-                    self.events.push(ClientEvent::Undone);
+                Entry::Parts { by, change } => {
+                    if by.is_some_and(|(by, _)| Some(by) == id) {
+                        self.events.push(ClientEvent::Undone);
+                    }
+                    if applied.is_void {
+                        let regions = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos));
+                        self.doubtful.extend(regions);
+                    }
                 }
                 _ => {}
             }

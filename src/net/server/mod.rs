@@ -35,11 +35,12 @@ use rustc_hash::FxHashMap;
 
 use super::encoding::{OrderWriter, entry_bytes};
 use super::message::{ClientId, Entry, Epoch, Kick, Lane, MOST_TO_CLIENT, ToClient};
+use super::never_shown;
 use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
 use crate::store::{FormatError, WorldId};
-use crate::terrain::{LooseSettings, Meshing, Terrain, WorkLimits, WorldChange};
+use crate::terrain::{LooseSettings, Terrain, WorldChange};
 use crate::volume::{DiggingRules, RulesError};
 pub use bucket::Rate;
 pub use events::{ServerEvent, ServerFigures};
@@ -143,9 +144,7 @@ impl Server {
 
     /// A server of a terrain that is at this number of its world's order.
     fn at(mut terrain: Terrain, world: WorldId, number: u64, settings: ServerSettings) -> Self {
-        terrain.set_meshing(Meshing::Never);
-        terrain.set_undo_budget(0);
-        terrain.set_work_limits(WorkLimits::UNBOUNDED);
+        never_shown(&mut terrain);
         let run = WorldId::random().0 as u64;
         Self {
             terrain,

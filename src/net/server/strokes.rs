@@ -8,7 +8,6 @@ use rustc_hash::FxHashMap;
 use crate::lattice::{BrickPos, ChunkPos};
 use crate::net::message::ClientId;
 use crate::terrain::{World, WorldChange};
-use crate::volume::layers::NONE;
 use crate::volume::{Brick, Fields};
 
 type Stored = Option<Arc<Brick>>;
@@ -107,7 +106,7 @@ impl Stroke {
             let now = world.brick(*pos);
             self.bytes += size(after.as_ref());
             if let Some(own) = self.bricks.get_mut(pos) {
-                self.is_touched |= !is_same(own.after.as_ref(), now);
+                self.is_touched |= !Brick::is_same(own.after.as_ref(), now);
                 self.bytes -= size(own.after.as_ref());
                 own.after = after.clone();
             } else {
@@ -131,8 +130,9 @@ impl Stroke {
     /// What takes it back, if all that it led to is still there. Fields that others have changed since stay: they hold what it
     /// replaced too.
     fn undone(&self, world: &World) -> Option<WorldChange> {
-        let is_there =
-            |(pos, own): (&BrickPos, &Replaced<Stored>)| is_same(own.after.as_ref(), world.brick(*pos));
+        let is_there = |(pos, own): (&BrickPos, &Replaced<Stored>)| {
+            Brick::is_same(own.after.as_ref(), world.brick(*pos))
+        };
         if self.is_touched || !self.bricks.iter().all(is_there) {
             return None;
         }
@@ -154,12 +154,4 @@ const ENTRY: usize = 64;
 /// Bytes that a brick takes, as if it were held here only.
 fn size(brick: Option<&Arc<Brick>>) -> usize {
     brick.map_or(0, |brick| brick.bytes())
-}
-
-fn is_same(a: Option<&Arc<Brick>>, b: Option<&Arc<Brick>>) -> bool {
-    match (a, b) {
-        (Some(a), Some(b)) if Arc::ptr_eq(a, b) => true,
-        (None, None) => true,
-        (a, b) => Brick::differences([a.map(Arc::as_ref), b.map(Arc::as_ref)]) == NONE,
-    }
 }
