@@ -25,8 +25,12 @@
 //! What is dug is saved as it is dug, with the inventory and the player's place: the title continues the world that was played
 //! last, and `--world NAME` another one, or a new one of that name. Scripts save only with `--world`.
 //!
+//! Others can join: choose "Together" on the title, or start with `--host`, and with `--join ADDRESS` on their machines.
+//!
 //! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows into
 //! mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
+//!
+//! `--together` plays a script of a host and a guest.
 //!
 //! With `--features examples,gamepad`, a gamepad does all of this except for the panel and the frame times. Its sticks
 //! walk and look, its shoulder buttons change the tool, and its left stick or D-pad selects menu items.
@@ -41,6 +45,7 @@
 //! | `tools` | what the player holds: digging, building, bombs, balls and lamps, and the inventory |
 //! | `world` | the landscape and its ore, saved worlds, day and night, the sky, particles and debris |
 //! | `ui` | menus, settings, and the heads-up display |
+//! | `party` | playing together: hosting, joining, and what other players look like |
 //! | `film` | scripts that play the game for pictures and films |
 
 #[path = "../shared/display.rs"]
@@ -48,6 +53,7 @@ mod display;
 mod film;
 #[path = "../shared/offscreen.rs"]
 mod offscreen;
+mod party;
 mod player;
 #[cfg(test)]
 mod test_support;
@@ -63,7 +69,8 @@ use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
 use clap::Parser;
 
-use crate::ui::settings::SettingsFile;
+use crate::party::connection::{Address, Party};
+use crate::ui::settings::{Settings, SettingsFile};
 use crate::world::saves::PlayedWorld;
 
 /// A first-person game on a landscape that can be dug.
@@ -75,6 +82,9 @@ pub struct Options {
     /// Record a minute of play, frame by frame.
     #[arg(long)]
     tour: bool,
+    /// Play the script of two players, a host and a guest, and write a picture.
+    #[arg(long, conflicts_with_all = ["tour", "headless", "join"])]
+    together: bool,
     /// Number of frames to draw, evenly spread over the tour. All by default.
     #[arg(long, requires = "tour", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=7200))]
     frames: Option<u32>,
@@ -100,6 +110,15 @@ pub struct Options {
     /// The saved world to play: its name, or its folder. By default the one that was played last; scripts save nothing.
     #[arg(long, value_name = "NAME")]
     world: Option<String>,
+    /// Let others join, at this port.
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "5100", conflicts_with = "tour")]
+    host: Option<u16>,
+    /// Join the world of a host, at this address.
+    #[arg(long, value_name = "ADDRESS", conflicts_with_all = ["host", "tour", "world"])]
+    join: Option<Address>,
+    /// What others call you.
+    #[arg(long)]
+    name: Option<String>,
     /// Where edits are computed.
     #[arg(long, value_enum, default_value_t = Computer::Auto)]
     backend: Computer,
@@ -109,6 +128,12 @@ impl Options {
     /// The folder of the world that was asked for.
     fn saved_world(&self) -> Option<PathBuf> {
         self.world.as_deref().and_then(PlayedWorld::named)
+    }
+
+    /// Who plays in it.
+    fn party(&self) -> Party {
+        let guest = self.join.map(|Address(host)| Party::Guest(host));
+        guest.or(self.host.map(Party::Host)).unwrap_or_default()
     }
 }
 
@@ -139,6 +164,9 @@ fn main() -> ExitCode {
         }
         return film::tour::run(&options, renderer);
     }
+    if options.together {
+        return film::together::run(&options, renderer);
+    }
     if options.headless || !display::has_display() || renderer.is_none() {
         return film::script::run(&options, renderer);
     }
@@ -151,9 +179,20 @@ fn main() -> ExitCode {
 }
 
 /// Adds the whole game to an app with or without a window.
-pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile, world: Option<PathBuf>) {
+pub fn game(
+    app: &mut App,
+    engine: BurrowEngine,
+    settings: SettingsFile,
+    world: Option<PathBuf>,
+    party: Party,
+) {
     app.insert_resource(engine)
         .add_plugins((BurrowPlugins, ui::settings::SettingsPlugin(settings)))
+        .add_plugins((
+            party::connection::ConnectionPlugin(party),
+            party::fellows::FellowsPlugin,
+            party::figures::FiguresPlugin,
+        ))
         .add_plugins((
             player::input::InputPlugin,
             player::game_state::GameStatePlugin,
@@ -202,7 +241,10 @@ fn open_window(options: &Options) -> App {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     let world = options.saved_world().or_else(PlayedWorld::latest);
-    game(&mut app, options.backend.engine(), SettingsFile::of_user(), world);
+    game(&mut app, options.backend.engine(), SettingsFile::of_user(), world, options.party());
+    if let Some(name) = &options.name {
+        app.world_mut().resource_mut::<Settings>().name.clone_from(name);
+    }
     if options.tell {
         app.add_plugins(film::event_log::EventLogPlugin);
     }
@@ -226,6 +268,14 @@ mod tests {
             ("digger --draw-all", false),
             ("digger --tour --draw-all", false),
             ("digger --headless --world mine", true),
+            ("digger --host", true),
+            ("digger --host 7000 --world mine --name Ann", true),
+            ("digger --join 192.168.0.7", true),
+            ("digger --join ann", false),
+            ("digger --join 192.168.0.7 --host", false),
+            ("digger --tour --host", false),
+            ("digger --together --world mine", true),
+            ("digger --together --headless", false),
         ] {
             assert_eq!(Options::try_parse_from(line.split(' ')).is_ok(), is_understood, "{line}");
         }

@@ -70,6 +70,19 @@ pub fn connect(world: &mut World, server: SocketAddr, player: u64) -> Result {
     Ok(())
 }
 
+/// Ends all connections.
+pub fn leave(world: &mut World) {
+    if let Some(mut client) = world.remove_resource::<NetcodeClientTransport>() {
+        client.disconnect();
+    }
+    let transport = world.remove_resource::<NetcodeServerTransport>();
+    if let (Some(mut transport), Some(mut server)) = (transport, world.get_resource_mut::<RenetServer>()) {
+        transport.disconnect_all(&mut server);
+    }
+    world.remove_resource::<RenetClient>();
+    world.remove_resource::<RenetServer>();
+}
+
 fn now() -> Result<Duration> {
     Ok(SystemTime::now().duration_since(SystemTime::UNIX_EPOCH)?)
 }

@@ -8,8 +8,7 @@ use std::time::{Duration, Instant};
 use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::{Server, ServerSettings};
-use bevy_burrow::plugin::BurrowPlugins;
-use bevy_burrow::store::{Store, StoreOptions};
+use bevy_burrow::prelude::*;
 use bevy_burrow::together::{GroundServer, TogetherPlugin};
 use bevy_replicon::prelude::*;
 use bevy_replicon_renet::RepliconRenetPlugins;
@@ -33,17 +32,10 @@ pub struct Dedicated {
 impl Dedicated {
     pub fn new(address: SocketAddr, world: Option<&Path>) -> Result<Self> {
         let settings = ServerSettings::default();
+        let terrain = crate::terrain()?;
         let ground = match world {
-            Some(folder) if Store::is_in(folder) => {
-                let (store, opened) = Store::open(folder, crate::ground()?, StoreOptions::default())?;
-                GroundServer::with_store(Server::open(opened.terrain, &store, settings), store)
-            }
-            Some(folder) => {
-                let mut terrain = crate::terrain()?;
-                let store = Store::create(folder, &mut terrain, StoreOptions::default())?;
-                GroundServer::with_store(Server::open(terrain, &store, settings), store)
-            }
-            None => GroundServer::new(Server::new(crate::terrain()?, settings)),
+            Some(folder) => GroundServer::saved(&SavedWorld::new(folder), &terrain, settings),
+            None => GroundServer::new(Server::new(terrain, settings)),
         };
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, RepliconRenetPlugins))
@@ -106,5 +98,6 @@ impl Dedicated {
     /// Saves everything.
     pub fn finish(mut self) {
         self.app.world_mut().resource_mut::<GroundServer>().finish();
+        party::leave(self.app.world_mut());
     }
 }

@@ -26,13 +26,23 @@ pub(super) struct Unopened;
 
 /// A world that is being read.
 #[derive(Component)]
-pub(super) struct OpeningWorld(ThreadTask<Result<Read, StoreError>>);
+pub(super) struct OpeningWorld(ThreadTask<Result<ReadWorld, StoreError>>);
 
 /// A world that was read or made.
-struct Read {
-    store: Store,
-    terrain: Terrain,
-    troubles: Vec<StoreTrouble>,
+pub(crate) struct ReadWorld {
+    pub store: Store,
+    pub terrain: Terrain,
+    pub troubles: Vec<StoreTrouble>,
+}
+
+/// Reads a world, on another thread.
+pub(crate) struct WorldReader {
+    saved: SavedWorld,
+    level: Option<(BurrowLevel, String)>,
+    ground: Arc<Ground>,
+    settings: TerrainSettings,
+    /// What is made where there is no world yet.
+    parts: WorldParts,
 }
 
 /// Holds a terrain until its world is read.
@@ -86,35 +96,36 @@ pub(super) fn start_opening(
             let level = levels.as_ref()?.get(&start.0)?.clone();
             Some((level, start.0.path().map(ToString::to_string).unwrap_or_default()))
         });
-        let (path, options) = (saved.path.clone(), saved.options());
-        let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
-        let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let open = move || read(&path, options, level, ground, &settings, parts);
-        let task = ThreadTask::start(Threads::Background, open);
+        let reader = WorldReader::new(saved, terrain, level);
+        let task = ThreadTask::start(Threads::Background, move || reader.read());
         commands.entity(entity).try_remove::<Unopened>().try_insert(OpeningWorld(task));
     }
 }
 
-/// Reads the world of a folder, or makes one there of these parts, on a level and its path if there is one.
-fn read(
-    path: &Path,
-    options: StoreOptions,
-    level: Option<(BurrowLevel, String)>,
-    ground: Arc<Ground>,
-    settings: &TerrainSettings,
-    parts: WorldParts,
-) -> Result<Read, StoreError> {
-    // One that can't be read was told of when the terrain was made of it.
-    let level =
-        level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, &ground).ok()?, path)));
-    let options = StoreOptions { level, ..options };
-    if Store::is_in(path) {
-        let (store, opened) = open_unlocked(path, &ground, &options)?;
-        return Ok(Read { store, terrain: opened.terrain, troubles: opened.troubles });
+impl WorldReader {
+    /// Of this world, with the ground and the sizes of this terrain; a new world begins as the terrain is, on a level and its path if
+    /// there is one.
+    pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
+        let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
+        let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
+        Self { saved: saved.clone(), level, ground, settings, parts }
     }
-    let mut terrain = Terrain::restore(ground, settings, parts)?;
-    let store = Store::create(path, &mut terrain, options)?;
-    Ok(Read { store, terrain, troubles: Vec::new() })
+
+    /// Reads the world, or makes one.
+    pub fn read(self) -> Result<ReadWorld, StoreError> {
+        let Self { saved, level, ground, settings, parts } = self;
+        // One that can't be read was told of when the terrain was made of it.
+        let level =
+            level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, &ground).ok()?, path)));
+        let options = StoreOptions { level, ..saved.options() };
+        if Store::is_in(&saved.path) {
+            let (store, opened) = open_unlocked(&saved.path, &ground, &options)?;
+            return Ok(ReadWorld { store, terrain: opened.terrain, troubles: opened.troubles });
+        }
+        let mut terrain = Terrain::restore(ground, &settings, parts)?;
+        let store = Store::create(&saved.path, &mut terrain, options)?;
+        Ok(ReadWorld { store, terrain, troubles: Vec::new() })
+    }
 }
 
 /// Opens a world. This app may be about to close it: then it is waited for a little.
@@ -142,7 +153,7 @@ pub(super) fn finish_opening(
     for (entity, mut terrain, mut opening) in &mut worlds {
         let Some(outcome) = opening.0.finish() else { continue };
         commands.entity(entity).try_remove::<(OpeningWorld, Held)>();
-        let outcome = outcome.map(|Read { store, terrain: mut read, troubles: found }| {
+        let outcome = outcome.map(|ReadWorld { store, terrain: mut read, troubles: found }| {
             troubles
                 .write_batch(found.into_iter().map(|trouble| StoreTroubleFound { terrain: entity, trouble }));
             let revision = read.world().revision();

@@ -41,6 +41,7 @@ struct Link {
     waiting: usize,
     /// Something went wrong with what is shown.
     is_broken: bool,
+    is_playable: bool,
 }
 
 /// A change of the connection that the client was not told of yet.
@@ -73,6 +74,11 @@ impl SharedTerrain {
     /// Who the player is for the server; `None` before it has joined once.
     pub fn id(&self) -> Option<net::ClientId> {
         self.facts().id
+    }
+
+    /// Is the ground around the player there?
+    pub fn is_playable(&self) -> bool {
+        self.link.as_ref().is_some_and(|link| link.is_playable)
     }
 
     /// Is all of the world there, and does it follow the server?
@@ -147,10 +153,16 @@ pub(super) fn begin(
                 facts: Facts::default(),
                 waiting: 0,
                 is_broken: world.revision() != 0,
+                is_playable: false,
             });
         }
         Err(why) => error!("the terrain can't be shared: {why}"),
     }
+}
+
+/// Brushes on a terrain that is no longer shared are its own again.
+pub(super) fn end(gone: On<Remove, SharedTerrain>, mut commands: Commands) {
+    commands.entity(gone.entity).try_remove::<EditOutbox>();
 }
 
 /// There is a connection.
@@ -264,7 +276,10 @@ pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>
                 Err(_) => link.is_broken = true,
             }
         }
-        client.take_events().into_iter().for_each(|event| answers.tell(entity, event));
+        for event in client.take_events() {
+            link.is_playable |= event == ClientEvent::Playable;
+            answers.tell(entity, event);
+        }
         let Some(mut client) = link.client.take() else { continue };
         let now = link.start.elapsed();
         link.under_way = Some(ThreadTask::start(Threads::Transactions, move || {

@@ -54,11 +54,13 @@ impl Plugin for TogetherPlugin {
             .add_message::<GroundJoined>()
             .add_observer(server::forget_player)
             .add_observer(client::begin)
+            .add_observer(client::end)
             .add_systems(OnEnter(ClientState::Connected), client::connect)
             .add_systems(OnExit(ClientState::Connected), client::disconnect)
             .add_systems(
                 Update,
                 (
+                    client::connect.run_if(resource_added::<GroundServer>).before(client::send),
                     client::receive.before(BurrowSystems::Collect),
                     (client::send, client::show)
                         .chain()

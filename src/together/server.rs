@@ -1,5 +1,7 @@
 //! The server of a ground in a Bevy app: bytes go through replicon, and edits run on the plugin's threads.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use bevy::platform::collections::HashMap;
@@ -9,21 +11,32 @@ use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;
 
 use super::messages::{BulkLane, FromPlayer, OrderLane};
-use crate::net::{self, Lane, Server, ServerEvent};
+use crate::net::{self, Lane, Server, ServerEvent, ServerSettings};
 use crate::plugin::{ThreadTask, Threads};
-use crate::store::Store;
+use crate::saves::{ReadWorld, SavedWorld, WorldReader};
+use crate::store::{Store, StoreError, StoreTrouble};
+use crate::terrain::Terrain;
 
 /// The ground that players dig together: insert it in the app that is the server. Its [`Server`] owns a terrain that nobody looks
 /// at; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like everybody else.
 #[derive(Resource)]
 pub struct GroundServer {
-    /// What is not under way.
-    parts: Option<Parts>,
-    under_way: Option<ThreadTask<Parts>>,
+    work: Work,
     waiting: Vec<Request>,
     start: Instant,
     /// Players that are connected, by their numbers.
     players: HashMap<net::ClientId, ClientId>,
+    data: BTreeMap<String, Vec<u8>>,
+}
+
+/// Where the server is.
+enum Work {
+    /// Its world is read.
+    Opening(ThreadTask<Result<(Parts, OpenedWorld), StoreError>>),
+    Here(Box<Parts>),
+    UnderWay(ThreadTask<Box<Parts>>),
+    /// Its world could not be read.
+    Closed,
 }
 
 /// What goes to a thread and comes back.
@@ -32,38 +45,74 @@ struct Parts {
     store: Option<Store>,
 }
 
+/// What a world was found to be.
+struct OpenedWorld {
+    troubles: Vec<StoreTrouble>,
+    data: BTreeMap<String, Vec<u8>>,
+}
+
 /// What waits for the server to come back.
-type Request = Box<dyn FnOnce(&mut Server, Duration) + Send + Sync>;
+type Request = Box<dyn FnOnce(&mut Parts, Duration) + Send + Sync>;
 
 /// Something happened on the ground's server.
-#[derive(Message, Clone, Debug, PartialEq)]
-pub struct GroundServerEvent(pub ServerEvent);
+#[derive(Message, Clone, Debug)]
+pub enum GroundServerEvent {
+    /// Its world was read, or can't be: then nothing is served.
+    Opened(Result<(), Arc<StoreError>>),
+    /// Something about its players.
+    Players(ServerEvent),
+    /// Something is wrong with its saved world; the game goes on.
+    Trouble(StoreTrouble),
+}
 
 impl GroundServer {
     /// Serves a world that is not saved.
     pub fn new(server: Server) -> Self {
-        Self { parts: Some(Parts { server, store: None }), ..Self::empty() }
+        Self::working(Work::Here(Box::new(Parts { server, store: None })))
     }
 
-    fn empty() -> Self {
+    /// Serves a saved world: the one in this folder on the ground of this terrain, or where there is none, the terrain, which is
+    /// saved there from now on. It is read on another thread, and [told](GroundServerEvent::Opened).
+    pub fn saved(world: &SavedWorld, terrain: &Terrain, settings: ServerSettings) -> Self {
+        let reader = WorldReader::new(world, terrain, None);
+        Self::working(Work::Opening(ThreadTask::start(Threads::Background, move || {
+            let ReadWorld { store, terrain, troubles } = reader.read()?;
+            let data = store.game_data().clone();
+            let server = Server::open(terrain, &store, settings);
+            Ok((Parts { server, store: Some(store) }, OpenedWorld { troubles, data }))
+        })))
+    }
+
+    fn working(work: Work) -> Self {
         Self {
-            parts: None,
-            under_way: None,
+            work,
             waiting: Vec::new(),
             start: Instant::now(),
             players: HashMap::default(),
+            data: BTreeMap::new(),
         }
-    }
-
-    /// Serves a world that is saved in this store: [`Server::open`] made the server of it.
-    pub fn with_store(server: Server, store: Store) -> Self {
-        Self { parts: Some(Parts { server, store: Some(store) }), ..Self::empty() }
     }
 
     /// Does something with the server as soon as it is not at work, in the order of these calls: sets where a player is, changes
     /// the rules.
     pub fn with(&mut self, work: impl FnOnce(&mut Server) + Send + Sync + 'static) {
-        self.waiting.push(Box::new(move |server, _| work(server)));
+        self.waiting.push(Box::new(move |parts, _| work(&mut parts.server)));
+    }
+
+    /// Keeps data of the game beside a saved world, as a [`WorldStore`](crate::saves::WorldStore) does.
+    pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
+        let (key, bytes) = (key.into(), bytes.into());
+        self.data.insert(key.clone(), bytes.clone());
+        self.waiting.push(Box::new(move |parts, _| {
+            if let Some(store) = &mut parts.store {
+                store.put(key, bytes);
+            }
+        }));
+    }
+
+    /// Data of the game as it was put last; nothing before the world is [read](GroundServerEvent::Opened).
+    pub fn get(&self, key: &str) -> Option<&[u8]> {
+        self.data.get(key).map(Vec::as_slice)
     }
 
     /// The number of a player on the server: one more than the transport's, so it stays over connections. A player on the
@@ -79,18 +128,44 @@ impl GroundServer {
     /// Waits until all that was asked for is done and saved: before the app ends.
     pub fn finish(&mut self) {
         let deadline = Instant::now() + Duration::from_secs(10);
-        while self.parts.is_none() && Instant::now() < deadline {
-            self.parts = self.under_way.as_mut().and_then(ThreadTask::finish);
+        while !self.comes_back(|_| {}) && Instant::now() < deadline {
             std::thread::sleep(Duration::from_millis(1));
         }
         let now = self.start.elapsed();
-        if let Some(parts) = &mut self.parts {
-            self.waiting.drain(..).for_each(|request| request(&mut parts.server, now));
+        if let Work::Here(parts) = &mut self.work {
+            self.waiting.drain(..).for_each(|request| request(parts, now));
             parts.advance(now);
             if let Some(Err(why)) = parts.store.as_mut().map(Store::flush) {
                 error!("the last edits are not saved: {why}");
             }
         }
+    }
+
+    /// Takes the server back from its thread, if it is done there. Is it here, or will it never be?
+    fn comes_back(&mut self, mut tell: impl FnMut(GroundServerEvent)) -> bool {
+        match &mut self.work {
+            Work::Here(_) | Work::Closed => return true,
+            Work::UnderWay(task) => {
+                let Some(parts) = task.finish() else { return false };
+                self.work = Work::Here(parts);
+            }
+            Work::Opening(task) => {
+                let Some(opened) = task.finish() else { return false };
+                let opened = opened.map(|(parts, OpenedWorld { troubles, data })| {
+                    self.work = Work::Here(Box::new(parts));
+                    // What was put meanwhile is newer.
+                    let newer = std::mem::replace(&mut self.data, data);
+                    self.data.extend(newer);
+                    troubles.into_iter().map(GroundServerEvent::Trouble).for_each(&mut tell);
+                });
+                if let Err(why) = &opened {
+                    error!("the world is not served: {why}");
+                    self.work = Work::Closed;
+                }
+                tell(GroundServerEvent::Opened(opened.map_err(Arc::new)));
+            }
+        }
+        true
     }
 }
 
@@ -119,23 +194,27 @@ pub(super) fn serve(
     for FromClient { client_id, message } in messages.read() {
         let player = GroundServer::player(*client_id, &ids);
         if ground.players.insert(player, *client_id) != Some(*client_id) {
-            ground.waiting.push(Box::new(move |server, now| server.connect(player, now)));
+            ground.waiting.push(Box::new(move |parts, now| parts.server.connect(player, now)));
         }
         let bytes = message.0.clone();
-        ground.waiting.push(Box::new(move |server, now| server.receive(player, &bytes, now)));
+        ground.waiting.push(Box::new(move |parts, now| parts.server.receive(player, &bytes, now)));
     }
-    if let Some(parts) = ground.under_way.as_mut().and_then(ThreadTask::finish) {
-        (ground.parts, ground.under_way) = (Some(parts), None);
-    }
-    let Some(mut parts) = ground.parts.take() else { return };
+    ground.comes_back(|event| {
+        events.write(event);
+    });
+    let Work::Here(_) = ground.work else { return };
+    let Work::Here(mut parts) = std::mem::replace(&mut ground.work, Work::Closed) else { return };
     let now = ground.start.elapsed();
-    ground.waiting.drain(..).for_each(|request| request(&mut parts.server, now));
+    ground.waiting.drain(..).for_each(|request| request(&mut parts, now));
     let mut kicked = Vec::new();
     for event in parts.server.take_events() {
         if let ServerEvent::Kicked(player, _) = event {
             kicked.push(player);
         }
-        events.write(GroundServerEvent(event));
+        events.write(GroundServerEvent::Players(event));
+    }
+    if let Some(store) = &parts.store {
+        events.write_batch(store.take_troubles().into_iter().map(GroundServerEvent::Trouble));
     }
     for (player, lane, bytes) in parts.server.take_outgoing() {
         let Some(&client) = ground.players.get(&player) else { continue };
@@ -150,7 +229,7 @@ pub(super) fn serve(
             leave.write(DisconnectRequest { client });
         }
     }
-    ground.under_way = Some(ThreadTask::start(Threads::Transactions, move || {
+    ground.work = Work::UnderWay(ThreadTask::start(Threads::Transactions, move || {
         parts.advance(now);
         parts
     }));
@@ -165,7 +244,7 @@ pub(super) fn forget_player(gone: On<Remove, ConnectedClient>, ground: Option<Re
         .map(|(id, _)| id)
         .collect();
     for player in left {
-        ground.waiting.push(Box::new(move |server, _| server.disconnect(player)));
+        ground.with(move |server| server.disconnect(player));
     }
 }
 

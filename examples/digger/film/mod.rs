@@ -7,4 +7,5 @@ pub mod report;
 pub mod script;
 pub mod scripted_brushes;
 pub mod studio;
+pub mod together;
 pub mod tour;

@@ -86,7 +86,7 @@ impl Studio {
         engine.wait(PATIENCE);
         let mut app = offscreen::build(renderer, |app| {
             app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
-            crate::game(app, engine, SettingsFile::default(), options.saved_world());
+            crate::game(app, engine, SettingsFile::default(), options.saved_world(), options.party());
         });
         // One frame, for the systems that spawn the camera.
         app.update();

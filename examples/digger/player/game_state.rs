@@ -4,6 +4,7 @@ use bevy::prelude::*;
 use bevy::window::{CursorGrabMode, CursorOptions, PrimaryWindow, WindowFocused};
 use bevy_burrow::panel::BurrowPanel;
 
+use crate::party::connection::is_shared;
 use crate::player::input::{Action, ActionSystems, Actions};
 
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -26,6 +27,8 @@ pub enum MenuPage {
     Menu,
     /// The saved worlds.
     Worlds,
+    /// Hosting and joining.
+    Together,
     Settings,
     Controls,
     Help,
@@ -42,7 +45,8 @@ impl Plugin for GameStatePlugin {
                 OnEnter(GameState::Playing),
                 (close_menu, resume_time, capture_mouse, release_actions),
             )
-            .add_systems(OnEnter(GameState::Paused), (pause_time, release_mouse))
+            // Where others play on, time does too.
+            .add_systems(OnEnter(GameState::Paused), (pause_time.run_if(not(is_shared)), release_mouse))
             // The title leaves time as it is: running before the first game, and paused after it.
             .add_systems(OnEnter(GameState::Title), release_mouse)
             .add_systems(PreUpdate, pause.after(ActionSystems).run_if(in_state(GameState::Playing)));

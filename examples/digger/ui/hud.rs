@@ -6,6 +6,7 @@ use bevy::prelude::*;
 use bevy_burrow::panel::BurrowPanel;
 use bevy_burrow::prelude::*;
 
+use crate::party::fellows::Fellow;
 use crate::player::camera::{DetachedCamera, PlayerCamera};
 use crate::player::game_state::GameState;
 use crate::player::headlamp::HeadlampSwitch;
@@ -299,12 +300,17 @@ fn show_time(
     clock: Res<Clock>,
     lamp: Res<HeadlampSwitch>,
     worlds: Query<(&Terrain, &WorldStore)>,
+    fellows: Query<&Fellow>,
     mut time: Single<&mut Text, With<TimeOfDay>>,
 ) {
     let lamp = if lamp.0 { "lamp on   " } else { "" };
     let is_behind = |(terrain, world): (&Terrain, &WorldStore)| world.durable() < terrain.world().revision();
     let saving = if worlds.iter().any(is_behind) { "saving   " } else { "" };
-    time.set_if_neq(Text::new(format!("{lamp}{saving}{}", clock.text())));
+    let players = match fellows.iter().count() {
+        0 | 1 => String::new(),
+        players => format!("{players} players   "),
+    };
+    time.set_if_neq(Text::new(format!("{players}{lamp}{saving}{}", clock.text())));
 }
 
 fn show_hints(

@@ -33,6 +33,10 @@ pub struct Settings {
     pub shape: BuildShape,
     /// Does the inventory limit what can be built?
     pub survival: bool,
+    /// What others call the player.
+    pub name: String,
+    /// The host that was joined last.
+    pub host: String,
     pub bindings: Bindings,
 }
 
@@ -58,6 +62,8 @@ impl Default for Settings {
             radius: 2.0,
             shape: BuildShape::default(),
             survival: true,
+            name: String::new(),
+            host: String::new(),
             bindings: Bindings::default(),
         }
     }
@@ -164,6 +170,7 @@ impl Plugin for SettingsPlugin {
             .insert_resource(IsBroken(is_broken))
             .add_systems(OnExit(MenuPage::Settings), save)
             .add_systems(OnExit(MenuPage::Controls), save)
+            .add_systems(OnExit(MenuPage::Together), save)
             .add_systems(
                 Last,
                 // After Bevy's own exit systems, because the last window may close in this frame.
@@ -173,7 +180,9 @@ impl Plugin for SettingsPlugin {
 }
 
 fn is_settings_page(page: Option<Res<State<MenuPage>>>) -> bool {
-    page.is_some_and(|page| matches!(page.get(), MenuPage::Settings | MenuPage::Controls))
+    page.is_some_and(|page| {
+        matches!(page.get(), MenuPage::Settings | MenuPage::Controls | MenuPage::Together)
+    })
 }
 
 fn save(settings: Res<Settings>, file: Res<SettingsFile>, mut is_broken: ResMut<IsBroken>) {

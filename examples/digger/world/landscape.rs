@@ -15,8 +15,10 @@ use bevy_burrow::ground::{GroundError, ImageSource, InsetSource, NoiseSource};
 use bevy_burrow::lattice::Column;
 use bevy_burrow::physics::EdgeWalls;
 use bevy_burrow::prelude::*;
+use bevy_burrow::together::SharedTerrain;
 
 use crate::film::places::Places;
+use crate::party::connection::Party;
 use crate::tools::hardness;
 use crate::world::saves::PlayedWorld;
 use crate::world::strata::strata;
@@ -130,7 +132,7 @@ pub struct DespawnOnNewGame;
 
 /// The ground without any edits, from which new games begin.
 #[derive(Resource, Clone)]
-struct OriginalGround(Arc<Ground>);
+pub struct OriginalGround(pub Arc<Ground>);
 
 /// The heightmap while it loads.
 #[derive(Resource)]
@@ -179,7 +181,7 @@ fn ground(heightmap: GreyImage) -> Result<Ground, GroundError> {
 }
 
 /// A terrain without any edits.
-fn new_terrain(ground: &Arc<Ground>) -> Result<Terrain, BevyError> {
+pub fn new_terrain(ground: &Arc<Ground>) -> Result<Terrain, BevyError> {
     let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings { chunk_size: 32, voxel_size: 1.0 })?;
     terrain.set_rules(hardness::rules())?;
     Ok(terrain)
@@ -192,16 +194,20 @@ fn replace_terrain(
     ground: Res<OriginalGround>,
     terrain: Single<Entity, With<GroundLook>>,
     played: Res<PlayedWorld>,
+    party: Res<Party>,
 ) -> Result {
-    insert_terrain(&mut commands.entity(*terrain), new_terrain(&ground.0)?, &played);
+    insert_terrain(&mut commands.entity(*terrain), new_terrain(&ground.0)?, &played, &party);
     Ok(())
 }
 
-/// Puts a terrain on its entity; where the world is saved, what is there takes its place.
-fn insert_terrain(entity: &mut EntityCommands, terrain: Terrain, played: &PlayedWorld) {
-    entity.insert(terrain);
-    if let Some(saved) = played.saved() {
-        entity.insert(saved);
+/// Puts a terrain on its entity; where the world is saved or shared, what is there takes its place.
+fn insert_terrain(entity: &mut EntityCommands, terrain: Terrain, played: &PlayedWorld, party: &Party) {
+    entity.remove::<(SavedWorld, SharedTerrain)>().insert(terrain);
+    match (party, played.saved()) {
+        (Party::Alone, Some(saved)) => drop(entity.insert(saved)),
+        (Party::Alone, None) => {}
+        // The host's server saves it.
+        (Party::Host(_) | Party::Guest(_), _) => drop(entity.insert(SharedTerrain::default())),
     }
 }
 
@@ -220,6 +226,7 @@ fn spawn_terrain(
     generation: Option<ResMut<Generation>>,
     terrain: Single<Entity, With<GroundLook>>,
     played: Res<PlayedWorld>,
+    party: Res<Party>,
     mut exit: MessageWriter<AppExit>,
 ) {
     let Some(result) = generation.and_then(|mut task| check_ready(&mut task.0)) else { return };
@@ -229,7 +236,7 @@ fn spawn_terrain(
             commands.insert_resource(places);
             commands.insert_resource(OriginalGround(ground));
             commands.entity(*terrain).insert(EdgeWalls::default());
-            insert_terrain(&mut commands.entity(*terrain), model, &played);
+            insert_terrain(&mut commands.entity(*terrain), model, &played, &party);
         }
         Err(reason) => {
             error!("the landscape can't be generated: {reason}");

@@ -9,6 +9,7 @@ use std::time::Duration;
 use bevy::prelude::*;
 use bevy::time::common_conditions::on_timer;
 use bevy_burrow::prelude::*;
+use bevy_burrow::together::{GroundServer, GroundServerEvent};
 use serde::{Deserialize, Serialize};
 
 use crate::player::Player;
@@ -138,22 +139,31 @@ struct SavedGame {
     place: Option<SavedPlace>,
 }
 
-/// Puts the game beside the ground.
+/// Puts the game beside the ground: the host's, where players share it.
 fn put_game(
     inventory: Res<Inventory>,
     clock: Res<Clock>,
     players: Query<(&Player, Body)>,
     mut worlds: Query<&mut WorldStore>,
+    mut server: Option<ResMut<GroundServer>>,
 ) {
+    if worlds.is_empty() && server.is_none() {
+        return;
+    }
     let place = players.iter().next().map(|(player, body)| {
         let Player { yaw, pitch } = *player;
         SavedPlace { feet: body.feet(), yaw, pitch }
     });
+    let game = SavedGame { inventory: inventory.saved(), hour: clock.hour, place };
+    let Ok(bytes) = serde_json::to_vec(&game) else { return };
+    if let Some(server) = &mut server
+        && server.get(KEY) != Some(&bytes[..])
+    {
+        server.put(KEY, bytes.clone());
+    }
     for mut world in &mut worlds {
-        let game = SavedGame { inventory: inventory.saved(), hour: clock.hour, place };
-        let Ok(bytes) = serde_json::to_vec(&game) else { continue };
         if world.get(KEY) != Some(&bytes[..]) {
-            world.put(KEY, bytes);
+            world.put(KEY, bytes.clone());
         }
     }
 }
@@ -161,17 +171,25 @@ fn put_game(
 /// Goes on with the game that was saved.
 fn continue_game(
     mut opened: MessageReader<WorldOpened>,
+    mut served: MessageReader<GroundServerEvent>,
     mut commands: Commands,
     worlds: Query<&WorldStore>,
+    server: Option<Res<GroundServer>>,
     mut inventory: ResMut<Inventory>,
     mut clock: ResMut<Clock>,
     mut hints: MessageWriter<Hint>,
 ) {
+    let mut games = Vec::new();
     for message in opened.read() {
         if let Err(why) = &message.outcome {
             hints.write(Hint(format!("nothing is saved: {why}")));
         }
-        let game = worlds.get(message.terrain).ok().and_then(|world| world.get(KEY));
+        games.push(worlds.get(message.terrain).ok().and_then(|world| world.get(KEY)));
+    }
+    if served.read().any(|event| matches!(event, GroundServerEvent::Opened(Ok(())))) {
+        games.push(server.as_deref().and_then(|server| server.get(KEY)));
+    }
+    for game in games {
         let Some(game) = game.and_then(|bytes| serde_json::from_slice::<SavedGame>(bytes).ok()) else {
             continue;
         };

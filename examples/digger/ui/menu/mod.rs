@@ -1,10 +1,11 @@
-//! The pages of the menu: title, worlds, pause, settings, controls and help.
+//! The pages of the menu: title, worlds, playing together, pause, settings, controls and help.
 
 mod controls;
 mod help;
 mod pause;
 mod settings_page;
 mod title;
+mod together;
 mod worlds;
 
 use bevy::prelude::*;
@@ -24,6 +25,7 @@ impl Plugin for MenuPlugin {
             controls::ControlsPlugin,
             help::HelpPlugin,
             worlds::WorldsPlugin,
+            together::TogetherPagePlugin,
         ));
     }
 }

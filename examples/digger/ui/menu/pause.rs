@@ -58,7 +58,9 @@ fn go_back(
     match (**now.0, **now.1) {
         (GameState::Paused, MenuPage::Menu) if back => state.set(GameState::Playing),
         (GameState::Paused, MenuPage::Help) if help => state.set(GameState::Playing),
-        (_, MenuPage::Settings | MenuPage::Controls | MenuPage::Help) if back => page.set(MenuPage::Menu),
+        (_, MenuPage::Settings | MenuPage::Controls | MenuPage::Help | MenuPage::Together) if back => {
+            page.set(MenuPage::Menu)
+        }
         _ => {}
     }
 }

@@ -134,9 +134,10 @@ fn arrow(sign: &str, by: i32) -> impl Bundle {
     (Arrow(by), node, BackgroundColor(Color::srgba(1.0, 1.0, 1.0, 0.08)), children![text(sign, 18.0, WHITE)])
 }
 
-/// Resets everything but the bindings, which have a page of their own.
+/// Resets everything but what has a page of its own.
 fn reset(_: On<Activated>, defaults: Res<DefaultSettings>, mut settings: ResMut<Settings>) {
-    *settings = Settings { bindings: settings.bindings.clone(), ..defaults.0.clone() };
+    let Settings { name, host, bindings, .. } = settings.clone();
+    *settings = Settings { name, host, bindings, ..defaults.0.clone() };
 }
 
 fn show_values(settings: Res<Settings>, mut values: Query<(&Value, &mut Text)>) {

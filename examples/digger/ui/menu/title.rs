@@ -3,10 +3,12 @@
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_burrow::prelude::*;
+use bevy_burrow::together::SharedTerrain;
 use bevy_burrow::view::GroundLoading;
 
 use super::{quit, spawn_common_buttons};
 use crate::film::places::{Places, flat};
+use crate::party::connection::Party;
 use crate::player::Player;
 use crate::player::camera::{DetachedCamera, PlayerCamera};
 use crate::player::game_state::{GameState, MenuPage};
@@ -96,6 +98,8 @@ fn open(mut commands: Commands, images: Option<Res<Images>>, game: Res<Start>, p
             left.spawn(widgets::button(next, "Worlds", WIDTH)).observe(super::go_to(MenuPage::Worlds));
             next += 1;
         }
+        left.spawn(widgets::button(next, "Together", WIDTH)).observe(super::go_to(MenuPage::Together));
+        next += 1;
         spawn_common_buttons(left, next, WIDTH);
         left.spawn(widgets::button(next + 3, "Quit", WIDTH)).observe(quit);
         left.spawn(progress());
@@ -119,7 +123,9 @@ fn start_new_game(
     mut commands: Commands,
     mut game: ResMut<Start>,
     mut played: ResMut<PlayedWorld>,
+    mut party: ResMut<Party>,
 ) {
+    *party = Party::Alone;
     // Where games are saved, each has a folder of its own.
     if played.0.is_some() {
         played.0 = saves::new_world();
@@ -134,8 +140,12 @@ fn has_focus(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
     windows.iter().all(|window| window.focused)
 }
 
-fn is_loaded(players: Query<(), With<Player>>, textures: Res<GroundLoading>) -> bool {
-    !players.is_empty() && textures.is_ready()
+fn is_loaded(
+    players: Query<(), With<Player>>,
+    textures: Res<GroundLoading>,
+    shared: Query<&SharedTerrain>,
+) -> bool {
+    !players.is_empty() && textures.is_ready() && shared.iter().all(SharedTerrain::is_playable)
 }
 
 /// Starts the game if the player wants to and is on the menu page. On other pages it waits.

@@ -6,6 +6,7 @@ use bevy::prelude::*;
 
 use super::spawn_page;
 use super::title::Start;
+use crate::party::connection::Party;
 use crate::player::game_state::{GameState, MenuPage};
 use crate::ui::widgets::{self, Activated, GREY, WHITE};
 use crate::world::landscape::NewGame;
@@ -39,6 +40,7 @@ fn open(mut commands: Commands, played: Res<PlayedWorld>, mut images: ResMut<Ass
             column.spawn(button).observe(
                 move |_: On<Activated>, mut commands: Commands, mut start: ResMut<Start>| {
                     commands.insert_resource(PlayedWorld(Some(folder.clone())));
+                    commands.insert_resource(Party::Alone);
                     begin(&mut commands, &mut start);
                 },
             );
@@ -72,8 +74,8 @@ fn slot(at: usize, world: &FoundWorld, is_played: bool, picture: Option<Handle<I
     (widgets::item(at, node), children![(picture, frame), words])
 }
 
-/// Plays the world that is set now.
-fn begin(commands: &mut Commands, start: &mut Start) {
+/// Plays the world that is set now, with the party that is set.
+pub fn begin(commands: &mut Commands, start: &mut Start) {
     commands.trigger(NewGame);
     start.is_wanted = true;
     commands.set_state(GameState::Title);

@@ -1,0 +1,251 @@
+//! Hosting and joining: what the terrain's `SharedTerrain` needs around it comes and goes with it.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
+use std::str::FromStr;
+use std::time::Duration;
+
+use bevy::prelude::*;
+use bevy_burrow::net::{ClientEvent, Reach, Server, ServerSettings, UndoPolicy};
+use bevy_burrow::prelude::*;
+use bevy_burrow::together::{GroundJoined, GroundServer, GroundServerEvent, SharedTerrain, TogetherPlugin};
+use bevy_replicon::prelude::*;
+use bevy_replicon_renet::RepliconRenetPlugins;
+
+use super::udp;
+use crate::player::game_state::GameState;
+use crate::ui::hud::Hint;
+use crate::world::landscape::{self, NewGame, OriginalGround};
+use crate::world::saves::PlayedWorld;
+
+/// Most players.
+const PLAYERS: usize = 16;
+/// Seconds until a lost connection is tried again.
+const PAUSE: f32 = 2.0;
+
+/// Who plays in this world.
+#[derive(Resource, Clone, Debug, Default, PartialEq)]
+pub enum Party {
+    #[default]
+    Alone,
+    /// This machine has the world, and others may join at this port.
+    Host(u16),
+    /// The world of another machine.
+    Guest(SocketAddr),
+}
+
+/// Text that is no address.
+#[derive(Debug, PartialEq, thiserror::Error)]
+#[error("{0:?} is no address: write 192.168.0.7, or 192.168.0.7:5100")]
+pub struct NoAddress(String);
+
+/// The address of a host, with or without a port.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Address(pub SocketAddr);
+
+impl FromStr for Address {
+    type Err = NoAddress;
+
+    fn from_str(text: &str) -> Result<Self, NoAddress> {
+        let text = text.trim();
+        let numbers = match text.strip_prefix("localhost") {
+            Some(port) => format!("127.0.0.1{port}"),
+            None => text.into(),
+        };
+        let with_port = || numbers.parse().ok();
+        let without = || Some(SocketAddr::new(numbers.parse::<IpAddr>().ok()?, udp::PORT));
+        with_port().or_else(without).map(Self).ok_or_else(|| NoAddress(text.into()))
+    }
+}
+
+/// The port that hosts listen at if nothing else is said.
+pub const PORT: u16 = udp::PORT;
+
+/// The address at which others find this machine. Nothing is sent to find it out.
+pub fn own_address() -> Option<IpAddr> {
+    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
+    socket.connect((Ipv4Addr::new(192, 0, 2, 1), 9)).ok()?;
+    Some(socket.local_addr().ok()?.ip())
+}
+
+/// The number that this program has in the network; the host itself has 0.
+#[derive(Resource, Clone, Copy, Debug)]
+pub struct OwnNumber(pub u64);
+
+/// Seconds until a guest tries to connect.
+#[derive(Resource)]
+struct NextTry(f32);
+
+/// Shares the terrain with others.
+pub struct ConnectionPlugin(pub Party);
+
+impl Plugin for ConnectionPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins((RepliconPlugins, RepliconRenetPlugins, TogetherPlugin))
+            .insert_resource(self.0.clone())
+            .insert_resource(OwnNumber(fastrand::u64(1..u64::MAX / 2)))
+            .add_observer(open)
+            .add_observer(close)
+            .add_systems(OnEnter(ClientState::Connected), forget_next_try)
+            .add_systems(OnExit(ClientState::Connected), tell_lost)
+            .add_systems(
+                Update,
+                (connect.run_if(in_state(ClientState::Disconnected)), follow_host, serve_unsaved),
+            );
+    }
+}
+
+/// Is the world shared with others?
+pub fn is_shared(party: Option<Res<Party>>) -> bool {
+    party.is_some_and(|party| *party != Party::Alone)
+}
+
+/// What the server allows. A bomb flies far from the player who threw it.
+fn settings() -> ServerSettings {
+    let reach = Reach { distance: 160, speed: 60, latency: Duration::from_secs(1) };
+    ServerSettings { reach: Some(reach), undo: UndoPolicy::Own, ..default() }
+}
+
+fn open(
+    new: On<Insert, SharedTerrain>,
+    mut commands: Commands,
+    party: Res<Party>,
+    played: Res<PlayedWorld>,
+    terrains: Query<&Terrain>,
+    ground: Res<OriginalGround>,
+    own: Res<OwnNumber>,
+) -> Result {
+    let terrain = terrains.get(new.entity)?;
+    match *party {
+        Party::Alone => {}
+        Party::Host(port) => {
+            commands.insert_resource(OwnNumber(0));
+            commands.insert_resource(match played.saved() {
+                Some(saved) => GroundServer::saved(&saved, terrain, settings()),
+                None => unsaved(&ground)?,
+            });
+            commands.queue(move |world: &mut World| {
+                if let Err(why) = udp::listen(world, (Ipv4Addr::UNSPECIFIED, port).into(), PLAYERS) {
+                    world.write_message(Hint(format!("nobody can join: {why}")));
+                }
+            });
+        }
+        Party::Guest(_) => {
+            if own.0 == 0 {
+                commands.insert_resource(OwnNumber(fastrand::u64(1..u64::MAX / 2)));
+            }
+            commands.insert_resource(NextTry(0.0));
+        }
+    }
+    Ok(())
+}
+
+fn unsaved(ground: &OriginalGround) -> Result<GroundServer> {
+    Ok(GroundServer::new(Server::new(landscape::new_terrain(&ground.0)?, settings())))
+}
+
+/// Goes on without saving where the world can't be read.
+fn serve_unsaved(
+    mut commands: Commands,
+    mut events: MessageReader<GroundServerEvent>,
+    ground: Option<Res<OriginalGround>>,
+    mut hints: MessageWriter<Hint>,
+) -> Result {
+    for event in events.read() {
+        match event {
+            GroundServerEvent::Opened(Err(why)) => {
+                hints.write(Hint(format!("nothing is saved: {why}")));
+                if let Some(ground) = &ground {
+                    commands.insert_resource(unsaved(ground)?);
+                }
+            }
+            GroundServerEvent::Trouble(trouble) => drop(hints.write(Hint(trouble.to_string()))),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn close(_: On<Remove, SharedTerrain>, mut commands: Commands) {
+    commands.remove_resource::<NextTry>();
+    commands.queue(|world: &mut World| {
+        udp::leave(world);
+        if let Some(mut server) = world.remove_resource::<GroundServer>() {
+            // It waits for the disk.
+            std::thread::spawn(move || server.finish());
+        }
+    });
+}
+
+/// Connects a guest, again and again.
+fn connect(
+    mut commands: Commands,
+    time: Res<Time<Real>>,
+    party: Res<Party>,
+    own: Res<OwnNumber>,
+    next: Option<ResMut<NextTry>>,
+) {
+    let (&Party::Guest(server), Some(mut next)) = (&*party, next) else { return };
+    next.0 -= time.delta_secs();
+    if next.0 > 0.0 {
+        return;
+    }
+    next.0 = PAUSE;
+    let number = own.0;
+    commands.queue(move |world: &mut World| {
+        if let Err(why) = udp::connect(world, server, number) {
+            world.write_message(Hint(format!("there is no way to {server}: {why}")));
+        }
+    });
+}
+
+fn forget_next_try(next: Option<ResMut<NextTry>>) {
+    if let Some(mut next) = next {
+        next.0 = PAUSE;
+    }
+}
+
+fn tell_lost(party: Res<Party>, mut hints: MessageWriter<Hint>) {
+    if matches!(*party, Party::Guest(_)) {
+        hints.write(Hint("the host can't be reached: what you dig meanwhile is sent later".into()));
+    }
+}
+
+/// What the host's server says about this player.
+fn follow_host(
+    mut commands: Commands,
+    mut joined: MessageReader<GroundJoined>,
+    mut party: ResMut<Party>,
+    mut hints: MessageWriter<Hint>,
+) {
+    for message in joined.read() {
+        if let ClientEvent::Kicked(why) = message.event {
+            hints.write(Hint(format!("the host has sent you away: {why}")));
+            *party = Party::Alone;
+            commands.trigger(NewGame);
+            commands.set_state(GameState::Title);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_may_lack_their_port() {
+        for (text, expected) in [
+            ("192.168.0.7", Some("192.168.0.7:5100")),
+            (" 10.0.0.1:99 ", Some("10.0.0.1:99")),
+            ("localhost", Some("127.0.0.1:5100")),
+            ("localhost:7", Some("127.0.0.1:7")),
+            ("::1", Some("[::1]:5100")),
+            ("[::1]:8", Some("[::1]:8")),
+            ("", None),
+            ("ann", None),
+            ("192.168.0.7:port", None),
+        ] {
+            let address: Result<Address, NoAddress> = text.parse();
+            assert_eq!(address.ok().map(|address| address.0.to_string()).as_deref(), expected, "{text}");
+        }
+    }
+}
