@@ -19,6 +19,7 @@ mod options;
 mod portable;
 mod quarantine;
 mod recover;
+mod region;
 mod salvage;
 mod segment;
 mod settle;
