@@ -20,8 +20,8 @@ use crate::lattice::RegionPos;
 use crate::terrain::WorldChange;
 
 /// The share of opening after which the database is read, and all files.
-const DATABASE_READ: f32 = 0.1;
-const FILES_READ: f32 = 0.15;
+const DATABASE_READ: f32 = 0.08;
+const FILES_READ: f32 = 0.1;
 
 /// A region's record as it was found.
 #[derive(Clone, Debug)]

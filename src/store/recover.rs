@@ -24,13 +24,14 @@ use crate::terrain::{
 };
 use crate::volume::DiggingRules;
 
-/// The share of opening after which a world is recovered.
+/// The shares of opening after which a world is recovered: as it is on the disk, and as one that has to be saved whole.
 const RECOVERED: f32 = 0.97;
+const RECOVERED_ANEW: f32 = 0.75;
 
 /// What a byte of a region costs to decode and to put in place, and a byte of a commit to replay, in one unit.
 const DECODE: u64 = 1;
-const RESTORE: u64 = 1;
-const REPLAY: u64 = 30;
+const RESTORE: u64 = 2;
+const REPLAY: u64 = 32;
 
 /// A world as it was recovered.
 pub(super) struct Recovered {
@@ -102,7 +103,8 @@ pub(super) fn recover(
 
     let tail = contents.frames_from(checkpoint.frame + 1);
     let regions = contents.bytes_of(&checkpoint);
-    let work = Work::until(progress, RECOVERED, (DECODE + RESTORE) * regions + REPLAY * bytes_of(&tail));
+    let end = if is_same_ground { RECOVERED } else { RECOVERED_ANEW };
+    let work = Work::until(progress, end, (DECODE + RESTORE) * regions + REPLAY * bytes_of(&tail));
     let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, &work);
     let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
     let restored = restore(parts.clone());
@@ -209,9 +211,9 @@ pub(super) fn replay_all(
     }
 }
 
-/// The work of replaying frames, after which the world is recovered.
+/// The work of replaying a log, after which the world has to be saved.
 fn replaying<'a>(progress: Option<&'a Progress>, frames: &[&Frame]) -> Work<'a> {
-    Work::until(progress, RECOVERED, REPLAY * bytes_of(frames))
+    Work::until(progress, RECOVERED_ANEW, REPLAY * bytes_of(frames))
 }
 
 fn bytes_of(frames: &[&Frame]) -> u64 {
@@ -330,9 +332,14 @@ fn replay(
                 break;
             }
         };
-        let replayed = batch.commits.iter().try_for_each(|record| match is_checked {
-            true => terrain.replay(record).map(drop),
-            false => replay_unchecked(&mut terrain, record),
+        let cost = REPLAY * frame.payload.len() as u64 / batch.commits.len().max(1) as u64;
+        let replayed = batch.commits.iter().try_for_each(|record| {
+            match is_checked {
+                true => drop(terrain.replay(record)?),
+                false => replay_unchecked(&mut terrain, record)?,
+            }
+            work.advance(cost);
+            Ok::<(), ReplayError>(())
         });
         if let Err(why) = replayed {
             refused = Some(why.to_string());
@@ -343,7 +350,6 @@ fn replay(
         records.append(&mut terrain.take_log());
         apply_game(&mut game, &batch.game);
         last = frame.number;
-        work.advance(REPLAY * frame.payload.len() as u64);
     }
     terrain.clear_history();
     terrain.set_work_limits(limits);
