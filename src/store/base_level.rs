@@ -10,7 +10,7 @@ use super::error::StoreError;
 use super::format::level::Level;
 use super::format::portable::SavedRegion;
 use super::format::region::region_key;
-use super::mirror::Region;
+use super::region::Region;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, RegionPos};
 use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldChange, WorldParts, brick_over};

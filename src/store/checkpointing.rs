@@ -10,12 +10,17 @@ use super::format;
 use super::format::change::put_change;
 use super::format::frame::{self, Kind};
 use super::keys;
-use super::mirror::{Mirror, Region};
+use super::mirror::Mirror;
+use super::progress::Work;
 use super::quarantine;
+use super::region::Region;
 use super::segment::FRAME_LIMIT;
 use super::writer::{Message, Writer};
 use crate::lattice::RegionPos;
 use crate::terrain::SIMULATION;
+
+/// The share of opening after which regions are encoded.
+const SAVED: f32 = 0.97;
 
 impl Writer {
     /// Makes a checkpoint; takes in what comes meanwhile.
@@ -39,8 +44,12 @@ impl Writer {
         self.state.after_gap = had_gap;
         self.state.changed = None;
         let mut records = Vec::with_capacity(dirty.len() + 1);
+        // Only the first one is waited for, when a world is opened or created.
+        let progress = self.options.progress.clone();
+        let work = Work::until(progress.as_ref(), SAVED, dirty.len() as u64);
         for (at, region) in dirty {
             records.push((keys::region(at), region.map(|region| self.encode(at, &region))));
+            work.advance(1);
             if let Some(messages) = messages {
                 self.listen(messages);
             }

@@ -12,11 +12,16 @@ use super::format::change::read_change;
 use super::format::frame::{self, Kind, WorldId};
 use super::format::{self, FormatError};
 use super::keys::{self, Key};
+use super::progress::{Progress, Work};
 use super::salvage;
 use super::segment::{self, FRAME_LIMIT, Found, Frame};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
 use crate::terrain::WorldChange;
+
+/// The share of opening after which the database is read, and all files.
+const DATABASE_READ: f32 = 0.08;
+const FILES_READ: f32 = 0.1;
 
 /// A region's record as it was found.
 #[derive(Clone, Debug)]
@@ -71,8 +76,9 @@ pub(super) struct Contents {
 
 impl Contents {
     /// Reads all of a world's files.
-    pub fn read(files: &dyn Files) -> Result<Self, StoreError> {
+    pub fn read(files: &dyn Files, progress: Option<&Progress>) -> Result<Self, StoreError> {
         let numbers = segment::list(files).map_err(StoreError::files("reading the journal"))?;
+        let reading = Work::until(progress, DATABASE_READ, 1);
         let (database, damaged, raw) =
             match Records::open(files).and_then(|open| Ok((open.read_all()?, open))) {
                 Ok((records, open)) => (Some(open), None, records),
@@ -88,6 +94,8 @@ impl Contents {
                     (None, Some(error.to_string()), salvage::records(&bytes))
                 }
             };
+        reading.finish();
+        let reading = Work::until(progress, FILES_READ, numbers.len() as u64);
         let mut world =
             raw.iter().filter(|(key, _)| keys::CHECKPOINTS.contains(&&key[..])).find_map(|(key, record)| {
                 let peeked = frame::peek(record)?;
@@ -101,6 +109,7 @@ impl Contents {
             refuse_newer(found.newer)?;
             world = world.or(found.world);
             segments.push(found);
+            reading.advance(1);
         }
         let world = match world {
             Some(world) => world,
@@ -118,6 +127,7 @@ impl Contents {
         for (key, record) in raw {
             contents.enter(&key, record)?;
         }
+        reading.finish();
         Ok(contents)
     }
 
@@ -154,6 +164,12 @@ impl Contents {
     /// The record of a region at a revision.
     pub fn region(&self, at: RegionPos, revision: u64) -> Option<&RegionRecord> {
         self.regions.get(&at)?.iter().find(|record| record.revision == revision)
+    }
+
+    /// Bytes of the regions of a checkpoint.
+    pub fn bytes_of(&self, checkpoint: &Checkpoint) -> u64 {
+        let records = checkpoint.regions.iter().filter_map(|(at, revision)| self.region(*at, *revision));
+        records.map(|record| record.payload.len() as u64).sum()
     }
 
     /// The checkpoint to start from: that which most regions agree with, the database's or a segment's.

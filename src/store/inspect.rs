@@ -11,7 +11,7 @@ use super::format::frame::WorldId;
 use super::found::Contents;
 use super::keys;
 use super::open_store::{has_world, take_lock};
-use super::options::BaseChanged;
+use super::options::{BaseChanged, StoreOptions};
 use super::recover::{self, recover};
 use super::segment;
 use super::shared::apply_game;
@@ -125,7 +125,7 @@ fn read(files: &dyn Files) -> Result<(Box<dyn super::files::Lock>, Contents), St
         return Err(StoreError::Missing(files.name()));
     }
     let lock = take_lock(files)?;
-    Ok((lock, Contents::read(files)?))
+    Ok((lock, Contents::read(files, None)?))
 }
 
 /// What a check of a world found.
@@ -165,7 +165,9 @@ pub fn check_in(
 ) -> Result<WorldCheck, StoreError> {
     let ground = ground.into();
     let (_lock, contents) = read(files)?;
-    let recovered = recover(&contents, &ground, BaseChanged::Refuse, level)?;
+    let level = level.cloned();
+    let options = StoreOptions { base_changed: BaseChanged::Refuse, level, ..StoreOptions::default() };
+    let recovered = recover(&contents, &ground, &options)?;
     let told = recover::troubles(&recovered, &std::collections::BTreeMap::new());
     let mut troubles: Vec<String> = contents.damaged.iter().cloned().collect();
     troubles.extend(told.iter().map(ToString::to_string));

@@ -4,28 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::base_level::BaseLevel;
+use super::region::Region;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, RegionPos};
 use crate::terrain::{CommitRecord, LogEntry, LooseSettings, WorldChange, WorldParts};
-use crate::volume::{Brick, DiggingRules, Fields};
-
-/// What is saved of a region in one record.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Region {
-    /// Its bricks.
-    pub bricks: BTreeMap<BrickPos, Arc<Brick>>,
-    /// The fields of the chunks whose lowest corners lie in it.
-    pub fields: BTreeMap<ChunkPos, Fields>,
-    /// The revision that changed it last.
-    pub revision: u64,
-    /// Has it a record? Not where it is as in the level below.
-    pub is_stored: bool,
-}
-
-impl Region {
-    fn is_empty(&self) -> bool {
-        self.bricks.is_empty() && self.fields.is_empty()
-    }
-}
+use crate::volume::DiggingRules;
 
 /// A world by regions.
 #[derive(Clone, Debug)]

@@ -14,6 +14,7 @@ use super::found::Contents;
 use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
+use super::progress::Work;
 use super::recover::recover;
 use super::segment::base;
 use super::settle::settle;
@@ -112,6 +113,7 @@ impl Store {
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
         let terms = (parts.rules.clone(), parts.loose);
         let (grid, level) = (terrain.world().grid(), options.level.clone());
+        let progress = options.progress.clone();
         let mirror = Mirror::new(grid, parts, hash, GameData::new(), level);
         // A log that begins with the level, or with a pristine world, is whole. Rules are in it too, then.
         let is_whole = revision == 0 && mirror.is_as_level();
@@ -140,6 +142,7 @@ impl Store {
             store.append(vec![CommitRecord { revision, hash, entries, change }])?;
             store.flush()?;
         }
+        Work::until(progress.as_ref(), 1.0, 1).finish();
         Ok(store)
     }
 
@@ -171,8 +174,9 @@ impl Store {
         }
         let lock = take_lock(&*files)?;
         let ground = ground.into();
-        let mut contents = Contents::read(&*files)?;
-        let recovered = recover(&contents, &ground, options.base_changed, options.level.as_ref())?;
+        let progress = options.progress.clone();
+        let mut contents = Contents::read(&*files, progress.as_ref())?;
+        let recovered = recover(&contents, &ground, &options)?;
         let settled = settle(&*files, &mut contents, &recovered);
         let (is_log_whole, replayed, is_new) = (
             recovered.is_log_whole,
@@ -214,6 +218,7 @@ impl Store {
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
         let store = Self::start(writer, shared, lock, world, revision, game)?;
+        Work::until(progress.as_ref(), 1.0, 1).finish();
         Ok((store, Opened { terrain, replayed, is_log_whole, troubles }))
     }
 

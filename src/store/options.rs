@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::base_level::BaseLevel;
+use super::progress::Progress;
 
 /// What to do with edits where the ground is another one than they were made on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,6 +41,8 @@ pub struct StoreOptions {
     /// The level that the world begins as. A new world saves only what differs from it, and can be opened with the same level
     /// only. Worlds that were created without one ignore it.
     pub level: Option<BaseLevel>,
+    /// Where to tell how far opening is.
+    pub progress: Option<Progress>,
 }
 
 impl Default for StoreOptions {
@@ -54,6 +57,7 @@ impl Default for StoreOptions {
             frame_bytes: 64 << 20,
             base_changed: BaseChanged::default(),
             level: None,
+            progress: None,
         }
     }
 }

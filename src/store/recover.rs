@@ -12,7 +12,8 @@ use super::format::Batch;
 use super::found::Contents;
 use super::keys;
 use super::mirror::Mirror;
-use super::options::BaseChanged;
+use super::options::{BaseChanged, StoreOptions};
+use super::progress::{Progress, Work};
 use super::segment::{self, Frame};
 use super::shared::{GameData, apply_game};
 use crate::ground::Ground;
@@ -22,6 +23,15 @@ use crate::terrain::{
     WorldParts,
 };
 use crate::volume::DiggingRules;
+
+/// The shares of opening after which a world is recovered: as it is on the disk, and as one that has to be saved whole.
+const RECOVERED: f32 = 0.97;
+const RECOVERED_ANEW: f32 = 0.75;
+
+/// What a byte of a region costs to decode and to put in place, and a byte of a commit to replay, in one unit.
+const DECODE: u64 = 1;
+const RESTORE: u64 = 2;
+const REPLAY: u64 = 32;
 
 /// A world as it was recovered.
 pub(super) struct Recovered {
@@ -61,9 +71,10 @@ struct Replayed {
 pub(super) fn recover(
     contents: &Contents,
     ground: &Arc<Ground>,
-    base_changed: BaseChanged,
-    level: Option<&BaseLevel>,
+    options: &StoreOptions,
 ) -> Result<Recovered, StoreError> {
+    let StoreOptions { base_changed, level, progress, .. } = options;
+    let (base_changed, level, progress) = (*base_changed, level.as_ref(), progress.as_ref());
     let Some(checkpoint) = contents.choose_checkpoint() else {
         return Err(StoreError::Unreadable("neither journal nor database hold a valid checkpoint".into()));
     };
@@ -82,19 +93,26 @@ pub(super) fn recover(
     let settings = checkpoint.metadata.settings;
     let empty = || -> Result<Terrain, StoreError> { Ok(BaseLevel::first(level, ground, &settings)?) };
     if !is_same_ground && base_changed == BaseChanged::Replay && is_contiguous {
-        let replayed = replay_good(empty, &GameData::new(), &whole, false)?;
+        let work = replaying(progress, &whole);
+        let replayed = replay_good(empty, &GameData::new(), &whole, false, &work)?;
         let regions = changed_regions(contents, &checkpoint, ground).len();
         let mut recovered = Recovered::whole(replayed, level);
         recovered.base_changed = Some((regions, "replayed"));
         return Ok(recovered);
     }
 
-    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level);
+    let tail = contents.frames_from(checkpoint.frame + 1);
+    let regions = contents.bytes_of(&checkpoint);
+    let end = if is_same_ground { RECOVERED } else { RECOVERED_ANEW };
+    let work = Work::until(progress, end, (DECODE + RESTORE) * regions + REPLAY * bytes_of(&tail));
+    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, &work);
     let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
     let restored = restore(parts.clone());
+    work.advance(RESTORE * regions);
     let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
     if is_same_ground && !is_exact && is_log_whole {
-        let replayed = replay_good(empty, &GameData::new(), &whole, true)?;
+        let work = replaying(progress, &whole);
+        let replayed = replay_good(empty, &GameData::new(), &whole, true, &work)?;
         // Behind what can't be replayed, the checkpoint may know more.
         if replayed.frame >= checkpoint.frame {
             let mut recovered = Recovered::whole(replayed, level);
@@ -105,7 +123,6 @@ pub(super) fn recover(
     }
     let terrain = restored?;
     let is_checked = is_same_ground && is_exact;
-    let tail = contents.frames_from(checkpoint.frame + 1);
     let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
     let (grid, hash) = (terrain.world().grid(), terrain.world().hash());
     let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone(), level.cloned());
@@ -116,7 +133,7 @@ pub(super) fn recover(
             None => Ok(restore(parts.clone())?),
         }
     };
-    let replayed = replay_good(begin, &game, &tail, is_checked)?;
+    let replayed = replay_good(begin, &game, &tail, is_checked, &work)?;
     let frame = replayed.frame.max(checkpoint.frame);
     let regions = changed_regions(contents, &checkpoint, ground).len();
     if is_checked {
@@ -187,11 +204,20 @@ pub(super) fn replay_all(
         return Err(StoreError::Unreadable("the log does not reach back to the first commit".into()));
     }
     let empty = BaseLevel::first(level, ground, &settings)?;
-    let replayed = replay(empty, GameData::new(), &whole, true)?;
+    let replayed = replay(empty, GameData::new(), &whole, true, &Work::until(None, 1.0, 0))?;
     match replayed.refused {
         Some(why) => Err(StoreError::Unreadable(format!("the log can't be replayed: {why}"))),
         None => Ok(replayed.terrain),
     }
+}
+
+/// The work of replaying a log, after which the world has to be saved.
+fn replaying<'a>(progress: Option<&'a Progress>, frames: &[&Frame]) -> Work<'a> {
+    Work::until(progress, RECOVERED_ANEW, REPLAY * bytes_of(frames))
+}
+
+fn bytes_of(frames: &[&Frame]) -> u64 {
+    frames.iter().map(|frame| frame.payload.len() as u64).sum()
 }
 
 /// The regions whose heights below are not those that they were saved with.
@@ -213,6 +239,7 @@ fn load_regions(
     checkpoint: &Checkpoint,
     ground: &Ground,
     level: Option<&BaseLevel>,
+    work: &Work,
 ) -> (WorldParts, Vec<RegionPos>) {
     let metadata = &checkpoint.metadata;
     let below = level.map(|level| level.parts(ground)).unwrap_or_default();
@@ -222,7 +249,9 @@ fn load_regions(
     }
     let decode = |(at, revision): &(RegionPos, u64)| {
         let record = contents.region(*at, *revision);
-        (*at, record.and_then(|record| record.decode(*at, ground).ok()))
+        let change = record.and_then(|record| record.decode(*at, ground).ok());
+        work.advance(DECODE * record.map_or(0, |record| record.payload.len() as u64));
+        (*at, change)
     };
     let regions: Vec<(RegionPos, u64)> =
         checkpoint.regions.iter().map(|(at, revision)| (*at, *revision)).collect();
@@ -271,13 +300,14 @@ fn replay_good(
     game: &GameData,
     frames: &[&Frame],
     is_checked: bool,
+    work: &Work,
 ) -> Result<Replayed, StoreError> {
-    let replayed = replay(begin()?, game.clone(), frames, is_checked)?;
+    let replayed = replay(begin()?, game.clone(), frames, is_checked, work)?;
     if replayed.refused.is_none() {
         return Ok(replayed);
     }
     let good: Vec<&Frame> = frames.iter().copied().filter(|frame| frame.number <= replayed.frame).collect();
-    Ok(Replayed { refused: replayed.refused, ..replay(begin()?, game.clone(), &good, is_checked)? })
+    Ok(Replayed { refused: replayed.refused, ..replay(begin()?, game.clone(), &good, is_checked, work)? })
 }
 
 /// Replays frames, and compares the world with each commit if `is_checked`. Stops before the first frame that does not fit.
@@ -286,6 +316,7 @@ fn replay(
     mut game: GameData,
     frames: &[&Frame],
     is_checked: bool,
+    work: &Work,
 ) -> Result<Replayed, StoreError> {
     terrain.set_meshing(Meshing::Never);
     terrain.keep_log(Some(usize::MAX));
@@ -301,9 +332,14 @@ fn replay(
                 break;
             }
         };
-        let replayed = batch.commits.iter().try_for_each(|record| match is_checked {
-            true => terrain.replay(record).map(drop),
-            false => replay_unchecked(&mut terrain, record),
+        let cost = REPLAY * frame.payload.len() as u64 / batch.commits.len().max(1) as u64;
+        let replayed = batch.commits.iter().try_for_each(|record| {
+            match is_checked {
+                true => drop(terrain.replay(record)?),
+                false => replay_unchecked(&mut terrain, record)?,
+            }
+            work.advance(cost);
+            Ok::<(), ReplayError>(())
         });
         if let Err(why) = replayed {
             refused = Some(why.to_string());

@@ -1,10 +1,13 @@
 //! Creating, opening, and what is told where that can't be.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Barrier};
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{BaseChanged, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble};
+use bevy_burrow::store::{
+    BaseChanged, Files, Progress, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
+};
 use bevy_burrow::terrain::Meshing;
 use fastrand::Rng;
 use glam::Vec3;
@@ -110,12 +113,13 @@ fn undo_goes_on_after_a_checkpoint_and_is_gone_after_a_restart() {
 }
 
 /// Two grounds that differ over one column of regions, and a world that was dug everywhere on the first.
-fn changed_base(disk: &SimulatedDisk, tail: bool) -> (Arc<Ground>, Terrain) {
+fn changed_base(disk: &SimulatedDisk, tail: bool) -> ([Arc<Ground>; 2], Terrain) {
     let ground = |raised: f64| {
         let height = |x: i32, z: i32| 20.0 + f64::from((x * 3 + z) % 5) + if x > 140 { raised } else { 0.0 };
         Arc::new(Ground::from_fn(200, 60, height).expect("valid heights"))
     };
-    let mut first = Terrain::new(ground(0.0), &TerrainSettings::default()).expect("valid");
+    let grounds = [ground(0.0), ground(3.0)];
+    let mut first = Terrain::new(Arc::clone(&grounds[0]), &TerrainSettings::default()).expect("valid");
     let mut store = Store::create_in(Arc::new(disk.clone()), &mut first, options(99)).expect("a new world");
     for x in 0..20 {
         first.apply([Brush::dig(Shape::sphere(Vec3::new(10.0 * x as f32, 20.0, 30.0), 4.0))]);
@@ -131,14 +135,14 @@ fn changed_base(disk: &SimulatedDisk, tail: bool) -> (Arc<Ground>, Terrain) {
             disk.damage(&path, |own| *own = bytes);
         }
     }
-    (ground(3.0), first)
+    (grounds, first)
 }
 
 #[test]
 fn a_changed_ground_keeps_the_edits() {
     for tail in [false, true] {
         let disk = SimulatedDisk::new();
-        let (other, first) = changed_base(&disk, tail);
+        let ([_, other], first) = changed_base(&disk, tail);
         let open = |disk: &SimulatedDisk, base_changed| {
             let options = StoreOptions { base_changed, ..options(99) };
             Store::open_in(Arc::new(disk.clone()), Arc::clone(&other), options)
@@ -195,4 +199,54 @@ fn game_data_is_there_by_its_keys() {
     let (after, _) = open(&disk, &ground).expect("it can be opened");
     let keys: Vec<&str> = after.game_data().keys().map(String::as_str).collect();
     assert_eq!((keys, after.get("time")), (vec!["time", "weather"], Some(&[8; 4][..])));
+}
+
+/// Opens a world, and asks all the while how far that is: what was seen, and whether it was opened.
+fn watched(disk: &SimulatedDisk, ground: &Arc<Ground>, base_changed: BaseChanged) -> (Vec<f32>, bool) {
+    let progress = Progress::default();
+    let options = StoreOptions { base_changed, progress: Some(progress.clone()), ..options(99) };
+    let (done, both) = (AtomicBool::new(false), Barrier::new(2));
+    std::thread::scope(|scope| {
+        let watcher = scope.spawn(|| {
+            let mut seen = vec![progress.share()];
+            both.wait();
+            while !done.load(Ordering::Acquire) {
+                seen.push(progress.share());
+                std::thread::yield_now();
+            }
+            seen.push(progress.share());
+            seen.dedup();
+            seen
+        });
+        both.wait();
+        let opened = Store::open_in(Arc::new(disk.clone()), Arc::clone(ground), options).is_ok();
+        done.store(true, Ordering::Release);
+        (watcher.join().expect("it only looks"), opened)
+    })
+}
+
+#[test]
+fn how_far_opening_is_never_falls_and_ends_at_one() {
+    let disk = SimulatedDisk::new();
+    let ([ground, other], _) = changed_base(&disk, true);
+    let cut = disk.image().lose_process();
+    cut.remove("regions.redb").expect("it is there");
+    let of = |disk: &SimulatedDisk| disk.image().lose_process();
+    for (what, disk, ground, base_changed) in [
+        ("a tail", of(&disk), &ground, BaseChanged::Refuse),
+        ("the log alone", cut, &ground, BaseChanged::Refuse),
+        ("edits kept", of(&disk), &other, BaseChanged::Keep),
+        ("edits replayed", of(&disk), &other, BaseChanged::Replay),
+    ] {
+        let (seen, is_opened) = watched(&disk, ground, base_changed);
+        assert!(is_opened && seen.is_sorted(), "{what}: {seen:?}");
+        assert_eq!((seen[0], seen.last()), (0.0, Some(&1.0)), "{what}");
+    }
+    let (seen, is_opened) = watched(&disk, &other, BaseChanged::Refuse);
+    assert!(!is_opened && seen.is_sorted() && seen.last().is_some_and(|share| (0.1..1.0).contains(share)));
+    // Creating a world is soon done.
+    let progress = Progress::default();
+    let options = StoreOptions { progress: Some(progress.clone()), ..options(99) };
+    drop(Store::create_in(Arc::new(SimulatedDisk::new()), &mut terrain(&ground), options));
+    assert_eq!(progress.share().to_bits(), 1f32.to_bits());
 }

@@ -1,0 +1,27 @@
+//! A part of a world that is saved by itself.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::lattice::{BrickPos, ChunkPos};
+use crate::volume::{Brick, Fields};
+
+/// What is saved of a region in one record.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Region {
+    /// Its bricks.
+    pub bricks: BTreeMap<BrickPos, Arc<Brick>>,
+    /// The fields of the chunks whose lowest corners lie in it.
+    pub fields: BTreeMap<ChunkPos, Fields>,
+    /// The revision that changed it last.
+    pub revision: u64,
+    /// Has it a record? Not where it is as in the level below.
+    pub is_stored: bool,
+}
+
+impl Region {
+    /// Does it hold neither bricks nor fields?
+    pub fn is_empty(&self) -> bool {
+        self.bricks.is_empty() && self.fields.is_empty()
+    }
+}
