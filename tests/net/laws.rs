@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::net::{ClientId, Entries, Entry, Lane, Server, ServerSettings, ToClient, UndoPolicy};
+use bevy_burrow::net::{ClientId, Entries, Entry, Lane, Rate, Server, ServerSettings, ToClient, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
 use bevy_burrow::terrain::WorldChange;
@@ -188,10 +188,10 @@ fn dig_before(play: &mut Play, edits: u64) {
     play.send();
 }
 
-#[test]
-fn who_comes_late_plays_soon() {
+/// Somebody comes after many edits, over a line of 256 KiB a second, while eight dig.
+fn come_late(log_bytes: usize) -> Play {
     // Without undo, edits that wait go into one transaction.
-    let settings = ServerSettings { log_bytes: 1 << 20, ..ServerSettings::default() };
+    let settings = ServerSettings { log_bytes, ..ServerSettings::default() };
     let edits = count("BURROW_EDITS", 1000);
     let mut play = Play::new(&hills(if edits > 20_000 { 512 } else { 160 }), 8, settings);
     play.seconds(2.0);
@@ -205,12 +205,30 @@ fn who_comes_late_plays_soon() {
     let late = &play.bots[8];
     let [playable, joined] = [late.playable_at, late.joined_at].map(|at| at.expect("it is there") - before);
     println!(
-        "{edits} edits: {:?} bytes by lane, playable after {playable:?}, joined after {joined:?}",
+        "{edits} edits, {log_bytes} bytes of log at most: {:?} bytes by lane, playable after {playable:?}, joined \
+         after {joined:?}",
         late.bytes
     );
     assert!(playable <= joined && playable <= Duration::from_secs(15));
-    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000);
     assert!(play.bots.iter().all(|bot| bot.order.most.max(bot.bulk.most) <= 5 << 20));
+    play
+}
+
+#[test]
+fn who_comes_late_plays_soon() {
+    let mut play = come_late(8 << 20);
+    let late = &play.bots[8];
+    assert!(late.client.figures().applied >= count("BURROW_EDITS", 1000), "it got regions");
+    assert!(late.event("others") < 500, "what was long ago is told");
+    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000);
+    play.settle();
+    assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+}
+
+#[test]
+fn who_comes_late_plays_soon_without_the_whole_log() {
+    let mut play = come_late(count("BURROW_EDITS", 1000) as usize * 10);
+    assert!(play.bots[8].client.figures().applied < 500, "it got the log");
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
@@ -249,21 +267,35 @@ fn who_comes_back_after_a_long_time_gets_the_regions_that_differ() {
     come_back(ServerSettings { log_bytes: 0, ..settings() }, 6.0);
 }
 
-#[test]
-fn who_is_cut_off_while_regions_come_gets_all_of_them_later() {
-    let slow = bevy_burrow::net::Rate { per_second: 8 << 10, burst: 4 << 10 };
-    let mut play = Play::new(&hills(160), 2, ServerSettings { bulk: slow, ..settings() });
+/// Cuts a player's line while what it begins with comes, and lets it come back.
+fn is_cut_off(log_bytes: usize, rate: u64) {
+    let slow = Rate { per_second: rate, burst: rate / 2 };
+    let mut play = Play::new(&hills(160), 2, ServerSettings { bulk: slow, log_bytes, ..settings() });
     play.seconds(2.0);
-    dig_before(&mut play, 600);
+    dig_before(&mut play, 1200);
     play.join();
-    play.seconds(2.0);
-    assert!(!play.bots[2].client.has_joined());
+    play.seconds(3.0);
+    assert!(play.bots[2].bytes[Lane::Bulk as usize] > 0 && !play.bots[2].client.has_joined());
     play.cut(2);
     play.seconds(1.0);
+    let sent = play.server.figures().bulk_bytes;
+    play.seconds(2.0);
+    assert_eq!(play.server.figures().bulk_bytes, sent, "nothing more is sent");
     play.reconnect(2);
     wait_until_joined(&mut play, 2);
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+    assert_eq!(play.bots[2].event("playable"), 1);
+}
+
+#[test]
+fn who_is_cut_off_while_regions_come_gets_all_of_them_later() {
+    is_cut_off(0, 32 << 10);
+}
+
+#[test]
+fn who_is_cut_off_while_the_log_comes_gets_all_of_it_later() {
+    is_cut_off(8 << 20, 4 << 10);
 }
 
 fn options() -> StoreOptions {

@@ -286,11 +286,18 @@ impl Client {
         }
         self.read_bulk();
         let is_busy = self.follow();
-        let (shown, receipts) = self.replica.update();
-        self.shown.extend(shown);
-        self.tell_predictions(receipts.unwrap_or_default());
+        if !self.is_history() {
+            let (shown, receipts) = self.replica.update();
+            self.shown.extend(shown);
+            self.tell_predictions(receipts.unwrap_or_default());
+        }
         self.acknowledge(now);
         is_busy
+    }
+
+    /// Are the entries that it applies from before its player came? They are not told, and shown as one once all are there.
+    fn is_history(&self) -> bool {
+        matches!(self.stage, Stage::ByLog { .. }) && !self.is_playable
     }
 
     fn tell_predictions(&mut self, receipts: Vec<Receipt>) {
@@ -390,9 +397,9 @@ impl Client {
             && let Some(entry) = self.waiting.remove(&(number + 1))
         {
             number += 1;
-            let is_mark = matches!(entry, Entry::Mark);
+            let is_compared = matches!((&entry, &self.stage), (Entry::Mark, Stage::Following));
             batch.push(entry);
-            if is_mark {
+            if is_compared {
                 break;
             }
         }
@@ -406,6 +413,7 @@ impl Client {
             Entry::Edit { author, own, .. } if Some(*author) == id => Some(*own),
             _ => None,
         };
+        let is_told = !self.is_history();
         let tags: BTreeMap<u64, u64> = self.replica.pending().map(|(own, edit)| (own, edit.tag())).collect();
         let applied = self.replica.apply(&batch, own);
         let mut receipts = applied.receipts.into_iter();
@@ -415,16 +423,20 @@ impl Client {
                 Entry::Edit { author, edit, .. } => {
                     self.reaches.note(epoch.number, edit.reach());
                     let Some(receipt) = receipts.next() else { continue };
-                    self.events.push(match own(entry) {
-                        Some(own) => {
-                            let tag = tags.get(&own).copied().unwrap_or_default();
-                            ClientEvent::Confirmed { tag, receipt: Some(Receipt { tag, ..receipt }) }
+                    // Its player may have been here before, in another client.
+                    match own(entry).and_then(|own| tags.get(&own).copied()) {
+                        Some(tag) => {
+                            let receipt = Some(Receipt { tag, ..receipt });
+                            self.events.push(ClientEvent::Confirmed { tag, receipt });
                         }
-                        None => ClientEvent::Others { author: *author, receipt },
-                    });
+                        None if is_told => {
+                            self.events.push(ClientEvent::Others { author: *author, receipt });
+                        }
+                        None => {}
+                    }
                 }
                 Entry::Parts { by, change } => {
-                    if by.is_some_and(|(by, _)| Some(by) == id) {
+                    if is_told && by.is_some_and(|(by, _)| Some(by) == id) {
                         self.events.push(ClientEvent::Undone);
                     }
                     if applied.is_void {
@@ -437,9 +449,11 @@ impl Client {
         }
         self.figures.applied += batch.len() as u64;
         self.epoch = Some(epoch);
-        self.marks.touch(applied.bricks);
-        if matches!(batch.last(), Some(Entry::Mark)) {
-            self.marks.mark(epoch.number, self.replica.world());
+        if matches!(self.stage, Stage::Following) {
+            self.marks.touch(applied.bricks);
+            if matches!(batch.last(), Some(Entry::Mark)) {
+                self.marks.mark(epoch.number, self.replica.world());
+            }
         }
         self.finish_log();
     }

@@ -98,6 +98,8 @@ pub struct Server {
     waiting_cost: u64,
     writer: OrderWriter,
     log: OrderLog,
+    /// Does the order lead from the pristine world to this one?
+    is_whole: bool,
     undos: VecDeque<UndoRequest>,
     strokes: Strokes,
     /// Regions that were touched since the last mark.
@@ -143,20 +145,27 @@ impl Server {
     }
 
     /// A server of a terrain that is at this number of its world's order.
-    fn at(mut terrain: Terrain, world: WorldId, number: u64, settings: ServerSettings) -> Self {
+    fn at(mut terrain: Terrain, id: WorldId, number: u64, settings: ServerSettings) -> Self {
         never_shown(&mut terrain);
+        let world = terrain.world();
+        let is_whole = number == 0
+            && world.next_field() == 0
+            && world.bricks().next().is_none()
+            && world.fields().next().is_none();
+        let terms = (terrain.rules().cloned().map(Arc::new), terrain.loose().copied());
         let run = WorldId::random().0 as u64;
-        Self {
+        let mut server = Self {
             terrain,
             settings,
             stamps: Stamps::default(),
             permission: Box::new(|_, _| true),
-            epoch: Epoch { world, run, number },
+            epoch: Epoch { world: id, run, number },
             applied: number,
             waiting: VecDeque::new(),
             waiting_cost: 0,
             writer: OrderWriter::default(),
-            log: OrderLog::new(settings.log_bytes),
+            log: OrderLog::new(settings.log_bytes, number),
+            is_whole,
             undos: VecDeque::new(),
             strokes: Strokes::new(settings.undo_bytes),
             touched: BTreeSet::new(),
@@ -174,7 +183,15 @@ impl Server {
             outgoing: Vec::new(),
             events: VecDeque::new(),
             figures: ServerFigures::default(),
+        };
+        // What holds already is part of what leads from the pristine world.
+        if let (true, Some(rules)) = (is_whole, terms.0) {
+            server.order(Entry::Rules(Some(rules)));
         }
+        if let (true, Some(loose)) = (is_whole, terms.1) {
+            server.order(Entry::Loose(Some(loose)));
+        }
+        server
     }
 
     /// The terrain, with all entries up to [`applied`](Self::applied).
@@ -324,6 +341,7 @@ impl Server {
         self.figures.ordered += 1;
         self.waiting_cost += ordered.cost;
         self.writer.put(&ordered.entry);
+        self.log.push(&ordered.entry);
         self.waiting.push_back(ordered);
         if self.writer.len() >= FULL_MESSAGE {
             self.flush();
@@ -333,14 +351,13 @@ impl Server {
     /// Sends what was ordered.
     fn flush(&mut self) {
         let last = self.epoch.number;
-        let Some((first, message)) = self.writer.take(last) else { return };
+        let Some(message) = std::mem::take(&mut self.writer).message(last) else { return };
         for (client, session) in &self.sessions {
             if session.has_joined() {
                 self.figures.order_bytes += message.len() as u64;
                 self.outgoing.push((*client, Lane::Order, message.clone()));
             }
         }
-        self.log.push(first, last, message.into(), self.applied);
     }
 
     fn send(&mut self, client: ClientId, message: &ToClient) {
@@ -375,6 +392,7 @@ impl Server {
             (self.last_mark, self.marked) = (now, self.epoch.number);
         }
         self.apply();
+        self.log.trim(self.applied);
         self.welcome_all();
         self.send_bulk(now);
     }
