@@ -33,7 +33,8 @@ pub struct Reference {
     pub number: u64,
     pub hashes: BTreeMap<u64, u64>,
     pub loose: usize,
-    pub undone: usize,
+    /// What undos put back, by who asked for them.
+    pub undone: BTreeMap<ClientId, Vec<Restored>>,
     pub terms: usize,
 }
 
@@ -42,7 +43,8 @@ impl Reference {
         let terrain = terrain(ground);
         let hashes = BTreeMap::from([(0, terrain.world().hash())]);
         let ground = Arc::clone(ground);
-        Self { terrain, ground, stamps, number: 0, hashes, loose: 0, undone: 0, terms: 0 }
+        let undone = BTreeMap::new();
+        Self { terrain, ground, stamps, number: 0, hashes, loose: 0, undone, terms: 0 }
     }
 
     /// Goes back to what a server has that was restarted.
@@ -82,8 +84,11 @@ impl Reference {
                     self.terms += 1;
                 }
                 Entry::Parts { change, by } => {
-                    self.terrain.apply_change(WorldChange::clone(&change), None).expect("they fit");
-                    self.undone += usize::from(by.is_some());
+                    let restored =
+                        self.terrain.apply_change(WorldChange::clone(&change), None).expect("they fit");
+                    if let Some((by, _)) = by {
+                        self.undone.entry(by).or_default().push(restored);
+                    }
                 }
                 _ => {}
             }
@@ -123,6 +128,10 @@ pub struct Bot {
     pub joined_at: Option<Duration>,
     pub durable: u64,
     pub bytes: [u64; 2],
+    /// Undos that were asked for.
+    pub undos: u64,
+    /// What undos put back.
+    pub undone: Vec<Restored>,
     /// Numbers of tags that came to an end.
     pub answered: u64,
 }
@@ -164,6 +173,8 @@ impl Bot {
             joined_at: None,
             durable: 0,
             bytes: [0; 2],
+            undos: 0,
+            undone: Vec::new(),
             answered: 0,
         }
     }
@@ -195,6 +206,7 @@ impl Bot {
         self.client.dig(edit);
         if self.rng.u32(0..30) == 0 {
             self.client.undo(None);
+            self.undos += 1;
         }
     }
 
@@ -231,7 +243,11 @@ impl Bot {
                     self.durable = number;
                     "durable"
                 }
-                ClientEvent::Undone => "undone",
+                ClientEvent::Undone(restored) => {
+                    self.undone.extend(restored);
+                    "undone"
+                }
+                ClientEvent::UndoRefused(_) => "not undone",
                 ClientEvent::Others { .. } => "others",
                 ClientEvent::Repaired(_) => "repaired",
                 ClientEvent::Kicked(why) => panic!("{:?} was kicked: {why}", self.id),

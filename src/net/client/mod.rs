@@ -77,6 +77,8 @@ pub struct Client {
     /// Edits from before the first welcome.
     early: Vec<Edit>,
     unsent: Vec<Edit>,
+    /// The numbers of undos that the server has not answered.
+    undos: BTreeSet<u64>,
     outgoing: Vec<Vec<u8>>,
     shown: Vec<ShownChange>,
     events: Vec<ClientEvent>,
@@ -90,7 +92,7 @@ impl Client {
     /// When the chunk size or the voxel size is out of range.
     pub fn new(ground: impl Into<Arc<Ground>>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
         let replica = Replica::new(ground.into(), settings)?;
-        let (inbox, bulk, waiting, marks, reaches, early, unsent, outgoing) = Default::default();
+        let (inbox, bulk, waiting, marks, reaches, early, unsent, undos, outgoing) = Default::default();
         Ok(Self {
             replica,
             stamps: Stamps::default(),
@@ -115,6 +117,7 @@ impl Client {
             told: 0,
             early,
             unsent,
+            undos,
             outgoing,
             shown: Vec::new(),
             events: Vec::new(),
@@ -232,9 +235,10 @@ impl Client {
     pub fn undo(&mut self, of: Option<ClientId>) {
         let Some(of) = of.or(self.id).filter(|_| self.is_welcome()) else {
             // Its number would hide those of edits that are sent again.
-            return self.events.push(ClientEvent::UndoRefused(Refusal::NotJoined));
+            return self.events.push(ClientEvent::UndoRefused(Some(Refusal::NotJoined)));
         };
         self.flush();
+        self.undos.insert(self.next_own);
         self.outgoing.push(ToServer::Undo { own: self.next_own, of }.to_bytes());
         self.next_own += 1;
     }
@@ -316,11 +320,11 @@ impl Client {
             ToClient::Entries(entries) => self.take_entries(lane, entries),
             ToClient::Void { number } => self.take_void(number),
             ToClient::Refused { own, why } => {
-                let event = match self.replica.take_back(own) {
-                    Some(edit) => ClientEvent::Refused { tag: edit.tag(), why: Some(why) },
-                    None => ClientEvent::UndoRefused(why),
-                };
-                self.events.push(event);
+                if self.undos.remove(&own) {
+                    self.events.push(ClientEvent::UndoRefused(Some(why)));
+                } else if let Some(edit) = self.replica.take_back(own) {
+                    self.events.push(ClientEvent::Refused { tag: edit.tag(), why: Some(why) });
+                }
             }
             ToClient::Hashes { number, regions } => self.marks.take_theirs(number, regions),
             ToClient::Table { number, regions } => self.take_table(number, &regions),
@@ -416,7 +420,7 @@ impl Client {
         let is_told = !self.is_history();
         let tags: BTreeMap<u64, u64> = self.replica.pending().map(|(own, edit)| (own, edit.tag())).collect();
         let applied = self.replica.apply(&batch, own);
-        let mut receipts = applied.receipts.into_iter();
+        let (mut receipts, mut restored) = (applied.receipts.into_iter(), applied.restored.into_iter());
         for entry in &batch {
             epoch.number += 1;
             match entry {
@@ -436,10 +440,12 @@ impl Client {
                     }
                 }
                 Entry::Parts { by, change } => {
-                    if is_told && by.is_some_and(|(by, _)| Some(by) == id) {
-                        self.events.push(ClientEvent::Undone);
+                    let restored = restored.next().flatten();
+                    let is_missing = restored.is_none();
+                    if by.is_some_and(|(by, own)| Some(by) == id && self.undos.remove(&own)) {
+                        self.events.push(ClientEvent::Undone(restored));
                     }
-                    if applied.is_void {
+                    if applied.is_void && is_missing {
                         let regions = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos));
                         self.doubtful.extend(regions);
                     }
