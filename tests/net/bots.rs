@@ -1,6 +1,6 @@
 //! A server, players who dig at random, and the lines between them; what everybody has is checked in every frame.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -33,6 +33,8 @@ pub struct Reference {
     pub number: u64,
     pub hashes: BTreeMap<u64, u64>,
     pub loose: usize,
+    /// The edits of players with their numbers in the order, whose they are, and their numbers there.
+    pub done: Vec<(u64, ClientId, u64)>,
     /// What undos put back, by who asked for them.
     pub undone: BTreeMap<ClientId, Vec<Restored>>,
     pub terms: usize,
@@ -44,7 +46,7 @@ impl Reference {
         let hashes = BTreeMap::from([(0, terrain.world().hash())]);
         let ground = Arc::clone(ground);
         let undone = BTreeMap::new();
-        Self { terrain, ground, stamps, number: 0, hashes, loose: 0, undone, terms: 0 }
+        Self { terrain, ground, stamps, number: 0, hashes, loose: 0, done: Vec::new(), undone, terms: 0 }
     }
 
     /// Goes back to what a server has that was restarted.
@@ -52,14 +54,14 @@ impl Reference {
         self.terrain = terrain;
         self.number = number;
         self.hashes.retain(|at, _| *at <= number);
+        self.done.retain(|(at, ..)| *at <= number);
         self.hashes.insert(number, self.terrain.world().hash());
     }
 
-    /// Obeys what is new in a message; returns the edits of players among it.
-    fn obey(&mut self, message: &[u8]) -> Vec<(ClientId, u64)> {
-        let mut own_numbers = Vec::new();
+    /// Obeys what is new in a message.
+    fn obey(&mut self, message: &[u8]) {
         let message = ToClient::from_bytes(message, &self.ground, &self.stamps).expect("a message");
-        let ToClient::Entries(Entries { first, entries }) = message else { return own_numbers };
+        let ToClient::Entries(Entries { first, entries }) = message else { return };
         for (number, entry) in (first..).zip(entries) {
             if number != self.number + 1 {
                 continue;
@@ -72,7 +74,7 @@ impl Reference {
                             self.loose += receipt.outcome.map_or(0, |applied| applied.loose.len());
                         }
                     }
-                    own_numbers.push((author, own));
+                    self.done.push((number, author, own));
                 }
                 Entry::Rules(rules) => {
                     let rules = rules.as_deref().cloned().unwrap_or_default();
@@ -95,7 +97,6 @@ impl Reference {
             self.number = number;
             self.hashes.insert(number, self.terrain.world().hash());
         }
-        own_numbers
     }
 }
 
@@ -111,6 +112,7 @@ pub struct Bot {
     free: [Duration; 2],
     rng: Rng,
     pub is_digging: bool,
+    pub is_undoing: bool,
     pub is_connected: bool,
     /// May its world differ from the others'? So it is where it is lied to.
     pub may_differ: bool,
@@ -134,6 +136,10 @@ pub struct Bot {
     pub undone: Vec<Restored>,
     /// Numbers of tags that came to an end.
     pub answered: u64,
+    /// Tags of edits that are not answered.
+    pub open: BTreeSet<u64>,
+    /// Tags of edits that were refused.
+    pub refused: BTreeSet<u64>,
 }
 
 impl std::fmt::Debug for Bot {
@@ -161,6 +167,7 @@ impl Bot {
             free,
             rng: Rng::with_seed(id),
             is_digging: true,
+            is_undoing: true,
             is_connected: true,
             may_differ: false,
             edits: 0,
@@ -176,6 +183,8 @@ impl Bot {
             undos: 0,
             undone: Vec::new(),
             answered: 0,
+            open: BTreeSet::new(),
+            refused: BTreeSet::new(),
         }
     }
 
@@ -203,8 +212,9 @@ impl Bot {
             return self.edits -= 1;
         }
         self.dug.insert(self.edits, frame);
+        self.open.insert(self.edits);
         self.client.dig(edit);
-        if self.rng.u32(0..30) == 0 {
+        if self.is_undoing && self.rng.u32(0..30) == 0 {
             self.client.undo(None);
             self.undos += 1;
         }
@@ -222,13 +232,16 @@ impl Bot {
                     }
                     "predicted"
                 }
-                ClientEvent::Confirmed { .. } => {
+                ClientEvent::Confirmed { tag, .. } => {
                     self.answered += 1;
+                    self.open.remove(&tag);
                     "confirmed"
                 }
                 ClientEvent::Refused { tag, .. } => {
                     self.dug.remove(&tag);
                     self.answered += 1;
+                    self.open.remove(&tag);
+                    self.refused.insert(tag);
                     "refused"
                 }
                 ClientEvent::Playable => {
@@ -336,7 +349,7 @@ impl Play {
     pub fn send(&mut self) {
         for (to, lane, message) in self.server.take_outgoing() {
             if lane == Lane::Order {
-                drop(self.reference.obey(&message));
+                self.reference.obey(&message);
             }
             let Some(bot) = self.bots.iter_mut().find(|bot| bot.id == to && bot.is_connected) else {
                 continue;

@@ -1,6 +1,7 @@
 //! Everybody has the same world: while they dig over bad lines, when they come late or come back, after the server's restart, and
 //! after lies that are found out.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -328,12 +329,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
             play.cut(at);
         }
         let number = play.server.epoch().number;
-        assert_eq!(play.reference.hashes[&number], play.server.terrain().world().hash());
-        let parts = play.server.terrain().parts();
-        let mut reference =
-            Terrain::restore(Arc::clone(&ground), &TerrainSettings::default(), parts).expect("valid parts");
-        reference.set_meshing(bevy_burrow::terrain::Meshing::Never);
-        play.reference.begin_again(reference, number);
+        begin_again(&mut play);
         play.seconds(0.5);
         (0..3).for_each(|at| play.reconnect(at));
         play.changes_terms = run == 1;
@@ -358,4 +354,79 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
     }
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+}
+
+/// The order goes on where a server does that was opened.
+fn begin_again(play: &mut Play) {
+    let number = play.server.epoch().number;
+    let world = play.server.terrain().world();
+    assert_eq!(play.reference.hashes[&number], world.hash());
+    let parts = play.server.terrain().parts();
+    let mut reference = Terrain::restore(Arc::clone(&play.ground), &TerrainSettings::default(), parts)
+        .expect("a world's own parts");
+    reference.set_meshing(bevy_burrow::terrain::Meshing::Never);
+    play.reference.begin_again(reference, number);
+}
+
+#[test]
+fn each_edit_is_done_once_though_the_server_is_killed() {
+    let ground = hills(96);
+    let mut play = Play::new(&ground, 5, ServerSettings::default());
+    play.bots.iter_mut().for_each(|bot| bot.is_undoing = false);
+    let mut disk = SimulatedDisk::new();
+    let mut saved = terrain(&ground);
+    let mut store = Store::create_in(Arc::new(disk.clone()), &mut saved, options()).expect("a new world");
+    play.server = Server::open(saved, &store, ServerSettings::default());
+    play.server.stamps_mut().add(Arc::clone(&play.image));
+    (0..5).for_each(|at| {
+        play.cut(at);
+        play.reconnect(at);
+    });
+    // Edits that were told to their players, and were not saved when the server was killed.
+    let (mut lost, mut unseen, mut rng) = (BTreeSet::new(), 0, Rng::with_seed(4));
+    let kills = count("BURROW_KILLS", 5);
+    for kill in 0..kills {
+        for _ in 0..rng.u32(60..200) {
+            play.step();
+            play.server.save(&mut store).expect("the store's thread runs");
+        }
+        if kill % 2 == 0 {
+            store.flush().expect("a disk that works");
+        }
+        disk = disk.image().lose_process();
+        drop(store);
+        let (again, opened) =
+            Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), options()).expect("it can be opened");
+        play.server = Server::open(opened.terrain, &again, ServerSettings::default());
+        play.server.stamps_mut().add(Arc::clone(&play.image));
+        store = again;
+        (0..5).for_each(|at| play.cut(at));
+        let number = play.server.epoch().number;
+        let is_open = |author: ClientId, own| play.bots[author.0 as usize - 1].open.contains(&own);
+        for &(at, author, own) in &play.reference.done {
+            match (at <= number, is_open(author, own)) {
+                (true, true) => unseen += 1,
+                (false, false) => drop(lost.insert((author, own))),
+                _ => {}
+            }
+        }
+        begin_again(&mut play);
+        play.seconds(0.3);
+        (0..5).for_each(|at| play.reconnect(at));
+    }
+    play.settle();
+    let mut done: Vec<(ClientId, u64)> =
+        play.reference.done.iter().map(|(_, author, own)| (*author, *own)).collect();
+    done.sort_unstable();
+    println!("{kills} kills, {} edits, {unseen} saved and not told, {} lost", done.len(), lost.len());
+    assert!(unseen > 0, "nothing was saved that was not told");
+    assert!(done.windows(2).all(|pair| pair[0] != pair[1]), "an edit was done twice");
+    for bot in &play.bots {
+        assert!(bot.open.is_empty() && bot.answered == bot.edits());
+        for own in 1..=bot.edits() {
+            let is_done = done.binary_search(&(bot.id, own)).is_ok();
+            let is_known = bot.refused.contains(&own) || lost.contains(&(bot.id, own));
+            assert!(is_done != is_known, "{:?} {own}: done {is_done}", bot.id);
+        }
+    }
 }

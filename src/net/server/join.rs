@@ -69,7 +69,7 @@ impl Server {
         let welcome = Welcome {
             client,
             epoch: Epoch { number, ..self.epoch },
-            own: self.own_numbers.get(&client).copied().unwrap_or_default(),
+            own: self.own_numbers.last(client),
             reach: self.settings.reach.map(|reach| reach.allowed()),
             cost: [self.settings.cost.per_second, self.settings.cost.burst],
             join,

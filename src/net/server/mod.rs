@@ -6,7 +6,8 @@
 //! | `settings`, `events` | what it allows, what it tells and counts |
 //! | `session` | a client that is connected |
 //! | `receive`, `validation`, `bucket` | messages that come, and what is refused |
-//! | `order_log` | the latest entries, as they were sent |
+//! | `order_log` | the latest entries, in long messages |
+//! | `own_numbers` | the last numbers of players' own edits |
 //! | `apply` | entries become the world |
 //! | `strokes` | what may be taken back |
 //! | `join`, `sender` | clients that come, come back, or differ; the bulk lane |
@@ -17,6 +18,7 @@ mod bucket;
 mod events;
 mod join;
 mod order_log;
+mod own_numbers;
 mod receive;
 mod save;
 mod sender;
@@ -46,6 +48,7 @@ pub use bucket::Rate;
 pub use events::{ServerEvent, ServerFigures};
 use join::Fetch;
 use order_log::OrderLog;
+use own_numbers::OwnNumbers;
 use session::Session;
 pub use settings::{Reach, ServerSettings, UndoPolicy};
 use strokes::Strokes;
@@ -55,9 +58,6 @@ pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
 
 /// The most events that wait to be taken.
 const MOST_EVENTS: usize = 4096;
-
-/// Clients whose numbers are remembered, at most, beside those that are connected.
-const MOST_REMEMBERED: usize = 1 << 16;
 
 /// A message with entries is sent once it has so many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
@@ -112,8 +112,7 @@ pub struct Server {
     /// The number of the last mark.
     marked: u64,
     sessions: BTreeMap<ClientId, Session>,
-    /// The last number of each client's edits that was seen.
-    own_numbers: BTreeMap<ClientId, u64>,
+    own_numbers: OwnNumbers,
     fetches: Vec<Fetch>,
     durable: u64,
     /// Revisions of a store, and the numbers that are durable with them.
@@ -174,7 +173,7 @@ impl Server {
             last_mark: Duration::ZERO,
             marked: number,
             sessions: BTreeMap::new(),
-            own_numbers: BTreeMap::new(),
+            own_numbers: OwnNumbers::default(),
             fetches: Vec::new(),
             durable: number,
             saved: VecDeque::new(),
@@ -238,10 +237,7 @@ impl Server {
     pub fn connect(&mut self, client: ClientId, now: Duration) {
         self.disconnect(client);
         self.sessions.insert(client, Session::new(&self.settings, now));
-        if self.own_numbers.len() > MOST_REMEMBERED {
-            let sessions = &self.sessions;
-            self.own_numbers.retain(|client, _| sessions.contains_key(client));
-        }
+        self.own_numbers.trim(|client| self.sessions.contains_key(&client));
     }
 
     /// Enters that a client is gone. What was to be sent to it is dropped.
