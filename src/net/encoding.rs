@@ -35,6 +35,10 @@ const TABLE: u8 = 6;
 const REGION: u8 = 7;
 const DURABLE: u8 = 8;
 const PIECE: u8 = 9;
+/// Before a message that is packed.
+const PACKED: u8 = 10;
+/// Most bytes of a message that is packed: bytes that say much would take much memory.
+const MOST_PACKED: usize = 64 << 10;
 
 /// Heads of edits are smaller.
 const RULES: u8 = 128;
@@ -230,6 +234,13 @@ impl ToClient {
                 Self::Region(RegionContent { number, pos, left, next_field, bricks, fields })
             }
             DURABLE => Self::Durable { number: reader.number()? },
+            PACKED => {
+                let message = unpack(&mut reader)?;
+                if message.first() == Some(&PACKED) {
+                    return Err(FormatError::Invalid("message that is packed twice"));
+                }
+                Self::from_bytes(&message, ground, stamps)?
+            }
             PIECE => Self::Piece(std::mem::take(&mut reader.0).to_vec()),
             _ => return Err(FormatError::Invalid("tag of a message")),
         };
@@ -360,16 +371,40 @@ impl OrderWriter {
         self.bytes.len()
     }
 
-    /// The number of the first entry and the message, if there is one. `last` is the number of the last entry.
-    pub fn take(&mut self, last: u64) -> Option<(u64, Vec<u8>)> {
-        let Self { bytes, count, .. } = std::mem::take(self);
-        let first = last.checked_sub(count)? + 1;
+    /// The message, if there are entries. `last` is the number of the last one.
+    pub fn message(&self, last: u64) -> Option<Vec<u8>> {
+        let first = last.checked_sub(self.count)? + 1;
         let mut message = vec![ENTRIES];
         put_number(&mut message, first);
-        put_number(&mut message, count);
-        message.extend(bytes);
-        (count > 0).then_some((first, message))
+        put_number(&mut message, self.count);
+        message.extend(&self.bytes);
+        (self.count > 0).then_some(message)
     }
+}
+
+/// A message to a client in fewer bytes, if it can be had in fewer.
+pub(super) fn pack(message: &[u8]) -> Vec<u8> {
+    if message.len() > MOST_PACKED {
+        return message.to_vec();
+    }
+    let mut packed = vec![PACKED];
+    put_number(&mut packed, message.len() as u64);
+    packed.extend(lz4_flex::block::compress(message));
+    if packed.len() < message.len() { packed } else { message.to_vec() }
+}
+
+/// The message that was packed.
+fn unpack(reader: &mut Reader) -> Result<Vec<u8>, FormatError> {
+    let length = reader.number()?;
+    let packed = std::mem::take(&mut reader.0);
+    if length > MOST_PACKED as u64 {
+        return Err(FormatError::TooLarge { length, limit: MOST_PACKED as u64 });
+    }
+    let message = lz4_flex::block::decompress(packed, length as usize);
+    message
+        .ok()
+        .filter(|message| message.len() as u64 == length)
+        .ok_or(FormatError::Invalid("packed message"))
 }
 
 fn read_entry(
@@ -507,4 +542,51 @@ fn put_hashes(to: &mut Vec<u8>, tag: u8, number: u64, hashes: &RegionHashes) {
 
 fn read_hashes(reader: &mut Reader) -> Result<RegionHashes, FormatError> {
     read_regions(reader, usize::MAX, |reader| reader.array().map(u64::from_le_bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::FormatError;
+
+    /// A message of so many marks.
+    fn marks(count: usize) -> Vec<u8> {
+        ToClient::Entries(Entries { first: 1, entries: vec![Entry::Mark; count] }).to_bytes()
+    }
+
+    fn read(bytes: &[u8]) -> Result<ToClient, FormatError> {
+        ToClient::from_bytes(bytes, &Ground::flat(8, 8, 4.0).expect("a valid ground"), &Stamps::default())
+    }
+
+    #[test]
+    fn packed_messages_are_what_they_were() {
+        for count in [0, 1, 5, 1000, MOST_PACKED - 10, MOST_PACKED + 10] {
+            let message = marks(count);
+            let packed = pack(&message);
+            assert!(packed.len() <= message.len());
+            assert_eq!(packed.len() < message.len(), (1000..=MOST_PACKED).contains(&count), "{count}");
+            assert_eq!(read(&packed).expect("a message").to_bytes(), message);
+        }
+    }
+
+    #[test]
+    fn packed_messages_that_are_too_long_or_packed_twice_are_refused() {
+        let with_length = |length: u64| {
+            let mut packed = vec![PACKED];
+            put_number(&mut packed, length);
+            packed.extend(lz4_flex::block::compress(&marks(1000)));
+            packed
+        };
+        let length = marks(1000).len() as u64;
+        assert!(read(&with_length(length)).is_ok());
+        for wrong in [0, length - 1, length + 1, MOST_PACKED as u64] {
+            assert!(matches!(read(&with_length(wrong)), Err(FormatError::Invalid(_))), "{wrong}");
+        }
+        let too_long = read(&with_length(MOST_PACKED as u64 + 1));
+        assert!(matches!(too_long, Err(FormatError::TooLarge { .. })), "{too_long:?}");
+        let mut twice = vec![PACKED];
+        put_number(&mut twice, with_length(length).len() as u64);
+        twice.extend(lz4_flex::block::compress(&with_length(length)));
+        assert!(matches!(read(&twice), Err(FormatError::Invalid(_))));
+    }
 }

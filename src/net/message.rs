@@ -163,7 +163,8 @@ pub enum ToServer {
 /// How a client gets from what it has to the number that it [starts](Welcome::epoch) from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Join {
-    /// [Entries](ToClient::Entries) come in the bulk lane, from its own number on or earlier, up to the start.
+    /// [Entries](ToClient::Entries) come in the bulk lane, from its own number on or earlier, up to the start. One without an
+    /// [epoch](Hello::epoch) has the number 0: the pristine world, which rules nothing.
     Log,
     /// All regions come in the bulk lane, as many as said. What else it has is pristine.
     Regions {

@@ -12,8 +12,8 @@ use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
 use crate::terrain::{
-    ChangeError, LooseSettings, Receipt, RestoreError, Terrain, TerrainError, TerrainSettings, World,
-    WorldChange, WorldParts,
+    ChangeError, LooseSettings, Receipt, RestoreError, Restored, Terrain, TerrainError, TerrainSettings,
+    World, WorldChange, WorldParts,
 };
 use crate::volume::{Brick, Fields};
 
@@ -40,6 +40,8 @@ struct Pending {
 pub(super) struct Applied {
     /// A receipt for each edit among them, in order.
     pub receipts: Vec<Receipt>,
+    /// What parts among them changed, in order; `None` for those that are not in place.
+    pub restored: Vec<Option<Restored>>,
     /// The bricks that changed.
     pub bricks: BTreeSet<BrickPos>,
     /// Was anything not applied that may be applied elsewhere?
@@ -127,6 +129,7 @@ impl Replica {
 
     /// Applies entries of the order. Own edits among them are no longer pending; `own` tells their numbers.
     pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
+        let mut submitted = Vec::new();
         for entry in entries {
             match entry {
                 Entry::Rules(rules) => {
@@ -135,9 +138,8 @@ impl Replica {
                 }
                 Entry::Loose(loose) => self.confirmed.set_loose(*loose),
                 Entry::Edit { edit, .. } => self.confirmed.submit_edit(edit),
-                // There is room: the limits are unbounded.
                 Entry::Parts { change, .. } => {
-                    let _ = self.confirmed.submit_change(WorldChange::clone(change), None);
+                    submitted.push(self.confirmed.submit_change(WorldChange::clone(change), None));
                 }
                 Entry::Mark => {}
             }
@@ -154,9 +156,12 @@ impl Replica {
             }
         }
         let mut applied = self.run();
-        let changes = self.confirmed.take_change_receipts();
-        let failed = |change: &Result<_, ChangeError>| matches!(change, Err(ChangeError::Panicked));
-        applied.is_void = changes.iter().any(failed);
+        let mut receipts = self.confirmed.take_change_receipts().into_iter();
+        for submitted in submitted {
+            let restored = submitted.and_then(|()| receipts.next().unwrap_or(Err(ChangeError::Panicked)));
+            applied.is_void |= matches!(restored, Err(ChangeError::Panicked | ChangeError::Overloaded));
+            applied.restored.push(restored.ok());
+        }
         // What is deterministic fails everywhere; with it, what is shown is drafted anew.
         self.is_outdated |= applied.receipts.iter().any(|receipt| receipt.outcome.is_err());
         self.share();

@@ -10,7 +10,7 @@ use crate::brush::Edit;
 use crate::net::{self, Client, ClientEvent, Lane, Refusal, ShownChange, Stamps};
 use crate::plugin::{BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, ThreadTask, Threads, pieces};
 use crate::terrain::{
-    HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain, TerrainSettings,
+    HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain, TerrainSettings,
 };
 
 /// Insert it with a pristine [`Terrain`] of the same ground and chunk size as the server's: the world that players share takes its
@@ -312,12 +312,16 @@ impl Answers<'_> {
                 self.pieces.write_batch(pieces(terrain, std::slice::from_ref(&receipt)));
             }
             ClientEvent::UndoRefused(_) => {
-                let outcome = Err(HistoryRejection::NothingToUndo);
-                let receipt = HistoryReceipt { step: HistoryStep::Undo, outcome };
-                self.moved.write(HistoryMoved { terrain: Some(terrain), receipt });
+                self.moved.write(undone(terrain, Err(HistoryRejection::NothingToUndo)));
             }
-            ClientEvent::Undone => {}
+            ClientEvent::Undone(restored) => {
+                self.moved.write(undone(terrain, Ok(restored.unwrap_or_default())));
+            }
             event => drop(self.joined.write(GroundJoined { terrain, event })),
         }
     }
+}
+
+fn undone(terrain: Entity, outcome: Result<Restored, HistoryRejection>) -> HistoryMoved {
+    HistoryMoved { terrain: Some(terrain), receipt: HistoryReceipt { step: HistoryStep::Undo, outcome } }
 }

@@ -1,6 +1,6 @@
 //! A server, players who dig at random, and the lines between them; what everybody has is checked in every frame.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -33,7 +33,10 @@ pub struct Reference {
     pub number: u64,
     pub hashes: BTreeMap<u64, u64>,
     pub loose: usize,
-    pub undone: usize,
+    /// The edits of players with their numbers in the order, whose they are, and their numbers there.
+    pub done: Vec<(u64, ClientId, u64)>,
+    /// What undos put back, by who asked for them.
+    pub undone: BTreeMap<ClientId, Vec<Restored>>,
     pub terms: usize,
 }
 
@@ -42,7 +45,8 @@ impl Reference {
         let terrain = terrain(ground);
         let hashes = BTreeMap::from([(0, terrain.world().hash())]);
         let ground = Arc::clone(ground);
-        Self { terrain, ground, stamps, number: 0, hashes, loose: 0, undone: 0, terms: 0 }
+        let undone = BTreeMap::new();
+        Self { terrain, ground, stamps, number: 0, hashes, loose: 0, done: Vec::new(), undone, terms: 0 }
     }
 
     /// Goes back to what a server has that was restarted.
@@ -50,14 +54,14 @@ impl Reference {
         self.terrain = terrain;
         self.number = number;
         self.hashes.retain(|at, _| *at <= number);
+        self.done.retain(|(at, ..)| *at <= number);
         self.hashes.insert(number, self.terrain.world().hash());
     }
 
-    /// Obeys what is new in a message; returns the edits of players among it.
-    fn obey(&mut self, message: &[u8]) -> Vec<(ClientId, u64)> {
-        let mut own_numbers = Vec::new();
+    /// Obeys what is new in a message.
+    fn obey(&mut self, message: &[u8]) {
         let message = ToClient::from_bytes(message, &self.ground, &self.stamps).expect("a message");
-        let ToClient::Entries(Entries { first, entries }) = message else { return own_numbers };
+        let ToClient::Entries(Entries { first, entries }) = message else { return };
         for (number, entry) in (first..).zip(entries) {
             if number != self.number + 1 {
                 continue;
@@ -70,7 +74,7 @@ impl Reference {
                             self.loose += receipt.outcome.map_or(0, |applied| applied.loose.len());
                         }
                     }
-                    own_numbers.push((author, own));
+                    self.done.push((number, author, own));
                 }
                 Entry::Rules(rules) => {
                     let rules = rules.as_deref().cloned().unwrap_or_default();
@@ -82,15 +86,17 @@ impl Reference {
                     self.terms += 1;
                 }
                 Entry::Parts { change, by } => {
-                    self.terrain.apply_change(WorldChange::clone(&change), None).expect("they fit");
-                    self.undone += usize::from(by.is_some());
+                    let restored =
+                        self.terrain.apply_change(WorldChange::clone(&change), None).expect("they fit");
+                    if let Some((by, _)) = by {
+                        self.undone.entry(by).or_default().push(restored);
+                    }
                 }
                 _ => {}
             }
             self.number = number;
             self.hashes.insert(number, self.terrain.world().hash());
         }
-        own_numbers
     }
 }
 
@@ -106,6 +112,7 @@ pub struct Bot {
     free: [Duration; 2],
     rng: Rng,
     pub is_digging: bool,
+    pub is_undoing: bool,
     pub is_connected: bool,
     /// May its world differ from the others'? So it is where it is lied to.
     pub may_differ: bool,
@@ -123,8 +130,16 @@ pub struct Bot {
     pub joined_at: Option<Duration>,
     pub durable: u64,
     pub bytes: [u64; 2],
+    /// Undos that were asked for.
+    pub undos: u64,
+    /// What undos put back.
+    pub undone: Vec<Restored>,
     /// Numbers of tags that came to an end.
     pub answered: u64,
+    /// Tags of edits that are not answered.
+    pub open: BTreeSet<u64>,
+    /// Tags of edits that were refused.
+    pub refused: BTreeSet<u64>,
 }
 
 impl std::fmt::Debug for Bot {
@@ -152,6 +167,7 @@ impl Bot {
             free,
             rng: Rng::with_seed(id),
             is_digging: true,
+            is_undoing: true,
             is_connected: true,
             may_differ: false,
             edits: 0,
@@ -164,7 +180,11 @@ impl Bot {
             joined_at: None,
             durable: 0,
             bytes: [0; 2],
+            undos: 0,
+            undone: Vec::new(),
             answered: 0,
+            open: BTreeSet::new(),
+            refused: BTreeSet::new(),
         }
     }
 
@@ -192,9 +212,11 @@ impl Bot {
             return self.edits -= 1;
         }
         self.dug.insert(self.edits, frame);
+        self.open.insert(self.edits);
         self.client.dig(edit);
-        if self.rng.u32(0..30) == 0 {
+        if self.is_undoing && self.rng.u32(0..30) == 0 {
             self.client.undo(None);
+            self.undos += 1;
         }
     }
 
@@ -210,13 +232,16 @@ impl Bot {
                     }
                     "predicted"
                 }
-                ClientEvent::Confirmed { .. } => {
+                ClientEvent::Confirmed { tag, .. } => {
                     self.answered += 1;
+                    self.open.remove(&tag);
                     "confirmed"
                 }
                 ClientEvent::Refused { tag, .. } => {
                     self.dug.remove(&tag);
                     self.answered += 1;
+                    self.open.remove(&tag);
+                    self.refused.insert(tag);
                     "refused"
                 }
                 ClientEvent::Playable => {
@@ -231,7 +256,11 @@ impl Bot {
                     self.durable = number;
                     "durable"
                 }
-                ClientEvent::Undone => "undone",
+                ClientEvent::Undone(restored) => {
+                    self.undone.extend(restored);
+                    "undone"
+                }
+                ClientEvent::UndoRefused(_) => "not undone",
                 ClientEvent::Others { .. } => "others",
                 ClientEvent::Repaired(_) => "repaired",
                 ClientEvent::Kicked(why) => panic!("{:?} was kicked: {why}", self.id),
@@ -320,7 +349,7 @@ impl Play {
     pub fn send(&mut self) {
         for (to, lane, message) in self.server.take_outgoing() {
             if lane == Lane::Order {
-                drop(self.reference.obey(&message));
+                self.reference.obey(&message);
             }
             let Some(bot) = self.bots.iter_mut().find(|bot| bot.id == to && bot.is_connected) else {
                 continue;

@@ -1,11 +1,12 @@
 //! Everybody has the same world: while they dig over bad lines, when they come late or come back, after the server's restart, and
 //! after lies that are found out.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::net::{ClientId, Entries, Entry, Lane, Server, ServerSettings, ToClient, UndoPolicy};
+use bevy_burrow::net::{ClientId, Entries, Entry, Lane, Rate, Server, ServerSettings, ToClient, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
 use bevy_burrow::terrain::WorldChange;
@@ -35,11 +36,12 @@ fn all_have_the_same_world_at_every_number() {
     dig(&mut play, count("BURROW_EDITS", 600));
     play.settle();
     let reference = &play.reference;
+    let undone: usize = reference.undone.values().map(Vec::len).sum();
     println!(
         "{} entries, {} undone, {} terms, {} loose pieces, {:?} of virtual time",
-        reference.number, reference.undone, reference.terms, reference.loose, play.now
+        reference.number, undone, reference.terms, reference.loose, play.now
     );
-    assert!(reference.undone > 0 && reference.terms > 3 && reference.loose > 0);
+    assert!(undone > 0 && reference.terms > 3 && reference.loose > 0);
     assert!(play.up_lag <= TICK);
     for bot in &play.bots {
         let figures = bot.client.figures();
@@ -53,6 +55,8 @@ fn all_have_the_same_world_at_every_number() {
         assert!(bot.lag <= 2 * TICK, "an edit of others was shown {:?} after it came", bot.lag);
         assert_eq!(bot.answered, bot.edits(), "every edit is answered once");
         assert_eq!(bot.event("predicted"), bot.edits());
+        assert_eq!(bot.event("undone") + bot.event("not undone"), bot.undos, "every undo is answered once");
+        assert_eq!(bot.undone, reference.undone.get(&bot.id).cloned().unwrap_or_default());
     }
 }
 
@@ -188,10 +192,10 @@ fn dig_before(play: &mut Play, edits: u64) {
     play.send();
 }
 
-#[test]
-fn who_comes_late_plays_soon() {
+/// Somebody comes after many edits, over a line of 256 KiB a second, while eight dig.
+fn come_late(log_bytes: usize) -> Play {
     // Without undo, edits that wait go into one transaction.
-    let settings = ServerSettings { log_bytes: 1 << 20, ..ServerSettings::default() };
+    let settings = ServerSettings { log_bytes, ..ServerSettings::default() };
     let edits = count("BURROW_EDITS", 1000);
     let mut play = Play::new(&hills(if edits > 20_000 { 512 } else { 160 }), 8, settings);
     play.seconds(2.0);
@@ -205,12 +209,30 @@ fn who_comes_late_plays_soon() {
     let late = &play.bots[8];
     let [playable, joined] = [late.playable_at, late.joined_at].map(|at| at.expect("it is there") - before);
     println!(
-        "{edits} edits: {:?} bytes by lane, playable after {playable:?}, joined after {joined:?}",
+        "{edits} edits, {log_bytes} bytes of log at most: {:?} bytes by lane, playable after {playable:?}, joined \
+         after {joined:?}",
         late.bytes
     );
     assert!(playable <= joined && playable <= Duration::from_secs(15));
-    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000);
     assert!(play.bots.iter().all(|bot| bot.order.most.max(bot.bulk.most) <= 5 << 20));
+    play
+}
+
+#[test]
+fn who_comes_late_plays_soon() {
+    let mut play = come_late(8 << 20);
+    let late = &play.bots[8];
+    assert!(late.client.figures().applied >= count("BURROW_EDITS", 1000), "it got regions");
+    assert!(late.event("others") < 500, "what was long ago is told");
+    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000);
+    play.settle();
+    assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+}
+
+#[test]
+fn who_comes_late_plays_soon_without_the_whole_log() {
+    let mut play = come_late(count("BURROW_EDITS", 1000) as usize * 10);
+    assert!(play.bots[8].client.figures().applied < 500, "it got the log");
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
@@ -235,6 +257,8 @@ fn come_back(settings: ServerSettings, away: f64) -> Play {
         let figures = bot.client.figures();
         assert_eq!((figures.repairs, figures.gaps), (0, 0));
         assert_eq!(bot.answered, bot.edits(), "every edit of {:?} is answered once", bot.id);
+        let undos = bot.event("undone") + bot.event("not undone");
+        assert_eq!(undos, bot.undos, "every undo of {:?} is answered once", bot.id);
     }
     play
 }
@@ -249,21 +273,35 @@ fn who_comes_back_after_a_long_time_gets_the_regions_that_differ() {
     come_back(ServerSettings { log_bytes: 0, ..settings() }, 6.0);
 }
 
-#[test]
-fn who_is_cut_off_while_regions_come_gets_all_of_them_later() {
-    let slow = bevy_burrow::net::Rate { per_second: 8 << 10, burst: 4 << 10 };
-    let mut play = Play::new(&hills(160), 2, ServerSettings { bulk: slow, ..settings() });
+/// Cuts a player's line while what it begins with comes, and lets it come back.
+fn is_cut_off(log_bytes: usize, rate: u64) {
+    let slow = Rate { per_second: rate, burst: rate / 2 };
+    let mut play = Play::new(&hills(160), 2, ServerSettings { bulk: slow, log_bytes, ..settings() });
     play.seconds(2.0);
-    dig_before(&mut play, 600);
+    dig_before(&mut play, 1200);
     play.join();
-    play.seconds(2.0);
-    assert!(!play.bots[2].client.has_joined());
+    play.seconds(3.0);
+    assert!(play.bots[2].bytes[Lane::Bulk as usize] > 0 && !play.bots[2].client.has_joined());
     play.cut(2);
     play.seconds(1.0);
+    let sent = play.server.figures().bulk_bytes;
+    play.seconds(2.0);
+    assert_eq!(play.server.figures().bulk_bytes, sent, "nothing more is sent");
     play.reconnect(2);
     wait_until_joined(&mut play, 2);
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+    assert_eq!(play.bots[2].event("playable"), 1);
+}
+
+#[test]
+fn who_is_cut_off_while_regions_come_gets_all_of_them_later() {
+    is_cut_off(0, 32 << 10);
+}
+
+#[test]
+fn who_is_cut_off_while_the_log_comes_gets_all_of_it_later() {
+    is_cut_off(8 << 20, 4 << 10);
 }
 
 fn options() -> StoreOptions {
@@ -291,12 +329,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
             play.cut(at);
         }
         let number = play.server.epoch().number;
-        assert_eq!(play.reference.hashes[&number], play.server.terrain().world().hash());
-        let parts = play.server.terrain().parts();
-        let mut reference =
-            Terrain::restore(Arc::clone(&ground), &TerrainSettings::default(), parts).expect("valid parts");
-        reference.set_meshing(bevy_burrow::terrain::Meshing::Never);
-        play.reference.begin_again(reference, number);
+        begin_again(&mut play);
         play.seconds(0.5);
         (0..3).for_each(|at| play.reconnect(at));
         play.changes_terms = run == 1;
@@ -321,4 +354,79 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
     }
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
+}
+
+/// The order goes on where a server does that was opened.
+fn begin_again(play: &mut Play) {
+    let number = play.server.epoch().number;
+    let world = play.server.terrain().world();
+    assert_eq!(play.reference.hashes[&number], world.hash());
+    let parts = play.server.terrain().parts();
+    let mut reference = Terrain::restore(Arc::clone(&play.ground), &TerrainSettings::default(), parts)
+        .expect("a world's own parts");
+    reference.set_meshing(bevy_burrow::terrain::Meshing::Never);
+    play.reference.begin_again(reference, number);
+}
+
+#[test]
+fn each_edit_is_done_once_though_the_server_is_killed() {
+    let ground = hills(96);
+    let mut play = Play::new(&ground, 5, ServerSettings::default());
+    play.bots.iter_mut().for_each(|bot| bot.is_undoing = false);
+    let mut disk = SimulatedDisk::new();
+    let mut saved = terrain(&ground);
+    let mut store = Store::create_in(Arc::new(disk.clone()), &mut saved, options()).expect("a new world");
+    play.server = Server::open(saved, &store, ServerSettings::default());
+    play.server.stamps_mut().add(Arc::clone(&play.image));
+    (0..5).for_each(|at| {
+        play.cut(at);
+        play.reconnect(at);
+    });
+    // Edits that were told to their players, and were not saved when the server was killed.
+    let (mut lost, mut unseen, mut rng) = (BTreeSet::new(), 0, Rng::with_seed(4));
+    let kills = count("BURROW_KILLS", 5);
+    for kill in 0..kills {
+        for _ in 0..rng.u32(60..200) {
+            play.step();
+            play.server.save(&mut store).expect("the store's thread runs");
+        }
+        if kill % 2 == 0 {
+            store.flush().expect("a disk that works");
+        }
+        disk = disk.image().lose_process();
+        drop(store);
+        let (again, opened) =
+            Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), options()).expect("it can be opened");
+        play.server = Server::open(opened.terrain, &again, ServerSettings::default());
+        play.server.stamps_mut().add(Arc::clone(&play.image));
+        store = again;
+        (0..5).for_each(|at| play.cut(at));
+        let number = play.server.epoch().number;
+        let is_open = |author: ClientId, own| play.bots[author.0 as usize - 1].open.contains(&own);
+        for &(at, author, own) in &play.reference.done {
+            match (at <= number, is_open(author, own)) {
+                (true, true) => unseen += 1,
+                (false, false) => drop(lost.insert((author, own))),
+                _ => {}
+            }
+        }
+        begin_again(&mut play);
+        play.seconds(0.3);
+        (0..5).for_each(|at| play.reconnect(at));
+    }
+    play.settle();
+    let mut done: Vec<(ClientId, u64)> =
+        play.reference.done.iter().map(|(_, author, own)| (*author, *own)).collect();
+    done.sort_unstable();
+    println!("{kills} kills, {} edits, {unseen} saved and not told, {} lost", done.len(), lost.len());
+    assert!(unseen > 0, "nothing was saved that was not told");
+    assert!(done.windows(2).all(|pair| pair[0] != pair[1]), "an edit was done twice");
+    for bot in &play.bots {
+        assert!(bot.open.is_empty() && bot.answered == bot.edits());
+        for own in 1..=bot.edits() {
+            let is_done = done.binary_search(&(bot.id, own)).is_ok();
+            let is_known = bot.refused.contains(&own) || lost.contains(&(bot.id, own));
+            assert!(is_done != is_known, "{:?} {own}: done {is_done}", bot.id);
+        }
+    }
 }

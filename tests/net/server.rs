@@ -328,7 +328,7 @@ fn an_undo_is_of_what_was_ordered_before_it() {
 #[test]
 fn late_joiners_and_those_who_come_back() {
     let small_log = ServerSettings { log_bytes: 300, ..generous() };
-    for (settings, way) in [(generous(), "log"), (small_log, "compare")] {
+    for (settings, [back, new]) in [(generous(), ["log", "log"]), (small_log, ["compare", "regions"])] {
         let mut scene = Scene::new(settings);
         let (mut a, mut b) = (scene.join(1), scene.join(2));
         let row = |z: usize| (0..12).map(move |x| dig(8.0 + 9.0 * x as f32, 8.0 + 9.0 * z as f32));
@@ -352,7 +352,7 @@ fn late_joiners_and_those_who_come_back() {
         }
         scene.play(&mut [&mut a, &mut b, &mut late], 60);
         agreed(&scene.server, &[&a, &b, &late]);
-        assert_eq!((b.joins, late.joins), (vec!["regions", way], vec!["regions"]));
+        assert_eq!((b.joins, late.joins), (vec!["log", back], vec![new]));
         assert_eq!(scene.server.figures().repairs, 0);
     }
 }
@@ -360,7 +360,7 @@ fn late_joiners_and_those_who_come_back() {
 #[test]
 fn regions_come_from_the_player_outwards_and_no_faster_than_allowed() {
     let bulk = Rate { per_second: 4000, burst: 1000 };
-    let mut scene = Scene::new(ServerSettings { bulk, piece: 500, window: 2000, ..generous() });
+    let mut scene = Scene::new(ServerSettings { bulk, piece: 500, window: 2000, log_bytes: 0, ..generous() });
     let mut a = scene.join(1);
     a.edit((0..12).flat_map(|x| (0..12).map(move |z| dig(8.0 + 9.0 * x as f32, 8.0 + 9.0 * z as f32))));
     scene.play(&mut [&mut a], 4);
@@ -463,7 +463,7 @@ fn a_server_goes_on_from_its_store() {
     b.edit([dig(90.0, 90.0)]);
     scene.play(&mut [&mut a, &mut b], 3);
     agreed(&scene.server, &[&a, &b]);
-    assert_eq!((&a.joins[..], a.repairs), (&["regions", "compare"][..], 0));
+    assert_eq!((&a.joins[..], a.repairs), (&["log", "compare"][..], 0));
     scene.server.save(&mut store).expect("a store that works");
     store.flush().expect("a disk that works");
     scene.server.save(&mut store).expect("a store that works");

@@ -2,7 +2,7 @@
 
 use super::super::message::{ClientId, Kick, Refusal};
 use crate::lattice::RegionPos;
-use crate::terrain::Receipt;
+use crate::terrain::{Receipt, Restored};
 
 /// What a game may want to know.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,10 +35,11 @@ pub enum ClientEvent {
         /// Why; `None` where it could not be sent or applied, or the client was away when that was told.
         why: Option<Refusal>,
     },
-    /// A stroke was taken back that this client asked for.
-    Undone,
-    /// A stroke is not taken back.
-    UndoRefused(Refusal),
+    /// A stroke was taken back that this client asked for: what that put back, without tags, as the order does not tell whose
+    /// edits they were. Inventories should follow this. `None` where the client was away when that happened.
+    Undone(Option<Restored>),
+    /// A stroke is not taken back. `None` where that could not be asked for, or the client was away when the reason was told.
+    UndoRefused(Option<Refusal>),
     /// An edit of somebody else's.
     Others {
         /// Whose.

@@ -61,6 +61,10 @@ impl Client {
             }
         }
         self.events.push(ClientEvent::Welcomed { client, reach });
+        // Undos are not sent again: by now they would be of other strokes.
+        for _ in self.undos.split_off(&own.saturating_add(1)) {
+            self.events.push(ClientEvent::UndoRefused(None));
+        }
         self.send_again(own);
         self.finish_log();
         self.finish_regions();
@@ -74,6 +78,10 @@ impl Client {
         // What became of these was told while the client was away; if they were done, the world holds them.
         for tag in self.take_answered(own) {
             self.events.push(ClientEvent::Confirmed { tag, receipt: None });
+        }
+        let undos = self.undos.split_off(&own.saturating_add(1));
+        for _ in std::mem::replace(&mut self.undos, undos) {
+            self.events.push(ClientEvent::Undone(None));
         }
     }
 
@@ -113,6 +121,10 @@ impl Client {
             // They were refused while the client was away.
             for tag in self.take_answered(own) {
                 self.events.push(ClientEvent::Refused { tag, why: None });
+            }
+            let undos = self.undos.split_off(&own.saturating_add(1));
+            for _ in std::mem::replace(&mut self.undos, undos) {
+                self.events.push(ClientEvent::UndoRefused(None));
             }
             self.follow_from_now();
         }

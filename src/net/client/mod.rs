@@ -77,6 +77,8 @@ pub struct Client {
     /// Edits from before the first welcome.
     early: Vec<Edit>,
     unsent: Vec<Edit>,
+    /// The numbers of undos that the server has not answered.
+    undos: BTreeSet<u64>,
     outgoing: Vec<Vec<u8>>,
     shown: Vec<ShownChange>,
     events: Vec<ClientEvent>,
@@ -90,7 +92,7 @@ impl Client {
     /// When the chunk size or the voxel size is out of range.
     pub fn new(ground: impl Into<Arc<Ground>>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
         let replica = Replica::new(ground.into(), settings)?;
-        let (inbox, bulk, waiting, marks, reaches, early, unsent, outgoing) = Default::default();
+        let (inbox, bulk, waiting, marks, reaches, early, unsent, undos, outgoing) = Default::default();
         Ok(Self {
             replica,
             stamps: Stamps::default(),
@@ -115,6 +117,7 @@ impl Client {
             told: 0,
             early,
             unsent,
+            undos,
             outgoing,
             shown: Vec::new(),
             events: Vec::new(),
@@ -232,9 +235,10 @@ impl Client {
     pub fn undo(&mut self, of: Option<ClientId>) {
         let Some(of) = of.or(self.id).filter(|_| self.is_welcome()) else {
             // Its number would hide those of edits that are sent again.
-            return self.events.push(ClientEvent::UndoRefused(Refusal::NotJoined));
+            return self.events.push(ClientEvent::UndoRefused(Some(Refusal::NotJoined)));
         };
         self.flush();
+        self.undos.insert(self.next_own);
         self.outgoing.push(ToServer::Undo { own: self.next_own, of }.to_bytes());
         self.next_own += 1;
     }
@@ -286,11 +290,18 @@ impl Client {
         }
         self.read_bulk();
         let is_busy = self.follow();
-        let (shown, receipts) = self.replica.update();
-        self.shown.extend(shown);
-        self.tell_predictions(receipts.unwrap_or_default());
+        if !self.is_history() {
+            let (shown, receipts) = self.replica.update();
+            self.shown.extend(shown);
+            self.tell_predictions(receipts.unwrap_or_default());
+        }
         self.acknowledge(now);
         is_busy
+    }
+
+    /// Are the entries that it applies from before its player came? They are not told, and shown as one once all are there.
+    fn is_history(&self) -> bool {
+        matches!(self.stage, Stage::ByLog { .. }) && !self.is_playable
     }
 
     fn tell_predictions(&mut self, receipts: Vec<Receipt>) {
@@ -309,11 +320,11 @@ impl Client {
             ToClient::Entries(entries) => self.take_entries(lane, entries),
             ToClient::Void { number } => self.take_void(number),
             ToClient::Refused { own, why } => {
-                let event = match self.replica.take_back(own) {
-                    Some(edit) => ClientEvent::Refused { tag: edit.tag(), why: Some(why) },
-                    None => ClientEvent::UndoRefused(why),
-                };
-                self.events.push(event);
+                if self.undos.remove(&own) {
+                    self.events.push(ClientEvent::UndoRefused(Some(why)));
+                } else if let Some(edit) = self.replica.take_back(own) {
+                    self.events.push(ClientEvent::Refused { tag: edit.tag(), why: Some(why) });
+                }
             }
             ToClient::Hashes { number, regions } => self.marks.take_theirs(number, regions),
             ToClient::Table { number, regions } => self.take_table(number, &regions),
@@ -390,9 +401,9 @@ impl Client {
             && let Some(entry) = self.waiting.remove(&(number + 1))
         {
             number += 1;
-            let is_mark = matches!(entry, Entry::Mark);
+            let is_compared = matches!((&entry, &self.stage), (Entry::Mark, Stage::Following));
             batch.push(entry);
-            if is_mark {
+            if is_compared {
                 break;
             }
         }
@@ -406,28 +417,35 @@ impl Client {
             Entry::Edit { author, own, .. } if Some(*author) == id => Some(*own),
             _ => None,
         };
+        let is_told = !self.is_history();
         let tags: BTreeMap<u64, u64> = self.replica.pending().map(|(own, edit)| (own, edit.tag())).collect();
         let applied = self.replica.apply(&batch, own);
-        let mut receipts = applied.receipts.into_iter();
+        let (mut receipts, mut restored) = (applied.receipts.into_iter(), applied.restored.into_iter());
         for entry in &batch {
             epoch.number += 1;
             match entry {
                 Entry::Edit { author, edit, .. } => {
                     self.reaches.note(epoch.number, edit.reach());
                     let Some(receipt) = receipts.next() else { continue };
-                    self.events.push(match own(entry) {
-                        Some(own) => {
-                            let tag = tags.get(&own).copied().unwrap_or_default();
-                            ClientEvent::Confirmed { tag, receipt: Some(Receipt { tag, ..receipt }) }
+                    // Its player may have been here before, in another client.
+                    match own(entry).and_then(|own| tags.get(&own).copied()) {
+                        Some(tag) => {
+                            let receipt = Some(Receipt { tag, ..receipt });
+                            self.events.push(ClientEvent::Confirmed { tag, receipt });
                         }
-                        None => ClientEvent::Others { author: *author, receipt },
-                    });
+                        None if is_told => {
+                            self.events.push(ClientEvent::Others { author: *author, receipt });
+                        }
+                        None => {}
+                    }
                 }
                 Entry::Parts { by, change } => {
-                    if by.is_some_and(|(by, _)| Some(by) == id) {
-                        self.events.push(ClientEvent::Undone);
+                    let restored = restored.next().flatten();
+                    let is_missing = restored.is_none();
+                    if by.is_some_and(|(by, own)| Some(by) == id && self.undos.remove(&own)) {
+                        self.events.push(ClientEvent::Undone(restored));
                     }
-                    if applied.is_void {
+                    if applied.is_void && is_missing {
                         let regions = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos));
                         self.doubtful.extend(regions);
                     }
@@ -437,9 +455,11 @@ impl Client {
         }
         self.figures.applied += batch.len() as u64;
         self.epoch = Some(epoch);
-        self.marks.touch(applied.bricks);
-        if matches!(batch.last(), Some(Entry::Mark)) {
-            self.marks.mark(epoch.number, self.replica.world());
+        if matches!(self.stage, Stage::Following) {
+            self.marks.touch(applied.bricks);
+            if matches!(batch.last(), Some(Entry::Mark)) {
+                self.marks.mark(epoch.number, self.replica.world());
+            }
         }
         self.finish_log();
     }

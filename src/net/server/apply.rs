@@ -45,8 +45,11 @@ impl Server {
                 self.terrain.set_rules(rules).unwrap_or_default();
             }
             Entry::Loose(loose) => self.terrain.set_loose(loose),
-            Entry::Parts { change, .. } => {
+            Entry::Parts { by, change } => {
                 self.put_parts(number, &change);
+                if let Some((client, own)) = by {
+                    self.own_numbers.apply(client, own, number);
+                }
                 self.applied = number;
                 return change.bricks.len() as u64 + 1;
             }
@@ -75,8 +78,12 @@ impl Server {
 
     fn apply_edits(&mut self, count: usize) -> u64 {
         let (mut edits, mut work, mut stroke) = (Vec::with_capacity(count), 0, None);
-        for Ordered { entry, labels: (tag, label), cost } in self.waiting.drain(..count) {
-            if let Entry::Edit { author, edit, .. } = entry {
+        let first = self.applied + 1;
+        for (number, Ordered { entry, labels: (tag, label), cost }) in
+            (first..).zip(self.waiting.drain(..count))
+        {
+            if let Entry::Edit { author, own, edit } = entry {
+                self.own_numbers.apply(author, own, number);
                 stroke = Some((author, label));
                 edits.push(edit.with_labels(tag, label));
                 work += cost;
@@ -84,7 +91,6 @@ impl Server {
         }
         self.waiting_cost = self.waiting_cost.saturating_sub(work);
         let receipts = self.transact(&edits, stroke.filter(|_| self.settings.undo != UndoPolicy::Nobody));
-        let first = self.applied + 1;
         self.applied += count as u64;
         for (number, receipt) in (first..).zip(receipts) {
             if is_void(&receipt) {

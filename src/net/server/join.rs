@@ -13,8 +13,8 @@ use crate::lattice::RegionPos;
 use crate::net::message::{ClientId, Epoch, Hello, Join, Lane, Terms, ToClient, Welcome};
 use crate::terrain::World;
 
-/// Bytes that a brick of a region takes in messages, about.
-const BRICK: usize = 64;
+/// Regions that are encoded to tell how many bytes all of them take.
+const MEASURED: usize = 16;
 
 /// Regions that a client asked for.
 pub(super) struct Fetch {
@@ -58,27 +58,26 @@ impl Server {
                 }
             }
             Some(_) => self.compare(client),
-            None => self.all_regions(hello.place),
+            // It has the pristine world.
+            None => match self.entries_after(0).filter(|_| self.is_whole) {
+                Some(jobs) => (Join::Log, jobs),
+                None => self.all_regions(hello.place),
+            },
         };
         // Old entries lead up to the last one, regions are those of the world as it is.
         let number = if join == Join::Log { self.epoch.number } else { self.applied };
         let welcome = Welcome {
             client,
             epoch: Epoch { number, ..self.epoch },
-            own: self.own_numbers.get(&client).copied().unwrap_or_default(),
+            own: self.own_numbers.last(client),
             reach: self.settings.reach.map(|reach| reach.allowed()),
             cost: [self.settings.cost.per_second, self.settings.cost.burst],
             join,
         };
         self.send(client, &ToClient::Welcome(welcome));
-        let missing: Vec<Vec<u8>> = self
-            .log
-            .after(number, self.epoch.number + 1)
-            .map(|messages| messages.map(|message| message.to_vec()).collect())
-            .unwrap_or_default();
-        for message in missing {
+        for message in self.log.after(number).unwrap_or_default() {
             self.figures.order_bytes += message.len() as u64;
-            self.outgoing.push((client, Lane::Order, message));
+            self.outgoing.push((client, Lane::Order, message.to_vec()));
         }
         if let Some(session) = self.sessions.get_mut(&client) {
             jobs.into_iter().for_each(|job| session.bulk.push(job));
@@ -88,14 +87,17 @@ impl Server {
 
     /// The messages with all entries after a number, if they are there, and take fewer bytes than the regions that changed since.
     fn entries_after(&self, number: u64) -> Option<Vec<Job>> {
-        let messages: Vec<_> = self.log.after(number, self.epoch.number + 1)?.collect();
+        let messages = self.log.after(number)?;
         let bytes: usize = messages.iter().map(|message| message.len()).sum();
-        let changed = self.changed.iter().filter(|(_, at)| **at > number);
-        let world = self.terrain.world();
-        let bricks: usize = changed.map(|(region, _)| world.bricks_in(*region).count()).sum();
         // A few entries are sent in any case.
-        let is_short = bytes <= (bricks * BRICK).max(super::FULL_MESSAGE);
-        is_short.then(|| messages.into_iter().map(|message| Job::Message(Arc::clone(message))).collect())
+        if bytes > super::FULL_MESSAGE {
+            let changed = self.changed.iter().filter(|(_, at)| **at > number);
+            let changed: Vec<RegionPos> = changed.map(|(region, _)| *region).collect();
+            if bytes > bytes_of(&self.terrain.snapshot(), &changed) {
+                return None;
+            }
+        }
+        Some(messages.into_iter().map(Job::Message).collect())
     }
 
     /// All regions, nearest first.
@@ -175,6 +177,14 @@ fn jobs(world: &Arc<World>, number: u64, regions: &[RegionPos]) -> Vec<Job> {
     let job =
         |(pos, left): (&RegionPos, u32)| Job::Region { world: Arc::clone(world), number, pos: *pos, left };
     regions.iter().zip(left).map(job).collect()
+}
+
+/// About how many bytes regions take in messages, as some of them do.
+fn bytes_of(world: &Arc<World>, regions: &[RegionPos]) -> usize {
+    let step = regions.len().div_ceil(MEASURED).max(1);
+    let some: Vec<RegionPos> = regions.iter().step_by(step).copied().collect();
+    let bytes: usize = jobs(world, 0, &some).iter().map(|job| job.to_bytes().len()).sum();
+    bytes * regions.len() / some.len().max(1)
 }
 
 /// From a place to the middle of a region.

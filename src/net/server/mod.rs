@@ -6,7 +6,8 @@
 //! | `settings`, `events` | what it allows, what it tells and counts |
 //! | `session` | a client that is connected |
 //! | `receive`, `validation`, `bucket` | messages that come, and what is refused |
-//! | `order_log` | the latest entries, as they were sent |
+//! | `order_log` | the latest entries, in long messages |
+//! | `own_numbers` | the last numbers of players' own edits |
 //! | `apply` | entries become the world |
 //! | `strokes` | what may be taken back |
 //! | `join`, `sender` | clients that come, come back, or differ; the bulk lane |
@@ -17,6 +18,7 @@ mod bucket;
 mod events;
 mod join;
 mod order_log;
+mod own_numbers;
 mod receive;
 mod save;
 mod sender;
@@ -46,6 +48,7 @@ pub use bucket::Rate;
 pub use events::{ServerEvent, ServerFigures};
 use join::Fetch;
 use order_log::OrderLog;
+use own_numbers::OwnNumbers;
 use session::Session;
 pub use settings::{Reach, ServerSettings, UndoPolicy};
 use strokes::Strokes;
@@ -55,9 +58,6 @@ pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
 
 /// The most events that wait to be taken.
 const MOST_EVENTS: usize = 4096;
-
-/// Clients whose numbers are remembered, at most, beside those that are connected.
-const MOST_REMEMBERED: usize = 1 << 16;
 
 /// A message with entries is sent once it has so many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
@@ -98,6 +98,8 @@ pub struct Server {
     waiting_cost: u64,
     writer: OrderWriter,
     log: OrderLog,
+    /// Does the order lead from the pristine world to this one?
+    is_whole: bool,
     undos: VecDeque<UndoRequest>,
     strokes: Strokes,
     /// Regions that were touched since the last mark.
@@ -110,8 +112,7 @@ pub struct Server {
     /// The number of the last mark.
     marked: u64,
     sessions: BTreeMap<ClientId, Session>,
-    /// The last number of each client's edits that was seen.
-    own_numbers: BTreeMap<ClientId, u64>,
+    own_numbers: OwnNumbers,
     fetches: Vec<Fetch>,
     durable: u64,
     /// Revisions of a store, and the numbers that are durable with them.
@@ -143,20 +144,27 @@ impl Server {
     }
 
     /// A server of a terrain that is at this number of its world's order.
-    fn at(mut terrain: Terrain, world: WorldId, number: u64, settings: ServerSettings) -> Self {
+    fn at(mut terrain: Terrain, id: WorldId, number: u64, settings: ServerSettings) -> Self {
         never_shown(&mut terrain);
+        let world = terrain.world();
+        let is_whole = number == 0
+            && world.next_field() == 0
+            && world.bricks().next().is_none()
+            && world.fields().next().is_none();
+        let terms = (terrain.rules().cloned().map(Arc::new), terrain.loose().copied());
         let run = WorldId::random().0 as u64;
-        Self {
+        let mut server = Self {
             terrain,
             settings,
             stamps: Stamps::default(),
             permission: Box::new(|_, _| true),
-            epoch: Epoch { world, run, number },
+            epoch: Epoch { world: id, run, number },
             applied: number,
             waiting: VecDeque::new(),
             waiting_cost: 0,
             writer: OrderWriter::default(),
-            log: OrderLog::new(settings.log_bytes),
+            log: OrderLog::new(settings.log_bytes, number),
+            is_whole,
             undos: VecDeque::new(),
             strokes: Strokes::new(settings.undo_bytes),
             touched: BTreeSet::new(),
@@ -165,7 +173,7 @@ impl Server {
             last_mark: Duration::ZERO,
             marked: number,
             sessions: BTreeMap::new(),
-            own_numbers: BTreeMap::new(),
+            own_numbers: OwnNumbers::default(),
             fetches: Vec::new(),
             durable: number,
             saved: VecDeque::new(),
@@ -174,7 +182,15 @@ impl Server {
             outgoing: Vec::new(),
             events: VecDeque::new(),
             figures: ServerFigures::default(),
+        };
+        // What holds already is part of what leads from the pristine world.
+        if let (true, Some(rules)) = (is_whole, terms.0) {
+            server.order(Entry::Rules(Some(rules)));
         }
+        if let (true, Some(loose)) = (is_whole, terms.1) {
+            server.order(Entry::Loose(Some(loose)));
+        }
+        server
     }
 
     /// The terrain, with all entries up to [`applied`](Self::applied).
@@ -221,10 +237,7 @@ impl Server {
     pub fn connect(&mut self, client: ClientId, now: Duration) {
         self.disconnect(client);
         self.sessions.insert(client, Session::new(&self.settings, now));
-        if self.own_numbers.len() > MOST_REMEMBERED {
-            let sessions = &self.sessions;
-            self.own_numbers.retain(|client, _| sessions.contains_key(client));
-        }
+        self.own_numbers.trim(|client| self.sessions.contains_key(&client));
     }
 
     /// Enters that a client is gone. What was to be sent to it is dropped.
@@ -324,6 +337,7 @@ impl Server {
         self.figures.ordered += 1;
         self.waiting_cost += ordered.cost;
         self.writer.put(&ordered.entry);
+        self.log.push(&ordered.entry);
         self.waiting.push_back(ordered);
         if self.writer.len() >= FULL_MESSAGE {
             self.flush();
@@ -333,14 +347,13 @@ impl Server {
     /// Sends what was ordered.
     fn flush(&mut self) {
         let last = self.epoch.number;
-        let Some((first, message)) = self.writer.take(last) else { return };
+        let Some(message) = std::mem::take(&mut self.writer).message(last) else { return };
         for (client, session) in &self.sessions {
             if session.has_joined() {
                 self.figures.order_bytes += message.len() as u64;
                 self.outgoing.push((*client, Lane::Order, message.clone()));
             }
         }
-        self.log.push(first, last, message.into(), self.applied);
     }
 
     fn send(&mut self, client: ClientId, message: &ToClient) {
@@ -375,6 +388,7 @@ impl Server {
             (self.last_mark, self.marked) = (now, self.epoch.number);
         }
         self.apply();
+        self.log.trim(self.applied);
         self.welcome_all();
         self.send_bulk(now);
     }

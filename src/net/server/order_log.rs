@@ -1,77 +1,132 @@
-//! The latest entries as they were sent, for clients that come back.
+//! The latest entries in long messages, for clients that come, or come back.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::FULL_MESSAGE;
+use crate::net::encoding::{OrderWriter, pack};
+use crate::net::message::Entry;
+
 /// Entries of one message.
 struct Block {
-    first: u64,
     last: u64,
     message: Arc<[u8]>,
 }
 
-/// The latest messages with entries, within a limit of bytes.
+/// The latest entries, within a limit of bytes.
 pub struct OrderLog {
+    /// The number of the first entry that is kept.
+    first: u64,
     blocks: VecDeque<Block>,
     bytes: usize,
     limit: usize,
+    /// The entries after those of the last block.
+    writer: OrderWriter,
+    last: u64,
 }
 
 impl OrderLog {
-    pub fn new(limit: usize) -> Self {
-        Self { blocks: VecDeque::new(), bytes: 0, limit }
+    /// Of an order that goes on after a number.
+    pub fn new(limit: usize, number: u64) -> Self {
+        let (blocks, writer) = Default::default();
+        Self { first: number + 1, blocks, bytes: 0, limit, writer, last: number }
     }
 
-    /// Adds the message with the entries from `first` to `last`. Those after `applied` are kept in any case.
-    pub fn push(&mut self, first: u64, last: u64, message: Arc<[u8]>, applied: u64) {
-        self.bytes += message.len();
-        self.blocks.push_back(Block { first, last, message });
-        while self.bytes > self.limit && self.blocks.front().is_some_and(|block| block.last <= applied) {
-            self.bytes -= self.blocks.pop_front().map_or(0, |block| block.message.len());
+    /// Adds the next entry.
+    pub fn push(&mut self, entry: &Entry) {
+        self.writer.put(entry);
+        self.last += 1;
+        if self.writer.len() < self.limit.min(FULL_MESSAGE) {
+            return;
+        }
+        if let Some(message) = self.writer.message(self.last) {
+            let message: Arc<[u8]> = pack(&message).into();
+            self.bytes += message.len();
+            self.blocks.push_back(Block { last: self.last, message });
+        }
+        self.writer = OrderWriter::default();
+    }
+
+    /// Drops the oldest entries beyond the limit. Those after `applied` are kept in any case.
+    pub fn trim(&mut self, applied: u64) {
+        while self.bytes > self.limit
+            && let Some(block) = self.blocks.pop_front_if(|block| block.last <= applied)
+        {
+            self.bytes -= block.message.len();
+            self.first = block.last + 1;
         }
     }
 
-    /// The messages with all entries after a number, which may hold entries before it too. `None` if some are gone; `next` is the
-    /// number of the entry that will be added next.
-    pub fn after(&self, number: u64, next: u64) -> Option<impl Iterator<Item = &Arc<[u8]>>> {
-        let kept = self.blocks.front().map_or(next, |block| block.first);
+    /// Messages with all entries after a number, which may hold entries before it too. `None` if some are gone or to come.
+    pub fn after(&self, number: u64) -> Option<Vec<Arc<[u8]>>> {
+        if self.first > number.saturating_add(1) || number > self.last {
+            return None;
+        }
         let from = self.blocks.partition_point(|block| block.last <= number);
-        (kept <= number.saturating_add(1) && number < next)
-            .then(|| self.blocks.iter().skip(from).map(|block| &block.message))
+        let blocks = self.blocks.iter().skip(from).map(|block| Arc::clone(&block.message));
+        let rest = (number < self.last).then(|| self.writer.message(self.last)).flatten();
+        Some(blocks.chain(rest.map(|message| pack(&message).into())).collect())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ground::Ground;
+    use crate::net::message::{Entries, ToClient};
+    use crate::net::stamps::Stamps;
+    use crate::terrain::LooseSettings;
 
-    fn log(limit: usize) -> OrderLog {
-        let mut log = OrderLog::new(limit);
-        for (first, last) in [(1, 3), (4, 4), (5, 9)] {
-            log.push(first, last, Arc::from([first as u8; 10]), 4);
-        }
+    /// Marks as every third entry, and search for loose pieces otherwise.
+    fn entry(number: u64) -> Entry {
+        let loose = LooseSettings { debris: number as u32, ..LooseSettings::default() };
+        if number.is_multiple_of(3) { Entry::Mark } else { Entry::Loose(Some(loose)) }
+    }
+
+    /// Twenty thousand entries after the number 7.
+    fn log(limit: usize, applied: u64) -> OrderLog {
+        let mut log = OrderLog::new(limit, 7);
+        (8..=20_007).for_each(|number| log.push(&entry(number)));
+        log.trim(applied);
         log
     }
 
-    fn firsts(log: &OrderLog, number: u64) -> Option<Vec<u8>> {
-        Some(log.after(number, 10)?.map(|message| message[0]).collect())
+    /// The numbers of all entries after this one, which are as they were added.
+    fn numbers(log: &OrderLog, number: u64) -> Option<Vec<u64>> {
+        let ground = Ground::flat(8, 8, 4.0).expect("a valid ground");
+        let mut numbers = Vec::new();
+        for message in log.after(number)? {
+            let message = ToClient::from_bytes(&message, &ground, &Stamps::default()).expect("a message");
+            let ToClient::Entries(Entries { first, entries }) = message else { panic!("{message:?}") };
+            for (number, own) in (first..).zip(entries) {
+                assert_eq!(format!("{own:?}"), format!("{:?}", entry(number)));
+                numbers.push(number);
+            }
+        }
+        numbers.retain(|other| *other > number);
+        Some(numbers)
     }
 
     #[test]
-    fn messages_after_a_number() {
-        let log = log(100);
-        assert_eq!(firsts(&log, 0), Some(vec![1, 4, 5]));
-        assert_eq!(firsts(&log, 2), Some(vec![1, 4, 5]));
-        assert_eq!(firsts(&log, 3), Some(vec![4, 5]));
-        assert_eq!(firsts(&log, 7), Some(vec![5]));
-        assert_eq!(firsts(&log, 9), Some(vec![]));
-        assert_eq!(firsts(&log, 10), None);
+    fn all_entries_after_a_number() {
+        let log = log(1 << 20, 0);
+        assert!(log.blocks.len() > 3);
+        for number in [7, 8, 5000, 20_006, 20_007] {
+            assert_eq!(numbers(&log, number), Some((number + 1..=20_007).collect()), "{number}");
+        }
+        assert_eq!((numbers(&log, 6), numbers(&log, 20_008), numbers(&log, u64::MAX)), (None, None, None));
     }
 
     #[test]
     fn the_oldest_are_dropped_unless_they_are_not_applied() {
-        let log = log(0);
-        assert_eq!((firsts(&log, 3), firsts(&log, 4)), (None, Some(vec![5])));
-        assert_eq!(log.bytes, 10);
+        let whole = log(0, 7);
+        assert_eq!(numbers(&whole, 7).map(|numbers| numbers.len()), Some(20_000));
+        let trimmed = log(0, 20_007);
+        assert_eq!((numbers(&trimmed, 20_007), numbers(&trimmed, 20_006)), (Some(vec![]), None));
+        let half = log(0, 10_000);
+        assert_eq!(
+            (numbers(&half, 10_000).map(|all| all.len()), numbers(&half, 9_999)),
+            (Some(10_007), None)
+        );
     }
 }

@@ -87,7 +87,7 @@ impl Server {
         }
         for (own, edit) in (first..).zip(edits) {
             self.figures.edits += 1;
-            if !self.is_new(client, own) {
+            if !self.own_numbers.is_new(client, own) {
                 continue;
             }
             // One that is too large is refused, however often it comes: that is no flood.
@@ -108,7 +108,7 @@ impl Server {
         if own == 0 {
             return false;
         }
-        if !self.is_new(client, own) || !self.may_go_on(client, UNDO, now) {
+        if !self.own_numbers.is_new(client, own) || !self.may_go_on(client, UNDO, now) {
             return true;
         }
         let is_full = self.undos.len() >= MOST_UNDOS;
@@ -118,14 +118,6 @@ impl Server {
             Err(why) => self.refuse(client, own, why),
         }
         true
-    }
-
-    /// Notes a client's own number. Was it not seen before? What a client sends again after a gap is not done twice.
-    fn is_new(&mut self, client: ClientId, own: u64) -> bool {
-        let last = self.own_numbers.entry(client).or_default();
-        let is_new = own > *last;
-        *last = own.max(*last);
-        is_new
     }
 
     fn receive_fetch(

@@ -1,5 +1,6 @@
 //! A server that survives a restart.
 
+use super::own_numbers::OwnNumbers;
 use super::{Server, ServerSettings, ToClient};
 use crate::store::{Store, StoreError};
 use crate::terrain::Terrain;
@@ -9,13 +10,15 @@ const NUMBER: &str = "net/number";
 
 impl Server {
     /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or one that a store
-    /// was created of.
+    /// was created of. What its clients send again that the world holds already is not done twice: the last numbers of the 1024
+    /// players who dug last are saved with it.
     pub fn open(terrain: Terrain, store: &Store, settings: ServerSettings) -> Self {
         let number = store.get(NUMBER).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);
         // Numbers near the end of their range were never given.
         let number = number.filter(|number| *number < u64::MAX / 2).unwrap_or_default();
         let server = Self::at(terrain, store.world_id(), number, settings);
-        Self { saved_revision: store.revision(), ..server }
+        let own_numbers = OwnNumbers::open(store);
+        Self { saved_revision: store.revision(), own_numbers, ..server }
     }
 
     /// Hands over to the store what was committed, and tells clients what has become durable. Call it after each
@@ -27,6 +30,7 @@ impl Server {
     pub fn save(&mut self, store: &mut Store) -> Result<(), StoreError> {
         if self.saved_number != self.applied {
             store.put(NUMBER, self.applied.to_le_bytes());
+            self.own_numbers.save(store);
             store.follow(&mut self.terrain)?;
             self.saved_number = self.applied;
             // Where no commit was among what was handed over, it is saved for sure once the next commit is.

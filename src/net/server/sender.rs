@@ -20,7 +20,7 @@ pub enum Job {
 }
 
 impl Job {
-    fn to_bytes(&self) -> Arc<[u8]> {
+    pub fn to_bytes(&self) -> Arc<[u8]> {
         match self {
             Self::Message(bytes) => Arc::clone(bytes),
             Self::Region { world, number, pos, left } => {

@@ -82,7 +82,7 @@ impl Default for ServerSettings {
             undo_bytes: 64 << 20,
             log_bytes: 8 << 20,
             bulk: Rate { per_second: 256 << 10, burst: 32 << 10 },
-            window: 192 << 10,
+            window: 512 << 10,
             piece: 1 << 10,
             work: 100_000,
             waiting: 6_000_000,
