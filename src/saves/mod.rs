@@ -26,6 +26,7 @@ mod saving;
 pub use components::{SavedWorld, WorldStore};
 pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
 pub use messages::{SaveNow, StoreTroubleFound, WorldOpened, WorldSaved};
+pub use opening::OpeningWorld;
 pub(crate) use opening::{ReadWorld, WorldReader};
 
 use bevy::prelude::*;

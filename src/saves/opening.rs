@@ -13,7 +13,7 @@ use super::messages::{StoreTroubleFound, WorldOpened};
 use super::saving::follow;
 use crate::ground::Ground;
 use crate::plugin::{Held, ThreadTask, Threads, free_later};
-use crate::store::{BaseLevel, Opened, Store, StoreError, StoreOptions, StoreTrouble, read_level};
+use crate::store::{BaseLevel, Opened, Progress, Store, StoreError, StoreOptions, StoreTrouble, read_level};
 use crate::terrain::{Terrain, TerrainSettings, WorldParts};
 
 /// How often, and how long, a locked world is waited for.
@@ -24,9 +24,19 @@ const LOCK_WAIT: Duration = Duration::from_millis(50);
 #[derive(Component)]
 pub(super) struct Unopened;
 
-/// A world that is being read.
+/// The world of a [`SavedWorld`] is being read; the plugin inserts it and takes it away.
 #[derive(Component)]
-pub(super) struct OpeningWorld(ThreadTask<Result<ReadWorld, StoreError>>);
+pub struct OpeningWorld {
+    task: ThreadTask<Result<ReadWorld, StoreError>>,
+    progress: Progress,
+}
+
+impl OpeningWorld {
+    /// How much of it is read, 0 to 1, for a bar on the screen.
+    pub fn progress(&self) -> f32 {
+        self.progress.share()
+    }
+}
 
 /// A world that was read or made.
 pub(crate) struct ReadWorld {
@@ -43,6 +53,7 @@ pub(crate) struct WorldReader {
     settings: TerrainSettings,
     /// What is made where there is no world yet.
     parts: WorldParts,
+    pub progress: Progress,
 }
 
 /// Holds a terrain until its world is read.
@@ -97,8 +108,9 @@ pub(super) fn start_opening(
             Some((level, start.0.path().map(ToString::to_string).unwrap_or_default()))
         });
         let reader = WorldReader::new(saved, terrain, level);
+        let progress = reader.progress.clone();
         let task = ThreadTask::start(Threads::Background, move || reader.read());
-        commands.entity(entity).try_remove::<Unopened>().try_insert(OpeningWorld(task));
+        commands.entity(entity).try_remove::<Unopened>().try_insert(OpeningWorld { task, progress });
     }
 }
 
@@ -108,16 +120,16 @@ impl WorldReader {
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        Self { saved: saved.clone(), level, ground, settings, parts }
+        Self { saved: saved.clone(), level, ground, settings, parts, progress: Progress::default() }
     }
 
     /// Reads the world, or makes one.
     pub fn read(self) -> Result<ReadWorld, StoreError> {
-        let Self { saved, level, ground, settings, parts } = self;
+        let Self { saved, level, ground, settings, parts, progress } = self;
         // One that can't be read was told of when the terrain was made of it.
         let level =
             level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, &ground).ok()?, path)));
-        let options = StoreOptions { level, ..saved.options() };
+        let options = StoreOptions { level, progress: Some(progress), ..saved.options() };
         if Store::is_in(&saved.path) {
             let (store, opened) = open_unlocked(&saved.path, &ground, &options)?;
             return Ok(ReadWorld { store, terrain: opened.terrain, troubles: opened.troubles });
@@ -151,7 +163,7 @@ pub(super) fn finish_opening(
     mut troubles: MessageWriter<StoreTroubleFound>,
 ) {
     for (entity, mut terrain, mut opening) in &mut worlds {
-        let Some(outcome) = opening.0.finish() else { continue };
+        let Some(outcome) = opening.task.finish() else { continue };
         commands.entity(entity).try_remove::<(OpeningWorld, Held)>();
         let outcome = outcome.map(|ReadWorld { store, terrain: mut read, troubles: found }| {
             troubles

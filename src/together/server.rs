@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -14,7 +15,7 @@ use super::messages::{BulkLane, FromPlayer, OrderLane};
 use crate::net::{self, Lane, Server, ServerEvent, ServerSettings};
 use crate::plugin::{ThreadTask, Threads};
 use crate::saves::{ReadWorld, SavedWorld, WorldReader};
-use crate::store::{Store, StoreError, StoreTrouble};
+use crate::store::{Progress, Store, StoreError, StoreTrouble};
 use crate::terrain::Terrain;
 
 /// The ground that players dig together: insert it in the app that is the server. Its [`Server`] owns a terrain that nobody looks
@@ -26,13 +27,15 @@ pub struct GroundServer {
     start: Instant,
     /// Players that are connected, by their numbers.
     players: HashMap<net::ClientId, ClientId>,
+    /// Clients that were sent away, until their connections are closed: what they still send is dropped.
+    kicked: EntityHashSet,
     data: BTreeMap<String, Vec<u8>>,
 }
 
 /// Where the server is.
 enum Work {
     /// Its world is read.
-    Opening(ThreadTask<Result<(Parts, OpenedWorld), StoreError>>),
+    Opening(ThreadTask<Result<(Parts, OpenedWorld), StoreError>>, Progress),
     Here(Box<Parts>),
     UnderWay(ThreadTask<Box<Parts>>),
     /// Its world could not be read.
@@ -75,12 +78,19 @@ impl GroundServer {
     /// saved there from now on. It is read on another thread, and [told](GroundServerEvent::Opened).
     pub fn saved(world: &SavedWorld, terrain: &Terrain, settings: ServerSettings) -> Self {
         let reader = WorldReader::new(world, terrain, None);
-        Self::working(Work::Opening(ThreadTask::start(Threads::Background, move || {
+        let progress = reader.progress.clone();
+        let task = ThreadTask::start(Threads::Background, move || {
             let ReadWorld { store, terrain, troubles } = reader.read()?;
             let data = store.game_data().clone();
             let server = Server::open(terrain, &store, settings);
             Ok((Parts { server, store: Some(store) }, OpenedWorld { troubles, data }))
-        })))
+        });
+        Self::working(Work::Opening(task, progress))
+    }
+
+    /// How much of a saved world is read, 0 to 1; `None` once it is.
+    pub fn opening(&self) -> Option<f32> {
+        if let Work::Opening(_, progress) = &self.work { Some(progress.share()) } else { None }
     }
 
     fn working(work: Work) -> Self {
@@ -89,6 +99,7 @@ impl GroundServer {
             waiting: Vec::new(),
             start: Instant::now(),
             players: HashMap::default(),
+            kicked: EntityHashSet::default(),
             data: BTreeMap::new(),
         }
     }
@@ -149,7 +160,7 @@ impl GroundServer {
                 let Some(parts) = task.finish() else { return false };
                 self.work = Work::Here(parts);
             }
-            Work::Opening(task) => {
+            Work::Opening(task, _) => {
                 let Some(opened) = task.finish() else { return false };
                 let opened = opened.map(|(parts, OpenedWorld { troubles, data })| {
                     self.work = Work::Here(Box::new(parts));
@@ -192,6 +203,9 @@ pub(super) fn serve(
 ) {
     let ground = &mut *ground;
     for FromClient { client_id, message } in messages.read() {
+        if client_id.entity().is_some_and(|client| ground.kicked.contains(&client)) {
+            continue;
+        }
         let player = GroundServer::player(*client_id, &ids);
         if ground.players.insert(player, *client_id) != Some(*client_id) {
             ground.waiting.push(Box::new(move |parts, now| parts.server.connect(player, now)));
@@ -226,6 +240,7 @@ pub(super) fn serve(
     }
     for player in kicked {
         if let Some(client) = ground.players.remove(&player).and_then(ClientId::entity) {
+            ground.kicked.insert(client);
             leave.write(DisconnectRequest { client });
         }
     }
@@ -238,6 +253,7 @@ pub(super) fn serve(
 /// Tells the server that a player is gone.
 pub(super) fn forget_player(gone: On<Remove, ConnectedClient>, ground: Option<ResMut<GroundServer>>) {
     let Some(mut ground) = ground else { return };
+    ground.kicked.remove(&gone.entity);
     let left: Vec<net::ClientId> = ground
         .players
         .extract_if(|_, client| client.entity() == Some(gone.entity))

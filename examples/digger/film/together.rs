@@ -141,7 +141,8 @@ impl Two {
         let aside = inward.perp();
         self.host.move_to(mouth.xz() - inward * 16.0 + aside * 4.0)?;
         let foot = mouth - flat(inward) * 3.0 - flat(aside) * 7.0;
-        let pillar = Shape::capsule(foot, foot + Vec3::Y * 6.0, 1.2);
+        let ground = self.host.land()?.height(foot.xz()).ok_or("the pillar would be outside the world")?;
+        let pillar = Shape::capsule(foot.with_y(ground - 1.0), foot.with_y(ground + 5.0), 1.2);
         self.edit(|two| &mut two.host, vec![Brush::add(pillar, CONCRETE)])?;
         let guest = self.guest.feet()?;
         self.host.look_at(guest + Vec3::Y * 1.6 + flat(inward) * 2.0)?;

@@ -3,6 +3,7 @@
 use std::f32::consts::FRAC_PI_2;
 
 use bevy::prelude::*;
+use bevy::render::renderer::RenderDevice;
 use bevy_burrow::prelude::*;
 
 use super::connection::OwnNumber;
@@ -64,8 +65,10 @@ fn dress(
     own: Res<OwnNumber>,
     meshes: Option<ResMut<Assets<Mesh>>>,
     materials: Option<ResMut<Assets<StandardMaterial>>>,
+    renderer: Option<Res<RenderDevice>>,
 ) {
-    let (Some(mut meshes), Some(mut materials)) = (meshes, materials) else { return };
+    // Without a renderer nobody looks, and Bevy can't remove lights.
+    let (Some(mut meshes), Some(mut materials), Some(_)) = (meshes, materials, renderer) else { return };
     let Ok((fellow, pose)) = fellows.get(new.entity) else { return };
     if fellow.number == own.0 {
         return;

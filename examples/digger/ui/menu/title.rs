@@ -3,7 +3,8 @@
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::SharedTerrain;
+use bevy_burrow::saves::OpeningWorld;
+use bevy_burrow::together::{GroundServer, SharedTerrain};
 use bevy_burrow::view::GroundLoading;
 
 use super::{quit, spawn_common_buttons};
@@ -162,12 +163,25 @@ fn note_start(mut game: ResMut<Start>) {
 fn show_progress(
     players: Query<(), With<Player>>,
     textures: Res<GroundLoading>,
+    opening: Query<&OpeningWorld>,
+    server: Option<Res<GroundServer>>,
+    shared: Query<&SharedTerrain>,
     mut shown: Query<&mut Visibility, With<Progress>>,
     mut texts: Query<&mut Text, With<ProgressText>>,
     mut bars: Query<&mut Node, With<ProgressBar>>,
 ) {
-    let done = 100.0 * textures.progress();
-    let words = progress_text(textures.is_ready(), done, !players.is_empty());
+    let saved = opening.iter().map(OpeningWorld::progress).next();
+    let saved = saved.or_else(|| server.and_then(|server| server.opening()));
+    let is_absent = shared.iter().any(|shared| !shared.is_playable());
+    let (words, share) = match (textures.is_ready(), saved) {
+        (false, _) => (Some("creating textures"), textures.progress()),
+        (true, Some(share)) => (Some("reading the world"), share),
+        (true, None) if players.is_empty() => (Some("loading the landscape"), 1.0),
+        (true, None) if is_absent => (Some("joining"), 1.0),
+        (true, None) => (None, 1.0),
+    };
+    let done = 100.0 * share;
+    let words = words.map(|words| progress_text(words, share));
     for mut shown in &mut shown {
         shown.set_if_neq(if words.is_some() { Visibility::Inherited } else { Visibility::Hidden });
     }
@@ -181,13 +195,9 @@ fn show_progress(
     }
 }
 
-/// What is loading, if anything is.
-fn progress_text(has_textures: bool, done: f32, has_player: bool) -> Option<String> {
-    match (has_textures, has_player) {
-        (false, _) => Some(format!("creating textures: {done:.0} %")),
-        (true, false) => Some("loading the landscape ...".into()),
-        (true, true) => None,
-    }
+/// What is done, and how much of it where that is known.
+fn progress_text(words: &str, share: f32) -> String {
+    if share < 1.0 { format!("{words}: {:.0} %", 100.0 * share) } else { format!("{words} ...") }
 }
 
 /// Moves the camera around the tunnel's hill. It uses real time, because the game may be paused.
@@ -229,14 +239,8 @@ mod tests {
 
     #[test]
     fn the_progress_text_says_what_is_loading() {
-        for (has_textures, done, has_player, expected) in [
-            (false, 0.0, false, Some("creating textures: 0 %")),
-            (false, 41.7, true, Some("creating textures: 42 %")),
-            (true, 100.0, false, Some("loading the landscape ...")),
-            (true, 100.0, true, None),
-        ] {
-            assert_eq!(progress_text(has_textures, done, has_player).as_deref(), expected);
-        }
+        assert_eq!(progress_text("reading the world", 0.417), "reading the world: 42 %");
+        assert_eq!(progress_text("joining", 1.0), "joining ...");
     }
 
     #[test]

@@ -189,12 +189,14 @@ fn join(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::player::game_state::GameState;
     use crate::test_support::tap_key;
     use crate::ui::menu::item_at;
 
     fn app() -> App {
         let plugin = |app: &mut App| {
-            app.init_resource::<Party>()
+            app.init_state::<GameState>()
+                .init_resource::<Party>()
                 .init_resource::<Start>()
                 .init_resource::<PlayedWorld>()
                 .add_plugins(TogetherPagePlugin);
