@@ -93,6 +93,13 @@ impl GroundServer {
         if let Work::Opening(_, progress) = &self.work { Some(progress.share()) } else { None }
     }
 
+    /// Serves the world of a store that is open, on a [level](crate::store::StoreOptions::level) say: [`Server::open`] made the
+    /// server of it.
+    pub fn with_store(server: Server, store: Store) -> Self {
+        let data = store.game_data().clone();
+        Self { data, ..Self::working(Work::Here(Box::new(Parts { server, store: Some(store) }))) }
+    }
+
     fn working(work: Work) -> Self {
         Self {
             work,

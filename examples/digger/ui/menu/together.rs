@@ -1,5 +1,7 @@
 //! The page for playing together: the player's name, hosting the world, joining another one.
 
+use std::net::SocketAddr;
+
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
@@ -64,22 +66,20 @@ struct Note;
 fn open(mut commands: Commands, party: Res<Party>, played: Res<PlayedWorld>) {
     spawn_page(&mut commands, MenuPage::Together, "Together", WIDTH + 54.0, |column| {
         field(column, 0, "Your name", Field::Name);
-        let address = own_address().map(|address| format!("{address}:{PORT}"));
+        let port = if let Party::Host(port) = *party { port } else { PORT };
+        let address = own_address().map(|address| SocketAddr::new(address, port));
+        let address = address.map_or_else(|| "this machine's address".into(), |address| address.to_string());
         let (host, note) = match *party {
-            Party::Alone => {
-                let address = address.unwrap_or_else(|| "this machine's address".into());
-                ("Let others join this world", format!("others then join at {address}"))
-            }
-            Party::Host(_) => {
-                ("Let nobody join any more", format!("others join at {}", address.unwrap_or_default()))
-            }
+            Party::Alone => ("Let others join this world", format!("others then join at {address}")),
+            Party::Host(_) => ("Let nobody join any more", format!("others join at {address}")),
             Party::Guest(host) => ("Leave", format!("you are at {host}")),
         };
         column.spawn(widgets::button(1, host, WIDTH)).observe(change_host);
         field(column, 2, "Address of a host", Field::Host);
         column.spawn(widgets::button(3, "Join", WIDTH)).observe(join);
-        let line = Node { margin: UiRect::axes(px(14), px(8)), ..default() };
-        let saved = if played.0.is_some() { "" } else { "; nothing is saved" };
+        let line = Node { width: px(WIDTH - 28.0), margin: UiRect::axes(px(14), px(8)), ..default() };
+        let is_saved = played.0.is_some() || matches!(*party, Party::Guest(_));
+        let saved = if is_saved { "" } else { "; nothing is saved" };
         column.spawn((Note, text(format!("{note}{saved}"), 15.0, GREY), line));
         column.spawn(widgets::button(4, "Back", WIDTH)).observe(go_to(MenuPage::Menu));
     });
