@@ -55,6 +55,14 @@ pub enum StoreError {
     /// Nothing of it can be read, and there is no log from which to rebuild it.
     #[error("the world can't be read: {0}")]
     Unreadable(String),
+    /// A part of a file takes more bytes than can be read, so it is neither read nor written.
+    #[error("a part of the file takes {length} bytes, more than the {limit} that can be read")]
+    TooLarge {
+        /// Its bytes.
+        length: u64,
+        /// The most that can be read.
+        limit: u64,
+    },
     /// The files can't be read or written.
     #[error("{doing}: {error}")]
     Files {

@@ -88,7 +88,7 @@ fn a_world_on_a_level_comes_back_whatever_happens() {
         assert!(opened.troubles.is_empty() && opened.is_log_whole && opened.replayed == 0);
         assert_eq!(state(&opened.terrain), state(&world));
         // A file to share needs no level.
-        let bytes = to_bytes(&opened.terrain, Default::default(), &BTreeMap::new());
+        let bytes = to_bytes(&opened.terrain, Default::default(), &BTreeMap::new()).expect("it is small");
         let shared = from_bytes(&bytes, Arc::clone(&ground)).expect("its own bytes");
         assert_eq!(state(&shared.terrain), state(&world));
     }
