@@ -39,8 +39,8 @@ pub enum StoreError {
         /// What the game called the level.
         label: String,
     },
-    /// The world was begun on another level than the one that is given, or the level has changed since. Nothing is lost: with
-    /// the level of then, the world can be opened.
+    /// The world was begun on another level than the one that is given, or the level has changed since, and
+    /// [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds. Nothing is lost.
     #[error(
         "the world was begun on the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}"
     )]
@@ -160,10 +160,10 @@ pub enum StoreTrouble {
         /// Where the copy is.
         quarantine: String,
     },
-    /// The ground is another one than the world was saved with; edits were kept or replayed.
-    #[error("the ground has changed below {regions} saved regions; the edits were {kept}")]
+    /// The ground or the level is another one than the world was saved with; edits were kept or replayed.
+    #[error("the ground or the level has changed below {regions} saved regions; the edits were {kept}")]
     BaseChanged {
-        /// Regions with edits over changed ground.
+        /// Regions with edits over changed ground; all of them, if it is the level.
         regions: usize,
         /// What became of the edits: "kept" or "replayed".
         kept: &'static str,

@@ -297,7 +297,7 @@ impl Writer {
     /// Lets the world stand on another ground from now on.
     fn take_ground(&mut self, ground: Arc<Ground>) {
         if ground.hash() != self.ground.hash() {
-            self.journal.set_base(base(ground.hash()));
+            self.journal.set_base(base(&ground, self.mirror.level.as_ref()));
             self.state.ground_hashes.clear();
             self.mirror.mark_all();
         }
