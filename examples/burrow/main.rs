@@ -195,6 +195,7 @@ fn export(world: &Path, file: &Path, ground: &GroundArgs) -> Result<(Value, bool
     let opened = Store::open(world, ground.required()?, StoreOptions::default());
     let (store, opened) = opened.map_err(|why| why.to_string())?;
     let bytes = store::to_bytes(&opened.terrain, store.world_id(), store.game_data());
+    let bytes = bytes.map_err(|why| why.to_string())?;
     let at = |error: std::io::Error| format!("{}: {error}", file.display());
     let mut out = std::fs::File::create_new(file).map_err(at)?;
     out.write_all(&bytes).and_then(|()| out.sync_all()).map_err(at)?;

@@ -93,7 +93,7 @@ impl AssetSaver for LevelSaver {
         (): &(),
         _: AssetPath<'_>,
     ) -> Result<(), LevelError> {
-        writer.write_all(&pack_level(&asset.0)).await?;
+        writer.write_all(&pack_level(&asset.0)?).await?;
         Ok(())
     }
 }

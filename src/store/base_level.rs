@@ -70,7 +70,7 @@ impl BaseLevel {
         &self.level
     }
 
-    /// The level that a world needs, if it is this one.
+    /// The level for a world that was begun on one, or on none.
     pub(super) fn needed<'a>(
         name: Option<&LevelName>,
         given: Option<&'a Self>,
@@ -78,12 +78,19 @@ impl BaseLevel {
         match (name, given) {
             (None, _) => Ok(None),
             (Some(name), None) => Err(StoreError::LevelMissing { label: name.label.clone() }),
-            (Some(name), Some(given)) if given.name.hash == name.hash => Ok(Some(given)),
-            (Some(name), Some(given)) => Err(StoreError::LevelChanged {
+            (Some(_), Some(given)) => Ok(Some(given)),
+        }
+    }
+
+    /// Is it the level that a world was begun on?
+    pub(super) fn expect(level: Option<&Self>, name: Option<&LevelName>) -> Result<(), StoreError> {
+        match (level, name) {
+            (Some(level), Some(name)) if level.name.hash != name.hash => Err(StoreError::LevelChanged {
                 label: name.label.clone(),
                 expected: name.hash,
-                found: given.name.hash,
+                found: level.name.hash,
             }),
+            _ => Ok(()),
         }
     }
 

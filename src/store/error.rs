@@ -39,8 +39,8 @@ pub enum StoreError {
         /// What the game called the level.
         label: String,
     },
-    /// The world was begun on another level than the one that is given, or the level has changed since. Nothing is lost: with
-    /// the level of then, the world can be opened.
+    /// The world was begun on another level than the one that is given, or the level has changed since, and
+    /// [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds. Nothing is lost.
     #[error(
         "the world was begun on the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}"
     )]
@@ -55,6 +55,14 @@ pub enum StoreError {
     /// Nothing of it can be read, and there is no log from which to rebuild it.
     #[error("the world can't be read: {0}")]
     Unreadable(String),
+    /// A part of a file takes more bytes than can be read, so it is neither read nor written.
+    #[error("a part of the file takes {length} bytes, more than the {limit} that can be read")]
+    TooLarge {
+        /// Its bytes.
+        length: u64,
+        /// The most that can be read.
+        limit: u64,
+    },
     /// The files can't be read or written.
     #[error("{doing}: {error}")]
     Files {
@@ -152,10 +160,10 @@ pub enum StoreTrouble {
         /// Where the copy is.
         quarantine: String,
     },
-    /// The ground is another one than the world was saved with; edits were kept or replayed.
-    #[error("the ground has changed below {regions} saved regions; the edits were {kept}")]
+    /// The ground or the level is another one than the world was saved with; edits were kept or replayed.
+    #[error("the ground or the level has changed below {regions} saved regions; the edits were {kept}")]
     BaseChanged {
-        /// Regions with edits over changed ground.
+        /// Regions with edits over changed ground; all of them, if it is the level.
         regions: usize,
         /// What became of the edits: "kept" or "replayed".
         kept: &'static str,

@@ -209,6 +209,7 @@ pub fn replay(
     let checkpoint = contents.choose_checkpoint();
     let name = checkpoint.as_ref().and_then(|own| own.level.as_ref());
     let level = BaseLevel::needed(name, level)?;
+    BaseLevel::expect(level, name)?;
     let settings = checkpoint.as_ref().map_or_else(TerrainSettings::default, |own| own.metadata.settings);
     recover::replay_all(&contents, &ground.into(), settings, level)
 }

@@ -7,11 +7,9 @@ use std::sync::Arc;
 use super::error::StoreError;
 use super::format::FormatError;
 use super::format::level::{self, Level, LevelFiles};
+use super::format::limits::Limits;
 use crate::ground::Ground;
 use crate::terrain::{RestoreError, Terrain};
-
-/// Most bytes of a level's file that is read.
-const MOST_BYTES: u64 = 1 << 30;
 
 /// Why no terrain can be made of a level.
 #[derive(Debug, thiserror::Error)]
@@ -84,8 +82,9 @@ pub fn read_level_files(path: impl AsRef<Path>) -> Result<LevelFiles, StoreError
     let read = StoreError::files("reading the level");
     if !path.is_dir() {
         let size = fs::metadata(path).map_err(StoreError::files("reading the level"))?.len();
-        if size > MOST_BYTES {
-            return Err(StoreError::Unreadable(format!("the level has more than {MOST_BYTES} bytes")));
+        let limit = Limits::FORMAT.packed_level as u64;
+        if size > limit {
+            return Err(FormatError::TooLarge { length: size, limit }.into());
         }
         return Ok(level::unpack_level(&fs::read(path).map_err(read)?)?);
     }

@@ -127,7 +127,7 @@ impl Store {
         let journal = Journal::new(
             Arc::clone(&files),
             world,
-            base(ground.hash()),
+            base(&ground, mirror.level.as_ref()),
             Vec::new(),
             frame + 1,
             (0, Vec::new()),
@@ -149,8 +149,8 @@ impl Store {
     /// Opens the world in a folder over the ground that it was saved with.
     ///
     /// # Errors
-    /// When there is none, when it is open already, when a newer version saved it, when the ground has changed and the options
-    /// [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing or another one, and when
+    /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below has changed
+    /// and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing, and when
     /// nothing of it can be read. Whatever else is wrong is told in [`Opened::troubles`].
     pub fn open(
         folder: impl AsRef<Path>,
@@ -191,7 +191,7 @@ impl Store {
         let journal = Journal::new(
             Arc::clone(&files),
             world,
-            base(ground.hash()),
+            base(&ground, mirror.level.as_ref()),
             settled.segments,
             settled.next_frame,
             (0, Vec::new()),

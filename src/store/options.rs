@@ -5,13 +5,18 @@ use std::time::Duration;
 use super::base_level::BaseLevel;
 use super::progress::Progress;
 
-/// What to do with edits where the ground is another one than they were made on.
+/// What to do with edits where the ground is another one than they were made on, or where the [level](StoreOptions::level) is
+/// another one than the world was begun on, say a new version of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BaseChanged {
-    /// Edited samples stay as they are: a hole stays where it is. What was pristine is that of the new ground.
+    /// Edited samples stay as they are: a hole stays where it is. What was pristine is that of the new ground. Bricks that
+    /// differed from the level stay as they are, all of their 512 samples, and all others are those of the new level.
+    ///
+    /// Commits behind the last checkpoint, which are there after a crash only, are made again.
     #[default]
     Keep,
-    /// All edits are made again on the new ground, if the log has all of them; else they are kept.
+    /// All edits are made again on the new ground and level, if the log has all of them; else they are kept. What an undo put
+    /// back is put back as it was.
     Replay,
     /// The world is not opened.
     Refuse,
@@ -36,10 +41,11 @@ pub struct StoreOptions {
     /// Bytes that a frame of the log may hold, 256 MiB at most. Commits and game data of more that come at once are saved by a
     /// checkpoint instead, which leaves a gap in the log.
     pub frame_bytes: usize,
-    /// Where the ground has changed.
+    /// Where the ground or the level has changed.
     pub base_changed: BaseChanged,
-    /// The level that the world begins as. A new world saves only what differs from it, and can be opened with the same level
-    /// only. Worlds that were created without one ignore it.
+    /// The level that the world begins as. A new world saves only what differs from it, and can't be opened without a level. With
+    /// another one than it was begun on, [`base_changed`](Self::base_changed) says what happens; from then on it is a world on
+    /// that one. Worlds that were created without a level ignore it.
     pub level: Option<BaseLevel>,
     /// Where to tell how far opening is.
     pub progress: Option<Progress>,

@@ -12,7 +12,14 @@ use crate::terrain::{SIMULATION, Terrain, TerrainSettings};
 
 /// The bytes of a terrain's world, with data of the game's by key. The same world under the same name gives the same bytes.
 /// Neither the ground nor history are part of it.
-pub fn to_bytes(terrain: &Terrain, world: WorldId, game: &BTreeMap<String, Vec<u8>>) -> Vec<u8> {
+///
+/// # Errors
+/// [`StoreError::TooLarge`] when it could not be read again: data of the game's and 13 bytes for each region may take 256 MiB.
+pub fn to_bytes(
+    terrain: &Terrain,
+    world: WorldId,
+    game: &BTreeMap<String, Vec<u8>>,
+) -> Result<Vec<u8>, StoreError> {
     let (parts, ground) = (terrain.parts(), terrain.world().ground());
     let metadata = Metadata {
         settings: TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() },
@@ -22,7 +29,7 @@ pub fn to_bytes(terrain: &Terrain, world: WorldId, game: &BTreeMap<String, Vec<u
         game: game.iter().map(|(key, bytes)| (key.clone(), bytes.clone())).collect(),
         ..Metadata::default()
     };
-    write_portable(&PortableWorld::new(world, metadata, parts, ground))
+    Ok(write_portable(&PortableWorld::new(world, metadata, parts, ground))?)
 }
 
 /// A world that was read from bytes.
@@ -60,6 +67,7 @@ impl From<FormatError> for StoreError {
     fn from(error: FormatError) -> Self {
         match error {
             FormatError::Newer { found, known } => Self::Newer { found, known },
+            FormatError::TooLarge { length, limit } => Self::TooLarge { length, limit },
             error => Self::Unreadable(error.to_string()),
         }
     }

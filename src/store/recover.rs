@@ -17,10 +17,10 @@ use super::progress::{Progress, Work};
 use super::segment::{self, Frame};
 use super::shared::{GameData, apply_game};
 use crate::ground::Ground;
-use crate::lattice::RegionPos;
+use crate::lattice::{ChunkGrid, RegionPos};
 use crate::terrain::{
-    CommitRecord, LogEntry, Meshing, ReplayError, Terrain, TerrainSettings, WorkLimits, WorldChange,
-    WorldParts,
+    CommitRecord, LogEntry, Meshing, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
+    WorldChange, WorldParts,
 };
 use crate::volume::DiggingRules;
 
@@ -82,49 +82,55 @@ pub(super) fn recover(
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     let is_contiguous = last >= checkpoint.frame;
-    let base = segment::base(ground.hash());
+    let base = segment::base(ground, level);
     let is_log_whole = is_contiguous && whole.iter().all(|frame| frame.base == base);
     let is_same_ground = checkpoint.metadata.ground == ground.hash();
+    let other_level = BaseLevel::expect(level, checkpoint.level.as_ref());
+    let is_same_base = is_same_ground && other_level.is_ok();
+    if base_changed == BaseChanged::Refuse {
+        other_level?;
+    }
     if !is_same_ground && base_changed == BaseChanged::Refuse {
         return Err(StoreError::BaseChanged {
-            regions: changed_regions(contents, &checkpoint, ground).len(),
+            regions: changed_regions(contents, &checkpoint, ground, level).len(),
         });
     }
     let settings = checkpoint.metadata.settings;
     let empty = || -> Result<Terrain, StoreError> { Ok(BaseLevel::first(level, ground, &settings)?) };
-    if !is_same_ground && base_changed == BaseChanged::Replay && is_contiguous {
+    if !is_same_base && base_changed == BaseChanged::Replay && is_contiguous {
         let work = replaying(progress, &whole);
         let replayed = replay_good(empty, &GameData::new(), &whole, false, &work)?;
-        let regions = changed_regions(contents, &checkpoint, ground).len();
-        let mut recovered = Recovered::whole(replayed, level);
+        let regions = changed_regions(contents, &checkpoint, ground, level).len();
+        let mut recovered = Recovered::whole(replayed, level, &checkpoint);
         recovered.base_changed = Some((regions, "replayed"));
         return Ok(recovered);
     }
 
     let tail = contents.frames_from(checkpoint.frame + 1);
     let regions = contents.bytes_of(&checkpoint);
-    let end = if is_same_ground { RECOVERED } else { RECOVERED_ANEW };
+    let end = if is_same_base { RECOVERED } else { RECOVERED_ANEW };
     let work = Work::until(progress, end, (DECODE + RESTORE) * regions + REPLAY * bytes_of(&tail));
-    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, &work);
+    let grid = Terrain::new(Arc::clone(ground), &settings).map_err(RestoreError::from)?.world().grid();
+    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, grid, &work);
     let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
     let restored = restore(parts.clone());
     work.advance(RESTORE * regions);
     let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
-    if is_same_ground && !is_exact && is_log_whole {
+    if is_same_base && !is_exact && is_log_whole {
         let work = replaying(progress, &whole);
         let replayed = replay_good(empty, &GameData::new(), &whole, true, &work)?;
         // Behind what can't be replayed, the checkpoint may know more.
         if replayed.frame >= checkpoint.frame {
-            let mut recovered = Recovered::whole(replayed, level);
+            let mut recovered = Recovered::whole(replayed, level, &checkpoint);
             recovered.is_log_whole = true;
             recovered.damaged = damaged;
             return Ok(recovered);
         }
     }
     let terrain = restored?;
-    let is_checked = is_same_ground && is_exact;
+    let is_checked = is_same_base && is_exact;
     let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
-    let (grid, hash) = (terrain.world().grid(), terrain.world().hash());
+    let hash = terrain.world().hash();
     let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone(), level.cloned());
     let mut restored = Some(terrain);
     let begin = || -> Result<Terrain, StoreError> {
@@ -135,7 +141,7 @@ pub(super) fn recover(
     };
     let replayed = replay_good(begin, &game, &tail, is_checked, &work)?;
     let frame = replayed.frame.max(checkpoint.frame);
-    let regions = changed_regions(contents, &checkpoint, ground).len();
+    let regions = changed_regions(contents, &checkpoint, ground, level).len();
     if is_checked {
         mirror.set_revisions(&checkpoint.regions);
         mirror.mark_saved();
@@ -143,12 +149,14 @@ pub(super) fn recover(
         mirror.game = replayed.game;
     } else {
         mirror = Mirror::new(
-            replayed.terrain.world().grid(),
+            grid,
             replayed.terrain.parts(),
             replayed.terrain.world().hash(),
             replayed.game,
             level.cloned(),
         );
+        // Also those whose records go.
+        mirror.put_back(checkpoint.regions.keys().copied());
     }
     Ok(Recovered {
         terrain: replayed.terrain,
@@ -158,9 +166,9 @@ pub(super) fn recover(
         replayed: replayed.commits,
         is_log_whole: is_log_whole && is_checked,
         is_new: !is_checked,
-        is_lossy: is_same_ground && !is_exact,
+        is_lossy: !is_checked,
         damaged,
-        base_changed: (!is_same_ground).then_some((regions, "kept")),
+        base_changed: (!is_same_base).then_some((regions, "kept")),
         refused: replayed.refused,
     })
 }
@@ -172,10 +180,12 @@ impl Recovered {
     }
 
     /// A world that was replayed from its first commit.
-    fn whole(replayed: Replayed, level: Option<&BaseLevel>) -> Self {
+    fn whole(replayed: Replayed, level: Option<&BaseLevel>, checkpoint: &Checkpoint) -> Self {
         let world = replayed.terrain.world();
         let parts = replayed.terrain.parts();
-        let mirror = Mirror::new(world.grid(), parts, world.hash(), replayed.game, level.cloned());
+        let mut mirror = Mirror::new(world.grid(), parts, world.hash(), replayed.game, level.cloned());
+        // Also those whose records go.
+        mirror.put_back(checkpoint.regions.keys().copied());
         Self {
             mirror,
             terrain: replayed.terrain,
@@ -220,8 +230,16 @@ fn bytes_of(frames: &[&Frame]) -> u64 {
     frames.iter().map(|frame| frame.payload.len() as u64).sum()
 }
 
-/// The regions whose heights below are not those that they were saved with.
-fn changed_regions(contents: &Contents, checkpoint: &Checkpoint, ground: &Ground) -> BTreeSet<RegionPos> {
+/// The regions whose heights below are not those that they were saved with; all of them on another level.
+fn changed_regions(
+    contents: &Contents,
+    checkpoint: &Checkpoint,
+    ground: &Ground,
+    level: Option<&BaseLevel>,
+) -> BTreeSet<RegionPos> {
+    if BaseLevel::expect(level, checkpoint.level.as_ref()).is_err() {
+        return checkpoint.regions.keys().copied().collect();
+    }
     if checkpoint.metadata.ground == ground.hash() {
         return BTreeSet::new();
     }
@@ -239,6 +257,7 @@ fn load_regions(
     checkpoint: &Checkpoint,
     ground: &Ground,
     level: Option<&BaseLevel>,
+    grid: ChunkGrid,
     work: &Work,
 ) -> (WorldParts, Vec<RegionPos>) {
     let metadata = &checkpoint.metadata;
@@ -247,6 +266,7 @@ fn load_regions(
     if below.chunk_size != metadata.settings.chunk_size {
         fields.clear();
     }
+    let is_same_level = BaseLevel::expect(level, checkpoint.level.as_ref()).is_ok();
     let decode = |(at, revision): &(RegionPos, u64)| {
         let record = contents.region(*at, *revision);
         let change = record.and_then(|record| record.decode(*at, ground).ok());
@@ -261,7 +281,9 @@ fn load_regions(
         match change {
             Some(change) => {
                 bricks.extend(change.bricks);
-                fields.extend(change.fields);
+                if is_same_level {
+                    fields.extend(change.fields);
+                }
             }
             None => damaged.push(at),
         }
@@ -270,7 +292,12 @@ fn load_regions(
     keep_latest(&mut fields);
     bricks.retain(|(_, brick)| brick.is_some());
     fields.retain(|(_, fields)| !fields.is_empty());
-    let change = WorldChange { bricks, fields, next_field: metadata.next_field };
+    let next_field = metadata.next_field.max(below.change.next_field);
+    let mut change = WorldChange { bricks, fields, next_field };
+    if !is_same_level {
+        // Fields of two levels may overlap, and have one name: the new one's go on, and grow.
+        change.cover(grid);
+    }
     let parts = WorldParts {
         change,
         chunk_size: metadata.settings.chunk_size,
@@ -355,12 +382,14 @@ fn replay(
     terrain.set_work_limits(limits);
     terrain.set_meshing(Meshing::All);
     terrain.keep_log(None);
-    // Other transactions than those of the records may have led here.
-    if revision.is_some_and(|revision| revision != terrain.world().revision()) {
-        let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
-        let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let revision = revision.unwrap_or(parts.revision);
-        terrain = Terrain::restore(ground, &settings, WorldParts { revision, ..parts })?;
+    if !is_checked && let Some(revision) = revision {
+        // Other transactions than those of the records may have led here, and bricks have come without fields.
+        let (ground, mut parts) = (terrain.world().shared_ground(), terrain.parts());
+        let has_grown = parts.change.cover(terrain.world().grid());
+        if has_grown || revision != parts.revision {
+            let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
+            terrain = Terrain::restore(ground, &settings, WorldParts { revision, ..parts })?;
+        }
     }
     Ok(Replayed { terrain, game, records, frame: last, commits, refused })
 }
@@ -375,7 +404,11 @@ fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), 
             LogEntry::Loose(settings) => terrain.set_loose(*settings),
             LogEntry::Edit(edit) => terrain.submit_edit(edit),
             LogEntry::Ground(ground) => terrain.set_ground(Arc::clone(ground))?,
-            LogEntry::Change => drop(terrain.apply_change(record.change.clone(), None)?),
+            // Its fields are those of the other world.
+            LogEntry::Change => {
+                let bricks = record.change.bricks.clone();
+                terrain.apply_change(WorldChange { bricks, ..WorldChange::default() }, None)?;
+            }
         }
     }
     // Edits that this world rejects are left out.

@@ -9,8 +9,10 @@
 use std::io;
 use std::ops::Range;
 
+use super::base_level::BaseLevel;
 use super::files::Files;
 use super::format::frame::{self, Kind, WorldId};
+use crate::ground::Ground;
 use crate::terrain::SIMULATION;
 
 /// The folder of segments.
@@ -44,10 +46,12 @@ fn key(frame: u64) -> [u8; 8] {
     frame.to_be_bytes()
 }
 
-/// Names a ground and how edits change it: frames that were written under another name can't be replayed exactly.
-pub(super) fn base(ground: u64) -> u64 {
+/// Names a ground, the level on it, and how edits change them: frames that were written under another name can't be replayed
+/// exactly.
+pub(super) fn base(ground: &Ground, level: Option<&BaseLevel>) -> u64 {
+    let level = level.map_or(0, |level| level.name().hash.rotate_left(1));
     // Any odd number keeps simulations apart.
-    ground ^ u64::from(SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    ground.hash() ^ level ^ u64::from(SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
 /// An entry of a segment.

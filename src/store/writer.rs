@@ -138,7 +138,11 @@ impl Writer {
     /// Lets the journal's next segment begin with the state of now.
     pub fn begin_segment(&mut self) {
         let frame = self.journal.last_frame();
-        let checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
+        let mut checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
+        if checkpoint.len() > FRAME_LIMIT {
+            // It could not be read; the database has the last one that can.
+            checkpoint.clear();
+        }
         self.journal.begin_segment(self.mirror.revision, checkpoint);
     }
 
@@ -293,7 +297,7 @@ impl Writer {
     /// Lets the world stand on another ground from now on.
     fn take_ground(&mut self, ground: Arc<Ground>) {
         if ground.hash() != self.ground.hash() {
-            self.journal.set_base(base(ground.hash()));
+            self.journal.set_base(base(&ground, self.mirror.level.as_ref()));
             self.state.ground_hashes.clear();
             self.mirror.mark_all();
         }

@@ -1,5 +1,6 @@
 //! A terrain from what was saved of it: from parts, or by replaying records.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::model::Terrain;
@@ -93,7 +94,8 @@ impl Terrain {
         let WorldParts { mut change, chunk_size, revision, rules, loose } = parts;
         check_number(revision)?;
         if chunk_size != settings.chunk_size {
-            (change.fields, change.next_field) = fields_of(terrain.world.grid(), &change);
+            change.fields.clear();
+            change.cover(terrain.world.grid());
         }
         terrain.meshing = Meshing::Never;
         terrain.put_now(Put { change, hash: None, counts: false, ground: None })?;
@@ -162,19 +164,28 @@ impl Terrain {
     }
 }
 
-/// Fields for the bricks of a change, and the greatest of their names.
-fn fields_of(grid: ChunkGrid, change: &WorldChange) -> (Vec<(ChunkPos, Fields)>, u64) {
-    let mut fields = std::collections::BTreeMap::<ChunkPos, Fields>::new();
-    let mut next = change.next_field;
-    for (pos, brick) in &change.bricks {
-        let Some(edited) = brick.as_ref().and_then(|brick| brick.edited_bounds(*pos)) else { continue };
-        for chunk in grid.chunks_of(edited) {
-            let Some(own) = grid.chunk_samples(chunk).intersection(edited) else { continue };
-            fields.entry(chunk).or_default().absorb(own, || {
-                next = next.saturating_add(1);
-                FieldId(next)
-            });
+impl WorldChange {
+    /// Lets fields take in the edited samples of all bricks that none of them holds; new ones get names that none has had. Returns
+    /// whether there were any.
+    pub(crate) fn cover(&mut self, grid: ChunkGrid) -> bool {
+        let mut fields: BTreeMap<ChunkPos, Fields> = std::mem::take(&mut self.fields).into_iter().collect();
+        let (mut next, mut has_grown) = (self.next_field, false);
+        for (pos, brick) in &self.bricks {
+            let Some(edited) = brick.as_ref().and_then(|brick| brick.edited_bounds(*pos)) else { continue };
+            for chunk in grid.chunks_of(edited) {
+                let Some(own) = grid.chunk_samples(chunk).intersection(edited) else { continue };
+                let fields = fields.entry(chunk).or_default();
+                if fields.iter().any(|field| field.bounds.encloses(own)) {
+                    continue;
+                }
+                has_grown = true;
+                fields.absorb(own, || {
+                    next = next.saturating_add(1);
+                    FieldId(next)
+                });
+            }
         }
+        (self.fields, self.next_field) = (fields.into_iter().collect(), next);
+        has_grown
     }
-    (fields.into_iter().collect(), next)
 }

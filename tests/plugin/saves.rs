@@ -215,7 +215,7 @@ fn a_terrain_begins_as_the_level_that_is_loaded() {
     let folder = Folder::new("level");
     let (level, expected) = level();
     std::fs::create_dir_all(&folder.0).expect("a new folder");
-    let packed = pack_level(&write_level(&level).expect("it can be written"));
+    let packed = pack_level(&write_level(&level).expect("it can be written")).expect("it is small");
     std::fs::write(folder.0.join("pit.burrow_level"), packed).expect("a new file");
 
     let mut app = App::new();

@@ -25,7 +25,7 @@ fn drawn(terrain: &Terrain) -> BTreeMap<Drawn, SurfaceMesh> {
 
 /// The same world, written and read over a ground.
 fn read_over(ground: &Arc<Ground>, terrain: &Terrain) -> Terrain {
-    let bytes = to_bytes(terrain, WorldId(1), &BTreeMap::new());
+    let bytes = to_bytes(terrain, WorldId(1), &BTreeMap::new()).expect("it is small");
     let mut read = from_bytes(&bytes, Arc::clone(ground)).expect("its own bytes").terrain;
     read.set_meshing(terrain.meshing());
     read

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseLevel, Files, Level, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble, check_in,
-    from_bytes, inspect_in, to_bytes,
+    BaseChanged, BaseLevel, Files, Level, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
+    check_in, from_bytes, inspect_in, to_bytes,
 };
 use bevy_burrow::terrain::{Meshing, WorldChange};
 use fastrand::Rng;
@@ -15,18 +15,18 @@ use glam::Vec3;
 use crate::play::{act, check_opened, count, ground, options, save, state, terrain};
 
 /// A level that somebody sculpted.
-fn level(ground: &Arc<Ground>, seed: u64, acts: u32) -> BaseLevel {
+pub fn level(ground: &Arc<Ground>, seed: u64, acts: u32) -> BaseLevel {
     let (mut sculpted, mut rng) = (terrain(ground), Rng::with_seed(seed));
     (0..acts).for_each(|_| act(&mut sculpted, &mut rng));
     BaseLevel::new(Level::of(&sculpted), format!("levels/{seed}"))
 }
 
-fn on(level: &BaseLevel, options: StoreOptions) -> StoreOptions {
+pub fn on(level: &BaseLevel, options: StoreOptions) -> StoreOptions {
     StoreOptions { level: Some(level.clone()), ..options }
 }
 
 /// A new world on a level.
-fn begin(
+pub fn begin(
     disk: &SimulatedDisk,
     level: &BaseLevel,
     ground: &Arc<Ground>,
@@ -40,7 +40,7 @@ fn begin(
 }
 
 /// Makes a brick of the level pristine again, together with all fields of its world.
-fn restore_brick(world: &mut Terrain, rng: &mut Rng) {
+pub fn restore_brick(world: &mut Terrain, rng: &mut Rng) {
     let mut places: Vec<_> = world.world().bricks().map(|(pos, _)| pos).collect();
     places.sort_unstable();
     if let Some(pos) = rng.choice(places) {
@@ -88,7 +88,7 @@ fn a_world_on_a_level_comes_back_whatever_happens() {
         assert!(opened.troubles.is_empty() && opened.is_log_whole && opened.replayed == 0);
         assert_eq!(state(&opened.terrain), state(&world));
         // A file to share needs no level.
-        let bytes = to_bytes(&opened.terrain, Default::default(), &BTreeMap::new());
+        let bytes = to_bytes(&opened.terrain, Default::default(), &BTreeMap::new()).expect("it is small");
         let shared = from_bytes(&bytes, Arc::clone(&ground)).expect("its own bytes");
         assert_eq!(state(&shared.terrain), state(&world));
     }
@@ -139,7 +139,8 @@ fn a_level_that_is_missing_or_has_changed_is_told_and_loses_nothing() {
     save(&mut store, &mut world).expect("the thread runs");
     drop(store);
     let open = |level: Option<&BaseLevel>| {
-        let options = StoreOptions { level: level.cloned(), ..options(9) };
+        let base_changed = BaseChanged::Refuse;
+        let options = StoreOptions { level: level.cloned(), base_changed, ..options(9) };
         Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), options)
     };
     let missing = open(None).expect_err("it has a level");

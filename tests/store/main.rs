@@ -6,6 +6,7 @@ mod ground;
 mod kill;
 mod levels;
 mod opening;
+mod other_level;
 mod play;
 mod power;
 mod random;

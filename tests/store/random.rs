@@ -108,7 +108,8 @@ fn play(seed: u64, operations: u64) -> [u64; 5] {
             }
             39 => {
                 // The world goes through one piece of bytes into another folder.
-                let bytes = to_bytes(&saved, open_store.world_id(), open_store.game_data());
+                let bytes =
+                    to_bytes(&saved, open_store.world_id(), open_store.game_data()).expect("it is small");
                 drop(store.take());
                 let imported = from_bytes(&bytes, Arc::clone(&ground)).expect("its own bytes");
                 saved = imported.terrain;

@@ -14,15 +14,13 @@ use xxhash_rust::xxh3::xxh3_64;
 use super::bytes::{Reader, put_bytes, put_number};
 use super::error::FormatError;
 use super::frame::{self, Kind, WorldId};
+use super::limits::check;
 
 /// How every file begins.
 const MAGIC: [u8; 4] = *b"\xB5BUR";
 
 /// The key of every head.
 const KEY: &[u8] = b"head";
-
-/// The most bytes of a head's content.
-const HEAD_LIMIT: usize = 256 << 20;
 
 /// Bytes that each frame takes in the head, at least.
 const ENTRY: usize = 9;
@@ -37,7 +35,16 @@ pub struct Container<'a> {
 }
 
 /// A file of frames; `own` is what its head says beside.
-pub fn write(kind: Kind, world: WorldId, own: &[u8], frames: &[Vec<u8>]) -> Vec<u8> {
+///
+/// # Errors
+/// When the head would have more bytes than `limit`.
+pub fn write(
+    kind: Kind,
+    world: WorldId,
+    own: &[u8],
+    frames: &[Vec<u8>],
+    limit: usize,
+) -> Result<Vec<u8>, FormatError> {
     let mut head = Vec::new();
     put_bytes(&mut head, own);
     put_number(&mut head, frames.len() as u64);
@@ -45,21 +52,23 @@ pub fn write(kind: Kind, world: WorldId, own: &[u8], frames: &[Vec<u8>]) -> Vec<
         put_number(&mut head, frame.len() as u64);
         head.extend_from_slice(&xxh3_64(frame).to_le_bytes());
     }
+    check(&head, limit)?;
     let head = frame::seal(kind, world, KEY, 0, 0, &head);
     let mut file = MAGIC.to_vec();
     // A head is shorter than its limit.
     file.extend_from_slice(&(head.len() as u32).to_le_bytes());
     file.extend_from_slice(&head);
     frames.iter().for_each(|frame| file.extend_from_slice(frame));
-    file
+    Ok(file)
 }
 
 /// Takes a file apart.
 ///
 /// # Errors
-/// When it is no file of this kind, when it is cut off, or when a frame is not the one that the head names.
-pub fn read(kind: Kind, file: &[u8]) -> Result<Container<'_>, FormatError> {
-    let (world, head, mut rest) = read_head(kind, file)?;
+/// When it is no file of this kind, when it is cut off, when a frame is not the one that the head names, or when the head has more
+/// bytes than `limit`.
+pub fn read(kind: Kind, file: &[u8], limit: usize) -> Result<Container<'_>, FormatError> {
+    let (world, head, mut rest) = read_head(kind, file, limit)?;
     let mut reader = Reader(&head);
     let own = reader.bytes()?.to_vec();
     let count = entries(&mut reader)?;
@@ -79,15 +88,15 @@ pub fn read(kind: Kind, file: &[u8]) -> Result<Container<'_>, FormatError> {
 }
 
 /// The world and what the head says beside its frames, without looking at these.
-pub fn read_own(kind: Kind, file: &[u8]) -> Result<(WorldId, Vec<u8>), FormatError> {
-    let (world, head, _) = read_head(kind, file)?;
+pub fn read_own(kind: Kind, file: &[u8], limit: usize) -> Result<(WorldId, Vec<u8>), FormatError> {
+    let (world, head, _) = read_head(kind, file, limit)?;
     Ok((world, Reader(&head).bytes()?.to_vec()))
 }
 
-fn read_head(kind: Kind, file: &[u8]) -> Result<(WorldId, Vec<u8>, Reader<'_>), FormatError> {
+fn read_head(kind: Kind, file: &[u8], limit: usize) -> Result<(WorldId, Vec<u8>, Reader<'_>), FormatError> {
     let mut reader = Reader(file.strip_prefix(&MAGIC).ok_or(FormatError::Magic)?);
     let length = u32::from_le_bytes(reader.array()?);
-    let (world, opened) = frame::open_any_world(reader.take(length as usize)?, kind, KEY, HEAD_LIMIT)?;
+    let (world, opened) = frame::open_any_world(reader.take(length as usize)?, kind, KEY, limit)?;
     Ok((world, opened.payload, reader))
 }
 

@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::container;
 use super::error::FormatError;
 use super::frame::{self, Kind, WorldId};
+use super::limits::{Limits, check, within};
 use super::portable::{SavedRegion, by_region, of_regions};
-use super::region::{REGION_LIMIT, region_key};
+use super::region::region_key;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
 use crate::terrain::{LooseSettings, SIMULATION, TerrainSettings, WorldParts};
@@ -20,9 +21,6 @@ use crate::volume::DiggingRules;
 
 /// The file that says what a level is.
 pub const LEVEL_JSON: &str = "level.json";
-
-/// The most bytes of a file of a packed level.
-const FILE_LIMIT: usize = 64 << 20;
 
 /// The files of a level by name.
 pub type LevelFiles = BTreeMap<String, Vec<u8>>;
@@ -100,8 +98,13 @@ fn file_error(name: &str, why: impl ToString) -> FormatError {
 /// The files of a level. The same content gives the same bytes, file by file.
 ///
 /// # Errors
-/// When settings hold numbers that JSON can't.
+/// When settings hold numbers that JSON can't, and [`FormatError::TooLarge`] when `level.json` with the game's data takes more than
+/// 64 MiB or a region more than 8 MiB, which bricks and fields of a terrain never do.
 pub fn write_level(level: &Level) -> Result<LevelFiles, FormatError> {
+    write_within(level, &Limits::FORMAT)
+}
+
+pub(super) fn write_within(level: &Level, limits: &Limits) -> Result<LevelFiles, FormatError> {
     let description = Description {
         burrow_level: frame::SCHEMA,
         simulation: SIMULATION,
@@ -114,10 +117,12 @@ pub fn write_level(level: &Level) -> Result<LevelFiles, FormatError> {
         regions: level.regions.keys().map(|at| region_name(*at)).collect(),
     };
     let json = serde_json::to_string_pretty(&description).map_err(|error| file_error(LEVEL_JSON, error))?;
-    let mut files = LevelFiles::from([(LEVEL_JSON.to_owned(), (json + "\n").into_bytes())]);
+    let mut files =
+        LevelFiles::from([(LEVEL_JSON.to_owned(), within((json + "\n").into_bytes(), limits.level_file)?)]);
     for (at, region) in &level.regions {
         let (key, hash) = (region_key(*at), region.ground_hash);
-        let sealed = frame::seal_unpacked(Kind::Region, WorldId::default(), &key, hash, &region.encode());
+        let content = within(region.encode(), limits.region)?;
+        let sealed = frame::seal_unpacked(Kind::Region, WorldId::default(), &key, hash, &content);
         files.insert(region_name(*at), sealed);
     }
     Ok(files)
@@ -128,7 +133,16 @@ pub fn write_level(level: &Level) -> Result<LevelFiles, FormatError> {
 /// # Errors
 /// When a file is damaged, missing, or none of the level's.
 pub fn read_level(files: &LevelFiles, ground: &Ground) -> Result<Level, FormatError> {
+    read_within(files, ground, &Limits::FORMAT)
+}
+
+pub(super) fn read_within(
+    files: &LevelFiles,
+    ground: &Ground,
+    limits: &Limits,
+) -> Result<Level, FormatError> {
     let json = files.get(LEVEL_JSON).ok_or_else(|| file_error(LEVEL_JSON, "it is missing"))?;
+    check(json, limits.level_file)?;
     let of: Description = read_description(json)?;
     let hash = u64::from_str_radix(&of.ground, 16).map_err(|error| file_error(LEVEL_JSON, error))?;
     if let Some(other) = files.keys().find(|name| *name != LEVEL_JSON && !of.regions.contains(*name)) {
@@ -138,7 +152,7 @@ pub fn read_level(files: &LevelFiles, ground: &Ground) -> Result<Level, FormatEr
     for name in &of.regions {
         let at = region_of_name(name).ok_or_else(|| file_error(name, "no region has this name"))?;
         let file = files.get(name).ok_or_else(|| file_error(name, "it is missing"))?;
-        let opened = frame::open(file, Kind::Region, WorldId::default(), &region_key(at), REGION_LIMIT);
+        let opened = frame::open(file, Kind::Region, WorldId::default(), &region_key(at), limits.region);
         let region = opened.and_then(|opened| SavedRegion::decode(&opened, at, ground));
         regions.insert(at, region.map_err(|error| file_error(name, error))?);
     }
@@ -175,12 +189,21 @@ fn read_description(json: &[u8]) -> Result<Description, FormatError> {
 }
 
 /// A level's files in one, to ship.
-pub fn pack_level(files: &LevelFiles) -> Vec<u8> {
+///
+/// # Errors
+/// [`FormatError::TooLarge`] when a file takes more than 64 MiB, or all together more than a GiB once packed.
+pub fn pack_level(files: &LevelFiles) -> Result<Vec<u8>, FormatError> {
+    pack_within(files, &Limits::FORMAT)
+}
+
+pub(super) fn pack_within(files: &LevelFiles, limits: &Limits) -> Result<Vec<u8>, FormatError> {
     let file = |(name, bytes): (&String, &Vec<u8>)| {
-        frame::seal(Kind::LevelFile, WorldId::default(), name.as_bytes(), 0, 0, bytes)
+        check(bytes, limits.level_file)?;
+        Ok(frame::seal(Kind::LevelFile, WorldId::default(), name.as_bytes(), 0, 0, bytes))
     };
-    let frames: Vec<Vec<u8>> = files.iter().map(file).collect();
-    container::write(Kind::Level, WorldId::default(), &[], &frames)
+    let frames = files.iter().map(file).collect::<Result<Vec<Vec<u8>>, FormatError>>()?;
+    let packed = container::write(Kind::Level, WorldId::default(), &[], &frames, limits.head)?;
+    within(packed, limits.packed_level)
 }
 
 /// Reads what [`pack_level`] wrote; no ground is needed.
@@ -188,14 +211,20 @@ pub fn pack_level(files: &LevelFiles) -> Vec<u8> {
 /// # Errors
 /// When it is damaged, or holds a file whose name none of a level's has.
 pub fn unpack_level(packed: &[u8]) -> Result<LevelFiles, FormatError> {
+    unpack_within(packed, &Limits::FORMAT)
+}
+
+pub(super) fn unpack_within(packed: &[u8], limits: &Limits) -> Result<LevelFiles, FormatError> {
+    check(packed, limits.packed_level)?;
     let mut files = LevelFiles::new();
-    for sealed in container::read(Kind::Level, packed)?.frames {
+    for sealed in container::read(Kind::Level, packed, limits.head)?.frames {
         let key = frame::peek(sealed).ok_or(FormatError::Invalid("file"))?.key;
         let name = String::from_utf8(key).map_err(|_| FormatError::Key)?;
         if name != LEVEL_JSON && region_of_name(&name).is_none() {
             return Err(file_error(&name, "no file of a level has this name"));
         }
-        let opened = frame::open(sealed, Kind::LevelFile, WorldId::default(), name.as_bytes(), FILE_LIMIT)?;
+        let opened =
+            frame::open(sealed, Kind::LevelFile, WorldId::default(), name.as_bytes(), limits.level_file)?;
         if files.insert(name.clone(), opened.payload).is_some() {
             return Err(file_error(&name, "it comes twice"));
         }

@@ -9,7 +9,7 @@
 //! | [`metadata`] | a world without its regions |
 //! | [`portable`] | a whole world as one file |
 //! | [`level`] | a designer's level: a folder of files, or one packed file |
-//! | [`container`], [`bytes`], [`plain`] | what these share |
+//! | [`container`], [`bytes`], [`plain`], [`limits`] | what these share |
 //!
 //! Whatever bytes are read, the result is what was written or a [`FormatError`]: nothing panics, and memory is taken by the length of
 //! the input and by limits that the caller names. The same content always gives the same bytes.
@@ -24,6 +24,7 @@ pub mod error;
 pub mod fields;
 pub mod frame;
 pub mod level;
+pub mod limits;
 pub mod metadata;
 pub mod plain;
 pub mod portable;

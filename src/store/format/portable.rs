@@ -9,16 +9,14 @@ use super::batch::Batch;
 use super::container;
 use super::error::FormatError;
 use super::frame::{self, Kind, WorldId};
+use super::limits::{Limits, within};
 use super::metadata::Metadata;
 use super::plain;
-use super::region::{REGION_LIMIT, decode_region, encode_region, region_key, region_of_key};
+use super::region::{decode_region, encode_region, region_key, region_of_key};
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
 use crate::terrain::{WorldChange, WorldParts};
 use crate::volume::{Brick, Fields};
-
-/// The most bytes of the content of a frame of commits.
-pub const JOURNAL_LIMIT: usize = 256 << 20;
 
 /// A region as it is saved.
 #[derive(Clone, Debug, Default)]
@@ -144,7 +142,18 @@ pub fn of_regions(regions: &BTreeMap<RegionPos, SavedRegion>, next_field: u64) -
 }
 
 /// The bytes of a portable file. The same world gives the same bytes.
-pub fn write_portable(portable: &PortableWorld) -> Vec<u8> {
+///
+/// # Errors
+/// [`FormatError::TooLarge`] when a part has more bytes than can be read again: 256 MiB for data of the game's and the list of
+/// regions, 256 MiB for a frame of commits, and 8 MiB for a region, which bricks and fields of a terrain never take.
+pub fn write_portable(portable: &PortableWorld) -> Result<Vec<u8>, FormatError> {
+    write_within(portable, &Limits::FORMAT)
+}
+
+pub(in crate::store) fn write_within(
+    portable: &PortableWorld,
+    limits: &Limits,
+) -> Result<Vec<u8>, FormatError> {
     let PortableWorld { world, metadata, regions, journal } = portable;
     let head = PortableHead {
         metadata: metadata.clone(),
@@ -153,14 +162,17 @@ pub fn write_portable(portable: &PortableWorld) -> Vec<u8> {
     };
     let region = |(at, region): (&RegionPos, &SavedRegion)| {
         let SavedRegion { revision, ground_hash, .. } = *region;
-        frame::seal(Kind::Region, *world, &region_key(*at), revision, ground_hash, &region.encode())
+        let content = within(region.encode(), limits.region)?;
+        Ok(frame::seal(Kind::Region, *world, &region_key(*at), revision, ground_hash, &content))
     };
     let batch = |(number, batch): (u64, &Batch)| {
         let revision = batch.commits.last().map_or(0, |last| last.revision);
-        frame::seal(Kind::Journal, *world, &number.to_be_bytes(), revision, 0, &batch.encode())
+        let content = within(batch.encode(), limits.journal)?;
+        Ok(frame::seal(Kind::Journal, *world, &number.to_be_bytes(), revision, 0, &content))
     };
-    let frames: Vec<Vec<u8>> = regions.iter().map(region).chain((1..).zip(journal).map(batch)).collect();
-    container::write(Kind::Portable, *world, &plain::to_bytes(&head), &frames)
+    let frames = regions.iter().map(region).chain((1..).zip(journal).map(batch));
+    let frames = frames.collect::<Result<Vec<Vec<u8>>, FormatError>>()?;
+    container::write(Kind::Portable, *world, &plain::to_bytes(&head), &frames, limits.head)
 }
 
 /// Reads what [`write_portable`] wrote, over the ground of the world.
@@ -168,7 +180,15 @@ pub fn write_portable(portable: &PortableWorld) -> Vec<u8> {
 /// # Errors
 /// When anything in the file is damaged or invalid. Memory is taken by the length of the file, and by a limit for each frame.
 pub fn read_portable(file: &[u8], ground: &Ground) -> Result<PortableWorld, FormatError> {
-    let container = container::read(Kind::Portable, file)?;
+    read_within(file, ground, &Limits::FORMAT)
+}
+
+pub(in crate::store) fn read_within(
+    file: &[u8],
+    ground: &Ground,
+    limits: &Limits,
+) -> Result<PortableWorld, FormatError> {
+    let container = container::read(Kind::Portable, file, limits.head)?;
     let (world, head) = (container.world, portable_head(&container.own)?);
     let regions = usize::try_from(head.regions).ok().filter(|&regions| regions <= container.frames.len());
     let (regions, batches) = container.frames.split_at(regions.ok_or(FormatError::Truncated)?);
@@ -179,14 +199,14 @@ pub fn read_portable(file: &[u8], ground: &Ground) -> Result<PortableWorld, Form
     for sealed in regions {
         let peeked = frame::peek(sealed).ok_or(FormatError::Invalid("region"))?;
         let at = region_of_key(&peeked.key).ok_or(FormatError::Key)?;
-        let opened = frame::open(sealed, Kind::Region, world, &peeked.key, REGION_LIMIT)?;
+        let opened = frame::open(sealed, Kind::Region, world, &peeked.key, limits.region)?;
         if portable.regions.last_key_value().is_some_and(|(last, _)| *last >= at) {
             return Err(FormatError::Invalid("order of regions"));
         }
         portable.regions.insert(at, SavedRegion::decode(&opened, at, ground)?);
     }
     for (number, sealed) in (1u64..).zip(batches) {
-        let opened = frame::open(sealed, Kind::Journal, world, &number.to_be_bytes(), JOURNAL_LIMIT)?;
+        let opened = frame::open(sealed, Kind::Journal, world, &number.to_be_bytes(), limits.journal)?;
         portable.journal.push(Batch::decode(&opened.payload, ground)?);
     }
     Ok(portable)
@@ -198,7 +218,7 @@ pub fn read_portable(file: &[u8], ground: &Ground) -> Result<PortableWorld, Form
 /// # Errors
 /// When it is no portable file, or when its head is damaged.
 pub fn read_portable_head(file: &[u8]) -> Result<(WorldId, PortableHead), FormatError> {
-    let (world, own) = container::read_own(Kind::Portable, file)?;
+    let (world, own) = container::read_own(Kind::Portable, file, Limits::FORMAT.head)?;
     Ok((world, portable_head(&own)?))
 }
 

@@ -10,9 +10,6 @@ use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
 use crate::volume::{Brick, Fields};
 
-/// More bytes than the content of any region takes: 512 bricks, and all fields that fit in.
-pub const REGION_LIMIT: usize = 8 << 20;
-
 /// Bricks and fields, each in order.
 pub type RegionParts = (Vec<(BrickPos, Arc<Brick>)>, Vec<(ChunkPos, Fields)>);
 

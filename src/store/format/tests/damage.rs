@@ -46,9 +46,9 @@ fn damaged_files_are_told() {
     let ground = worlds::hills(96);
     let mut terrain = worlds::eventful(&ground, 12, 1);
     let saved = worlds::portable(&mut terrain, &ground);
-    let file = write_portable(&saved);
+    let file = write_portable(&saved).unwrap();
     let files = write_level(&Level::new(terrain.parts(), 1.0, Default::default(), &ground)).unwrap();
-    let packed = pack_level(&files);
+    let packed = pack_level(&files).unwrap();
     let (key, world) = (*b"a key", WorldId(7));
     let sealed = seal(Kind::Region, world, &key, 9, 11, &packed);
     let mut rng = Rng::with_seed(count("BURROW_SEED", 1));

@@ -53,7 +53,7 @@ fn written() -> (PortableWorld, Vec<u8>, LevelFiles) {
     let game = [("spawn".to_owned(), vec![1, 2, 3])].into();
     let level = Level::new(terrain.parts(), TerrainSettings::default().voxel_size, game, &ground);
     let portable = worlds::portable(&mut terrain, &ground);
-    let file = write_portable(&portable);
+    let file = write_portable(&portable).unwrap();
     (portable, file, write_level(&level).expect("a valid level"))
 }
 

@@ -13,6 +13,7 @@ use crate::store::format::container;
 use crate::store::format::edits::{EditSequence, put_edit, read_edit};
 use crate::store::format::frame::{self, Kind, WorldId};
 use crate::store::format::level::{Level, read_level, unpack_level, write_level};
+use crate::store::format::limits::Limits;
 use crate::store::format::portable::{read_portable, write_portable};
 use crate::store::format::{Batch, Metadata, decode_region, encode_region};
 
@@ -122,22 +123,24 @@ fn frames() {
     });
 }
 
+const LIMIT: usize = Limits::FORMAT.head;
+
 /// The same file with a right checksum for its changed head, and with the frames that it had.
 fn resealed(file: &[u8], kind: Kind, own: &[u8]) -> Vec<u8> {
-    let container = container::read(kind, file).unwrap();
+    let container = container::read(kind, file, LIMIT).unwrap();
     let frames: Vec<Vec<u8>> = container.frames.iter().map(|frame| frame.to_vec()).collect();
-    container::write(kind, container.world, own, &frames)
+    container::write(kind, container.world, own, &frames, LIMIT).unwrap()
 }
 
 #[test]
 fn portable_files() {
     let ground = worlds::hills(64);
     let mut terrain = worlds::eventful(&ground, 5, 4);
-    let file = write_portable(&worlds::portable(&mut terrain, &ground));
+    let file = write_portable(&worlds::portable(&mut terrain, &ground)).unwrap();
     let read = |file: &[u8]| match read_portable(file, &ground) {
         Ok(portable) => {
             assert!(compare::portables(
-                &read_portable(&write_portable(&portable), &ground).unwrap(),
+                &read_portable(&write_portable(&portable).unwrap(), &ground).unwrap(),
                 &portable
             ));
             true
@@ -145,13 +148,13 @@ fn portable_files() {
         Err(_) => false,
     };
     fuzz("portable file", std::slice::from_ref(&file), 800, read);
-    let own = container::read(Kind::Portable, &file).unwrap().own;
+    let own = container::read(Kind::Portable, &file, LIMIT).unwrap().own;
     fuzz("portable head", &[own], 10_000, |own| {
         let file = resealed(&file, Kind::Portable, own);
         // NaN as a voxel size is not equal to itself.
         read_portable(&file, &ground).is_ok_and(|read| {
-            let again = write_portable(&read);
-            write_portable(&read_portable(&again, &ground).unwrap()) == again
+            let again = write_portable(&read).unwrap();
+            write_portable(&read_portable(&again, &ground).unwrap()).unwrap() == again
         })
     });
 }
@@ -161,7 +164,7 @@ fn levels() {
     let ground = worlds::hills(64);
     let terrain = worlds::eventful(&ground, 5, 4);
     let files = write_level(&Level::new(terrain.parts(), 1.0, Default::default(), &ground)).unwrap();
-    let packed = crate::store::format::level::pack_level(&files);
+    let packed = crate::store::format::level::pack_level(&files).unwrap();
     fuzz("packed level", &[packed], 800, |bytes| unpack_level(bytes).is_ok());
     for (name, file) in &files {
         fuzz(name, std::slice::from_ref(file), 800, |bytes| {

@@ -4,6 +4,7 @@ mod compare;
 mod damage;
 mod fixtures;
 mod fuzz;
+mod limits;
 mod round_trips;
 mod sizes;
 mod worlds;

@@ -32,10 +32,10 @@ fn random_worlds_come_back() {
         for batch in &saved.journal {
             assert!(compare::batches(&Batch::decode(&batch.encode(), &ground).unwrap(), batch));
         }
-        let file = write_portable(&saved);
+        let file = write_portable(&saved).unwrap();
         let read = read_portable(&file, &ground).unwrap();
         assert!(compare::portables(&read, &saved));
-        assert_eq!(write_portable(&read), file);
+        assert_eq!(write_portable(&read).unwrap(), file);
         assert!(compare::parts(&read.parts(), &terrain.parts()));
         let (world, head) = read_portable_head(&file).unwrap();
         assert_eq!((world, &head.metadata), (saved.world, &saved.metadata));
@@ -62,7 +62,7 @@ fn levels_come_back_and_files_change_only_where_the_ground_did() {
         Level::new(terrain.parts(), 0.5, std::collections::BTreeMap::clone(&game), &ground)
     };
     let (level, files) = (of(&terrain), write_level(&of(&terrain)).unwrap());
-    let packed = pack_level(&files);
+    let packed = pack_level(&files).unwrap();
     assert_eq!(unpack_level(&packed).unwrap(), files);
     let read = read_level(&files, &ground).unwrap();
     assert!(compare::regions(&read.regions, &level.regions));
