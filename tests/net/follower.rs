@@ -8,7 +8,7 @@ use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
     BulkReader, ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent,
-    RegionHashes, Server, Stamps, Terms, ToClient, ToServer, Welcome,
+    RegionHashes, Server, Stamps, Terms, ToClient, ToServer, Welcome, region_hash, touched_regions,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{Meshing, SIMULATION, WorldChange};
@@ -196,7 +196,8 @@ impl Follower {
         self.awaited.clear();
         self.regions.clear();
         let terms = match welcome.join {
-            Join::Log => {
+            Join::Log { voids } => {
+                assert!(voids.is_empty());
                 self.joins.push("log");
                 self.is_joining = false;
                 return;
@@ -222,7 +223,7 @@ impl Follower {
         let world = self.terrain.world();
         let table: BTreeMap<RegionPos, u64> = regions.iter().copied().collect();
         let all: BTreeSet<RegionPos> = world.regions().chain(table.keys().copied()).collect();
-        let differs = |at: &RegionPos| world.region_hash(*at) != table.get(at).copied().unwrap_or(0);
+        let differs = |at: &RegionPos| region_hash(world, *at) != table.get(at).copied().unwrap_or(0);
         self.awaited = all.into_iter().filter(differs).collect();
         self.is_joining = false;
         if !self.awaited.is_empty() {
@@ -290,15 +291,15 @@ impl Follower {
             Entry::Mark => {
                 let world = self.terrain.world();
                 let touched = std::mem::take(&mut self.touched).into_iter();
-                let hashes = touched.map(|at| (at, world.region_hash(at))).collect();
+                let hashes = touched.map(|at| (at, region_hash(world, at))).collect();
                 self.marks.insert(self.number, hashes);
             }
             other => panic!("unknown: {other:?}"),
         }
         while let Some(transaction) = self.terrain.begin() {
             let commit = transaction.run();
-            let bricks = commit.change().bricks;
-            self.touched.extend(bricks.iter().map(|(pos, _)| RegionPos::of(*pos)));
+            let grid = self.terrain.world().grid();
+            self.touched.append(&mut touched_regions(grid, &commit.change()));
             self.terrain.commit(commit).expect("its own commit");
         }
     }
@@ -317,7 +318,7 @@ impl Follower {
                 self.marks.values().flat_map(BTreeMap::keys).chain(&self.touched).copied().collect();
             let own = |at: &RegionPos| match noted.get(at) {
                 None if later.contains(at) => None,
-                None => Some(world.region_hash(*at)),
+                None => Some(region_hash(world, *at)),
                 known => known.copied(),
             };
             let all: BTreeSet<RegionPos> = noted.keys().chain(told.keys()).copied().collect();

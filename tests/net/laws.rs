@@ -128,9 +128,9 @@ fn rules_that_come_one_edit_late_are_noticed_at_the_next_mark_and_mended() {
     play.bots.iter_mut().for_each(|bot| bot.is_digging = false);
     play.seconds(3.0);
     play.server.set_rules(DiggingRules::default().with_bedrock(60)).expect("valid rules");
-    play.server.edit(edit(&sphere(40.0, 40.0)));
+    play.server.edit(edit(&sphere(40.0, 40.0))).expect("no stamp");
     play.server.set_rules(DiggingRules::default()).expect("valid rules");
-    play.server.edit(edit(&sphere(80.0, 80.0)));
+    play.server.edit(edit(&sphere(80.0, 80.0))).expect("no stamp");
     lie(&mut play, |entries| {
         entries.swap(0, 1);
         Lie::Told
@@ -181,7 +181,7 @@ fn dig_before(play: &mut Play, edits: u64) {
         if let Ok(edit) = edit
             && edit.stamp_image().is_none()
         {
-            play.server.edit(edit);
+            play.server.edit(edit).expect("no stamp");
         }
         if done % 500 == 499 {
             play.server.advance(play.now);
