@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::lattice::RegionPos;
+use bevy_burrow::lattice::{ChunkPos, RegionPos};
 use bevy_burrow::net::{
     BulkReader, ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent,
     RegionHashes, Server, Stamps, Terms, ToClient, ToServer, Welcome, region_hash, touched_regions,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{Meshing, SIMULATION, WorldChange};
+use bevy_burrow::volume::Fields;
 use glam::IVec3;
 
 /// A frame of the tests.
@@ -255,8 +256,10 @@ impl Follower {
             };
             if self.number >= target {
                 assert_eq!(self.number, target, "a region of the past");
-                std::mem::take(&mut self.regions).iter().for_each(|content| self.put(content));
+                let regions = std::mem::take(&mut self.regions);
+                regions.iter().for_each(|content| self.put(content));
                 self.awaited.clear();
+                regions.iter().take(1).for_each(|content| self.lower_names(content.next_field));
                 continue;
             }
             match self.waiting.front() {
@@ -338,12 +341,30 @@ impl Follower {
         let world = self.terrain.world();
         let mut bricks: BTreeMap<_, _> = world.bricks_in(content.pos).map(|(pos, _)| (pos, None)).collect();
         bricks.extend(content.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))));
+        let samples = content.pos.samples();
+        let touches = |chunk: &ChunkPos| world.grid().chunk_samples(*chunk).intersection(samples).is_some();
+        let own = world.fields().map(|(chunk, _)| chunk).filter(touches);
+        let mut fields: BTreeMap<_, _> = own.map(|chunk| (chunk, Fields::default())).collect();
+        fields.extend(content.fields.iter().cloned());
         let change = WorldChange {
             bricks: bricks.into_iter().collect(),
-            fields: content.fields.clone(),
+            fields: fields.into_iter().collect(),
             next_field: content.next_field,
         };
         self.terrain.apply_change(change, None).expect("a valid region");
+    }
+
+    /// Lets fields to come have the names that they have on the server.
+    fn lower_names(&mut self, next_field: u64) {
+        if self.terrain.world().next_field() > next_field {
+            let mut parts = self.terrain.parts();
+            parts.change.next_field = next_field;
+            let settings = TerrainSettings::default();
+            self.terrain =
+                Terrain::restore(Arc::clone(&self.ground), &settings, parts).expect("a world's own parts");
+            self.terrain.set_meshing(Meshing::Never);
+            self.terrain.set_undo_budget(0);
+        }
     }
 
     /// Breaks its world, as a bug would.

@@ -194,9 +194,21 @@ impl Client {
             self.is_playable = true;
             self.events.push(ClientEvent::Playable);
         }
+        let next_field = content.next_field;
         self.put_region(content);
+        if left == 1 {
+            self.lower_names(next_field);
+        }
         self.stage = Stage::ByRegions { to, left: left - 1 };
         self.finish_regions();
+    }
+
+    /// Lets fields to come have the names that they have on the server: what was put can only have raised them.
+    pub(super) fn lower_names(&mut self, next_field: u64) {
+        if self.replica.world().next_field() > next_field {
+            let terms = Terms { next_field, ..self.replica.terms() };
+            self.figures.malformed += u64::from(self.replica.restart(&terms, true).is_err());
+        }
     }
 
     pub(super) fn put_region(&mut self, content: RegionContent) {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
-use super::super::message::{Entry, MOST_REGIONS, RegionContent, RegionHashes, Terms, ToServer};
+use super::super::message::{Entry, MOST_REGIONS, RegionContent, RegionHashes, ToServer};
 use super::join::Stage;
 use super::{Client, ClientEvent};
 use crate::lattice::{BrickPos, LatticeBox, RegionPos};
@@ -168,11 +168,7 @@ impl Client {
         self.figures.repairs += repair.wanted.len() as u64;
         let next_field = repair.contents.values().map(|content| content.next_field).max();
         repair.contents.into_values().for_each(|content| self.put_region(content));
-        // Putting raises the greatest name only.
-        if let Some(next_field) = next_field.filter(|next| *next < self.replica.world().next_field()) {
-            let terms = Terms { next_field, ..self.replica.terms() };
-            self.figures.malformed += u64::from(self.replica.restart(&terms, true).is_err());
-        }
+        next_field.into_iter().for_each(|next_field| self.lower_names(next_field));
         self.marks.forget(&repair.wanted);
         self.events.push(ClientEvent::Repaired(repair.wanted.into_iter().collect()));
     }
