@@ -459,7 +459,15 @@ fn put_welcome(to: &mut Vec<u8>, welcome: &Welcome) {
     put_number(to, welcome.reach.map_or(0, |reach| u64::from(reach) + 1));
     welcome.cost.iter().for_each(|&number| put_number(to, number));
     match &welcome.join {
-        Join::Log => to.push(LOG),
+        Join::Log { voids } => {
+            to.push(LOG);
+            put_number(to, voids.len() as u64);
+            let mut last = 0;
+            for &number in voids {
+                put_number(to, number.wrapping_sub(last));
+                last = number;
+            }
+        }
         Join::Regions { regions, terms } => {
             to.push(REGIONS);
             put_number(to, (*regions).into());
@@ -480,7 +488,14 @@ fn read_welcome(reader: &mut Reader) -> Result<Welcome, FormatError> {
     };
     let cost = [reader.number()?, reader.number()?];
     let join = match reader.byte()? {
-        LOG => Join::Log,
+        LOG => {
+            let (mut voids, mut last) = (Vec::new(), 0_u64);
+            for _ in 0..reader.count()? {
+                last = last.wrapping_add(reader.number()?);
+                voids.push(last);
+            }
+            Join::Log { voids }
+        }
         REGIONS => Join::Regions { regions: small(reader)?, terms: read_terms(reader)? },
         COMPARE => Join::Compare { terms: read_terms(reader)? },
         _ => return Err(FormatError::Invalid("way to join")),

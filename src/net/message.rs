@@ -28,7 +28,7 @@ use crate::terrain::{LooseSettings, WorldChange};
 use crate::volume::{Brick, DiggingRules, Fields};
 
 /// Changes when messages are no longer what they were.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;
 
 /// Most bytes of a message to a server.
 pub const MOST_TO_SERVER: usize = 64 << 10;
@@ -165,7 +165,10 @@ pub enum ToServer {
 pub enum Join {
     /// [Entries](ToClient::Entries) come in the bulk lane, from its own number on or earlier, up to the start. One without an
     /// [epoch](Hello::epoch) has the number 0: the pristine world, which rules nothing.
-    Log,
+    Log {
+        /// The numbers of entries among them that the server could not apply: they do nothing.
+        voids: Vec<u64>,
+    },
     /// All regions come in the bulk lane, as many as said. What else it has is pristine.
     Regions {
         /// How many.
@@ -210,7 +213,7 @@ pub struct Welcome {
     pub join: Join,
 }
 
-/// Hashes of regions; 0 is a pristine one.
+/// [Hashes](super::region_hash) of regions; 0 is a pristine one.
 pub type RegionHashes = Vec<(RegionPos, u64)>;
 
 /// A region at a number: whatever it does not name is pristine.

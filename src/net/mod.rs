@@ -10,6 +10,7 @@
 //! | `encoding` | these in bytes |
 //! | `stamps` | images of stamps, which are named and not sent |
 //! | `bulk` | the lane of what takes long: regions and old entries, as one stream that is cut into pieces |
+//! | `regions` | regions as they are compared and sent |
 //! | `client` | the client: prediction, joins, repair |
 //! | `replica` | the world of the order, and what is shown of it |
 //! | `server` | the server: order, validation, undo, joins |
@@ -57,6 +58,7 @@ mod bulk;
 mod client;
 mod encoding;
 pub mod message;
+mod regions;
 mod replica;
 mod server;
 mod stamps;
@@ -68,9 +70,11 @@ pub use message::{
     ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent, RegionHashes,
     Terms, ToClient, ToServer, Welcome,
 };
+pub use regions::{region_hash, touched_regions};
 pub use replica::ShownChange;
 pub use server::{
     Outgoing, Permission, Rate, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
+    UnknownStamp,
 };
 pub use stamps::{StampId, Stamps};
 

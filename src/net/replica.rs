@@ -8,12 +8,13 @@ use std::sync::Arc;
 
 use super::message::{Entry, Terms};
 use super::never_shown;
+use super::regions::{chunks_of, touched_regions};
 use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
 use crate::terrain::{
-    ChangeError, LooseSettings, Receipt, RestoreError, Restored, Terrain, TerrainError, TerrainSettings,
-    World, WorldChange, WorldParts,
+    ChangeError, Receipt, RestoreError, Restored, Terrain, TerrainError, TerrainSettings, World, WorldChange,
+    WorldParts,
 };
 use crate::volume::{Brick, Fields};
 
@@ -42,8 +43,8 @@ pub(super) struct Applied {
     pub receipts: Vec<Receipt>,
     /// What parts among them changed, in order; `None` for those that are not in place.
     pub restored: Vec<Option<Restored>>,
-    /// The bricks that changed.
-    pub bricks: BTreeSet<BrickPos>,
+    /// The regions that changed.
+    pub regions: BTreeSet<RegionPos>,
     /// Was anything not applied that may be applied elsewhere?
     pub is_void: bool,
 }
@@ -99,9 +100,13 @@ impl Replica {
         self.confirmed.world()
     }
 
-    /// How the order searches for loose pieces now.
-    pub fn loose(&self) -> Option<LooseSettings> {
-        self.confirmed.loose().copied()
+    /// What holds now beside bricks and fields.
+    pub fn terms(&self) -> Terms {
+        Terms {
+            rules: self.confirmed.rules().cloned(),
+            loose: self.confirmed.loose().copied(),
+            next_field: self.world().next_field(),
+        }
     }
 
     /// The hash of what is shown, once all that was returned is put.
@@ -175,7 +180,7 @@ impl Replica {
             let commit = transaction.run();
             let change = commit.change();
             self.before.note(self.confirmed.world(), &change);
-            applied.bricks.extend(change.bricks.iter().map(|(pos, _)| *pos));
+            applied.regions.append(&mut touched_regions(self.world().grid(), &change));
             // It is the one under way.
             applied.receipts.extend(self.confirmed.commit(commit).unwrap_or_default());
         }
@@ -252,9 +257,7 @@ impl Replica {
         let mut all: BTreeMap<BrickPos, Stored> =
             world.bricks_in(region).map(|(pos, _)| (pos, None)).collect();
         all.extend(bricks.into_iter().map(|(pos, brick)| (pos, Some(brick))));
-        let samples = region.samples().intersection(world.grid().edit_bounds());
-        let chunks = samples.into_iter().flat_map(|samples| world.grid().chunks_of(samples));
-        let mut chunks: BTreeMap<ChunkPos, Fields> = chunks
+        let mut chunks: BTreeMap<ChunkPos, Fields> = chunks_of(world.grid(), region)
             .filter(|chunk| world.fields_of(*chunk).is_some())
             .map(|chunk| (chunk, Fields::default()))
             .collect();

@@ -10,6 +10,7 @@ use super::*;
 use crate::brush::{Brush, Shape, Stamp};
 use crate::ground::{GreyImage, MaterialId};
 use crate::net::ClientId;
+use crate::terrain::LooseSettings;
 use crate::volume::DiggingRules;
 
 const SIDE: u32 = 72;

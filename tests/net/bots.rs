@@ -5,12 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
+use bevy_burrow::lattice::ChunkPos;
 use bevy_burrow::net::{
     Client, ClientEvent, ClientId, Entries, Entry, Lane, Server, ServerSettings, ShownChange, Stamps,
     ToClient,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::WorldChange;
+use bevy_burrow::terrain::{World, WorldChange};
+use bevy_burrow::volume::{FieldId, Fields};
 use fastrand::Rng;
 use glam::{IVec3, Vec2, Vec3};
 
@@ -459,9 +461,16 @@ impl Play {
             assert_eq!(bot.client.pending(), 0, "{:?}", bot.id);
             assert_eq!(bot.client.world().hash(), hash, "{:?}", bot.id);
             assert_eq!(bot.shown.world().hash(), hash, "{:?}", bot.id);
+            assert_eq!(names(bot.client.world()), names(self.server.terrain().world()), "{:?}", bot.id);
             assert_eq!(bot.client.figures().malformed, 0, "{:?}", bot.id);
         }
         let figures = self.server.figures();
         assert_eq!((figures.malformed, figures.voids, figures.kicked), (0, 0, 0));
     }
+}
+
+/// The names of all fields, and the greatest that there was.
+fn names(world: &World) -> (BTreeMap<ChunkPos, Vec<FieldId>>, u64) {
+    let names = |fields: &Fields| fields.iter().map(|field| field.id).collect();
+    (world.fields().map(|(chunk, fields)| (chunk, names(fields))).collect(), world.next_field())
 }

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::lattice::RegionPos;
+use bevy_burrow::lattice::{ChunkPos, RegionPos};
 use bevy_burrow::net::{
     BulkReader, ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent,
-    RegionHashes, Server, Stamps, Terms, ToClient, ToServer, Welcome,
+    RegionHashes, Server, Stamps, Terms, ToClient, ToServer, Welcome, region_hash, touched_regions,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{Meshing, SIMULATION, WorldChange};
+use bevy_burrow::volume::Fields;
 use glam::IVec3;
 
 /// A frame of the tests.
@@ -196,7 +197,8 @@ impl Follower {
         self.awaited.clear();
         self.regions.clear();
         let terms = match welcome.join {
-            Join::Log => {
+            Join::Log { voids } => {
+                assert!(voids.is_empty());
                 self.joins.push("log");
                 self.is_joining = false;
                 return;
@@ -222,7 +224,7 @@ impl Follower {
         let world = self.terrain.world();
         let table: BTreeMap<RegionPos, u64> = regions.iter().copied().collect();
         let all: BTreeSet<RegionPos> = world.regions().chain(table.keys().copied()).collect();
-        let differs = |at: &RegionPos| world.region_hash(*at) != table.get(at).copied().unwrap_or(0);
+        let differs = |at: &RegionPos| region_hash(world, *at) != table.get(at).copied().unwrap_or(0);
         self.awaited = all.into_iter().filter(differs).collect();
         self.is_joining = false;
         if !self.awaited.is_empty() {
@@ -254,8 +256,10 @@ impl Follower {
             };
             if self.number >= target {
                 assert_eq!(self.number, target, "a region of the past");
-                std::mem::take(&mut self.regions).iter().for_each(|content| self.put(content));
+                let regions = std::mem::take(&mut self.regions);
+                regions.iter().for_each(|content| self.put(content));
                 self.awaited.clear();
+                regions.iter().take(1).for_each(|content| self.lower_names(content.next_field));
                 continue;
             }
             match self.waiting.front() {
@@ -290,15 +294,15 @@ impl Follower {
             Entry::Mark => {
                 let world = self.terrain.world();
                 let touched = std::mem::take(&mut self.touched).into_iter();
-                let hashes = touched.map(|at| (at, world.region_hash(at))).collect();
+                let hashes = touched.map(|at| (at, region_hash(world, at))).collect();
                 self.marks.insert(self.number, hashes);
             }
             other => panic!("unknown: {other:?}"),
         }
         while let Some(transaction) = self.terrain.begin() {
             let commit = transaction.run();
-            let bricks = commit.change().bricks;
-            self.touched.extend(bricks.iter().map(|(pos, _)| RegionPos::of(*pos)));
+            let grid = self.terrain.world().grid();
+            self.touched.append(&mut touched_regions(grid, &commit.change()));
             self.terrain.commit(commit).expect("its own commit");
         }
     }
@@ -317,7 +321,7 @@ impl Follower {
                 self.marks.values().flat_map(BTreeMap::keys).chain(&self.touched).copied().collect();
             let own = |at: &RegionPos| match noted.get(at) {
                 None if later.contains(at) => None,
-                None => Some(world.region_hash(*at)),
+                None => Some(region_hash(world, *at)),
                 known => known.copied(),
             };
             let all: BTreeSet<RegionPos> = noted.keys().chain(told.keys()).copied().collect();
@@ -337,12 +341,30 @@ impl Follower {
         let world = self.terrain.world();
         let mut bricks: BTreeMap<_, _> = world.bricks_in(content.pos).map(|(pos, _)| (pos, None)).collect();
         bricks.extend(content.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))));
+        let samples = content.pos.samples();
+        let touches = |chunk: &ChunkPos| world.grid().chunk_samples(*chunk).intersection(samples).is_some();
+        let own = world.fields().map(|(chunk, _)| chunk).filter(touches);
+        let mut fields: BTreeMap<_, _> = own.map(|chunk| (chunk, Fields::default())).collect();
+        fields.extend(content.fields.iter().cloned());
         let change = WorldChange {
             bricks: bricks.into_iter().collect(),
-            fields: content.fields.clone(),
+            fields: fields.into_iter().collect(),
             next_field: content.next_field,
         };
         self.terrain.apply_change(change, None).expect("a valid region");
+    }
+
+    /// Lets fields to come have the names that they have on the server.
+    fn lower_names(&mut self, next_field: u64) {
+        if self.terrain.world().next_field() > next_field {
+            let mut parts = self.terrain.parts();
+            parts.change.next_field = next_field;
+            let settings = TerrainSettings::default();
+            self.terrain =
+                Terrain::restore(Arc::clone(&self.ground), &settings, parts).expect("a world's own parts");
+            self.terrain.set_meshing(Meshing::Never);
+            self.terrain.set_undo_budget(0);
+        }
     }
 
     /// Breaks its world, as a bug would.

@@ -128,9 +128,9 @@ fn rules_that_come_one_edit_late_are_noticed_at_the_next_mark_and_mended() {
     play.bots.iter_mut().for_each(|bot| bot.is_digging = false);
     play.seconds(3.0);
     play.server.set_rules(DiggingRules::default().with_bedrock(60)).expect("valid rules");
-    play.server.edit(edit(&sphere(40.0, 40.0)));
+    play.server.edit(edit(&sphere(40.0, 40.0))).expect("no stamp");
     play.server.set_rules(DiggingRules::default()).expect("valid rules");
-    play.server.edit(edit(&sphere(80.0, 80.0)));
+    play.server.edit(edit(&sphere(80.0, 80.0))).expect("no stamp");
     lie(&mut play, |entries| {
         entries.swap(0, 1);
         Lie::Told
@@ -163,6 +163,32 @@ fn a_brick_that_is_missing_is_noticed_at_the_next_mark_and_mended() {
     check_mended(&play);
 }
 
+#[test]
+fn names_of_fields_that_drift_are_noticed_at_the_next_mark_and_mended() {
+    let mut play = Play::new(&hills(96), 3, settings());
+    play.bots.iter_mut().for_each(|bot| bot.is_digging = false);
+    play.seconds(3.0);
+    let mut other = terrain(&play.ground);
+    other.apply([sphere(40.0, 40.0)]);
+    play.server.put(other.parts().change).expect("it fits");
+    lie(&mut play, |entries| {
+        for entry in entries {
+            if let Entry::Parts { change, .. } = entry {
+                // Later fields have other names than those of the others; samples are equal.
+                *change = Arc::new(WorldChange { next_field: 70, ..WorldChange::clone(change) });
+                return Lie::Told;
+            }
+        }
+        Lie::Not
+    });
+    play.seconds(3.0);
+    assert_eq!(play.bots[0].client.figures().repairs, 0, "no field has a name of its own");
+    play.server.edit(edit(&sphere(80.0, 80.0))).expect("no stamp");
+    play.bots[0].may_differ = false;
+    play.settle();
+    check_mended(&play);
+}
+
 fn wait_until_joined(play: &mut Play, at: usize) {
     for _ in 0..1200 {
         play.seconds(0.1);
@@ -181,7 +207,7 @@ fn dig_before(play: &mut Play, edits: u64) {
         if let Ok(edit) = edit
             && edit.stamp_image().is_none()
         {
-            play.server.edit(edit);
+            play.server.edit(edit).expect("no stamp");
         }
         if done % 500 == 499 {
             play.server.advance(play.now);

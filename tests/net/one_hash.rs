@@ -1,11 +1,13 @@
-//! One order of edits of all operations has one hash, with one thread and with many, in whatever transactions.
+//! One order of edits of all operations has one hash, with one thread and with many, in whatever transactions, and on a card.
 //!
 //! ```text
-//! BURROW_EDITS=100000 cargo test --no-default-features --features net --test net -- --nocapture one_hash
+//! BURROW_EDITS=100000 cargo test --release --no-default-features --features cuda,net --test net -- --nocapture one_hash
 //! ```
 
 use std::sync::Arc;
+use std::time::Duration;
 
+use bevy_burrow::backend::{Backend, Engine, EngineState};
 use bevy_burrow::brush::Edit;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
@@ -45,9 +47,10 @@ fn script(ground: &Ground, edits: u64) -> Vec<Turn> {
     (0..edits).map(turn).collect()
 }
 
-/// The hash, and that of all receipts.
-fn play(ground: &Arc<Ground>, script: &[Turn], longest: u64) -> u64 {
+/// The hash of the world.
+fn play(ground: &Arc<Ground>, script: &[Turn], longest: u64, engine: &Engine) -> u64 {
     let (mut terrain, mut rng) = (terrain(ground), Rng::with_seed(longest));
+    terrain.set_engine(engine.clone());
     let mut waiting = 0;
     for turn in script {
         match turn {
@@ -74,10 +77,24 @@ fn one_hash() {
     let edits = count("BURROW_EDITS", 400);
     let ground = hills(if edits > 20_000 { 512 } else { 128 });
     let script = script(&ground, edits);
-    let hashes = [(1, 1), (1, 40), (3, 1), (8, 40)].map(|(threads, longest)| {
+    println!("| backend | threads | edits at once | edits | debug assertions | hash |");
+    println!("| --- | ---: | ---: | ---: | --- | --- |");
+    let run = |name: &str, engine: &Engine, threads, longest| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| play(&ground, &script, longest))
-    });
-    println!("{edits} edits, debug assertions {}: {:#018x}", cfg!(debug_assertions), hashes[0]);
+        let hash = pool.install(|| play(&ground, &script, longest, engine));
+        println!("| {name} | {threads} | {longest} | {edits} | {} | {hash:#018x} |", cfg!(debug_assertions));
+        hash
+    };
+    let cpu = Engine::new(Backend::Cpu);
+    let mut hashes: Vec<u64> = [(1, 1), (1, 40), (3, 1), (8, 40)]
+        .map(|(threads, longest)| run("CPU", &cpu, threads, longest))
+        .to_vec();
+    let cuda = Engine::new(Backend::Cuda);
+    if let EngineState::Cuda(card) = cuda.wait(Duration::from_secs(60)) {
+        hashes.extend([(1, 40), (8, 400)].map(|(threads, longest)| run(&card, &cuda, threads, longest)));
+        let figures = cuda.figures();
+        println!("{} stages on the card, {} beside it", figures.cuda, figures.cpu);
+        assert!(figures.cuda > 0 && matches!(cuda.state(), EngineState::Cuda(_)));
+    }
     assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:x?}");
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{
     ClientId, Entry, Hello, Kick, Lane, Rate, Reach, Refusal, Server, ServerEvent, ServerSettings, ToClient,
-    ToServer, UndoPolicy,
+    ToServer, UndoPolicy, UnknownStamp,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
@@ -323,6 +324,26 @@ fn an_undo_is_of_what_was_ordered_before_it() {
     }
     scene.play(&mut [&mut b, &mut a], 12);
     assert_eq!(agreed(&scene.server, &[&a, &b]), pristine);
+}
+
+#[test]
+fn a_stamp_that_clients_can_not_read_is_not_ordered() {
+    let mut scene = Scene::new(generous());
+    let mut a = scene.join(1);
+    let image =
+        Arc::new(GreyImage::from_samples(4, 4, (0..16).map(|at| at * 4000).collect()).expect("an image"));
+    let at = Vec3::new(40.0, 20.0, 40.0);
+    let stamp = Stamp::new(Arc::clone(&image), at, glam::Vec2::splat(9.0), 3.0);
+    let edit = Edit::quantize(&Brush::stamp(Shape::sphere(at, 6.0), stamp)).expect("a valid brush");
+    let number = scene.server.epoch().number;
+    assert_eq!(scene.server.edit(edit.clone()), Err(UnknownStamp));
+    assert_eq!(scene.server.epoch().number, number);
+    scene.server.stamps_mut().add(Arc::clone(&image));
+    a.stamps.add(image);
+    assert_eq!(scene.server.edit(edit), Ok(()));
+    scene.play(&mut [&mut a], 3);
+    agreed(&scene.server, &[&a]);
+    assert!(a.number > number);
 }
 
 #[test]

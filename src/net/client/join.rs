@@ -1,10 +1,13 @@
 //! Getting to where the server is.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use glam::IVec3;
 
 use super::super::message::{
     Join, MOST_EDITS, MOST_REGIONS, RegionContent, RegionHashes, Terms, ToServer, Welcome,
 };
+use super::super::regions::{region_hash, regions_of};
 use super::{Client, ClientEvent};
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
@@ -39,11 +42,13 @@ impl Client {
         self.received = epoch.number;
         self.next_own = self.next_own.max(own.saturating_add(1));
         let to = epoch.number;
-        self.is_part = join != Join::Log;
+        self.is_part = !matches!(join, Join::Log { .. });
+        self.voids.clear();
         // Until it is there, it has what it had.
         let known = self.epoch.map_or(0, |known| known.number);
         match join {
-            Join::Log => {
+            Join::Log { voids } => {
+                self.voids.extend(voids);
                 self.epoch = Some(super::Epoch { number: known, ..epoch });
                 self.stage = Stage::ByLog { to, own };
             }
@@ -154,16 +159,14 @@ impl Client {
             return;
         }
         let world = self.replica.world();
-        let differs =
-            |&(region, hash): &(RegionPos, u64)| (world.region_hash(region) != hash).then_some(region);
-        let wanted: Vec<RegionPos> = regions.iter().filter_map(differs).collect();
-        let is_known = |region: &RegionPos| regions.binary_search_by_key(region, |(pos, _)| *pos).is_ok();
-        let gone: Vec<RegionPos> = world.regions().filter(|region| !is_known(region)).collect();
-        let next_field = world.next_field();
-        for region in gone {
-            let change = self.replica.region_change(region, Vec::new(), Vec::new(), next_field);
-            self.put(change);
-        }
+        let theirs: BTreeMap<RegionPos, u64> = regions.iter().copied().collect();
+        // Regions of ours that the server has not may share chunks with others, so they are fetched too.
+        let all: BTreeSet<RegionPos> = regions_of(world).into_iter().chain(theirs.keys().copied()).collect();
+        let differs = |region: &RegionPos| {
+            region_hash(world, *region) != theirs.get(region).copied().unwrap_or_default()
+        };
+        let mut wanted: Vec<RegionPos> = all.into_iter().filter(differs).collect();
+        wanted.sort_by_key(|region| distance(*region, self.place));
         for regions in wanted.chunks(MOST_REGIONS) {
             self.outgoing.push(ToServer::Fetch { number, regions: regions.to_vec() }.to_bytes());
         }
@@ -191,9 +194,21 @@ impl Client {
             self.is_playable = true;
             self.events.push(ClientEvent::Playable);
         }
+        let next_field = content.next_field;
         self.put_region(content);
+        if left == 1 {
+            self.lower_names(next_field);
+        }
         self.stage = Stage::ByRegions { to, left: left - 1 };
         self.finish_regions();
+    }
+
+    /// Lets fields to come have the names that they have on the server: what was put can only have raised them.
+    pub(super) fn lower_names(&mut self, next_field: u64) {
+        if self.replica.world().next_field() > next_field {
+            let terms = Terms { next_field, ..self.replica.terms() };
+            self.figures.malformed += u64::from(self.replica.restart(&terms, true).is_err());
+        }
     }
 
     pub(super) fn put_region(&mut self, content: RegionContent) {

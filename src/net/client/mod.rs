@@ -25,7 +25,7 @@ use super::replica::{Replica, ShownChange};
 use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::ground::Ground;
-use crate::lattice::RegionPos;
+use crate::lattice::{LatticeBox, RegionPos};
 use crate::terrain::{Receipt, SIMULATION, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use join::Stage;
@@ -66,6 +66,8 @@ pub struct Client {
     marks: Marks,
     reaches: Reaches,
     repair: Option<Repair>,
+    /// Entries to come that the server could not apply.
+    voids: BTreeSet<u64>,
     /// Regions that are to be fetched, whatever their hashes are.
     doubtful: BTreeSet<RegionPos>,
     /// Was the ground around the player there once?
@@ -111,6 +113,7 @@ impl Client {
             marks,
             reaches,
             repair: None,
+            voids: BTreeSet::new(),
             doubtful: BTreeSet::new(),
             is_playable: false,
             next_own: 1,
@@ -401,6 +404,7 @@ impl Client {
             && let Some(entry) = self.waiting.remove(&(number + 1))
         {
             number += 1;
+            let entry = self.valid(number, entry);
             let is_compared = matches!((&entry, &self.stage), (Entry::Mark, Stage::Following));
             batch.push(entry);
             if is_compared {
@@ -445,6 +449,8 @@ impl Client {
                     if by.is_some_and(|(by, own)| Some(by) == id && self.undos.remove(&own)) {
                         self.events.push(ClientEvent::Undone(restored));
                     }
+                    let reach = change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
+                    reach.into_iter().for_each(|reach| self.reaches.note(epoch.number, reach));
                     if applied.is_void && is_missing {
                         let regions = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos));
                         self.doubtful.extend(regions);
@@ -456,7 +462,7 @@ impl Client {
         self.figures.applied += batch.len() as u64;
         self.epoch = Some(epoch);
         if matches!(self.stage, Stage::Following) {
-            self.marks.touch(applied.bricks);
+            self.marks.touch(applied.regions);
             if matches!(batch.last(), Some(Entry::Mark)) {
                 self.marks.mark(epoch.number, self.replica.world());
             }

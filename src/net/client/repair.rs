@@ -1,11 +1,13 @@
 //! Marks: places of the order at which the hashes of regions are compared, and the repair of those that differ.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
 
 use super::super::message::{Entry, MOST_REGIONS, RegionContent, RegionHashes, ToServer};
 use super::join::Stage;
 use super::{Client, ClientEvent};
 use crate::lattice::{BrickPos, LatticeBox, RegionPos};
+use crate::net::regions::region_hash;
 use crate::terrain::World;
 
 /// Marks that wait for the other side, at most.
@@ -13,6 +15,9 @@ const MOST_MARKS: usize = 256;
 
 /// Edits whose reach is remembered, in case that the server voids one.
 const MOST_REACHES: usize = 4096;
+
+/// Void entries that are to come, at most.
+const MOST_VOIDS: usize = 1 << 16;
 
 /// The most regions that are fetched because of one void entry.
 const MOST_VOID: usize = 512;
@@ -31,14 +36,14 @@ impl Marks {
         *self = Self::default();
     }
 
-    pub fn touch(&mut self, bricks: BTreeSet<BrickPos>) {
-        self.touched.extend(bricks.into_iter().map(RegionPos::of));
+    pub fn touch(&mut self, mut regions: BTreeSet<RegionPos>) {
+        self.touched.append(&mut regions);
     }
 
     /// Notes the hashes of a world at a mark.
     pub fn mark(&mut self, number: u64, world: &World) {
         let touched = std::mem::take(&mut self.touched);
-        let hashes = touched.into_iter().map(|region| (region, world.region_hash(region))).collect();
+        let hashes = touched.into_iter().map(|region| (region, region_hash(world, region))).collect();
         self.ours.insert(number, hashes);
         while self.ours.len() > MOST_MARKS {
             self.ours.pop_first();
@@ -74,7 +79,7 @@ impl Marks {
                 // tells.
                 let own = ours.get(&region).copied();
                 let own = own
-                    .or_else(|| (!self.is_touched_after(number, region)).then(|| world.region_hash(region)));
+                    .or_else(|| (!self.is_touched_after(number, region)).then(|| region_hash(world, region)));
                 if own.is_some_and(|own| own != hash) {
                     differing.insert(region);
                 }
@@ -161,7 +166,9 @@ impl Client {
             return;
         };
         self.figures.repairs += repair.wanted.len() as u64;
+        let next_field = repair.contents.values().map(|content| content.next_field).max();
         repair.contents.into_values().for_each(|content| self.put_region(content));
+        next_field.into_iter().for_each(|next_field| self.lower_names(next_field));
         self.marks.forget(&repair.wanted);
         self.events.push(ClientEvent::Repaired(repair.wanted.into_iter().collect()));
     }
@@ -169,13 +176,8 @@ impl Client {
     /// The server could not apply an entry.
     pub(super) fn take_void(&mut self, number: u64) {
         if number > self.number() {
-            let nothing = Entry::Loose(self.replica.loose());
-            if let Some(entry) = self.waiting.get_mut(&number)
-                && let Entry::Edit { author, own, .. } = std::mem::replace(entry, nothing)
-                && Some(author) == self.id
-                && let Some(edit) = self.replica.take_back(own)
-            {
-                self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
+            if self.voids.len() < MOST_VOIDS {
+                self.voids.insert(number);
             }
         } else if let Some(reach) = self.reaches.of(number) {
             let low = RegionPos::of(BrickPos::of(reach.min)).0;
@@ -185,5 +187,24 @@ impl Client {
                 .flat_map(|(x, y)| (low.z..=high.z).map(move |z| RegionPos(glam::IVec3::new(x, y, z))));
             self.doubtful.extend(regions.take(MOST_VOID));
         }
+    }
+
+    /// An entry as it is to be applied. Those that the server could not apply do nothing.
+    pub(super) fn valid(&mut self, number: u64, entry: Entry) -> Entry {
+        if !self.voids.remove(&number) {
+            return entry;
+        }
+        match entry {
+            Entry::Edit { author, own, .. } if Some(author) == self.id => {
+                if let Some(edit) = self.replica.take_back(own) {
+                    self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
+                }
+            }
+            Entry::Parts { by: Some((by, own)), .. } if Some(by) == self.id && self.undos.remove(&own) => {
+                self.events.push(ClientEvent::UndoRefused(None));
+            }
+            _ => {}
+        }
+        Entry::Parts { by: None, change: Arc::default() }
     }
 }

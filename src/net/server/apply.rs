@@ -9,6 +9,7 @@ use crate::brush::Edit;
 use crate::lattice::RegionPos;
 use crate::net::encoding::entry_bytes;
 use crate::net::message::{Entry, Refusal, RegionHashes, ToClient};
+use crate::net::regions::{region_hash, touched_regions};
 use crate::terrain::{ChangeError, Receipt, Rejection, WorldChange};
 
 /// Most bytes of what an undo puts back: it goes to all clients in one message.
@@ -121,8 +122,7 @@ impl Server {
 
     fn touch(&mut self, change: &WorldChange) {
         let number = self.applied + 1;
-        for (pos, _) in &change.bricks {
-            let region = RegionPos::of(*pos);
+        for region in touched_regions(self.terrain.world().grid(), change) {
             self.touched.insert(region);
             self.changed.insert(region, number);
             self.known_hashes.remove(&region);
@@ -138,8 +138,9 @@ impl Server {
         }
     }
 
-    fn void(&mut self, number: u64) {
+    pub(super) fn void(&mut self, number: u64) {
         self.figures.voids += 1;
+        self.voids.insert(number);
         self.tell(ServerEvent::Void(number));
         self.send_to_all(&ToClient::Void { number });
     }
@@ -153,7 +154,7 @@ impl Server {
     /// The hashes of regions as they are; those that are known are not computed again.
     pub(super) fn hashes_of(&mut self, regions: BTreeSet<RegionPos>) -> RegionHashes {
         let (world, known) = (self.terrain.world(), &mut self.known_hashes);
-        let mut hash = |region| *known.entry(region).or_insert_with(|| world.region_hash(region));
+        let mut hash = |region| *known.entry(region).or_insert_with(|| region_hash(world, region));
         regions.into_iter().map(|region| (region, hash(region))).collect()
     }
 

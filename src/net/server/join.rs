@@ -1,6 +1,5 @@
 //! Clients that come, come back, or have another world.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -11,6 +10,7 @@ use super::session::Stage;
 use super::{Server, ServerEvent};
 use crate::lattice::RegionPos;
 use crate::net::message::{ClientId, Epoch, Hello, Join, Lane, Terms, ToClient, Welcome};
+use crate::net::regions::regions_of;
 use crate::terrain::World;
 
 /// Regions that are encoded to tell how many bytes all of them take.
@@ -53,19 +53,19 @@ impl Server {
         let (join, jobs) = match ours {
             Some(epoch) if epoch.run == self.epoch.run && epoch.number <= self.epoch.number => {
                 match self.entries_after(epoch.number) {
-                    Some(jobs) => (Join::Log, jobs),
+                    Some(log) => log,
                     None => self.compare(client),
                 }
             }
             Some(_) => self.compare(client),
             // It has the pristine world.
             None => match self.entries_after(0).filter(|_| self.is_whole) {
-                Some(jobs) => (Join::Log, jobs),
+                Some(log) => log,
                 None => self.all_regions(hello.place),
             },
         };
         // Old entries lead up to the last one, regions are those of the world as it is.
-        let number = if join == Join::Log { self.epoch.number } else { self.applied };
+        let number = if matches!(join, Join::Log { .. }) { self.epoch.number } else { self.applied };
         let welcome = Welcome {
             client,
             epoch: Epoch { number, ..self.epoch },
@@ -86,7 +86,7 @@ impl Server {
     }
 
     /// The messages with all entries after a number, if they are there, and take fewer bytes than the regions that changed since.
-    fn entries_after(&self, number: u64) -> Option<Vec<Job>> {
+    fn entries_after(&self, number: u64) -> Option<(Join, Vec<Job>)> {
         let messages = self.log.after(number)?;
         let bytes: usize = messages.iter().map(|message| message.len()).sum();
         // A few entries are sent in any case.
@@ -97,7 +97,8 @@ impl Server {
                 return None;
             }
         }
-        Some(messages.into_iter().map(Job::Message).collect())
+        let voids = self.voids.range(number.saturating_add(1)..).copied().collect();
+        Some((Join::Log { voids }, messages.into_iter().map(Job::Message).collect()))
     }
 
     /// All regions, nearest first.
@@ -162,14 +163,6 @@ impl Server {
             }
         }
     }
-}
-
-/// The regions that hold bricks or fields.
-fn regions_of(world: &World) -> BTreeSet<RegionPos> {
-    let corners = world.fields().flat_map(|(_, fields)| {
-        fields.iter().map(|field| RegionPos::of(crate::lattice::BrickPos::of(field.bounds.min)))
-    });
-    corners.chain(world.regions()).collect()
 }
 
 fn jobs(world: &Arc<World>, number: u64, regions: &[RegionPos]) -> Vec<Job> {

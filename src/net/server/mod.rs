@@ -62,6 +62,11 @@ const MOST_EVENTS: usize = 4096;
 /// A message with entries is sent once it has so many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
 
+/// The image of a stamp is not among those that both sides have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the image of the stamp is not registered")]
+pub struct UnknownStamp;
+
 /// A message that waits to be sent.
 pub type Outgoing = (ClientId, Lane, Vec<u8>);
 
@@ -98,6 +103,8 @@ pub struct Server {
     waiting_cost: u64,
     writer: OrderWriter,
     log: OrderLog,
+    /// Entries of the log that could not be applied.
+    voids: BTreeSet<u64>,
     /// Does the order lead from the pristine world to this one?
     is_whole: bool,
     undos: VecDeque<UndoRequest>,
@@ -164,6 +171,7 @@ impl Server {
             waiting_cost: 0,
             writer: OrderWriter::default(),
             log: OrderLog::new(settings.log_bytes, number),
+            voids: BTreeSet::new(),
             is_whole,
             undos: VecDeque::new(),
             strokes: Strokes::new(settings.undo_bytes),
@@ -302,9 +310,16 @@ impl Server {
         self.order(Entry::Loose(loose));
     }
 
-    /// Orders an edit of the game's own, which is not checked. Its author is [`ClientId::SERVER`].
-    pub fn edit(&mut self, edit: Edit) {
+    /// Orders an edit of the game's own, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
+    ///
+    /// # Errors
+    /// When it is a stamp whose image is not among the [stamps](Self::stamps_mut): no client could read it.
+    pub fn edit(&mut self, edit: Edit) -> Result<(), UnknownStamp> {
+        if !self.stamps.can_send(&edit) {
+            return Err(UnknownStamp);
+        }
         self.order_edit(ClientId::SERVER, 0, edit, 0);
+        Ok(())
     }
 
     /// Orders that parts take the place of others.
@@ -389,6 +404,7 @@ impl Server {
         }
         self.apply();
         self.log.trim(self.applied);
+        self.voids = self.voids.split_off(&self.log.first());
         self.welcome_all();
         self.send_bulk(now);
     }
@@ -405,3 +421,6 @@ impl Server {
         std::mem::take(&mut self.events).into()
     }
 }
+
+#[cfg(test)]
+mod void_tests;

@@ -9,6 +9,7 @@ use super::settings::ServerSettings;
 use crate::lattice::RegionPos;
 use crate::net::bulk::put_message;
 use crate::net::message::{RegionContent, ToClient};
+use crate::net::regions::chunks_of;
 use crate::terrain::World;
 
 /// What is to be sent.
@@ -34,8 +35,7 @@ impl Job {
 /// A region of a world.
 fn content(world: &World, number: u64, pos: RegionPos, left: u32) -> RegionContent {
     let bricks = world.bricks_in(pos).map(|(at, brick)| (at, Arc::clone(brick))).collect();
-    let own = pos.samples().intersection(world.grid().edit_bounds());
-    let chunks = own.into_iter().flat_map(|samples| world.grid().chunks_of(samples));
+    let chunks = chunks_of(world.grid(), pos);
     let fields = chunks.filter_map(|chunk| Some((chunk, world.fields_of(chunk)?.clone()))).collect();
     RegionContent { number, pos, left, next_field: world.next_field(), bricks, fields }
 }

@@ -1,0 +1,115 @@
+//! Regions as they are compared and sent: bricks, and the names of fields.
+
+use std::collections::BTreeSet;
+
+use xxhash_rust::xxh3::Xxh3Default;
+
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, RegionPos};
+use crate::terrain::{World, WorldChange};
+
+/// The hash of a region as marks and tables tell it: that of its [samples](World::region_hash), and of the names of the fields in
+/// all chunks that reach into it. 0 for a pristine one.
+pub fn region_hash(world: &World, region: RegionPos) -> u64 {
+    let samples = world.region_hash(region);
+    let (mut names, mut is_empty) = (Xxh3Default::new(), true);
+    names.update(&samples.to_le_bytes());
+    for chunk in chunks_of(world.grid(), region) {
+        let Some(fields) = world.fields_of(chunk).filter(|fields| !fields.is_empty()) else { continue };
+        is_empty = false;
+        let ChunkPos { x, y, z } = chunk;
+        [x, y, z].iter().for_each(|part| names.update(&part.to_le_bytes()));
+        fields.iter().for_each(|field| names.update(&field.id.0.to_le_bytes()));
+    }
+    if is_empty { samples } else { names.digest() }
+}
+
+/// The regions whose [hash](region_hash) a change may change.
+pub fn touched_regions(grid: ChunkGrid, change: &WorldChange) -> BTreeSet<RegionPos> {
+    let mut regions: BTreeSet<RegionPos> = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos)).collect();
+    for (chunk, _) in &change.fields {
+        let Some(samples) = grid.chunk_samples(*chunk).intersection(grid.edit_bounds()) else { continue };
+        let [low, high] = [samples.min, samples.max].map(|corner| RegionPos::of(BrickPos::of(corner)).0);
+        regions.extend(crate::lattice::LatticeBox { min: low, max: high }.points().map(RegionPos));
+    }
+    regions
+}
+
+/// The chunks that have a sample in a region.
+pub(super) fn chunks_of(grid: ChunkGrid, region: RegionPos) -> impl Iterator<Item = ChunkPos> {
+    let samples = region.samples().intersection(grid.edit_bounds());
+    samples.into_iter().flat_map(move |samples| grid.chunks_of(samples))
+}
+
+/// Regions with all bricks and fields of a world among them.
+pub(super) fn regions_of(world: &World) -> BTreeSet<RegionPos> {
+    let corners = world
+        .fields()
+        .flat_map(|(_, fields)| fields.iter().map(|field| RegionPos::of(BrickPos::of(field.bounds.min))));
+    corners.chain(world.regions()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use glam::{IVec3, Vec3};
+
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::Ground;
+    use crate::terrain::{Terrain, TerrainSettings};
+    use crate::volume::{Field, FieldId, Fields};
+
+    /// With chunks that fit into regions, and with others.
+    fn terrains() -> [Terrain; 3] {
+        [16, 32, 100].map(|chunk_size| {
+            let ground = Ground::flat(200, 200, 20.0).expect("a valid ground");
+            let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
+            Terrain::new(ground, &settings).expect("valid settings")
+        })
+    }
+
+    fn hashes(world: &World) -> BTreeMap<RegionPos, u64> {
+        let all = (-1..5).flat_map(|x| (-2..3).flat_map(move |y| (-1..5).map(move |z| IVec3::new(x, y, z))));
+        all.map(|at| (RegionPos(at), region_hash(world, RegionPos(at)))).collect()
+    }
+
+    #[test]
+    fn what_a_change_changes_is_among_the_regions_that_it_touches() {
+        let mut rng = fastrand::Rng::with_seed(6);
+        for mut terrain in terrains() {
+            let pristine = hashes(terrain.world());
+            assert!(pristine.values().all(|hash| *hash == 0));
+            for _ in 0..30 {
+                let at = Vec3::new(rng.f32() * 200.0, rng.f32() * 30.0, rng.f32() * 200.0);
+                let before = hashes(terrain.world());
+                terrain.submit(&Brush::dig(Shape::sphere(at, 1.0 + 9.0 * rng.f32())));
+                let commit = terrain.begin().expect("an edit").run();
+                let change = commit.change();
+                terrain.commit(commit).expect("its own commit");
+                let touched = touched_regions(terrain.world().grid(), &change);
+                for (region, hash) in hashes(terrain.world()) {
+                    assert!(hash == before[&region] || touched.contains(&region), "{region:?} at {at}");
+                }
+            }
+            assert_ne!(hashes(terrain.world()), pristine);
+        }
+    }
+
+    #[test]
+    fn another_name_is_another_hash_of_the_same_samples() {
+        for mut terrain in terrains() {
+            terrain.apply([Brush::dig(Shape::sphere(Vec3::new(90.0, 20.0, 90.0), 6.0))]);
+            let (before, hash) = (hashes(terrain.world()), terrain.world().hash());
+            let parts = terrain.parts().change;
+            let (chunk, fields) = parts.fields.first().expect("a field").clone();
+            let renamed = fields.iter().map(|field| Field { id: FieldId(field.id.0 + 70), ..*field });
+            let renamed = Fields::restored(renamed.collect()).expect("names that differ");
+            let change =
+                WorldChange { fields: vec![(chunk, renamed)], next_field: 100, ..WorldChange::default() };
+            terrain.apply_change(change, Some(hash)).expect("it fits");
+            let own = BrickPos::of(fields.iter().next().expect("a field").bounds.min);
+            assert_ne!(hashes(terrain.world())[&RegionPos::of(own)], before[&RegionPos::of(own)]);
+        }
+    }
+}
