@@ -28,7 +28,7 @@ pub enum StoreError {
         known: u32,
     },
     /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
-    #[error("the ground has changed below {regions} saved regions")]
+    #[error("the ground has changed{}", if *.regions == 0 { String::new() } else { format!(" below {regions} saved regions") })]
     BaseChanged {
         /// Regions with edits over changed ground; 0 if only materials or places without edits changed.
         regions: usize,
@@ -141,11 +141,9 @@ pub enum StoreTrouble {
         quarantine: String,
     },
     /// A damaged part was rebuilt from the log; nothing is lost.
-    #[error(
-        "{what} was damaged and has been rebuilt from the log; a copy of the damaged one is in {quarantine}"
-    )]
+    #[error("{what}; it has been rebuilt from the log, and a copy of what was there is in {quarantine}")]
     Rebuilt {
-        /// What was damaged.
+        /// What was wrong, in words.
         what: String,
         /// Where the copy is.
         quarantine: String,

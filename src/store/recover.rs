@@ -423,7 +423,10 @@ pub(super) fn troubles(recovered: &Recovered, copies: &BTreeMap<RegionPos, Strin
         let quarantine = copies.get(at).cloned().unwrap_or_else(|| "no file, as nothing was left".into());
         troubles.push(match recovered.is_lossy {
             true => StoreTrouble::RegionLost { region: keys::name(*at), quarantine },
-            false => StoreTrouble::Rebuilt { what: format!("the region {}", keys::name(*at)), quarantine },
+            false => StoreTrouble::Rebuilt {
+                what: format!("the region {} is damaged", keys::name(*at)),
+                quarantine,
+            },
         });
     }
     troubles
