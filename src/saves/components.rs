@@ -19,7 +19,7 @@ pub struct SavedWorld {
     pub path: PathBuf,
     /// What may be lost at most if the machine loses power: commits of this long, and a little more for the disk.
     pub loss_window: Duration,
-    /// What to do with edits where the ground is another one than they were made on.
+    /// What to do with edits where the ground or the [level](super::StartLevel) is another one than they were made on.
     #[reflect(ignore)]
     pub base_changed: BaseChanged,
 }

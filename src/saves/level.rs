@@ -100,8 +100,8 @@ impl AssetSaver for LevelSaver {
 
 /// The terrain of this entity begins as a level. Insert it with a terrain without edits, which gives the ground; the terrain is
 /// [`Held`] until the level is loaded. With a [`SavedWorld`](super::SavedWorld) beside it, a world that was saved goes on, and only a
-/// new one begins as the level. That world saves only what differs from the level, and needs the same level to go on: with another
-/// one, [`WorldOpened`](super::WorldOpened) says so, and the world stays on the disk as it is.
+/// new one begins as the level. That world saves only what differs from the level, and needs a level to go on: where it is another
+/// one, say a new version of it, [`SavedWorld::base_changed`](super::SavedWorld::base_changed) says what happens.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct StartLevel(pub Handle<BurrowLevel>);
 

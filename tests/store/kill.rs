@@ -1,4 +1,5 @@
-//! A process that digs is killed at random, also while it makes checkpoints and while it recovers. `BURROW_KILLS` is how often.
+//! A process that digs is killed at random, also while it makes checkpoints and while it recovers. `BURROW_KILLS` is how often,
+//! and `BURROW_SEED` the seed.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};

@@ -7,12 +7,13 @@ use bevy_burrow::lattice::{BrickPos, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
     BaseChanged, BaseLevel, DiskImage, Level, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
-    check_in,
+    check_in, inspect_in,
 };
 use bevy_burrow::terrain::{Meshing, WorldChange};
 use bevy_burrow::volume::Brick;
 use fastrand::Rng;
 
+use crate::damage::{Record, records};
 use crate::levels::{begin, level, on, restore_brick};
 use crate::play::{act, count, ground, options, save, state};
 use crate::worlds::any_random_brush;
@@ -153,6 +154,10 @@ fn own_bricks_stay_and_all_others_are_those_of_the_new_level() {
                 .expect("it is its level");
             assert_eq!((state(&again.terrain), again.troubles), (state(&moved), vec![]), "seed {seed}");
         }
+        // No record of before is left.
+        let is_region = |(key, _): &&Record| key.len() == 13 && key[0] == b'r';
+        let stored = records(&disk).1.iter().filter(is_region).count();
+        assert_eq!(stored, inspect_in(&disk).expect("it can be read").regions, "seed {seed}");
         let check = check_in(&disk, Arc::clone(&ground), Some(&new)).expect("it can be read");
         assert_eq!((check.troubles, check.replays), (vec![], None), "seed {seed}");
         let back = by_hand(&moved, &ground, &new, &old);
