@@ -148,7 +148,7 @@ impl Play {
 
     /// Gives the replica some entries, and checks whether it has to do anything.
     fn give(&mut self, count: usize) {
-        let was_outdated = self.replica.is_outdated;
+        let was_outdated = self.replica.is_outdated || self.replica.is_apart;
         let batch = &self.order[self.given..self.order.len().min(self.given + count)];
         let mut pending: VecDeque<u64> = self.replica.pending().map(|(own, _)| own).collect();
         let is_echo = |entry: &Entry| match own_number(entry) {
