@@ -11,7 +11,7 @@ use super::never_shown;
 use super::regions::{chunks_of, touched_regions};
 use crate::brush::Edit;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkPos, RegionPos};
+use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{
     ChangeError, Receipt, RestoreError, Restored, Terrain, TerrainError, TerrainSettings, World, WorldChange,
     WorldParts,
@@ -19,6 +19,9 @@ use crate::terrain::{
 use crate::volume::{Brick, Fields};
 
 type Stored = Option<Arc<Brick>>;
+
+/// So far beyond what it may change an edit reads at most, in voxels: a neighbouring sample, and more than that.
+const MARGIN: i32 = 8;
 
 /// What is to be put into the world that is shown.
 #[derive(Clone, Debug)]
@@ -58,12 +61,20 @@ pub(super) struct Replica {
     bricks: BTreeMap<BrickPos, Stored>,
     /// Fields of chunks that are shown otherwise than confirmed.
     fields: BTreeMap<ChunkPos, Fields>,
-    /// The hash of what is shown.
-    hash: u64,
+    /// The sum of the hashes of all regions of what is shown.
+    samples: u64,
+    /// What that has more than the confirmed world's when they were compared.
+    more: u64,
+    /// The greatest name that a field of what is shown has had.
+    next_field: u64,
     /// What has changed of the confirmed world since it was compared with what is shown, as it was then.
     before: Before,
     /// May what is shown differ from the confirmed world with the pending edits?
     is_outdated: bool,
+    /// Has the confirmed world changed only where pending edits read nothing, since it was compared with what is shown?
+    is_apart: bool,
+    /// Times that pending edits were worked out.
+    drafts: u64,
 }
 
 /// Parts of a world before they changed.
@@ -90,9 +101,21 @@ impl Replica {
     pub fn new(ground: Arc<Ground>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
         let mut confirmed = Terrain::new(ground, settings)?;
         never_shown(&mut confirmed);
-        let hash = confirmed.world().hash();
-        let (pending, bricks, fields, before) = Default::default();
-        Ok(Self { confirmed, pending, bricks, fields, hash, before, is_outdated: false })
+        let (samples, next_field) = (confirmed.world().regions_hash(), confirmed.world().next_field());
+        let (pending, bricks, fields, before, is_outdated, is_apart, drafts) = Default::default();
+        Ok(Self {
+            confirmed,
+            pending,
+            bricks,
+            fields,
+            samples,
+            more: 0,
+            next_field,
+            before,
+            is_outdated,
+            is_apart,
+            drafts,
+        })
     }
 
     /// The world after the order's entries.
@@ -111,7 +134,12 @@ impl Replica {
 
     /// The hash of what is shown, once all that was returned is put.
     pub fn shown_hash(&self) -> u64 {
-        self.hash
+        World::hash_of(self.world().ground().hash(), self.samples)
+    }
+
+    /// Times that pending edits were worked out.
+    pub fn drafts(&self) -> u64 {
+        self.drafts
     }
 
     /// Adds an own edit.
@@ -134,7 +162,9 @@ impl Replica {
 
     /// Applies entries of the order. Own edits among them are no longer pending; `own` tells their numbers.
     pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
-        let mut submitted = Vec::new();
+        let (mut submitted, mut is_own, mut is_foreign) = (Vec::new(), false, false);
+        let next_field = self.world().next_field();
+        self.is_outdated |= self.is_apart && entries.iter().any(|entry| own(entry).is_some());
         for entry in entries {
             match entry {
                 Entry::Rules(rules) => {
@@ -152,12 +182,17 @@ impl Replica {
                 // What is shown contains it already.
                 Some(number) if self.pending.front().is_some_and(|first| first.own == number) => {
                     self.pending.pop_front();
+                    is_own = true;
                 }
                 Some(number) => {
                     self.is_outdated = true;
                     self.pending.retain(|pending| pending.own != number);
                 }
-                None => self.is_outdated |= !matches!(entry, Entry::Mark),
+                None => match entry {
+                    Entry::Edit { .. } | Entry::Parts { .. } => is_foreign = true,
+                    Entry::Rules(_) | Entry::Loose(_) => self.is_outdated = true,
+                    Entry::Mark => {}
+                },
             }
         }
         let mut applied = self.run();
@@ -169,6 +204,10 @@ impl Replica {
         }
         // What is deterministic fails everywhere; with it, what is shown is drafted anew.
         self.is_outdated |= applied.receipts.iter().any(|receipt| receipt.outcome.is_err());
+        if is_foreign && !self.is_outdated {
+            self.is_apart = !is_own && self.reads_nothing_of_before(next_field);
+            self.is_outdated = !self.is_apart;
+        }
         self.share();
         applied
     }
@@ -193,10 +232,11 @@ impl Replica {
         let changed = self.before.bricks.keys().filter_map(|pos| Some((*pos, Arc::clone(shown(pos)?))));
         let changed: Vec<(BrickPos, Arc<Brick>)> = changed.collect();
         self.confirmed.share_bricks(changed.iter().map(|(pos, brick)| (*pos, brick)));
-        if self.is_outdated {
+        if self.is_outdated || self.is_apart {
             return;
         }
         // What is shown stays as it is: all that changed was shown before.
+        self.more = self.samples.wrapping_sub(self.world().regions_hash());
         let before = std::mem::take(&mut self.before);
         let world = self.confirmed.world();
         for (pos, old) in before.bricks {
@@ -265,13 +305,39 @@ impl Replica {
         WorldChange { bricks: all.into_iter().collect(), fields: chunks.into_iter().collect(), next_field }
     }
 
+    /// Do the pending edits come to the same as before, whatever has changed of the confirmed world? `next_field` is what it had.
+    fn reads_nothing_of_before(&self, next_field: u64) -> bool {
+        if self.pending.is_empty() {
+            return self.bricks.is_empty() && self.fields.is_empty();
+        }
+        let world = self.world();
+        // Pieces may come loose anywhere, and new fields have the next names.
+        if self.confirmed.loose().is_some()
+            || (world.next_field() != next_field && self.next_field > next_field)
+        {
+            return false;
+        }
+        let reads = |edit: &Edit| edit.reach().grown(MARGIN).intersection(world.grid().edit_bounds());
+        let reads: Vec<LatticeBox> = self.pending.iter().filter_map(|pending| reads(&pending.edit)).collect();
+        let chunks: BTreeSet<ChunkPos> =
+            reads.iter().flat_map(|samples| world.grid().chunks_of(*samples)).collect();
+        let is_read = |pos: &BrickPos| reads.iter().any(|own| own.intersection(pos.samples()).is_some());
+        self.before.fields.keys().all(|chunk| !chunks.contains(chunk) && !self.fields.contains_key(chunk))
+            && self.before.bricks.keys().all(|pos| !is_read(pos) && !self.bricks.contains_key(pos))
+    }
+
     /// Brings what is shown up to date: the change that is to be put there, if there is one, and the receipts of pending edits,
     /// in order, if they were drafted.
     pub fn update(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
+        if self.is_apart && !self.is_outdated {
+            self.is_apart = false;
+            return (self.follow_apart(), None);
+        }
         if !self.is_outdated {
             return (None, None);
         }
-        self.is_outdated = false;
+        (self.is_outdated, self.is_apart) = (false, false);
+        self.drafts += u64::from(!self.pending.is_empty());
         let edits: Vec<Edit> = self.pending.iter().map(|pending| pending.edit.clone()).collect();
         let draft = self.confirmed.draft(&edits);
         let (world, before) = (self.confirmed.world(), std::mem::take(&mut self.before));
@@ -304,10 +370,32 @@ impl Replica {
                 change.fields.push((chunk, new));
             }
         }
-        (self.bricks, self.fields, self.hash) = (bricks, fields, draft.hash);
+        self.more = draft.samples.wrapping_sub(world.regions_hash());
+        (self.bricks, self.fields, self.samples) = (bricks, fields, draft.samples);
+        self.next_field = change.next_field;
         let is_empty = change.bricks.is_empty() && change.fields.is_empty();
         let shown = (!is_empty).then_some(ShownChange { change, hash: draft.hash });
         (shown, Some(draft.receipts))
+    }
+
+    /// What is to be put where the confirmed world has changed apart from the pending edits, which stay as they are shown.
+    fn follow_apart(&mut self) -> Option<ShownChange> {
+        let Before { bricks, fields } = std::mem::take(&mut self.before);
+        self.samples = self.world().regions_hash().wrapping_add(self.more);
+        let (hash, world) = (self.shown_hash(), self.confirmed.world());
+        self.next_field = self.next_field.max(world.next_field());
+        let bricks = bricks.into_iter().filter_map(|(pos, old)| {
+            let new = world.brick(pos);
+            (!Brick::is_same(old.as_ref(), new)).then(|| (pos, new.cloned()))
+        });
+        let fields = fields.into_iter().filter_map(|(chunk, old)| {
+            let new = fields_of(world, chunk);
+            (old != new).then_some((chunk, new))
+        });
+        let change =
+            WorldChange { bricks: bricks.collect(), fields: fields.collect(), next_field: self.next_field };
+        let is_empty = change.bricks.is_empty() && change.fields.is_empty();
+        (!is_empty).then_some(ShownChange { change, hash })
     }
 
     /// All that is to be put into a world, whatever it holds, so that it is what is to be shown.
@@ -333,7 +421,7 @@ impl Replica {
             fields: chunks.into_iter().map(|chunk| (chunk, fields(chunk))).collect(),
             next_field: world.next_field(),
         };
-        ShownChange { change, hash: self.hash }
+        ShownChange { change, hash: self.shown_hash() }
     }
 }
 

@@ -16,6 +16,9 @@ use crate::volume::DiggingRules;
 const SIDE: u32 = 72;
 const OWN: ClientId = ClientId(1);
 
+/// Places of edits that meet each other.
+const NEAR: (f32, f32) = (8.0, 48.0);
+
 fn ground() -> Arc<Ground> {
     let height = |x: i32, z: i32| 20.0 + 3.0 * (f64::from(x) * 0.2).sin() + (f64::from(z) * 0.3).cos();
     Arc::new(Ground::from_fn(SIDE, SIDE, height).expect("valid heights"))
@@ -31,10 +34,10 @@ fn terrain(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
-/// An edit of any operation, near to all others.
-fn edit(rng: &mut Rng, image: &Arc<GreyImage>) -> Edit {
+/// An edit of any operation, between these places.
+fn edit(rng: &mut Rng, image: &Arc<GreyImage>, (low, high): (f32, f32)) -> Edit {
     let mut within = |low: f32, high: f32| low + rng.f32() * (high - low);
-    let at = Vec3::new(within(8.0, 48.0), within(12.0, 26.0), within(8.0, 48.0));
+    let at = Vec3::new(within(low, high), within(12.0, 26.0), within(8.0, 48.0));
     let size = within(1.0, 6.0);
     let shape = match rng.u32(0..3) {
         0 => Shape::cuboid(at, Vec3::new(size, 1.5, size)),
@@ -129,6 +132,8 @@ struct Play {
     sent: VecDeque<(u64, Edit)>,
     /// Updates where nothing was to be done.
     quiet: usize,
+    /// Updates where others had changed what no pending edit read.
+    apart: usize,
     shared: usize,
 }
 
@@ -138,12 +143,12 @@ impl Play {
         let replica = Replica::new(Arc::clone(&ground), &settings()).expect("valid settings");
         let (shown, reference) = (terrain(&ground), terrain(&ground));
         let (order, sent) = Default::default();
-        Self { replica, shown, reference, obeyed: 0, order, given: 0, sent, quiet: 0, shared: 0 }
+        Self { replica, shown, reference, obeyed: 0, order, given: 0, sent, quiet: 0, apart: 0, shared: 0 }
     }
 
     /// Gives the replica some entries, and checks whether it has to do anything.
     fn give(&mut self, count: usize) {
-        let was_outdated = self.replica.is_outdated;
+        let was_outdated = self.replica.is_outdated || self.replica.is_apart;
         let batch = &self.order[self.given..self.order.len().min(self.given + count)];
         let mut pending: VecDeque<u64> = self.replica.pending().map(|(own, _)| own).collect();
         let is_echo = |entry: &Entry| match own_number(entry) {
@@ -164,7 +169,9 @@ impl Play {
     }
 
     fn check(&mut self) {
+        let (was_outdated, has_pending) = (self.replica.is_outdated, self.replica.pending().count() > 0);
         if let (Some(ShownChange { change, hash }), _) = self.replica.update() {
+            self.apart += usize::from(!was_outdated && has_pending);
             self.shown.apply_change(change, Some(hash)).expect("it fits");
         }
         while self.obeyed < self.given {
@@ -203,13 +210,15 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
     let rounds = std::env::var("BURROW_ROUNDS").ok().and_then(|rounds| rounds.parse().ok()).unwrap_or(12);
     let image =
         Arc::new(GreyImage::from_samples(4, 4, (0..16).map(|at| at * 4000).collect()).expect("an image"));
-    let (mut quiet, mut shared) = (0, 0);
+    let (mut quiet, mut apart, mut shared) = (0, 0, 0);
     for round in 0..rounds {
         let mut rng = Rng::with_seed(round);
         let mut play = Play::new();
+        // In every other round the others are mostly too far away to meet what own edits read.
+        let (near, others) = if round % 2 == 0 { (NEAR, NEAR) } else { ((8.0, 22.0), (34.0, 66.0)) };
         for own in 1..=40 {
             if rng.u32(0..3) > 0 {
-                let edit = edit(&mut rng, &image);
+                let edit = edit(&mut rng, &image, near);
                 play.replica.predict(own, edit.clone());
                 play.sent.push_back((own, edit));
             }
@@ -218,7 +227,7 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
             }
             // In some rounds others dig much, in some nobody does.
             if rng.u64(0..6) < round % 4 {
-                let edit = edit(&mut rng, &image);
+                let edit = edit(&mut rng, &image, others);
                 play.order.push(Entry::Edit { author: ClientId(2), own, edit });
             }
             if round % 3 > 0 && rng.u32(0..6) == 0 {
@@ -233,7 +242,15 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
                     play.order.push(Entry::Edit { author: OWN, own, edit });
                 }
             }
-            if rng.bool() {
+            if round % 2 == 1 {
+                play.check();
+                for _ in 0..rng.usize(0..4) {
+                    play.give(1);
+                    if rng.bool() {
+                        play.check();
+                    }
+                }
+            } else if rng.bool() {
                 play.give(rng.usize(1..6));
             }
             if rng.bool() {
@@ -243,13 +260,14 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
         play.check();
         let whole = play.replica.whole(play.shown.world());
         let mut other = terrain(&ground());
-        obey(&mut other, &Entry::Edit { author: OWN, own: 0, edit: edit(&mut rng, &image) });
+        obey(&mut other, &Entry::Edit { author: OWN, own: 0, edit: edit(&mut rng, &image, NEAR) });
         let ShownChange { change, hash } = play.replica.whole(other.world());
         other.apply_change(change, Some(hash)).expect("it fits");
         assert_eq!((hash, other.world().hash()), (whole.hash, play.shown.world().hash()));
         assert_eq!(fields(other.world()), fields(play.shown.world()));
-        (quiet, shared) = (quiet + play.quiet, shared + play.shared);
+        (quiet, apart, shared) = (quiet + play.quiet, apart + play.apart, shared + play.shared);
     }
     assert!(quiet >= 10, "{quiet} predictions came as they were");
+    assert!(apart >= 10, "{apart} updates drafted nothing");
     assert!(shared >= 1000, "{shared} bricks are shared");
 }

@@ -22,6 +22,8 @@ pub struct Draft {
     pub change: WorldChange,
     /// The [hash](World::hash) that the world would have.
     pub hash: u64,
+    /// The sum of the hashes of all regions that the world would have.
+    pub(crate) samples: u64,
 }
 
 impl Terrain {
@@ -38,15 +40,17 @@ impl Terrain {
         }
         let Some((Taken::Edits(edits), _)) = queue.take() else {
             let change = WorldChange { next_field: self.world.next_field, ..WorldChange::default() };
-            return Draft { receipts: Vec::new(), change, hash: self.world.hash() };
+            let (hash, samples) = (self.world.hash(), self.world.sample_hash);
+            return Draft { receipts: Vec::new(), change, hash, samples };
         };
         let transaction = self.transaction(unique(), Work::Edits(edits));
         let transaction =
             Transaction { meshing: Meshing::Never, drawn_cut: None, is_logged: false, ..transaction };
         let commit = transaction.run();
-        let hash = World::hash_of(self.world.ground().hash(), commit.sample_hash());
+        let samples = commit.sample_hash();
+        let hash = World::hash_of(self.world.ground().hash(), samples);
         let change = commit.change();
-        Draft { receipts: commit.receipts, change, hash }
+        Draft { receipts: commit.receipts, change, hash, samples }
     }
 
     /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as they are.

@@ -39,6 +39,11 @@ impl World {
         self.next_field
     }
 
+    /// The sum of the hashes of all regions.
+    pub(crate) fn regions_hash(&self) -> u64 {
+        self.sample_hash
+    }
+
     /// Hash of the edited samples of a region; 0 where nothing was edited. The sum of all, which wraps around, is that of the
     /// world: see [`hash_of`](Self::hash_of).
     pub fn region_hash(&self, region: RegionPos) -> u64 {

@@ -68,4 +68,6 @@ pub struct ClientFigures {
     pub gaps: u64,
     /// Messages that meant nothing.
     pub malformed: u64,
+    /// Times that edits which the server had not answered were worked out, at first and where others met what they read.
+    pub drafts: u64,
 }

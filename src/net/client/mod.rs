@@ -208,7 +208,7 @@ impl Client {
 
     /// What was counted so far.
     pub fn figures(&self) -> ClientFigures {
-        self.figures
+        ClientFigures { drafts: self.replica.drafts(), ..self.figures }
     }
 
     /// Edits of the player that the server has not answered.
