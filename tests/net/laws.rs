@@ -13,7 +13,7 @@ use bevy_burrow::terrain::WorldChange;
 use fastrand::Rng;
 use glam::Vec3;
 
-use crate::bots::{Play, TICK};
+use crate::bots::{Bot, Play, TICK};
 use crate::follower::{count, hills, terrain};
 use crate::worlds::any_random_brush;
 
@@ -189,14 +189,18 @@ fn names_of_fields_that_drift_are_noticed_at_the_next_mark_and_mended() {
     check_mended(&play);
 }
 
-fn wait_until_joined(play: &mut Play, at: usize) {
+fn wait_until(play: &mut Play, at: usize, is_so: impl Fn(&Bot) -> bool) {
     for _ in 0..1200 {
         play.seconds(0.1);
-        if play.bots[at].client.has_joined() {
+        if is_so(&play.bots[at]) {
             return;
         }
     }
-    panic!("{:?} has not joined: {:?}", play.bots[at].id, play.bots[at].client.figures());
+    panic!("{:?} waits: {:?}", play.bots[at].id, play.bots[at].client.figures());
+}
+
+fn wait_until_joined(play: &mut Play, at: usize) {
+    wait_until(play, at, |bot| bot.client.has_joined());
 }
 
 /// Has so many edits ordered by the server itself.
@@ -231,35 +235,43 @@ fn come_late(log_bytes: usize) -> Play {
     play.line.rate = 256 << 10;
     play.join();
     play.bots[8].client.set_near(64);
-    wait_until_joined(&mut play, 8);
+    wait_until(&mut play, 8, |bot| bot.playable_at.is_some());
     let late = &play.bots[8];
-    let [playable, joined] = [late.playable_at, late.joined_at].map(|at| at.expect("it is there") - before);
+    let playable = late.playable_at.expect("it is there") - before;
     println!(
-        "{edits} edits, {log_bytes} bytes of log at most: {:?} bytes by lane, playable after {playable:?}, joined \
-         after {joined:?}",
+        "{edits} edits, {log_bytes} bytes of log at most: {:?} bytes by lane, playable after {playable:?}",
         late.bytes
     );
-    assert!(playable <= joined && playable <= Duration::from_secs(15));
+    assert!(playable <= Duration::from_secs(15));
     assert!(play.bots.iter().all(|bot| bot.order.most.max(bot.bulk.most) <= 5 << 20));
+    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000, "too much until one can play");
     play
 }
+
+/// All regions of many edits take minutes.
+const MANY: u64 = 20_000;
 
 #[test]
 fn who_comes_late_plays_soon() {
     let mut play = come_late(8 << 20);
     let late = &play.bots[8];
-    assert!(late.client.figures().applied >= count("BURROW_EDITS", 1000), "it got regions");
+    assert!(late.client.has_joined(), "all of the log is there");
+    assert!(late.client.figures().applied > count("BURROW_EDITS", 1000) * 3 / 4, "it got regions");
     assert!(late.event("others") < 500, "what was long ago is told");
-    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000);
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
 
 #[test]
 fn who_comes_late_plays_soon_without_the_whole_log() {
-    let mut play = come_late(count("BURROW_EDITS", 1000) as usize * 10);
+    let edits = count("BURROW_EDITS", 1000);
+    let mut play = come_late(edits as usize * 10);
     assert!(play.bots[8].client.figures().applied < 500, "it got the log");
-    play.settle();
+    if edits <= MANY {
+        wait_until(&mut play, 8, |bot| bot.client.has_joined());
+        println!("joined with {:?} bytes by lane", play.bots[8].bytes);
+        play.settle();
+    }
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
 
