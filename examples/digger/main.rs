@@ -190,7 +190,7 @@ pub fn game(
         .add_plugins((BurrowPlugins, ui::settings::SettingsPlugin(settings)))
         .add_plugins((
             party::connection::ConnectionPlugin(party),
-            party::fellows::FellowsPlugin,
+            party::players::PlayersPlugin,
             party::figures::FiguresPlugin,
         ))
         .add_plugins((

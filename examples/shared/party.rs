@@ -51,11 +51,13 @@ pub fn listen(world: &mut World, address: SocketAddr, players: usize) -> Result<
     Ok(local)
 }
 
-/// Connects to a server, as the player of this number.
+/// Connects to a server, as the player of this number, and ends what was there before.
 ///
 /// # Errors
 /// When there is no network.
 pub fn connect(world: &mut World, server: SocketAddr, player: u64) -> Result {
+    // Replicon notices a connection when its resource is added, and not when it replaces another one.
+    leave(world);
     let any = if server.ip().is_loopback() { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
     let socket = UdpSocket::bind((any, 0))?;
     let authentication = ClientAuthentication::Unsecure {

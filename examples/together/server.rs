@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
@@ -9,7 +10,7 @@ use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::{Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundServer, TogetherPlugin};
+use bevy_burrow::together::{GroundServer, GroundServerEvent, TogetherPlugin};
 use bevy_replicon::prelude::*;
 use bevy_replicon_renet::RepliconRenetPlugins;
 
@@ -43,6 +44,15 @@ impl Dedicated {
             .insert_resource(ground);
         app.finish();
         app.cleanup();
+        while app.world().resource::<GroundServer>().opening().is_some() {
+            app.update();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        for event in app.world().resource::<Messages<GroundServerEvent>>().iter_current_update_messages() {
+            if let GroundServerEvent::Opened(Err(why)) = event {
+                return Err(Arc::clone(why).into());
+            }
+        }
         let address = party::listen(app.world_mut(), address, PLAYERS)?;
         Ok(Self { app, address, next_line: Instant::now() + Duration::from_secs(1) })
     }

@@ -17,7 +17,7 @@ use crate::store::{BaseLevel, Opened, Progress, Store, StoreError, StoreOptions,
 use crate::terrain::{Terrain, TerrainSettings, WorldParts};
 
 /// How often, and how long, a locked world is waited for.
-const LOCK_TRIES: usize = 20;
+const LOCK_TRIES: usize = 60;
 const LOCK_WAIT: Duration = Duration::from_millis(50);
 
 /// A world that nobody has begun to read.

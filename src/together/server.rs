@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -27,8 +26,6 @@ pub struct GroundServer {
     start: Instant,
     /// Players that are connected, by their numbers.
     players: HashMap<net::ClientId, ClientId>,
-    /// Clients that were sent away, until their connections are closed: what they still send is dropped.
-    kicked: EntityHashSet,
     data: BTreeMap<String, Vec<u8>>,
 }
 
@@ -38,8 +35,8 @@ enum Work {
     Opening(ThreadTask<Result<(Parts, OpenedWorld), StoreError>>, Progress),
     Here(Box<Parts>),
     UnderWay(ThreadTask<Box<Parts>>),
-    /// Its world could not be read.
-    Closed,
+    /// Its world could not be read, or it is taken out for a moment.
+    Gone,
 }
 
 /// What goes to a thread and comes back.
@@ -53,6 +50,9 @@ struct OpenedWorld {
     troubles: Vec<StoreTrouble>,
     data: BTreeMap<String, Vec<u8>>,
 }
+
+/// Most of what waits for a world that is read; what comes then is dropped.
+const MOST_WAITING: usize = 1 << 14;
 
 /// What waits for the server to come back.
 type Request = Box<dyn FnOnce(&mut Parts, Duration) + Send + Sync>;
@@ -106,7 +106,6 @@ impl GroundServer {
             waiting: Vec::new(),
             start: Instant::now(),
             players: HashMap::default(),
-            kicked: EntityHashSet::default(),
             data: BTreeMap::new(),
         }
     }
@@ -114,18 +113,31 @@ impl GroundServer {
     /// Does something with the server as soon as it is not at work, in the order of these calls: sets where a player is, changes
     /// the rules.
     pub fn with(&mut self, work: impl FnOnce(&mut Server) + Send + Sync + 'static) {
-        self.waiting.push(Box::new(move |parts, _| work(&mut parts.server)));
+        self.ask(move |parts, _| work(&mut parts.server));
+    }
+
+    fn ask(&mut self, work: impl FnOnce(&mut Parts, Duration) + Send + Sync + 'static) {
+        if self.waiting.len() < MOST_WAITING {
+            self.waiting.push(Box::new(work));
+        }
+    }
+
+    /// Serves this world where the saved one [can't be read](GroundServerEvent::Opened). Players who have come meanwhile join it.
+    pub fn serve_instead(&mut self, server: Server) {
+        if let Work::Gone = self.work {
+            self.work = Work::Here(Box::new(Parts { server, store: None }));
+        }
     }
 
     /// Keeps data of the game beside a saved world, as a [`WorldStore`](crate::saves::WorldStore) does.
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         let (key, bytes) = (key.into(), bytes.into());
         self.data.insert(key.clone(), bytes.clone());
-        self.waiting.push(Box::new(move |parts, _| {
+        self.ask(move |parts, _| {
             if let Some(store) = &mut parts.store {
                 store.put(key, bytes);
             }
-        }));
+        });
     }
 
     /// Data of the game as it was put last; nothing before the world is [read](GroundServerEvent::Opened).
@@ -143,11 +155,18 @@ impl GroundServer {
         net::ClientId(known.unwrap_or(unknown).min(u64::MAX - 1))
     }
 
-    /// Waits until all that was asked for is done and saved: before the app ends.
+    /// Waits until all that was asked for is done and saved: before the app ends. A world that is still read has nothing to save.
     pub fn finish(&mut self) {
         let deadline = Instant::now() + Duration::from_secs(10);
-        while !self.comes_back(|_| {}) && Instant::now() < deadline {
-            std::thread::sleep(Duration::from_millis(1));
+        while let Work::UnderWay(_) = self.work {
+            if let Some(parts) = self.take_parts(|_| {}) {
+                self.work = Work::Here(parts);
+            } else if Instant::now() > deadline {
+                error!("the last edits are not saved: the server is still at work");
+                return;
+            } else {
+                std::thread::sleep(Duration::from_millis(1));
+            }
         }
         let now = self.start.elapsed();
         if let Work::Here(parts) = &mut self.work {
@@ -159,31 +178,32 @@ impl GroundServer {
         }
     }
 
-    /// Takes the server back from its thread, if it is done there. Is it here, or will it never be?
-    fn comes_back(&mut self, mut tell: impl FnMut(GroundServerEvent)) -> bool {
+    /// Takes the server out, if it is not at work.
+    fn take_parts(&mut self, mut tell: impl FnMut(GroundServerEvent)) -> Option<Box<Parts>> {
         match &mut self.work {
-            Work::Here(_) | Work::Closed => return true,
-            Work::UnderWay(task) => {
-                let Some(parts) = task.finish() else { return false };
-                self.work = Work::Here(parts);
-            }
-            Work::Opening(task, _) => {
-                let Some(opened) = task.finish() else { return false };
-                let opened = opened.map(|(parts, OpenedWorld { troubles, data })| {
-                    self.work = Work::Here(Box::new(parts));
+            Work::Here(_) => match std::mem::replace(&mut self.work, Work::Gone) {
+                Work::Here(parts) => Some(parts),
+                _ => None,
+            },
+            Work::Gone => None,
+            Work::UnderWay(task) => task.finish(),
+            Work::Opening(task, _) => match task.finish()? {
+                Ok((parts, OpenedWorld { troubles, data })) => {
                     // What was put meanwhile is newer.
                     let newer = std::mem::replace(&mut self.data, data);
                     self.data.extend(newer);
                     troubles.into_iter().map(GroundServerEvent::Trouble).for_each(&mut tell);
-                });
-                if let Err(why) = &opened {
-                    error!("the world is not served: {why}");
-                    self.work = Work::Closed;
+                    tell(GroundServerEvent::Opened(Ok(())));
+                    Some(Box::new(parts))
                 }
-                tell(GroundServerEvent::Opened(opened.map_err(Arc::new)));
-            }
+                Err(why) => {
+                    error!("the world is not served: {why}");
+                    self.work = Work::Gone;
+                    tell(GroundServerEvent::Opened(Err(Arc::new(why))));
+                    None
+                }
+            },
         }
-        true
     }
 }
 
@@ -210,21 +230,17 @@ pub(super) fn serve(
 ) {
     let ground = &mut *ground;
     for FromClient { client_id, message } in messages.read() {
-        if client_id.entity().is_some_and(|client| ground.kicked.contains(&client)) {
-            continue;
-        }
         let player = GroundServer::player(*client_id, &ids);
         if ground.players.insert(player, *client_id) != Some(*client_id) {
-            ground.waiting.push(Box::new(move |parts, now| parts.server.connect(player, now)));
+            ground.ask(move |parts, now| parts.server.connect(player, now));
         }
         let bytes = message.0.clone();
-        ground.waiting.push(Box::new(move |parts, now| parts.server.receive(player, &bytes, now)));
+        ground.ask(move |parts, now| parts.server.receive(player, &bytes, now));
     }
-    ground.comes_back(|event| {
+    let parts = ground.take_parts(|event| {
         events.write(event);
     });
-    let Work::Here(_) = ground.work else { return };
-    let Work::Here(mut parts) = std::mem::replace(&mut ground.work, Work::Closed) else { return };
+    let Some(mut parts) = parts else { return };
     let now = ground.start.elapsed();
     ground.waiting.drain(..).for_each(|request| request(&mut parts, now));
     let mut kicked = Vec::new();
@@ -247,7 +263,6 @@ pub(super) fn serve(
     }
     for player in kicked {
         if let Some(client) = ground.players.remove(&player).and_then(ClientId::entity) {
-            ground.kicked.insert(client);
             leave.write(DisconnectRequest { client });
         }
     }
@@ -260,7 +275,6 @@ pub(super) fn serve(
 /// Tells the server that a player is gone.
 pub(super) fn forget_player(gone: On<Remove, ConnectedClient>, ground: Option<ResMut<GroundServer>>) {
     let Some(mut ground) = ground else { return };
-    ground.kicked.remove(&gone.entity);
     let left: Vec<net::ClientId> = ground
         .players
         .extract_if(|_, client| client.entity() == Some(gone.entity))

@@ -16,9 +16,10 @@ use crate::film::report::EditLog;
 use crate::film::scripted_brushes;
 use crate::film::studio::{PATIENCE, Studio};
 use crate::party::connection::Address;
-use crate::party::fellows::Fellow;
+use crate::party::players::PlayerInfo;
 use crate::ui::settings::Settings;
-use crate::world::landscape::CONCRETE;
+use crate::world::landscape::{CONCRETE, NewGame};
+use crate::world::saves::PlayedWorld;
 
 /// Steps of the tunnel that the guest digs.
 const STEPS: usize = 6;
@@ -38,14 +39,15 @@ fn play(options: &Options, renderer: Option<RenderResources>) -> Result {
     let free_port = || Ok::<_, BevyError>(UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()?.port());
     let port = options.host.map_or_else(free_port, Ok)?;
     let join = Some(Address((Ipv4Addr::LOCALHOST, port).into()));
-    let host = Studio::open(&Options { host: Some(port), ..options.clone() }, renderer)?;
-    let guest = Studio::open(&Options { host: None, join, world: None, ..options.clone() }, None)?;
+    let mut host = Studio::open(&Options { host: Some(port), ..options.clone() }, renderer)?;
+    let guest = Options { host: None, join, world: None, ..options.clone() };
+    let guest = Studio::open_while(&guest, None, || host.wait(1))?;
     let mut two = Two { host, guest };
     two.host.world().resource_mut::<Settings>().name = "Ann".into();
     two.guest.world().resource_mut::<Settings>().name = "Bob".into();
 
     two.until("the guest has joined", |two| Ok(two.guest.shared()?.has_joined()))?;
-    two.until("both know each other", |two| Ok(two.host.fellows() == 2 && two.guest.fellows() == 2))?;
+    two.until("both know each other", |two| Ok(two.host.players() == 2 && two.guest.players() == 2))?;
     let places: Places = two.host.resource();
     let hillside = places.hillside;
     two.guest_digs(&hillside)?;
@@ -57,8 +59,10 @@ fn play(options: &Options, renderer: Option<RenderResources>) -> Result {
     for picture in &two.host.pictures {
         println!("picture {}", picture.display());
     }
+
+    two.host_begins_anew()?;
     two.guest.world().write_message(AppExit::Success);
-    two.until("the guest has gone", |two| Ok(two.host.fellows() == 1))
+    two.until("the guest has gone", |two| Ok(two.host.players() == 1))
 }
 
 /// What this script asks of a player's game.
@@ -74,9 +78,9 @@ impl Studio {
         Ok((self.shared()?.number(), self.terrain()?.world().hash()))
     }
 
-    fn fellows(&mut self) -> usize {
+    fn players(&mut self) -> usize {
         let world = self.world();
-        world.query::<&Fellow>().iter(world).count()
+        world.query::<&PlayerInfo>().iter(world).count()
     }
 
     fn answered(&self) -> usize {
@@ -121,6 +125,20 @@ impl Two {
             player(self).world().write_message(brush);
             self.until("an edit is answered", |two| Ok(player(two).answered() > answered))?;
         }
+        Ok(())
+    }
+
+    /// The host begins the game anew, in a world that is not saved, and the guest comes back by itself.
+    fn host_begins_anew(&mut self) -> Result {
+        let before = self.guest.state()?;
+        *self.host.world().resource_mut::<PlayedWorld>() = PlayedWorld(None);
+        self.host.world().trigger(NewGame);
+        self.until("the guest loses the host", |two| Ok(two.guest.players() == 0))?;
+        self.until("the guest comes back", |two| Ok(two.host.players() == 2 && two.guest.players() == 2))?;
+        self.until("both see the new world", |two| {
+            Ok(two.guest.shared()?.has_joined() && two.guest.state()?.1 != before.1 && two.agree()?)
+        })?;
+        println!("the host began anew, and both see the world {:#018x}", self.guest.state()?.1);
         Ok(())
     }
 

@@ -1,11 +1,12 @@
 //! Hosting and joining: what the terrain's `SharedTerrain` needs around it comes and goes with it.
 
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
+use std::net::{AddrParseError, IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::str::FromStr;
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 use bevy::prelude::*;
-use bevy_burrow::net::{ClientEvent, Reach, Server, ServerSettings, UndoPolicy};
+use bevy_burrow::net::{ClientEvent, Rate, Reach, Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{GroundJoined, GroundServer, GroundServerEvent, SharedTerrain, TogetherPlugin};
 use bevy_replicon::prelude::*;
@@ -20,7 +21,7 @@ use crate::world::saves::PlayedWorld;
 /// Most players.
 const PLAYERS: usize = 16;
 /// Seconds until a lost connection is tried again.
-const PAUSE: f32 = 2.0;
+const RETRY_PAUSE: f32 = 2.0;
 
 /// Who plays in this world.
 #[derive(Resource, Clone, Debug, Default, PartialEq)]
@@ -51,9 +52,9 @@ impl FromStr for Address {
             Some(port) => format!("127.0.0.1{port}"),
             None => text.into(),
         };
-        let with_port = || numbers.parse().ok();
-        let without = || Some(SocketAddr::new(numbers.parse::<IpAddr>().ok()?, udp::PORT));
-        with_port().or_else(without).map(Self).ok_or_else(|| NoAddress(text.into()))
+        let with_port = numbers.parse::<SocketAddrV4>();
+        let address = with_port.or_else(|_| Ok(SocketAddrV4::new(numbers.parse()?, PORT)));
+        address.map(|address| Self(address.into())).map_err(|_: AddrParseError| NoAddress(text.into()))
     }
 }
 
@@ -71,6 +72,10 @@ pub fn own_address() -> Option<IpAddr> {
 #[derive(Resource, Clone, Copy, Debug)]
 pub struct OwnNumber(pub u64);
 
+/// Servers that save the last of their worlds.
+#[derive(Resource, Default)]
+struct Closing(Vec<JoinHandle<()>>);
+
 /// Seconds until a guest tries to connect.
 #[derive(Resource)]
 struct NextTry(f32);
@@ -85,8 +90,12 @@ impl Plugin for ConnectionPlugin {
             .insert_resource(OwnNumber(fastrand::u64(1..u64::MAX / 2)))
             .add_observer(open)
             .add_observer(close)
-            .add_systems(OnEnter(ClientState::Connected), forget_next_try)
-            .add_systems(OnExit(ClientState::Connected), tell_lost)
+            .add_observer(tell_other_version)
+            .add_systems(OnExit(ClientState::Connected), announce_loss)
+            .add_systems(
+                Last,
+                finish_closing.run_if(on_message::<AppExit>).run_if(resource_exists::<Closing>),
+            )
             .add_systems(
                 Update,
                 (connect.run_if(in_state(ClientState::Disconnected)), follow_host, serve_unsaved),
@@ -102,7 +111,9 @@ pub fn is_shared(party: Option<Res<Party>>) -> bool {
 /// What the server allows. A bomb flies far from the player who threw it.
 fn settings() -> ServerSettings {
     let reach = Reach { distance: 160, speed: 60, latency: Duration::from_secs(1) };
-    ServerSettings { reach: Some(reach), undo: UndoPolicy::Own, ..default() }
+    // Home networks are fast, and the host gets its own saved world this way.
+    let bulk = Rate { per_second: 2 << 20, burst: 128 << 10 };
+    ServerSettings { reach: Some(reach), undo: UndoPolicy::Own, bulk, window: 2 << 20, ..default() }
 }
 
 fn open(
@@ -113,7 +124,10 @@ fn open(
     terrains: Query<&Terrain>,
     ground: Res<OriginalGround>,
     own: Res<OwnNumber>,
+    mut time: ResMut<Time<Virtual>>,
 ) -> Result {
+    // It may have been paused, and goes on for all.
+    time.unpause();
     let terrain = terrains.get(new.entity)?;
     match *party {
         Party::Alone => {}
@@ -121,7 +135,7 @@ fn open(
             commands.insert_resource(OwnNumber(0));
             commands.insert_resource(match played.saved() {
                 Some(saved) => GroundServer::saved(&saved, terrain, settings()),
-                None => unsaved(&ground)?,
+                None => GroundServer::new(unsaved(&ground)?),
             });
             commands.queue(move |world: &mut World| {
                 if let Err(why) = udp::listen(world, (Ipv4Addr::UNSPECIFIED, port).into(), PLAYERS) {
@@ -139,26 +153,28 @@ fn open(
     Ok(())
 }
 
-fn unsaved(ground: &OriginalGround) -> Result<GroundServer> {
-    Ok(GroundServer::new(Server::new(landscape::new_terrain(&ground.0)?, settings())))
+fn unsaved(ground: &OriginalGround) -> Result<Server> {
+    Ok(Server::new(landscape::new_terrain(&ground.0)?, settings()))
 }
 
 /// Goes on without saving where the world can't be read.
 fn serve_unsaved(
-    mut commands: Commands,
     mut events: MessageReader<GroundServerEvent>,
     ground: Option<Res<OriginalGround>>,
+    mut server: Option<ResMut<GroundServer>>,
     mut hints: MessageWriter<Hint>,
 ) -> Result {
     for event in events.read() {
         match event {
             GroundServerEvent::Opened(Err(why)) => {
                 hints.write(Hint(format!("nothing is saved: {why}")));
-                if let Some(ground) = &ground {
-                    commands.insert_resource(unsaved(ground)?);
+                if let (Some(ground), Some(server)) = (&ground, &mut server) {
+                    server.serve_instead(unsaved(ground)?);
                 }
             }
-            GroundServerEvent::Trouble(trouble) => drop(hints.write(Hint(trouble.to_string()))),
+            GroundServerEvent::Trouble(trouble) => {
+                hints.write(Hint(trouble.to_string()));
+            }
             _ => {}
         }
     }
@@ -171,9 +187,18 @@ fn close(_: On<Remove, SharedTerrain>, mut commands: Commands) {
         udp::leave(world);
         if let Some(mut server) = world.remove_resource::<GroundServer>() {
             // It waits for the disk.
-            std::thread::spawn(move || server.finish());
+            let closing = std::thread::spawn(move || server.finish());
+            world.get_resource_or_init::<Closing>().0.push(closing);
         }
     });
+}
+
+/// Waits for what is saved by servers that were left, before the app ends.
+fn finish_closing(mut closing: ResMut<Closing>) {
+    for server in closing.0.drain(..) {
+        // One that panicked has said so.
+        let _ = server.join();
+    }
 }
 
 /// Connects a guest, again and again.
@@ -189,7 +214,7 @@ fn connect(
     if next.0 > 0.0 {
         return;
     }
-    next.0 = PAUSE;
+    next.0 = RETRY_PAUSE;
     let number = own.0;
     commands.queue(move |world: &mut World| {
         if let Err(why) = udp::connect(world, server, number) {
@@ -198,16 +223,15 @@ fn connect(
     });
 }
 
-fn forget_next_try(next: Option<ResMut<NextTry>>) {
-    if let Some(mut next) = next {
-        next.0 = PAUSE;
+fn announce_loss(next: Option<Res<NextTry>>, mut hints: MessageWriter<Hint>) {
+    // Who has left does not try again.
+    if next.is_some() {
+        hints.write(Hint("the host can't be reached: what you dig meanwhile is sent later".into()));
     }
 }
 
-fn tell_lost(party: Res<Party>, mut hints: MessageWriter<Hint>) {
-    if matches!(*party, Party::Guest(_)) {
-        hints.write(Hint("the host can't be reached: what you dig meanwhile is sent later".into()));
-    }
+fn tell_other_version(_: On<ProtocolMismatch>, mut hints: MessageWriter<Hint>) {
+    hints.write(Hint("the host has another version of the game".into()));
 }
 
 /// What the host's server says about this player.
@@ -238,8 +262,8 @@ mod tests {
             (" 10.0.0.1:99 ", Some("10.0.0.1:99")),
             ("localhost", Some("127.0.0.1:5100")),
             ("localhost:7", Some("127.0.0.1:7")),
-            ("::1", Some("[::1]:5100")),
-            ("[::1]:8", Some("[::1]:8")),
+            // Sockets are of version 4.
+            ("::1", None),
             ("", None),
             ("ann", None),
             ("192.168.0.7:port", None),

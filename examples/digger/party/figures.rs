@@ -7,19 +7,19 @@ use bevy::render::renderer::RenderDevice;
 use bevy_burrow::prelude::*;
 
 use super::connection::OwnNumber;
-use super::fellows::{Fellow, Pose, cleaned};
+use super::players::{PlayerInfo, Pose, cleaned};
 use crate::player::camera::PlayerCamera;
 use crate::player::game_state::GameState;
 use crate::ui::widgets;
 
 /// Metres up to which names are shown.
-const NAMES: f32 = 120.0;
+const NAME_DISTANCE: f32 = 120.0;
 /// Where a name is, above the feet.
 const NAME_HEIGHT: f32 = 2.15;
 /// How fast figures follow what is known of their players, per second.
-const FOLLOW: f32 = 14.0;
+const FOLLOW_RATE: f32 = 14.0;
 /// A figure that is so far off is put in its place at once.
-const JUMP: f32 = 8.0;
+const JUMP_DISTANCE: f32 = 8.0;
 /// Luminous power of the lamp of a figure, in lumens.
 const LAMP: f32 = 4_000_000.0;
 
@@ -33,15 +33,15 @@ const COLORS: [Color; 6] = [
     Color::srgb(0.16, 0.46, 0.50),
 ];
 
-/// The head of a figure, of this fellow.
+/// The head of a figure, of this player.
 #[derive(Component)]
 struct Head(Entity);
 
-/// The lamp on a head, of this fellow.
+/// The lamp on a head, of this player.
 #[derive(Component)]
 struct Lamp(Entity);
 
-/// The name of this fellow, on the screen.
+/// The name of this player, on the screen.
 #[derive(Component)]
 struct NameTag(Entity);
 
@@ -50,7 +50,7 @@ pub struct FiguresPlugin;
 
 impl Plugin for FiguresPlugin {
     fn build(&self, app: &mut App) {
-        app.add_observer(dress).add_observer(remove_name).add_systems(
+        app.add_observer(spawn_figure).add_observer(remove_name).add_systems(
             Update,
             ((follow, turn_heads, switch_lamps), show_names).chain().after(BurrowSystems::Propagate),
         );
@@ -58,10 +58,10 @@ impl Plugin for FiguresPlugin {
 }
 
 /// Gives another player its figure.
-fn dress(
+fn spawn_figure(
     new: On<Add, Pose>,
     mut commands: Commands,
-    fellows: Query<(&Fellow, &Pose)>,
+    players: Query<(&PlayerInfo, &Pose)>,
     own: Res<OwnNumber>,
     meshes: Option<ResMut<Assets<Mesh>>>,
     materials: Option<ResMut<Assets<StandardMaterial>>>,
@@ -69,15 +69,15 @@ fn dress(
 ) {
     // Without a renderer nobody looks, and Bevy can't remove lights.
     let (Some(mut meshes), Some(mut materials), Some(_)) = (meshes, materials, renderer) else { return };
-    let Ok((fellow, pose)) = fellows.get(new.entity) else { return };
-    if fellow.number == own.0 {
+    let Ok((player, pose)) = players.get(new.entity) else { return };
+    if player.number == own.0 {
         return;
     }
     let mut part = |mesh: Mesh, color: Color, place: Transform| {
         let color = StandardMaterial { perceptual_roughness: 0.8, ..color.into() };
         (Mesh3d(meshes.add(mesh)), MeshMaterial3d(materials.add(color)), place)
     };
-    let color = COLORS[(fellow.number % COLORS.len() as u64) as usize];
+    let color = COLORS[(player.number % COLORS.len() as u64) as usize];
     let (skin, yellow) = (Color::srgb(0.72, 0.52, 0.40), Color::srgb(0.85, 0.66, 0.12));
     let (dark, steel) = (Color::srgb(0.10, 0.09, 0.09), Color::srgb(0.45, 0.46, 0.48));
     let leg = |x: f32| Transform::from_xyz(x, 0.35, 0.0);
@@ -134,7 +134,7 @@ fn dress(
         NameTag(of),
         node,
         Visibility::Hidden,
-        children![widgets::text(cleaned(&fellow.name), 16.0, widgets::WHITE)],
+        children![widgets::text(cleaned(&player.name), 16.0, widgets::WHITE)],
     ));
 }
 
@@ -146,12 +146,12 @@ fn remove_name(gone: On<Remove, Pose>, mut commands: Commands, names: Query<(Ent
 
 /// Figures follow their players smoothly.
 fn follow(time: Res<Time<Real>>, mut figures: Query<(&Pose, &mut Transform)>) {
-    let part = 1.0 - (-FOLLOW * time.delta_secs()).exp();
+    let part = 1.0 - (-FOLLOW_RATE * time.delta_secs()).exp();
     for (pose, mut place) in &mut figures {
         if !pose.feet.is_finite() || !pose.yaw.is_finite() {
             continue;
         }
-        let is_far = place.translation.distance(pose.feet) > JUMP;
+        let is_far = place.translation.distance(pose.feet) > JUMP_DISTANCE;
         let part = if is_far { 1.0 } else { part };
         place.translation = place.translation.lerp(pose.feet, part);
         place.rotation = place.rotation.slerp(Quat::from_rotation_y(pose.yaw), part);
@@ -192,7 +192,7 @@ fn show_names(
     let view = GlobalTransform::from(*eye);
     for (name, mut node, mut shown, size) in &mut names {
         let place = figures.get(name.0).ok().map(|place| place.translation + Vec3::Y * NAME_HEIGHT);
-        let place = place.filter(|place| place.distance(eye.translation) < NAMES);
+        let place = place.filter(|place| place.distance(eye.translation) < NAME_DISTANCE);
         let place = place.filter(|_| *state.get() != GameState::Title);
         let on_screen = place.and_then(|place| camera.world_to_viewport(&view, place).ok());
         let visibility = if on_screen.is_some() { Visibility::Visible } else { Visibility::Hidden };

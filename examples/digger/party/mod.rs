@@ -5,12 +5,12 @@
 //! | file | subject |
 //! | --- | --- |
 //! | `connection.rs` | hosting, joining, and coming back |
-//! | `fellows.rs` | where all players are, and who they are |
+//! | `players.rs` | where all players are, and who they are |
 //! | `figures.rs` | what others look like, with their names |
 
 #[path = "../../shared/party.rs"]
 mod udp;
 
 pub mod connection;
-pub mod fellows;
 pub mod figures;
+pub mod players;

@@ -11,12 +11,13 @@ pub mod world_edge;
 use bevy::prelude::*;
 use bevy_burrow::physics::{CharacterSteering, CharacterSystems};
 use bevy_burrow::prelude::*;
+use bevy_burrow::together::SharedTerrain;
 
 use self::game_state::GameState;
 use self::input::{Action, Actions};
 use crate::film::places::Places;
 use crate::ui::settings::Settings;
-use crate::world::landscape::DespawnOnNewGame;
+use crate::world::landscape::{DespawnOnNewGame, NewGame};
 use crate::world::saves::SavedPlace;
 
 /// The player's body and the direction of its head.
@@ -44,7 +45,13 @@ pub struct PlayerPlugin;
 impl Plugin for PlayerPlugin {
     fn build(&self, app: &mut App) {
         app.configure_sets(Update, PlayerControlSystems.before(BurrowSystems::Collect))
-            .add_observer(spawn_player)
+            .add_observer(|_: On<TerrainReady>, mut commands: Commands| {
+                commands.insert_resource(GroundIsReady)
+            })
+            .add_observer(|_: On<NewGame>, mut commands: Commands| {
+                commands.remove_resource::<GroundIsReady>()
+            })
+            .add_systems(Update, spawn_player.run_if(resource_exists::<GroundIsReady>))
             .add_systems(
                 Update,
                 (look, steer).run_if(in_state(GameState::Playing)).in_set(PlayerControlSystems),
@@ -67,16 +74,20 @@ impl Player {
     }
 }
 
+/// The terrain has loaded since the game began.
+#[derive(Resource)]
+struct GroundIsReady;
+
+/// Spawns the player where the ground is known: on shared terrain, once it has come.
 fn spawn_player(
-    _: On<TerrainReady>,
     mut commands: Commands,
+    shared: Query<&SharedTerrain>,
     terrains: Terrains,
     places: Res<Places>,
     players: Query<(), With<Player>>,
     saved: Option<Res<SavedPlace>>,
 ) {
-    // The event comes again whenever the terrain has loaded anew.
-    if !players.is_empty() {
+    if !players.is_empty() || shared.iter().any(|shared| !shared.is_playable()) {
         return;
     }
     if let Some(&SavedPlace { feet, yaw, pitch }) = saved.as_deref() {

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use bevy::prelude::*;
 use bevy_burrow::plugin::{HistoryMoved, Redo, Undo};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{HistoryStep, PieceFate};
+use bevy_burrow::terrain::{HistoryStep, PieceFate, Restored};
 use serde::{Deserialize, Serialize};
 
 use crate::player::PlayerControlSystems;
@@ -142,6 +142,19 @@ impl Inventory {
         self.apply(&total)
     }
 
+    /// Applies what a step put back, whatever brushes it was of, and returns what it changed.
+    fn apply_restored(&mut self, restored: &Restored) -> Vec<(MaterialId, i64)> {
+        let mut total = Amounts::default();
+        for (sign, counts) in [(1, &restored.removed), (-1, &restored.added), (-1, &restored.painted)] {
+            for (material, voxels) in counts.iter() {
+                if let Some(sum) = total.get_mut(usize::from(material.0)) {
+                    *sum += sign * voxels as i64;
+                }
+            }
+        }
+        self.apply(&total)
+    }
+
     /// What is saved of it.
     pub fn saved(&self) -> SavedInventory {
         SavedInventory { amounts: self.amounts.to_vec(), next_tag: self.next_tag }
@@ -233,7 +246,11 @@ pub fn read_history(
     for HistoryMoved { receipt, .. } in steps.read() {
         match &receipt.outcome {
             Ok(restored) => {
-                let applied = inventory.apply_history(receipt.step, &restored.tags);
+                // Where players share the ground, a step has no tags, but is always this player's own.
+                let applied = match restored.tags[..] {
+                    [] => inventory.apply_restored(restored),
+                    _ => inventory.apply_history(receipt.step, &restored.tags),
+                };
                 changes.write_batch(applied.into_iter().map(|(material, by)| AmountChanged { material, by }));
             }
             Err(nothing) => drop(hints.write(Hint(nothing.to_string()))),

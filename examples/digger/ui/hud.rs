@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_burrow::panel::BurrowPanel;
 use bevy_burrow::prelude::*;
 
-use crate::party::fellows::Fellow;
+use crate::party::players::PlayerInfo;
 use crate::player::camera::{DetachedCamera, PlayerCamera};
 use crate::player::game_state::GameState;
 use crate::player::headlamp::HeadlampSwitch;
@@ -300,13 +300,13 @@ fn show_time(
     clock: Res<Clock>,
     lamp: Res<HeadlampSwitch>,
     worlds: Query<(&Terrain, &WorldStore)>,
-    fellows: Query<&Fellow>,
+    others: Query<&PlayerInfo>,
     mut time: Single<&mut Text, With<TimeOfDay>>,
 ) {
     let lamp = if lamp.0 { "lamp on   " } else { "" };
     let is_behind = |(terrain, world): (&Terrain, &WorldStore)| world.durable() < terrain.world().revision();
     let saving = if worlds.iter().any(is_behind) { "saving   " } else { "" };
-    let players = match fellows.iter().count() {
+    let players = match others.iter().count() {
         0 | 1 => String::new(),
         players => format!("{players} players   "),
     };

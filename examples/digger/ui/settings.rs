@@ -36,7 +36,7 @@ pub struct Settings {
     /// What others call the player.
     pub name: String,
     /// The host that was joined last.
-    pub host: String,
+    pub host_address: String,
     pub bindings: Bindings,
 }
 
@@ -63,7 +63,7 @@ impl Default for Settings {
             shape: BuildShape::default(),
             survival: true,
             name: String::new(),
-            host: String::new(),
+            host_address: String::new(),
             bindings: Bindings::default(),
         }
     }

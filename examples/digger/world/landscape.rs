@@ -19,6 +19,7 @@ use bevy_burrow::together::SharedTerrain;
 
 use crate::film::places::Places;
 use crate::party::connection::Party;
+use crate::party::players::voxel;
 use crate::tools::hardness;
 use crate::world::saves::PlayedWorld;
 use crate::world::strata::strata;
@@ -195,19 +196,30 @@ fn replace_terrain(
     terrain: Single<Entity, With<GroundLook>>,
     played: Res<PlayedWorld>,
     party: Res<Party>,
+    places: Res<Places>,
 ) -> Result {
-    insert_terrain(&mut commands.entity(*terrain), new_terrain(&ground.0)?, &played, &party);
+    insert_terrain(&mut commands.entity(*terrain), new_terrain(&ground.0)?, &played, &party, &places);
     Ok(())
 }
 
 /// Puts a terrain on its entity; where the world is saved or shared, what is there takes its place.
-fn insert_terrain(entity: &mut EntityCommands, terrain: Terrain, played: &PlayedWorld, party: &Party) {
+fn insert_terrain(
+    entity: &mut EntityCommands,
+    terrain: Terrain,
+    played: &PlayedWorld,
+    party: &Party,
+    places: &Places,
+) {
     entity.remove::<(SavedWorld, SharedTerrain)>().insert(terrain);
     match (party, played.saved()) {
         (Party::Alone, Some(saved)) => drop(entity.insert(saved)),
         (Party::Alone, None) => {}
         // The host's server saves it.
-        (Party::Host(_) | Party::Guest(_), _) => drop(entity.insert(SharedTerrain::default())),
+        (Party::Host(_) | Party::Guest(_), _) => {
+            let mut shared = SharedTerrain::default();
+            shared.place = voxel(places.hillside.mouth);
+            entity.insert(shared);
+        }
     }
 }
 
@@ -233,10 +245,10 @@ fn spawn_terrain(
     commands.remove_resource::<Generation>();
     match result {
         Ok((ground, model, places)) => {
-            commands.insert_resource(places);
             commands.insert_resource(OriginalGround(ground));
             commands.entity(*terrain).insert(EdgeWalls::default());
-            insert_terrain(&mut commands.entity(*terrain), model, &played, &party);
+            insert_terrain(&mut commands.entity(*terrain), model, &played, &party, &places);
+            commands.insert_resource(places);
         }
         Err(reason) => {
             error!("the landscape can't be generated: {reason}");

@@ -32,13 +32,19 @@ pub struct SavesPlugin(pub Option<PathBuf>);
 impl Plugin for SavesPlugin {
     fn build(&self, app: &mut App) {
         app.insert_resource(PlayedWorld(self.0.clone()))
-            .add_observer(|_: On<NewGame>, mut commands: Commands| commands.remove_resource::<SavedPlace>())
+            .add_observer(|_: On<NewGame>, mut commands: Commands| {
+                commands.remove_resource::<SavedPlace>();
+                commands.remove_resource::<GameIsRead>();
+            })
             .add_systems(
                 Update,
                 (
                     continue_game,
                     (
-                        put_game.run_if(resource_changed::<Inventory>.or_else(on_timer(PLACE_EVERY))),
+                        put_game
+                            .after(continue_game)
+                            .run_if(resource_exists::<GameIsRead>)
+                            .run_if(resource_changed::<Inventory>.or_else(on_timer(PLACE_EVERY))),
                         tell_trouble,
                     )
                         .after(BurrowSystems::Commit)
@@ -131,6 +137,10 @@ pub struct SavedPlace {
     pub pitch: f32,
 }
 
+/// The saved game was read, or there is none: from now on it is written.
+#[derive(Resource)]
+struct GameIsRead;
+
 /// What is saved beside the ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct SavedGame {
@@ -188,6 +198,9 @@ fn continue_game(
     }
     if served.read().any(|event| matches!(event, GroundServerEvent::Opened(Ok(())))) {
         games.push(server.as_deref().and_then(|server| server.get(KEY)));
+    }
+    if !games.is_empty() {
+        commands.insert_resource(GameIsRead);
     }
     for game in games {
         let Some(game) = game.and_then(|bytes| serde_json::from_slice::<SavedGame>(bytes).ok()) else {

@@ -12,6 +12,7 @@ use bevy::time::common_conditions::on_timer;
 use bevy::window::PrimaryWindow;
 
 use super::saves::PlayedWorld;
+use crate::party::connection::Party;
 use crate::player::game_state::GameState;
 
 /// The file in a world's folder.
@@ -31,7 +32,15 @@ impl Plugin for ThumbnailsPlugin {
 }
 
 /// Takes a picture of the window, if there is one. It is made small and written on another thread.
-fn take(mut commands: Commands, played: Res<PlayedWorld>, windows: Query<(), With<PrimaryWindow>>) {
+fn take(
+    mut commands: Commands,
+    played: Res<PlayedWorld>,
+    party: Res<Party>,
+    windows: Query<(), With<PrimaryWindow>>,
+) {
+    if matches!(*party, Party::Guest(_)) {
+        return;
+    }
     let Some(folder) = played.0.clone().filter(|_| !windows.is_empty()) else { return };
     commands.spawn(Screenshot::primary_window()).observe(move |picture: On<ScreenshotCaptured>| {
         let (picture, folder) = (picture.image.clone(), folder.clone());

@@ -35,7 +35,7 @@ impl Client {
         let Welcome { client, epoch, own, reach, join, .. } = welcome;
         self.repair = None;
         self.marks.clear();
-        if self.epoch.is_some_and(|known| known.run != epoch.run || known.world != epoch.world) {
+        if self.epoch.is_none_or(|known| known.run != epoch.run || known.world != epoch.world) {
             self.waiting.clear();
         }
         self.id = Some(client);

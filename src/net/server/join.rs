@@ -58,8 +58,8 @@ impl Server {
                 }
             }
             Some(_) => self.compare(client),
-            // It has the pristine world.
-            None => match self.entries_after(0).filter(|_| self.is_whole) {
+            // It has the pristine world, or another one.
+            None => match self.entries_after(0).filter(|_| self.is_whole && hello.epoch.is_none()) {
                 Some(log) => log,
                 None => self.all_regions(hello.place),
             },

@@ -59,6 +59,9 @@ pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
 /// The most events that wait to be taken.
 const MOST_EVENTS: usize = 4096;
 
+/// Places of clients that are not connected yet, at most.
+const MOST_EARLY_PLACES: usize = 1024;
+
 /// A message with entries is sent once it has so many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
 
@@ -119,6 +122,8 @@ pub struct Server {
     /// The number of the last mark.
     marked: u64,
     sessions: BTreeMap<ClientId, Session>,
+    /// Places of clients that are not connected yet.
+    early_places: BTreeMap<ClientId, IVec3>,
     own_numbers: OwnNumbers,
     fetches: Vec<Fetch>,
     durable: u64,
@@ -181,6 +186,7 @@ impl Server {
             last_mark: Duration::ZERO,
             marked: number,
             sessions: BTreeMap::new(),
+            early_places: BTreeMap::new(),
             own_numbers: OwnNumbers::default(),
             fetches: Vec::new(),
             durable: number,
@@ -244,7 +250,8 @@ impl Server {
     /// Enters that a client is connected. If it was so already, it begins anew.
     pub fn connect(&mut self, client: ClientId, now: Duration) {
         self.disconnect(client);
-        self.sessions.insert(client, Session::new(&self.settings, now));
+        let place = self.early_places.remove(&client);
+        self.sessions.insert(client, Session { place, ..Session::new(&self.settings, now) });
         self.own_numbers.trim(|client| self.sessions.contains_key(&client));
     }
 
@@ -280,10 +287,15 @@ impl Server {
         session.map(|session| session.acknowledged)
     }
 
-    /// Says where a client's player is, in voxels: from there its [reach](ServerSettings::reach) counts. `None`: nowhere.
+    /// Says where a client's player is, in voxels: from there its [reach](ServerSettings::reach) counts. `None`: nowhere. It holds
+    /// for clients that are about to connect as well.
     pub fn set_place(&mut self, client: ClientId, place: Option<IVec3>) {
-        if let Some(session) = self.sessions.get_mut(&client) {
-            session.place = place;
+        match (self.sessions.get_mut(&client), place) {
+            (Some(session), place) => session.place = place,
+            (None, Some(place)) if self.early_places.len() < MOST_EARLY_PLACES => {
+                self.early_places.insert(client, place);
+            }
+            (None, _) => drop(self.early_places.remove(&client)),
         }
     }
 

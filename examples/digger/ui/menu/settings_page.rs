@@ -136,8 +136,8 @@ fn arrow(sign: &str, by: i32) -> impl Bundle {
 
 /// Resets everything but what has a page of its own.
 fn reset(_: On<Activated>, defaults: Res<DefaultSettings>, mut settings: ResMut<Settings>) {
-    let Settings { name, host, bindings, .. } = settings.clone();
-    *settings = Settings { name, host, bindings, ..defaults.0.clone() };
+    let Settings { name, host_address, bindings, .. } = settings.clone();
+    *settings = Settings { name, host_address, bindings, ..defaults.0.clone() };
 }
 
 fn show_values(settings: Res<Settings>, mut values: Query<(&Value, &mut Text)>) {

@@ -65,7 +65,13 @@ struct ProgressText;
 #[derive(Component)]
 struct ProgressBar;
 
-fn open(mut commands: Commands, images: Option<Res<Images>>, game: Res<Start>, played: Res<PlayedWorld>) {
+fn open(
+    mut commands: Commands,
+    images: Option<Res<Images>>,
+    game: Res<Start>,
+    played: Res<PlayedWorld>,
+    party: Res<Party>,
+) {
     let Some(images) = images else { return };
     let left = Node {
         padding: UiRect::left(px(84)),
@@ -85,6 +91,7 @@ fn open(mut commands: Commands, images: Option<Res<Images>>, game: Res<Start>, p
         left.spawn((widgets::text("a real landscape that you can dig", 17.0, GREY), below));
         let saved = played.0.as_deref().filter(|folder| folder.exists());
         let first = match saved {
+            _ if matches!(*party, Party::Guest(_)) => "Continue".into(),
             Some(folder) => format!("Continue {}", saves::name(folder)),
             None if game.has_begun => "Continue".into(),
             None => "Dig".into(),

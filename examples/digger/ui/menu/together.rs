@@ -9,7 +9,7 @@ use bevy::prelude::*;
 use super::title::Start;
 use super::{go_to, spawn_page, worlds};
 use crate::party::connection::{Address, NoAddress, PORT, Party, own_address};
-use crate::party::fellows::MOST_LETTERS;
+use crate::party::players::MOST_LETTERS;
 use crate::player::game_state::MenuPage;
 use crate::ui::settings::Settings;
 use crate::ui::widgets::{self, Activated, GOLD, GREY, MenuInputDisabled, RED, WHITE, text};
@@ -18,7 +18,7 @@ use crate::world::saves::PlayedWorld;
 /// Width of the rows.
 const WIDTH: f32 = 520.0;
 /// Most letters of an address.
-const MOST_OF_ADDRESS: usize = 48;
+const MAX_ADDRESS_LETTERS: usize = 48;
 
 /// The page for playing together.
 pub struct TogetherPagePlugin;
@@ -36,21 +36,21 @@ impl Plugin for TogetherPagePlugin {
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
 enum Field {
     Name,
-    Host,
+    Address,
 }
 
 impl Field {
     fn of(self, settings: &Settings) -> &String {
         match self {
             Self::Name => &settings.name,
-            Self::Host => &settings.host,
+            Self::Address => &settings.host_address,
         }
     }
 
     fn of_mut(self, settings: &mut Settings) -> (&mut String, usize) {
         match self {
             Self::Name => (&mut settings.name, MOST_LETTERS),
-            Self::Host => (&mut settings.host, MOST_OF_ADDRESS),
+            Self::Address => (&mut settings.host_address, MAX_ADDRESS_LETTERS),
         }
     }
 }
@@ -70,12 +70,15 @@ fn open(mut commands: Commands, party: Res<Party>, played: Res<PlayedWorld>) {
         let address = own_address().map(|address| SocketAddr::new(address, port));
         let address = address.map_or_else(|| "this machine's address".into(), |address| address.to_string());
         let (host, note) = match *party {
+            Party::Alone if played.0.is_none() => {
+                ("Host a new world", format!("others then join at {address}"))
+            }
             Party::Alone => ("Let others join this world", format!("others then join at {address}")),
             Party::Host(_) => ("Let nobody join any more", format!("others join at {address}")),
             Party::Guest(host) => ("Leave", format!("you are at {host}")),
         };
         column.spawn(widgets::button(1, host, WIDTH)).observe(change_host);
-        field(column, 2, "Address of a host", Field::Host);
+        field(column, 2, "Address of a host", Field::Address);
         column.spawn(widgets::button(3, "Join", WIDTH)).observe(join);
         let line = Node { width: px(WIDTH - 28.0), margin: UiRect::axes(px(14), px(8)), ..default() };
         let is_saved = played.0.is_some() || matches!(*party, Party::Guest(_));
@@ -115,6 +118,10 @@ fn write(
     let Some(writing) = writing.filter(|writing| !writing.is_added()) else { return presses.for_each(drop) };
     let Writing(field, before) = &*writing;
     let mut is_done = mouse.just_pressed(MouseButton::Left);
+    let presses: Vec<_> = presses.collect();
+    if presses.is_empty() && !is_done {
+        return;
+    }
     let (words, most) = field.of_mut(&mut settings);
     for press in presses {
         match &press.logical_key {
@@ -128,7 +135,9 @@ fn write(
             Key::Character(letters) => words.extend(letters.chars().filter(char::is_ascii_graphic)),
             _ => {}
         }
-        words.truncate(most);
+        while words.chars().count() > most {
+            words.pop();
+        }
     }
     if is_done {
         commands.run_system_cached(stop_writing);
@@ -171,7 +180,7 @@ fn join(
     mut start: ResMut<Start>,
     mut note: Query<(&mut Text, &mut TextColor), With<Note>>,
 ) {
-    let address: Result<Address, NoAddress> = settings.host.parse();
+    let address: Result<Address, NoAddress> = settings.host_address.parse();
     match address {
         Ok(Address(host)) => {
             *party = Party::Guest(host);
@@ -249,14 +258,14 @@ mod tests {
     #[test]
     fn what_is_no_address_is_said_and_changes_nothing() {
         let mut app = app();
-        app.world_mut().resource_mut::<Settings>().host = "nowhere".into();
+        app.world_mut().resource_mut::<Settings>().host_address = "nowhere".into();
         activate(&mut app, 3);
         assert_eq!(*app.world().resource::<Party>(), Party::Alone);
         let mut notes = app.world_mut().query_filtered::<&Text, With<Note>>();
         let note = notes.single(app.world()).expect("a note").0.clone();
         assert!(note.contains("nowhere"), "{note}");
         tap_key(&mut app, KeyCode::KeyA);
-        app.world_mut().resource_mut::<Settings>().host = "10.0.0.3".into();
+        app.world_mut().resource_mut::<Settings>().host_address = "10.0.0.3".into();
         activate(&mut app, 3);
         assert_eq!(*app.world().resource::<Party>(), Party::Guest(([10, 0, 0, 3], PORT).into()));
     }

@@ -14,7 +14,6 @@ use super::connection::{OwnNumber, Party, is_shared};
 use crate::player::Player;
 use crate::player::body::Body;
 use crate::player::headlamp::HeadlampSwitch;
-use crate::tools::Hand;
 use crate::ui::hud::Hint;
 use crate::ui::settings::Settings;
 use crate::world::day::Clock;
@@ -26,35 +25,41 @@ const POSE_EVERY: Duration = Duration::from_millis(50);
 const NAME_EVERY: Duration = Duration::from_millis(500);
 /// Most letters of a name.
 pub const MOST_LETTERS: usize = 16;
+/// No player is so far from the middle of the world, in metres.
+const FAR: f32 = 20_000.0;
 /// The host's clock is taken over where it differs by so many hours.
 const CLOCK_DIFFERENCE: f32 = 0.02;
 
 /// A player, this one too.
 #[derive(Component, Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Fellow {
+pub struct PlayerInfo {
     /// In the network; the host has 0.
     pub number: u64,
     pub name: String,
 }
 
-/// Where a player stands and looks, and what it holds.
+/// Where a player stands and looks.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     pub feet: Vec3,
     pub yaw: f32,
     pub pitch: f32,
-    /// Of all tools.
-    pub tool: u8,
     pub has_light: bool,
 }
 
 impl Pose {
-    fn is_finite(&self) -> bool {
-        self.feet.is_finite() && self.yaw.is_finite() && self.pitch.is_finite()
+    /// Can somebody stand there?
+    fn is_possible(&self) -> bool {
+        self.feet.abs().max_element() < FAR && self.yaw.is_finite() && self.pitch.is_finite()
+    }
+
+    /// The voxel at the feet.
+    fn voxel(&self) -> IVec3 {
+        voxel(self.feet)
     }
 }
 
-/// The time of day at the host, on its own [`Fellow`].
+/// The time of day at the host, on its own [`PlayerInfo`].
 #[derive(Component, Clone, Copy, Debug, Serialize, Deserialize)]
 struct HostClock(f32);
 
@@ -67,19 +72,20 @@ struct Introduction(String);
 struct Moved(Pose);
 
 /// Tells all players of all others.
-pub struct FellowsPlugin;
+pub struct PlayersPlugin;
 
-impl Plugin for FellowsPlugin {
+impl Plugin for PlayersPlugin {
     fn build(&self, app: &mut App) {
-        app.replicate::<Fellow>()
+        app.replicate::<PlayerInfo>()
             .replicate::<Pose>()
             .replicate::<HostClock>()
             .add_client_message::<Introduction>(Channel::Ordered)
             .add_client_message::<Moved>(Channel::Unreliable)
-            .add_observer(welcome)
-            .add_observer(say_goodbye)
+            .add_observer(announce_arrival)
+            .add_observer(announce_leaving)
             .add_observer(forget_all)
-            .add_systems(OnExit(ClientState::Connected), forget_fellows)
+            .add_systems(OnEnter(ClientState::Connected), (introduce, tell_pose))
+            .add_systems(OnExit(ClientState::Connected), forget_players)
             .add_systems(
                 Update,
                 (
@@ -92,6 +98,11 @@ impl Plugin for FellowsPlugin {
                     .run_if(is_shared),
             );
     }
+}
+
+/// The voxel at a place.
+pub fn voxel(place: Vec3) -> IVec3 {
+    place.as_ivec3().saturating_add(ORIGIN)
 }
 
 /// A name that can be shown.
@@ -110,23 +121,17 @@ fn name_of(settings: &Settings) -> String {
 fn introduce(
     settings: Res<Settings>,
     own: Res<OwnNumber>,
-    fellows: Query<&Fellow>,
+    players: Query<&PlayerInfo>,
     mut messages: MessageWriter<Introduction>,
 ) {
-    if fellows.iter().all(|fellow| fellow.number != own.0) {
+    if players.iter().all(|player| player.number != own.0) {
         messages.write(Introduction(name_of(&settings)));
     }
 }
 
-fn tell_pose(
-    players: Query<(&Player, Body)>,
-    hand: Res<Hand>,
-    lamp: Res<HeadlampSwitch>,
-    mut messages: MessageWriter<Moved>,
-) {
+fn tell_pose(players: Query<(&Player, Body)>, lamp: Res<HeadlampSwitch>, mut messages: MessageWriter<Moved>) {
     for (player, body) in &players {
-        let (tool, has_light) = (hand.tool as u8, lamp.0);
-        let pose = Pose { feet: body.feet(), yaw: player.yaw, pitch: player.pitch, tool, has_light };
+        let pose = Pose { feet: body.feet(), yaw: player.yaw, pitch: player.pitch, has_light: lamp.0 };
         messages.write(Moved(pose));
     }
 }
@@ -134,7 +139,7 @@ fn tell_pose(
 /// Ground comes from the player outwards.
 fn place_ground(players: Query<Body, With<Player>>, mut terrains: Query<&mut SharedTerrain>) {
     for (body, mut terrain) in players.iter().zip(&mut terrains) {
-        terrain.bypass_change_detection().place = body.feet().as_ivec3() + ORIGIN;
+        terrain.bypass_change_detection().place = voxel(body.feet());
     }
 }
 
@@ -143,20 +148,21 @@ fn enter(
     mut commands: Commands,
     mut introductions: MessageReader<FromClient<Introduction>>,
     ids: Query<&NetworkId>,
-    fellows: Query<&Fellow>,
+    players: Query<&PlayerInfo>,
     clock: Res<Clock>,
 ) {
     for FromClient { client_id, message } in introductions.read() {
         let name = cleaned(&message.0);
         match client_id.entity() {
             Some(client) => {
-                let Ok(id) = ids.get(client) else { continue };
-                let fellow = Fellow { number: id.get(), name };
-                commands.entity(client).insert_if_new((Replicated, fellow, Pose::default()));
+                // 0 is the host's.
+                let Some(id) = ids.get(client).ok().filter(|id| id.get() != 0) else { continue };
+                let player = PlayerInfo { number: id.get(), name };
+                commands.entity(client).insert_if_new((Replicated, player, Pose::default()));
             }
-            None if fellows.iter().all(|fellow| fellow.number != 0) => {
-                let fellow = Fellow { number: 0, name };
-                commands.spawn((Replicated, fellow, Pose::default(), HostClock(clock.hour)));
+            None if players.iter().all(|player| player.number != 0) => {
+                let player = PlayerInfo { number: 0, name };
+                commands.spawn((Replicated, player, Pose::default(), HostClock(clock.hour)));
             }
             None => {}
         }
@@ -167,29 +173,30 @@ fn enter(
 fn place(
     mut moves: MessageReader<FromClient<Moved>>,
     ids: Query<&NetworkId>,
-    mut fellows: Query<(&Fellow, &mut Pose, Option<&mut HostClock>)>,
+    mut players: Query<&mut Pose, Without<HostClock>>,
+    mut host: Query<(&mut Pose, &mut HostClock)>,
     mut server: ResMut<GroundServer>,
     clock: Res<Clock>,
 ) {
-    for FromClient { client_id, message: Moved(new) } in moves.read() {
-        if !new.is_finite() {
-            continue;
+    for FromClient { client_id, message: Moved(new) } in
+        moves.read().filter(|moved| moved.message.0.is_possible())
+    {
+        if let Some(client) = client_id.entity() {
+            if let Ok(mut pose) = players.get_mut(client) {
+                pose.set_if_neq(*new);
+            }
+        } else if let Ok((mut pose, mut hours)) = host.single_mut() {
+            pose.set_if_neq(*new);
+            if (hours.0 - clock.hour).abs() > CLOCK_DIFFERENCE / 2.0 {
+                hours.0 = clock.hour;
+            }
         }
-        let number = client_id.entity().map_or(Some(0), |client| ids.get(client).ok().map(NetworkId::get));
-        let found = fellows.iter_mut().find(|(fellow, ..)| Some(fellow.number) == number);
-        let Some((_, mut pose, hours)) = found else { continue };
-        pose.set_if_neq(*new);
-        if let Some(mut hours) = hours
-            && (hours.0 - clock.hour).abs() > CLOCK_DIFFERENCE / 2.0
-        {
-            hours.0 = clock.hour;
-        }
-        let (player, at) = (GroundServer::player(*client_id, &ids), new.feet.as_ivec3() + ORIGIN);
+        let (player, at) = (GroundServer::player(*client_id, &ids), new.voxel());
         server.with(move |server: &mut net::Server| server.set_place(player, Some(at)));
     }
 }
 
-/// It is as late as at the host's.
+/// Follows the host's time of day.
 fn follow_clock(party: Res<Party>, hosts: Query<&HostClock, Changed<HostClock>>, mut clock: ResMut<Clock>) {
     for hour in hosts.iter().filter(|hour| hour.0.is_finite()) {
         if matches!(*party, Party::Guest(_)) && (clock.hour - hour.0).abs() > CLOCK_DIFFERENCE {
@@ -198,37 +205,37 @@ fn follow_clock(party: Res<Party>, hosts: Query<&HostClock, Changed<HostClock>>,
     }
 }
 
-fn welcome(
-    new: On<Add, Fellow>,
-    fellows: Query<&Fellow>,
+fn announce_arrival(
+    new: On<Add, PlayerInfo>,
+    players: Query<&PlayerInfo>,
     own: Res<OwnNumber>,
     mut hints: MessageWriter<Hint>,
 ) {
-    if let Some(fellow) = fellows.get(new.entity).ok().filter(|fellow| fellow.number != own.0) {
-        hints.write(Hint(format!("{} is here", cleaned(&fellow.name))));
+    if let Some(player) = players.get(new.entity).ok().filter(|player| player.number != own.0) {
+        hints.write(Hint(format!("{} is here", cleaned(&player.name))));
     }
 }
 
-fn say_goodbye(
-    gone: On<Remove, Fellow>,
-    fellows: Query<&Fellow>,
+fn announce_leaving(
+    gone: On<Remove, PlayerInfo>,
+    players: Query<&PlayerInfo>,
     own: Res<OwnNumber>,
     mut hints: MessageWriter<Hint>,
 ) {
-    if let Some(fellow) = fellows.get(gone.entity).ok().filter(|fellow| fellow.number != own.0) {
-        hints.write(Hint(format!("{} has gone", cleaned(&fellow.name))));
+    if let Some(player) = players.get(gone.entity).ok().filter(|player| player.number != own.0) {
+        hints.write(Hint(format!("{} has gone", cleaned(&player.name))));
     }
 }
 
 /// Without a connection nobody is there.
-fn forget_fellows(mut commands: Commands, fellows: Query<Entity, With<Fellow>>) {
-    for fellow in &fellows {
-        commands.entity(fellow).try_despawn();
+fn forget_players(mut commands: Commands, players: Query<Entity, With<PlayerInfo>>) {
+    for player in &players {
+        commands.entity(player).try_despawn();
     }
 }
 
 fn forget_all(_: On<Remove, SharedTerrain>, mut commands: Commands) {
-    commands.run_system_cached(forget_fellows);
+    commands.run_system_cached(forget_players);
 }
 
 #[cfg(test)]
