@@ -370,7 +370,7 @@ impl Replica {
                 change.fields.push((chunk, new));
             }
         }
-        self.more = draft.samples.wrapping_sub(world.regions_hash());
+        self.more = draft.regions_hash.wrapping_sub(world.regions_hash());
         (self.bricks, self.fields, self.samples) = (bricks, fields, draft.samples);
         self.next_field = change.next_field;
         let is_empty = change.bricks.is_empty() && change.fields.is_empty();

@@ -22,8 +22,8 @@ pub struct Draft {
     pub change: WorldChange,
     /// The [hash](World::hash) that the world would have.
     pub hash: u64,
-    /// The sum of the hashes of all regions that the world would have.
-    pub(crate) samples: u64,
+    /// The [sum of the hashes of all regions](World::regions_hash) that the world would have.
+    pub regions_hash: u64,
 }
 
 impl Terrain {
@@ -40,17 +40,17 @@ impl Terrain {
         }
         let Some((Taken::Edits(edits), _)) = queue.take() else {
             let change = WorldChange { next_field: self.world.next_field, ..WorldChange::default() };
-            let (hash, samples) = (self.world.hash(), self.world.sample_hash);
-            return Draft { receipts: Vec::new(), change, hash, samples };
+            let (hash, regions_hash) = (self.world.hash(), self.world.sample_hash);
+            return Draft { receipts: Vec::new(), change, hash, regions_hash };
         };
         let transaction = self.transaction(unique(), Work::Edits(edits));
         let transaction =
             Transaction { meshing: Meshing::Never, drawn_cut: None, is_logged: false, ..transaction };
         let commit = transaction.run();
-        let samples = commit.sample_hash();
-        let hash = World::hash_of(self.world.ground().hash(), samples);
+        let regions_hash = commit.sample_hash();
+        let hash = World::hash_of(self.world.ground().hash(), regions_hash);
         let change = commit.change();
-        Draft { receipts: commit.receipts, change, hash, samples }
+        Draft { receipts: commit.receipts, change, hash, regions_hash }
     }
 
     /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as they are.

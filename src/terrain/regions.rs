@@ -39,8 +39,8 @@ impl World {
         self.next_field
     }
 
-    /// The sum of the hashes of all regions.
-    pub(crate) fn regions_hash(&self) -> u64 {
+    /// The sum of the [hashes of all regions](Self::region_hash), which wraps around; it is kept, so this takes no time.
+    pub fn regions_hash(&self) -> u64 {
         self.sample_hash
     }
 
