@@ -371,7 +371,7 @@ impl Replica {
             }
         }
         self.more = draft.regions_hash.wrapping_sub(world.regions_hash());
-        (self.bricks, self.fields, self.samples) = (bricks, fields, draft.samples);
+        (self.bricks, self.fields, self.samples) = (bricks, fields, draft.regions_hash);
         self.next_field = change.next_field;
         let is_empty = change.bricks.is_empty() && change.fields.is_empty();
         let shown = (!is_empty).then_some(ShownChange { change, hash: draft.hash });
