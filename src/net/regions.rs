@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use xxhash_rust::xxh3::Xxh3Default;
 
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, RegionPos};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{World, WorldChange};
 
 /// The hash of a region as marks and tables tell it: that of its [samples](World::region_hash), and of the names of the fields in
@@ -29,7 +29,7 @@ pub fn touched_regions(grid: ChunkGrid, change: &WorldChange) -> BTreeSet<Region
     for (chunk, _) in &change.fields {
         let Some(samples) = grid.chunk_samples(*chunk).intersection(grid.edit_bounds()) else { continue };
         let [low, high] = [samples.min, samples.max].map(|corner| RegionPos::of(BrickPos::of(corner)).0);
-        regions.extend(crate::lattice::LatticeBox { min: low, max: high }.points().map(RegionPos));
+        regions.extend(LatticeBox { min: low, max: high }.points().map(RegionPos));
     }
     regions
 }

@@ -32,7 +32,7 @@ pub struct GroundServer {
 /// Where the server is.
 enum Work {
     /// Its world is read.
-    Opening(ThreadTask<Result<(Parts, OpenedWorld), StoreError>>, Progress),
+    Opening(ThreadTask<Result<(Box<Parts>, Vec<StoreTrouble>), StoreError>>, Progress),
     Here(Box<Parts>),
     UnderWay(ThreadTask<Box<Parts>>),
     /// Its world could not be read, or it is taken out for a moment.
@@ -45,13 +45,7 @@ struct Parts {
     store: Option<Store>,
 }
 
-/// What a world was found to be.
-struct OpenedWorld {
-    troubles: Vec<StoreTrouble>,
-    data: BTreeMap<String, Vec<u8>>,
-}
-
-/// Most of what waits for a world that is read; what comes then is dropped.
+/// Most that waits until a world is read; what comes then is dropped.
 const MOST_WAITING: usize = 1 << 14;
 
 /// What waits for the server to come back.
@@ -81,9 +75,8 @@ impl GroundServer {
         let progress = reader.progress.clone();
         let task = ThreadTask::start(Threads::Background, move || {
             let ReadWorld { store, terrain, troubles } = reader.read()?;
-            let data = store.game_data().clone();
             let server = Server::open(terrain, &store, settings);
-            Ok((Parts { server, store: Some(store) }, OpenedWorld { troubles, data }))
+            Ok((Box::new(Parts { server, store: Some(store) }), troubles))
         });
         Self::working(Work::Opening(task, progress))
     }
@@ -117,7 +110,8 @@ impl GroundServer {
     }
 
     fn ask(&mut self, work: impl FnOnce(&mut Parts, Duration) + Send + Sync + 'static) {
-        if self.waiting.len() < MOST_WAITING {
+        let is_read = matches!(self.work, Work::Here(_) | Work::UnderWay(_));
+        if is_read || self.waiting.len() < MOST_WAITING {
             self.waiting.push(Box::new(work));
         }
     }
@@ -180,30 +174,31 @@ impl GroundServer {
 
     /// Takes the server out, if it is not at work.
     fn take_parts(&mut self, mut tell: impl FnMut(GroundServerEvent)) -> Option<Box<Parts>> {
-        match &mut self.work {
-            Work::Here(_) => match std::mem::replace(&mut self.work, Work::Gone) {
-                Work::Here(parts) => Some(parts),
-                _ => None,
+        match std::mem::replace(&mut self.work, Work::Gone) {
+            Work::Here(parts) => return Some(parts),
+            Work::Gone => {}
+            Work::UnderWay(mut task) => match task.finish() {
+                None => self.work = Work::UnderWay(task),
+                done => return done,
             },
-            Work::Gone => None,
-            Work::UnderWay(task) => task.finish(),
-            Work::Opening(task, _) => match task.finish()? {
-                Ok((parts, OpenedWorld { troubles, data })) => {
+            Work::Opening(mut task, progress) => match task.finish() {
+                None => self.work = Work::Opening(task, progress),
+                Some(Ok((parts, troubles))) => {
                     // What was put meanwhile is newer.
-                    let newer = std::mem::replace(&mut self.data, data);
+                    let newer = std::mem::take(&mut self.data);
+                    self.data.extend(parts.store.iter().flat_map(|store| store.game_data().clone()));
                     self.data.extend(newer);
                     troubles.into_iter().map(GroundServerEvent::Trouble).for_each(&mut tell);
                     tell(GroundServerEvent::Opened(Ok(())));
-                    Some(Box::new(parts))
+                    return Some(parts);
                 }
-                Err(why) => {
+                Some(Err(why)) => {
                     error!("the world is not served: {why}");
-                    self.work = Work::Gone;
                     tell(GroundServerEvent::Opened(Err(Arc::new(why))));
-                    None
                 }
             },
         }
+        None
     }
 }
 

@@ -122,11 +122,33 @@ fn check_mended(play: &Play) {
     assert_eq!(play.server.figures().repairs, repairs[0]);
 }
 
-#[test]
-fn rules_that_come_one_edit_late_are_noticed_at_the_next_mark_and_mended() {
+/// Three bots that have joined and do not dig.
+fn quiet_play() -> Play {
     let mut play = Play::new(&hills(96), 3, settings());
     play.bots.iter_mut().for_each(|bot| bot.is_digging = false);
     play.seconds(3.0);
+    play
+}
+
+/// The server puts a hole, and one bot is told of another one.
+fn lie_about_parts(play: &mut Play, mut damage: impl FnMut(&mut WorldChange) + 'static) {
+    let mut other = terrain(&play.ground);
+    other.apply([sphere(40.0, 40.0)]);
+    play.server.put(other.parts().change).expect("it fits");
+    lie(play, move |entries| {
+        for entry in entries {
+            if let Entry::Parts { change, .. } = entry {
+                damage(Arc::make_mut(change));
+                return Lie::Told;
+            }
+        }
+        Lie::Not
+    });
+}
+
+#[test]
+fn rules_that_come_one_edit_late_are_noticed_at_the_next_mark_and_mended() {
+    let mut play = quiet_play();
     play.server.set_rules(DiggingRules::default().with_bedrock(60)).expect("valid rules");
     play.server.edit(edit(&sphere(40.0, 40.0))).expect("no stamp");
     play.server.set_rules(DiggingRules::default()).expect("valid rules");
@@ -141,23 +163,10 @@ fn rules_that_come_one_edit_late_are_noticed_at_the_next_mark_and_mended() {
 
 #[test]
 fn a_brick_that_is_missing_is_noticed_at_the_next_mark_and_mended() {
-    let mut play = Play::new(&hills(96), 3, settings());
-    play.bots.iter_mut().for_each(|bot| bot.is_digging = false);
-    play.seconds(3.0);
-    let mut other = terrain(&play.ground);
-    other.apply([sphere(40.0, 40.0)]);
-    play.server.put(other.parts().change).expect("it fits");
-    lie(&mut play, |entries| {
-        for entry in entries {
-            if let Entry::Parts { change, .. } = entry {
-                let mut bricks = change.bricks.clone();
-                let at = bricks.iter().position(|(_, brick)| brick.is_some()).expect("a brick");
-                bricks.remove(at);
-                *change = Arc::new(WorldChange { bricks, ..WorldChange::clone(change) });
-                return Lie::Told;
-            }
-        }
-        Lie::Not
+    let mut play = quiet_play();
+    lie_about_parts(&mut play, |change| {
+        let at = change.bricks.iter().position(|(_, brick)| brick.is_some()).expect("a brick");
+        change.bricks.remove(at);
     });
     play.settle();
     check_mended(&play);
@@ -165,22 +174,9 @@ fn a_brick_that_is_missing_is_noticed_at_the_next_mark_and_mended() {
 
 #[test]
 fn names_of_fields_that_drift_are_noticed_at_the_next_mark_and_mended() {
-    let mut play = Play::new(&hills(96), 3, settings());
-    play.bots.iter_mut().for_each(|bot| bot.is_digging = false);
-    play.seconds(3.0);
-    let mut other = terrain(&play.ground);
-    other.apply([sphere(40.0, 40.0)]);
-    play.server.put(other.parts().change).expect("it fits");
-    lie(&mut play, |entries| {
-        for entry in entries {
-            if let Entry::Parts { change, .. } = entry {
-                // Later fields have other names than those of the others; samples are equal.
-                *change = Arc::new(WorldChange { next_field: 70, ..WorldChange::clone(change) });
-                return Lie::Told;
-            }
-        }
-        Lie::Not
-    });
+    let mut play = quiet_play();
+    // Later fields have other names than those of the others; samples are equal.
+    lie_about_parts(&mut play, |change| change.next_field = 70);
     play.seconds(3.0);
     assert_eq!(play.bots[0].client.figures().repairs, 0, "no field has a name of its own");
     play.server.edit(edit(&sphere(80.0, 80.0))).expect("no stamp");

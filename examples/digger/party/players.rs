@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use bevy::time::common_conditions::on_real_timer;
 use bevy_burrow::net;
@@ -205,25 +206,27 @@ fn follow_clock(party: Res<Party>, hosts: Query<&HostClock, Changed<HostClock>>,
     }
 }
 
-fn announce_arrival(
-    new: On<Add, PlayerInfo>,
-    players: Query<&PlayerInfo>,
-    own: Res<OwnNumber>,
-    mut hints: MessageWriter<Hint>,
-) {
-    if let Some(player) = players.get(new.entity).ok().filter(|player| player.number != own.0) {
-        hints.write(Hint(format!("{} is here", cleaned(&player.name))));
-    }
+fn announce_arrival(new: On<Add, PlayerInfo>, mut announcer: Announcer) {
+    announcer.tell(new.entity, "is here");
 }
 
-fn announce_leaving(
-    gone: On<Remove, PlayerInfo>,
-    players: Query<&PlayerInfo>,
-    own: Res<OwnNumber>,
-    mut hints: MessageWriter<Hint>,
-) {
-    if let Some(player) = players.get(gone.entity).ok().filter(|player| player.number != own.0) {
-        hints.write(Hint(format!("{} has gone", cleaned(&player.name))));
+fn announce_leaving(gone: On<Remove, PlayerInfo>, mut announcer: Announcer) {
+    announcer.tell(gone.entity, "has gone");
+}
+
+/// Says what other players do.
+#[derive(SystemParam)]
+struct Announcer<'w, 's> {
+    players: Query<'w, 's, &'static PlayerInfo>,
+    own: Res<'w, OwnNumber>,
+    hints: MessageWriter<'w, Hint>,
+}
+
+impl Announcer<'_, '_> {
+    fn tell(&mut self, player: Entity, what: &str) {
+        if let Some(player) = self.players.get(player).ok().filter(|player| player.number != self.own.0) {
+            self.hints.write(Hint(format!("{} {what}", cleaned(&player.name))));
+        }
     }
 }
 

@@ -84,10 +84,8 @@ impl Client {
         for tag in self.take_answered(own) {
             self.events.push(ClientEvent::Confirmed { tag, receipt: None });
         }
-        let undos = self.undos.split_off(&own.saturating_add(1));
-        for _ in std::mem::replace(&mut self.undos, undos) {
-            self.events.push(ClientEvent::Undone(None));
-        }
+        let undone = self.take_answered_undos(own).map(|_| ClientEvent::Undone(None));
+        self.events.extend(undone);
     }
 
     /// Takes back own edits up to a number; returns their tags.
@@ -95,6 +93,12 @@ impl Client {
         let answered: Vec<u64> =
             self.replica.pending().map(|(number, _)| number).filter(|number| *number <= own).collect();
         answered.into_iter().filter_map(|number| Some(self.replica.take_back(number)?.tag())).collect()
+    }
+
+    /// Forgets own undos up to a number; returns their numbers.
+    fn take_answered_undos(&mut self, own: u64) -> impl Iterator<Item = u64> + use<> {
+        let later = self.undos.split_off(&own.saturating_add(1));
+        std::mem::replace(&mut self.undos, later).into_iter()
     }
 
     /// Sends own edits that the server has not seen, and those from before the first welcome.
@@ -127,10 +131,8 @@ impl Client {
             for tag in self.take_answered(own) {
                 self.events.push(ClientEvent::Refused { tag, why: None });
             }
-            let undos = self.undos.split_off(&own.saturating_add(1));
-            for _ in std::mem::replace(&mut self.undos, undos) {
-                self.events.push(ClientEvent::UndoRefused(None));
-            }
+            let refused = self.take_answered_undos(own).map(|_| ClientEvent::UndoRefused(None));
+            self.events.extend(refused);
             self.follow_from_now();
         }
     }

@@ -148,12 +148,8 @@ fn has_focus(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
     windows.iter().all(|window| window.focused)
 }
 
-fn is_loaded(
-    players: Query<(), With<Player>>,
-    textures: Res<GroundLoading>,
-    shared: Query<&SharedTerrain>,
-) -> bool {
-    !players.is_empty() && textures.is_ready() && shared.iter().all(SharedTerrain::is_playable)
+fn is_loaded(players: Query<(), With<Player>>, textures: Res<GroundLoading>) -> bool {
+    !players.is_empty() && textures.is_ready()
 }
 
 /// Starts the game if the player wants to and is on the menu page. On other pages it waits.
@@ -183,8 +179,8 @@ fn show_progress(
     let (words, share) = match (textures.is_ready(), saved) {
         (false, _) => (Some("creating textures"), textures.progress()),
         (true, Some(share)) => (Some("reading the world"), share),
-        (true, None) if players.is_empty() => (Some("loading the landscape"), 1.0),
         (true, None) if is_absent => (Some("joining"), 1.0),
+        (true, None) if players.is_empty() => (Some("loading the landscape"), 1.0),
         (true, None) => (None, 1.0),
     };
     let done = 100.0 * share;
