@@ -8,8 +8,13 @@
 //! timed from its start until the graphics card has drawn it, so unlike in a game, frames never overlap. The plugin's
 //! time on the main thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same
 //! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
-//! times the plain material's part of the frame the look takes.
+//! times the plain material's part of the frame the look takes. What is drawn is looked at too: the benchmark fails if ground
+//! is missing where a ray meets it.
 
+#[path = "../examples/shared/capture.rs"]
+mod capture;
+#[path = "../examples/shared/holes.rs"]
+mod holes;
 #[path = "../examples/shared/mountains.rs"]
 mod mountains;
 #[path = "../examples/shared/offscreen.rs"]
@@ -29,6 +34,7 @@ use bevy_burrow::ground::{GreyImage, ImageLimits, ImageScale, NoiseSource};
 use bevy_burrow::lattice::Column;
 use bevy_burrow::physics::{ColliderSource, PhysicsFigures, TerrainPhysicsPlugin};
 use bevy_burrow::prelude::*;
+use image::Rgb;
 
 /// Time between frames.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
@@ -131,6 +137,7 @@ fn report(what: &str, mut times: Vec<Duration>) -> [f64; 2] {
 struct Walk {
     app: App,
     camera: Entity,
+    film: Handle<Image>,
     path: Vec<Vec3>,
     balls: Vec<Entity>,
     /// Is the camera so far up that nothing is in sight?
@@ -158,10 +165,13 @@ impl Walk {
         println!("drawn by {}", world.resource::<RenderAdapterInfo>().name);
         let film = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
         let film = world.resource_mut::<Assets<Image>>().add(film);
+        // No ground has this colour.
+        world.resource_mut::<ClearColor>().0 = Color::linear_rgb(1.0, 0.0, 1.0);
         let fog =
             DistanceFog { falloff: FogFalloff::from_visibility_squared(900.0), ..DistanceFog::default() };
         // What hills cover is not shaded, as in the digger.
-        let camera = (Camera3d::default(), DepthPrepass, RenderTarget::from(film), fog, Transform::default());
+        let camera =
+            (Camera3d::default(), DepthPrepass, RenderTarget::from(film.clone()), fog, Transform::default());
         // All scenes are seen as far.
         let projection = Projection::from(PerspectiveProjection { far: 20_000.0, ..default() });
         let camera = world.spawn((camera, projection, ColliderSource { radius: 48.0 })).id();
@@ -183,7 +193,7 @@ impl Walk {
             }
         };
         let mut walk =
-            Self { app, camera, path, balls: Vec::new(), is_far: false, next_brush: Instant::now() };
+            Self { app, camera, film, path, balls: Vec::new(), is_far: false, next_brush: Instant::now() };
         // The ground is ready when its textures are generated and its tiles are shown.
         let start = Instant::now();
         while !walk.is_shown() {
@@ -215,6 +225,9 @@ impl Walk {
                 for (part, medians) in rounds.iter_mut().enumerate() {
                     self.set_material(PARTS[part]);
                     self.is_far = PARTS[part] == Part::Nothing;
+                    if round == 0 && !self.is_far {
+                        self.check_for_holes(if part < 2 { "the look" } else { "a plain material" });
+                    }
                     let start = Instant::now();
                     let is_in_time = |&number: &usize| number < FIRST_FRAMES + 3 || start.elapsed() < ROUND;
                     let mut took: Vec<_> = (0..FIRST_FRAMES + frames)
@@ -237,6 +250,25 @@ impl Walk {
             );
         }
         self.is_far = false;
+    }
+
+    /// Looks at some frames of the walk.
+    ///
+    /// # Panics
+    /// Panics if ground is missing.
+    fn check_for_holes(&mut self, what: &str) {
+        for number in [0, 200, 400] {
+            for _ in 0..3 {
+                self.frame(number, false);
+            }
+            let picture =
+                capture::capture(&mut self.app, &self.film, Duration::from_secs(120)).expect("a picture");
+            let background = Rgb([255, 0, 255]);
+            let found = holes::count(&self.app, self.camera, &picture, 300.0, |_, _, pixel| {
+                holes::is_same(pixel, &background)
+            });
+            assert!(found.holes == 0 && found.ground > 0, "{what}, frame {number}: {found:?}");
+        }
     }
 
     /// Gives the terrain its look, or a plain material in place of it.
@@ -353,6 +385,7 @@ fn horizon(size: (u32, u32), frames: usize) {
             *time = own[0];
         }
         walk.set_visible(true);
+        walk.check_for_holes("levels of detail");
         if view == 0.0 {
             first = times;
             println!("1.2 km in full detail: {:.0} with shadows, {:.0} without", times[0], times[1]);
@@ -389,7 +422,9 @@ fn mountains() -> Ground {
 
 /// The landscape of the examples.
 fn ground() -> Ground {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/jacksboro_fault.png");
+    // Cargo sets it; elsewhere it says where the assets were copied to.
+    let root = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_else(|_| env!("CARGO_MANIFEST_DIR").into());
+    let path = format!("{root}/assets/jacksboro_fault.png");
     let bytes = std::fs::read(path).expect("the shipped elevation model can be read");
     let image = GreyImage::decode_png(&bytes, &ImageLimits::default()).expect("a grey PNG");
     let scale = ImageScale { voxels_per_sample: 3, low: 0.0, high: 150.0, detail: None };

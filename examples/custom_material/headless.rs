@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
@@ -19,7 +20,7 @@ pub fn run(folder: &Path) -> Result {
         app.add_plugins(super::table);
     });
     let place = Transform::from_translation(super::VIEW.0).looking_at(super::VIEW.1, Vec3::Y);
-    let camera = app.world_mut().spawn((Camera3d::default(), place)).id();
+    let camera = app.world_mut().spawn((Camera3d::default(), DepthPrepass, place)).id();
     let photographer = Photographer::new(&mut app, camera, SIZE);
     until(&mut app, |app| {
         let mut tiles = app.world_mut().query_filtered::<(), (With<Tile>, With<Mesh3d>)>();

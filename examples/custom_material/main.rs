@@ -36,6 +36,7 @@ use std::path::PathBuf;
 use std::process::{ExitCode, Termination};
 
 use bevy::camera_controller::free_camera::FreeCameraPlugin;
+use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 use clap::Parser;
@@ -101,6 +102,7 @@ const VIEW: (Vec3, Vec3) = (Vec3::new(128.0, 120.0, 300.0), Vec3::new(128.0, -20
 fn open_eyes(mut commands: Commands) {
     commands.spawn((
         Camera3d::default(),
+        DepthPrepass,
         flight::free_camera(20.0, 60.0),
         Transform::from_translation(VIEW.0).looking_at(VIEW.1, Vec3::Y),
     ));

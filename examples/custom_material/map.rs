@@ -9,6 +9,7 @@ use bevy::render::render_resource::{AsBindGroup, RenderPipelineDescriptor, Speci
 use bevy::shader::{ShaderDefVal, ShaderRef};
 use bevy_burrow::plugin::ATTRIBUTE_GROUND_DEPTH;
 use bevy_burrow::prelude::*;
+use bevy_burrow::view::prepass_vertex_shader;
 
 /// Makes terrains with a [`MapMaterial`] show it.
 pub struct MapPlugin;
@@ -47,7 +48,7 @@ impl Default for MapMaterial {
     }
 }
 
-const SHADER: &str = "embedded://custom_material/custom_material/map.wgsl";
+const SHADER: &str = concat!("embedded://", env!("CARGO_CRATE_NAME"), "/custom_material/map.wgsl");
 
 impl Material for MapMaterial {
     fn vertex_shader() -> ShaderRef {
@@ -58,13 +59,18 @@ impl Material for MapMaterial {
         SHADER.into()
     }
 
+    // Its positions are those of `map.wgsl`, to the bit. Those of Bevy's prepass might differ by rounding.
+    fn prepass_vertex_shader() -> ShaderRef {
+        prepass_vertex_shader()
+    }
+
     fn specialize(
         _: &MaterialPipeline,
         descriptor: &mut RenderPipelineDescriptor,
         layout: &MeshVertexBufferLayoutRef,
         _: MaterialPipelineKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
-        // Shadows and prepasses are drawn by Bevy's own shaders, which want nothing new.
+        // The prepass, which draws shadows too, wants no attributes of ours.
         if descriptor.vertex.shader_defs.contains(&ShaderDefVal::from("PREPASS_PIPELINE")) {
             return Ok(());
         }

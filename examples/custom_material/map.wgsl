@@ -1,4 +1,5 @@
-#import bevy_pbr::{mesh_functions, view_transformations::position_world_to_clip}
+#import bevy_burrow::position::position_of
+#import bevy_pbr::mesh_functions
 
 struct Map {
     shallow: vec4<f32>,
@@ -18,7 +19,8 @@ struct Vertex {
 }
 
 struct Varying {
-    @builtin(position) position: vec4<f32>,
+    // Invariant, so that it has the same bits in the prepass: else a camera with a `DepthPrepass` may see holes.
+    @invariant @builtin(position) position: vec4<f32>,
     @location(0) place: vec3<f32>,
     @location(1) normal: vec3<f32>,
     @location(2) color: vec3<f32>,
@@ -27,11 +29,10 @@ struct Varying {
 
 @vertex
 fn vertex(in: Vertex) -> Varying {
-    let world_from_local = mesh_functions::get_world_from_local(in.instance_index);
-    let place = mesh_functions::mesh_position_local_to_world(world_from_local, vec4(in.position, 1.0));
+    let position = position_of(in.position, in.instance_index);
     var out: Varying;
-    out.position = position_world_to_clip(place.xyz);
-    out.place = place.xyz;
+    out.position = position.clip;
+    out.place = position.world.xyz;
     out.normal = mesh_functions::mesh_normal_local_to_world(in.normal, in.instance_index);
     out.color = in.color.rgb;
     out.depth = in.depth;

@@ -4,6 +4,7 @@ use std::marker::PhantomData;
 
 use bevy::prelude::*;
 
+use super::vertex::VertexPlugin;
 use crate::plugin::propagate_with_pieces;
 
 /// Propagates the `MeshMaterial3d<M>` of a terrain's entity to its tiles, chunks and [pieces](crate::plugin::GroundPiece), also
@@ -12,7 +13,8 @@ use crate::plugin::propagate_with_pieces;
 /// `BurrowPlugins` contain it for `StandardMaterial`; add it for each material type of your own, before or after Bevy's
 /// plugins. Vertex colours carry the terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
 /// [`ATTRIBUTE_MATERIAL_IDS`](crate::plugin::ATTRIBUTE_MATERIAL_IDS) and
-/// [`ATTRIBUTE_MATERIAL_WEIGHTS`](crate::plugin::ATTRIBUTE_MATERIAL_WEIGHTS) are there for shaders.
+/// [`ATTRIBUTE_MATERIAL_WEIGHTS`](crate::plugin::ATTRIBUTE_MATERIAL_WEIGHTS) are there for shaders. A material with a vertex
+/// shader of its own also needs [`prepass_vertex_shader`](super::prepass_vertex_shader).
 pub struct TerrainMaterialPlugin<M: Material>(PhantomData<fn() -> M>);
 
 impl<M: Material> Default for TerrainMaterialPlugin<M> {
@@ -23,6 +25,7 @@ impl<M: Material> Default for TerrainMaterialPlugin<M> {
 
 impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     fn build(&self, app: &mut App) {
+        VertexPlugin::add_once(app);
         propagate_with_pieces::<MeshMaterial3d<M>>(app);
     }
 }

@@ -34,12 +34,16 @@
 //! commands.spawn((terrain, MeshMaterial3d(toon)));
 //! # }
 //! ```
+//!
+//! If that material has a vertex shader, see [`prepass_vertex_shader`].
 
 pub mod ground;
 mod material;
+mod vertex;
 
 pub use ground::{
     GroundArrays, GroundArraysError, GroundLayer, GroundLayerImages, GroundLoading, GroundLook,
     GroundMaterial, GroundPlugin, GroundQuality, GroundTextures, GroundTexturesError,
 };
 pub use material::TerrainMaterialPlugin;
+pub use vertex::prepass_vertex_shader;

@@ -17,7 +17,7 @@ const SIDE: u32 = 4096;
 const SHOWS: f32 = 0.015;
 
 /// Mountains of 4 x 4 km.
-fn mountains() -> Ground {
+pub fn mountains() -> Ground {
     let heights = NoiseHeights {
         seed: 7,
         kind: NoiseKind::Ridged,
@@ -42,7 +42,7 @@ fn summit(studio: &mut Studio) -> Vec3 {
 const AHEAD: Vec3 = Vec3::new(10.0, -3.0, 9.0);
 
 /// Updates the app until all is drawn as the cameras need it.
-fn settle(studio: &mut Studio) {
+pub fn settle(studio: &mut Studio) {
     studio.app.update();
     // Twice: a change of levels begins the frame after the camera moved.
     for _ in 0..2 {
@@ -55,18 +55,25 @@ fn settle(studio: &mut Studio) {
     }
 }
 
-pub fn shoot(studio: &mut Studio, album: &mut Album) {
-    studio.terrain(mountains(), GroundLook::default());
+/// Gives the only terrain levels of detail, for what the camera sees up to a distance.
+pub fn watch_levels(studio: &mut Studio, view_distance: f32) {
     let far = Projection::from(PerspectiveProjection { far: 10_000.0, ..default() });
     let camera = studio.camera;
     let world = studio.app.world_mut();
-    let fog = DistanceFog { falloff: FogFalloff::from_visibility_squared(8000.0), ..default() };
-    world.entity_mut(camera).insert((far.clone(), fog));
+    world.entity_mut(camera).insert(far.clone());
     // The studio turns its camera off while it waits. This one is always on, looks with it, and draws nothing.
     let target = RenderTarget::None { size: UVec2::new(SIZE.0, SIZE.1) };
     world.spawn((ChildOf(camera), Camera::default(), far, target, RenderLayers::none()));
     let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
-    world.entity_mut(terrain).insert(LevelsOfDetail { view_distance: 4000.0, ..default() });
+    world.entity_mut(terrain).insert(LevelsOfDetail { view_distance, ..default() });
+}
+
+pub fn shoot(studio: &mut Studio, album: &mut Album) {
+    studio.terrain(mountains(), GroundLook::default());
+    let fog = DistanceFog { falloff: FogFalloff::from_visibility_squared(8000.0), ..default() };
+    let camera = studio.camera;
+    studio.app.world_mut().entity_mut(camera).insert(fog);
+    watch_levels(studio, 4000.0);
     let eye = summit(studio);
     studio.look(eye, eye + AHEAD);
     studio.until("levels", |app| {

@@ -17,9 +17,15 @@
 #![cfg(feature = "examples")]
 
 mod album;
+#[path = "../../examples/shared/capture.rs"]
+mod capture;
 mod debug_views;
+#[path = "../../examples/shared/holes.rs"]
+mod holes;
 mod landscape;
 mod levels;
+#[path = "../../examples/custom_material/map.rs"]
+mod map;
 #[path = "../../examples/shared/offscreen.rs"]
 mod offscreen;
 mod own_textures;
@@ -33,6 +39,7 @@ mod studio;
 mod truth;
 mod tunnel;
 mod ways;
+mod whole;
 
 use album::Album;
 use bevy::app::App;
@@ -64,6 +71,46 @@ fn levels_look_as_approved() {
     let Some(mut studio) = Studio::open(add) else { return };
     let mut album = Album::default();
     levels::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+#[test]
+fn ground_has_no_holes() {
+    let Some(mut studio) = Studio::open(|app| {
+        app.add_plugins(map::MapPlugin);
+    }) else {
+        return;
+    };
+    let mut album = Album::default();
+    whole::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+/// `BURROW_COMPARE=A:B` names two folders; each picture of A is compared with the one of that name in B.
+#[test]
+#[ignore = "compares pictures of two machines: tools/card.sh"]
+fn two_renderers_draw_the_same() {
+    let folders = std::env::var("BURROW_COMPARE").expect("BURROW_COMPARE=A:B");
+    let (a, b) = folders.split_once(':').expect("two folders");
+    let open = |folder: &str, name: &std::ffi::OsStr| {
+        image::open(std::path::Path::new(folder).join(name)).map(image::DynamicImage::into_rgb8)
+    };
+    let mut album = Album::default();
+    let mut compared = 0;
+    for entry in std::fs::read_dir(a).expect("a folder with pictures").flatten() {
+        let name = entry.file_name();
+        if !name.to_string_lossy().ends_with(".png") {
+            continue;
+        }
+        compared += 1;
+        match (open(a, &name), open(b, &name)) {
+            (Ok(first), Ok(second)) => album.compare_two(&name.to_string_lossy(), &first, &second),
+            (_, Err(error)) | (Err(error), _) => {
+                album.check(false, || format!("{}: {error}", name.display()))
+            }
+        }
+    }
+    album.check(compared > 0, || format!("{a} has no pictures"));
     album.close();
 }
 

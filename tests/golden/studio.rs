@@ -1,6 +1,6 @@
 //! A windowless app that takes pictures of terrains.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bevy::camera::RenderTarget;
@@ -8,11 +8,11 @@ use bevy::ecs::component::Mutable;
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::prelude::*;
 use bevy::render::render_resource::TextureFormat;
-use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::prelude::*;
 use image::RgbImage;
 
+use crate::capture::capture;
 use crate::{offscreen, shaders};
 
 /// Width and height of pictures.
@@ -30,7 +30,6 @@ pub struct Studio {
     pub camera: Entity,
     sun: Entity,
     film: Handle<Image>,
-    size: (u32, u32),
     _only: MutexGuard<'static, ()>,
 }
 
@@ -85,7 +84,7 @@ impl Studio {
                 CascadeShadowConfigBuilder { num_cascades: 2, maximum_distance: 120.0, ..default() }.build(),
             ))
             .id();
-        let mut studio = Self { app, camera, sun, film, size: SIZE, _only: only };
+        let mut studio = Self { app, camera, sun, film, _only: only };
         studio.sun(Vec3::new(1.0, 0.9, 0.4));
         Some(studio)
     }
@@ -107,7 +106,6 @@ impl Studio {
     pub fn resize(&mut self, size: (u32, u32)) {
         let image = Image::new_target_texture(size.0, size.1, TextureFormat::Rgba8UnormSrgb, None);
         self.film = self.app.world_mut().resource_mut::<Assets<Image>>().add(image);
-        self.size = size;
         self.app.world_mut().entity_mut(self.camera).insert(RenderTarget::from(self.film.clone()));
     }
 
@@ -178,22 +176,7 @@ impl Studio {
             assert!(waiting.elapsed() < TIMEOUT, "a shader was not compiled in time");
             self.app.update();
         }
-        let taken = Arc::new(Mutex::new(None));
-        let place = Arc::clone(&taken);
-        let shot = Screenshot::image(self.film.clone());
-        self.app.world_mut().spawn(shot).observe(move |shot: On<ScreenshotCaptured>| {
-            *place.lock().expect("not poisoned") = shot.image.data.clone();
-        });
-        let start = Instant::now();
-        loop {
-            self.app.update();
-            if let Some(data) = taken.lock().expect("not poisoned").take() {
-                let rgb: Vec<u8> =
-                    data.chunks_exact(4).flat_map(|texel| [texel[0], texel[1], texel[2]]).collect();
-                return RgbImage::from_raw(self.size.0, self.size.1, rgb).expect("a whole picture");
-            }
-            assert!(start.elapsed() < TIMEOUT, "no picture was taken");
-        }
+        capture(&mut self.app, &self.film, TIMEOUT).expect("a picture")
     }
 
     fn set_camera_active(&mut self, runs: bool) {

@@ -103,6 +103,8 @@ pub struct Report {
     pub edited_seams: SeamReport,
     pub memory: Memory,
     pub pictures: Vec<PathBuf>,
+    /// Pixels of ground in these, and those where it is missing.
+    pub holes: (usize, usize),
     pub frames: Durations,
     pub drawn: Durations,
     /// Time until the landscape was loaded, and in total.
@@ -138,6 +140,8 @@ impl fmt::Display for Report {
             )?;
             writeln!(f, "                worst normal jump {worst_normal_jump:.3} degrees")?;
         }
+        let (ground, holes) = self.holes;
+        writeln!(f, "  holes         {holes} of {ground} pixels of ground")?;
         writeln!(f, "  ms per edit   {transactions} in the transaction,")?;
         writeln!(f, "                {receipts} from brush to receipt, frames included")?;
         let all = memory.ground + memory.edits();

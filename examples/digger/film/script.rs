@@ -22,7 +22,8 @@ use crate::world::landscape::CONCRETE;
 /// The number of pictures.
 const PICTURES: usize = 9;
 
-/// Plays the script and prints the summary. It fails if a seam is open or a picture is missing.
+/// Plays the script and prints the summary. It fails if a seam is open, a picture is missing, or ground is
+/// missing in a picture.
 pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     if renderer.is_none() {
         eprintln!(
@@ -46,10 +47,10 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     // Where levels of detail meet, triangles may have no area, and edges may serve four triangles.
     let drawn = &report.drawn_seams;
     let is_whole = drawn.is_closed() && drawn.worst_normal_at.is_none();
-    if is_whole && report.edited_seams.is_flawless() && complete {
+    if is_whole && report.edited_seams.is_flawless() && complete && report.holes.1 == 0 {
         return ExitCode::SUCCESS;
     }
-    eprintln!("Seams are not flawless or pictures are missing.");
+    eprintln!("Seams are not flawless, pictures are missing, or ground is missing in pictures.");
     eprintln!("All that is drawn has {drawn}");
     eprintln!("What was dug and built has {}", report.edited_seams);
     ExitCode::FAILURE
@@ -245,6 +246,7 @@ impl Stage {
         let (engine, figures) = (engine.state(), engine.figures());
         let edit_log: EditLog = self.studio.resource();
         let pictures = self.studio.pictures.clone();
+        let holes = (self.studio.holes.ground, self.studio.holes.holes);
         let (transactions, receipts) = (self.studio.transactions.clone(), self.studio.receipts.clone());
         let terrain = self.studio.terrain()?;
         let world: &Model = terrain.world();
@@ -262,6 +264,7 @@ impl Stage {
             edited_seams: world.check_seams_in(&edited_in_full(world)),
             memory: world.memory(),
             pictures,
+            holes,
             engine,
             stages: (figures.cpu, figures.cuda),
             frames: self.studio.frames.clone(),

@@ -3,6 +3,8 @@
 //! The script plays like a player: it steers the same character with [`CharacterSteering`] and sends the same [`Brush`]
 //! messages. While it only walks and digs, the camera is off, and frames are fast.
 
+#[path = "../../shared/holes.rs"]
+mod holes;
 #[path = "../../shared/photo.rs"]
 mod photo;
 
@@ -13,6 +15,7 @@ use std::time::{Duration, Instant};
 use avian3d::prelude::Position;
 use bevy::camera::RenderTarget;
 use bevy::camera::visibility::RenderLayers;
+use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy::render::settings::RenderResources;
@@ -20,6 +23,7 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::physics::{Character, CharacterMotion, CharacterSteering, HeldByGround};
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
+use holes::Holes;
 use photo::Photographer;
 pub use photo::{Developed, PATIENCE, pixels};
 
@@ -39,6 +43,9 @@ use crate::ui::settings::SettingsFile;
 use crate::ui::widgets::scale_for;
 use crate::world::day::Clock;
 use crate::world::landscape::ORIGIN;
+
+/// Metres within which pictures are searched for holes.
+const HOLES_WITHIN: f32 = 400.0;
 
 /// Game time of a frame.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
@@ -70,6 +77,8 @@ pub struct Studio {
     pub receipts: Durations,
     /// Pictures that were written.
     pub pictures: Vec<PathBuf>,
+    /// The ground that they show, and the ground that is missing in them.
+    pub holes: Holes,
 }
 
 impl Studio {
@@ -132,6 +141,7 @@ impl Studio {
             transactions: Durations::default(),
             receipts: Durations::default(),
             pictures: Vec::new(),
+            holes: Holes::default(),
         })
     }
 
@@ -376,6 +386,20 @@ impl Studio {
         self.is_warm = true;
         let drawn = &mut self.drawn;
         photographer.shoot_after(frames, &mut self.app, &path, |app| draw(app, drawn))?;
+        // Ground that is missing in it is there without the prepass.
+        let (camera, whole) = (self.eyes, path.with_extension("whole.png"));
+        self.app.world_mut().entity_mut(camera).remove::<DepthPrepass>();
+        let shot = photographer.shoot_after(2, &mut self.app, &whole, |app| draw(app, drawn));
+        self.app.world_mut().entity_mut(camera).insert(DepthPrepass);
+        shot?;
+        let [drawn, reference] =
+            [&path, &whole].map(|path| image::open(path).map(image::DynamicImage::into_rgb8));
+        let found = holes::count_against(&self.app, camera, &drawn?, &reference?, HOLES_WITHIN);
+        if found.holes == 0 {
+            std::fs::remove_file(&whole)?;
+        }
+        self.holes.ground += found.ground;
+        self.holes.holes += found.holes;
         self.pictures.push(path);
         Ok(())
     }

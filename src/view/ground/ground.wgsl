@@ -1,11 +1,11 @@
 // Layers of ground over Bevy's own material. The uniform is `GroundUniform` in material.rs.
 
+#import bevy_burrow::position::position_of
 #import bevy_pbr::{
     decal::clustered::apply_decals,
     mesh_functions,
     mesh_view_bindings::view,
     pbr_fragment::pbr_input_from_standard_material,
-    view_transformations::position_world_to_clip,
 }
 
 #ifdef PREPASS_PIPELINE
@@ -112,14 +112,15 @@ fn noise_at(place: vec3<f32>, metres: f32) -> vec4<f32> {
 @vertex
 fn vertex(in: Vertex) -> Varying {
     var out: Varying;
-    let world_from_local = mesh_functions::get_world_from_local(in.instance_index);
-    out.world_position = mesh_functions::mesh_position_local_to_world(world_from_local, vec4(in.position, 1.0));
-    out.position = position_world_to_clip(out.world_position.xyz);
+    let position = position_of(in.position, in.instance_index);
+    out.world_position = position.world;
+    out.position = position.clip;
     out.world_normal = mesh_functions::mesh_normal_local_to_world(in.normal, in.instance_index);
     out.instance_index = in.instance_index;
 #ifdef VISIBILITY_RANGE_DITHER
     out.visibility_range_dither =
-        mesh_functions::get_visibility_range_dither_level(in.instance_index, world_from_local[3]);
+        mesh_functions::get_visibility_range_dither_level(
+            in.instance_index, mesh_functions::get_world_from_local(in.instance_index)[3]);
 #endif
     // This noise changes little from one vertex to the next.
     let place = (place_from_world(in.instance_index) * out.world_position).xyz;

@@ -12,6 +12,7 @@ use bevy::render::render_resource::{
 };
 use bevy::shader::{ShaderDefVal, ShaderRef};
 
+use super::super::vertex::prepass_vertex_shader;
 use super::look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
 use crate::plugin::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 
@@ -142,6 +143,9 @@ impl MaterialExtension for GroundExtension {
     fn fragment_shader() -> ShaderRef {
         SHADER.into()
     }
+    fn prepass_vertex_shader() -> ShaderRef {
+        prepass_vertex_shader()
+    }
     fn deferred_vertex_shader() -> ShaderRef {
         SHADER.into()
     }
@@ -156,7 +160,7 @@ impl MaterialExtension for GroundExtension {
         key: MaterialExtensionKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
         let has = |name: &str| descriptor.vertex.shader_defs.contains(&ShaderDefVal::from(name));
-        // Depth, shadows and motion are Bevy's own.
+        // Depth, shadows and motion take the attributes that Bevy's prepass does.
         if has("PREPASS_PIPELINE") && !has("DEFERRED_PREPASS") {
             return Ok(());
         }

@@ -36,6 +36,7 @@ use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
+use super::vertex::VertexPlugin;
 use crate::plugin::{BurrowSystems, GroundPiece, SlimVertices, propagate_to_ground, remove_inherited};
 use crate::terrain::Terrain;
 use material::GroundUniform;
@@ -51,6 +52,7 @@ impl Plugin for GroundPlugin {
         if !app.is_plugin_added::<PbrPlugin>() {
             return;
         }
+        VertexPlugin::add_once(app);
         embedded_asset!(app, "ground.wgsl");
         // Pieces have one of their own, which knows where they were in the ground.
         propagate_to_ground::<MeshMaterial3d<GroundMaterial>>(app);
