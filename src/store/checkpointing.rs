@@ -4,15 +4,14 @@ use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use super::checkpoint::Checkpoint;
-use super::database::{Change, DATABASE, DatabaseError, Records};
 use super::error::StoreError;
 use super::format;
 use super::format::change::put_change;
 use super::format::frame::{self, Kind};
+use super::ground_size::GroundSize;
 use super::keys;
 use super::mirror::Mirror;
 use super::progress::Work;
-use super::quarantine;
 use super::region::Region;
 use super::segment::FRAME_LIMIT;
 use super::writer::{Message, Writer};
@@ -28,8 +27,10 @@ impl Writer {
         if !self.state.has_gap {
             self.flush()?;
         }
-        if let Err(error) = self.ready_database() {
-            return Err(self.fail(&error.to_string()));
+        match self.database.ready(&*self.files) {
+            Ok(false) => {}
+            Ok(true) => self.mirror.mark_all(),
+            Err(error) => return Err(self.fail(&error.to_string())),
         }
         let (revision, frame, commits) =
             (self.mirror.revision, self.journal.last_frame(), self.state.commits);
@@ -58,7 +59,7 @@ impl Writer {
             let sealed = frame::seal(Kind::Checkpoint, self.world, key, revision, 0, &checkpoint);
             records.push((key.to_vec(), Some(sealed)));
         }
-        let written = self.write_records(&records);
+        let written = self.database.write(&*self.files, frame, &records);
         let after_gap = std::mem::take(&mut self.state.after_gap);
         if let Err(error) = written {
             self.mirror.put_back(positions);
@@ -82,41 +83,6 @@ impl Writer {
         Ok(())
     }
 
-    /// Opens the database where it is not open, or sees to it that a new one gets all regions.
-    fn ready_database(&mut self) -> Result<(), DatabaseError> {
-        if !self.files.exists(DATABASE)? {
-            self.database = None;
-            self.mirror.mark_all();
-            return Ok(());
-        }
-        if self.database.is_some() {
-            return Ok(());
-        }
-        match Records::open(&*self.files) {
-            Ok(open) => self.database = Some(open),
-            Err(DatabaseError::Files(error)) => return Err(error.into()),
-            Err(DatabaseError::Missing | DatabaseError::Damaged(_)) => {
-                quarantine::file(&*self.files, DATABASE)?;
-                self.mirror.mark_all();
-            }
-        }
-        Ok(())
-    }
-
-    fn write_records(&mut self, records: &[Change]) -> Result<(), DatabaseError> {
-        let Some(database) = &self.database else {
-            self.files.create_folder("")?;
-            self.database = Some(Records::create(&*self.files, records)?);
-            return Ok(());
-        };
-        let written = database.write(records);
-        if written.is_err() {
-            // It takes nothing more after an error, and has to be opened anew.
-            self.database = None;
-        }
-        written
-    }
-
     fn encode(&mut self, at: RegionPos, region: &Region) -> Vec<u8> {
         let ground = &self.ground;
         let hash = self.state.ground_hashes.entry(at.column());
@@ -134,6 +100,8 @@ impl Writer {
 
     pub(super) fn metadata(&self) -> format::Metadata {
         let Mirror { revision, hash, next_field, rules, loose, game, .. } = &self.mirror;
+        let mut game = game.iter().map(|(key, value)| (key.clone(), value.clone())).collect();
+        GroundSize::of(&self.ground).put(&mut game);
         format::Metadata {
             settings: self.settings,
             revision: *revision,
@@ -143,7 +111,7 @@ impl Writer {
             loose: *loose,
             simulation: SIMULATION,
             ground: self.ground.hash(),
-            game: game.iter().map(|(key, value)| (key.clone(), value.clone())).collect(),
+            game,
         }
     }
 }

@@ -27,6 +27,26 @@ pub enum StoreError {
         /// The greatest schema that this version reads.
         known: u32,
     },
+    /// A newer version of the database wrote its file. Nothing was changed.
+    #[error(
+        "the world was saved by a newer version: the file regions.redb has the format {found}, and this version reads up to {known}"
+    )]
+    NewerDatabase {
+        /// The format of the file.
+        found: u8,
+        /// The greatest format that this version reads.
+        known: u8,
+    },
+    /// The ground has another size than that of the saved world, which can't go on there. Nothing was changed.
+    #[error("the saved world has a ground of {saved}, and the one given has {given}: {why}")]
+    GroundSize {
+        /// The size of the ground that the world was saved with; at least so much, if that is all that is known.
+        saved: String,
+        /// The size of the ground that is given.
+        given: String,
+        /// Why it can't go on there, and what to do.
+        why: &'static str,
+    },
     /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
     #[error("the ground has changed{}", if *.regions == 0 { String::new() } else { format!(" below {regions} saved regions") })]
     BaseChanged {
@@ -120,43 +140,62 @@ pub enum StoreTrouble {
     /// The log ends in something that is no record: commits that were not durable yet when the power or the process went,
     /// or damage. A copy of it is kept.
     #[error(
-        "the log ends with {bytes} bytes that can't be read after revision {revision}; a copy is in {quarantine}"
+        "the log ends with {bytes} bytes that can't be read after revision {revision}{}",
+        copy(quarantine)
     )]
     LogCut {
         /// The last revision that was read.
         revision: u64,
         /// How much was left out.
         bytes: u64,
-        /// Where the copy is.
+        /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// The log leads to another world than it says, so what comes after was left out.
-    #[error("the log can't be replayed behind revision {revision}: {why}; a copy is in {quarantine}")]
+    #[error("the log can't be replayed behind revision {revision}: {why}{}", copy(quarantine))]
     LogRefused {
         /// The last revision that was replayed.
         revision: u64,
         /// What does not fit.
         why: String,
-        /// Where the copy is.
+        /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
-    /// A damaged part was rebuilt from the log; nothing is lost.
-    #[error("{what}; it has been rebuilt from the log, and a copy of what was there is in {quarantine}")]
+    /// A damaged part was rebuilt, from the log or from other files; nothing is lost.
+    #[error("{what}; it has been rebuilt, and nothing is lost{}", copy(quarantine))]
     Rebuilt {
         /// What was wrong, in words.
         what: String,
-        /// Where the copy is.
+        /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// A damaged region is lost: the ground there is as the world began.
     #[error(
-        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is as before anybody dug; a copy is in {quarantine}"
+        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is as before anybody dug{}",
+        copy(quarantine)
     )]
     RegionLost {
         /// The region, as `x y z` in units of 64 voxels.
         region: String,
-        /// Where the copy is.
+        /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
+    },
+    /// The log has gone, with all commits that were in it only: somebody removed the folder `journal` after a crash.
+    #[error("the log is missing: what was dug after revision {revision}, before the last crash, is lost")]
+    LogMissing {
+        /// The revision of the last checkpoint.
+        revision: u64,
+    },
+    /// Nothing is left of a world but regions: rules, data of the game's and what undo restored are lost. Only a world that is
+    /// [salvaged](super::StoreOptions::salvage) is opened then.
+    #[error("only regions are left of the world: its rules and the game's data are lost")]
+    CheckpointLost,
+    /// Commits that were in the log only were made by a version of the crate in which edits change the ground otherwise; they were
+    /// made again. The ground may differ a little there from what it was.
+    #[error("{commits} commits of another version, behind the last checkpoint, were made again")]
+    MadeAgain {
+        /// How many.
+        commits: u64,
     },
     /// The ground or the level is another one than the world was saved with; edits were kept or replayed.
     #[error("the ground or the level has changed below {regions} saved regions; the edits were {kept}")]
@@ -166,4 +205,9 @@ pub enum StoreTrouble {
         /// What became of the edits: "kept" or "replayed".
         kept: &'static str,
     },
+}
+
+/// Says where a copy is, if there is one.
+fn copy(quarantine: &str) -> String {
+    if quarantine.is_empty() { String::new() } else { format!("; a copy is in {quarantine}") }
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::files::{Files, OpenFile, Opening};
 use super::format::frame::WorldId;
 use super::segment::{self, FOLDER};
+use super::unsaved;
 
 /// A frame that is not durable yet.
 #[derive(Debug)]
@@ -52,6 +53,8 @@ pub(super) struct Journal {
     head: (u64, Vec<u8>),
     /// The revision of the last frame that was written.
     written: Option<u64>,
+    /// Whether it was entered that there are commits.
+    is_entered: bool,
 }
 
 impl Journal {
@@ -78,6 +81,7 @@ impl Journal {
             next_segment,
             head,
             written: None,
+            is_entered: false,
         }
     }
 
@@ -155,6 +159,10 @@ impl Journal {
             self.files.sync_folder(FOLDER)?;
             current.is_fresh = false;
         }
+        if !self.is_entered {
+            unsaved::enter(&*self.files, number)?;
+            self.is_entered = true;
+        }
         current.end = start + bytes.len() as u64;
         let segment = Segment { number, last_frame, bytes: current.end };
         match self.segments.last_mut().filter(|last| last.number == number) {
@@ -174,7 +182,8 @@ impl Journal {
     pub fn trim(&mut self, bytes: u64, needed: u64) -> io::Result<()> {
         let mut total: u64 = self.segments.iter().map(|segment| segment.bytes).sum();
         let own = self.current.as_ref().map(|current| current.number);
-        while let Some(&oldest) = self.segments.first() {
+        // One stays, so that a journal that somebody removed is missed.
+        while let [oldest, _, ..] = self.segments[..] {
             if total <= bytes || oldest.last_frame > needed || own == Some(oldest.number) {
                 break;
             }

@@ -9,6 +9,7 @@ mod error;
 mod files;
 pub(crate) mod format;
 mod found;
+mod ground_size;
 mod inspect;
 mod journal;
 mod keys;
@@ -19,12 +20,17 @@ mod options;
 mod portable;
 mod progress;
 mod quarantine;
+mod reading;
 mod recover;
 mod region;
+mod region_file;
+mod replace;
 mod salvage;
 mod segment;
 mod settle;
 mod shared;
+mod sources;
+mod unsaved;
 mod writer;
 
 pub use base_level::{BaseLevel, LevelName};
@@ -37,7 +43,7 @@ pub use format::portable::{
     PortableHead, PortableWorld, SavedRegion, read_portable, read_portable_head, write_portable,
 };
 pub use format::{Batch, FormatError, Metadata};
-pub use inspect::{WorldCheck, WorldInfo, check, check_in, inspect, inspect_in, replay};
+pub use inspect::{WorldCheck, WorldInfo, check, check_in, inspect, inspect_in, read_world, replay};
 pub use levels::{RestoreLevelError, load_level, read_level_files, save_level};
 pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
+use super::database::DATABASE;
 use super::error::{StoreError, StoreTrouble};
 use super::files::{Files, Folder, Lock};
 use super::format::frame::WorldId;
@@ -16,9 +17,12 @@ use super::mirror::Mirror;
 use super::options::StoreOptions;
 use super::progress::Work;
 use super::recover::recover;
+use super::region_file::RegionFile;
 use super::segment::base;
 use super::settle::settle;
 use super::shared::{GameChange, GameData, Shared, apply_game};
+use super::sources::has_world;
+use super::unsaved;
 use super::writer::{Answer, Message, Writer};
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, Terrain, TerrainSettings, WorldChange};
@@ -99,11 +103,26 @@ impl Store {
         terrain: &mut Terrain,
         options: StoreOptions,
     ) -> Result<Self, StoreError> {
+        Self::create_with_data_in(files, terrain, BTreeMap::new(), options)
+    }
+
+    /// Saves a terrain as a new world in [files](Files), together with data of the game's: both are there, or neither.
+    ///
+    /// # Errors
+    /// When there is a world already, and when the files can't be written.
+    pub fn create_with_data_in(
+        files: Arc<dyn Files>,
+        terrain: &mut Terrain,
+        data: BTreeMap<String, Vec<u8>>,
+        options: StoreOptions,
+    ) -> Result<Self, StoreError> {
         files.create_folder("").map_err(StoreError::files("creating the world's folder"))?;
         let lock = take_lock(&*files)?;
         if has_world(&*files).map_err(StoreError::files("reading the world's folder"))? {
             return Err(StoreError::Exists(name(&*files)));
         }
+        // That of a world which somebody removed.
+        unsaved::clear(&*files).map_err(StoreError::files("creating the world"))?;
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
         let (parts, hash) = (terrain.parts(), terrain.world().hash());
@@ -114,9 +133,9 @@ impl Store {
         let terms = (parts.rules.clone(), parts.loose);
         let (grid, level) = (terrain.world().grid(), options.level.clone());
         let progress = options.progress.clone();
-        let mirror = Mirror::new(grid, parts, hash, GameData::new(), level);
+        let mirror = Mirror::new(grid, parts, hash, data.clone(), level);
         // A log that begins with the level, or with a pristine world, is whole. Rules are in it too, then.
-        let is_whole = revision == 0 && mirror.is_as_level();
+        let is_whole = revision == 0 && mirror.is_as_level() && data.is_empty();
         let mut entries = Vec::new();
         if is_whole {
             entries.extend(terms.0.map(|rules| LogEntry::Rules(Some(Arc::new(rules)))));
@@ -133,10 +152,11 @@ impl Store {
             (0, Vec::new()),
         );
         let saved = Arc::clone(&shared);
+        let database = RegionFile::new();
         let mut writer =
-            Writer::new(files, options, saved, world, ground, settings, mirror, journal, None, frame);
+            Writer::new(files, options, saved, world, ground, settings, mirror, journal, database, frame);
         writer.save_all()?;
-        let mut store = Self::start(writer, shared, lock, world, revision, GameData::new())?;
+        let mut store = Self::start(writer, shared, lock, world, revision, data)?;
         if !entries.is_empty() {
             let change = WorldChange::default();
             store.append(vec![CommitRecord { revision, hash, entries, change }])?;
@@ -151,7 +171,9 @@ impl Store {
     /// # Errors
     /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below has changed
     /// and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing, and when
-    /// nothing of it can be read. Whatever else is wrong is told in [`Opened::troubles`].
+    /// nothing of it can be read. So is a world of which a file can't be read at the moment that holds something that no other file
+    /// does, and one whose ground had a size in which this one has no room for what was dug. Nothing is changed then. Whatever else
+    /// is wrong is told in [`Opened::troubles`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -177,17 +199,24 @@ impl Store {
         let progress = options.progress.clone();
         let mut contents = Contents::read(&*files, progress.as_ref())?;
         let recovered = recover(&contents, &ground, &options)?;
-        let settled = settle(&*files, &mut contents, &recovered);
+        if !options.salvage {
+            contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
+        }
+        let settled = settle(&*files, &contents, &recovered);
         let (is_log_whole, replayed, is_new) = (
             recovered.is_log_whole,
             recovered.replayed,
             recovered.is_new || settled.is_unfinished || contents.damaged.is_some(),
         );
-        let settings = recovered.settings();
+        let (settings, findings) = (recovered.settings(), recovered.findings.clone());
         let (mut terrain, mirror) = (recovered.terrain, recovered.mirror);
         let (revision, game) = (mirror.revision, mirror.game.clone());
         let shared = Arc::new(Shared::default());
-        let (world, database) = (contents.world, contents.database.take());
+        let world = contents.world;
+        let database = match &contents.damaged {
+            None => RegionFile::new(),
+            Some(_) => RegionFile::damaged(contents.choose_checkpoint().map_or(0, |own| own.frame)),
+        };
         let journal = Journal::new(
             Arc::clone(&files),
             world,
@@ -208,13 +237,19 @@ impl Store {
             database,
             recovered.checkpoint,
         );
-        let mut troubles = settled.troubles;
+        let mut failures = Vec::new();
         if is_new {
             writer.save_all_or_later();
-            troubles.extend(shared.take_troubles());
+            failures = shared.take_troubles();
         } else {
             shared.set_durable(revision);
         }
+        // Where it could not be replaced yet, the damaged file is still in its place.
+        let is_in_place = contents.has_database && !failures.is_empty();
+        let kept = writer.database.kept().or(is_in_place.then_some(DATABASE));
+        let mut troubles = findings.troubles(&settled.copies, contents.damaged.as_deref(), kept);
+        troubles.extend(settled.troubles);
+        troubles.extend(failures);
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
         let store = Self::start(writer, shared, lock, world, revision, game)?;
@@ -405,10 +440,6 @@ impl Drop for Store {
             drop(thread.join());
         }
     }
-}
-
-pub(super) fn has_world(files: &dyn Files) -> std::io::Result<bool> {
-    Ok(files.exists(super::database::DATABASE)? || !super::segment::list(files)?.is_empty())
 }
 
 pub(super) fn take_lock(files: &dyn Files) -> Result<Box<dyn Lock>, StoreError> {

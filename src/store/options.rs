@@ -49,6 +49,9 @@ pub struct StoreOptions {
     pub level: Option<BaseLevel>,
     /// Where to tell how far opening is.
     pub progress: Option<Progress>,
+    /// Opens a world of which anything is left, even where a file can't be read at the moment or nothing says what the world was
+    /// beside its regions. Tools that repair worlds set it; a game should ask the player first.
+    pub salvage: bool,
 }
 
 impl Default for StoreOptions {
@@ -64,6 +67,7 @@ impl Default for StoreOptions {
             base_changed: BaseChanged::default(),
             level: None,
             progress: None,
+            salvage: false,
         }
     }
 }

@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 use rustc_hash::FxHashMap;
 
 use super::checkpoint::Checkpoint;
-use super::database::Records;
 use super::error::{StoreError, StoreTrouble};
 use super::files::Files;
 use super::format::Batch;
@@ -16,8 +15,10 @@ use super::format::frame::WorldId;
 use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
+use super::region_file::RegionFile;
 use super::segment::{FRAME_LIMIT, base};
 use super::shared::{GameChange, Shared, apply_game};
+use super::unsaved;
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, TerrainSettings, WorldChange, WorldParts};
 
@@ -67,7 +68,7 @@ pub(super) struct Writer {
     pub settings: TerrainSettings,
     pub mirror: Mirror,
     pub journal: Journal,
-    pub database: Option<Records>,
+    pub database: RegionFile,
     /// The frames of the last checkpoint and of the one before.
     pub checkpoints: [u64; 2],
     pub(super) state: State,
@@ -102,7 +103,7 @@ impl Writer {
         settings: TerrainSettings,
         mirror: Mirror,
         journal: Journal,
-        database: Option<Records>,
+        database: RegionFile,
         checkpoint: u64,
     ) -> Self {
         let (checkpoints, state) = ([checkpoint; 2], State::default());
@@ -164,8 +165,13 @@ impl Writer {
             self.tick(messages);
         }
         // What can't be saved now is lost with the process; the game was told.
-        if self.flush().is_ok() && self.is_changed() {
-            drop(self.checkpoint(None));
+        let mut is_saved = self.flush().is_ok();
+        if is_saved && self.is_changed() {
+            is_saved = self.checkpoint(None).is_ok();
+        }
+        if is_saved {
+            // If that fails, it says more than is so, which does no harm.
+            drop(unsaved::clear(&*self.files));
         }
     }
 
@@ -219,7 +225,8 @@ impl Writer {
                 drop(answer.send(done.map(|()| self.shared.durable())));
             }
             Message::Compact(answer) => {
-                let done = self.checkpoint(Some(messages)).and_then(|()| self.compact());
+                self.database.compact_next();
+                let done = self.checkpoint(Some(messages));
                 drop(answer.send(done.map(|()| self.shared.durable())));
             }
         }
@@ -231,11 +238,6 @@ impl Writer {
             self.flush()?;
         }
         if self.state.has_gap { self.checkpoint(Some(messages)) } else { Ok(()) }
-    }
-
-    fn compact(&mut self) -> Result<(), StoreError> {
-        let done = self.database.as_mut().map_or(Ok(()), Records::compact);
-        done.map_err(|why| StoreError::NotSaved(why.to_string()))
     }
 
     /// Takes in what has to be saved.
