@@ -161,6 +161,7 @@ fn info(world: &Path) -> Result<(Value, bool), String> {
         "voxel_size": info.settings.voxel_size,
         "simulation": info.simulation,
         "ground": hex(info.ground),
+        "ground_size": info.ground_size,
         "checkpoint": info.checkpoint,
         "regions": info.regions,
         "region_bytes": info.region_bytes,

@@ -128,6 +128,15 @@ impl Contents {
             segments.push(found);
             reading.advance(1);
         }
+        let numbers = segments.iter().flat_map(|found| {
+            let own = found.frames.iter().map(|frame| frame.number);
+            own.chain((found.length > 0).then_some(found.number))
+        });
+        if numbers.max() > Some(MOST_NUMBER / 2) {
+            return Err(StoreError::Unreadable(
+                "the numbers in its journal leave none for what follows".into(),
+            ));
+        }
         let unsaved = unsaved::read(files);
         let is_there = |first: u64| segments.iter().any(|found| found.number >= first);
         let mut contents = Self {
@@ -324,20 +333,37 @@ impl Contents {
     /// Whether the log leads to a checkpoint, as far as its last commit before it says: one of another branch of the same world
     /// does not.
     pub fn leads_to(&self, checkpoint: &Checkpoint) -> bool {
+        let metadata = &checkpoint.metadata;
+        match self.last_commit(checkpoint.frame) {
+            Ok(last) => last.is_none_or(|last| last == (metadata.revision, metadata.hash)),
+            Err(_) => false,
+        }
+    }
+
+    /// Whether the log holds commits up to a revision.
+    pub fn reaches(&self, revision: u64) -> bool {
+        self.last_commit(u64::MAX).is_ok_and(|last| last.is_some_and(|(last, _)| last >= revision))
+    }
+
+    /// Revision and hash after the last commit in frames up to a number.
+    fn last_commit(&self, frame: u64) -> Result<Option<(u64, u64)>, FormatError> {
         // Revisions and hashes do not depend on it.
-        let Ok(any_ground) = Ground::flat(1, 1, 0.0) else { return false };
+        let any_ground = Ground::flat(1, 1, 0.0).map_err(|_| FormatError::Invalid("ground"))?;
         let frames = self.segments.iter().flat_map(|found| &found.frames);
-        let mut before: Vec<&Frame> = frames.filter(|frame| frame.number <= checkpoint.frame).collect();
-        before.sort_by_key(|frame| Reverse(frame.number));
+        let mut before: Vec<&Frame> = frames.filter(|own| own.number <= frame).collect();
+        before.sort_by_key(|own| Reverse(own.number));
         for frame in before {
-            let batch = frame.payload().and_then(|payload| Batch::decode(&payload, &any_ground));
-            let Ok(batch) = batch else { return false };
+            let batch = Batch::decode(&frame.payload()?, &any_ground)?;
             if let Some(last) = batch.commits.last() {
-                let metadata = &checkpoint.metadata;
-                return (last.revision, last.hash) == (metadata.revision, metadata.hash);
+                return Ok(Some((last.revision, last.hash)));
             }
         }
-        true
+        Ok(None)
+    }
+
+    /// Whether regions are stored as they differ from a level.
+    pub fn is_on_level(&self) -> bool {
+        self.regions.values().chain(self.other_regions.values()).flatten().any(|record| record.is_change)
     }
 
     /// Whether what can't be read of a segment makes no difference to a world at a frame: frames that follow are part of it, or the
@@ -381,7 +407,7 @@ fn decode_checkpoint(payload: &[u8]) -> Option<Checkpoint> {
     let checkpoint = Checkpoint::decode(payload)?;
     let Metadata { revision, next_field, .. } = checkpoint.metadata;
     let numbers = checkpoint.regions.values().copied().chain([checkpoint.frame, revision, next_field]);
-    (numbers.max() <= Some(MOST_NUMBER)).then_some(checkpoint)
+    (numbers.max() <= Some(MOST_NUMBER / 2)).then_some(checkpoint)
 }
 
 /// A world that a newer version wrote to is left alone, whole: what this version can't read is no damage.

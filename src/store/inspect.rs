@@ -36,6 +36,8 @@ pub struct WorldInfo {
     pub simulation: u32,
     /// Hash of its ground.
     pub ground: u64,
+    /// Cells of its ground along x and z; `None` if an older version saved it.
+    pub ground_size: Option<(u32, u32)>,
     /// The level that it was begun on, from which its regions differ.
     pub level: Option<LevelName>,
     /// The revision of its last checkpoint.
@@ -108,6 +110,7 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
         settings: metadata.settings,
         simulation: metadata.simulation,
         ground: metadata.ground,
+        ground_size: checkpoint.cells.map(|size| (size.width, size.depth)),
         level: checkpoint.level.clone(),
         checkpoint: metadata.revision,
         regions: checkpoint.regions.len(),

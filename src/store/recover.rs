@@ -99,33 +99,38 @@ pub(super) fn recover(
             return Err(StoreError::Unreadable(why.into()));
         }
     };
-    let level = BaseLevel::needed(checkpoint.level.as_ref(), level)?;
+    let level = match has_lost_rest {
+        false => BaseLevel::needed(checkpoint.level.as_ref(), level)?,
+        true if !contents.is_on_level() => None,
+        true => {
+            let missing = || StoreError::LevelMissing { label: "unknown".into() };
+            Some(level.ok_or_else(missing)?)
+        }
+    };
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     let is_contiguous = last >= checkpoint.frame;
     let base = segment::base(ground, level);
     let reaches_back = is_contiguous && whole.iter().all(|frame| frame.base == base);
     let has_other_log = reaches_back && !has_lost_rest && !contents.leads_to(&checkpoint);
-    let is_log_whole = reaches_back && !has_other_log;
+    let is_log_whole = match has_lost_rest {
+        false => reaches_back && !has_other_log,
+        true => reaches_back && contents.reaches(checkpoint.metadata.revision),
+    };
     let tail = contents.frames_from(checkpoint.frame + 1);
     let is_same_ground = checkpoint.metadata.ground == ground.hash() || has_lost_rest;
     let other_level = BaseLevel::expect(level, checkpoint.level.as_ref());
     let is_same_base = is_same_ground && other_level.is_ok();
     // What follows the checkpoint was made by other rules of how edits change the ground: it can be made again, but not verified.
     let is_remade = is_same_base && tail.iter().any(|frame| frame.base != base);
-    if base_changed == BaseChanged::Refuse {
-        other_level?;
-    }
-    if !is_same_ground && base_changed == BaseChanged::Refuse {
-        return Err(StoreError::BaseChanged {
-            regions: changed_regions(contents, &checkpoint, ground, level).len(),
-        });
-    }
     let size = GroundSize::of(ground);
     let other_size = checkpoint.cells.filter(|saved| *saved != size);
     if let Some(saved) = other_size {
         let replays = base_changed == BaseChanged::Replay && is_contiguous;
         let why = match () {
+            () if base_changed == BaseChanged::Refuse => {
+                Some("only the ground that it was saved with is allowed")
+            }
             () if replays && saved.fits_in(size) => None,
             () if replays => Some("edits beyond it could not be made again"),
             // Where the world ended, edits ended too.
@@ -138,6 +143,14 @@ pub(super) fn recover(
         if let Some(why) = why {
             return Err(StoreError::GroundSize { saved: saved.to_string(), given: size.to_string(), why });
         }
+    }
+    if base_changed == BaseChanged::Refuse {
+        other_level?;
+    }
+    if !is_same_ground && base_changed == BaseChanged::Refuse {
+        return Err(StoreError::BaseChanged {
+            regions: changed_regions(contents, &checkpoint, ground, level).len(),
+        });
     }
     let settings = checkpoint.metadata.settings;
     let empty = || -> Result<Terrain, StoreError> { Ok(BaseLevel::first(level, ground, &settings)?) };
@@ -154,7 +167,7 @@ pub(super) fn recover(
     let end = if is_same_base { RECOVERED } else { RECOVERED_ANEW };
     let work = Work::until(progress, end, (DECODE + RESTORE) * regions + REPLAY * bytes_of(&tail));
     let grid = Terrain::new(Arc::clone(ground), &settings).map_err(RestoreError::from)?.world().grid();
-    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, grid, &work);
+    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, grid, has_lost_rest, &work);
     let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
     let restored = restore(parts.clone());
     if let (false, Err(RestoreError::Parts(_))) = (is_same_base, &restored)
@@ -313,6 +326,7 @@ fn load_regions(
     ground: &Ground,
     level: Option<&BaseLevel>,
     grid: ChunkGrid,
+    has_lost_rest: bool,
     work: &Work,
 ) -> (WorldParts, Vec<RegionPos>) {
     let metadata = &checkpoint.metadata;
@@ -336,7 +350,8 @@ fn load_regions(
         match change {
             Some(change) => {
                 bricks.extend(change.bricks);
-                if is_same_level {
+                // Of chunks whose size is not known they can't be used.
+                if is_same_level && !has_lost_rest {
                     fields.extend(change.fields);
                 }
             }

@@ -109,6 +109,8 @@ fn cut_journal(
                 file.set_length(end as u64)?;
                 file.sync()?;
             }
+        } else if found.length == 0 && found.error.is_none() {
+            // It is nobody's, whatever its name says.
         } else if found.frames.is_empty() && found.bad.is_empty() {
             segments.push(Segment { number: found.number, last_frame: 0, bytes: all });
         } else {

@@ -7,9 +7,10 @@ use bevy_burrow::store::{
     DiskFault, Files, SimulatedDisk, Store, StoreOptions, StoreTrouble, check_in, inspect_in, replay,
 };
 use fastrand::Rng;
+use glam::Vec3;
 
 use crate::opening::Place;
-use crate::play::{act, ground, open, options, save, state, terrain};
+use crate::play::{act, ground, open, options, samples, save, state, terrain};
 
 const DATABASE: &str = "regions.redb";
 
@@ -57,25 +58,28 @@ fn a_world_is_whole_after_a_disk_was_full() {
     let ground = ground(2);
     for begin in 0..40 {
         let (disk, mut world, mut rng) = (SimulatedDisk::new(), terrain(&ground), Rng::with_seed(1));
-        let mut store =
-            Store::create_in(Arc::new(disk.clone()), &mut world, options(7)).expect("a new world");
-        play(&mut store, &mut world, &mut rng, 5);
-        store.flush().expect("the disk works");
+        let created = Store::create_in(Arc::new(disk.clone()), &mut world, options(7));
+        let mut store = Some(created.expect("a new world"));
+        let mut go_on = |commits: u64, is_fine: bool| {
+            let store = store.as_mut().expect("it is open");
+            play(store, &mut world, &mut rng, commits);
+            assert!(store.flush().is_ok() || !is_fine);
+        };
+        go_on(5, true);
         disk.fail_at(disk.operations() + begin, DiskFault::Full);
-        play(&mut store, &mut world, &mut rng, 10);
-        drop(store.flush());
+        go_on(10, false);
         disk.set_fault(DiskFault::None);
-        play(&mut store, &mut world, &mut rng, 5);
-        store.flush().expect("the disk works again");
+        go_on(5, true);
         for is_closed in [false, true] {
             let killed = disk.image().lose_process();
+            // What the disk took of a write before it was full.
+            for path in killed.paths().into_iter().filter(|path| path.starts_with("journal")) {
+                let torn = [&[200, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0][..], b"\xB5BRW", &[1; 40]].concat();
+                killed.damage(&path, |bytes| bytes.extend(torn));
+            }
             let disk = if is_closed { &disk } else { &killed };
             if is_closed {
-                drop(std::mem::replace(
-                    &mut store,
-                    Store::create_in(Arc::new(SimulatedDisk::new()), &mut terrain(&ground), options(7))
-                        .expect("a new world"),
-                ));
+                store = None;
             }
             let check = check_in(disk, Arc::clone(&ground), None).expect("it can be read");
             assert_eq!((check.troubles, state(&check.terrain)), (vec![], state(&world)), "from {begin}");
@@ -90,16 +94,24 @@ fn a_world_is_whole_after_a_disk_was_full() {
 #[test]
 fn the_log_of_another_branch_is_not_taken_for_that_of_the_world() {
     let ground = ground(2);
-    let (disk, mut world, mut rng) = (SimulatedDisk::new(), terrain(&ground), Rng::with_seed(1));
+    let dig = |store: &mut Store, world: &mut Terrain, seed: u64| {
+        let mut rng = Rng::with_seed(seed);
+        for _ in 0..8 {
+            let at = Vec3::new(rng.f32() * 70.0, 5.0, rng.f32() * 70.0);
+            world.apply([Brush::dig(Shape::sphere(at, 6.0))]);
+            save(store, world).expect("the thread runs");
+        }
+    };
+    let (disk, mut world) = (SimulatedDisk::new(), terrain(&ground));
     let mut store = Store::create_in(Arc::new(disk.clone()), &mut world, options(99)).expect("a new world");
-    play(&mut store, &mut world, &mut rng, 8);
+    dig(&mut store, &mut world, 1);
     drop(store);
     // A backup that is played on, otherwise.
     let branches = [2, 3].map(|seed| {
         let branch = disk.image().lose_process();
         let (mut store, opened) = open(&branch, &ground).expect("it is whole");
-        let (mut world, mut rng) = (opened.terrain, Rng::with_seed(seed));
-        play(&mut store, &mut world, &mut rng, 8);
+        let mut world = opened.terrain;
+        dig(&mut store, &mut world, seed);
         drop(store);
         (branch, world)
     });
@@ -193,9 +205,6 @@ fn whatever_is_left_of_a_world_can_be_opened() {
     let opened =
         Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), options).expect("it has regions");
     assert_eq!(opened.1.troubles, [StoreTrouble::CheckpointLost]);
-    let samples = |own: &Terrain| -> Vec<_> {
-        own.world().bricks().flat_map(|(pos, own)| own.edited_samples(pos).collect::<Vec<_>>()).collect()
-    };
     assert_eq!(samples(&opened.1.terrain), samples(&world));
     drop(opened);
     let (_, again) = open(&disk, &ground).expect("it is a world again");

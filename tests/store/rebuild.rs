@@ -174,7 +174,7 @@ fn check(disk: &SimulatedDisk, played: &Played, known: &Known, what: &str) {
 
 /// So many numbers of a list, spread evenly.
 fn some<T>(all: Vec<T>) -> Vec<T> {
-    let most = usize::try_from(count("BURROW_MATRIX", 14)).unwrap_or(usize::MAX).max(1);
+    let most = usize::try_from(count("BURROW_MATRIX", 8)).unwrap_or(usize::MAX).max(1);
     let step = all.len().div_ceil(most).max(1);
     all.into_iter().enumerate().filter(|(at, _)| at % step == step / 2).map(|(_, own)| own).collect()
 }

@@ -3,7 +3,7 @@
 use std::io;
 use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
@@ -25,6 +25,9 @@ struct BadDisk {
     /// The disk answers until the bad bytes are asked for, and no more then.
     goes: bool,
     is_gone: Arc<AtomicBool>,
+    /// How often the database can't be synced from now on, and how often a new one was begun.
+    failing_syncs: Arc<AtomicU64>,
+    new_databases: Arc<AtomicU64>,
 }
 
 #[derive(Debug)]
@@ -32,12 +35,14 @@ struct BadFile {
     file: Box<dyn OpenFile>,
     of: BadDisk,
     is_bad: bool,
+    is_database: bool,
 }
 
 impl BadDisk {
     fn new(disk: &SimulatedDisk, path: &str, bad: Range<u64>, goes: bool) -> Arc<Self> {
         let (disk, path) = (disk.clone(), path.to_owned());
-        Arc::new(Self { disk, path, bad, goes, is_gone: Arc::default() })
+        let (is_gone, failing_syncs, new_databases) = Default::default();
+        Arc::new(Self { disk, path, bad, goes, is_gone, failing_syncs, new_databases })
     }
 
     fn check(&self, is_bad: bool) -> io::Result<()> {
@@ -74,6 +79,11 @@ impl OpenFile for BadFile {
 
     fn sync(&self) -> io::Result<()> {
         self.of.check(false)?;
+        let one_less = |left: u64| left.checked_sub(1);
+        let left = &self.of.failing_syncs;
+        if self.is_database && left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, one_less).is_ok() {
+            return Err(io::Error::from_raw_os_error(5));
+        }
         self.file.sync()
     }
 }
@@ -86,7 +96,11 @@ impl Files for BadDisk {
     fn open(&self, path: &str, opening: Opening) -> io::Result<Box<dyn OpenFile>> {
         self.check(false)?;
         let (file, of) = (Files::open(&self.disk, path, opening)?, self.clone());
-        Ok(Box::new(BadFile { file, of, is_bad: path == self.path && opening == Opening::Existing }))
+        if path == "regions.new" && opening == Opening::New {
+            self.new_databases.fetch_add(1, Ordering::SeqCst);
+        }
+        let is_bad = path == self.path && opening == Opening::Existing;
+        Ok(Box::new(BadFile { file, of, is_bad, is_database: path == DATABASE }))
     }
 
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
@@ -259,4 +273,30 @@ fn a_file_that_can_not_be_read_at_all_is_no_reason_to_lock_anybody_out() {
         let (_, troubles) = open(bad(), true).unwrap_or_else(|why| panic!("{path}: {why}"));
         assert!(path != DATABASE && !path.starts_with(FIRST_SEGMENT) || !troubles.is_empty());
     }
+}
+
+/// Pages that could not be written look as if they were, once they are read again: the file can't be trusted any more.
+#[test]
+fn a_database_that_could_not_be_synced_is_written_anew() {
+    let disk = SimulatedDisk::new();
+    let files = BadDisk::new(&disk, "none", 0..0, false);
+    let mut world = terrain(&ground());
+    let created = Store::create_in(Arc::clone(&files) as Arc<dyn Files>, &mut world, options(u64::MAX));
+    let mut store = created.expect("a new world");
+    assert_eq!(files.new_databases.load(Ordering::SeqCst), 1);
+    for number in 0..6 {
+        world.apply([Brush::dig(Shape::sphere(Vec3::splat(30.0 + 9.0 * number as f32), 6.0))]);
+        save(&mut store, &mut world).expect("the thread runs");
+        if number % 2 == 1 {
+            files.failing_syncs.store(1, Ordering::SeqCst);
+            assert!(matches!(store.checkpoint(), Err(StoreError::NotSaved(_))));
+        }
+        store.checkpoint().expect("the disk works");
+        let expected = 1 + (number + 1) / 2;
+        assert_eq!(files.new_databases.load(Ordering::SeqCst), expected);
+    }
+    let (_, opened) = Store::open_in(Arc::new(disk.image().lose_power(|| false)), ground(), options(9))
+        .expect("it is whole");
+    assert_eq!(state(&opened.terrain), state(&world));
+    assert!(!disk.paths().iter().any(|path| path.starts_with("quarantine")), "nothing was damaged");
 }
