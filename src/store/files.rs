@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use redb::StorageBackend;
 use redb::backends::FileBackend;
 
-/// Files below one folder. Paths are relative to it, with `/` between their parts.
+/// Files below one folder. Paths are relative to it, with `/` between their parts. Errors should name the file, since they are shown
+/// to players as they are.
 pub trait Files: fmt::Debug + Send + Sync + 'static {
     /// How messages name the folder.
     fn name(&self) -> String;

@@ -24,7 +24,7 @@ use crate::terrain::{
     CommitRecord, LogEntry, Meshing, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
     WorldChange, WorldParts,
 };
-use crate::volume::DiggingRules;
+use crate::volume::{DiggingRules, Field, Fields};
 
 /// The shares of opening after which a world is recovered: as it is on the disk, and as one that has to be saved whole.
 const RECOVERED: f32 = 0.97;
@@ -364,8 +364,9 @@ fn load_regions(
     fields.retain(|(_, fields)| !fields.is_empty());
     let next_field = metadata.next_field.max(below.change.next_field);
     let mut change = WorldChange { bricks, fields, next_field };
-    // Chunks beyond the rim of a smaller ground are none.
-    change.fields.retain(|(chunk, _)| grid.has_tile(chunk.tile()));
+    if checkpoint.metadata.ground != ground.hash() {
+        fit_fields(&mut change, grid);
+    }
     if !is_same_level || checkpoint.metadata.ground != ground.hash() {
         // Fields of two levels may overlap, and have one name: the new one's go on, and grow. Beyond the rim of a smaller ground, edits
         // reach into more chunks.
@@ -379,6 +380,20 @@ fn load_regions(
         loose: metadata.loose,
     };
     (parts, damaged)
+}
+
+/// Cuts fields off where their chunk ends on a ground of another size: the last chunk has one column more than others.
+fn fit_fields(change: &mut WorldChange, grid: ChunkGrid) {
+    for (chunk, fields) in &mut change.fields {
+        let own = grid.chunk_samples(*chunk).intersection(grid.edit_bounds());
+        let own = own.filter(|_| grid.has_tile(chunk.tile()));
+        if own.is_some_and(|own| fields.iter().all(|field| own.encloses(field.bounds))) {
+            continue;
+        }
+        let cut = |field: &Field| Some(Field { bounds: field.bounds.intersection(own?)?, ..*field });
+        *fields = Fields::restored(fields.iter().filter_map(cut).collect()).unwrap_or_default();
+    }
+    change.fields.retain(|(_, fields)| !fields.is_empty());
 }
 
 /// Sorts a list by key; of those with the same key the last stays.

@@ -79,7 +79,7 @@ fn a_world_is_whole_after_a_disk_was_full() {
             }
             let disk = if is_closed { &disk } else { &killed };
             if is_closed {
-                store = None;
+                drop(store.take());
             }
             let check = check_in(disk, Arc::clone(&ground), None).expect("it can be read");
             assert_eq!((check.troubles, state(&check.terrain)), (vec![], state(&world)), "from {begin}");
