@@ -4,6 +4,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::checkpoint::Checkpoint;
+use super::checkpoint_copy;
 use super::database::{DATABASE, DatabaseError, Records};
 use super::error::StoreError;
 use super::files::Files;
@@ -66,7 +67,7 @@ pub(super) struct Contents {
     pub database: Option<Records>,
     /// What is wrong with the database, if it can't be used.
     pub damaged: Option<String>,
-    /// The checkpoints that the database holds: two alike, but for damage.
+    /// The checkpoints that the database holds, two alike, and the copy beside the journal, but for damage.
     checkpoints: Vec<Checkpoint>,
     /// Valid records of each region: one, but for what was salvaged from a damaged database.
     regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
@@ -126,6 +127,12 @@ impl Contents {
         };
         for (key, record) in raw {
             contents.enter(&key, record)?;
+        }
+        for copy in checkpoint_copy::read(files, world) {
+            match copy {
+                Ok(copy) => contents.checkpoints.extend(Checkpoint::decode(&copy)),
+                Err(error) => refuse_newer(error.newer_schema())?,
+            }
         }
         reading.finish();
         Ok(contents)
