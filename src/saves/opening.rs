@@ -35,7 +35,7 @@ pub(super) struct Unopened;
 pub struct OpeningWorld {
     reader: Arc<WorldReader>,
     /// `None` between two tries.
-    task: Option<ThreadTask<Result<ReadWorld, StoreError>>>,
+    task: Option<ThreadTask<Result<Found, StoreError>>>,
     /// The terrain that the world takes the place of.
     version: Version,
     since: Instant,
@@ -64,7 +64,7 @@ impl OpeningWorld {
     }
 
     /// The world once it is read, or why it can't be. One that is open elsewhere is tried again, without a thread that waits.
-    fn poll(&mut self) -> Option<Result<ReadWorld, StoreError>> {
+    fn poll(&mut self) -> Option<Result<Found, StoreError>> {
         let Some(task) = &mut self.task else {
             if self.tried.elapsed() >= LOCK_TRY {
                 self.begin();
@@ -101,8 +101,22 @@ pub(crate) struct ReadWorld {
     pub store: Store,
     pub terrain: Terrain,
     pub troubles: Vec<StoreTrouble>,
-    /// Whether it was made of the terrain, as there was none.
-    pub is_new: bool,
+}
+
+/// What came of reading.
+enum Found {
+    /// The world that was there.
+    Old(ReadWorld),
+    /// There was none, and it was made of the terrain.
+    New(ReadWorld),
+}
+
+impl Found {
+    fn world(self) -> ReadWorld {
+        match self {
+            Self::Old(world) | Self::New(world) => world,
+        }
+    }
 }
 
 /// Reads a world, on another thread.
@@ -140,13 +154,13 @@ impl WorldReader {
         loop {
             match self.try_read() {
                 Err(StoreError::Locked(_)) if start.elapsed() < LOCK_WAIT => std::thread::sleep(LOCK_TRY),
-                other => return other,
+                other => return other.map(Found::world),
             }
         }
     }
 
     /// Reads the world, or makes one, unless somebody has it open.
-    fn try_read(&self) -> Result<ReadWorld, StoreError> {
+    fn try_read(&self) -> Result<Found, StoreError> {
         let Self { saved, level, ground, settings, parts, progress } = self;
         // One that can't be read was told of when the terrain was made of it.
         let level = level.as_ref();
@@ -159,7 +173,8 @@ impl WorldReader {
                 // Somebody made it in between.
                 Err(StoreError::Exists(_)) => {}
                 created => {
-                    return Ok(ReadWorld { store: created?, terrain, troubles: Vec::new(), is_new: true });
+                    let (store, troubles) = (created?, Vec::new());
+                    return Ok(Found::New(ReadWorld { store, terrain, troubles }));
                 }
             }
         }
@@ -174,7 +189,7 @@ impl WorldReader {
         if parts.loose.is_some() && parts.loose.as_ref() != terrain.loose() {
             terrain.set_loose(parts.loose);
         }
-        Ok(ReadWorld { store, terrain, troubles, is_new: false })
+        Ok(Found::Old(ReadWorld { store, terrain, troubles }))
     }
 }
 
@@ -278,24 +293,29 @@ pub(super) fn finish_opening(
         if !now.is_same_world(opening.version) {
             // The game assigned another one meanwhile.
             if let Ok(read) = outcome {
-                closing.close(entity, saved.path.clone(), ClosedBecause::Removed, read.store);
+                closing.close(entity, saved.path.clone(), ClosedBecause::Removed, read.world().store);
             }
             opening.read_anew(&terrain, entity, &mut commands);
             continue;
         }
         commands.entity(entity).try_remove::<OpeningWorld>();
-        let outcome = outcome.map(|ReadWorld { mut store, terrain: mut read, troubles: found, is_new }| {
-            found.into_iter().for_each(&mut tell);
-            if is_new {
+        let outcome = outcome.map(|found| {
+            let store = match found {
                 // The terrain goes on as it is, and so does its history.
-                store.adopt(&terrain);
-            } else {
-                if now != opening.version {
-                    warn!("what the game did to {entity} while its world was read is not in that");
+                Found::New(ReadWorld { mut store, .. }) => {
+                    store.adopt(&terrain);
+                    store
                 }
-                read.take_over(&mut terrain);
-                free_later(std::mem::replace(&mut *terrain, read));
-            }
+                Found::Old(ReadWorld { store, terrain: mut read, troubles }) => {
+                    troubles.into_iter().for_each(&mut tell);
+                    if now != opening.version {
+                        warn!("what the game did to {entity} while its world was read is not in that");
+                    }
+                    read.take_over(&mut terrain);
+                    free_later(std::mem::replace(&mut *terrain, read));
+                    store
+                }
+            };
             commands.entity(entity).try_insert(WorldStore::new(store, saved.path.clone()));
             terrain.world().revision()
         });
