@@ -4,6 +4,7 @@ use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use super::checkpoint::Checkpoint;
+use super::checkpoint_copy;
 use super::error::StoreError;
 use super::format;
 use super::format::change::put_change;
@@ -14,7 +15,7 @@ use super::mirror::Mirror;
 use super::progress::Work;
 use super::region::Region;
 use super::segment::FRAME_LIMIT;
-use super::writer::{Message, Writer};
+use super::writer::{CHECKPOINT_TIME, Message, Writer};
 use crate::lattice::RegionPos;
 use crate::terrain::SIMULATION;
 
@@ -34,6 +35,7 @@ impl Writer {
         }
         let (revision, frame, commits) =
             (self.mirror.revision, self.journal.last_frame(), self.state.commits);
+        let point = self.point;
         let checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
         if checkpoint.len() > FRAME_LIMIT {
             return Err(self.fail(&format!("the game's data takes more than {FRAME_LIMIT} bytes")));
@@ -43,6 +45,7 @@ impl Writer {
         // What comes from now on is in frames again.
         let had_gap = std::mem::take(&mut self.state.has_gap);
         self.state.after_gap = had_gap;
+        self.state.written = None;
         self.state.changed = None;
         let mut records = Vec::with_capacity(dirty.len() + 1);
         // Only the first one is waited for, when a world is opened or created.
@@ -59,6 +62,7 @@ impl Writer {
             let sealed = frame::seal(Kind::Checkpoint, self.world, key, revision, 0, &checkpoint);
             records.push((key.to_vec(), Some(sealed)));
         }
+        self.shared.begin_waiting(CHECKPOINT_TIME);
         let written = self.database.write(&*self.files, frame, &records);
         let after_gap = std::mem::take(&mut self.state.after_gap);
         if let Err(error) = written {
@@ -70,17 +74,20 @@ impl Writer {
             return Err(self.fail(&error.to_string()));
         }
         self.state.commits -= commits.min(self.state.commits);
-        let durable = if after_gap { self.journal.written().unwrap_or_default() } else { 0 };
-        self.shared.set_durable(self.shared.durable().max(revision).max(durable));
-        self.journal.begin_segment(revision, checkpoint);
+        self.shared.set_durable(point);
+        if let (true, Some(written)) = (after_gap, self.state.written) {
+            self.shared.set_durable(written);
+        }
         self.checkpoints = [self.checkpoints[1], frame];
         if !self.state.has_gap {
             self.succeed();
         }
-        if let Err(error) = self.journal.trim(self.options.log_bytes, self.checkpoints[0]) {
-            return Err(self.fail(&error.to_string()));
+        if self.journal.is_long(self.options.log_bytes) {
+            self.begin_segment();
         }
-        Ok(())
+        let copied = checkpoint_copy::write(&*self.files, self.world, revision, &checkpoint);
+        let trimmed = self.journal.trim(self.options.log_bytes, self.checkpoints[0]);
+        copied.and(trimmed).map_err(|error| self.fail(&error.to_string()))
     }
 
     fn encode(&mut self, at: RegionPos, region: &Region) -> Vec<u8> {

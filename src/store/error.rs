@@ -1,8 +1,8 @@
 //! What may be wrong with a stored world, in one message each.
 
-use std::io;
+use std::{fmt, io};
 
-use crate::terrain::{ReplayError, RestoreError};
+use crate::terrain::{ReplayError, RestoreError, Terrain};
 
 /// Why a world can't be opened, created or read.
 #[derive(Debug, thiserror::Error)]
@@ -105,12 +105,64 @@ pub enum StoreError {
         /// The record's.
         found: u64,
     },
+    /// The terrain has another size than the saved world. Nothing of it was written.
+    #[error("the saved world has {saved}, and the terrain has {given}: save it in another folder")]
+    OtherSize {
+        /// The size of the saved world.
+        saved: WorldSize,
+        /// That of the terrain.
+        given: WorldSize,
+    },
+    /// A server keeps the world of this terrain, and saves it.
+    #[error("the terrain is shared, so its server saves it: a world is saved or shared")]
+    Shared,
+    /// A terrain over another ground, or of another size, was put in the place of the one that the world was to be read for.
+    #[error(
+        "another level is in the place of the terrain that the world was read for, so it is not saved there"
+    )]
+    OtherTerrain,
     /// The store's thread is gone.
-    #[error("the store's thread has ended")]
+    #[error("the store's thread has ended: nothing is saved any more until the world is opened again")]
     Ended,
+    /// The disk does not answer, and what waits for it takes all the memory that it may. Nothing was taken.
+    #[error("too much waits to be saved, as the disk does not answer")]
+    Full,
+    /// The disk has not answered in time. What was given to the store is still written if it answers.
+    #[error("the disk has not answered in time")]
+    TimedOut,
     /// What has to be written can't be for now; it is kept in memory, and tried again.
     #[error("the world can't be saved for now: {0}")]
     NotSaved(String),
+}
+
+/// The sizes that a world keeps for as long as it is saved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorldSize {
+    /// Cells along x and along z.
+    pub cells: [u32; 2],
+    /// Cells along the side of a chunk.
+    pub chunk_size: u32,
+    /// Metres along the side of a voxel.
+    pub voxel_size: f32,
+}
+
+impl WorldSize {
+    /// The sizes of a terrain.
+    pub fn of(terrain: &Terrain) -> Self {
+        let (ground, grid) = (terrain.world().ground(), terrain.world().grid());
+        Self {
+            cells: [ground.width(), ground.depth()].map(i32::cast_unsigned),
+            chunk_size: grid.size().cast_unsigned(),
+            voxel_size: terrain.voxel_size(),
+        }
+    }
+}
+
+impl fmt::Display for WorldSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { cells: [width, depth], chunk_size, voxel_size } = self;
+        write!(f, "{width} x {depth} cells, chunks of {chunk_size} and voxels of {voxel_size} m")
+    }
 }
 
 impl StoreError {
@@ -130,6 +182,16 @@ pub enum StoreTrouble {
     /// Saving works again.
     #[error("saving works again")]
     SavedAgain,
+    /// The disk does not answer: a network share that is away, or a drive that is asleep. What is dug is kept in memory, up to
+    /// [`waiting_bytes`](super::StoreOptions::waiting_bytes), and is saved once it answers; [`SavedAgain`](Self::SavedAgain) says so.
+    #[error("the disk does not answer: what is dug is kept in memory until it does")]
+    Hanging,
+    /// Somebody else has the world open, and is waited for.
+    #[error("the world is open elsewhere: waiting until it is closed")]
+    WaitsForLock,
+    /// The store's thread has ended, which only a fault in this crate can cause. Nothing is saved any more.
+    #[error("saving has ended, and nothing is saved any more ({0}): save the world in another folder")]
+    Ended(String),
     /// The log got a gap, as too much waited to be saved, or came at once, or another world took the place of this one: it can no
     /// longer rebuild damaged regions. The world is saved whole instead.
     #[error("the log has a gap at revision {revision}, so the world is saved whole")]

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use super::checkpoint::Checkpoint;
+use super::checkpoint_copy;
 use super::database::DATABASE;
 use super::error::StoreError;
 use super::files::Files;
@@ -90,6 +91,8 @@ pub(super) struct Contents {
     error: Option<io::Error>,
     /// The checkpoints that the file of regions holds: two alike, but for damage.
     checkpoints: Vec<Checkpoint>,
+    /// The copies beside the journal.
+    copies: Vec<Checkpoint>,
     /// Those of other files that may hold regions.
     other_checkpoints: Vec<Checkpoint>,
     /// Valid records of each region: one, but for what was salvaged from a damaged file.
@@ -148,6 +151,7 @@ impl Contents {
             segments,
             error,
             checkpoints: Vec::new(),
+            copies: Vec::new(),
             other_checkpoints: Vec::new(),
             regions: BTreeMap::new(),
             other_regions: BTreeMap::new(),
@@ -173,6 +177,12 @@ impl Contents {
         }
         for source in others {
             contents.enter_others(source);
+        }
+        for copy in checkpoint_copy::read(files, contents.world) {
+            match copy {
+                Ok(copy) => contents.copies.extend(decode_checkpoint(&copy)),
+                Err(error) => refuse_newer(error.newer_schema())?,
+            }
         }
         reading.finish();
         Ok(contents)
@@ -245,8 +255,10 @@ impl Contents {
         records.map(|record| record.bytes() as u64).sum()
     }
 
+    /// The checkpoints in the journal, all of which the database had.
     fn heads(&self) -> impl Iterator<Item = Checkpoint> {
-        self.segments.iter().filter_map(|found| decode_checkpoint(&found.checkpoint()?))
+        let heads = self.segments.iter().filter_map(|found| decode_checkpoint(&found.checkpoint()?));
+        heads.chain(self.copies.iter().cloned())
     }
 
     /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, with which most regions

@@ -116,7 +116,7 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
         regions: checkpoint.regions.len(),
         region_bytes,
         segments: contents.segments.len(),
-        log_bytes: contents.segments.iter().map(|found| found.length as u64).sum(),
+        log_bytes: contents.segments.iter().map(|found| segment::on_disk(found.length as u64)).sum(),
         is_log_whole: last >= checkpoint.frame.max(contents.greatest_frame())
             && contents.leads_to(&checkpoint),
         game: game.into_iter().map(|(key, bytes): (String, Vec<u8>)| (key, bytes.len())).collect(),

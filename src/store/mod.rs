@@ -2,7 +2,9 @@
 
 mod base_level;
 mod checkpoint;
+mod checkpoint_copy;
 mod checkpointing;
+mod closing;
 mod database;
 mod disk;
 mod error;
@@ -34,8 +36,9 @@ mod unsaved;
 mod writer;
 
 pub use base_level::{BaseLevel, LevelName};
+pub use closing::ClosingStore;
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
-pub use error::{StoreError, StoreTrouble};
+pub use error::{StoreError, StoreTrouble, WorldSize};
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
 pub use format::frame::WorldId;
 pub use format::level::{Level, LevelFiles, pack_level, read_level, unpack_level, write_level};
@@ -49,3 +52,4 @@ pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};
 pub use portable::{Imported, from_bytes, to_bytes};
 pub use progress::Progress;
+pub use shared::SavePoint;

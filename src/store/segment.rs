@@ -26,6 +26,14 @@ const PREFIX: usize = 12;
 /// The most bytes that a frame may hold once it is unpacked.
 pub(super) const FRAME_LIMIT: usize = 256 << 20;
 
+/// Bytes that a file system keeps together: a file takes whole ones.
+const BLOCK: u64 = 4096;
+
+/// Bytes that a file of this length takes on the disk.
+pub(super) fn on_disk(length: u64) -> u64 {
+    length.next_multiple_of(BLOCK)
+}
+
 /// The path of a segment.
 pub(super) fn path(segment: u64) -> String {
     format!("{FOLDER}/{segment:08}.log")

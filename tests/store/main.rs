@@ -2,12 +2,15 @@
 
 mod crafted;
 mod damage;
+mod durable;
 mod faults;
 mod folders;
+mod gated;
 mod ground;
 mod inspecting;
 mod kill;
 mod levels;
+mod log;
 mod opening;
 mod other_level;
 mod play;
@@ -18,5 +21,6 @@ mod rebuild;
 mod sectors;
 mod sizes;
 mod times;
+mod trouble;
 #[path = "../worlds/mod.rs"]
 mod worlds;
