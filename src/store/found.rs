@@ -167,6 +167,8 @@ impl Contents {
                 }
             }
         }
+        // One that is whole goes before what is left of another.
+        others.sort_by_key(|source| matches!(source, Source::Damaged { .. }));
         let all = || std::iter::once(&raw[..]).chain(others.iter().map(Source::records));
         match world.or_else(|| all().find_map(|records| world_of(records, false))) {
             Some(world) => contents.world = world,
@@ -276,7 +278,8 @@ impl Contents {
             let run = runs.range(..=from.saturating_add(1)).next_back();
             run.map_or(from, |(_, last)| from.max(*last))
         };
-        let all = self.checkpoints.iter().chain(&heads).chain(others);
+        // Those that lie beside their regions come first: over another ground, regions have the same revisions and other content.
+        let all = self.checkpoints.iter().chain(others).chain(&heads);
         // Among equals the newest, after which least has to be replayed.
         let rank = |checkpoint: &&Checkpoint| {
             let (missing, unknown) = self.disagreeing(checkpoint);
