@@ -366,8 +366,8 @@ pub mod prelude {
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{
-        BurrowLevel, SaveNow, SaveSystems, SavedWorld, StartLevel, StoreTroubleFound, WorldOpened,
-        WorldSaved, WorldStore,
+        BurrowLevel, ClosedBecause, SaveNow, SaveSystems, SavedWorld, StartLevel, StoreTroubleFound,
+        WorldClosed, WorldOpened, WorldSaved, WorldStore,
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,

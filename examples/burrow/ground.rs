@@ -4,8 +4,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use bevy_burrow::ground::{GreyImage, Ground, GroundError, ImageLimits, ImageScale, Strata};
+use bevy_burrow::store::{BaseLevel, load_level};
 use clap::Args;
 
+use crate::json;
 use crate::noise_ground::noise_ground;
 
 /// The ground that the world was saved with. A world holds only what differs from it.
@@ -27,6 +29,9 @@ pub struct GroundArgs {
     /// The hills of the example `server`, of so many cells along each side
     #[arg(long, value_name = "N", conflicts_with = "heights", global = true)]
     side: Option<u32>,
+    /// The level that the world was begun on: its folder, or the packed file
+    #[arg(long, value_name = "PATH", global = true)]
+    level: Option<PathBuf>,
 }
 
 impl GroundArgs {
@@ -35,6 +40,10 @@ impl GroundArgs {
         let ground = match (&self.heights, self.side) {
             (Some(path), _) => {
                 let at = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+                if self.height_range[0] == self.height_range[1] {
+                    let heights = "give the heights of black and of white, which differ";
+                    return Err(format!("--height-range: {heights}"));
+                }
                 let bytes = fs::read(path).map_err(|error| at(&error))?;
                 let scale = ImageScale {
                     voxels_per_sample: self.voxels_per_sample,
@@ -53,8 +62,8 @@ impl GroundArgs {
         let strata = match name.to_str().and_then(Strata::preset) {
             Some(preset) => preset,
             None => {
-                let text = fs::read_to_string(name).map_err(|error| at(&error))?;
-                serde_json::from_str(&text).map_err(|error| at(&error))?
+                let bytes = fs::read(name).map_err(|error| at(&error))?;
+                json::parse(&bytes).map_err(|error| at(&error))?
             }
         };
         ground.with_strata(&strata).map(Some).map_err(|error| at(&error))
@@ -65,5 +74,13 @@ impl GroundArgs {
         self.build()?.ok_or_else(|| {
             "this needs the ground that the world was saved with: give --heights or --side".into()
         })
+    }
+
+    /// Reads the level, if there is one.
+    pub fn level(&self, ground: &Ground) -> Result<Option<BaseLevel>, String> {
+        let Some(path) = &self.level else { return Ok(None) };
+        let at = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+        let level = load_level(path, ground).map_err(|error| at(&error))?;
+        Ok(Some(BaseLevel::new(level, path.display().to_string())))
     }
 }

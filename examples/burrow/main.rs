@@ -9,14 +9,19 @@
 //! | --- | --- | --- |
 //! | `info` | prints what is known of a world | no |
 //! | `check` | reads all of it, and replays its log from the first commit on; changes nothing | to do so in full |
-//! | `repair` | opens it as a game would, which rebuilds what is damaged, and saves it | yes |
+//! | `repair` | opens whatever is left of it, rebuilds what is damaged, and saves it | yes |
 //! | `compact` | makes the file of regions as small as it can be | yes |
 //! | `replay` | replays the log alone, and verifies each commit | yes |
 //! | `export` | writes the world to one file | yes |
 //! | `import` | makes a world of such a file | yes |
 //!
 //! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights` and the
-//! options beside it name it as for the example `export`, `--side` as for the example `server`.
+//! options beside it name it as for the example `export`, `--side` as for the example `server`. `--level` names the level that it was
+//! begun on, if it was begun on one.
+//!
+//! `info`, `check`, `replay` and `export` change nothing, so that they work on read-only media too. `repair` opens worlds that a game
+//! refuses to open, as a file can't be read or only regions are left; it replaces a file only once the new one is complete, and keeps the
+//! old one in `quarantine`.
 //!
 //! | exit code | when |
 //! | --- | --- |
@@ -25,16 +30,20 @@
 //! | 2 | it could not be done: the reason goes to stderr |
 
 mod ground;
+#[path = "../shared/json.rs"]
+mod json;
 #[path = "../shared/noise_ground.rs"]
 mod noise_ground;
 #[path = "../shared/output.rs"]
 mod output;
 
-use std::io::Write;
+use std::fs::{self, File};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 
-use bevy_burrow::store::{self, Store, StoreOptions};
+use bevy_burrow::store::{self, Folder, Store, StoreOptions};
 use bevy_burrow::terrain::World;
 use clap::{Parser, Subcommand};
 use serde_json::{Map, Value, json};
@@ -63,7 +72,7 @@ enum Command {
         /// The world's folder
         world: PathBuf,
     },
-    /// Opens a world, which rebuilds what is damaged, and saves it
+    /// Opens whatever is left of a world, rebuilds what is damaged, and saves it
     Repair {
         /// The world's folder
         world: PathBuf,
@@ -120,8 +129,9 @@ fn run(args: &Args) -> Result<(Value, bool), String> {
         Command::Export { world, file } => export(world, file, &args.ground),
         Command::Import { file, world } => import(file, world, &args.ground),
         Command::Replay { world } => {
-            let terrain =
-                store::replay(world, args.ground.required()?, None).map_err(|why| why.to_string())?;
+            let ground = args.ground.required()?;
+            let level = args.ground.level(&ground)?;
+            let terrain = store::replay(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
             Ok((Value::Object(state(terrain.world())), true))
         }
     }
@@ -151,6 +161,7 @@ fn info(world: &Path) -> Result<(Value, bool), String> {
         "voxel_size": info.settings.voxel_size,
         "simulation": info.simulation,
         "ground": hex(info.ground),
+        "ground_size": info.ground_size,
         "checkpoint": info.checkpoint,
         "regions": info.regions,
         "region_bytes": info.region_bytes,
@@ -158,14 +169,16 @@ fn info(world: &Path) -> Result<(Value, bool), String> {
         "log_bytes": info.log_bytes,
         "is_log_whole": info.is_log_whole,
         "game": game,
+        "level": info.level.map(|level| level.label),
         "troubles": info.damage,
     });
     Ok((answer, info.damage.is_empty()))
 }
 
-fn check(world: &Path, ground: &GroundArgs) -> Result<(Value, bool), String> {
-    let Some(ground) = ground.build()? else { return info(world) };
-    let check = store::check(world, ground, None).map_err(|why| why.to_string())?;
+fn check(world: &Path, args: &GroundArgs) -> Result<(Value, bool), String> {
+    let Some(ground) = args.build()? else { return info(world) };
+    let level = args.level(&ground)?;
+    let check = store::check(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
     let is_sound = check.troubles.is_empty() && check.replays != Some(false);
     let mut answer = state(check.terrain.world());
     answer.insert("troubles".into(), check.troubles.into());
@@ -173,13 +186,15 @@ fn check(world: &Path, ground: &GroundArgs) -> Result<(Value, bool), String> {
     Ok((Value::Object(answer), is_sound))
 }
 
-/// Opens a world as a game would, does something to it, and saves it.
+/// Opens a world, whatever is left of it, does something to it, and saves it.
 fn opened(
     world: &Path,
-    ground: &GroundArgs,
+    args: &GroundArgs,
     work: impl FnOnce(&mut Store) -> Result<(), String>,
 ) -> Result<(Value, bool), String> {
-    let opened = Store::open(world, ground.required()?, StoreOptions::default());
+    let ground = args.required()?;
+    let options = StoreOptions { level: args.level(&ground)?, salvage: true, ..StoreOptions::default() };
+    let opened = Store::open(world, ground, options);
     let (mut store, opened) = opened.map_err(|why| why.to_string())?;
     work(&mut store)?;
     store.checkpoint().map_err(|why| why.to_string())?;
@@ -191,28 +206,45 @@ fn opened(
     Ok((Value::Object(answer), is_sound))
 }
 
-fn export(world: &Path, file: &Path, ground: &GroundArgs) -> Result<(Value, bool), String> {
-    let opened = Store::open(world, ground.required()?, StoreOptions::default());
-    let (store, opened) = opened.map_err(|why| why.to_string())?;
-    let bytes = store::to_bytes(&opened.terrain, store.world_id(), store.game_data());
-    let bytes = bytes.map_err(|why| why.to_string())?;
-    let at = |error: std::io::Error| format!("{}: {error}", file.display());
-    let mut out = std::fs::File::create_new(file).map_err(at)?;
-    out.write_all(&bytes).and_then(|()| out.sync_all()).map_err(at)?;
-    let mut answer = state(opened.terrain.world());
+fn export(world: &Path, file: &Path, args: &GroundArgs) -> Result<(Value, bool), String> {
+    let ground = args.required()?;
+    let level = args.level(&ground)?;
+    let read = store::read_world(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
+    let bytes = store::to_bytes(&read.terrain, read.world, &read.game).map_err(|why| why.to_string())?;
+    write_new(file, &bytes).map_err(|error| format!("{}: {error}", file.display()))?;
+    let mut answer = state(read.terrain.world());
     answer.insert("bytes".into(), bytes.len().into());
-    Ok((Value::Object(answer), opened.troubles.is_empty()))
+    let is_sound = read.troubles.is_empty();
+    answer.insert("troubles".into(), read.troubles.into());
+    Ok((Value::Object(answer), is_sound))
 }
 
-fn import(file: &Path, world: &Path, ground: &GroundArgs) -> Result<(Value, bool), String> {
+/// Writes a file that must not exist. It gets its name once it is complete.
+fn write_new(file: &Path, bytes: &[u8]) -> io::Result<()> {
+    if file.symlink_metadata().is_ok() {
+        return Err(io::ErrorKind::AlreadyExists.into());
+    }
+    let mut unfinished = file.as_os_str().to_owned();
+    unfinished.push(".new");
+    let write = || {
+        let mut out = File::create(&unfinished)?;
+        out.write_all(bytes)?;
+        out.sync_all()?;
+        fs::rename(&unfinished, file)
+    };
+    write().inspect_err(|_| drop(fs::remove_file(&unfinished)))
+}
+
+fn import(file: &Path, world: &Path, args: &GroundArgs) -> Result<(Value, bool), String> {
     let at = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
-    let bytes = std::fs::read(file).map_err(|error| at(&error))?;
-    let imported = store::from_bytes(&bytes, ground.required()?).map_err(|error| at(&error))?;
+    let bytes = fs::read(file).map_err(|error| at(&error))?;
+    let ground = args.required()?;
+    let level = args.level(&ground)?;
+    let imported = store::from_bytes(&bytes, ground).map_err(|error| at(&error))?;
     let mut terrain = imported.terrain;
-    let created = Store::create(world, &mut terrain, StoreOptions::default());
-    let mut store = created.map_err(|why| why.to_string())?;
-    imported.game.into_iter().for_each(|(key, bytes)| store.put(key, bytes));
-    store.checkpoint().map_err(|why| why.to_string())?;
+    let (files, options) = (Arc::new(Folder::new(world)), StoreOptions { level, ..StoreOptions::default() });
+    let created = Store::create_with_data_in(files, &mut terrain, imported.game, options);
+    drop(created.map_err(|why| why.to_string())?);
     let mut answer = state(terrain.world());
     answer.insert("is_base_changed".into(), imported.is_base_changed.into());
     Ok((Value::Object(answer), true))

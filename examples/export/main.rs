@@ -39,6 +39,8 @@
 
 #[path = "../shared/brush_lines.rs"]
 mod brush_lines;
+#[path = "../shared/json.rs"]
+mod json;
 mod levels;
 mod obj;
 #[path = "../shared/output.rs"]
@@ -127,6 +129,8 @@ enum ExportError {
     Read { path: PathBuf, reason: io::Error },
     #[error("{}: {reason}", path.display())]
     Ground { path: PathBuf, reason: GroundError },
+    #[error("--height-range: {0} twice makes flat land: give the heights of black and of white")]
+    HeightRange(f64),
     #[error("{} is neither a file nor one of the presets alpine, desert and mine", .0.display())]
     Strata(PathBuf),
     #[error(transparent)]
@@ -216,7 +220,7 @@ fn write_json(out: &mut impl Write, content: &(impl Serialize + ?Sized)) -> io::
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, ExportError> {
     let bytes =
         read_at_most(path, MOST_JSON).map_err(|reason| ExportError::Read { path: path.into(), reason })?;
-    serde_json::from_slice(&bytes).map_err(|reason| ExportError::Json { path: path.into(), reason })
+    json::parse(&bytes).map_err(|reason| ExportError::Json { path: path.into(), reason })
 }
 
 /// Most bytes of a file with strata or rules.
@@ -233,6 +237,9 @@ fn read_strata(name: &Path) -> Result<Strata, ExportError> {
 
 fn read_ground(args: &Args) -> Result<Ground, ExportError> {
     let limits = ImageLimits::default();
+    if args.height_range[0] == args.height_range[1] {
+        return Err(ExportError::HeightRange(args.height_range[0]));
+    }
     let bytes = read_at_most(&args.heights, limits.max_file_bytes + 1)
         .map_err(|reason| ExportError::Read { path: args.heights.clone(), reason })?;
     let scale = ImageScale {

@@ -338,6 +338,24 @@ fn bad_lines_are_named_and_nothing_is_written() {
 }
 
 #[test]
+fn json_is_read_as_editors_save_it() {
+    let temp = TempFolder::new();
+    temp.put_hills();
+    let edits = temp.put("edits.jsonl", DIG);
+    for (option, json) in [("--rules", r#"{"bedrock":-20}"#), ("--strata", r#"{"seed":1}"#)] {
+        for text in [json.to_owned(), format!("\u{feff}{json}\r\n")] {
+            let path = temp.put("file.json", text);
+            temp.run(&edits, &[option, &path.display().to_string()]).expect("a byte order mark is allowed");
+            fs::remove_dir_all(temp.path("out")).expect("the folder");
+        }
+        let utf_16: Vec<u8> = "\u{feff}{}".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let path = temp.put("file.json", utf_16);
+        let (code, message) = temp.run(&edits, &[option, &path.display().to_string()]).unwrap_err();
+        assert!(code == 2 && message.contains("save it as UTF-8"), "{message}");
+    }
+}
+
+#[test]
 fn bad_arguments_and_files_are_refused_and_nothing_is_written() {
     let temp = TempFolder::new();
     let edits = temp.put("edits.jsonl", DIG);
@@ -366,6 +384,7 @@ fn bad_arguments_and_files_are_refused_and_nothing_is_written() {
         (&["--height-range", "0", "nan"], "height of full grey is NaN"),
         (&["--height-range", "0", "40000"], "height of full grey is 40000"),
         (&["--height-range", "0"], "2 values required"),
+        (&["--height-range", "5", "5"], "flat land"),
         (&["--batch", "0"], "--batch"),
         (&["--heihgts", "x.png"], "unexpected argument"),
     ] {

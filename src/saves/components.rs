@@ -5,13 +5,23 @@ use std::time::Duration;
 
 use bevy::prelude::*;
 
-use crate::store::{BaseChanged, Store, StoreOptions};
-use crate::terrain::Version;
+use super::messages::ClosedBecause;
+use crate::store::{BaseChanged, SavePoint, Store, StoreOptions};
+
+/// How long an app that ends waits for the disk.
+pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
 /// it; the terrain itself they leave out.
 ///
-/// Removing it, or the entity, saves what is not saved yet and closes the world.
+/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed) says so.
+///
+/// | inserted beside it | what happens |
+/// | --- | --- |
+/// | a `SavedWorld` with another path | the first world is closed, and the second takes the terrain's place, or is made of it |
+/// | a [`Terrain`](crate::terrain::Terrain) over another ground, or of another size | that is another level: the world is closed, and this component removed |
+/// | a `Terrain` over the same ground, of the same size | that is another state of the same world, and takes the place of what was saved |
+/// | a `SharedTerrain` | the world is closed, and this component removed: the server saves what players share |
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component)]
 pub struct SavedWorld {
@@ -33,39 +43,63 @@ impl SavedWorld {
 
     pub(super) fn options(&self) -> StoreOptions {
         let Self { loss_window, base_changed, .. } = *self;
-        StoreOptions { loss_window, base_changed, ..StoreOptions::default() }
+        StoreOptions { loss_window, base_changed, close_timeout: EXIT_WAIT, ..StoreOptions::default() }
     }
 }
 
 /// The open store of a terrain's world. The plugin inserts it once the world is read.
 #[derive(Component)]
 pub struct WorldStore {
-    pub(super) store: Store,
-    /// The world that is saved, as it was last.
-    pub(super) version: Version,
-    /// The revision that was told as durable last, and whether it is to be told anyway.
-    pub(super) told: Option<u64>,
+    /// `None` once it is being closed.
+    pub(super) store: Option<Store>,
+    pub(super) path: PathBuf,
+    /// The last point that was told as durable.
+    pub(super) told: Option<SavePoint>,
+    /// What [`SaveNow`](super::SaveNow) waits for, and whether it was sent again since.
+    pub(super) asked: Option<SavePoint>,
+    pub(super) asked_again: bool,
+    /// Why it is closed, if it is.
+    pub(super) closing: ClosedBecause,
+    /// Whether it was logged that nothing is saved any more.
+    pub(super) has_failed: bool,
 }
 
 impl WorldStore {
-    /// Everything up to this revision would survive a crash.
+    pub(super) fn new(store: Store, path: PathBuf) -> Self {
+        Self {
+            store: Some(store),
+            path,
+            told: None,
+            asked: None,
+            asked_again: false,
+            closing: ClosedBecause::Removed,
+            has_failed: false,
+        }
+    }
+
+    /// The terrain would be there after a crash up to this revision.
     pub fn durable(&self) -> u64 {
-        self.store.durable()
+        self.store.as_ref().map_or(0, Store::durable)
     }
 
     /// Keeps data of the game beside the world: an inventory, the time of day. It is saved in one piece with the commits of this
-    /// frame, so that after a crash nothing that was dug is missing in one and there in the other.
+    /// frame, so that after a crash nothing that was dug is missing in one and there in the other. What is put again unchanged costs
+    /// nothing, and of what changes in each frame the last value in each [loss window](SavedWorld::loss_window) is saved.
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
-        self.store.put(key, bytes);
+        if let Some(store) = &mut self.store {
+            store.put(key, bytes);
+        }
     }
 
     /// Removes data of the game's.
     pub fn remove(&mut self, key: impl Into<String>) {
-        self.store.remove(key);
+        if let Some(store) = &mut self.store {
+            store.remove(key);
+        }
     }
 
     /// Data of the game as it was put last.
     pub fn get(&self, key: &str) -> Option<&[u8]> {
-        self.store.get(key)
+        self.store.as_ref()?.get(key)
     }
 }

@@ -1,16 +1,22 @@
 //! Levels as assets: what a designer sculpted is loaded with the ground's other assets.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use bevy::asset::io::{Reader, Writer};
 use bevy::asset::saver::{AssetSaver, SavedAsset};
-use bevy::asset::{AssetLoadFailedEvent, AssetLoader, AssetPath, AsyncWriteExt, LoadContext};
+use bevy::asset::{AssetLoader, AssetPath, AsyncWriteExt, LoadContext, LoadState};
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::Allow;
+use bevy::ecs::system::SystemParam;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::opening::Unopened;
+use super::components::WorldStore;
+use super::opening::release;
 use crate::plugin::{Held, ThreadTask, Threads, free_later};
 use crate::store::{FormatError, Level, LevelFiles, RestoreLevelError, pack_level, read_level, unpack_level};
-use crate::terrain::Terrain;
+use crate::terrain::{Terrain, Version};
 
 /// A level, packed in one file with the extension `burrow_level`. What it holds is checked when it is loaded; that it fits its ground,
 /// when a terrain is made of it.
@@ -99,47 +105,140 @@ impl AssetSaver for LevelSaver {
 }
 
 /// The terrain of this entity begins as a level. Insert it with a terrain without edits, which gives the ground; the terrain is
-/// [`Held`] until the level is loaded. With a [`SavedWorld`](super::SavedWorld) beside it, a world that was saved goes on, and only a
-/// new one begins as the level. That world saves only what differs from the level, and needs a level to go on: where it is another
-/// one, say a new version of it, [`SavedWorld::base_changed`](super::SavedWorld::base_changed) says what happens.
+/// [`Held`] until the level is loaded, and begins without it where it can't be, which is logged as an error.
+///
+/// With a [`SavedWorld`](super::SavedWorld) beside it, a world that was saved goes on, and only a new one begins as the level. That world
+/// saves only what differs from the level, and needs a level to go on: where it is another one, say a new version of it,
+/// [`SavedWorld::base_changed`](super::SavedWorld::base_changed) says what happens. Inserted beside a world that is open already, it does
+/// nothing: what was dug there stays.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct StartLevel(pub Handle<BurrowLevel>);
 
 /// A level that a terrain is made of.
 #[derive(Component)]
-pub(super) struct MakingLevel(ThreadTask<Result<Terrain, RestoreLevelError>>);
-
-/// Holds a terrain until its level is loaded.
-pub(super) fn hold(new: On<Insert, StartLevel>, mut commands: Commands) {
-    commands.entity(new.entity).try_remove::<MakingLevel>().try_insert((Held, Waiting));
-}
+pub(super) struct MakingLevel(ThreadTask<Result<Terrain, RestoreLevelError>>, Version);
 
 /// A level that nobody has begun to make a terrain of.
 #[derive(Component)]
-pub(super) struct Waiting;
+pub(super) struct Waiting {
+    since: Instant,
+    told: bool,
+}
+
+impl Waiting {
+    fn new() -> Self {
+        Self { since: Instant::now(), told: false }
+    }
+}
+
+/// How long a level is waited for before that is told.
+const TOLD: Duration = Duration::from_secs(10);
+
+/// The levels that are loaded, and those that can't be.
+#[derive(SystemParam)]
+pub(super) struct FindLevel<'w> {
+    levels: Option<Res<'w, Assets<BurrowLevel>>>,
+    assets: Option<Res<'w, AssetServer>>,
+}
+
+impl FindLevel<'_> {
+    /// A level; `None` while it is loaded.
+    ///
+    /// # Errors
+    /// When it can't be loaded.
+    pub fn find(&self, start: &StartLevel) -> Result<Option<&BurrowLevel>, String> {
+        let id = start.0.id();
+        if let Some(level) = self.levels.as_ref().and_then(|levels| levels.get(id)) {
+            return Ok(Some(level));
+        }
+        if start.0 == Handle::default() {
+            return Err("its handle names no asset".into());
+        }
+        match self.assets.as_ref().and_then(|assets| assets.get_load_state(id)) {
+            Some(LoadState::Failed(why)) => Err(why.to_string()),
+            _ => Ok(None),
+        }
+    }
+
+    /// What the game calls a level.
+    pub fn path_of(&self, start: Option<&StartLevel>) -> String {
+        start.and_then(|start| start.0.path()).map(ToString::to_string).unwrap_or_default()
+    }
+}
+
+/// Holds a terrain until its level is loaded.
+pub(super) fn hold(new: On<Insert, StartLevel>, mut commands: Commands) {
+    let entity = new.entity;
+    // A world that is closed with the same insertion is closed by then.
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        if entity.contains::<WorldStore>() {
+            warn!("a level for {} changes nothing: its saved world goes on", entity.id());
+            return;
+        }
+        if let Some(mut terrain) = entity.get_mut::<Terrain>() {
+            terrain.abandon();
+        }
+        entity.remove::<MakingLevel>().insert((Held, Waiting::new()));
+    });
+}
+
+/// A level is no longer wanted.
+pub(super) fn give_up(gone: On<Remove, StartLevel>, mut commands: Commands) {
+    commands.entity(gone.entity).try_remove::<(MakingLevel, Waiting)>();
+    release(&mut commands, gone.entity);
+}
+
+/// Makes a terrain anew where another one takes the place of the one that a level was to be.
+pub(super) fn make_anew(
+    new: On<Insert, Terrain>,
+    making: Query<(), (With<MakingLevel>, Allow<Disabled>)>,
+    mut commands: Commands,
+) {
+    if making.contains(new.entity) {
+        commands.entity(new.entity).try_remove::<MakingLevel>().try_insert(Waiting::new());
+    }
+}
 
 /// Makes terrains of levels that are loaded, and puts them in place.
 pub(super) fn start_levels(
     mut commands: Commands,
-    levels: Option<Res<Assets<BurrowLevel>>>,
-    mut failures: Option<MessageReader<AssetLoadFailedEvent<BurrowLevel>>>,
-    waiting: Query<(Entity, &StartLevel, &Terrain), With<Waiting>>,
-    mut making: Query<(Entity, &mut Terrain, &mut MakingLevel, Has<Unopened>), Without<Waiting>>,
+    levels: FindLevel,
+    mut waiting: Query<(Entity, &StartLevel, &Terrain, &mut Waiting), Allow<Disabled>>,
+    mut making: Query<(Entity, &mut Terrain, &mut MakingLevel), (Without<Waiting>, Allow<Disabled>)>,
 ) {
-    let failed: Vec<_> =
-        failures.iter_mut().flat_map(|failures| failures.read().map(|failure| failure.id)).collect();
-    for (entity, start, terrain) in &waiting {
-        if failed.contains(&start.0.id()) {
-            error!("the level of {entity} can't be loaded: the terrain begins without it");
-            commands.entity(entity).try_remove::<(Waiting, Held)>();
+    for (entity, start, terrain, mut wait) in &mut waiting {
+        match levels.find(start) {
+            Ok(Some(level)) => {
+                let world = terrain.world();
+                let (level, ground) = (level.clone(), world.shared_ground());
+                let task = ThreadTask::start(Threads::Background, move || level.terrain(ground));
+                let making = MakingLevel(task, world.version());
+                commands.entity(entity).try_remove::<Waiting>().try_insert(making);
+            }
+            Ok(None) if !wait.told && wait.since.elapsed() >= TOLD => {
+                wait.told = true;
+                warn!(
+                    "{entity} still waits for its level {:?}: remove its StartLevel to begin without",
+                    start.0
+                );
+            }
+            Ok(None) => {}
+            Err(why) => {
+                error!("the level of {entity} can't be loaded, so the terrain begins without it: {why}");
+                commands.entity(entity).try_remove::<Waiting>();
+                release(&mut commands, entity);
+            }
         }
-        let Some(level) = levels.as_ref().and_then(|levels| levels.get(&start.0)) else { continue };
-        let (level, ground) = (level.clone(), terrain.world().shared_ground());
-        let task = ThreadTask::start(Threads::Background, move || level.terrain(ground));
-        commands.entity(entity).try_remove::<Waiting>().try_insert(MakingLevel(task));
     }
-    for (entity, mut terrain, mut level, is_unopened) in &mut making {
+    for (entity, mut terrain, mut level) in &mut making {
         let Some(made) = level.0.finish() else { continue };
+        commands.entity(entity).try_remove::<MakingLevel>();
+        if !terrain.world().version().is_same_world(level.1) {
+            // The game assigned another one meanwhile.
+            commands.entity(entity).try_insert(Waiting::new());
+            continue;
+        }
         match made {
             Ok(mut made) => {
                 made.take_over(&mut terrain);
@@ -147,10 +246,7 @@ pub(super) fn start_levels(
             }
             Err(why) => error!("the level of {entity} does not fit: {why}"),
         }
-        commands.entity(entity).try_remove::<MakingLevel>();
         // A saved world is read next.
-        if !is_unopened {
-            commands.entity(entity).try_remove::<Held>();
-        }
+        release(&mut commands, entity);
     }
 }

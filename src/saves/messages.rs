@@ -1,5 +1,7 @@
 //! Messages about saved worlds.
 
+use std::fmt;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use bevy::prelude::*;
@@ -7,7 +9,7 @@ use bevy::prelude::*;
 use crate::store::{StoreError, StoreTrouble};
 
 /// Saves at once, and makes a checkpoint: say when a level ends, or before a menu closes the game. Without it, everything is
-/// saved too, within the loss window. A [`WorldSaved`] follows.
+/// saved too, within the loss window. A [`WorldSaved`] follows once all that was committed and put by then is durable.
 #[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SaveNow {
     /// The terrain's entity; `None` for every saved world.
@@ -23,7 +25,8 @@ pub struct WorldOpened {
     pub outcome: Result<u64, Arc<StoreError>>,
 }
 
-/// Everything up to a revision would survive a crash.
+/// The terrain would be there after a crash, up to a revision. Comes whenever more has become durable, also while each frame commits
+/// more, and where another terrain has taken the place of the one that was saved before.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WorldSaved {
     /// The terrain's entity.
@@ -40,4 +43,41 @@ pub struct StoreTroubleFound {
     pub terrain: Entity,
     /// What it is.
     pub trouble: StoreTrouble,
+}
+
+/// A saved world is closed, so that its folder can be opened, copied or removed.
+#[derive(Message, Clone, Debug)]
+pub struct WorldClosed {
+    /// The terrain's entity, which may be gone.
+    pub terrain: Entity,
+    /// The world's folder.
+    pub path: PathBuf,
+    /// Why it was closed.
+    pub because: ClosedBecause,
+    /// The revision that was saved last; or why not everything was.
+    pub outcome: Result<u64, Arc<StoreError>>,
+}
+
+/// Why a saved world was closed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ClosedBecause {
+    /// Its [`SavedWorld`](super::SavedWorld) was removed or replaced, or its entity despawned.
+    #[default]
+    Removed,
+    /// A [`Terrain`](crate::terrain::Terrain) over another ground, or of another size, was put in place of its own. Its `SavedWorld` was
+    /// removed, and nothing was written of that terrain: insert another `SavedWorld` with it to save that.
+    OtherTerrain,
+    /// Its terrain is shared from now on, and the server saves what players share. Its `SavedWorld` was removed.
+    Shared,
+}
+
+impl fmt::Display for ClosedBecause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Removed => "it was removed",
+            Self::OtherTerrain => "a terrain over another ground, or of another size, is in its place",
+            Self::Shared => "its terrain is shared",
+        })
+    }
 }

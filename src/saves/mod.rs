@@ -17,15 +17,17 @@
 //! # let _ = continue_game;
 //! ```
 
+mod closing;
 mod components;
 mod level;
 mod messages;
 mod opening;
 mod saving;
 
+pub(crate) use closing::detach;
 pub use components::{SavedWorld, WorldStore};
 pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
-pub use messages::{SaveNow, StoreTroubleFound, WorldOpened, WorldSaved};
+pub use messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldClosed, WorldOpened, WorldSaved};
 pub use opening::OpeningWorld;
 pub(crate) use opening::{ReadWorld, WorldReader};
 
@@ -47,11 +49,19 @@ impl Plugin for SavePlugin {
         app.add_message::<SaveNow>()
             .add_message::<WorldOpened>()
             .add_message::<WorldSaved>()
+            .add_message::<WorldClosed>()
             .add_message::<StoreTroubleFound>()
+            .init_resource::<closing::ClosingWorlds>()
             .add_observer(opening::hold)
+            .add_observer(opening::give_up)
+            .add_observer(opening::read_anew)
+            .add_observer(opening::wait_for_terrain)
             .add_observer(level::hold)
-            .add_observer(opening::close)
-            .add_observer(opening::follow_discarded)
+            .add_observer(level::give_up)
+            .add_observer(level::make_anew)
+            .add_observer(closing::close)
+            .add_observer(closing::close_with_component)
+            .add_observer(closing::follow_discarded)
             .configure_sets(Update, SaveSystems.after(BurrowSystems::Begin))
             .add_systems(
                 Update,
@@ -59,7 +69,9 @@ impl Plugin for SavePlugin {
                     (level::start_levels, opening::finish_opening, opening::start_opening)
                         .chain()
                         .before(BurrowSystems::Load),
-                    (saving::save_commits, saving::save_now, saving::tell).chain().in_set(SaveSystems),
+                    (saving::save_commits, saving::save_now, saving::tell, closing::tell_closed)
+                        .chain()
+                        .in_set(SaveSystems),
                 ),
             )
             .add_systems(Last, saving::finish_at_exit);

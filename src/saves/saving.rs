@@ -1,49 +1,69 @@
 //! Hands commits to stores, and tells what they say.
 
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::Allow;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::components::WorldStore;
-use super::messages::{SaveNow, StoreTroubleFound, WorldSaved};
+use super::closing::{ClosingWorlds, detach};
+use super::components::{EXIT_WAIT, WorldStore};
+use super::messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldSaved};
 use crate::terrain::Terrain;
 
-/// Bytes of commits that wait at most until the store takes them, which it does each frame.
-const LOG_BYTES: usize = 64 << 20;
-
-/// Hands over what was committed to one terrain.
-pub(super) fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
-    // For the game this is no change of the terrain.
-    let terrain = terrain.bypass_change_detection();
-    let now = terrain.world().version();
-    let followed = match now.is_same_world(world.version) {
-        true => world.store.follow(terrain),
-        // The game put another world in its place.
-        false => {
-            terrain.keep_log(Some(LOG_BYTES));
-            drop(terrain.take_log());
-            world.store.append_whole(terrain)
-        }
-    };
-    world.version = now;
-    if let Err(why) = followed {
-        error_once!("nothing is saved any more: {why}");
+/// Hands over what was committed to a terrain, if the store follows it: one that was put in its place is left alone.
+pub(super) fn follow_same(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
+    if world.store.as_ref().is_some_and(|store| store.follows(terrain)) {
+        follow(terrain, world);
     }
 }
 
-/// Hands over what was committed.
-pub(super) fn save_commits(mut worlds: Query<(&mut Terrain, &mut WorldStore)>) {
-    for (mut terrain, mut world) in &mut worlds {
-        follow(&mut terrain, &mut world);
+/// Hands over what was committed to a terrain, or all of it where it is another one.
+fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
+    let Some(store) = &mut world.store else { return };
+    // For the game this is no change of the terrain.
+    let followed = store.follow(terrain.bypass_change_detection());
+    match followed {
+        Err(why) if !std::mem::replace(&mut world.has_failed, true) => {
+            error!("nothing is saved in {} any more: {why}", world.path.display());
+        }
+        _ => {}
+    }
+}
+
+/// Hands over what was committed. A terrain that is no state of the saved world is not written into it: the world is closed.
+pub(super) fn save_commits(
+    mut commands: Commands,
+    mut worlds: Query<(Entity, &mut Terrain, &mut WorldStore), Allow<Disabled>>,
+) {
+    for (entity, mut terrain, mut world) in &mut worlds {
+        match world.store.as_ref().is_some_and(|store| store.is_of(&terrain)) {
+            true => follow(&mut terrain, &mut world),
+            false => detach(&mut commands, entity, ClosedBecause::OtherTerrain),
+        }
     }
 }
 
 /// Saves at once where that is asked for.
-pub(super) fn save_now(mut requests: MessageReader<SaveNow>, mut worlds: Query<(Entity, &mut WorldStore)>) {
+pub(super) fn save_now(
+    mut requests: MessageReader<SaveNow>,
+    mut worlds: Query<(Entity, &mut WorldStore), Allow<Disabled>>,
+) {
     for request in requests.read() {
         for (entity, mut world) in &mut worlds {
             if request.terrain.is_none_or(|wanted| wanted == entity) {
-                // If its thread is gone, that was told.
-                let _ = world.store.request_checkpoint();
-                world.told = None;
+                world.asked_again = true;
+            }
+        }
+    }
+    for (_, mut world) in &mut worlds {
+        // One request at a time: a disk that does not answer is asked once.
+        if world.asked_again && world.asked.is_none() {
+            let world = &mut *world;
+            let Some(store) = &mut world.store else { continue };
+            world.asked_again = false;
+            // If its thread is gone, that is told as a trouble.
+            if store.request_checkpoint().is_ok() {
+                world.asked = Some(store.point());
             }
         }
     }
@@ -51,37 +71,48 @@ pub(super) fn save_now(mut requests: MessageReader<SaveNow>, mut worlds: Query<(
 
 /// Tells what became durable, and what went wrong.
 pub(super) fn tell(
-    mut worlds: Query<(Entity, &mut WorldStore)>,
+    mut worlds: Query<(Entity, &mut WorldStore), Allow<Disabled>>,
     mut saved: MessageWriter<WorldSaved>,
     mut troubles: MessageWriter<StoreTroubleFound>,
 ) {
     for (entity, mut world) in &mut worlds {
-        let found = world.store.take_troubles();
-        for trouble in &found {
-            warn!("the world of {entity}: {trouble}");
+        let world = &mut *world;
+        let Some(store) = &world.store else { continue };
+        for trouble in store.take_troubles() {
+            warn!("the world in {}: {trouble}", world.path.display());
+            troubles.write(StoreTroubleFound { terrain: entity, trouble });
         }
-        troubles.write_batch(found.into_iter().map(|trouble| StoreTroubleFound { terrain: entity, trouble }));
-        let revision = world.store.durable();
-        let is_news = world.told.is_none_or(|told| told < revision);
-        if is_news && revision == world.store.revision() {
-            world.told = Some(revision);
-            saved.write(WorldSaved { terrain: entity, revision });
+        let Some(durable) = store.durable_point() else { continue };
+        let is_answered = world.asked.is_some_and(|asked| store.is_durable(asked));
+        if is_answered {
+            world.asked = None;
+        }
+        if is_answered || world.told.is_none_or(|told| told < durable) {
+            world.told = Some(durable);
+            saved.write(WorldSaved { terrain: entity, revision: durable.revision() });
         }
     }
 }
 
-/// Saves everything before the app ends.
+/// Saves everything before the app ends, also of worlds that are just being closed.
 pub(super) fn finish_at_exit(
     mut exits: MessageReader<AppExit>,
-    mut worlds: Query<(&mut Terrain, &mut WorldStore)>,
+    mut worlds: Query<(&mut Terrain, &mut WorldStore), Allow<Disabled>>,
+    closing: Res<ClosingWorlds>,
 ) {
     if exits.read().next().is_none() {
         return;
     }
+    let end = Instant::now() + EXIT_WAIT;
     for (mut terrain, mut world) in &mut worlds {
-        follow(&mut terrain, &mut world);
-        if let Err(why) = world.store.flush() {
-            error!("the last commits are not saved: {why}");
+        let is_of = world.store.as_ref().is_some_and(|store| store.is_of(&terrain));
+        if is_of {
+            follow(&mut terrain, &mut world);
+        }
+        let Some(store) = &mut world.store else { continue };
+        if let Err(why) = store.flush_within(end.saturating_duration_since(Instant::now())) {
+            error!("the last commits are not saved in {}: {why}", world.path.display());
         }
     }
+    closing.wait(end);
 }

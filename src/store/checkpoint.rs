@@ -6,6 +6,7 @@ use glam::IVec3;
 
 use super::base_level::LevelName;
 use super::format::Metadata;
+use super::ground_size::GroundSize;
 use super::mirror::Mirror;
 use crate::lattice::RegionPos;
 
@@ -19,6 +20,8 @@ pub(super) struct Checkpoint {
     pub regions: BTreeMap<RegionPos, u64>,
     /// The level below, from which the regions differ.
     pub level: Option<LevelName>,
+    /// The size of the ground, where it is known.
+    pub cells: Option<GroundSize>,
 }
 
 /// A region and its revision as they are stored.
@@ -29,7 +32,8 @@ impl Checkpoint {
     pub fn of(mirror: &Mirror, frame: u64, metadata: Metadata) -> Self {
         let stored = mirror.regions.iter().filter(|(_, region)| region.is_stored);
         let regions = stored.map(|(at, region)| (*at, region.revision)).collect();
-        Self { frame, metadata, regions, level: mirror.level.as_ref().map(|level| level.name().clone()) }
+        let level = mirror.level.as_ref().map(|level| level.name().clone());
+        Self { frame, metadata, regions, level, cells: None }
     }
 
     /// Its bytes; none if it can't be encoded, which is never so.
@@ -46,9 +50,10 @@ impl Checkpoint {
     /// The checkpoint of these bytes, if they are one.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         type Parts = (u64, Vec<Entry>, Metadata);
-        let ((frame, regions, metadata), rest): (Parts, _) = postcard::take_from_bytes(bytes).ok()?;
+        let ((frame, regions, mut metadata), rest): (Parts, _) = postcard::take_from_bytes(bytes).ok()?;
+        let cells = GroundSize::take(&mut metadata.game);
         let level = (!rest.is_empty()).then(|| postcard::from_bytes(rest)).transpose().ok()?;
         let region = |(at, revision)| (RegionPos(IVec3::from_array(at)), revision);
-        Some(Self { frame, metadata, regions: regions.into_iter().map(region).collect(), level })
+        Some(Self { frame, metadata, regions: regions.into_iter().map(region).collect(), level, cells })
     }
 }

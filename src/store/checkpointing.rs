@@ -4,18 +4,18 @@ use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use super::checkpoint::Checkpoint;
-use super::database::{Change, DATABASE, DatabaseError, Records};
+use super::checkpoint_copy;
 use super::error::StoreError;
 use super::format;
 use super::format::change::put_change;
 use super::format::frame::{self, Kind};
+use super::ground_size::GroundSize;
 use super::keys;
 use super::mirror::Mirror;
 use super::progress::Work;
-use super::quarantine;
 use super::region::Region;
 use super::segment::FRAME_LIMIT;
-use super::writer::{Message, Writer};
+use super::writer::{CHECKPOINT_TIME, Message, Writer};
 use crate::lattice::RegionPos;
 use crate::terrain::SIMULATION;
 
@@ -28,11 +28,14 @@ impl Writer {
         if !self.state.has_gap {
             self.flush()?;
         }
-        if let Err(error) = self.ready_database() {
-            return Err(self.fail(&error.to_string()));
+        match self.database.ready(&*self.files) {
+            Ok(false) => {}
+            Ok(true) => self.mirror.mark_all(),
+            Err(error) => return Err(self.fail(&error.to_string())),
         }
         let (revision, frame, commits) =
             (self.mirror.revision, self.journal.last_frame(), self.state.commits);
+        let point = self.point;
         let checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
         if checkpoint.len() > FRAME_LIMIT {
             return Err(self.fail(&format!("the game's data takes more than {FRAME_LIMIT} bytes")));
@@ -42,6 +45,7 @@ impl Writer {
         // What comes from now on is in frames again.
         let had_gap = std::mem::take(&mut self.state.has_gap);
         self.state.after_gap = had_gap;
+        self.state.written = None;
         self.state.changed = None;
         let mut records = Vec::with_capacity(dirty.len() + 1);
         // Only the first one is waited for, when a world is opened or created.
@@ -58,7 +62,8 @@ impl Writer {
             let sealed = frame::seal(Kind::Checkpoint, self.world, key, revision, 0, &checkpoint);
             records.push((key.to_vec(), Some(sealed)));
         }
-        let written = self.write_records(&records);
+        self.shared.begin_waiting(CHECKPOINT_TIME);
+        let written = self.database.write(&*self.files, frame, &records);
         let after_gap = std::mem::take(&mut self.state.after_gap);
         if let Err(error) = written {
             self.mirror.put_back(positions);
@@ -69,52 +74,20 @@ impl Writer {
             return Err(self.fail(&error.to_string()));
         }
         self.state.commits -= commits.min(self.state.commits);
-        let durable = if after_gap { self.journal.written().unwrap_or_default() } else { 0 };
-        self.shared.set_durable(self.shared.durable().max(revision).max(durable));
-        self.journal.begin_segment(revision, checkpoint);
+        self.shared.set_durable(point);
+        if let (true, Some(written)) = (after_gap, self.state.written) {
+            self.shared.set_durable(written);
+        }
         self.checkpoints = [self.checkpoints[1], frame];
         if !self.state.has_gap {
             self.succeed();
         }
-        if let Err(error) = self.journal.trim(self.options.log_bytes, self.checkpoints[0]) {
-            return Err(self.fail(&error.to_string()));
+        if self.journal.is_long(self.options.log_bytes) {
+            self.begin_segment();
         }
-        Ok(())
-    }
-
-    /// Opens the database where it is not open, or sees to it that a new one gets all regions.
-    fn ready_database(&mut self) -> Result<(), DatabaseError> {
-        if !self.files.exists(DATABASE)? {
-            self.database = None;
-            self.mirror.mark_all();
-            return Ok(());
-        }
-        if self.database.is_some() {
-            return Ok(());
-        }
-        match Records::open(&*self.files) {
-            Ok(open) => self.database = Some(open),
-            Err(DatabaseError::Files(error)) => return Err(error.into()),
-            Err(DatabaseError::Missing | DatabaseError::Damaged(_)) => {
-                quarantine::file(&*self.files, DATABASE)?;
-                self.mirror.mark_all();
-            }
-        }
-        Ok(())
-    }
-
-    fn write_records(&mut self, records: &[Change]) -> Result<(), DatabaseError> {
-        let Some(database) = &self.database else {
-            self.files.create_folder("")?;
-            self.database = Some(Records::create(&*self.files, records)?);
-            return Ok(());
-        };
-        let written = database.write(records);
-        if written.is_err() {
-            // It takes nothing more after an error, and has to be opened anew.
-            self.database = None;
-        }
-        written
+        let copied = checkpoint_copy::write(&*self.files, self.world, revision, &checkpoint);
+        let trimmed = self.journal.trim(self.options.log_bytes, self.checkpoints[0]);
+        copied.and(trimmed).map_err(|error| self.fail(&error.to_string()))
     }
 
     fn encode(&mut self, at: RegionPos, region: &Region) -> Vec<u8> {
@@ -134,6 +107,8 @@ impl Writer {
 
     pub(super) fn metadata(&self) -> format::Metadata {
         let Mirror { revision, hash, next_field, rules, loose, game, .. } = &self.mirror;
+        let mut game = game.iter().map(|(key, value)| (key.clone(), value.clone())).collect();
+        GroundSize::of(&self.ground).put(&mut game);
         format::Metadata {
             settings: self.settings,
             revision: *revision,
@@ -143,7 +118,7 @@ impl Writer {
             loose: *loose,
             simulation: SIMULATION,
             ground: self.ground.hash(),
-            game: game.iter().map(|(key, value)| (key.clone(), value.clone())).collect(),
+            game,
         }
     }
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::files::{Files, Lock, OpenFile, Opening};
+use super::files::{Files, Lock, OpenFile, Opening, named};
 
 /// Bytes of a sector: a write is cut into these when power is lost.
 const SECTOR: u64 = 512;
@@ -247,7 +247,7 @@ impl SimulatedDisk {
     }
 
     /// Counts an operation, and fails where the disk does.
-    fn operate(&self, writes: bool) -> io::Result<MutexGuard<'_, State>> {
+    fn operate(&self, path: &str, writes: bool) -> io::Result<MutexGuard<'_, State>> {
         let watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if let (Some(watch), true) = (watch, writes) {
             watch(&self.image());
@@ -259,7 +259,10 @@ impl SimulatedDisk {
         {
             (state.fault, state.fault_at) = (fault, None);
         }
-        state.fault.check(writes)?;
+        state
+            .fault
+            .check(writes)
+            .map_err(|error| named(if path.is_empty() { "the folder" } else { path }, &error))?;
         Ok(state)
     }
 }
@@ -274,7 +277,7 @@ impl Files for SimulatedDisk {
     }
 
     fn open(&self, path: &str, opening: Opening) -> io::Result<Box<dyn OpenFile>> {
-        let mut state = self.operate(opening == Opening::New)?;
+        let mut state = self.operate(path, opening == Opening::New)?;
         let file = match (state.names.get(path), opening) {
             (Some(_), Opening::New) => return Err(io::ErrorKind::AlreadyExists.into()),
             (Some(file), Opening::Existing) => *file,
@@ -289,38 +292,38 @@ impl Files for SimulatedDisk {
                 file
             }
         };
-        Ok(Box::new(SimulatedFile { disk: self.clone(), file }))
+        Ok(Box::new(SimulatedFile { disk: self.clone(), path: path.into(), file }))
     }
 
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        let state = self.operate(false)?;
+        let state = self.operate(path, false)?;
         let content = state.names.get(path).and_then(|file| state.files.get(file));
         Ok(Vec::clone(&content.ok_or_else(missing)?.now))
     }
 
     fn exists(&self, path: &str) -> io::Result<bool> {
-        Ok(self.operate(false)?.names.contains_key(path))
+        Ok(self.operate(path, false)?.names.contains_key(path))
     }
 
     fn list(&self, folder: &str) -> io::Result<Vec<String>> {
-        let state = self.operate(false)?;
+        let state = self.operate(folder, false)?;
         let own = state.names.keys().filter(|path| folder_of(path) == folder);
         Ok(own.map(|path| path.rsplit('/').next().unwrap_or_default().into()).collect())
     }
 
-    fn create_folder(&self, _folder: &str) -> io::Result<()> {
-        self.operate(true).map(drop)
+    fn create_folder(&self, folder: &str) -> io::Result<()> {
+        self.operate(folder, true).map(drop)
     }
 
     fn remove(&self, path: &str) -> io::Result<()> {
-        let mut state = self.operate(true)?;
+        let mut state = self.operate(path, true)?;
         state.names.remove(path).ok_or_else(missing)?;
         state.renamings.push(Renaming::Removed(path.into()));
         Ok(())
     }
 
     fn rename(&self, from: &str, to: &str) -> io::Result<()> {
-        let mut state = self.operate(true)?;
+        let mut state = self.operate(from, true)?;
         if state.names.contains_key(to) {
             return Err(io::ErrorKind::AlreadyExists.into());
         }
@@ -332,7 +335,7 @@ impl Files for SimulatedDisk {
     }
 
     fn sync_folder(&self, folder: &str) -> io::Result<()> {
-        let mut state = self.operate(true)?;
+        let mut state = self.operate(folder, true)?;
         let state = &mut *state;
         let names = &mut state.synced_names;
         state.renamings.retain(|renaming| {
@@ -346,7 +349,7 @@ impl Files for SimulatedDisk {
     }
 
     fn lock(&self, path: &str) -> io::Result<Option<Box<dyn Lock>>> {
-        let mut state = self.operate(false)?;
+        let mut state = self.operate(path, false)?;
         let is_free = state.locks.insert(path.into());
         Ok(is_free.then(|| Box::new(SimulatedLock { disk: self.clone(), path: path.into() }) as _))
     }
@@ -367,17 +370,18 @@ impl Drop for SimulatedLock {
 #[derive(Debug)]
 struct SimulatedFile {
     disk: SimulatedDisk,
+    path: String,
     file: u64,
 }
 
 impl SimulatedFile {
     fn change(&self, change: impl FnOnce(&mut Content)) -> io::Result<()> {
-        let mut state = self.disk.operate(true)?;
+        let mut state = self.disk.operate(&self.path, true)?;
         state.files.get_mut(&self.file).map(change).ok_or_else(missing)
     }
 
     fn inspect<T>(&self, inspect: impl FnOnce(&Content) -> io::Result<T>) -> io::Result<T> {
-        let state = self.disk.operate(false)?;
+        let state = self.disk.operate(&self.path, false)?;
         state.files.get(&self.file).ok_or_else(missing).and_then(inspect)
     }
 }

@@ -1,8 +1,8 @@
 //! What may be wrong with a stored world, in one message each.
 
-use std::io;
+use std::{fmt, io};
 
-use crate::terrain::{ReplayError, RestoreError};
+use crate::terrain::{ReplayError, RestoreError, Terrain};
 
 /// Why a world can't be opened, created or read.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +26,26 @@ pub enum StoreError {
         found: u32,
         /// The greatest schema that this version reads.
         known: u32,
+    },
+    /// A newer version of the database wrote its file. Nothing was changed.
+    #[error(
+        "the world was saved by a newer version: the file regions.redb has the format {found}, and this version reads up to {known}"
+    )]
+    NewerDatabase {
+        /// The format of the file.
+        found: u8,
+        /// The greatest format that this version reads.
+        known: u8,
+    },
+    /// The ground has another size than that of the saved world, which can't go on there. Nothing was changed.
+    #[error("the saved world has a ground of {saved}, and the one given has {given}: {why}")]
+    GroundSize {
+        /// The size of the ground that the world was saved with; at least so much, if that is all that is known.
+        saved: String,
+        /// The size of the ground that is given.
+        given: String,
+        /// Why it can't go on there, and what to do.
+        why: &'static str,
     },
     /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
     #[error("the ground has changed{}", if *.regions == 0 { String::new() } else { format!(" below {regions} saved regions") })]
@@ -85,12 +105,64 @@ pub enum StoreError {
         /// The record's.
         found: u64,
     },
+    /// The terrain has another size than the saved world. Nothing of it was written.
+    #[error("the saved world has {saved}, and the terrain has {given}: save it in another folder")]
+    OtherSize {
+        /// The size of the saved world.
+        saved: WorldSize,
+        /// That of the terrain.
+        given: WorldSize,
+    },
+    /// A server keeps the world of this terrain, and saves it.
+    #[error("the terrain is shared, so its server saves it: a world is saved or shared")]
+    Shared,
+    /// A terrain over another ground, or of another size, was put in the place of the one that the world was to be read for.
+    #[error(
+        "another level is in the place of the terrain that the world was read for, so it is not saved there"
+    )]
+    OtherTerrain,
     /// The store's thread is gone.
-    #[error("the store's thread has ended")]
+    #[error("the store's thread has ended: nothing is saved any more until the world is opened again")]
     Ended,
+    /// The disk does not answer, and what waits for it takes all the memory that it may. Nothing was taken.
+    #[error("too much waits to be saved, as the disk does not answer")]
+    Full,
+    /// The disk has not answered in time. What was given to the store is still written if it answers.
+    #[error("the disk has not answered in time")]
+    TimedOut,
     /// What has to be written can't be for now; it is kept in memory, and tried again.
     #[error("the world can't be saved for now: {0}")]
     NotSaved(String),
+}
+
+/// The sizes that a world keeps for as long as it is saved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorldSize {
+    /// Cells along x and along z.
+    pub cells: [u32; 2],
+    /// Cells along the side of a chunk.
+    pub chunk_size: u32,
+    /// Metres along the side of a voxel.
+    pub voxel_size: f32,
+}
+
+impl WorldSize {
+    /// The sizes of a terrain.
+    pub fn of(terrain: &Terrain) -> Self {
+        let (ground, grid) = (terrain.world().ground(), terrain.world().grid());
+        Self {
+            cells: [ground.width(), ground.depth()].map(i32::cast_unsigned),
+            chunk_size: grid.size().cast_unsigned(),
+            voxel_size: terrain.voxel_size(),
+        }
+    }
+}
+
+impl fmt::Display for WorldSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { cells: [width, depth], chunk_size, voxel_size } = self;
+        write!(f, "{width} x {depth} cells, chunks of {chunk_size} and voxels of {voxel_size} m")
+    }
 }
 
 impl StoreError {
@@ -110,6 +182,16 @@ pub enum StoreTrouble {
     /// Saving works again.
     #[error("saving works again")]
     SavedAgain,
+    /// The disk does not answer: a network share that is away, or a drive that is asleep. What is dug is kept in memory, up to
+    /// [`waiting_bytes`](super::StoreOptions::waiting_bytes), and is saved once it answers; [`SavedAgain`](Self::SavedAgain) says so.
+    #[error("the disk does not answer: what is dug is kept in memory until it does")]
+    Hanging,
+    /// Somebody else has the world open, and is waited for.
+    #[error("the world is open elsewhere: waiting until it is closed")]
+    WaitsForLock,
+    /// The store's thread has ended, which only a fault in this crate can cause. Nothing is saved any more.
+    #[error("saving has ended, and nothing is saved any more ({0}): save the world in another folder")]
+    Ended(String),
     /// The log got a gap, as too much waited to be saved, or came at once, or another world took the place of this one: it can no
     /// longer rebuild damaged regions. The world is saved whole instead.
     #[error("the log has a gap at revision {revision}, so the world is saved whole")]
@@ -120,43 +202,62 @@ pub enum StoreTrouble {
     /// The log ends in something that is no record: commits that were not durable yet when the power or the process went,
     /// or damage. A copy of it is kept.
     #[error(
-        "the log ends with {bytes} bytes that can't be read after revision {revision}; a copy is in {quarantine}"
+        "the log ends with {bytes} bytes that can't be read after revision {revision}{}",
+        copy(quarantine)
     )]
     LogCut {
         /// The last revision that was read.
         revision: u64,
         /// How much was left out.
         bytes: u64,
-        /// Where the copy is.
+        /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// The log leads to another world than it says, so what comes after was left out.
-    #[error("the log can't be replayed behind revision {revision}: {why}; a copy is in {quarantine}")]
+    #[error("the log can't be replayed behind revision {revision}: {why}{}", copy(quarantine))]
     LogRefused {
         /// The last revision that was replayed.
         revision: u64,
         /// What does not fit.
         why: String,
-        /// Where the copy is.
+        /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
-    /// A damaged part was rebuilt from the log; nothing is lost.
-    #[error("{what}; it has been rebuilt from the log, and a copy of what was there is in {quarantine}")]
+    /// A damaged part was rebuilt, from the log or from other files; nothing is lost.
+    #[error("{what}; it has been rebuilt, and nothing is lost{}", copy(quarantine))]
     Rebuilt {
         /// What was wrong, in words.
         what: String,
-        /// Where the copy is.
+        /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// A damaged region is lost: the ground there is as the world began.
     #[error(
-        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is as before anybody dug; a copy is in {quarantine}"
+        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is as before anybody dug{}",
+        copy(quarantine)
     )]
     RegionLost {
         /// The region, as `x y z` in units of 64 voxels.
         region: String,
-        /// Where the copy is.
+        /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
+    },
+    /// The log has gone, with all commits that were in it only: somebody removed the folder `journal` after a crash.
+    #[error("the log is missing: what was dug after revision {revision}, before the last crash, is lost")]
+    LogMissing {
+        /// The revision of the last checkpoint.
+        revision: u64,
+    },
+    /// Nothing is left of a world but regions: rules, data of the game's and what undo restored are lost. Only a world that is
+    /// [salvaged](super::StoreOptions::salvage) is opened then.
+    #[error("only regions are left of the world: its rules and the game's data are lost")]
+    CheckpointLost,
+    /// Commits that were in the log only were made by a version of the crate in which edits change the ground otherwise; they were
+    /// made again. The ground may differ a little there from what it was.
+    #[error("{commits} commits of another version, behind the last checkpoint, were made again")]
+    MadeAgain {
+        /// How many.
+        commits: u64,
     },
     /// The ground or the level is another one than the world was saved with; edits were kept or replayed.
     #[error("the ground or the level has changed below {regions} saved regions; the edits were {kept}")]
@@ -166,4 +267,9 @@ pub enum StoreTrouble {
         /// What became of the edits: "kept" or "replayed".
         kept: &'static str,
     },
+}
+
+/// Says where a copy is, if there is one.
+fn copy(quarantine: &str) -> String {
+    if quarantine.is_empty() { String::new() } else { format!("; a copy is in {quarantine}") }
 }

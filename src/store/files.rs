@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use redb::StorageBackend;
 use redb::backends::FileBackend;
 
-/// Files below one folder. Paths are relative to it, with `/` between their parts.
+/// Files below one folder. Paths are relative to it, with `/` between their parts. Errors should name the file, since they are shown
+/// to players as they are.
 pub trait Files: fmt::Debug + Send + Sync + 'static {
     /// How messages name the folder.
     fn name(&self) -> String;
@@ -115,14 +116,18 @@ pub trait OpenFile: fmt::Debug + Send + Sync {
     fn sync(&self) -> io::Result<()>;
 }
 
-/// The files of a folder of the system.
+/// The files of a folder of the system. The process may change its current folder: these stay where they are.
 #[derive(Clone, Debug)]
 pub struct Folder(PathBuf);
 
 impl Folder {
-    /// The files below a folder, which need not exist yet.
+    /// The files below a folder, which need not exist yet. A relative path, of which an empty one is one, is below the current
+    /// folder of now.
     pub fn new(path: impl Into<PathBuf>) -> Self {
-        Self(path.into())
+        let path: PathBuf = path.into();
+        let path = if path.as_os_str().is_empty() { PathBuf::from(".") } else { path };
+        // Without a current folder it stays relative, and nothing in it can be opened.
+        Self(std::path::absolute(&path).unwrap_or(path))
     }
 
     /// Where it is.
@@ -131,8 +136,19 @@ impl Folder {
     }
 
     fn at(&self, path: &str) -> PathBuf {
-        self.0.join(path)
+        if path.is_empty() { self.0.clone() } else { self.0.join(path) }
     }
+
+    /// Does something with a file; an error names it.
+    fn with<T>(&self, path: &str, work: impl FnOnce(&Path) -> io::Result<T>) -> io::Result<T> {
+        let at = self.at(path);
+        work(&at).map_err(|error| named(at.display(), &error))
+    }
+}
+
+/// An error that names the file.
+pub(super) fn named(file: impl fmt::Display, error: &io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{file}: {error}"))
 }
 
 impl Files for Folder {
@@ -141,30 +157,42 @@ impl Files for Folder {
     }
 
     fn open(&self, path: &str, opening: Opening) -> io::Result<Box<dyn OpenFile>> {
-        let mut options = OpenOptions::new();
-        options.read(true).write(true).create_new(opening == Opening::New);
-        let file = FileBackend::new(options.open(self.at(path))?).map_err(io::Error::other)?;
-        Ok(Box::new(file))
+        self.with(path, |at| {
+            let mut options = OpenOptions::new();
+            options.read(true).write(true).create_new(opening == Opening::New);
+            let (file, is_read_only) = match options.open(at) {
+                // What may not be written may still be read.
+                Err(error) if opening == Opening::Existing && is_read_only(&error) => (File::open(at)?, true),
+                opened => (opened?, false),
+            };
+            let pages = FileBackend::new(file).map_err(io::Error::other)?;
+            Ok(Box::new(FolderFile { pages, path: at.into(), is_read_only }) as Box<dyn OpenFile>)
+        })
     }
 
     fn read(&self, path: &str) -> io::Result<Vec<u8>> {
-        fs::read(self.at(path))
+        self.with(path, |at| fs::read(at))
     }
 
     fn exists(&self, path: &str) -> io::Result<bool> {
-        self.at(path).try_exists()
+        self.with(path, Path::try_exists)
     }
 
     fn list(&self, folder: &str) -> io::Result<Vec<String>> {
         let entries = match fs::read_dir(self.at(folder)) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-            entries => entries?,
+            entries => entries.map_err(|error| named(self.at(folder).display(), &error))?,
         };
         let mut names = Vec::new();
         for entry in entries {
             let entry = entry?;
+            // Links are followed, and one that leads nowhere is a file that can't be read.
+            let is_file = match fs::metadata(entry.path()) {
+                Ok(metadata) => metadata.is_file(),
+                Err(_) => !entry.file_type()?.is_dir(),
+            };
             // No file of a store has another name.
-            if let (true, Ok(name)) = (entry.file_type()?.is_file(), entry.file_name().into_string()) {
+            if let (true, Ok(name)) = (is_file, entry.file_name().into_string()) {
                 names.push(name);
             }
         }
@@ -173,38 +201,56 @@ impl Files for Folder {
     }
 
     fn create_folder(&self, folder: &str) -> io::Result<()> {
-        fs::create_dir_all(self.at(folder))
+        self.with(folder, |at| fs::create_dir_all(at))
     }
 
     fn remove(&self, path: &str) -> io::Result<()> {
-        fs::remove_file(self.at(path))
+        self.with(path, |at| fs::remove_file(at))
     }
 
     fn rename(&self, from: &str, to: &str) -> io::Result<()> {
-        // Only holders of the lock create files here, so nobody creates one in between.
-        if self.at(to).symlink_metadata().is_ok() {
-            return Err(io::ErrorKind::AlreadyExists.into());
-        }
-        fs::rename(self.at(from), self.at(to))
+        let to = self.at(to);
+        self.with(from, |from| {
+            // Only holders of the lock create files here, so nobody creates one in between.
+            if to.symlink_metadata().is_ok() {
+                return Err(named(to.display(), &io::ErrorKind::AlreadyExists.into()));
+            }
+            fs::rename(from, &to)
+        })
     }
 
     fn sync_folder(&self, folder: &str) -> io::Result<()> {
         // Windows has no way to, and needs none.
-        if cfg!(unix) { File::open(self.at(folder))?.sync_all() } else { Ok(()) }
+        if cfg!(unix) { self.with(folder, |at| File::open(at)?.sync_all()) } else { Ok(()) }
     }
 
     fn lock(&self, path: &str) -> io::Result<Option<Box<dyn Lock>>> {
-        let open = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(self.at(path));
-        let file = match open {
-            // On a read-only disk a lock that exists can be held all the same.
-            Err(error) if is_read_only(&error) => File::open(self.at(path)).map_err(|_| error)?,
-            opened => opened?,
-        };
-        match file.try_lock() {
-            Ok(()) => Ok(Some(Box::new(file))),
-            Err(TryLockError::WouldBlock) => Ok(None),
-            Err(TryLockError::Error(error)) => Err(error),
-        }
+        let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let folder = self.at(folder);
+        self.with(path, |at| {
+            let open = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(at);
+            let file = match open {
+                // On a read-only disk a lock that exists can be held all the same; where there is none, nobody can write.
+                Err(error) if is_read_only(&error) => match File::open(at) {
+                    Err(missing) if missing.kind() == io::ErrorKind::NotFound => None,
+                    opened => Some(opened.map_err(|_| error)?),
+                },
+                opened => Some(opened?),
+            };
+            if let Some(file) = &file {
+                match file.try_lock() {
+                    Ok(()) => {}
+                    Err(TryLockError::WouldBlock) => return Ok(None),
+                    Err(TryLockError::Error(error)) => return Err(error),
+                }
+            }
+            // A lock that looks stale may be removed while the world is open: the folder is locked too, where the system can do that.
+            let folder = File::open(folder).ok();
+            if let Some(Err(TryLockError::WouldBlock)) = folder.as_ref().map(File::try_lock) {
+                return Ok(None);
+            }
+            Ok(Some(Box::new((file, folder)) as Box<dyn Lock>))
+        })
     }
 }
 
@@ -212,50 +258,44 @@ fn is_read_only(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied)
 }
 
-impl OpenFile for FileBackend {
-    fn length(&self) -> io::Result<u64> {
-        self.len()
+/// A file of a folder.
+#[derive(Debug)]
+struct FolderFile {
+    pages: FileBackend,
+    path: PathBuf,
+    is_read_only: bool,
+}
+
+impl FolderFile {
+    fn named<T>(&self, done: io::Result<T>) -> io::Result<T> {
+        done.map_err(|error| named(self.path.display(), &error))
     }
 
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        self.read(offset, out)
-    }
-
-    fn write_at(&self, offset: u64, bytes: &[u8]) -> io::Result<()> {
-        self.write(offset, bytes)
-    }
-
-    fn set_length(&self, length: u64) -> io::Result<()> {
-        self.set_len(length)
-    }
-
-    fn sync(&self) -> io::Result<()> {
-        self.sync_data()
+    fn check_writable(&self) -> io::Result<()> {
+        self.named(if self.is_read_only { Err(io::ErrorKind::PermissionDenied.into()) } else { Ok(()) })
     }
 }
 
-/// A file as the database sees it.
-#[derive(Debug)]
-pub(super) struct Pages(pub Box<dyn OpenFile>);
-
-impl StorageBackend for Pages {
-    fn len(&self) -> io::Result<u64> {
-        self.0.length()
+impl OpenFile for FolderFile {
+    fn length(&self) -> io::Result<u64> {
+        self.named(self.pages.len())
     }
 
-    fn read(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        self.0.read_at(offset, out)
+    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        self.named(self.pages.read(offset, out))
     }
 
-    fn set_len(&self, len: u64) -> io::Result<()> {
-        self.0.set_length(len)
+    fn write_at(&self, offset: u64, bytes: &[u8]) -> io::Result<()> {
+        self.check_writable()?;
+        self.named(self.pages.write(offset, bytes))
     }
 
-    fn sync_data(&self) -> io::Result<()> {
-        self.0.sync()
+    fn set_length(&self, length: u64) -> io::Result<()> {
+        self.check_writable()?;
+        self.named(self.pages.set_len(length))
     }
 
-    fn write(&self, offset: u64, data: &[u8]) -> io::Result<()> {
-        self.0.write_at(offset, data)
+    fn sync(&self) -> io::Result<()> {
+        self.named(self.pages.sync_data())
     }
 }

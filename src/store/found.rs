@@ -2,22 +2,25 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 
 use super::checkpoint::Checkpoint;
-use super::database::{DATABASE, DatabaseError, Records};
+use super::checkpoint_copy;
+use super::database::DATABASE;
 use super::error::StoreError;
 use super::files::Files;
 use super::format::bytes::Reader;
 use super::format::change::read_change;
 use super::format::frame::{self, Kind, WorldId};
-use super::format::{self, FormatError};
+use super::format::{self, Batch, FormatError, Metadata};
 use super::keys::{self, Key};
 use super::progress::{Progress, Work};
-use super::salvage;
-use super::segment::{self, FRAME_LIMIT, Found, Frame};
+use super::segment::{self, Bad, FRAME_LIMIT, Found, Frame, MOST_NUMBER};
+use super::sources::{self, Source};
+use super::unsaved;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::WorldChange;
+use crate::terrain::{TerrainSettings, WorldChange};
 
 /// The share of opening after which the database is read, and all files.
 const DATABASE_READ: f32 = 0.08;
@@ -29,31 +32,44 @@ pub(super) struct RegionRecord {
     pub revision: u64,
     /// Hash of the ground below.
     pub ground: u64,
-    pub payload: Vec<u8>,
+    world: WorldId,
+    /// Its bytes. Unpacked they may be far more.
+    sealed: Box<[u8]>,
     /// Does it say how the region differs from the level below, instead of all that it holds?
-    pub is_change: bool,
+    is_change: bool,
 }
 
 impl RegionRecord {
-    fn open(record: &[u8], world: WorldId, key: &[u8]) -> Result<Self, FormatError> {
-        let open = |kind| frame::open(record, kind, world, key, FRAME_LIMIT);
-        let (opened, is_change) = match open(Kind::Region) {
-            Err(FormatError::Kind { .. }) => (open(Kind::RegionChange)?, true),
-            opened => (opened?, false),
+    fn open(record: Vec<u8>, world: WorldId, key: &[u8]) -> Result<Self, (FormatError, Vec<u8>)> {
+        let open = |kind| frame::open(&record, kind, world, key, FRAME_LIMIT);
+        let opened = match open(Kind::Region) {
+            Err(FormatError::Kind { .. }) => open(Kind::RegionChange).map(|opened| (opened, true)),
+            opened => opened.map(|opened| (opened, false)),
         };
-        let frame::Opened { revision, ground_hash: ground, payload } = opened;
-        Ok(Self { revision, ground, payload, is_change })
+        match opened {
+            Ok((frame::Opened { revision, ground_hash: ground, .. }, is_change)) => {
+                Ok(Self { revision, ground, world, sealed: record.into(), is_change })
+            }
+            Err(why) => Err((why, record)),
+        }
+    }
+
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        self.sealed.len()
     }
 
     /// What it holds, over a ground.
     pub fn decode(&self, at: RegionPos, ground: &Ground) -> Result<WorldChange, FormatError> {
+        let kind = if self.is_change { Kind::RegionChange } else { Kind::Region };
+        let payload = frame::open(&self.sealed, kind, self.world, &keys::region(at), FRAME_LIMIT)?.payload;
         if self.is_change {
-            let mut reader = Reader(&self.payload);
+            let mut reader = Reader(&payload);
             let change = read_change(&mut reader, ground)?;
             reader.end()?;
             return Ok(change);
         }
-        let (bricks, fields) = format::decode_region(&self.payload, at, ground)?;
+        let (bricks, fields) = format::decode_region(&payload, at, ground)?;
         let bricks = bricks.into_iter().map(|(pos, brick)| (pos, Some(brick))).collect();
         Ok(WorldChange { bricks, fields, ..WorldChange::default() })
     }
@@ -63,45 +79,49 @@ impl RegionRecord {
 pub(super) struct Contents {
     pub world: WorldId,
     pub segments: Vec<Found>,
-    pub database: Option<Records>,
-    /// What is wrong with the database, if it can't be used.
+    /// What is wrong with the file of regions, if it can't be used.
     pub damaged: Option<String>,
-    /// The checkpoints that the database holds: two alike, but for damage.
+    /// Whether there is a file of regions, so that a copy of what is damaged can be kept.
+    pub has_database: bool,
+    /// Whether the process that wrote the world last put all of it into a checkpoint.
+    is_closed: bool,
+    /// Whether the journal has gone in which there were commits.
+    pub has_lost_journal: bool,
+    /// Why the file of regions can't be read at the moment.
+    error: Option<io::Error>,
+    /// The checkpoints that the file of regions holds: two alike, but for damage.
     checkpoints: Vec<Checkpoint>,
-    /// Valid records of each region: one, but for what was salvaged from a damaged database.
+    /// The copies beside the journal.
+    copies: Vec<Checkpoint>,
+    /// Those of other files that may hold regions.
+    other_checkpoints: Vec<Checkpoint>,
+    /// Valid records of each region: one, but for what was salvaged from a damaged file.
     regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
+    /// Those of other files.
+    other_regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
     /// Records that are not valid, by region.
     pub invalid: BTreeMap<RegionPos, Vec<u8>>,
 }
 
 impl Contents {
-    /// Reads all of a world's files.
+    /// Reads all of a world's files, and changes nothing.
     pub fn read(files: &dyn Files, progress: Option<&Progress>) -> Result<Self, StoreError> {
         let numbers = segment::list(files).map_err(StoreError::files("reading the journal"))?;
         let reading = Work::until(progress, DATABASE_READ, 1);
-        let (database, damaged, raw) =
-            match Records::open(files).and_then(|open| Ok((open.read_all()?, open))) {
-                Ok((records, open)) => (Some(open), None, records),
-                Err(DatabaseError::Missing) if numbers.is_empty() => {
-                    return Err(StoreError::Missing("this folder".into()));
-                }
-                Err(error @ DatabaseError::Missing) => (None, Some(error.to_string()), Vec::new()),
-                Err(DatabaseError::Files(error)) => {
-                    return Err(StoreError::Files { doing: "reading the database", error });
-                }
-                Err(error @ DatabaseError::Damaged(_)) => {
-                    let bytes = files.read(DATABASE).map_err(StoreError::files("reading the database"))?;
-                    (None, Some(error.to_string()), salvage::records(&bytes))
-                }
-            };
+        let source = Source::read(files, DATABASE)?;
+        let has_database = !matches!(source, Source::Missing);
+        let (raw, damaged, error) = match source {
+            Source::Whole(raw) => (raw, None, None),
+            Source::Damaged { what, records } => (records, Some(what), None),
+            Source::Missing => (Vec::new(), Some(format!("the file {DATABASE} is missing")), None),
+            Source::Unreadable(error) => {
+                let what = format!("the file {DATABASE} can't be read: {error}");
+                (Vec::new(), Some(what), Some(error))
+            }
+        };
         reading.finish();
         let reading = Work::until(progress, FILES_READ, numbers.len() as u64);
-        let mut world =
-            raw.iter().filter(|(key, _)| keys::CHECKPOINTS.contains(&&key[..])).find_map(|(key, record)| {
-                let peeked = frame::peek(record)?;
-                frame::open(record, Kind::Checkpoint, peeked.world, key, FRAME_LIMIT).ok()?;
-                Some(peeked.world)
-            });
+        let mut world = world_of(&raw, true);
         let mut segments = Vec::with_capacity(numbers.len());
         for number in numbers {
             let found = segment::read(files, world, number);
@@ -111,47 +131,88 @@ impl Contents {
             segments.push(found);
             reading.advance(1);
         }
-        let world = match world {
-            Some(world) => world,
-            None => Self::no_world(&raw)?,
-        };
+        let numbers = segments.iter().flat_map(|found| {
+            let own = found.frames.iter().map(|frame| frame.number);
+            own.chain((found.length > 0).then_some(found.number))
+        });
+        if numbers.max() > Some(MOST_NUMBER / 2) {
+            return Err(StoreError::Unreadable(
+                "the numbers in its journal leave none for what follows".into(),
+            ));
+        }
+        let unsaved = unsaved::read(files);
+        let is_there = |first: u64| segments.iter().any(|found| found.number >= first);
         let mut contents = Self {
-            world,
-            segments,
-            database,
+            world: world.unwrap_or_default(),
             damaged,
+            has_database,
+            is_closed: unsaved.is_none(),
+            has_lost_journal: unsaved.is_some_and(|first| !is_there(first)),
+            segments,
+            error,
             checkpoints: Vec::new(),
+            copies: Vec::new(),
+            other_checkpoints: Vec::new(),
             regions: BTreeMap::new(),
+            other_regions: BTreeMap::new(),
             invalid: BTreeMap::new(),
         };
+        let mut others = Vec::new();
+        if contents.damaged.is_some() {
+            // An interrupted step may have left more.
+            for path in sources::others(files).map_err(StoreError::files("reading the regions"))? {
+                if let Ok(source @ (Source::Whole(_) | Source::Damaged { .. })) = Source::read(files, &path) {
+                    world = world.or_else(|| world_of(source.records(), true));
+                    others.push(source);
+                }
+            }
+        }
+        // One that is whole goes before what is left of another.
+        others.sort_by_key(|source| matches!(source, Source::Damaged { .. }));
+        let all = || std::iter::once(&raw[..]).chain(others.iter().map(Source::records));
+        match world.or_else(|| all().find_map(|records| world_of(records, false))) {
+            Some(world) => contents.world = world,
+            None => return Err(contents.no_world(&raw)?),
+        }
         for (key, record) in raw {
             contents.enter(&key, record)?;
+        }
+        for source in others {
+            contents.enter_others(source);
+        }
+        for copy in checkpoint_copy::read(files, contents.world) {
+            match copy {
+                Ok(copy) => contents.copies.extend(decode_checkpoint(&copy)),
+                Err(error) => refuse_newer(error.newer_schema())?,
+            }
         }
         reading.finish();
         Ok(contents)
     }
 
     /// Nothing says which world it is.
-    fn no_world(raw: &[(Vec<u8>, Vec<u8>)]) -> Result<WorldId, StoreError> {
-        let of_record = |(key, record): &(Vec<u8>, Vec<u8>)| {
-            let world = frame::peek(record)?.world;
-            frame::open(record, Kind::Checkpoint, world, key, FRAME_LIMIT).err()?.newer_schema()
-        };
-        refuse_newer(raw.iter().find_map(of_record))?;
-        Err(StoreError::Unreadable("neither journal nor database hold a valid record".into()))
+    fn no_world(&mut self, raw: &[(Vec<u8>, Vec<u8>)]) -> Result<StoreError, StoreError> {
+        let newer = |(key, record): &(Vec<u8>, Vec<u8>)| sources::check(key, record).err()?.newer_schema();
+        refuse_newer(raw.iter().find_map(newer))?;
+        let segment = self.segments.iter_mut().find_map(|found| found.error.take());
+        Ok(match (self.error.take(), segment) {
+            (Some(error), _) => StoreError::Files { doing: "reading the regions", error },
+            (None, Some(error)) => StoreError::Files { doing: "reading the journal", error },
+            (None, None) => StoreError::Unreadable("neither journal nor database hold a valid record".into()),
+        })
     }
 
     fn enter(&mut self, key: &[u8], record: Vec<u8>) -> Result<(), StoreError> {
         match Key::of(key) {
             Some(Key::Checkpoint) => {
                 match frame::open(&record, Kind::Checkpoint, self.world, key, FRAME_LIMIT) {
-                    Ok(opened) => self.checkpoints.extend(Checkpoint::decode(&opened.payload)),
+                    Ok(opened) => self.checkpoints.extend(decode_checkpoint(&opened.payload)),
                     Err(error) => refuse_newer(error.newer_schema())?,
                 }
             }
-            Some(Key::Region(at)) => match RegionRecord::open(&record, self.world, key) {
+            Some(Key::Region(at)) => match RegionRecord::open(record, self.world, key) {
                 Ok(found) => self.regions.entry(at).or_default().push(found),
-                Err(error) => {
+                Err((error, record)) => {
                     refuse_newer(error.newer_schema())?;
                     self.invalid.insert(at, record);
                 }
@@ -161,31 +222,108 @@ impl Contents {
         Ok(())
     }
 
+    /// Enters what another file holds than the one in place.
+    fn enter_others(&mut self, source: Source) {
+        let (Source::Whole(records) | Source::Damaged { records, .. }) = source else { return };
+        for (key, record) in records {
+            match Key::of(&key) {
+                Some(Key::Checkpoint) => {
+                    let opened = frame::open(&record, Kind::Checkpoint, self.world, &key, FRAME_LIMIT);
+                    let checkpoint = opened.ok().and_then(|opened| decode_checkpoint(&opened.payload));
+                    self.other_checkpoints.extend(checkpoint);
+                }
+                Some(Key::Region(at)) => {
+                    let known = self.other_regions.entry(at).or_default();
+                    if let Ok(found) = RegionRecord::open(record, self.world, &key)
+                        && known.iter().all(|own| own.revision != found.revision)
+                    {
+                        known.push(found);
+                    }
+                }
+                None => {}
+            }
+        }
+    }
+
     /// The record of a region at a revision.
     pub fn region(&self, at: RegionPos, revision: u64) -> Option<&RegionRecord> {
-        self.regions.get(&at)?.iter().find(|record| record.revision == revision)
+        let all = [&self.regions, &self.other_regions].into_iter().filter_map(|own| own.get(&at));
+        all.flatten().find(|record| record.revision == revision)
     }
 
     /// Bytes of the regions of a checkpoint.
     pub fn bytes_of(&self, checkpoint: &Checkpoint) -> u64 {
         let records = checkpoint.regions.iter().filter_map(|(at, revision)| self.region(*at, *revision));
-        records.map(|record| record.payload.len() as u64).sum()
+        records.map(|record| record.bytes() as u64).sum()
     }
 
-    /// The checkpoint to start from: that which most regions agree with, the database's or a segment's.
+    /// The checkpoints in the journal, all of which the database had.
+    fn heads(&self) -> impl Iterator<Item = Checkpoint> {
+        let heads = self.segments.iter().filter_map(|found| decode_checkpoint(&found.checkpoint()?));
+        heads.chain(self.copies.iter().cloned())
+    }
+
+    /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, with which most regions
+    /// agree. It is the database's, a segment's, or that of another file if the database has none.
     pub fn choose_checkpoint(&self) -> Option<Checkpoint> {
-        let heads = self.segments.iter().filter_map(|found| Checkpoint::decode(found.checkpoint.as_deref()?));
-        let all = self.checkpoints.iter().cloned().chain(heads);
+        let heads: Vec<Checkpoint> = self.heads().collect();
+        let others = if self.checkpoints.is_empty() { &self.other_checkpoints[..] } else { &[] };
+        // A damaged database may hold a checkpoint that was never finished, and other files may be old: they say nothing about what
+        // the latest state is.
+        let finished = if self.damaged.is_none() { &self.checkpoints[..] } else { &[] };
+        let known = heads.iter().chain(finished).map(|checkpoint| checkpoint.frame);
+        let latest = known.chain([self.greatest_frame()]).max().unwrap_or_default();
+        let runs = self.frame_runs();
+        let reached = |from: u64| {
+            let run = runs.range(..=from.saturating_add(1)).next_back();
+            run.map_or(from, |(_, last)| from.max(*last))
+        };
+        // Those that lie beside their regions come first: over another ground, regions have the same revisions and other content.
+        let all = self.checkpoints.iter().chain(others).chain(&heads);
         // Among equals the newest, after which least has to be replayed.
-        all.min_by_key(|checkpoint| (self.disagreeing(checkpoint), Reverse(checkpoint.frame)))
+        let rank = |checkpoint: &&Checkpoint| {
+            let (missing, unknown) = self.disagreeing(checkpoint);
+            let lag = latest.saturating_sub(reached(checkpoint.frame));
+            (lag, missing, unknown, Reverse(checkpoint.frame))
+        };
+        all.min_by_key(rank).cloned()
     }
 
-    /// How many regions are not as a checkpoint says.
-    fn disagreeing(&self, checkpoint: &Checkpoint) -> usize {
-        let said = |(at, revision): &(&RegionPos, &u64)| self.region(**at, **revision).is_none();
+    /// The first and the last number of frames that follow each other.
+    fn frame_runs(&self) -> BTreeMap<u64, u64> {
+        let frames = self.segments.iter().flat_map(|found| &found.frames);
+        let numbers: BTreeSet<u64> = frames.map(|frame| frame.number).collect();
+        let mut runs = BTreeMap::<u64, u64>::new();
+        for number in numbers {
+            match runs.last_entry() {
+                Some(mut last) if *last.get() + 1 == number => drop(last.insert(number)),
+                _ => drop(runs.insert(number, number)),
+            }
+        }
+        runs
+    }
+
+    /// A checkpoint of all regions that were found, where none is left: rules, data of the game's and what was where nothing is
+    /// left are unknown.
+    pub fn assume_checkpoint(&self) -> Checkpoint {
+        let mut regions = BTreeMap::new();
+        for (at, records) in self.regions.iter().chain(&self.other_regions) {
+            let latest = records.iter().map(|record| record.revision).max().unwrap_or_default();
+            let known = regions.entry(*at).or_insert(latest);
+            *known = latest.max(*known);
+        }
+        let revision = regions.values().copied().max().unwrap_or_default();
+        let settings = TerrainSettings::default();
+        let metadata = Metadata { settings, revision, ..Metadata::default() };
+        Checkpoint { frame: 0, metadata, regions, level: None, cells: None }
+    }
+
+    /// How many regions of a checkpoint are not there as it says, and how many others are.
+    fn disagreeing(&self, checkpoint: &Checkpoint) -> (usize, usize) {
+        let is_missing = |(at, revision): &(&RegionPos, &u64)| self.region(**at, **revision).is_none();
         let found = self.regions.keys().chain(self.invalid.keys());
         let unknown: BTreeSet<_> = found.filter(|at| !checkpoint.regions.contains_key(at)).collect();
-        checkpoint.regions.iter().filter(said).count() + unknown.len()
+        (checkpoint.regions.iter().filter(is_missing).count(), unknown.len())
     }
 
     /// The frames from a number on for as long as none is missing.
@@ -206,6 +344,85 @@ impl Contents {
         let frames = self.segments.iter().flat_map(|found| &found.frames);
         frames.map(|frame| frame.number).max().unwrap_or_default()
     }
+
+    /// Whether the log leads to a checkpoint, as far as its last commit before it says: one of another branch of the same world
+    /// does not.
+    pub fn leads_to(&self, checkpoint: &Checkpoint) -> bool {
+        let metadata = &checkpoint.metadata;
+        match self.last_commit(checkpoint.frame) {
+            Ok(last) => last.is_none_or(|last| last == (metadata.revision, metadata.hash)),
+            Err(_) => false,
+        }
+    }
+
+    /// Whether the log holds commits up to a revision.
+    pub fn reaches(&self, revision: u64) -> bool {
+        self.last_commit(u64::MAX).is_ok_and(|last| last.is_some_and(|(last, _)| last >= revision))
+    }
+
+    /// Revision and hash after the last commit in frames up to a number.
+    fn last_commit(&self, frame: u64) -> Result<Option<(u64, u64)>, FormatError> {
+        // Revisions and hashes do not depend on it.
+        let any_ground = Ground::flat(1, 1, 0.0).map_err(|_| FormatError::Invalid("ground"))?;
+        let frames = self.segments.iter().flat_map(|found| &found.frames);
+        let mut before: Vec<&Frame> = frames.filter(|own| own.number <= frame).collect();
+        before.sort_by_key(|own| Reverse(own.number));
+        for frame in before {
+            let batch = Batch::decode(&frame.payload()?, &any_ground)?;
+            if let Some(last) = batch.commits.last() {
+                return Ok(Some((last.revision, last.hash)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether regions are stored as they differ from a level.
+    pub fn is_on_level(&self) -> bool {
+        self.regions.values().chain(self.other_regions.values()).flatten().any(|record| record.is_change)
+    }
+
+    /// Whether what can't be read of a segment makes no difference to a world at a frame: frames that follow are part of it, or the
+    /// one that began there is.
+    pub fn is_harmless(&self, segment: u64, bad: &Bad, frame: u64) -> bool {
+        let is_part = |own: &Frame| own.number <= frame;
+        let is_after = |own: &Found, at: &Frame| {
+            own.number > segment || own.number == segment && at.range.start >= bad.range.end
+        };
+        let mut all = self.segments.iter().flat_map(|own| own.frames.iter().map(move |at| (own, at)));
+        let begins = bad.number.is_some_and(|number| (1..=frame).contains(&number));
+        begins || all.any(|(own, at)| is_after(own, at) && is_part(at))
+    }
+
+    /// Refuses a world of which a file can't be read at the moment, if something may be in that file only.
+    pub fn refuse_unread(&mut self, frame: u64, is_rebuilt: bool) -> Result<(), StoreError> {
+        if let Some(error) = self.error.take_if(|_| !is_rebuilt) {
+            return Err(StoreError::Files { doing: "reading the regions", error });
+        }
+        let is_missed = |found: &Found| {
+            let is_harmless =
+                self.is_closed || found.bad.iter().all(|bad| self.is_harmless(found.number, bad, frame));
+            found.error.is_some() && !is_harmless
+        };
+        let missed = self.segments.iter().position(is_missed);
+        match missed.and_then(|at| self.segments.get_mut(at)?.error.take()) {
+            Some(error) => Err(StoreError::Files { doing: "reading the journal", error }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The world that records belong to: that of a checkpoint, or of any valid record.
+fn world_of(records: &[(Vec<u8>, Vec<u8>)], is_checkpoint: bool) -> Option<WorldId> {
+    let is_asked = |(key, _): &&(Vec<u8>, Vec<u8>)| keys::CHECKPOINTS.contains(&&key[..]) == is_checkpoint;
+    records.iter().filter(is_asked).find_map(|(key, record)| sources::check(key, record).ok())
+}
+
+/// A checkpoint whose numbers others can follow.
+fn decode_checkpoint(payload: &[u8]) -> Option<Checkpoint> {
+    let checkpoint = Checkpoint::decode(payload)?;
+    let Metadata { revision, next_field, .. } = checkpoint.metadata;
+    let numbers = checkpoint.regions.values().copied().chain([checkpoint.frame, revision, next_field]);
+    (numbers.max() <= Some(MOST_NUMBER / 2)).then_some(checkpoint)
 }
 
 /// A world that a newer version wrote to is left alone, whole: what this version can't read is no damage.
@@ -222,6 +439,7 @@ mod tests {
 
     use glam::Vec3;
 
+    use super::super::database::{self, Records};
     use super::super::{Store, StoreOptions};
     use super::*;
     use crate::brush::{Brush, Shape};
@@ -248,6 +466,11 @@ mod tests {
         newer(&mut bytes[last]);
     }
 
+    /// The records of a disk's database.
+    fn all(disk: &SimulatedDisk) -> Vec<(Vec<u8>, Vec<u8>)> {
+        database::read_all(disk.read(DATABASE).unwrap()).unwrap()
+    }
+
     /// A world with a checkpoint and a tail.
     fn world(ground: &Arc<Ground>) -> SimulatedDisk {
         let disk = SimulatedDisk::new();
@@ -264,6 +487,41 @@ mod tests {
     }
 
     #[test]
+    fn numbers_that_no_others_can_follow_are_none() {
+        let ground = Arc::new(Ground::flat(64, 64, 4.0).unwrap());
+        for which in ["frame", "revision", "field", "region"] {
+            for number in [u64::MAX, u64::MAX - 1, MOST_NUMBER + 1] {
+                let disk = world(&ground);
+                let expected = {
+                    let opened = Store::open_in(
+                        Arc::new(disk.image().lose_process()),
+                        Arc::clone(&ground),
+                        StoreOptions::default(),
+                    );
+                    opened.unwrap().1.terrain
+                };
+                for (key, record) in all(&disk).into_iter().filter(|(key, _)| key.len() == 1) {
+                    let world = frame::peek(&record).unwrap().world;
+                    let opened = frame::open(&record, Kind::Checkpoint, world, &key, FRAME_LIMIT).unwrap();
+                    let mut crafted = Checkpoint::decode(&opened.payload).unwrap();
+                    match which {
+                        "frame" => crafted.frame = number,
+                        "revision" => crafted.metadata.revision = number,
+                        "field" => crafted.metadata.next_field = number,
+                        _ => crafted.regions.values_mut().for_each(|revision| *revision = number),
+                    }
+                    let record = frame::seal(Kind::Checkpoint, world, &key, 1, 0, &crafted.encode());
+                    Records::open(&disk).unwrap().write(&[(key, Some(record))]).unwrap();
+                }
+                let (files, options) = (Arc::new(disk.clone()), StoreOptions::default());
+                super::super::inspect_in(&disk).unwrap();
+                let (_, opened) = Store::open_in(files, Arc::clone(&ground), options).unwrap();
+                assert_eq!(opened.terrain.world().hash(), expected.world().hash(), "{which} {number}");
+            }
+        }
+    }
+
+    #[test]
     fn what_a_newer_version_wrote_is_refused_and_left_alone() {
         let ground = Arc::new(Ground::flat(64, 64, 4.0).unwrap());
         for which in ["nothing", "checkpoint", "region", "journal"] {
@@ -272,11 +530,10 @@ mod tests {
                 let number = *segment::list(&disk).unwrap().last().unwrap();
                 disk.damage(&segment::path(number), |bytes| newer_journal(bytes));
             } else if which != "nothing" {
-                let records = Records::open(&disk).unwrap();
-                for (key, mut record) in records.read_all().unwrap() {
+                for (key, mut record) in all(&disk) {
                     if keys::CHECKPOINTS.contains(&&key[..]) == (which == "checkpoint") {
                         newer(&mut record);
-                        records.write(&[(key, Some(record))]).unwrap();
+                        Records::open(&disk).unwrap().write(&[(key, Some(record))]).unwrap();
                     }
                 }
             }
@@ -284,11 +541,7 @@ mod tests {
                 let log = disk.paths().into_iter().filter(|path| path.starts_with(segment::FOLDER));
                 let log: Vec<_> = log.map(|path| (disk.read(&path).unwrap(), path)).collect();
                 let is_copy = |path: &&String| path.starts_with("quarantine");
-                (
-                    log,
-                    disk.paths().iter().filter(is_copy).count(),
-                    Records::open(disk).unwrap().read_all().unwrap(),
-                )
+                (log, disk.paths().iter().filter(is_copy).count(), all(disk))
             };
             let before = content(&disk);
             let opened = Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), StoreOptions::default());

@@ -1,20 +1,22 @@
 //! Looking at a world without playing it: what tools print, check and replay.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::base_level::{BaseLevel, LevelName};
-use super::error::StoreError;
+use super::error::{StoreError, StoreTrouble};
 use super::files::{Files, Folder};
 use super::format::Batch;
 use super::format::frame::WorldId;
 use super::found::Contents;
 use super::keys;
-use super::open_store::{has_world, take_lock};
+use super::open_store::take_lock;
 use super::options::{BaseChanged, StoreOptions};
 use super::recover::{self, recover};
-use super::segment;
+use super::segment::{self, Bad};
 use super::shared::apply_game;
+use super::sources::has_world;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
 
@@ -34,6 +36,8 @@ pub struct WorldInfo {
     pub simulation: u32,
     /// Hash of its ground.
     pub ground: u64,
+    /// Cells of its ground along x and z; `None` if an older version saved it.
+    pub ground_size: Option<(u32, u32)>,
     /// The level that it was begun on, from which its regions differ.
     pub level: Option<LevelName>,
     /// The revision of its last checkpoint.
@@ -74,14 +78,8 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
     let mut region_bytes = 0;
     for (at, revision) in &checkpoint.regions {
         match contents.region(*at, *revision) {
-            Some(record) => region_bytes += record.payload.len() as u64,
+            Some(record) => region_bytes += record.bytes() as u64,
             None => damage.push(format!("the record of the region {} can't be read", keys::name(*at))),
-        }
-    }
-    for found in &contents.segments {
-        let bytes: usize = found.bad.iter().map(ExactSizeIterator::len).sum();
-        if bytes > 0 {
-            damage.push(format!("{} holds {bytes} bytes that can't be read", segment::path(found.number)));
         }
     }
     let metadata = &checkpoint.metadata;
@@ -89,8 +87,10 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
     let mut game = metadata.game.iter().cloned().collect();
     // Revisions and hashes do not depend on it.
     let any_ground = Ground::flat(1, 1, 0.0).map_err(|why| StoreError::Unreadable(why.to_string()))?;
+    let mut frame_before = checkpoint.frame;
     for frame in contents.frames_from(checkpoint.frame + 1) {
-        let Ok(batch) = Batch::decode(&frame.payload, &any_ground) else {
+        let batch = frame.payload().and_then(|payload| Batch::decode(&payload, &any_ground));
+        let Ok(batch) = batch else {
             damage.push(format!("the frame {} of the journal can't be read", frame.number));
             break;
         };
@@ -98,7 +98,9 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
             (revision, hash) = (last.revision, last.hash);
         }
         apply_game(&mut game, &batch.game);
+        frame_before = frame.number;
     }
+    damage.extend(journal_troubles(&contents, frame_before, revision));
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     Ok(WorldInfo {
@@ -108,13 +110,15 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
         settings: metadata.settings,
         simulation: metadata.simulation,
         ground: metadata.ground,
+        ground_size: checkpoint.cells.map(|size| (size.width, size.depth)),
         level: checkpoint.level.clone(),
         checkpoint: metadata.revision,
         regions: checkpoint.regions.len(),
         region_bytes,
         segments: contents.segments.len(),
-        log_bytes: contents.segments.iter().map(|found| found.length as u64).sum(),
-        is_log_whole: last >= checkpoint.frame.max(contents.greatest_frame()),
+        log_bytes: contents.segments.iter().map(|found| segment::on_disk(found.length as u64)).sum(),
+        is_log_whole: last >= checkpoint.frame.max(contents.greatest_frame())
+            && contents.leads_to(&checkpoint),
         game: game.into_iter().map(|(key, bytes): (String, Vec<u8>)| (key, bytes.len())).collect(),
         damage,
     })
@@ -128,16 +132,42 @@ fn read(files: &dyn Files) -> Result<(Box<dyn super::files::Lock>, Contents), St
     Ok((lock, Contents::read(files, None)?))
 }
 
-/// What a check of a world found.
+/// What can't be read of the journal and matters to a world at a frame, in words.
+fn journal_troubles(contents: &Contents, frame: u64, revision: u64) -> Vec<String> {
+    let mut troubles = Vec::new();
+    for found in &contents.segments {
+        let matters = |bad: &&Bad| !contents.is_harmless(found.number, bad, frame);
+        let bytes: usize = found.bad.iter().filter(matters).map(|bad| bad.range.len()).sum();
+        let path = segment::path(found.number);
+        match &found.error {
+            Some(error) => troubles.push(format!("{path} can't be read: {error}")),
+            None if bytes > 0 => troubles.push(format!("{path} holds {bytes} bytes that can't be read")),
+            None => {}
+        }
+    }
+    if contents.greatest_frame() > frame {
+        troubles.push(format!("the log has frames behind a gap after revision {revision}"));
+    }
+    if contents.has_lost_journal {
+        troubles.push(StoreTrouble::LogMissing { revision }.to_string());
+    }
+    troubles
+}
+
+/// A world as it was read.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct WorldCheck {
+    /// Its name.
+    pub world: WorldId,
     /// The world as opening it would bring it back.
     pub terrain: Terrain,
+    /// Data of the game's, by key.
+    pub game: BTreeMap<String, Vec<u8>>,
     /// What opening it would tell.
     pub troubles: Vec<String>,
-    /// Was the whole log replayed from the first commit, and did it lead to the same world? `None` if it does not reach back so
-    /// far.
+    /// Was the whole log replayed from the first commit, and did it lead to the same world? `None` if it was not replayed, or does
+    /// not reach back so far.
     pub replays: Option<bool>,
 }
 
@@ -163,35 +193,63 @@ pub fn check_in(
     ground: impl Into<Arc<Ground>>,
     level: Option<&BaseLevel>,
 ) -> Result<WorldCheck, StoreError> {
-    let ground = ground.into();
-    let (_lock, contents) = read(files)?;
+    look(files, &ground.into(), level, true)
+}
+
+/// Reads the world in a folder, over its ground and its level if it has one, without changing it, and without replaying its log from
+/// the first commit on.
+///
+/// # Errors
+/// As for [`check`].
+pub fn read_world(
+    folder: impl AsRef<Path>,
+    ground: impl Into<Arc<Ground>>,
+    level: Option<&BaseLevel>,
+) -> Result<WorldCheck, StoreError> {
+    look(&Folder::new(folder.as_ref()), &ground.into(), level, false)
+}
+
+fn look(
+    files: &dyn Files,
+    ground: &Arc<Ground>,
+    level: Option<&BaseLevel>,
+    replays: bool,
+) -> Result<WorldCheck, StoreError> {
+    let (_lock, mut contents) = read(files)?;
     let level = level.cloned();
     let options = StoreOptions { base_changed: BaseChanged::Refuse, level, ..StoreOptions::default() };
-    let recovered = recover(&contents, &ground, &options)?;
-    let told = recover::troubles(&recovered, &std::collections::BTreeMap::new());
-    let mut troubles: Vec<String> = contents.damaged.iter().cloned().collect();
-    troubles.extend(told.iter().map(ToString::to_string));
+    let recovered = recover(&contents, ground, &options)?;
+    contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
+    // Nothing was copied, as nothing was changed.
+    let told = recovered.findings.troubles(&BTreeMap::new(), contents.damaged.as_deref(), None);
+    let mut troubles: Vec<String> = told.iter().map(ToString::to_string).collect();
     troubles.extend(recovered.refused.iter().map(|why| format!("the log can't be replayed: {why}")));
-    if contents.greatest_frame() > recovered.frame {
-        troubles
-            .push(format!("the log has frames behind a gap after revision {}", recovered.mirror.revision));
-    }
-    for found in &contents.segments {
-        let bytes: usize = found.bad.iter().map(ExactSizeIterator::len).sum();
-        if bytes > 0 {
-            troubles.push(format!("{} holds {bytes} bytes that can't be read", segment::path(found.number)));
+    troubles.extend(journal_troubles(&contents, recovered.frame, recovered.mirror.revision));
+    let is_asked = replays && recovered.is_log_whole;
+    let replays = is_asked.then(|| {
+        let world = recovered.terrain.world();
+        let level = recovered.mirror.level.as_ref();
+        let other = recover::replay_all(&contents, ground, recovered.settings(), level)
+            .map_err(|why| format!("the log does not lead to the world: {why}"))?;
+        let (found, expected) = (other.world().hash(), world.hash());
+        match found == expected && other.world().revision() == world.revision() {
+            true => Ok(()),
+            false => Err(format!(
+                "the log leads to another world, with the hash {found:#018x} and not {expected:#018x}"
+            )),
         }
-    }
-    let world = recovered.terrain.world();
-    let replays = recovered.is_log_whole.then(|| {
-        let replayed =
-            recover::replay_all(&contents, &ground, recovered.settings(), recovered.mirror.level.as_ref());
-        replayed.is_ok_and(|other| {
-            let other = other.world();
-            (other.hash(), other.revision()) == (world.hash(), world.revision())
-        })
     });
-    Ok(WorldCheck { terrain: recovered.terrain, troubles, replays })
+    if let Some(Err(why)) = &replays {
+        troubles.push(why.clone());
+    }
+    if recovered.has_other_log {
+        troubles.push(
+            "the log does not lead to the last checkpoint: it is that of another branch of the world".into(),
+        );
+    }
+    let replays = replays.map(|replayed| replayed.is_ok());
+    let (world, game) = (contents.world, recovered.mirror.game);
+    Ok(WorldCheck { world, terrain: recovered.terrain, game, troubles, replays })
 }
 
 /// Replays the log of the world in a folder from the first commit on, over this ground and its level if it has one, and verifies

@@ -7,12 +7,18 @@ use std::sync::Arc;
 use super::files::{Files, OpenFile, Opening};
 use super::format::frame::WorldId;
 use super::segment::{self, FOLDER};
+use super::unsaved;
+
+/// The most bytes of a segment. Whole segments are removed, so the log is cut in steps of this.
+const SEGMENT_BYTES: u64 = 1 << 20;
+
+/// How many segments a log has at least when it is as long as it may be.
+const LEAST_SEGMENTS: u64 = 16;
 
 /// A frame that is not durable yet.
 #[derive(Debug)]
 struct Waiting {
     frame: u64,
-    revision: u64,
     entry: Vec<u8>,
 }
 
@@ -50,8 +56,8 @@ pub(super) struct Journal {
     next_segment: u64,
     /// The head of the next segment: a revision and its checkpoint.
     head: (u64, Vec<u8>),
-    /// The revision of the last frame that was written.
-    written: Option<u64>,
+    /// Whether it was entered that there are commits.
+    is_entered: bool,
 }
 
 impl Journal {
@@ -77,7 +83,7 @@ impl Journal {
             next_frame,
             next_segment,
             head,
-            written: None,
+            is_entered: false,
         }
     }
 
@@ -102,7 +108,7 @@ impl Journal {
         self.next_frame += 1;
         let entry = segment::entry(self.world, self.base, frame, revision, payload);
         self.waiting_bytes += entry.len();
-        self.waiting.push_back(Waiting { frame, revision, entry });
+        self.waiting.push_back(Waiting { frame, entry });
     }
 
     /// Drops the frames that are not durable yet, and leaves a gap in their numbers.
@@ -112,28 +118,32 @@ impl Journal {
         self.next_frame += 1;
     }
 
-    /// Makes all frames durable. Returns the revision of the last one if there was any.
-    pub fn write(&mut self) -> io::Result<Option<u64>> {
-        let Some(last) = self.waiting.back() else { return Ok(None) };
-        let (frame, revision) = (last.frame, last.revision);
-        let written = self.write_waiting(frame);
+    /// Makes all frames durable.
+    pub fn write(&mut self) -> io::Result<()> {
+        let Some(last) = self.waiting.back() else { return Ok(()) };
+        let written = self.write_waiting(last.frame);
         if written.is_err() {
             // Nothing is known of what it holds: all goes into another one.
             if let Some(current) = self.current.take().filter(|current| current.is_fresh) {
                 // It may stay, as frames that come twice are harmless.
                 drop(self.files.remove(&segment::path(current.number)));
             }
-            return written.map(|()| None);
+            return written;
         }
         self.waiting.clear();
         self.waiting_bytes = 0;
-        self.written = Some(revision);
-        Ok(Some(revision))
+        Ok(())
     }
 
-    /// The revision of the last frame that was made durable.
-    pub fn written(&self) -> Option<u64> {
-        self.written
+    /// Whether any segment is on the disk.
+    pub fn has_segments(&self) -> bool {
+        !self.segments.is_empty()
+    }
+
+    /// Whether the segment that is written is as long as one should be in a log of so many bytes.
+    pub fn is_long(&self, log_bytes: u64) -> bool {
+        let most = SEGMENT_BYTES.min(log_bytes / LEAST_SEGMENTS);
+        self.current.as_ref().is_some_and(|current| current.end >= most)
     }
 
     fn write_waiting(&mut self, last_frame: u64) -> io::Result<()> {
@@ -154,6 +164,12 @@ impl Journal {
         if current.is_fresh {
             self.files.sync_folder(FOLDER)?;
             current.is_fresh = false;
+            // It is needed once.
+            self.head.1 = Vec::new();
+        }
+        if !self.is_entered {
+            unsaved::enter(&*self.files, number)?;
+            self.is_entered = true;
         }
         current.end = start + bytes.len() as u64;
         let segment = Segment { number, last_frame, bytes: current.end };
@@ -170,11 +186,12 @@ impl Journal {
         self.head = (revision, checkpoint);
     }
 
-    /// Removes the oldest segments until the rest takes no more than so many bytes, but none with frames after `needed`.
+    /// Removes the oldest segments until the rest takes no more than so many bytes on the disk, but none with frames after `needed`.
     pub fn trim(&mut self, bytes: u64, needed: u64) -> io::Result<()> {
-        let mut total: u64 = self.segments.iter().map(|segment| segment.bytes).sum();
+        let mut total: u64 = self.segments.iter().map(|segment| segment::on_disk(segment.bytes)).sum();
         let own = self.current.as_ref().map(|current| current.number);
-        while let Some(&oldest) = self.segments.first() {
+        // One stays, so that a journal that somebody removed is missed.
+        while let [oldest, _, ..] = self.segments[..] {
             if total <= bytes || oldest.last_frame > needed || own == Some(oldest.number) {
                 break;
             }
@@ -182,7 +199,7 @@ impl Journal {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
                 _ => {}
             }
-            total -= oldest.bytes;
+            total -= segment::on_disk(oldest.bytes);
             self.segments.remove(0);
         }
         Ok(())

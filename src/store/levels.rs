@@ -1,8 +1,12 @@
 //! Levels in folders and packed files: what designers sculpt, and games ship.
 
+use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use super::error::StoreError;
 use super::format::FormatError;
@@ -38,9 +42,118 @@ impl Level {
     }
 }
 
+/// The file that lists what of a level is put in place.
+const PENDING: &str = "level.pending";
+
+/// What of a level is put in place: all new files are there, and durable.
+#[derive(Default, Serialize, Deserialize)]
+struct Pending {
+    /// Files that have new ones beside them, unless these were put in place already.
+    changed: BTreeSet<String>,
+    /// Files of regions that hold nothing any more.
+    removed: BTreeSet<String>,
+}
+
+impl Pending {
+    /// What a crash left to be done in a folder.
+    fn read(folder: &Path) -> Result<Option<Self>, StoreError> {
+        let bytes = match fs::read(folder.join(PENDING)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            bytes => bytes.map_err(StoreError::files("reading the level"))?,
+        };
+        let why = |why: String| FormatError::File { name: PENDING.into(), why };
+        let pending: Self = serde_json::from_slice(&bytes).map_err(|error| why(error.to_string()))?;
+        match pending.changed.iter().chain(&pending.removed).find(|name| !is_of_level(name)) {
+            Some(name) => Err(why(format!("`{name}` is none of a level's files")).into()),
+            None => Ok(Some(pending)),
+        }
+    }
+
+    /// Writes new files beside the old ones, and what is to be done then.
+    fn prepare(folder: &Path, files: &LevelFiles) -> Result<(), StoreError> {
+        let mut pending = Self::default();
+        for (name, bytes) in files {
+            let path = folder.join(name);
+            if fs::read(&path).is_ok_and(|old| old == *bytes) {
+                continue;
+            }
+            write_durably(&new_of(&path), bytes).map_err(StoreError::files("writing the level"))?;
+            pending.changed.insert(name.clone());
+        }
+        let entries = fs::read_dir(folder).map_err(StoreError::files("reading the level's folder"))?;
+        let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+        let is_gone = |name: &String| level::region_of_name(name).is_some() && !files.contains_key(name);
+        pending.removed = names.filter(is_gone).collect();
+        if pending.changed.is_empty() && pending.removed.is_empty() {
+            return Ok(());
+        }
+        let json = serde_json::to_vec_pretty(&pending).map_err(|error| {
+            StoreError::from(FormatError::File { name: PENDING.into(), why: error.to_string() })
+        })?;
+        let path = folder.join(PENDING);
+        let enter = || {
+            write_durably(&new_of(&path), &json)?;
+            sync_folder(folder)?;
+            fs::rename(new_of(&path), &path)?;
+            sync_folder(folder)
+        };
+        enter().map_err(StoreError::files("writing the level"))
+    }
+
+    /// Puts everything in place that is to be.
+    fn finish(folder: &Path) -> Result<(), StoreError> {
+        let Some(pending) = Self::read(folder)? else { return Ok(()) };
+        let finish = || {
+            for path in pending.changed.iter().map(|name| folder.join(name)) {
+                is_done(fs::rename(new_of(&path), &path))?;
+            }
+            for name in &pending.removed {
+                is_done(fs::remove_file(folder.join(name)))?;
+            }
+            sync_folder(folder)?;
+            fs::remove_file(folder.join(PENDING))?;
+            sync_folder(folder)
+        };
+        finish().map_err(StoreError::files("putting the level's files in place"))
+    }
+}
+
+/// A step that was done before a crash need not be done again.
+fn is_done(step: io::Result<()>) -> io::Result<()> {
+    match step {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        step => step,
+    }
+}
+
+fn is_of_level(name: &str) -> bool {
+    name == level::LEVEL_JSON || level::region_of_name(name).is_some()
+}
+
+/// The path of the file that takes the place of another.
+fn new_of(path: &Path) -> PathBuf {
+    let mut new = path.as_os_str().to_owned();
+    new.push(".new");
+    new.into()
+}
+
+fn write_durably(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = fs::File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    // Windows has no way to, and needs none.
+    if cfg!(unix) { fs::File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
 /// Writes a level to a folder, one file for each region, so that version control stores and shows what changed. Files that are as
 /// they should be are left alone, and those of regions that hold nothing any more are removed. Nothing else in the folder is
 /// touched.
+///
+/// After a crash the folder holds the old level or the new one: new files are complete before the first of the old ones is touched,
+/// and [`read_level_files`] reads those that were not put in place yet.
 ///
 /// # Errors
 /// When a file can't be written.
@@ -48,29 +161,9 @@ pub fn save_level(folder: impl AsRef<Path>, level: &Level) -> Result<(), StoreEr
     let folder = folder.as_ref();
     let files = level::write_level(level)?;
     fs::create_dir_all(folder).map_err(StoreError::files("creating the level's folder"))?;
-    for (name, bytes) in &files {
-        let path = folder.join(name);
-        if fs::read(&path).is_ok_and(|old| old == *bytes) {
-            continue;
-        }
-        // A crash leaves the old file or the new one.
-        let new = path.with_extension("new");
-        let write = || {
-            fs::write(&new, bytes)?;
-            fs::File::open(&new)?.sync_all()?;
-            fs::rename(&new, &path)
-        };
-        write().map_err(StoreError::files("writing the level"))?;
-    }
-    let entries = fs::read_dir(folder).map_err(StoreError::files("reading the level's folder"))?;
-    for entry in entries.flatten() {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if level::region_of_name(&name).is_some() && !files.contains_key(&name) {
-            fs::remove_file(entry.path())
-                .map_err(StoreError::files("removing a region that is empty now"))?;
-        }
-    }
-    Ok(())
+    Pending::finish(folder)?;
+    Pending::prepare(folder, &files)?;
+    Pending::finish(folder)
 }
 
 /// Reads the files of a level: of a folder, or of a packed file.
@@ -88,13 +181,18 @@ pub fn read_level_files(path: impl AsRef<Path>) -> Result<LevelFiles, StoreError
         }
         return Ok(level::unpack_level(&fs::read(path).map_err(read)?)?);
     }
+    let pending = Pending::read(path)?.unwrap_or_default();
+    let names = fs::read_dir(path).map_err(read)?.flatten();
+    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let is_there = |name: &String| is_of_level(name) && !pending.removed.contains(name);
+    let mut names: BTreeSet<String> = names.filter(is_there).collect();
+    names.extend(pending.changed.iter().cloned());
     let mut files = LevelFiles::new();
-    for entry in fs::read_dir(path).map_err(read)?.flatten() {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if name == level::LEVEL_JSON || level::region_of_name(&name).is_some() {
-            let bytes = fs::read(entry.path()).map_err(StoreError::files("reading the level"))?;
-            files.insert(name, bytes);
-        }
+    for name in names {
+        let (old, new) = (path.join(&name), new_of(&path.join(&name)));
+        let is_new = pending.changed.contains(&name) && new.exists();
+        let bytes = fs::read(if is_new { new } else { old });
+        files.insert(name, bytes.map_err(StoreError::files("reading the level"))?);
     }
     Ok(files)
 }
@@ -105,4 +203,58 @@ pub fn read_level_files(path: impl AsRef<Path>) -> Result<LevelFiles, StoreError
 /// When there is no level, when its files can't be read, and when they are damaged.
 pub fn load_level(path: impl AsRef<Path>, ground: &Ground) -> Result<Level, StoreError> {
     Ok(level::read_level(&read_level_files(path)?, ground)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::terrain::TerrainSettings;
+
+    /// Copies of a folder at each step of putting a level in place.
+    fn steps(folder: &Path, new: &Level) -> Vec<LevelFiles> {
+        let mut seen = vec![read_level_files(folder).unwrap()];
+        Pending::prepare(folder, &level::write_level(new).unwrap()).unwrap();
+        seen.push(read_level_files(folder).unwrap());
+        let pending = Pending::read(folder).unwrap().unwrap();
+        for path in pending.changed.iter().map(|name| folder.join(name)) {
+            fs::rename(new_of(&path), &path).unwrap();
+            seen.push(read_level_files(folder).unwrap());
+        }
+        for name in &pending.removed {
+            fs::remove_file(folder.join(name)).unwrap();
+            seen.push(read_level_files(folder).unwrap());
+        }
+        Pending::finish(folder).unwrap();
+        seen.push(read_level_files(folder).unwrap());
+        seen
+    }
+
+    #[test]
+    fn a_crash_leaves_the_old_level_or_the_new_one() {
+        let ground = Arc::new(Ground::flat(200, 200, 4.0).unwrap());
+        let level = |places: &[f32]| {
+            let mut terrain = Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).unwrap();
+            let dig = |&x: &f32| Brush::dig(Shape::sphere(Vec3::new(x, 4.0, x), 9.0));
+            terrain.apply(places.iter().map(dig));
+            Level::of(&terrain)
+        };
+        let (old, new) = (level(&[30.0, 100.0]), level(&[100.0, 101.0, 170.0]));
+        let folder = std::env::temp_dir().join(format!("bevy_burrow_level_{}", std::process::id()));
+        drop(fs::remove_dir_all(&folder));
+        save_level(&folder, &old).unwrap();
+        let [before, after] = [&old, &new].map(|own| level::write_level(own).unwrap());
+        let seen = steps(&folder, &new);
+        assert!(seen.len() > 5 && seen[0] == before);
+        assert!(seen[1..].iter().all(|own| *own == after));
+        let left = fs::read_dir(&folder).unwrap().flatten().count();
+        assert_eq!(left, after.len(), "nothing is left over");
+        // What was not finished is finished by the next one.
+        Pending::prepare(&folder, &before).unwrap();
+        save_level(&folder, &new).unwrap();
+        assert_eq!(read_level_files(&folder).unwrap(), after);
+        fs::remove_dir_all(&folder).unwrap();
+    }
 }

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::Duration;
 
-use super::error::{StoreError, StoreTrouble};
+use super::closing::{ClosingStore, StoreThread};
+use super::database::DATABASE;
+use super::error::{StoreError, StoreTrouble, WorldSize};
 use super::files::{Files, Folder, Lock};
 use super::format::frame::WorldId;
 use super::found::Contents;
@@ -16,12 +18,15 @@ use super::mirror::Mirror;
 use super::options::StoreOptions;
 use super::progress::Work;
 use super::recover::recover;
+use super::region_file::RegionFile;
 use super::segment::base;
 use super::settle::settle;
-use super::shared::{GameChange, GameData, Shared, apply_game};
-use super::writer::{Answer, Message, Writer};
+use super::shared::{GameChange, GameData, SavePoint, Shared, apply_game};
+use super::sources::has_world;
+use super::unsaved;
+use super::writer::{Answer, Content, Given, Message, Writer};
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Terrain, TerrainSettings, WorldChange};
+use crate::terrain::{CommitRecord, LogEntry, Terrain, TerrainSettings, Version, WorldChange};
 
 /// The file that is locked while a world is open.
 const LOCK: &str = "lock";
@@ -29,29 +34,41 @@ const LOCK: &str = "lock";
 /// Bytes of records that a terrain keeps until its store takes them.
 const LOG_BYTES: usize = 256 << 20;
 
+/// Bytes that may wait for the thread, whatever the options say.
+const LEAST_QUEUED: usize = 1 << 20;
+
 /// A world in a folder. Commits go to a thread of its own, which makes them durable within the
 /// [loss window](StoreOptions::loss_window); whoever digs never waits for the disk.
 ///
-/// Dropping it saves what is left, and makes a checkpoint.
+/// Dropping it saves what is left, makes a checkpoint, and waits for both, [as long as it may](StoreOptions::close_timeout).
+/// [`close`](Self::close) does so without waiting.
 pub struct Store {
     shared: Arc<Shared>,
-    messages: Option<Sender<Message>>,
-    thread: Option<JoinHandle<()>>,
-    /// The revision that comes before the next record.
-    revision: u64,
+    /// `None` once it is closed.
+    open: Option<(Sender<Message>, StoreThread)>,
+    /// Where the last of what was given leads to.
+    point: SavePoint,
+    /// The terrain that was given last.
+    version: Version,
+    size: WorldSize,
+    /// The hash of its ground.
+    ground: u64,
+    /// Something was left out, since too much waited: all of the world comes next.
+    has_gap: bool,
     game: GameData,
-    /// What the game put since the last commits.
-    unsent: Vec<GameChange>,
+    /// What the game put since the last commits, the last value of each key.
+    unsent: BTreeMap<String, Option<Vec<u8>>>,
     world: WorldId,
-    /// Held as long as the thread may write.
-    _lock: Box<dyn Lock>,
+    /// Bytes that may wait for the thread.
+    most_queued: usize,
+    close_timeout: Duration,
 }
 
 impl fmt::Debug for Store {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Store")
             .field("world", &self.world)
-            .field("revision", &self.revision)
+            .field("revision", &self.revision())
             .field("durable", &self.durable())
             .finish_non_exhaustive()
     }
@@ -99,11 +116,26 @@ impl Store {
         terrain: &mut Terrain,
         options: StoreOptions,
     ) -> Result<Self, StoreError> {
+        Self::create_with_data_in(files, terrain, BTreeMap::new(), options)
+    }
+
+    /// Saves a terrain as a new world in [files](Files), together with data of the game's: both are there, or neither.
+    ///
+    /// # Errors
+    /// When there is a world already, and when the files can't be written.
+    pub fn create_with_data_in(
+        files: Arc<dyn Files>,
+        terrain: &mut Terrain,
+        data: BTreeMap<String, Vec<u8>>,
+        options: StoreOptions,
+    ) -> Result<Self, StoreError> {
         files.create_folder("").map_err(StoreError::files("creating the world's folder"))?;
         let lock = take_lock(&*files)?;
         if has_world(&*files).map_err(StoreError::files("reading the world's folder"))? {
             return Err(StoreError::Exists(name(&*files)));
         }
+        // That of a world which somebody removed.
+        unsaved::clear(&*files).map_err(StoreError::files("creating the world"))?;
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
         let (parts, hash) = (terrain.parts(), terrain.world().hash());
@@ -114,9 +146,9 @@ impl Store {
         let terms = (parts.rules.clone(), parts.loose);
         let (grid, level) = (terrain.world().grid(), options.level.clone());
         let progress = options.progress.clone();
-        let mirror = Mirror::new(grid, parts, hash, GameData::new(), level);
+        let mirror = Mirror::new(grid, parts, hash, data.clone(), level);
         // A log that begins with the level, or with a pristine world, is whole. Rules are in it too, then.
-        let is_whole = revision == 0 && mirror.is_as_level();
+        let is_whole = revision == 0 && mirror.is_as_level() && data.is_empty();
         let mut entries = Vec::new();
         if is_whole {
             entries.extend(terms.0.map(|rules| LogEntry::Rules(Some(Arc::new(rules)))));
@@ -133,10 +165,12 @@ impl Store {
             (0, Vec::new()),
         );
         let saved = Arc::clone(&shared);
-        let mut writer =
-            Writer::new(files, options, saved, world, ground, settings, mirror, journal, None, frame);
+        let database = RegionFile::new();
+        let mut writer = Writer::new(
+            files, options, saved, world, ground, settings, mirror, journal, database, frame, lock,
+        );
         writer.save_all()?;
-        let mut store = Self::start(writer, shared, lock, world, revision, GameData::new())?;
+        let mut store = Self::start(writer, shared, world, terrain)?;
         if !entries.is_empty() {
             let change = WorldChange::default();
             store.append(vec![CommitRecord { revision, hash, entries, change }])?;
@@ -151,7 +185,9 @@ impl Store {
     /// # Errors
     /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below has changed
     /// and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing, and when
-    /// nothing of it can be read. Whatever else is wrong is told in [`Opened::troubles`].
+    /// nothing of it can be read. So is a world of which a file can't be read at the moment that holds something that no other file
+    /// does, and one whose ground had a size in which this one has no room for what was dug. Nothing is changed then. Whatever else
+    /// is wrong is told in [`Opened::troubles`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -177,17 +213,23 @@ impl Store {
         let progress = options.progress.clone();
         let mut contents = Contents::read(&*files, progress.as_ref())?;
         let recovered = recover(&contents, &ground, &options)?;
-        let settled = settle(&*files, &mut contents, &recovered);
+        if !options.salvage {
+            contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
+        }
+        let settled = settle(&*files, &contents, &recovered);
         let (is_log_whole, replayed, is_new) = (
             recovered.is_log_whole,
             recovered.replayed,
             recovered.is_new || settled.is_unfinished || contents.damaged.is_some(),
         );
-        let settings = recovered.settings();
+        let (settings, findings) = (recovered.settings(), recovered.findings.clone());
         let (mut terrain, mirror) = (recovered.terrain, recovered.mirror);
-        let (revision, game) = (mirror.revision, mirror.game.clone());
         let shared = Arc::new(Shared::default());
-        let (world, database) = (contents.world, contents.database.take());
+        let world = contents.world;
+        let database = match &contents.damaged {
+            None => RegionFile::new(),
+            Some(_) => RegionFile::damaged(contents.choose_checkpoint().map_or(0, |own| own.frame)),
+        };
         let journal = Journal::new(
             Arc::clone(&files),
             world,
@@ -207,17 +249,24 @@ impl Store {
             journal,
             database,
             recovered.checkpoint,
+            lock,
         );
-        let mut troubles = settled.troubles;
+        let mut failures = Vec::new();
         if is_new {
             writer.save_all_or_later();
-            troubles.extend(shared.take_troubles());
+            failures = shared.take_troubles();
         } else {
-            shared.set_durable(revision);
+            shared.set_durable(writer.point);
         }
+        // Where it could not be replaced yet, the damaged file is still in its place.
+        let is_in_place = contents.has_database && !failures.is_empty();
+        let kept = writer.database.kept().or(is_in_place.then_some(DATABASE));
+        let mut troubles = findings.troubles(&settled.copies, contents.damaged.as_deref(), kept);
+        troubles.extend(settled.troubles);
+        troubles.extend(failures);
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
-        let store = Self::start(writer, shared, lock, world, revision, game)?;
+        let store = Self::start(writer, shared, world, &terrain)?;
         Work::until(progress.as_ref(), 1.0, 1).finish();
         Ok((store, Opened { terrain, replayed, is_log_whole, troubles }))
     }
@@ -225,34 +274,56 @@ impl Store {
     fn start(
         mut writer: Writer,
         shared: Arc<Shared>,
-        lock: Box<dyn Lock>,
         world: WorldId,
-        revision: u64,
-        game: GameData,
+        terrain: &Terrain,
     ) -> Result<Self, StoreError> {
         writer.begin_segment();
+        let StoreOptions { waiting_bytes, close_timeout, .. } = writer.options;
+        let (point, game) = (writer.point, writer.mirror.game.clone());
         let (messages, inbox): (Sender<Message>, Receiver<Message>) = channel();
-        let thread = std::thread::Builder::new().name("burrow store".into());
-        let thread = thread.spawn(move || writer.run(&inbox));
-        let thread = thread.map_err(StoreError::files("starting the store's thread"))?;
-        let unsent = Vec::new();
-        let (messages, thread) = (Some(messages), Some(thread));
-        Ok(Self { shared, messages, thread, revision, game, unsent, world, _lock: lock })
+        let thread = StoreThread::start(Arc::clone(&shared), move || writer.run(&inbox))?;
+        Ok(Self {
+            shared,
+            open: Some((messages, thread)),
+            point,
+            version: terrain.world().version(),
+            size: WorldSize::of(terrain),
+            ground: terrain.world().ground().hash(),
+            has_gap: false,
+            game,
+            unsent: BTreeMap::new(),
+            world,
+            most_queued: waiting_bytes.max(LEAST_QUEUED),
+            close_timeout,
+        })
     }
 
     /// Takes the records of a terrain's commits, so that they become durable. Call it as often as you like: it takes
-    /// microseconds, and does nothing where nothing was committed.
+    /// microseconds, and does nothing where nothing was committed. Where it is another terrain than before, of the same size, all of
+    /// that takes the place of what was saved.
+    ///
+    /// While so much waits for a disk that does not answer that no more is kept, nothing is taken, and [all of the
+    /// terrain](Self::append_whole) once there is room.
     ///
     /// # Errors
+    /// [`StoreError::OtherSize`] where the terrain has another size than what is saved, and nothing is taken then;
     /// [`StoreError::Ended`] when the store's thread has panicked.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
-        let now = terrain.world().revision();
-        if !terrain.has_log() && self.unsent.is_empty() && now == self.revision {
+        let is_next = self.follows(terrain) && !self.has_gap;
+        let revision = terrain.world().revision();
+        if is_next && !terrain.has_log() && self.unsent.is_empty() && revision == self.point.revision {
             return Ok(());
         }
+        self.check_size(terrain)?;
+        self.ground = terrain.world().ground().hash();
         let records = terrain.take_log();
-        let last = records.last().map_or(self.revision, |record| record.revision);
-        if last == now && self.continues(&records) {
+        if self.is_full() {
+            self.has_gap = true;
+            return self.check_thread();
+        }
+        let last = records.last().map_or(self.point.revision, |record| record.revision);
+        if is_next && last == revision && self.continues(&records) {
+            self.version = terrain.world().version();
             return self.append(records);
         }
         // Records were dropped, or never kept.
@@ -260,9 +331,43 @@ impl Store {
         self.append_whole(terrain)
     }
 
+    /// Whether this terrain is the one that was given last, whatever was committed to it since.
+    pub(crate) fn follows(&self, terrain: &Terrain) -> bool {
+        terrain.world().version().is_same_world(self.version)
+            || terrain.log_sets_ground_after(self.point.revision)
+    }
+
+    /// Lets a terrain that was made of the same parts take the place of the one that was given last.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn adopt(&mut self, terrain: &Terrain) {
+        self.version = terrain.world().version();
+    }
+
+    /// Whether this terrain is another state of the saved world: it has the same ground and size.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn is_of(&self, terrain: &Terrain) -> bool {
+        self.follows(terrain)
+            || self.check_size(terrain).is_ok() && terrain.world().ground().hash() == self.ground
+    }
+
+    fn check_size(&self, terrain: &Terrain) -> Result<(), StoreError> {
+        let (saved, given) = (self.size, WorldSize::of(terrain));
+        if saved == given { Ok(()) } else { Err(StoreError::OtherSize { saved, given }) }
+    }
+
+    /// Whether so much waits for the thread that it should take that first.
+    fn is_full(&self) -> bool {
+        self.shared.queued() > self.most_queued
+    }
+
+    fn check_thread(&self) -> Result<(), StoreError> {
+        let is_running = self.open.as_ref().is_some_and(|(_, thread)| !thread.is_done());
+        if is_running { Ok(()) } else { Err(StoreError::Ended) }
+    }
+
     /// Does every record follow the one before?
     fn continues(&self, records: &[CommitRecord]) -> bool {
-        let mut at = self.revision;
+        let mut at = self.point.revision;
         records.iter().all(|record| {
             let follows = record.revision == at.saturating_add(record.is_commit().into());
             at = record.revision;
@@ -273,51 +378,96 @@ impl Store {
     /// Takes records of commits, so that they become durable, together with all that was [put](Self::put) since the last ones.
     ///
     /// # Errors
-    /// [`StoreError::Gap`] when they do not follow those that were taken before, and none is taken then;
-    /// [`StoreError::Ended`] when the store's thread has panicked.
+    /// [`StoreError::Gap`] when they do not follow those that were taken before; [`StoreError::Full`] when too much waits for a disk
+    /// that does not answer. None is taken then. [`StoreError::Ended`] when the store's thread has panicked.
     pub fn append(&mut self, records: Vec<CommitRecord>) -> Result<(), StoreError> {
-        if !self.continues(&records) {
+        if self.has_gap || !self.continues(&records) {
             let found = records.first().map_or(0, |record| record.revision);
-            return Err(StoreError::Gap { at: self.revision, found });
+            return Err(StoreError::Gap { at: self.point.revision, found });
         }
-        self.revision = records.last().map_or(self.revision, |record| record.revision);
-        let game = std::mem::take(&mut self.unsent);
-        self.send(Message::Commits(records, game))
+        let revision = records.last().map_or(self.point.revision, |record| record.revision);
+        self.give(SavePoint { revision, ..self.point }, Content::Commits(records))
     }
 
-    /// Takes all of a terrain, where records are missing. It is durable with the next checkpoint, which is made at once.
+    /// Takes all of a terrain, where records are missing or another terrain takes the place of the one before. It is durable with the
+    /// next checkpoint, which is made at once.
     ///
     /// # Errors
-    /// [`StoreError::Ended`] when the store's thread has panicked.
+    /// [`StoreError::OtherSize`] when the terrain has another size than what is saved; [`StoreError::Full`] when too much waits for
+    /// a disk that does not answer. Nothing is taken then. [`StoreError::Ended`] when the store's thread has panicked.
     pub fn append_whole(&mut self, terrain: &Terrain) -> Result<(), StoreError> {
-        let (parts, hash) = (Box::new(terrain.parts()), terrain.world().hash());
-        self.revision = parts.revision;
-        let game = std::mem::take(&mut self.unsent);
-        self.send(Message::Whole(parts, terrain.world().shared_ground(), hash, game))
+        self.check_size(terrain)?;
+        let world = terrain.world();
+        let (parts, hash) = (Box::new(terrain.parts()), world.hash());
+        let is_other = !self.follows(terrain);
+        let point = SavePoint {
+            revision: parts.revision,
+            terrain: self.point.terrain + u64::from(is_other),
+            ..self.point
+        };
+        self.give(point, Content::Whole(parts, world.shared_ground(), hash))?;
+        (self.version, self.has_gap) = (world.version(), false);
+        Ok(())
+    }
+
+    /// Hands something over that leads to a point, with what the game put since the last time.
+    fn give(&mut self, point: SavePoint, content: Content) -> Result<(), StoreError> {
+        if self.is_full() {
+            return Err(StoreError::Full);
+        }
+        let game = std::mem::take(&mut self.unsent).into_iter().collect();
+        let given = Given { point: SavePoint { number: point.number + 1, ..point }, content, game };
+        let (bytes, point) = (given.bytes(), given.point);
+        self.shared.add_queued(bytes);
+        self.send(Message::Save(given))?;
+        self.point = point;
+        Ok(())
+    }
+
+    /// Hands over what the game put. While commits are missing, it waits for the world with them.
+    fn send_game(&mut self) -> Result<(), StoreError> {
+        if self.unsent.is_empty() || self.has_gap { Ok(()) } else { self.append(Vec::new()) }
     }
 
     fn send(&self, message: Message) -> Result<(), StoreError> {
-        let sent = self.messages.as_ref().map(|messages| messages.send(message));
+        let sent = self.open.as_ref().map(|(messages, _)| messages.send(message));
         sent.and_then(Result::ok).ok_or(StoreError::Ended)
     }
 
-    /// Everything up to this revision would survive a loss of power, what the game put with it included.
+    /// The terrain that was given last is durable up to this revision, with what the game had put by then: it would survive a loss of
+    /// power. 0 where nothing of it is durable yet; [`durable_point`](Self::durable_point) tells these apart.
     pub fn durable(&self) -> u64 {
-        self.shared.durable()
+        self.durable_point().map_or(0, SavePoint::revision)
+    }
+
+    /// The last point up to which everything is durable; `None` where nothing of the terrain that was given last is.
+    pub fn durable_point(&self) -> Option<SavePoint> {
+        self.shared.durable().filter(|durable| durable.is_same_terrain(self.point))
+    }
+
+    /// Whether everything up to a point is durable.
+    pub fn is_durable(&self, point: SavePoint) -> bool {
+        self.shared.durable() >= Some(point)
+    }
+
+    /// The point up to which everything was taken.
+    pub fn point(&self) -> SavePoint {
+        self.point
     }
 
     /// The revision of the last record that was taken.
     pub fn revision(&self) -> u64 {
-        self.revision
+        self.point.revision
     }
 
-    fn ask(&mut self, message: impl FnOnce(Answer) -> Message) -> Result<u64, StoreError> {
-        if !self.unsent.is_empty() {
-            self.append(Vec::new())?;
-        }
+    fn ask(&mut self, wait: Duration, message: impl FnOnce(Answer) -> Message) -> Result<u64, StoreError> {
+        self.send_game()?;
         let (answer, answered) = channel();
         self.send(message(answer))?;
-        answered.recv().map_err(|_| StoreError::Ended)?
+        answered.recv_timeout(wait).map_err(|error| match error {
+            RecvTimeoutError::Timeout => StoreError::TimedOut,
+            RecvTimeoutError::Disconnected => StoreError::Ended,
+        })?
     }
 
     /// Waits until all that was taken is durable, and returns its revision.
@@ -325,7 +475,15 @@ impl Store {
     /// # Errors
     /// When it can't be saved for now.
     pub fn flush(&mut self) -> Result<u64, StoreError> {
-        self.ask(Message::Flush)
+        self.flush_within(Duration::MAX)
+    }
+
+    /// Waits until all that was taken is durable, but no longer than this, and returns its revision.
+    ///
+    /// # Errors
+    /// When it can't be saved for now; [`StoreError::TimedOut`] when the disk does not answer in time.
+    pub fn flush_within(&mut self, wait: Duration) -> Result<u64, StoreError> {
+        self.ask(wait, Message::Flush)
     }
 
     /// Waits until a checkpoint is made of all that was taken, so that nothing has to be replayed. It is made by itself now and
@@ -334,7 +492,7 @@ impl Store {
     /// # Errors
     /// When it can't be saved for now.
     pub fn checkpoint(&mut self) -> Result<u64, StoreError> {
-        self.ask(Message::Checkpoint)
+        self.ask(Duration::MAX, Message::Checkpoint)
     }
 
     /// Asks for a checkpoint without waiting for it.
@@ -342,9 +500,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Ended`] when the store's thread has panicked.
     pub fn request_checkpoint(&mut self) -> Result<(), StoreError> {
-        if !self.unsent.is_empty() {
-            self.append(Vec::new())?;
-        }
+        self.send_game()?;
         // Nobody waits for the answer.
         self.send(Message::Checkpoint(channel().0))
     }
@@ -354,13 +510,17 @@ impl Store {
     /// # Errors
     /// When it can't be saved for now.
     pub fn compact(&mut self) -> Result<u64, StoreError> {
-        self.ask(Message::Compact)
+        self.ask(Duration::MAX, Message::Compact)
     }
 
     /// Keeps data of the game's under a key, say an inventory or the time of day. It becomes durable together with the commits
     /// of the next [`append`](Self::append) or [`follow`](Self::follow): after a crash both are there, or neither.
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
-        self.change_game((key.into(), Some(bytes.into())));
+        let (key, bytes) = (key.into(), bytes.into());
+        // Games put the same again and again, which takes no room in the log.
+        if self.get(&key) != Some(&bytes[..]) {
+            self.change_game((key, Some(bytes)));
+        }
     }
 
     /// Removes data of the game's.
@@ -370,7 +530,7 @@ impl Store {
 
     fn change_game(&mut self, change: GameChange) {
         apply_game(&mut self.game, std::slice::from_ref(&change));
-        self.unsent.push(change);
+        self.unsent.insert(change.0, change.1);
     }
 
     /// Data of the game's.
@@ -392,23 +552,28 @@ impl Store {
     pub fn world_id(&self) -> WorldId {
         self.world
     }
+
+    /// Saves what is left and makes a last checkpoint, on the store's own thread.
+    pub fn close(mut self) -> ClosingStore {
+        self.begin_closing()
+    }
+
+    fn begin_closing(&mut self) -> ClosingStore {
+        // If it can't be taken, the outcome says that it is not saved.
+        drop(self.send_game());
+        let is_given = self.unsent.is_empty() && !self.has_gap;
+        let thread = self.open.take().map(|(_, thread)| thread);
+        ClosingStore::new(Arc::clone(&self.shared), thread, self.point, is_given)
+    }
 }
 
 impl Drop for Store {
     fn drop(&mut self) {
-        if !self.unsent.is_empty() {
-            drop(self.append(Vec::new()));
-        }
-        self.messages = None;
-        if let Some(thread) = self.thread.take() {
-            // If it panicked, what is durable stays so.
-            drop(thread.join());
+        if self.open.is_some() {
+            // If the thread panicked, what is durable stays so.
+            drop(self.begin_closing().wait(self.close_timeout));
         }
     }
-}
-
-pub(super) fn has_world(files: &dyn Files) -> std::io::Result<bool> {
-    Ok(files.exists(super::database::DATABASE)? || !super::segment::list(files)?.is_empty())
 }
 
 pub(super) fn take_lock(files: &dyn Files) -> Result<Box<dyn Lock>, StoreError> {

@@ -22,7 +22,7 @@ pub enum BaseChanged {
     Refuse,
 }
 
-/// How a store saves.
+/// How a store saves. Any duration may be [`Duration::MAX`], which stands for never.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoreOptions {
     /// Commits are durable this long after they were appended, and a little more for the disk: what is lost at most when the
@@ -35,8 +35,8 @@ pub struct StoreOptions {
     pub checkpoint_commits: u64,
     /// Time after which a checkpoint is made, if anything changed.
     pub checkpoint_after: Duration,
-    /// Bytes of records that wait in memory while saving fails; beyond it they are dropped, and the world is saved whole once
-    /// that works.
+    /// Bytes of records that wait in memory while saving fails, and once more while the disk does not answer; beyond it they are
+    /// dropped, and the world is saved whole once that works.
     pub waiting_bytes: usize,
     /// Bytes that a frame of the log may hold, 256 MiB at most. Commits and game data of more that come at once are saved by a
     /// checkpoint instead, which leaves a gap in the log.
@@ -49,10 +49,17 @@ pub struct StoreOptions {
     pub level: Option<BaseLevel>,
     /// Where to tell how far opening is.
     pub progress: Option<Progress>,
+    /// Opens a world of which anything is left, even where a file can't be read at the moment or nothing says what the world was
+    /// beside its regions. Tools that repair worlds set it; a game should ask the player first.
+    pub salvage: bool,
+    /// How long dropping the store waits for the disk at most. What is left is written in any case, if the process goes on and the
+    /// disk answers in the end; the world stays locked until then.
+    pub close_timeout: Duration,
 }
 
 impl Default for StoreOptions {
-    /// A loss window of a second, 64 MiB of log and of a frame, checkpoints each minute or 4096 commits.
+    /// A loss window of a second, 64 MiB of log and of a frame, checkpoints each minute or 4096 commits. Closing waits for the disk
+    /// as long as it takes.
     fn default() -> Self {
         Self {
             loss_window: Duration::from_secs(1),
@@ -64,6 +71,8 @@ impl Default for StoreOptions {
             base_changed: BaseChanged::default(),
             level: None,
             progress: None,
+            salvage: false,
+            close_timeout: Duration::MAX,
         }
     }
 }

@@ -11,9 +11,25 @@ pub(super) const FOLDER: &str = "quarantine";
 fn free(files: &dyn Files, name: &str) -> io::Result<String> {
     files.create_folder(FOLDER)?;
     let taken = files.list(FOLDER)?;
-    let numbered = (1..).map(|number: u64| format!("{name}.{number}"));
-    let free = numbered.into_iter().find(|name| !taken.contains(name)).unwrap_or_else(|| name.into());
+    // Above all others, so that their numbers say which is the latest.
+    let last = taken.iter().filter_map(|taken| number(taken, name)).max().unwrap_or(0);
+    let mut next = (last + 1..).map(|number| format!("{name}.{number}"));
+    let free = next.find(|name| !taken.contains(name)).unwrap_or_default();
     Ok(format!("{FOLDER}/{free}"))
+}
+
+/// The number of a file in the folder that had this name.
+fn number(taken: &str, name: &str) -> Option<u64> {
+    let number: u64 = taken.strip_prefix(name)?.strip_prefix('.')?.parse().ok()?;
+    // Nobody counts further.
+    (number <= u32::MAX.into() && format!("{name}.{number}") == taken).then_some(number)
+}
+
+/// The files in the folder that had this name, the latest first.
+pub(super) fn of(files: &dyn Files, name: &str) -> io::Result<Vec<String>> {
+    let mut numbers: Vec<u64> = files.list(FOLDER)?.iter().filter_map(|taken| number(taken, name)).collect();
+    numbers.sort_unstable();
+    Ok(numbers.into_iter().rev().map(|number| format!("{FOLDER}/{name}.{number}")).collect())
 }
 
 /// Keeps a copy of damaged bytes; returns its path.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use glam::IVec3;
 use rayon::prelude::*;
 
 use super::base_level::BaseLevel;
@@ -10,6 +11,7 @@ use super::checkpoint::Checkpoint;
 use super::error::{StoreError, StoreTrouble};
 use super::format::Batch;
 use super::found::Contents;
+use super::ground_size::GroundSize;
 use super::keys;
 use super::mirror::Mirror;
 use super::options::{BaseChanged, StoreOptions};
@@ -22,7 +24,7 @@ use crate::terrain::{
     CommitRecord, LogEntry, Meshing, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
     WorldChange, WorldParts,
 };
-use crate::volume::DiggingRules;
+use crate::volume::{DiggingRules, Field, Fields};
 
 /// The shares of opening after which a world is recovered: as it is on the disk, and as one that has to be saved whole.
 const RECOVERED: f32 = 0.97;
@@ -46,15 +48,27 @@ pub(super) struct Recovered {
     pub replayed: u64,
     /// Can damaged regions be rebuilt from the log?
     pub is_log_whole: bool,
+    /// Whether the log reaches from the first commit to the checkpoint, and leads elsewhere.
+    pub has_other_log: bool,
     /// Are its records, or its log, those of another world than it is now?
     pub is_new: bool,
+    pub findings: Findings,
+    /// Why the frame after the last one was refused.
+    pub refused: Option<String>,
+}
+
+/// What a recovery found that should be reported.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Findings {
     /// Damaged regions that were rebuilt or lost, and whether they are lost.
     pub damaged: Vec<RegionPos>,
     pub is_lossy: bool,
     /// Regions over another ground than they were saved with, if the ground is another one, and whether edits were made anew.
     pub base_changed: Option<(usize, &'static str)>,
-    /// Why the frame after the last one was refused.
-    pub refused: Option<String>,
+    /// Commits that another [`SIMULATION`](crate::terrain::SIMULATION) made, and that were made again.
+    pub remade: Option<u64>,
+    /// Whether everything but the regions is lost.
+    pub has_lost_rest: bool,
 }
 
 /// How far a world is replayed, and whether it is compared with the log.
@@ -75,18 +89,61 @@ pub(super) fn recover(
 ) -> Result<Recovered, StoreError> {
     let StoreOptions { base_changed, level, progress, .. } = options;
     let (base_changed, level, progress) = (*base_changed, level.as_ref(), progress.as_ref());
-    let Some(checkpoint) = contents.choose_checkpoint() else {
-        return Err(StoreError::Unreadable("neither journal nor database hold a valid checkpoint".into()));
+    let found = contents.choose_checkpoint();
+    let has_lost_rest = found.is_none();
+    let checkpoint = match found {
+        Some(checkpoint) => checkpoint,
+        None if options.salvage => contents.assume_checkpoint(),
+        None => {
+            let why = "neither journal nor database hold a valid checkpoint";
+            return Err(StoreError::Unreadable(why.into()));
+        }
     };
-    let level = BaseLevel::needed(checkpoint.level.as_ref(), level)?;
+    let level = match has_lost_rest {
+        false => BaseLevel::needed(checkpoint.level.as_ref(), level)?,
+        true if !contents.is_on_level() => None,
+        true => {
+            let missing = || StoreError::LevelMissing { label: "unknown".into() };
+            Some(level.ok_or_else(missing)?)
+        }
+    };
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     let is_contiguous = last >= checkpoint.frame;
     let base = segment::base(ground, level);
-    let is_log_whole = is_contiguous && whole.iter().all(|frame| frame.base == base);
-    let is_same_ground = checkpoint.metadata.ground == ground.hash();
+    let reaches_back = is_contiguous && whole.iter().all(|frame| frame.base == base);
+    let has_other_log = reaches_back && !has_lost_rest && !contents.leads_to(&checkpoint);
+    let is_log_whole = match has_lost_rest {
+        false => reaches_back && !has_other_log,
+        true => reaches_back && contents.reaches(checkpoint.metadata.revision),
+    };
+    let tail = contents.frames_from(checkpoint.frame + 1);
+    let is_same_ground = checkpoint.metadata.ground == ground.hash() || has_lost_rest;
     let other_level = BaseLevel::expect(level, checkpoint.level.as_ref());
     let is_same_base = is_same_ground && other_level.is_ok();
+    // What follows the checkpoint was made by other rules of how edits change the ground: it can be made again, but not verified.
+    let is_remade = is_same_base && tail.iter().any(|frame| frame.base != base);
+    let size = GroundSize::of(ground);
+    let other_size = checkpoint.cells.filter(|saved| *saved != size);
+    if let Some(saved) = other_size {
+        let replays = base_changed == BaseChanged::Replay && is_contiguous;
+        let why = match () {
+            () if base_changed == BaseChanged::Refuse => {
+                Some("only the ground that it was saved with is allowed")
+            }
+            () if replays && saved.fits_in(size) => None,
+            () if replays => Some("edits beyond it could not be made again"),
+            // Where the world ended, edits ended too.
+            () if !tail.is_empty() => Some(
+                "it was not closed properly, and its last edits can only be made again on a ground of its own size: open it over that \
+                 one, and close it, first",
+            ),
+            () => None,
+        };
+        if let Some(why) = why {
+            return Err(StoreError::GroundSize { saved: saved.to_string(), given: size.to_string(), why });
+        }
+    }
     if base_changed == BaseChanged::Refuse {
         other_level?;
     }
@@ -102,18 +159,24 @@ pub(super) fn recover(
         let replayed = replay_good(empty, &GameData::new(), &whole, false, &work)?;
         let regions = changed_regions(contents, &checkpoint, ground, level).len();
         let mut recovered = Recovered::whole(replayed, level, &checkpoint);
-        recovered.base_changed = Some((regions, "replayed"));
+        recovered.findings.base_changed = Some((regions, "replayed"));
         return Ok(recovered);
     }
 
-    let tail = contents.frames_from(checkpoint.frame + 1);
     let regions = contents.bytes_of(&checkpoint);
     let end = if is_same_base { RECOVERED } else { RECOVERED_ANEW };
     let work = Work::until(progress, end, (DECODE + RESTORE) * regions + REPLAY * bytes_of(&tail));
     let grid = Terrain::new(Arc::clone(ground), &settings).map_err(RestoreError::from)?.world().grid();
-    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, grid, &work);
+    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, grid, has_lost_rest, &work);
     let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
     let restored = restore(parts.clone());
+    if let (false, Err(RestoreError::Parts(_))) = (is_same_base, &restored)
+        && let Some(saved) = reach(&parts.change).filter(|reach| !reach.fits_in(size))
+    {
+        let saved = other_size.map_or_else(|| format!("at least {saved}"), |saved| saved.to_string());
+        let why = "it was dug beyond the rim of this one";
+        return Err(StoreError::GroundSize { saved, given: size.to_string(), why });
+    }
     work.advance(RESTORE * regions);
     let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
     if is_same_base && !is_exact && is_log_whole {
@@ -123,12 +186,12 @@ pub(super) fn recover(
         if replayed.frame >= checkpoint.frame {
             let mut recovered = Recovered::whole(replayed, level, &checkpoint);
             recovered.is_log_whole = true;
-            recovered.damaged = damaged;
+            recovered.findings = Findings { damaged, ..Findings::default() };
             return Ok(recovered);
         }
     }
     let terrain = restored?;
-    let is_checked = is_same_base && is_exact;
+    let is_checked = is_same_base && is_exact && !is_remade;
     let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
     let hash = terrain.world().hash();
     let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone(), level.cloned());
@@ -165,10 +228,15 @@ pub(super) fn recover(
         checkpoint: if is_checked { checkpoint.frame } else { 0 },
         replayed: replayed.commits,
         is_log_whole: is_log_whole && is_checked,
+        has_other_log,
         is_new: !is_checked,
-        is_lossy: !is_checked,
-        damaged,
-        base_changed: (!is_same_base).then_some((regions, "kept")),
+        findings: Findings {
+            damaged,
+            is_lossy: !is_checked,
+            base_changed: (!is_same_base).then_some((regions, "kept")),
+            remade: is_remade.then_some(replayed.commits),
+            has_lost_rest,
+        },
         refused: replayed.refused,
     })
 }
@@ -193,10 +261,9 @@ impl Recovered {
             checkpoint: 0,
             replayed: replayed.commits,
             is_log_whole: false,
+            has_other_log: false,
             is_new: true,
-            damaged: Vec::new(),
-            is_lossy: false,
-            base_changed: None,
+            findings: Findings::default(),
             refused: replayed.refused,
         }
     }
@@ -210,7 +277,8 @@ pub(super) fn replay_all(
     level: Option<&BaseLevel>,
 ) -> Result<Terrain, StoreError> {
     let whole = contents.frames_from(1);
-    if whole.last().map_or(0, |last| last.number) < contents.greatest_frame() {
+    let last = contents.choose_checkpoint().map_or(0, |checkpoint| checkpoint.frame);
+    if whole.last().map_or(0, |last| last.number) < contents.greatest_frame().max(last) {
         return Err(StoreError::Unreadable("the log does not reach back to the first commit".into()));
     }
     let empty = BaseLevel::first(level, ground, &settings)?;
@@ -227,7 +295,7 @@ fn replaying<'a>(progress: Option<&'a Progress>, frames: &[&Frame]) -> Work<'a> 
 }
 
 fn bytes_of(frames: &[&Frame]) -> u64 {
-    frames.iter().map(|frame| frame.payload.len() as u64).sum()
+    frames.iter().map(|frame| frame.bytes() as u64).sum()
 }
 
 /// The regions whose heights below are not those that they were saved with; all of them on another level.
@@ -258,6 +326,7 @@ fn load_regions(
     ground: &Ground,
     level: Option<&BaseLevel>,
     grid: ChunkGrid,
+    has_lost_rest: bool,
     work: &Work,
 ) -> (WorldParts, Vec<RegionPos>) {
     let metadata = &checkpoint.metadata;
@@ -270,7 +339,7 @@ fn load_regions(
     let decode = |(at, revision): &(RegionPos, u64)| {
         let record = contents.region(*at, *revision);
         let change = record.and_then(|record| record.decode(*at, ground).ok());
-        work.advance(DECODE * record.map_or(0, |record| record.payload.len() as u64));
+        work.advance(DECODE * record.map_or(0, |record| record.bytes() as u64));
         (*at, change)
     };
     let regions: Vec<(RegionPos, u64)> =
@@ -281,7 +350,8 @@ fn load_regions(
         match change {
             Some(change) => {
                 bricks.extend(change.bricks);
-                if is_same_level {
+                // Of chunks whose size is not known they can't be used.
+                if is_same_level && !has_lost_rest {
                     fields.extend(change.fields);
                 }
             }
@@ -294,8 +364,12 @@ fn load_regions(
     fields.retain(|(_, fields)| !fields.is_empty());
     let next_field = metadata.next_field.max(below.change.next_field);
     let mut change = WorldChange { bricks, fields, next_field };
-    if !is_same_level {
-        // Fields of two levels may overlap, and have one name: the new one's go on, and grow.
+    if checkpoint.metadata.ground != ground.hash() {
+        fit_fields(&mut change, grid);
+    }
+    if !is_same_level || checkpoint.metadata.ground != ground.hash() {
+        // Fields of two levels may overlap, and have one name: the new one's go on, and grow. Beyond the rim of a smaller ground, edits
+        // reach into more chunks.
         change.cover(grid);
     }
     let parts = WorldParts {
@@ -306,6 +380,20 @@ fn load_regions(
         loose: metadata.loose,
     };
     (parts, damaged)
+}
+
+/// Cuts fields off where their chunk ends on a ground of another size: the last chunk has one column more than others.
+fn fit_fields(change: &mut WorldChange, grid: ChunkGrid) {
+    for (chunk, fields) in &mut change.fields {
+        let own = grid.chunk_samples(*chunk).intersection(grid.edit_bounds());
+        let own = own.filter(|_| grid.has_tile(chunk.tile()));
+        if own.is_some_and(|own| fields.iter().all(|field| own.encloses(field.bounds))) {
+            continue;
+        }
+        let cut = |field: &Field| Some(Field { bounds: field.bounds.intersection(own?)?, ..*field });
+        *fields = Fields::restored(fields.iter().filter_map(cut).collect()).unwrap_or_default();
+    }
+    change.fields.retain(|(_, fields)| !fields.is_empty());
 }
 
 /// Sorts a list by key; of those with the same key the last stays.
@@ -352,14 +440,15 @@ fn replay(
     let limits = terrain.work_limits();
     terrain.set_work_limits(WorkLimits::UNBOUNDED);
     for frame in frames {
-        let batch = match Batch::decode(&frame.payload, terrain.world().ground()) {
+        let batch = frame.payload().and_then(|payload| Batch::decode(&payload, terrain.world().ground()));
+        let batch = match batch {
             Ok(batch) => batch,
             Err(why) => {
                 refused = Some(why.to_string());
                 break;
             }
         };
-        let cost = REPLAY * frame.payload.len() as u64 / batch.commits.len().max(1) as u64;
+        let cost = REPLAY * frame.bytes() as u64 / batch.commits.len().max(1) as u64;
         let replayed = batch.commits.iter().try_for_each(|record| {
             match is_checked {
                 true => drop(terrain.replay(record)?),
@@ -416,20 +505,101 @@ fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), 
     Ok(())
 }
 
-/// What to tell of a recovery, given where copies of damaged parts are.
-pub(super) fn troubles(recovered: &Recovered, copies: &BTreeMap<RegionPos, String>) -> Vec<StoreTrouble> {
-    let mut troubles = Vec::new();
-    for at in &recovered.damaged {
-        let quarantine = copies.get(at).cloned().unwrap_or_else(|| "no file, as nothing was left".into());
-        troubles.push(match recovered.is_lossy {
-            true => StoreTrouble::RegionLost { region: keys::name(*at), quarantine },
-            false => StoreTrouble::Rebuilt {
-                what: format!("the region {} is damaged", keys::name(*at)),
-                quarantine,
-            },
-        });
+/// The cells along x and z that edited samples of bricks need.
+fn reach(change: &WorldChange) -> Option<GroundSize> {
+    let bounds = change.bricks.iter().filter_map(|(pos, brick)| brick.as_ref()?.edited_bounds(*pos));
+    let most = bounds.map(|bounds| bounds.max).reduce(IVec3::max)?;
+    let cells = |at: i32| u32::try_from(at).unwrap_or_default();
+    Some(GroundSize { width: cells(most.x), depth: cells(most.z) })
+}
+
+impl Findings {
+    /// What to report, given where copies of damaged records are, what is wrong with the file of regions, and where that is kept.
+    pub fn troubles(
+        &self,
+        copies: &BTreeMap<RegionPos, String>,
+        damaged: Option<&str>,
+        kept: Option<&str>,
+    ) -> Vec<StoreTrouble> {
+        let mut troubles = Vec::new();
+        for at in &self.damaged {
+            let quarantine = copies.get(at).map(String::as_str).or(kept).unwrap_or_default().to_owned();
+            troubles.push(match self.is_lossy {
+                true => StoreTrouble::RegionLost { region: keys::name(*at), quarantine },
+                false => StoreTrouble::Rebuilt {
+                    what: format!("the region {} is damaged", keys::name(*at)),
+                    quarantine,
+                },
+            });
+        }
+        if let (Some(what), true) = (damaged, self.damaged.is_empty()) {
+            let quarantine = kept.unwrap_or_default().to_owned();
+            troubles.push(StoreTrouble::Rebuilt { what: what.into(), quarantine });
+        }
+        let has_lost_rest = self.has_lost_rest.then_some(StoreTrouble::CheckpointLost);
+        troubles.extend(has_lost_rest);
+        let base_changed = self.base_changed;
+        troubles.extend(base_changed.map(|(regions, kept)| StoreTrouble::BaseChanged { regions, kept }));
+        troubles.extend(self.remade.map(|commits| StoreTrouble::MadeAgain { commits }));
+        troubles
     }
-    troubles
-        .extend(recovered.base_changed.map(|(regions, kept)| StoreTrouble::BaseChanged { regions, kept }));
-    troubles
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::super::{SimulatedDisk, Store};
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::store::format::frame::WorldId;
+
+    /// Writes the frames of a journal anew, as a version with another simulation would have written them: on another base, and with
+    /// other hashes.
+    fn by_another_simulation(disk: &SimulatedDisk, world: WorldId, ground: &Ground) {
+        for number in segment::list(disk).unwrap() {
+            let found = segment::read(disk, Some(world), number).unwrap();
+            disk.damage(&segment::path(number), |bytes| {
+                for frame in found.frames.iter().rev() {
+                    let mut batch = Batch::decode(&frame.payload().unwrap(), ground).unwrap();
+                    batch.commits.iter_mut().for_each(|record| record.hash ^= 1);
+                    let revision = batch.commits.last().map_or(0, |record| record.revision);
+                    let entry =
+                        segment::entry(world, frame.base ^ 1, frame.number, revision, &batch.encode());
+                    drop(bytes.splice(frame.range.clone(), entry));
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn commits_of_another_simulation_are_made_again() {
+        let ground = Arc::new(Ground::flat(64, 64, 4.0).unwrap());
+        let disk = SimulatedDisk::new();
+        let mut terrain = Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).unwrap();
+        let created = Store::create_in(Arc::new(disk.clone()), &mut terrain, StoreOptions::default());
+        let mut store = created.unwrap();
+        for x in 0..8 {
+            terrain.apply([Brush::dig(Shape::sphere(Vec3::new(8.0 * x as f32, 4.0, 30.0), 5.0))]);
+            store.follow(&mut terrain).unwrap();
+            if x == 3 { store.checkpoint() } else { store.flush() }.unwrap();
+        }
+        let world = store.world_id();
+        let killed = disk.image().lose_process();
+        by_another_simulation(&killed, world, &ground);
+        let now = terrain.world();
+        for base_changed in [BaseChanged::Keep, BaseChanged::Replay, BaseChanged::Refuse] {
+            let disk = killed.image().lose_process();
+            let open = || {
+                let options = StoreOptions { base_changed, ..StoreOptions::default() };
+                Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), options).unwrap()
+            };
+            let (_, opened) = open();
+            assert_eq!((opened.terrain.world().revision(), opened.terrain.world().hash()), (8, now.hash()));
+            assert_eq!(opened.troubles, [StoreTrouble::MadeAgain { commits: 4 }]);
+            assert!(!opened.is_log_whole);
+            let (_, again) = open();
+            assert_eq!((again.terrain.world().hash(), again.troubles), (now.hash(), vec![]));
+        }
+    }
 }

@@ -1,15 +1,31 @@
 //! What can still be read of a damaged database: its records are found by their magic, wherever they lie in the file.
 
+use super::format::FormatError;
 use super::format::frame;
 
-/// The records with their keys, valid or not.
-pub(super) fn records(bytes: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
+/// How often the bytes of a file may be looked at: records that lie in one another are none, but each has to be tried.
+const MOST_PASSES: usize = 8;
+
+/// Calls `take` with the key and the bytes of each record that may be one. Where it is, records that overlap it are none.
+pub(super) fn records(bytes: &[u8], mut take: impl FnMut(&[u8], &[u8]) -> Result<(), FormatError>) {
     let magic = &frame::MAGIC;
-    let starts = bytes.windows(magic.len()).enumerate().filter(|(_, window)| window == magic);
-    let record = |start: usize| {
-        let rest = &bytes[start..];
-        let peeked = frame::peek(rest)?;
-        Some((peeked.key.to_vec(), rest.get(..peeked.length)?.to_vec()))
-    };
-    starts.filter_map(|(start, _)| record(start)).collect()
+    // Made so that files of others take no more time or memory than they have bytes.
+    let mut budget = bytes.len().saturating_mul(MOST_PASSES);
+    let mut at = 0;
+    while let Some(found) = bytes.get(at..).and_then(|rest| find(rest, magic)) {
+        let start = at + found;
+        at = start + 1;
+        let Some(peeked) = bytes.get(start..).and_then(frame::peek) else { continue };
+        let Some(record) = bytes.get(start..start + peeked.length).filter(|own| own.len() <= budget) else {
+            continue;
+        };
+        budget -= record.len();
+        if take(peeked.key, record).is_ok() {
+            at = start + record.len();
+        }
+    }
+}
+
+fn find(bytes: &[u8], magic: &[u8]) -> Option<usize> {
+    bytes.windows(magic.len()).position(|window| window == magic)
 }

@@ -11,7 +11,9 @@ use std::ops::Range;
 
 use super::base_level::BaseLevel;
 use super::files::Files;
+use super::format::FormatError;
 use super::format::frame::{self, Kind, WorldId};
+use super::reading::{is_refused, read_file};
 use crate::ground::Ground;
 use crate::terrain::SIMULATION;
 
@@ -24,14 +26,26 @@ const PREFIX: usize = 12;
 /// The most bytes that a frame may hold once it is unpacked.
 pub(super) const FRAME_LIMIT: usize = 256 << 20;
 
+/// Bytes that a file system keeps together: a file takes whole ones.
+const BLOCK: u64 = 4096;
+
+/// Bytes that a file of this length takes on the disk.
+pub(super) fn on_disk(length: u64) -> u64 {
+    length.next_multiple_of(BLOCK)
+}
+
 /// The path of a segment.
 pub(super) fn path(segment: u64) -> String {
     format!("{FOLDER}/{segment:08}.log")
 }
 
-/// The segment with this file name.
+/// The greatest number of a segment, a frame or a revision that is read: others follow without an overflow. Nobody gets so far.
+pub(super) const MOST_NUMBER: u64 = 1 << 60;
+
+/// The segment with this file name. Files that somebody else put there have other names.
 fn number_of(name: &str) -> Option<u64> {
-    name.strip_suffix(".log")?.parse().ok()
+    let number = name.strip_suffix(".log")?.parse().ok().filter(|number| *number <= MOST_NUMBER)?;
+    path(number).ends_with(&format!("/{name}")).then_some(number)
 }
 
 /// The numbers of all segments, in order.
@@ -79,47 +93,93 @@ pub(super) struct Frame {
     pub number: u64,
     /// The [base] that it was written on.
     pub base: u64,
-    pub payload: Vec<u8>,
+    world: WorldId,
+    /// Its bytes, which hold the commits. Unpacked they may be far more.
+    sealed: Box<[u8]>,
     /// Where its entry is in its segment.
     pub range: Range<usize>,
 }
 
+impl Frame {
+    /// The commits in it.
+    pub fn payload(&self) -> Result<Vec<u8>, FormatError> {
+        let opened = frame::open(&self.sealed, Kind::Journal, self.world, &key(self.number), FRAME_LIMIT);
+        opened.map(|opened| opened.payload)
+    }
+
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        self.sealed.len()
+    }
+}
+
+/// A part of a segment that is no entry.
+#[derive(Clone, Debug)]
+pub(super) struct Bad {
+    pub range: Range<usize>,
+    /// The frame whose entry may have begun there.
+    pub number: Option<u64>,
+}
+
 /// A segment as it was found.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Found {
     pub number: u64,
     /// The world that it says it belongs to.
     pub world: Option<WorldId>,
-    /// The checkpoint of its head.
-    pub checkpoint: Option<Vec<u8>>,
+    /// Its head as it is stored.
+    head: Option<Box<[u8]>>,
     pub frames: Vec<Frame>,
     /// What is no entry.
-    pub bad: Vec<Range<usize>>,
+    pub bad: Vec<Bad>,
     pub length: usize,
     /// The schema of a frame that is newer than what can be read.
     pub newer: Option<u32>,
+    /// Why nothing of it can be read at the moment.
+    pub error: Option<io::Error>,
+}
+
+impl Found {
+    /// The checkpoint of its head.
+    pub fn checkpoint(&self) -> Option<Vec<u8>> {
+        let (head, key) = (self.head.as_ref()?, key(self.number));
+        frame::open(head, Kind::Checkpoint, self.world?, &key, FRAME_LIMIT).ok().map(|opened| opened.payload)
+    }
 }
 
 /// Reads a segment of a world, or of whatever world its head names.
 pub(super) fn read(files: &dyn Files, world: Option<WorldId>, number: u64) -> io::Result<Found> {
-    let bytes = files.read(&path(number))?;
-    let mut found = Found { number, world, length: bytes.len(), ..Found::default() };
-    let mut at = 0;
-    let mut bad = 0;
+    let mut found = Found { number, world, ..Found::default() };
+    let bytes = match read_file(files, &path(number)) {
+        Ok(read) => read.bytes,
+        Err(error) if is_refused(&error) => return Err(error),
+        Err(error) => {
+            found.error = Some(error);
+            found.bad.push(Bad { range: 0..0, number: None });
+            return Ok(found);
+        }
+    };
+    found.length = bytes.len();
+    let (mut at, mut bad) = (0, 0);
+    // Each byte is looked at a few times at most, whatever the lengths of entries say.
+    let mut budget = bytes.len().saturating_mul(8);
+    let enter_bad = |found: &mut Found, range: Range<usize>| {
+        if !range.is_empty() {
+            let number = bytes.get(range.start + 4..range.start + PREFIX).and_then(<[u8]>::first_chunk);
+            let number = number.map(|number| u64::from_le_bytes(*number));
+            found.bad.push(Bad { range, number });
+        }
+    };
     while at < bytes.len() {
-        match read_entry(&bytes, at, &mut found) {
+        match read_entry(&bytes, at, &mut found, &mut budget) {
             Some(end) => {
-                if bad < at {
-                    found.bad.push(bad..at);
-                }
+                enter_bad(&mut found, bad..at);
                 (at, bad) = (end, end);
             }
             None => at = next_magic(&bytes, at + 1),
         }
     }
-    if bad < bytes.len() {
-        found.bad.push(bad..bytes.len());
-    }
+    enter_bad(&mut found, bad..bytes.len());
     Ok(found)
 }
 
@@ -131,14 +191,18 @@ fn next_magic(bytes: &[u8], from: usize) -> usize {
 }
 
 /// Reads the entry at an offset; returns its end.
-fn read_entry(bytes: &[u8], at: usize, found: &mut Found) -> Option<usize> {
+fn read_entry(bytes: &[u8], at: usize, found: &mut Found, budget: &mut usize) -> Option<usize> {
     let prefix: &[u8; PREFIX] = bytes.get(at..)?.first_chunk()?;
     let (length, number) = prefix.split_first_chunk::<4>()?;
     let length = u32::from_le_bytes(*length) as usize;
     let frame_number = u64::from_le_bytes(number.try_into().ok()?);
+    if frame_number > MOST_NUMBER {
+        return None;
+    }
     let start = at + PREFIX;
     let end = start.checked_add(length)?;
     let sealed = bytes.get(start..end)?;
+    *budget = budget.checked_sub(sealed.len())?;
     let (kind, own) = match frame_number {
         0 => (Kind::Checkpoint, key(found.number)),
         _ => (Kind::Journal, key(frame_number)),
@@ -150,11 +214,12 @@ fn read_entry(bytes: &[u8], at: usize, found: &mut Found) -> Option<usize> {
     match frame::open(sealed, kind, world, &own, FRAME_LIMIT) {
         Ok(opened) => {
             found.world = Some(world);
+            let sealed = sealed.into();
             if frame_number == 0 {
-                found.checkpoint = Some(opened.payload);
+                found.head = Some(sealed);
             } else {
-                let (base, payload) = (opened.ground_hash, opened.payload);
-                found.frames.push(Frame { number: frame_number, base, payload, range: at..end });
+                let base = opened.ground_hash;
+                found.frames.push(Frame { number: frame_number, base, world, sealed, range: at..end });
             }
             Some(end)
         }

@@ -3,14 +3,17 @@
 use std::collections::BTreeMap;
 use std::io;
 
+use super::database::UNFINISHED;
 use super::error::StoreTrouble;
 use super::files::{Files, Opening};
 use super::found::Contents;
 use super::journal::Segment;
 use super::keys;
 use super::quarantine;
-use super::recover::{Recovered, troubles};
+use super::reading::read_file;
+use super::recover::Recovered;
 use super::segment::{self, Found};
+use super::unsaved;
 use crate::lattice::RegionPos;
 
 /// A journal that can go on.
@@ -19,14 +22,16 @@ pub(super) struct Settled {
     pub next_frame: u64,
     /// Something could not be done: only a checkpoint makes the world durable.
     pub is_unfinished: bool,
+    /// Where copies of damaged records are.
+    pub copies: BTreeMap<RegionPos, String>,
     pub troubles: Vec<StoreTrouble>,
 }
 
 /// Puts aside what is not part of a world, and makes sure that the rest is durable.
-pub(super) fn settle(files: &dyn Files, contents: &mut Contents, recovered: &Recovered) -> Settled {
+pub(super) fn settle(files: &dyn Files, contents: &Contents, recovered: &Recovered) -> Settled {
     let mut copies = BTreeMap::<RegionPos, String>::new();
-    let mut failed = None;
-    for at in &recovered.damaged {
+    let (mut failed, mut told) = (None, Vec::new());
+    for at in &recovered.findings.damaged {
         let Some(record) = contents.invalid.get(at) else { continue };
         let name = format!("region.{}.record", keys::name(*at).replace(' ', "."));
         match quarantine::copy(files, &name, record) {
@@ -34,12 +39,17 @@ pub(super) fn settle(files: &dyn Files, contents: &mut Contents, recovered: &Rec
             Err(error) => failed = Some(error),
         }
     }
-    let mut told = troubles(recovered, &copies);
-    if let Some(what) = &contents.damaged {
-        let quarantine = quarantine::FOLDER.to_string();
-        if recovered.damaged.is_empty() {
-            told.push(StoreTrouble::Rebuilt { what: what.clone(), quarantine });
-        }
+    if contents.damaged.is_none() {
+        // What an interrupted replacement left is older than the file in place.
+        let left = files
+            .exists(UNFINISHED)
+            .and_then(|is_left| if is_left { files.remove(UNFINISHED) } else { Ok(()) });
+        failed = failed.or(left.err());
+    }
+    if contents.has_lost_journal {
+        told.push(StoreTrouble::LogMissing { revision: recovered.mirror.revision });
+        // It was reported.
+        drop(unsaved::clear(files));
     }
     let mut segments = Vec::new();
     let cut = cut_journal(files, contents, recovered, &mut told, &mut segments);
@@ -54,7 +64,7 @@ pub(super) fn settle(files: &dyn Files, contents: &mut Contents, recovered: &Rec
             recovered.frame.max(contents.greatest_frame()) + 2
         }
     };
-    Settled { segments, next_frame, is_unfinished: failed.is_some(), troubles: told }
+    Settled { segments, next_frame, is_unfinished: failed.is_some(), copies, troubles: told }
 }
 
 /// Copies or moves aside all that lies behind the last frame.
@@ -69,6 +79,12 @@ fn cut_journal(
     let last_kept = contents.segments.iter().filter(is_kept).map(|found| found.number).max().unwrap_or(0);
     let (mut bytes, mut place) = (0, None);
     let mut moved = Vec::new();
+    // What the disk did not take whole, and was written elsewhere, is nobody's concern.
+    let is_harmless = |found: &Found| {
+        let mut frames = found.frames.iter().map(|frame| frame.number);
+        let is_harmless = |bad| contents.is_harmless(found.number, bad, recovered.frame);
+        frames.all(|number| number <= recovered.frame) && found.bad.iter().all(is_harmless)
+    };
     for found in &contents.segments {
         let kept = found.frames.iter().filter(|frame| frame.number <= recovered.frame);
         let (last_frame, end) = kept.fold((0, 0), |(last, end): (u64, usize), frame| {
@@ -82,14 +98,19 @@ fn cut_journal(
             segments.push(Segment { number: found.number, last_frame, bytes: end as u64 });
             if end < found.length {
                 let path = segment::path(found.number);
-                let rest = files.read(&path)?.split_off(end);
+                let rest = read_file(files, &path)?.bytes.split_off(end);
                 let name = path.rsplit('/').next().unwrap_or_default();
-                bytes += rest.len() as u64;
-                place = Some(quarantine::copy(files, name, &rest)?);
+                let copy = quarantine::copy(files, name, &rest)?;
+                if !is_harmless(found) {
+                    bytes += rest.len() as u64;
+                    place = Some(copy);
+                }
                 let file = files.open(&path, Opening::Existing)?;
                 file.set_length(end as u64)?;
                 file.sync()?;
             }
+        } else if found.length == 0 && found.error.is_none() {
+            // It is nobody's, whatever its name says.
         } else if found.frames.is_empty() && found.bad.is_empty() {
             segments.push(Segment { number: found.number, last_frame: 0, bytes: all });
         } else {
@@ -97,8 +118,11 @@ fn cut_journal(
         }
     }
     for found in moved {
-        bytes += found.length as u64;
-        place = Some(quarantine::file(files, &segment::path(found.number))?);
+        let copy = quarantine::file(files, &segment::path(found.number))?;
+        if !is_harmless(found) {
+            bytes += found.length as u64;
+            place = Some(copy);
+        }
     }
     let (Some(quarantine), revision) = (place, recovered.mirror.revision) else { return Ok(()) };
     told.push(match &recovered.refused {

@@ -1,8 +1,8 @@
-//! What the store's thread tells, and data of the game's.
+//! What the store's thread reports, and data of the game's.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use super::error::StoreTrouble;
 
@@ -22,36 +22,166 @@ pub(super) fn apply_game(data: &mut GameData, changes: &[GameChange]) {
     }
 }
 
-/// What the thread tells.
+/// A moment in what a [`Store`](super::Store) was given: everything up to it is durable, or not yet.
+///
+/// Revisions alone can't say so. They begin again where another terrain takes the place of the one that was saved, and data that the
+/// game puts has none. Points are ordered by when they were given to the store.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SavePoint {
+    /// How often anything was given to the store.
+    pub(super) number: u64,
+    /// How often another terrain took the place of the one before.
+    pub(super) terrain: u64,
+    pub(super) revision: u64,
+}
+
+impl SavePoint {
+    /// The revision of the terrain at this point.
+    pub fn revision(self) -> u64 {
+        self.revision
+    }
+
+    /// Whether both are of one terrain, so that their revisions can be compared.
+    pub fn is_same_terrain(self, other: Self) -> bool {
+        self.terrain == other.terrain
+    }
+}
+
+/// What the thread reports.
 #[derive(Debug, Default)]
-pub(super) struct Shared {
-    durable: AtomicU64,
-    troubles: Mutex<VecDeque<StoreTrouble>>,
+pub(super) struct Shared(Mutex<Report>);
+
+#[derive(Debug, Default)]
+struct Report {
+    durable: Option<SavePoint>,
+    troubles: VecDeque<StoreTrouble>,
+    /// Why saving fails at the moment.
+    failing: Option<String>,
+    /// When the disk should have answered, while the thread waits for it.
+    answer_due: Option<Instant>,
+    /// Whether it was reported that the disk does not answer.
+    is_hanging: bool,
+    /// Bytes that were sent to the thread, and that it has not taken.
+    queued: usize,
 }
 
 /// Troubles that are kept until they are taken.
 const MOST_TROUBLES: usize = 256;
 
+impl Report {
+    fn tell(&mut self, trouble: StoreTrouble) {
+        if self.troubles.len() == MOST_TROUBLES {
+            self.troubles.pop_front();
+        }
+        self.troubles.push_back(trouble);
+    }
+}
+
 impl Shared {
-    /// The revision up to which everything is durable.
-    pub fn durable(&self) -> u64 {
-        self.durable.load(Ordering::Acquire)
+    fn report(&self) -> MutexGuard<'_, Report> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Says that everything up to a revision is durable.
-    pub fn set_durable(&self, revision: u64) {
-        self.durable.store(revision, Ordering::Release);
+    /// The last point up to which everything is durable; `None` where nothing is.
+    pub fn durable(&self) -> Option<SavePoint> {
+        self.report().durable
+    }
+
+    /// Enters that everything up to a point is durable. What is durable stays so: an earlier point changes nothing.
+    pub fn set_durable(&self, point: SavePoint) {
+        let mut report = self.report();
+        report.durable = report.durable.max(Some(point));
     }
 
     pub fn tell(&self, trouble: StoreTrouble) {
-        let mut troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
-        if troubles.len() == MOST_TROUBLES {
-            troubles.pop_front();
+        self.report().tell(trouble);
+    }
+
+    /// Enters why saving fails, or that it works.
+    pub fn set_failing(&self, why: Option<&str>) {
+        self.report().failing = why.map(Into::into);
+    }
+
+    /// Why saving fails, if it does.
+    pub fn failing(&self) -> Option<String> {
+        self.report().failing.clone()
+    }
+
+    /// The thread waits for the disk, which should take no longer than this.
+    pub fn begin_waiting(&self, longest: Duration) {
+        self.report().answer_due = Instant::now().checked_add(longest);
+    }
+
+    /// The disk has answered.
+    pub fn end_waiting(&self) {
+        let mut report = self.report();
+        report.answer_due = None;
+        if std::mem::take(&mut report.is_hanging) {
+            report.tell(StoreTrouble::SavedAgain);
         }
-        troubles.push_back(trouble);
+    }
+
+    /// Whether the disk has not answered for longer than it should.
+    fn check_waiting(report: &mut Report) {
+        let is_late = report.answer_due.is_some_and(|due| due <= Instant::now());
+        if is_late && !report.is_hanging {
+            report.is_hanging = true;
+            report.tell(StoreTrouble::Hanging);
+        }
     }
 
     pub fn take_troubles(&self) -> Vec<StoreTrouble> {
-        std::mem::take(&mut *self.troubles.lock().unwrap_or_else(PoisonError::into_inner)).into()
+        let mut report = self.report();
+        Self::check_waiting(&mut report);
+        std::mem::take(&mut report.troubles).into()
+    }
+
+    /// Bytes that the thread has not taken.
+    pub fn queued(&self) -> usize {
+        self.report().queued
+    }
+
+    pub fn add_queued(&self, bytes: usize) {
+        let mut report = self.report();
+        report.queued = report.queued.saturating_add(bytes);
+    }
+
+    pub fn remove_queued(&self, bytes: usize) {
+        let mut report = self.report();
+        report.queued = report.queued.saturating_sub(bytes);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_durable_stays_so() {
+        let shared = Shared::default();
+        let point = |number, terrain, revision| SavePoint { number, terrain, revision };
+        assert_eq!(shared.durable(), None);
+        for (said, durable) in [
+            (point(1, 0, 5), point(1, 0, 5)),
+            // Another terrain with a lower revision.
+            (point(2, 1, 0), point(2, 1, 0)),
+            (point(1, 0, 5), point(2, 1, 0)),
+        ] {
+            shared.set_durable(said);
+            assert_eq!(shared.durable(), Some(durable));
+        }
+    }
+
+    #[test]
+    fn a_disk_that_does_not_answer_is_reported_once_and_so_is_its_answer() {
+        let shared = Shared::default();
+        shared.begin_waiting(Duration::MAX);
+        assert_eq!(shared.take_troubles(), []);
+        shared.begin_waiting(Duration::ZERO);
+        assert_eq!(shared.take_troubles(), [StoreTrouble::Hanging]);
+        assert_eq!(shared.take_troubles(), []);
+        shared.end_waiting();
+        shared.end_waiting();
+        assert_eq!(shared.take_troubles(), [StoreTrouble::SavedAgain]);
     }
 }

@@ -8,37 +8,80 @@ use std::time::{Duration, Instant};
 use rustc_hash::FxHashMap;
 
 use super::checkpoint::Checkpoint;
-use super::database::Records;
 use super::error::{StoreError, StoreTrouble};
-use super::files::Files;
+use super::files::{Files, Lock};
 use super::format::Batch;
 use super::format::frame::WorldId;
 use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
+use super::region_file::RegionFile;
 use super::segment::{FRAME_LIMIT, base};
-use super::shared::{GameChange, Shared, apply_game};
+use super::shared::{GameChange, SavePoint, Shared, apply_game};
+use super::unsaved;
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, TerrainSettings, WorldChange, WorldParts};
 
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
 
+/// How long the disk may take for a frame of the log and for a checkpoint, before it is reported that it does not answer.
+const FRAME_TIME: Duration = Duration::from_secs(3);
+pub(super) const CHECKPOINT_TIME: Duration = Duration::from_secs(30);
+
 /// Where the answer to a request goes: the revision that is durable then.
 pub(super) type Answer = Sender<Result<u64, StoreError>>;
 
 /// What the thread is told.
 pub(super) enum Message {
-    /// Commits, and what the game puts beside them, in one frame.
-    Commits(Vec<CommitRecord>, Vec<GameChange>),
-    /// All of the world, since records are missing, its ground, and its hash.
-    Whole(Box<WorldParts>, Arc<Ground>, u64, Vec<GameChange>),
+    /// What has to be saved.
+    Save(Given),
     /// Makes all that was told so far durable.
     Flush(Answer),
     /// Makes a checkpoint of all that was told so far.
     Checkpoint(Answer),
     /// The same, and makes the database as small as it can be.
     Compact(Answer),
+}
+
+/// Something that has to be saved, in one piece.
+pub(super) struct Given {
+    /// Where this leads to.
+    pub point: SavePoint,
+    pub content: Content,
+    /// What the game put beside it.
+    pub game: Vec<GameChange>,
+}
+
+/// What was given of the world.
+pub(super) enum Content {
+    Commits(Vec<CommitRecord>),
+    /// All of the world, since records are missing, its ground, and its hash.
+    Whole(Box<WorldParts>, Arc<Ground>, u64),
+}
+
+impl Given {
+    /// Whether it is all of a world.
+    fn is_whole(&self) -> bool {
+        matches!(self.content, Content::Whole(..))
+    }
+
+    /// About how many bytes of memory it takes.
+    pub fn bytes(&self) -> usize {
+        let world = match &self.content {
+            Content::Commits(records) => records.iter().map(record_bytes).sum(),
+            Content::Whole(parts, ..) => parts.change.bricks.len() * 1024,
+        };
+        64 + world + self.game.iter().map(game_bytes).sum::<usize>()
+    }
+}
+
+fn record_bytes(record: &CommitRecord) -> usize {
+    64 + record.entries.len() * 64 + record.change.bricks.len() * 1024
+}
+
+fn game_bytes((key, value): &GameChange) -> usize {
+    key.len() + value.as_ref().map_or(0, Vec::len)
 }
 
 /// What fails, and when it is tried again.
@@ -53,8 +96,26 @@ struct Failing {
 struct Pending {
     batch: Batch,
     bytes: usize,
-    /// When they have to be written.
-    due: Option<Instant>,
+    /// When the first of them came.
+    since: Option<Instant>,
+}
+
+impl Pending {
+    fn push(&mut self, record: CommitRecord) {
+        self.bytes += record_bytes(&record);
+        self.batch.commits.push(record);
+    }
+
+    /// Enters values of the game's. A frame is read whole or not at all, so only the last value of a key counts.
+    fn put(&mut self, game: Vec<GameChange>) {
+        for change in game {
+            self.bytes += game_bytes(&change);
+            match self.batch.game.iter_mut().find(|(key, _)| *key == change.0) {
+                Some(old) => self.bytes -= game_bytes(&std::mem::replace(old, change)),
+                None => self.batch.game.push(change),
+            }
+        }
+    }
 }
 
 /// The store's thread.
@@ -67,10 +128,14 @@ pub(super) struct Writer {
     pub settings: TerrainSettings,
     pub mirror: Mirror,
     pub journal: Journal,
-    pub database: Option<Records>,
+    pub database: RegionFile,
     /// The frames of the last checkpoint and of the one before.
     pub checkpoints: [u64; 2],
+    /// Up to where the mirror holds what was given.
+    pub point: SavePoint,
     pub(super) state: State,
+    /// Held as long as anything may be written.
+    _lock: Box<dyn Lock>,
 }
 
 /// What changes while the thread runs.
@@ -84,6 +149,8 @@ pub(super) struct State {
     pub has_gap: bool,
     /// Is a checkpoint being made that ends a gap? Frames are durable with it only.
     pub after_gap: bool,
+    /// Up to where frames were written since the last checkpoint was begun.
+    pub written: Option<SavePoint>,
     failing: Option<Failing>,
     /// Requests that came during a checkpoint.
     later: VecDeque<Message>,
@@ -102,10 +169,12 @@ impl Writer {
         settings: TerrainSettings,
         mirror: Mirror,
         journal: Journal,
-        database: Option<Records>,
+        database: RegionFile,
         checkpoint: u64,
+        lock: Box<dyn Lock>,
     ) -> Self {
         let (checkpoints, state) = ([checkpoint; 2], State::default());
+        let point = SavePoint { revision: mirror.revision, ..SavePoint::default() };
         Self {
             files,
             options,
@@ -117,7 +186,9 @@ impl Writer {
             journal,
             database,
             checkpoints,
+            point,
             state,
+            _lock: lock,
         }
     }
 
@@ -135,10 +206,14 @@ impl Writer {
         }
     }
 
-    /// Lets the journal's next segment begin with the state of now.
+    /// Lets the journal go on in a new segment. The first one of all begins with the state of now, so that a world can be made of
+    /// the log alone; in others that would only take room away from commits.
     pub fn begin_segment(&mut self) {
-        let frame = self.journal.last_frame();
-        let mut checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
+        let mut checkpoint = Vec::new();
+        if !self.journal.has_segments() {
+            let frame = self.journal.last_frame();
+            checkpoint = Checkpoint::of(&self.mirror, frame, self.metadata()).encode();
+        }
         if checkpoint.len() > FRAME_LIMIT {
             // It could not be read; the database has the last one that can.
             checkpoint.clear();
@@ -162,11 +237,18 @@ impl Writer {
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             self.tick(messages);
+            self.shared.end_waiting();
         }
         // What can't be saved now is lost with the process; the game was told.
-        if self.flush().is_ok() && self.is_changed() {
-            drop(self.checkpoint(None));
+        let mut is_saved = self.flush().is_ok();
+        if is_saved && self.is_changed() {
+            is_saved = self.checkpoint(None).is_ok();
         }
+        if is_saved {
+            // If that fails, it says more than is so, which does no harm.
+            drop(unsaved::clear(&*self.files));
+        }
+        self.shared.end_waiting();
     }
 
     /// Is there anything that the database does not hold?
@@ -179,8 +261,17 @@ impl Writer {
         if let Some(failing) = &self.state.failing {
             return Some(failing.again);
         }
-        let checkpoint = self.state.changed.map(|since| since + self.options.checkpoint_after);
-        [self.state.pending.due, checkpoint].into_iter().flatten().min()
+        [self.frame_due(), self.checkpoint_due()].into_iter().flatten().min()
+    }
+
+    /// When what waits has to be written.
+    fn frame_due(&self) -> Option<Instant> {
+        self.state.pending.since?.checked_add(self.options.loss_window)
+    }
+
+    /// When a checkpoint has to be made.
+    fn checkpoint_due(&self) -> Option<Instant> {
+        self.state.changed?.checked_add(self.options.checkpoint_after)
     }
 
     /// Does what is due.
@@ -192,10 +283,10 @@ impl Writer {
             }
             return;
         }
-        if self.state.pending.due.is_some_and(|due| due <= now) {
+        if self.frame_due().is_some_and(|due| due <= now) {
             drop(self.flush());
         }
-        let is_old = self.state.changed.is_some_and(|since| since + self.options.checkpoint_after <= now);
+        let is_old = self.checkpoint_due().is_some_and(|due| due <= now);
         if self.state.failing.is_none() && (is_old || self.state.commits >= self.options.checkpoint_commits) {
             drop(self.checkpoint(Some(messages)));
         }
@@ -203,26 +294,27 @@ impl Writer {
 
     fn take(&mut self, message: Message, messages: &Receiver<Message>) {
         match message {
-            Message::Commits(records, game) => self.enter(records, game),
-            Message::Whole(parts, ground, hash, game) => {
-                self.enter(Vec::new(), game);
-                self.mirror.replace(*parts, hash);
-                self.take_ground(ground);
-                self.leave_gap();
-            }
+            Message::Save(given) => self.enter(given),
             Message::Flush(answer) => {
                 let done = self.make_durable(messages);
-                drop(answer.send(done.map(|()| self.shared.durable())));
+                self.answer(&answer, done);
             }
             Message::Checkpoint(answer) => {
                 let done = self.checkpoint(Some(messages));
-                drop(answer.send(done.map(|()| self.shared.durable())));
+                self.answer(&answer, done);
             }
             Message::Compact(answer) => {
-                let done = self.checkpoint(Some(messages)).and_then(|()| self.compact());
-                drop(answer.send(done.map(|()| self.shared.durable())));
+                self.database.compact_next();
+                let done = self.checkpoint(Some(messages));
+                self.answer(&answer, done);
             }
         }
+    }
+
+    /// Answers a request, for which nobody may wait any more.
+    fn answer(&self, answer: &Answer, done: Result<(), StoreError>) {
+        let revision = || self.shared.durable().map_or(0, SavePoint::revision);
+        drop(answer.send(done.map(|()| revision())));
     }
 
     /// Makes all that came so far durable, by the log if that has no gap.
@@ -233,38 +325,26 @@ impl Writer {
         if self.state.has_gap { self.checkpoint(Some(messages)) } else { Ok(()) }
     }
 
-    fn compact(&mut self) -> Result<(), StoreError> {
-        let done = self.database.as_mut().map_or(Ok(()), Records::compact);
-        done.map_err(|why| StoreError::NotSaved(why.to_string()))
-    }
-
     /// Takes in what has to be saved.
-    fn enter(&mut self, records: Vec<CommitRecord>, game: Vec<GameChange>) {
+    fn enter(&mut self, given: Given) {
+        self.shared.remove_queued(given.bytes());
+        let Given { point, content, game } = given;
         let now = Instant::now();
-        self.state.pending.due.get_or_insert(now + self.options.loss_window);
+        self.state.pending.since.get_or_insert(now);
         self.state.changed.get_or_insert(now);
-        for mut record in records {
-            if let Some(ground) = new_ground(&record) {
-                // The log that follows can't be replayed on the old ground.
-                drop(self.flush());
-                self.take_ground(ground);
-                self.give_up_waiting();
-                self.checkpoint_soon();
-            }
-            self.mirror.apply(&record);
-            self.state.commits += 1;
-            // Edits lead to the same bricks again.
-            if !record.entries.contains(&LogEntry::Change) {
-                record.change = WorldChange::default();
-            }
-            let pending = &mut self.state.pending;
-            pending.bytes += 64 + record.entries.len() * 64 + record.change.bricks.len() * 1024;
-            pending.batch.commits.push(record);
-        }
         apply_game(&mut self.mirror.game, &game);
-        let bytes = |(key, value): &GameChange| key.len() + value.as_ref().map_or(0, Vec::len);
-        self.state.pending.bytes += game.iter().map(bytes).sum::<usize>();
-        self.state.pending.batch.game.extend(game);
+        match content {
+            Content::Commits(records) => {
+                records.into_iter().for_each(|record| self.enter_record(record));
+                self.state.pending.put(game);
+            }
+            Content::Whole(parts, ground, hash) => {
+                self.mirror.replace(*parts, hash);
+                self.take_ground(ground);
+                self.leave_gap();
+            }
+        }
+        self.point = point;
         if self.state.has_gap {
             // A checkpoint saves them, since the journal can't.
             self.state.pending = Pending::default();
@@ -276,10 +356,28 @@ impl Writer {
         }
     }
 
+    fn enter_record(&mut self, mut record: CommitRecord) {
+        if let Some(ground) = new_ground(&record) {
+            // The log that follows can't be replayed on the old ground.
+            drop(self.flush());
+            self.take_ground(ground);
+            self.give_up_waiting();
+            self.checkpoint_soon();
+        }
+        self.mirror.apply(&record);
+        self.state.commits += 1;
+        // Edits lead to the same bricks again.
+        if !record.entries.contains(&LogEntry::Change) {
+            record.change = WorldChange::default();
+        }
+        self.state.pending.push(record);
+    }
+
     /// Gives up what waits for the journal: only a checkpoint makes it durable now.
     fn leave_gap(&mut self) {
         if !self.state.has_gap {
-            self.shared.tell(StoreTrouble::LogGap { revision: self.shared.durable() });
+            let revision = self.shared.durable().map_or(0, SavePoint::revision);
+            self.shared.tell(StoreTrouble::LogGap { revision });
         }
         self.give_up_waiting();
         self.checkpoint_soon();
@@ -321,13 +419,14 @@ impl Writer {
             }
             self.journal.push(self.mirror.revision, &payload);
         }
+        self.shared.begin_waiting(FRAME_TIME);
         match self.journal.write() {
-            Ok(written) => {
-                let counts = !self.state.has_gap && !self.state.after_gap;
-                if let (Some(revision), true) = (written, counts) {
-                    self.shared.set_durable(revision);
-                }
-                if counts {
+            // Frames behind a gap are durable with the checkpoint that ends it.
+            Ok(()) if self.state.has_gap => Ok(()),
+            Ok(()) => {
+                self.state.written = Some(self.point);
+                if !self.state.after_gap {
+                    self.shared.set_durable(self.point);
                     self.succeed();
                 }
                 Ok(())
@@ -345,14 +444,14 @@ impl Writer {
     pub(super) fn listen(&mut self, messages: &Receiver<Message>) {
         loop {
             match messages.try_recv() {
-                Ok(Message::Commits(records, game)) if self.state.later.is_empty() => {
-                    self.enter(records, game)
+                Ok(Message::Save(given)) if self.state.later.is_empty() && !given.is_whole() => {
+                    self.enter(given)
                 }
                 Ok(message) => self.state.later.push_back(message),
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
             }
         }
-        let is_due = self.state.pending.due.is_some_and(|due| due <= Instant::now());
+        let is_due = self.frame_due().is_some_and(|due| due <= Instant::now());
         if is_due && self.state.failing.is_none() && !self.state.has_gap {
             drop(self.flush());
         }
@@ -367,6 +466,7 @@ impl Writer {
         if self.state.failing.as_ref().is_none_or(|failing| failing.why != why) {
             self.shared.tell(StoreTrouble::NotSaved(why.into()));
         }
+        self.shared.set_failing(Some(why));
         self.state.failing = Some(Failing { wait, again: Instant::now() + wait, why: why.into() });
         StoreError::NotSaved(why.into())
     }
@@ -375,6 +475,7 @@ impl Writer {
         if self.state.failing.take().is_some_and(|failing| !failing.why.is_empty()) {
             self.shared.tell(StoreTrouble::SavedAgain);
         }
+        self.shared.set_failing(None);
     }
 }
 

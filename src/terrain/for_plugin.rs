@@ -85,11 +85,13 @@ impl Terrain {
         self.drawn_cut = drawn;
     }
 
-    /// Takes the place of a terrain: takes over what waits in it, its engine, limits and budget of history.
+    /// Takes the place of a terrain: takes over what waits in it, its engine, limits and budget of history. Edits that wait obey the
+    /// rules of this terrain.
     #[cfg(feature = "store")]
     pub(crate) fn take_over(&mut self, old: &mut Self) {
         old.abandon();
         self.queue.take_over(&mut old.queue);
+        self.queue.change_terms((&old.rules, &old.loose), (&self.rules, &self.loose));
         self.answered.append(&mut old.answered);
         self.step_receipts.append(&mut old.step_receipts);
         self.change_receipts.append(&mut old.change_receipts);

@@ -221,6 +221,18 @@ impl Terrain {
         self.log.as_ref().is_some_and(|log| !log.records.is_empty())
     }
 
+    /// Whether the records that wait follow this revision, and one of them sets another ground: then the world is another one than before,
+    /// and the terrain is the same.
+    #[cfg(feature = "store")]
+    pub(crate) fn log_sets_ground_after(&self, revision: u64) -> bool {
+        let Some(log) = &self.log else { return false };
+        let sets_ground =
+            |record: &CommitRecord| record.entries.iter().any(|entry| matches!(entry, LogEntry::Ground(_)));
+        let first = log.records.front();
+        first.is_some_and(|first| first.revision == revision.saturating_add(first.is_commit().into()))
+            && log.records.iter().any(sets_ground)
+    }
+
     /// Enters the terms of later edits into the log, unless edits wait that obey others.
     pub(super) fn log_terms(&mut self) {
         if self.is_busy() || self.queue.len() > 0 {

@@ -245,6 +245,28 @@ impl Queue {
         *self = Self { limits: other.limits, ..std::mem::take(other) };
     }
 
+    /// Lets edits that wait under these rules and settings of loose pieces obey others.
+    #[cfg(all(feature = "plugin", feature = "store"))]
+    pub fn change_terms(
+        &mut self,
+        (old_rules, old_loose): (&Option<Arc<DiggingRules>>, &Option<LooseSettings>),
+        (rules, loose): (&Option<Arc<DiggingRules>>, &Option<LooseSettings>),
+    ) {
+        let edits = self.requests.iter_mut().filter_map(|request| match request {
+            Request::Edit(submission) => Some(&mut submission.terms),
+            Request::Step(_) | Request::Put(_) => None,
+        });
+        for terms in edits {
+            let is_old = match (&terms.rules, old_rules) {
+                (Some(own), Some(old)) => Arc::ptr_eq(own, old),
+                (own, old) => own.is_none() && old.is_none(),
+            };
+            if is_old && terms.loose == *old_loose {
+                (terms.rules, terms.loose) = (rules.clone(), *loose);
+            }
+        }
+    }
+
     /// Drops all requests.
     #[cfg(feature = "plugin")]
     pub fn clear(&mut self) {

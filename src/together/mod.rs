@@ -31,6 +31,7 @@
 
 mod client;
 mod messages;
+mod saved_or_shared;
 mod server;
 
 pub use client::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
@@ -55,6 +56,8 @@ impl Plugin for TogetherPlugin {
             .add_observer(server::forget_player)
             .add_observer(client::begin)
             .add_observer(client::end)
+            .add_observer(saved_or_shared::close_own_world)
+            .add_observer(saved_or_shared::refuse_own_world)
             .add_systems(OnEnter(ClientState::Connected), client::connect)
             .add_systems(OnExit(ClientState::Connected), client::disconnect)
             .add_systems(

@@ -20,6 +20,12 @@ mod propagate;
 mod queries;
 mod receipts;
 mod replacing;
+mod saved;
+mod saved_changes;
+mod saved_lifecycle;
+#[cfg(feature = "replicon")]
+mod saved_or_shared;
+mod saved_troubles;
 mod saves;
 mod server;
 mod several_terrains;

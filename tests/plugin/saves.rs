@@ -1,86 +1,17 @@
 //! Worlds that a `SavedWorld` saves: what was dug is there again, whatever ends the app.
 #![cfg(feature = "store")]
 
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::path::Path;
+use std::time::Duration;
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{Level, StoreError, StoreOptions, load_level, pack_level, save_level, write_level};
 
-/// A folder that is removed with this.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("burrow-saves-{}-{name}", std::process::id()));
-        drop(std::fs::remove_dir_all(&path));
-        Self(path)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        drop(std::fs::remove_dir_all(&self.0));
-    }
-}
-
-#[derive(Resource, Default)]
-struct Heard {
-    opened: Vec<Result<u64, String>>,
-    saved: Vec<u64>,
-    receipts: usize,
-}
-
-fn hear(
-    mut opened: MessageReader<WorldOpened>,
-    mut saved: MessageReader<WorldSaved>,
-    mut receipts: MessageReader<BrushApplied>,
-    mut heard: ResMut<Heard>,
-) {
-    let outcome = |message: &WorldOpened| message.outcome.clone().map_err(|why| why.to_string());
-    heard.opened.extend(opened.read().map(outcome));
-    heard.saved.extend(saved.read().map(|message| message.revision));
-    heard.receipts += receipts.read().filter(|message| message.receipt.outcome.is_ok()).count();
-}
-
-fn ground() -> Ground {
-    Ground::from_fn(96, 96, |x, z| f64::from((x * 5 + z * 3) % 17) / 4.0 + 10.0).expect("valid")
-}
-
-fn terrain() -> Terrain {
-    Terrain::new(ground(), &TerrainSettings::default()).expect("valid")
-}
-
-/// An app with a saved terrain.
-fn app(path: &Path) -> (App, Entity) {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, BurrowPlugins)).init_resource::<Heard>().add_systems(Last, hear);
-    let saved = SavedWorld { loss_window: Duration::from_millis(20), ..SavedWorld::new(path) };
-    let entity = app.world_mut().spawn((terrain(), saved)).id();
-    (app, entity)
-}
-
-fn run_until(app: &mut App, what: &str, is_done: impl Fn(&World) -> bool) {
-    let start = Instant::now();
-    while !is_done(app.world()) {
-        app.update();
-        assert!(start.elapsed() < Duration::from_secs(60), "never: {what}");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-}
-
-fn dig(app: &mut App, x: f32) {
-    app.world_mut().write_message(Brush::dig(Shape::sphere(Vec3::new(x, 11.0, 40.0), 4.0)));
-}
-
-fn hash(app: &App, entity: Entity) -> u64 {
-    app.world().get::<Terrain>(entity).expect("a terrain").world().hash()
-}
-
-fn run_until_saved(app: &mut App, revision: u64) {
-    run_until(app, "everything is durable", |world| world.resource::<Heard>().saved.contains(&revision));
-}
+use crate::saved::{
+    Folder, Heard, app, dig, ground, hash, hear, run_until, run_until_applied, run_until_opened,
+    run_until_saved, terrain,
+};
 
 #[test]
 fn what_was_dug_is_there_in_the_next_app() {
@@ -88,9 +19,9 @@ fn what_was_dug_is_there_in_the_next_app() {
     let (mut first, entity) = app(&folder.0);
     // Sent before the world is there.
     dig(&mut first, 20.0);
-    run_until(&mut first, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    run_until_applied(&mut first, 1);
     dig(&mut first, 30.0);
-    run_until(&mut first, "the dig is applied", |world| world.resource::<Heard>().receipts == 2);
+    run_until_applied(&mut first, 2);
     let mut worlds = first.world_mut().query::<&mut WorldStore>();
     worlds.single_mut(first.world_mut()).expect("it is open").put("coal", *b"7");
     run_until_saved(&mut first, 2);
@@ -103,11 +34,11 @@ fn what_was_dug_is_there_in_the_next_app() {
     copy_folder(&folder.0, &copy.0);
     let (mut second, entity) = app(&copy.0);
     dig(&mut second, 50.0);
-    run_until(&mut second, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+    run_until_opened(&mut second);
     assert_eq!(second.world().resource::<Heard>().opened, [Ok(2)]);
     assert_eq!(second.world().get::<WorldStore>(entity).expect("open").get("coal"), Some(&b"7"[..]));
     assert_eq!(hash(&second, entity), before);
-    run_until(&mut second, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    run_until_applied(&mut second, 1);
     assert_ne!(hash(&second, entity), before);
     let terrain = second.world().get::<Terrain>(entity).expect("a terrain");
     assert!(terrain.world().check_seams().is_flawless());
@@ -129,9 +60,9 @@ fn copy_folder(from: &Path, to: &Path) {
 fn an_app_that_exits_saves_first() {
     let folder = Folder::new("exit");
     let (mut first, entity) = app(&folder.0);
-    run_until(&mut first, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+    run_until_opened(&mut first);
     dig(&mut first, 30.0);
-    run_until(&mut first, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    run_until_applied(&mut first, 1);
     let before = hash(&first, entity);
     first.world_mut().write_message(AppExit::Success);
     first.update();
@@ -139,7 +70,7 @@ fn an_app_that_exits_saves_first() {
     drop(first);
 
     let (mut second, entity) = app(&folder.0);
-    run_until(&mut second, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+    run_until_opened(&mut second);
     assert_eq!((hash(&second, entity), &second.world().resource::<Heard>().opened), (before, &vec![Ok(1)]));
 }
 
@@ -148,32 +79,39 @@ fn a_terrain_that_goes_is_saved_and_its_world_can_be_opened_again() {
     let folder = Folder::new("despawn");
     let (mut app_once, entity) = app(&folder.0);
     dig(&mut app_once, 30.0);
-    run_until(&mut app_once, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    run_until_applied(&mut app_once, 1);
     let before = hash(&app_once, entity);
     app_once.world_mut().despawn(entity);
     app_once.update();
     drop(app_once);
     let (mut again, entity) = app(&folder.0);
-    run_until(&mut again, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+    run_until_opened(&mut again);
     assert_eq!(hash(&again, entity), before);
 }
 
 #[test]
-fn another_terrain_in_its_place_is_saved_in_its_stead() {
+fn another_state_of_its_world_is_saved_in_its_stead() {
     let folder = Folder::new("replaced");
     let (mut first, entity) = app(&folder.0);
     dig(&mut first, 30.0);
-    run_until(&mut first, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    run_until_applied(&mut first, 1);
+    run_until_saved(&mut first, 1);
+    dig(&mut first, 70.0);
+    run_until_applied(&mut first, 2);
     let mut new = terrain();
     new.apply([Brush::dig(Shape::sphere(Vec3::new(60.0, 11.0, 20.0), 6.0))]);
     let expected = new.world().hash();
+    first.world_mut().resource_mut::<Heard>().saved.clear();
     first.world_mut().entity_mut(entity).insert(new);
+    // Its revision is lower than that of the one before, and is told once it is durable.
     run_until_saved(&mut first, 1);
+    let durable = first.world().get::<WorldStore>(entity).expect("it is open").durable();
+    assert_eq!((durable, first.world().resource::<Heard>().closed.len()), (1, 0));
     first.world_mut().write_message(AppExit::Success);
     first.update();
     drop(first);
     let (mut second, entity) = app(&folder.0);
-    run_until(&mut second, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+    run_until_opened(&mut second);
     assert_eq!(hash(&second, entity), expected);
 }
 
@@ -181,26 +119,67 @@ fn another_terrain_in_its_place_is_saved_in_its_stead() {
 fn save_now_is_answered_even_where_nothing_is_new() {
     let folder = Folder::new("now");
     let (mut app, entity) = app(&folder.0);
-    run_until(&mut app, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+    run_until_opened(&mut app);
     run_until_saved(&mut app, 0);
     let before = app.world().resource::<Heard>().saved.len();
     app.world_mut().write_message(SaveNow { terrain: Some(entity) });
     run_until(&mut app, "it is saved", |world| world.resource::<Heard>().saved.len() > before);
 }
 
+/// Changes the ground by itself in each frame.
+fn dig_in_each_frame(mut terrains: Query<&mut Terrain, With<WorldStore>>, mut count: Local<u32>) {
+    for mut terrain in &mut terrains {
+        *count += 1;
+        terrain
+            .apply([Brush::dig(Shape::sphere(Vec3::new(8.0 + (*count * 7 % 80) as f32, 11.0, 40.0), 3.0))]);
+    }
+}
+
+#[test]
+fn a_world_that_is_dug_in_each_frame_is_told_to_be_saved() {
+    let folder = Folder::new("busy");
+    let (mut app, entity) = app(&folder.0);
+    app.add_systems(Update, dig_in_each_frame.before(SaveSystems));
+    run_until_opened(&mut app);
+    run_until(&mut app, "it is told", |world| world.resource::<Heard>().saved.len() > 5);
+    let told = app.world().resource::<Heard>().saved.clone();
+    assert!(told.is_sorted(), "{told:?}");
+    app.world_mut().write_message(SaveNow::default());
+    let now = app.world().get::<Terrain>(entity).expect("a terrain").world().revision();
+    run_until(&mut app, "all up to then is told", move |world| {
+        world.resource::<Heard>().saved.last().is_some_and(|revision| *revision >= now)
+    });
+}
+
+#[test]
+fn data_that_is_put_alone_is_told_to_be_saved() {
+    let folder = Folder::new("data");
+    let (mut app, entity) = app(&folder.0);
+    run_until_opened(&mut app);
+    run_until_saved(&mut app, 0);
+    let before = app.world().resource::<Heard>().saved.len();
+    app.world_mut().get_mut::<WorldStore>(entity).expect("it is open").put("coal", *b"7");
+    run_until(&mut app, "it is told", |world| world.resource::<Heard>().saved.len() > before);
+    let copy = Folder::new("data-copy");
+    copy_folder(&folder.0, &copy.0);
+    let (store, _) =
+        bevy_burrow::store::Store::open(&copy.0, ground(), StoreOptions::default()).expect("a world");
+    assert_eq!(store.get("coal"), Some(&b"7"[..]));
+}
+
 #[test]
 fn a_world_that_is_open_already_is_played_in_memory() {
     let folder = Folder::new("locked");
     let (mut first, _) = app(&folder.0);
-    run_until(&mut first, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+    run_until_opened(&mut first);
     let (mut second, entity) = app(&folder.0);
-    run_until(&mut second, "it is told", |world| !world.resource::<Heard>().opened.is_empty());
+    run_until_opened(&mut second);
     let told = &second.world().resource::<Heard>().opened[0];
     let expected = StoreError::Locked(folder.0.display().to_string()).to_string();
     assert_eq!(told, &Err(expected));
     assert!(second.world().get::<WorldStore>(entity).is_none());
     dig(&mut second, 30.0);
-    run_until(&mut second, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    run_until_applied(&mut second, 1);
 }
 
 /// A level of the terrain with a pit.
@@ -228,7 +207,7 @@ fn a_terrain_begins_as_the_level_that_is_loaded() {
         move |world: &World| world.get::<Terrain>(entity).is_some_and(|own| own.world().hash() == expected);
     run_until(&mut app, "the level is there", pit);
     // What was sent meanwhile comes on top of it.
-    run_until(&mut app, "the dig is applied", |world| world.resource::<Heard>().receipts == 1);
+    run_until_applied(&mut app, 1);
     assert_ne!(hash(&app, entity), expected);
 }
 
@@ -242,11 +221,11 @@ fn a_save_begins_as_a_level_and_goes_on_as_itself() {
         let asset = BurrowLevel::new(&level).expect("it can be written");
         let handle = app.world_mut().resource_mut::<Assets<BurrowLevel>>().add(asset);
         app.world_mut().entity_mut(entity).insert(StartLevel(handle));
-        run_until(&mut app, "it is opened", |world| !world.resource::<Heard>().opened.is_empty());
+        run_until_opened(&mut app);
         let first = hash(&app, entity);
         for number in 0..digs {
             dig(&mut app, 20.0);
-            run_until(&mut app, "it is dug", move |world| world.resource::<Heard>().receipts > number);
+            run_until_applied(&mut app, number + 1);
         }
         app.world_mut().write_message(AppExit::Success);
         app.update();

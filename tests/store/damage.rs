@@ -248,7 +248,7 @@ pub fn records(disk: &SimulatedDisk) -> (Bytes, Vec<Record>) {
 }
 
 /// Changes a record of a disk's database.
-fn put(disk: &SimulatedDisk, key: &[u8], record: Option<&[u8]>) {
+pub fn put(disk: &SimulatedDisk, key: &[u8], record: Option<&[u8]>) {
     let (bytes, _) = records(disk);
     let database = Builder::new().create_with_backend(bytes.clone()).expect("a database");
     let write = database.begin_write().expect("it can be written");

@@ -1,5 +1,5 @@
-//! A process that digs is killed at random, also while it makes checkpoints and while it recovers. `BURROW_KILLS` is how often,
-//! and `BURROW_SEED` the seed.
+//! A process that digs is killed at random, also while it makes checkpoints, while it recovers, and, a quarter of the times, while it
+//! rebuilds a damaged database, with a log that is whole or not. `BURROW_KILLS` is how often, and `BURROW_SEED` the seed.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
@@ -16,9 +16,12 @@ use crate::play::{TURN, act, count, ground, save, terrain};
 
 const FOLDER: &str = "BURROW_KILLED_WORLD";
 const SEED: &str = "BURROW_KILLED_SEED";
+const LOG_BYTES: &str = "BURROW_KILLED_LOG_BYTES";
+const DATABASE: &str = "regions.redb";
 
-fn options() -> StoreOptions {
-    StoreOptions { loss_window: Duration::from_millis(5), checkpoint_commits: 60, ..StoreOptions::default() }
+fn options(log_bytes: u64) -> StoreOptions {
+    let loss_window = Duration::from_millis(5);
+    StoreOptions { loss_window, checkpoint_commits: 60, log_bytes, ..StoreOptions::default() }
 }
 
 fn say(line: std::fmt::Arguments) {
@@ -33,6 +36,7 @@ fn say(line: std::fmt::Arguments) {
 fn child() {
     let (Ok(folder), Ok(seed)) = (std::env::var(FOLDER), std::env::var(SEED)) else { return };
     let mut rng = Rng::with_seed(seed.parse().expect("a number"));
+    let options = || options(count(LOG_BYTES, u64::MAX));
     let ground = ground(3);
     say(format_args!("\nopening"));
     let (mut store, mut terrain) = if Store::is_in(&folder) {
@@ -104,12 +108,25 @@ fn hear(lines: &Receiver<String>, known: &mut Known, until: Instant, stop: &str)
     }
 }
 
-fn kill_once(folder: &Path, rng: &mut Rng, known: &mut Known) -> &'static str {
+/// Damages a database so that its structure is lost, but no record.
+fn damage(database: &Path) -> bool {
+    let flip = || {
+        let mut bytes = std::fs::read(database)?;
+        bytes.iter_mut().take(1).for_each(|byte| *byte ^= 1);
+        std::fs::write(database, bytes)
+    };
+    flip().is_ok()
+}
+
+fn kill_once(folder: &Path, log_bytes: u64, rng: &mut Rng, known: &mut Known) -> &'static str {
+    let kind = rng.u32(0..8);
+    let is_rebuilt = kind < 2 && damage(&folder.join(DATABASE));
     let program = std::env::current_exe().expect("it runs");
     let mut child = Command::new(program)
         .args(["kill::child", "--exact", "--ignored", "--nocapture"])
         .env(FOLDER, folder)
         .env(SEED, rng.u64(..).to_string())
+        .env(LOG_BYTES, log_bytes.to_string())
         .stdout(Stdio::piped())
         .spawn()
         .expect("it can be started");
@@ -120,13 +137,18 @@ fn kill_once(folder: &Path, rng: &mut Rng, known: &mut Known) -> &'static str {
     });
     let soon = |rng: &mut Rng, most: u64| Instant::now() + Duration::from_micros(rng.u64(0..most));
     let long = Instant::now() + Duration::from_secs(20);
-    let during = match rng.u32(0..8) {
-        0 => {
+    let during = match kind {
+        0..=1 if is_rebuilt => {
+            hear(&lines, known, long, "opening");
+            hear(&lines, known, soon(rng, 12_000), "");
+            "rebuild"
+        }
+        2 => {
             hear(&lines, known, long, "opening");
             hear(&lines, known, soon(rng, 12_000), "");
             "recovery"
         }
-        1 => {
+        3 => {
             hear(&lines, known, long, "checkpoint");
             hear(&lines, known, soon(rng, 15_000), "");
             "checkpoint"
@@ -149,20 +171,22 @@ fn a_killed_process_loses_nothing_that_was_acknowledged() {
     let kills = count("BURROW_KILLS", 20);
     let mut rng = Rng::with_seed(count("BURROW_SEED", 26));
     let place = std::env::temp_dir().join(format!("bevy_burrow_kill_{}", std::process::id()));
-    let (mut known, mut folder) = (Known::default(), PathBuf::new());
+    let (mut known, mut folder, mut log_bytes) = (Known::default(), PathBuf::new(), u64::MAX);
     let (mut when, mut lost, mut in_flight) = (BTreeMap::<&str, u64>::new(), 0, 0);
     for kill in 0..kills {
-        if kill % 50 == 0 {
+        // So that few kills see both kinds of logs.
+        if kill % 50 == 0 || kill == 8 {
             drop(std::fs::remove_dir_all(&place));
             (known, folder) = (Known::default(), place.join(kill.to_string()));
+            log_bytes = if kill % 100 == 0 { u64::MAX } else { 0 };
             known.hashes.insert(0, vec![terrain(&ground(3)).world().hash()]);
         }
-        *when.entry(kill_once(&folder, &mut rng, &mut known)).or_default() += 1;
+        *when.entry(kill_once(&folder, log_bytes, &mut rng, &mut known)).or_default() += 1;
         if !Store::is_in(&folder) {
             assert!(known.acknowledged == 0 && known.latest == 0, "kill {kill}: the world is gone");
             continue;
         }
-        let opened = Store::open(&folder, ground(3), options());
+        let opened = Store::open(&folder, ground(3), options(log_bytes));
         let (store, opened) = opened.unwrap_or_else(|why| panic!("kill {kill} in {folder:?}: {why}"));
         let (revision, hash) = (opened.terrain.world().revision(), opened.terrain.world().hash());
         let bounds = known.acknowledged..=known.latest;

@@ -15,10 +15,10 @@ use glam::Vec3;
 use crate::play::{act, ground, open, options, save, state, terrain};
 
 /// A folder that is removed at the end.
-struct Place(PathBuf);
+pub struct Place(pub PathBuf);
 
 impl Place {
-    fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         let place = std::env::temp_dir().join(format!("bevy_burrow_{name}_{}", std::process::id()));
         drop(std::fs::remove_dir_all(&place));
         Self(place)

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use bevy_burrow::lattice::ChunkPos;
+use bevy_burrow::lattice::{BrickPos, ChunkPos};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{Opened, SimulatedDisk, Store, StoreError, StoreOptions};
 use bevy_burrow::terrain::Meshing;
-use bevy_burrow::volume::Field;
+use bevy_burrow::volume::{Brick, Field};
 use fastrand::Rng;
 
 use crate::worlds::{any_random_brush, random_ground_of_size};
@@ -56,6 +56,14 @@ pub fn state(terrain: &Terrain) -> State {
         rules: terrain.rules().cloned(),
         loose: terrain.loose().copied(),
     }
+}
+
+/// The edited samples of each brick.
+pub fn samples(terrain: &Terrain) -> BTreeMap<BrickPos, Vec<String>> {
+    let of = |(pos, brick): (BrickPos, &Brick)| {
+        (pos, brick.edited_samples(pos).map(|sample| format!("{sample:?}")).collect())
+    };
+    terrain.world().bricks().map(of).collect()
 }
 
 /// Does something at random: mostly digs.

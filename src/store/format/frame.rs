@@ -95,11 +95,11 @@ pub struct Opened {
 
 /// What a frame says of itself before it is checked.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Peeked {
+pub struct Peeked<'a> {
     /// The world that it belongs to.
     pub world: WorldId,
     /// Its place in that world.
-    pub key: Vec<u8>,
+    pub key: &'a [u8],
     /// How many bytes it takes.
     pub length: usize,
 }
@@ -191,11 +191,11 @@ fn split_schema(bytes: &[u8]) -> Result<(u8, &[u8]), FormatError> {
 }
 
 /// What a frame at the front of `bytes` says of itself, unchecked; `None` if none begins there that this version can read.
-pub fn peek(bytes: &[u8]) -> Option<Peeked> {
+pub fn peek(bytes: &[u8]) -> Option<Peeked<'_>> {
     let (schema, rest) = split_schema(bytes).ok()?;
     let (parts, after) = (u32::from(schema) == SCHEMA).then(|| parts(rest))?.ok()?;
     let length = bytes.len() - after.len() + CHECKSUM;
-    (length <= bytes.len()).then(|| Peeked { world: parts.world, key: parts.key.to_vec(), length })
+    (length <= bytes.len()).then(|| Peeked { world: parts.world, key: parts.key, length })
 }
 
 /// Unwraps what [`seal`] wrapped.

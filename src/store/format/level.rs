@@ -219,7 +219,7 @@ pub(super) fn unpack_within(packed: &[u8], limits: &Limits) -> Result<LevelFiles
     let mut files = LevelFiles::new();
     for sealed in container::read(Kind::Level, packed, limits.head)?.frames {
         let key = frame::peek(sealed).ok_or(FormatError::Invalid("file"))?.key;
-        let name = String::from_utf8(key).map_err(|_| FormatError::Key)?;
+        let name = String::from_utf8(key.to_vec()).map_err(|_| FormatError::Key)?;
         if name != LEVEL_JSON && region_of_name(&name).is_none() {
             return Err(file_error(&name, "no file of a level has this name"));
         }

@@ -198,8 +198,8 @@ pub(in crate::store) fn read_within(
     let mut portable = PortableWorld { world, metadata: head.metadata, ..PortableWorld::default() };
     for sealed in regions {
         let peeked = frame::peek(sealed).ok_or(FormatError::Invalid("region"))?;
-        let at = region_of_key(&peeked.key).ok_or(FormatError::Key)?;
-        let opened = frame::open(sealed, Kind::Region, world, &peeked.key, limits.region)?;
+        let at = region_of_key(peeked.key).ok_or(FormatError::Key)?;
+        let opened = frame::open(sealed, Kind::Region, world, peeked.key, limits.region)?;
         if portable.regions.last_key_value().is_some_and(|(last, _)| *last >= at) {
             return Err(FormatError::Invalid("order of regions"));
         }

@@ -92,8 +92,9 @@ fn a_frame_is_no_other_frame() {
     assert_eq!(open(&sealed, Kind::Region, WorldId(6), b"here", 1000), Err(other));
     assert_eq!(open(&sealed, Kind::Region, world, b"there", 1000), Err(FormatError::Key));
     assert_eq!(open(b"PNG", Kind::Region, world, b"here", 1000), Err(FormatError::Magic));
-    let peeked = frame::peek(&[&*sealed, b"more"].concat()).unwrap();
-    assert_eq!((peeked.world, &*peeked.key, peeked.length), (world, &b"here"[..], sealed.len()));
+    let longer = [&*sealed, b"more"].concat();
+    let peeked = frame::peek(&longer).unwrap();
+    assert_eq!((peeked.world, peeked.key, peeked.length), (world, &b"here"[..], sealed.len()));
 }
 
 #[test]

@@ -1,0 +1,136 @@
+//! Closing worlds: what is left is saved on the store's own thread, and nobody waits for it but an app that ends.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::lifecycle::Discard;
+use bevy::ecs::query::Allow;
+use bevy::platform::time::Instant;
+use bevy::prelude::*;
+
+use super::components::{EXIT_WAIT, SavedWorld, WorldStore};
+use super::messages::{ClosedBecause, StoreTroubleFound, WorldClosed, WorldOpened};
+use super::opening::{OpeningWorld, Unopened};
+use super::saving::follow_same;
+use crate::store::{ClosingStore, Store, StoreError};
+use crate::terrain::Terrain;
+
+/// A world that is being closed.
+struct Closing {
+    terrain: Entity,
+    path: PathBuf,
+    because: ClosedBecause,
+    store: ClosingStore,
+}
+
+/// Worlds that are being closed.
+#[derive(Resource, Default)]
+pub(super) struct ClosingWorlds(Vec<Closing>);
+
+impl ClosingWorlds {
+    pub fn close(&mut self, terrain: Entity, path: PathBuf, because: ClosedBecause, store: Store) {
+        self.0.push(Closing { terrain, path, because, store: store.close() });
+    }
+
+    /// Waits until all are closed, or up to a moment.
+    pub fn wait(&self, end: Instant) {
+        for Closing { path, store, .. } in &self.0 {
+            if let Err(why) = store.wait(end.saturating_duration_since(Instant::now())) {
+                error!("not everything is saved in {}: {why}", path.display());
+            }
+        }
+    }
+}
+
+/// An app that ends before they are closed waits for them, unless the disk does not answer.
+impl Drop for ClosingWorlds {
+    fn drop(&mut self) {
+        self.wait(Instant::now() + EXIT_WAIT);
+    }
+}
+
+/// Closes the store of a world that is no longer wanted, with the last commits of its terrain.
+pub(super) fn close(
+    gone: On<Discard, WorldStore>,
+    mut worlds: Query<(&mut WorldStore, Option<&mut Terrain>), Allow<Disabled>>,
+    mut closing: ResMut<ClosingWorlds>,
+) {
+    let Ok((mut world, terrain)) = worlds.get_mut(gone.entity) else { return };
+    if let Some(mut terrain) = terrain {
+        follow_same(&mut terrain, &mut world);
+    }
+    let (path, because) = (std::mem::take(&mut world.path), world.closing);
+    if let Some(store) = world.store.take() {
+        closing.close(gone.entity, path, because, store);
+    }
+}
+
+/// A world is closed with its component. A terrain that was put in the place of its own in this frame is not written into it.
+pub(super) fn close_with_component(
+    gone: On<Discard, SavedWorld>,
+    mut worlds: Query<(&mut WorldStore, &mut Terrain), Allow<Disabled>>,
+    mut commands: Commands,
+) {
+    if let Ok((mut world, mut terrain)) = worlds.get_mut(gone.entity) {
+        follow_same(&mut terrain, &mut world);
+    }
+    commands.entity(gone.entity).try_remove::<WorldStore>();
+}
+
+/// Hands over the last commits of a terrain that another one replaces, or that goes.
+pub(super) fn follow_discarded(
+    gone: On<Discard, Terrain>,
+    mut worlds: Query<(&mut WorldStore, &mut Terrain), Allow<Disabled>>,
+) {
+    if let Ok((mut world, mut terrain)) = worlds.get_mut(gone.entity) {
+        follow_same(&mut terrain, &mut world);
+    }
+}
+
+/// Takes the [`SavedWorld`] off an entity, and says why.
+pub(crate) fn detach(commands: &mut Commands, entity: Entity, because: ClosedBecause) {
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        let Some(saved) = entity.get::<SavedWorld>().cloned() else { return };
+        let path = saved.path.display();
+        warn!("{} is no longer saved in {path}, since {because}", entity.id());
+        if let Some(mut store) = entity.get_mut::<WorldStore>() {
+            store.closing = because;
+        }
+        let was_opening = entity.contains::<Unopened>() || entity.contains::<OpeningWorld>();
+        let terrain = entity.id();
+        entity.remove::<SavedWorld>();
+        if was_opening {
+            let why =
+                if because == ClosedBecause::Shared { StoreError::Shared } else { StoreError::OtherTerrain };
+            world.write_message(WorldOpened { terrain, outcome: Err(Arc::new(why)) });
+        }
+    });
+}
+
+/// Tells of worlds that are closed.
+pub(super) fn tell_closed(
+    mut closing: ResMut<ClosingWorlds>,
+    mut closed: MessageWriter<WorldClosed>,
+    mut troubles: MessageWriter<StoreTroubleFound>,
+) {
+    if closing.0.is_empty() {
+        return;
+    }
+    closing.0.retain(|Closing { terrain, path, because, store }| {
+        // Its last troubles come before its end.
+        let outcome = store.outcome();
+        for trouble in store.take_troubles() {
+            warn!("the world in {}: {trouble}", path.display());
+            troubles.write(StoreTroubleFound { terrain: *terrain, trouble });
+        }
+        let Some(outcome) = outcome else { return true };
+        if let Err(why) = &outcome {
+            error!("not everything is saved in {}: {why}", path.display());
+        }
+        let outcome = outcome.map_err(Arc::new);
+        closed.write(WorldClosed { terrain: *terrain, path: path.clone(), because: *because, outcome });
+        false
+    });
+}

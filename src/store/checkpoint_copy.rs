@@ -1,0 +1,41 @@
+//! A copy of the last checkpoint in a file of its own, since both copies in the database may be in one sector.
+
+use std::io;
+
+use super::files::{Files, Opening};
+use super::format::FormatError;
+use super::format::frame::{self, Kind, WorldId};
+use super::segment::{FOLDER, FRAME_LIMIT};
+
+/// The file, and its name while it is not complete.
+const PATHS: [&str; 2] = ["journal/checkpoint", "journal/checkpoint.new"];
+
+const KEY: &[u8] = b"copy";
+
+/// Writes a copy of a checkpoint in place of the last one.
+pub(super) fn write(files: &dyn Files, world: WorldId, revision: u64, checkpoint: &[u8]) -> io::Result<()> {
+    let [complete, unfinished] = PATHS;
+    files.create_folder(FOLDER)?;
+    remove(files, unfinished)?;
+    let file = files.open(unfinished, Opening::New)?;
+    file.write_at(0, &frame::seal(Kind::Checkpoint, world, KEY, revision, 0, checkpoint))?;
+    file.sync()?;
+    drop(file);
+    remove(files, complete)?;
+    files.rename(unfinished, complete)?;
+    files.sync_folder(FOLDER)
+}
+
+fn remove(files: &dyn Files, path: &str) -> io::Result<()> {
+    match files.remove(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// The copies of a world's checkpoint that are there, which may be damaged.
+pub(super) fn read(files: &dyn Files, world: WorldId) -> Vec<Result<Vec<u8>, FormatError>> {
+    let read = PATHS.into_iter().filter_map(|path| files.read(path).ok());
+    let open = |bytes: Vec<u8>| frame::open(&bytes, Kind::Checkpoint, world, KEY, FRAME_LIMIT);
+    read.map(open).map(|opened| opened.map(|opened| opened.payload)).collect()
+}

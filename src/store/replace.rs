@@ -1,0 +1,85 @@
+//! How a file takes the place of another: the only way in which one is ever replaced.
+//!
+//! 1. The new file is written beside the old one, whole, and made durable.
+//! 2. The old one is moved to quarantine, or removed where the new one holds all that it held.
+//! 3. The new one gets its name.
+//!
+//! At each moment at least one of them is complete. Where a step was interrupted, [recovery](super::sources) reads whichever is
+//! there, and the next replacement finishes the step first.
+
+use std::io;
+
+use super::files::{Files, Opening};
+use super::quarantine;
+
+/// What becomes of the file that is replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Old {
+    /// It may be damaged: it is kept in quarantine.
+    Quarantined,
+    /// It held nothing that the new one does not hold.
+    Removed,
+}
+
+/// A file that may be replaced.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Replaced<'a> {
+    /// Its path.
+    pub path: &'a str,
+    /// The path of one that is not complete yet.
+    pub unfinished: &'a str,
+}
+
+impl Replaced<'_> {
+    /// Replaces the file by one that `build` writes at the path that it is given, and makes durable. Returns where the old one is
+    /// kept, if it is. `is_complete` says of an unfinished file whether it may take the place of the old one.
+    pub fn replace<E: From<io::Error>>(
+        self,
+        files: &dyn Files,
+        old: Old,
+        is_complete: impl FnOnce() -> bool,
+        build: impl FnOnce(&str) -> Result<(), E>,
+    ) -> Result<Option<String>, E> {
+        let mut kept = None;
+        let mut old = old;
+        if files.exists(self.unfinished)? {
+            if is_complete() {
+                kept = self.put_in_place(files, old)?;
+                // What is there now is complete.
+                old = Old::Removed;
+            } else if files.exists(self.path)? {
+                files.remove(self.unfinished)?;
+            } else {
+                drop(quarantine::file(files, self.unfinished)?);
+            }
+        }
+        if let Err(error) = build(self.unfinished) {
+            // What is left of it takes space, and is removed at the next try at the latest.
+            drop(files.remove(self.unfinished));
+            return Err(error);
+        }
+        let last = self.put_in_place(files, old)?;
+        Ok(kept.or(last))
+    }
+
+    /// Lets the unfinished file, which is complete, take the place of the old one.
+    fn put_in_place(self, files: &dyn Files, old: Old) -> io::Result<Option<String>> {
+        let folder = self.path.rsplit_once('/').map_or("", |(folder, _)| folder);
+        // A process that was killed may not have come so far.
+        files.open(self.unfinished, Opening::Existing)?.sync()?;
+        files.sync_folder(folder)?;
+        let mut kept = None;
+        if files.exists(self.path)? {
+            let is_empty = files.open(self.path, Opening::Existing)?.length()? == 0;
+            if old == Old::Quarantined && !is_empty {
+                kept = Some(quarantine::file(files, self.path)?);
+            } else {
+                files.remove(self.path)?;
+                files.sync_folder(folder)?;
+            }
+        }
+        files.rename(self.unfinished, self.path)?;
+        files.sync_folder(folder)?;
+        Ok(kept)
+    }
+}

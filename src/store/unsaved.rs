@@ -1,0 +1,43 @@
+//! A file that says that commits are in the journal only, so that a journal that somebody removed is missed.
+//!
+//! It is there from the first frame that is durable after a world is opened until the world is closed with all of it in a
+//! checkpoint, and holds the number of the segment of that frame, twice.
+
+use std::io;
+
+use super::files::{Files, Opening};
+
+/// Its path.
+pub(super) const UNSAVED: &str = "unsaved";
+
+/// Enters that a segment holds commits that may be in no checkpoint.
+pub(super) fn enter(files: &dyn Files, segment: u64) -> io::Result<()> {
+    if files.exists(UNSAVED)? {
+        // That of a process that was killed names an earlier segment.
+        return Ok(());
+    }
+    let file = files.open(UNSAVED, Opening::New)?;
+    file.write_at(0, format!("{segment} {segment}\n").as_bytes())?;
+    file.sync()?;
+    files.sync_folder("")
+}
+
+/// Enters that all commits are in a checkpoint.
+pub(super) fn clear(files: &dyn Files) -> io::Result<()> {
+    if files.exists(UNSAVED)? {
+        files.remove(UNSAVED)?;
+        files.sync_folder("")?;
+    }
+    Ok(())
+}
+
+/// The segment from which on commits may be in no checkpoint: 0 if nothing is known of it, `None` if there are none.
+pub(super) fn read(files: &dyn Files) -> Option<u64> {
+    let bytes = match files.read(UNSAVED) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
+        bytes => bytes.unwrap_or_default(),
+    };
+    let text = String::from_utf8(bytes).unwrap_or_default();
+    let (first, second) = text.trim_end().split_once(' ').unwrap_or_default();
+    first.parse().ok().filter(|_| first == second).or(Some(0))
+}

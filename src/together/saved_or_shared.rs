@@ -1,0 +1,28 @@
+//! A world is saved or shared: the server saves what players share, and never the component that saves a player's own world.
+
+use bevy::prelude::*;
+
+use super::SharedTerrain;
+use crate::saves::{ClosedBecause, SavedWorld, detach};
+
+/// A terrain that becomes shared is no longer saved here: its own world is closed with all that was dug in it.
+pub(super) fn close_own_world(
+    new: On<Insert, SharedTerrain>,
+    saved: Query<(), With<SavedWorld>>,
+    mut commands: Commands,
+) {
+    if saved.contains(new.entity) {
+        detach(&mut commands, new.entity, ClosedBecause::Shared);
+    }
+}
+
+/// A terrain that is shared can't be saved here.
+pub(super) fn refuse_own_world(
+    new: On<Insert, SavedWorld>,
+    shared: Query<(), With<SharedTerrain>>,
+    mut commands: Commands,
+) {
+    if shared.contains(new.entity) {
+        detach(&mut commands, new.entity, ClosedBecause::Shared);
+    }
+}
