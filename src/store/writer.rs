@@ -236,13 +236,11 @@ impl Writer {
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             self.tick(messages);
-            self.shared.end_waiting();
         }
         // What can't be saved now is lost with the process; the game was told.
         if self.flush().is_ok() && self.is_changed() {
             drop(self.checkpoint(None));
         }
-        self.shared.end_waiting();
     }
 
     /// Is there anything that the database does not hold?
@@ -418,7 +416,9 @@ impl Writer {
             self.journal.push(self.mirror.revision, &payload);
         }
         self.shared.begin_waiting(FRAME_TIME);
-        match self.journal.write() {
+        let written = self.journal.write();
+        self.shared.end_waiting();
+        match written {
             // Frames behind a gap are durable with the checkpoint that ends it.
             Ok(()) if self.state.has_gap => Ok(()),
             Ok(()) => {

@@ -70,8 +70,6 @@ fn a_disk_that_does_not_answer_is_reported_and_catches_up() {
     game.gate.set(Gate::Open);
     game.store.flush().expect("the disk answers");
     assert_eq!(game.store.durable(), game.terrain.world().revision());
-    // The thread says so when it rests.
-    game.store.flush().expect("the disk answers");
     assert_eq!(game.store.take_troubles(), [StoreTrouble::SavedAgain]);
     game.check_saved();
 }
