@@ -302,7 +302,8 @@ pub(super) fn finish_opening(
         let outcome = outcome.map(|found| {
             let store = match found {
                 // The terrain goes on as it is, and so does its history.
-                Found::New(ReadWorld { mut store, .. }) => {
+                Found::New(ReadWorld { mut store, terrain: copy, .. }) => {
+                    free_later(copy);
                     store.adopt(&terrain);
                     store
                 }

@@ -64,6 +64,7 @@ impl Writer {
         }
         self.shared.begin_waiting(CHECKPOINT_TIME);
         let written = self.database.write(&*self.files, frame, &records);
+        self.shared.end_waiting();
         let after_gap = std::mem::take(&mut self.state.after_gap);
         if let Err(error) = written {
             self.mirror.put_back(positions);
@@ -85,8 +86,10 @@ impl Writer {
         if self.journal.is_long(self.options.log_bytes) {
             self.begin_segment();
         }
+        self.shared.begin_waiting(CHECKPOINT_TIME);
         let copied = checkpoint_copy::write(&*self.files, self.world, revision, &checkpoint);
         let trimmed = self.journal.trim(self.options.log_bytes, self.checkpoints[0]);
+        self.shared.end_waiting();
         copied.and(trimmed).map_err(|error| self.fail(&error.to_string()))
     }
 

@@ -237,7 +237,6 @@ impl Writer {
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             self.tick(messages);
-            self.shared.end_waiting();
         }
         // What can't be saved now is lost with the process; the game was told.
         let mut is_saved = self.flush().is_ok();
@@ -248,7 +247,6 @@ impl Writer {
             // If that fails, it says more than is so, which does no harm.
             drop(unsaved::clear(&*self.files));
         }
-        self.shared.end_waiting();
     }
 
     /// Is there anything that the database does not hold?
@@ -420,7 +418,9 @@ impl Writer {
             self.journal.push(self.mirror.revision, &payload);
         }
         self.shared.begin_waiting(FRAME_TIME);
-        match self.journal.write() {
+        let written = self.journal.write();
+        self.shared.end_waiting();
+        match written {
             // Frames behind a gap are durable with the checkpoint that ends it.
             Ok(()) if self.state.has_gap => Ok(()),
             Ok(()) => {
