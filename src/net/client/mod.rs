@@ -251,7 +251,8 @@ impl Client {
 
     /// What was counted so far.
     pub fn figures(&self) -> ClientFigures {
-        ClientFigures { drafts: self.replica.drafts(), ..self.figures }
+        let (drafts, drafted) = (self.replica.drafts(), self.replica.drafted());
+        ClientFigures { drafts, drafted, ..self.figures }
     }
 
     /// Edits of the player that the server has not answered.
@@ -333,14 +334,21 @@ impl Client {
         if matches!(self.stage, Stage::Greeting) && self.now.saturating_sub(self.greeted) >= GREET_AGAIN {
             self.say_hello();
         }
+        if self.replica.can_append() {
+            self.show();
+        }
         let is_busy = self.follow();
+        self.show();
+        self.acknowledge(now);
+        is_busy
+    }
+
+    fn show(&mut self) {
         if !self.is_history() {
             let (shown, receipts) = self.replica.update();
             self.shown.extend(shown);
             self.tell_predictions(receipts.unwrap_or_default());
         }
-        self.acknowledge(now);
-        is_busy
     }
 
     /// Are the entries that it applies from before its player came? They are not told, and shown as one once all are there.
@@ -349,7 +357,8 @@ impl Client {
     }
 
     fn tell_predictions(&mut self, receipts: Vec<Receipt>) {
-        for ((own, _), receipt) in self.replica.pending().zip(receipts) {
+        let before = self.replica.pending().count().saturating_sub(receipts.len());
+        for ((own, _), receipt) in self.replica.pending().skip(before).zip(receipts) {
             if own > self.told {
                 self.told = own;
                 self.events.push(ClientEvent::Predicted(receipt));
@@ -509,7 +518,8 @@ impl Client {
             _ => None,
         };
         let is_told = !self.is_history();
-        let tags: BTreeMap<u64, u64> = self.replica.pending().map(|(own, edit)| (own, edit.tag())).collect();
+        let tag = |own| Some((own, self.replica.pending_edit(own)?.tag()));
+        let tags: BTreeMap<u64, u64> = batch.iter().filter_map(own).filter_map(tag).collect();
         for entry in &batch {
             match entry {
                 Entry::Edit { .. } => {

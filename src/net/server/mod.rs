@@ -442,7 +442,7 @@ impl Server {
     pub fn advance(&mut self, now: Duration) {
         self.now = self.now.max(now);
         let is_due = now.saturating_sub(self.last_mark) >= self.settings.mark;
-        if is_due && self.epoch.number > self.marked && self.later.is_empty() {
+        if is_due && self.epoch.number > self.marked {
             self.order(Entry::Mark);
             (self.last_mark, self.marked) = (now, self.epoch.number);
         }
