@@ -54,7 +54,8 @@ pub const MOST_IMAGES: usize = 64;
 pub const MOST_OWN_JUMP: u64 = 1 << 16;
 
 /// Names a player. The caller gives these numbers: whoever comes back with the same one is the same player, and small ones are
-/// short in messages.
+/// short in messages. Limits, undo and administrators go by them, so the caller has to check who a client is: whoever comes under
+/// another player's number is that player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ClientId(pub u64);
 

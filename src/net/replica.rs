@@ -371,6 +371,8 @@ impl Replica {
     /// Brings what is shown up to date: the change that is to be put there, if there is one, and the receipts of the last pending edits
     /// that were worked out, in order.
     pub fn update(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
+        // Names of fields may differ that were drafted one after the other.
+        self.is_outdated |= self.pending.is_empty() && !(self.bricks.is_empty() && self.fields.is_empty());
         let updated = match self.can_append().then(|| self.append()).flatten() {
             Some((change, receipts)) => (change, Some(receipts)),
             None => {

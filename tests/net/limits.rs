@@ -254,7 +254,8 @@ fn whoever_comes_under_a_players_number_can_not_lock_that_player_out() {
 #[test]
 fn numbers_at_the_end_of_their_range_are_counted() {
     let ground = flat(64);
-    for (first, count) in [(u64::MAX, 0), (u64::MAX, 1), (u64::MAX - 1, 1), (u64::MAX - 1, 2), (0, 1)] {
+    for (first, count) in [(u64::MAX, 1), (u64::MAX - 1, 1), (u64::MAX - 1, 2), (1 << 40, 3), (0, 0), (0, 1)]
+    {
         let mut server = Server::new(terrain(&ground), ServerSettings::default());
         let_in(&mut server, ONE, &ground, BEGIN);
         send(&mut server, ONE, first, vec![edit(&ball(30.0, 30.0, 2.0)); count], BEGIN);

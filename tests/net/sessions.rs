@@ -46,7 +46,7 @@ fn random_settings(rng: &mut Rng) -> ServerSettings {
         bulk: Rate { per_second: rate, burst: rate / 4 },
         window: [3_000, 30_000, 512 << 10][rng.usize(0..3)],
         // A connection may end at any byte of the stream.
-        piece: [1 + rng.usize(0..40), 100, 1 << 10][rng.usize(0..3)],
+        piece: [7 + rng.usize(0..40), 100, 1 << 10][rng.usize(0..3)],
         work: [1, 200, 100_000][rng.usize(0..3)],
         ..ServerSettings::default()
     }
@@ -388,6 +388,42 @@ fn a_greeting_that_nobody_heard_is_repeated() {
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
     assert_eq!(client.world().hash(), server.terrain().world().hash());
     assert_eq!(server.figures().malformed, 0);
+}
+
+#[test]
+fn who_begins_with_the_level_gets_only_what_differs() {
+    let ground = hills(SIDE);
+    let level = dug(&ground, 300, &mut Rng::with_seed(4));
+    let joined = |has_level: bool| {
+        let served = Terrain::restore(Arc::clone(&ground), &TerrainSettings::default(), level.parts());
+        let mut server = Server::new(served.expect("its own parts"), ServerSettings::default());
+        let mut now = Duration::from_secs(1);
+        server.edit(random_dig(&mut Rng::with_seed(1))).expect("no stamp");
+        server.connect(ID, now);
+        let mut client =
+            Client::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
+        if has_level {
+            client.begin_with(level.parts().change).expect("it fits");
+        }
+        client.connect(now);
+        let mut shown = terrain(&ground);
+        for _ in 0..200 {
+            now += TICK;
+            client.take_outgoing().iter().for_each(|message| server.receive(ID, message, now));
+            server.advance(now);
+            server.take_outgoing().into_iter().for_each(|(_, lane, message)| client.receive(lane, message));
+            client.advance(now);
+            for change in client.take_shown() {
+                shown.apply_change(change.change, Some(change.hash)).expect("it fits");
+            }
+        }
+        assert!(client.has_joined());
+        let hash = server.terrain().world().hash();
+        assert_eq!([client.world().hash(), shown.world().hash()], [hash; 2]);
+        server.figures().bulk_bytes
+    };
+    let [all, some] = [false, true].map(joined);
+    assert!(some < all, "{some} bytes instead of {all}");
 }
 
 #[test]

@@ -102,7 +102,7 @@ impl Attackers {
                 }
                 // Undoes great strokes.
                 4 => {
-                    let edits = vec![random_dig(&mut self.rng, 24.0).with_labels(0, Some(tick))];
+                    let edits = vec![random_dig(&mut self.rng, 9.0).with_labels(0, Some(tick))];
                     send(ToServer::Edits { first: *own + 1, edits });
                     send(ToServer::Undo { own: *own + 2, of: id });
                     *own += 2;
@@ -129,7 +129,7 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
     let ground = hills(SIDE as u32);
     let mut rng = Rng::with_seed(5);
     let mut dug = terrain(&ground);
-    (0..1500).for_each(|_| dug.submit_edit(&random_dig(&mut rng, 6.0)));
+    (0..2500).for_each(|_| dug.submit_edit(&random_dig(&mut rng, 9.0)));
     while let Some(transaction) = dug.begin() {
         dug.commit(transaction.run()).expect("it waits for it");
     }

@@ -33,7 +33,7 @@ use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{LatticeBox, RegionPos};
 use crate::store::WorldId;
-use crate::terrain::{Receipt, SIMULATION, TerrainError, TerrainSettings, World};
+use crate::terrain::{ChangeError, Receipt, SIMULATION, TerrainError, TerrainSettings, World, WorldChange};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
@@ -160,7 +160,21 @@ impl Client {
         })
     }
 
-    /// The images that stamps may have: the same as those of the server.
+    /// Begins with a world that is here already, such as the level that the game ships, instead of the pristine one: its
+    /// [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent. Call it before the
+    /// first [`connect`](Self::connect).
+    ///
+    /// # Errors
+    /// When the parts do not fit the ground or the chunk size.
+    pub fn begin_with(&mut self, change: WorldChange) -> Result<(), ChangeError> {
+        self.replica.put(change)?;
+        // It is in no order, so the server has to compare.
+        self.epoch = Some(Epoch { world: WorldId(0), run: 0, number: 0 });
+        self.is_part = true;
+        Ok(())
+    }
+
+    /// The images that stamps may have: those that the player uses. Others come from the server.
     pub fn stamps_mut(&mut self) -> &mut Stamps {
         &mut self.stamps
     }
@@ -388,6 +402,10 @@ impl Client {
             return;
         }
         match message {
+            // Two servers have answered the greeting, one in the place of the other.
+            ToClient::Stream { stream } if stream == self.stream && self.has_begun[lane as usize] => {
+                self.greet()
+            }
             ToClient::Stream { stream } => self.has_begun[lane as usize] = stream == self.stream,
             ToClient::Greet => {
                 // One that has greeted waits for the answer.

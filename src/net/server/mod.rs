@@ -248,7 +248,7 @@ impl Server {
         &self.settings
     }
 
-    /// The images that stamps may have: the same as those of the clients.
+    /// The images that stamps may have. Clients that lack one get it when it is used first.
     pub fn stamps_mut(&mut self) -> &mut Stamps {
         &mut self.stamps
     }

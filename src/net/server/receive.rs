@@ -93,7 +93,7 @@ impl Server {
         unknown: &[usize],
         now: Duration,
     ) -> bool {
-        if self.own_numbers.judge(client, first) == OwnNumber::Impossible {
+        if first == 0 || first.checked_add(edits.len() as u64).is_none() {
             return false;
         }
         for (place, edit) in edits.into_iter().enumerate() {
@@ -128,16 +128,15 @@ impl Server {
     }
 
     fn receive_undo(&mut self, client: ClientId, own: u64, of: ClientId, now: Duration) -> bool {
-        match self.own_numbers.judge(client, own) {
-            OwnNumber::Impossible => return false,
-            OwnNumber::Old => return true,
-            OwnNumber::New => {}
-        }
         if !self.sessions.get(&client).is_some_and(|session| session.has_joined()) {
             self.refuse(client, own, Refusal::NotJoined);
             return true;
         }
-        self.own_numbers.note(client, own);
+        match self.own_numbers.judge(client, own) {
+            OwnNumber::New => self.own_numbers.note(client, own),
+            OwnNumber::Old => return true,
+            OwnNumber::Impossible => return false,
+        }
         if !self.may_go_on(client, UNDO, now) {
             return true;
         }
