@@ -70,7 +70,7 @@ const REFUSALS: [Refusal; 10] = [
     Refusal::UnknownStamp,
 ];
 
-const KICKS: [Kick; 8] = [
+const KICKS: [Kick; 7] = [
     Kick::Protocol,
     Kick::Simulation,
     Kick::Ground,
@@ -78,7 +78,6 @@ const KICKS: [Kick; 8] = [
     Kick::Malformed,
     Kick::Flood,
     Kick::ByGame,
-    Kick::Stamp,
 ];
 /// Before the number of a game's own reason.
 const REFUSED_BY_GAME: u8 = 255;

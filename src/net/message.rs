@@ -383,7 +383,4 @@ pub enum Kick {
     /// The game [does not admit](super::Server::set_admission) the player. The number is the game's own, say of a text that it shows.
     #[error("refused by the game, reason {0}")]
     Refused(u32),
-    /// It lacks the image of a stamp, which is too large to be sent.
-    #[error("the image of a stamp is missing and too large to be sent")]
-    Stamp,
 }

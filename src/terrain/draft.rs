@@ -61,9 +61,10 @@ impl Terrain {
     pub fn fork(&self) -> Result<Self, TerrainError> {
         let chunk_size = self.world.grid().size() as u32;
         let settings = TerrainSettings { chunk_size, voxel_size: self.voxel_size() };
-        let (rules, loose) = (self.rules.clone(), self.loose);
-        let new = Self::new(self.world.shared_ground(), &settings)?;
-        Ok(Self { world: Arc::clone(&self.world), rules, loose, ..new })
+        let mut fork = Self::new(self.world.shared_ground(), &settings)?;
+        fork.world = Arc::clone(&self.world);
+        (fork.rules, fork.loose) = (self.rules.clone(), self.loose);
+        Ok(fork)
     }
 
     /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as they are.

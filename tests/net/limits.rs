@@ -561,20 +561,6 @@ fn a_stamp_that_the_server_does_not_know_is_refused() {
     assert_eq!((player.client.pending(), play.server.figures().malformed), (0, 0));
 }
 
-#[test]
-fn an_image_that_is_too_large_to_be_sent_keeps_a_player_out() {
-    let ground = flat(128);
-    let mut play = Play::new(&ground, ServerSettings::default());
-    let huge = image(2100);
-    play.server.stamps_mut().add(Arc::clone(&huge));
-    let (a, b) = (play.join(1), play.join(2));
-    play.players[a].client.stamps_mut().add(Arc::clone(&huge));
-    play.dig(a, &stamp(&huge, 64.0));
-    play.frames(10);
-    assert_eq!(play.players[b].events.last(), Some(&ClientEvent::Kicked(Kick::Stamp)));
-    assert_eq!(play.players[a].client.world().hash(), play.hash());
-}
-
 /// What a game puts goes out as it is acknowledged, and to all in the end; who acknowledges nothing gets no more than a window.
 #[test]
 fn the_order_lane_keeps_within_its_window() {

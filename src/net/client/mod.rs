@@ -277,7 +277,7 @@ impl Client {
     /// An edit of the player: it is sent, and shown after the next [`advance`](Self::advance). [Events](ClientEvent) tell by its tag
     /// what becomes of it.
     pub fn dig(&mut self, edit: Edit) {
-        if self.epoch.is_none() {
+        if self.id.is_none() {
             self.early.push(edit);
         } else if !self.stamps.can_send(&edit) {
             self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });

@@ -15,18 +15,28 @@ enum Own {
     Undo(ClientId),
 }
 
+/// What it costs.
+#[derive(Clone, Copy)]
+struct Cost {
+    /// As soon as it arrives.
+    known: u64,
+    /// At most.
+    most: u64,
+}
+
 /// What waits to be sent, and what the server has not answered.
 ///
 /// The server's bucket is mirrored. So much of it as messages on their way may cost is left out: however these are delayed, it is there
 /// when they arrive, all at once too.
 pub struct Outbox {
-    waiting: VecDeque<(u64, u64, Own)>,
+    waiting: VecDeque<(u64, Cost, Own)>,
     bucket: Bucket,
     burst: u64,
     /// The most that the part of the bucket holds that is mirrored.
     mirrored: u64,
     /// What is on its way and what it costs, by own number.
-    on_the_way: BTreeMap<u64, u64>,
+    on_the_way: BTreeMap<u64, Cost>,
+    /// What is on its way costs so much, but for what undos restore.
     cost: u64,
 }
 
@@ -46,22 +56,22 @@ impl Outbox {
     pub fn edit(&mut self, own: u64, edit: Edit, cost: u64) {
         // What costs too much is refused, whatever is left.
         let counted = if cost <= self.burst { cost } else { 0 };
-        self.waiting.push_back((own, counted, Own::Edit(edit)));
+        self.waiting.push_back((own, Cost { known: counted, most: counted }, Own::Edit(edit)));
     }
 
     /// Adds an undo.
     pub fn undo(&mut self, own: u64, of: ClientId) {
+        let known = if UNDO <= self.burst { UNDO } else { 0 };
         // What it restores is charged too, and not known yet.
-        let counted =
-            if UNDO <= self.burst { (UNDO + MOST_UNDO_BYTES as u64 / UNDO_BYTES).min(self.burst) } else { 0 };
-        self.waiting.push_back((own, counted, Own::Undo(of)));
+        let most = (known + MOST_UNDO_BYTES as u64 / UNDO_BYTES).min(self.burst);
+        self.waiting.push_back((own, Cost { known, most }, Own::Undo(of)));
     }
 
     /// Notes that the server has answered what has this number. It has cost so much, if that is known.
     pub fn answer(&mut self, own: u64, cost: Option<u64>, now: Duration) {
-        if let Some(counted) = self.on_the_way.remove(&own) {
-            self.cost -= counted;
-            self.bucket.refund(now, counted.saturating_sub(cost.unwrap_or(counted)));
+        if let Some(Cost { known, most }) = self.on_the_way.remove(&own) {
+            self.cost -= known;
+            self.bucket.refund(now, most.saturating_sub(cost.unwrap_or(known)));
         }
     }
 
@@ -71,9 +81,9 @@ impl Outbox {
         while self.waiting.front().map(|(_, cost, _)| *cost).is_some_and(|cost| self.may_send(cost, now))
             && let Some((own, cost, what)) = self.waiting.pop_front()
         {
-            self.bucket.charge(now, cost);
+            self.bucket.charge(now, cost.most);
             self.on_the_way.insert(own, cost);
-            self.cost += cost;
+            self.cost += cost.known;
             if edits.len() == MOST_EDITS || own != first + edits.len() as u64 || matches!(what, Own::Undo(_))
             {
                 messages.extend(edits_message(first, &mut edits));
@@ -91,13 +101,13 @@ impl Outbox {
         messages
     }
 
-    fn may_send(&mut self, cost: u64, now: Duration) -> bool {
+    fn may_send(&mut self, Cost { known, most }: Cost, now: Duration) -> bool {
         let left = self.bucket.left(now);
-        if cost > self.mirrored {
+        if most > self.mirrored {
             // All of the server's bucket has to be there.
             return left == self.mirrored && self.on_the_way.is_empty();
         }
-        cost <= left && (self.on_the_way.is_empty() || self.cost + cost <= self.burst - self.mirrored)
+        most <= left && (self.on_the_way.is_empty() || self.cost + known <= self.burst - self.mirrored)
     }
 }
 

@@ -1,13 +1,15 @@
 //! Messages that come from clients.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::own_numbers::OwnNumber;
 use super::session::Fetch;
 use super::{Later, Server, UndoRequest};
 use crate::brush::Edit;
+use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
-use crate::net::message::{ClientId, Kick, MOST_REGIONS, MOST_TO_CLIENT, Refusal, ToClient, ToServer};
+use crate::net::message::{ClientId, Kick, MOST_REGIONS, Refusal, ToClient, ToServer};
 use crate::net::price::{UNDO, cost};
 use crate::net::stamps::StampId;
 use crate::store::format::bricks::is_possible;
@@ -21,8 +23,8 @@ const BYTES: u64 = 64;
 
 /// Most messages and regions that wait in a client's bulk lane before it may fetch more.
 const MOST_JOBS: usize = 2 * MOST_REGIONS;
-/// Most bytes of an image that is sent.
-const MOST_IMAGE: usize = MOST_TO_CLIENT / 2;
+/// Most bytes of an image that is sent: no stamp has larger ones.
+const MOST_IMAGE: usize = 2 * 256 * 256;
 
 impl Server {
     /// Takes a message of a client's. Whatever its bytes are, it is answered, or counted as invalid.
@@ -184,12 +186,11 @@ impl Server {
     /// Sends images that a client lacks, each once.
     fn receive_images(&mut self, client: ClientId, images: Vec<StampId>) -> bool {
         for id in images {
-            let Some(image) = self.stamps.get(id) else { return false };
+            let is_small = |image: &&Arc<GreyImage>| size_of_val(image.samples()) <= MOST_IMAGE;
+            let Some(image) = self.stamps.get(id).filter(is_small) else { return false };
             let Some(session) = self.sessions.get_mut(&client) else { return true };
-            if size_of_val(image.samples()) > MOST_IMAGE {
-                self.kick_for(client, Kick::Stamp);
-            } else if session.images.insert(id) {
-                session.bulk.push_image(std::sync::Arc::clone(image));
+            if session.images.insert(id) {
+                session.bulk.push_image(Arc::clone(image));
             }
         }
         true
