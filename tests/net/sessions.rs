@@ -32,7 +32,6 @@ struct Play {
     ground: Arc<Ground>,
     server: Server,
     store: Option<(Store, SimulatedDisk)>,
-    settings: ServerSettings,
     players: Vec<Player>,
     now: Duration,
     rng: Rng,
@@ -81,7 +80,6 @@ impl Play {
             ground: Arc::clone(ground),
             server,
             store: None,
-            settings,
             players: Vec::new(),
             now: Duration::from_secs(1),
             rng,
@@ -176,8 +174,8 @@ impl Play {
     }
 
     /// Another server takes the place of this one, over connections that go on, with messages to the old one on their way.
-    fn replace(&mut self, server: Server, settings: ServerSettings) {
-        (self.server, self.settings) = (server, settings);
+    fn replace(&mut self, server: Server) {
+        self.server = server;
         for player in self.players.iter().filter(|player| player.is_connected) {
             self.server.connect(player.id, self.now);
         }
@@ -203,9 +201,8 @@ impl Play {
         let disk_of_store = Arc::new(disk.clone());
         let (store, opened) =
             Store::open_in(disk_of_store, Arc::clone(&self.ground), options()).expect("a saved world");
-        let settings = random_settings(&mut self.rng);
-        let server = Server::open(opened.terrain, &store, settings);
-        self.replace(server, settings);
+        let server = Server::open(opened.terrain, &store, random_settings(&mut self.rng));
+        self.replace(server);
         self.store = Some((store, disk));
     }
 
@@ -225,7 +222,7 @@ impl Play {
                 let digs = self.rng.u32(0..60);
                 let terrain = dug(&self.ground, digs, &mut self.rng);
                 self.store = None;
-                self.replace(Server::new(terrain, settings), settings);
+                self.replace(Server::new(terrain, settings));
             }
             10 => self.restart(),
             // The server begins a session anew, and nobody tells the client.
