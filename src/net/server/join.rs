@@ -62,7 +62,11 @@ impl Server {
         let (mut greeted, mut silent) = (Vec::new(), Vec::new());
         for (client, session) in &mut self.sessions {
             match std::mem::replace(&mut session.stage, Stage::Joined) {
-                Stage::Greeted(hello) if self.players.player(*client).greetings.spend(now, 1) => {
+                // What it asked for before has to have a number, as the welcome tells that it was seen.
+                Stage::Greeted(hello)
+                    if !self.later.iter().any(|later| later.is_of(*client))
+                        && self.players.player(*client).greetings.spend(now, 1) =>
+                {
                     greeted.push((*client, hello));
                 }
                 stage => session.stage = stage,

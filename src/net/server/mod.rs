@@ -94,6 +94,16 @@ enum Later {
     Entry(Ordered),
 }
 
+impl Later {
+    fn is_of(&self, client: ClientId) -> bool {
+        match self {
+            Self::Undo(request) => request.by == client,
+            Self::Entry(Ordered { entry: Entry::Edit { author, .. }, .. }) => *author == client,
+            Self::Entry(_) => false,
+        }
+    }
+}
+
 /// The server of a world: bytes in, bytes out.
 ///
 /// In each frame: [`receive`](Self::receive) every message that came, send what [`take_outgoing`](Self::take_outgoing) returns, then
