@@ -23,6 +23,10 @@ type Stored = Option<Arc<Brick>>;
 /// So far beyond what it may change an edit reads at most, in voxels: a neighbouring sample, and more than that.
 const MARGIN: i32 = 8;
 
+/// From so many pending edits on, what is shown is held as a terrain of its own: then a further edit is worked out alone, and not with
+/// all before it.
+const MANY: usize = 16;
+
 /// What is to be put into the world that is shown.
 #[derive(Clone, Debug)]
 pub struct ShownChange {
@@ -73,8 +77,14 @@ pub(super) struct Replica {
     is_outdated: bool,
     /// Has the confirmed world changed only where pending edits read nothing, since it was compared with what is shown?
     is_apart: bool,
+    /// How many pending edits at the end were not worked out yet.
+    appended: usize,
+    /// What is shown, as long as many edits are pending.
+    shown: Option<Terrain>,
     /// Times that pending edits were worked out.
     drafts: u64,
+    /// Edits that were worked out, each time.
+    drafted: u64,
 }
 
 /// Parts of a world before they changed.
@@ -102,7 +112,7 @@ impl Replica {
         let mut confirmed = Terrain::new(ground, settings)?;
         never_shown(&mut confirmed);
         let (samples, next_field) = (confirmed.world().regions_hash(), confirmed.world().next_field());
-        let (pending, bricks, fields, before, is_outdated, is_apart, drafts) = Default::default();
+        let (pending, bricks, fields, before, is_outdated, is_apart) = Default::default();
         Ok(Self {
             confirmed,
             pending,
@@ -114,7 +124,10 @@ impl Replica {
             before,
             is_outdated,
             is_apart,
-            drafts,
+            appended: 0,
+            shown: None,
+            drafts: 0,
+            drafted: 0,
         })
     }
 
@@ -142,10 +155,22 @@ impl Replica {
         self.drafts
     }
 
+    /// Edits that were worked out, counted each time.
+    pub fn drafted(&self) -> u64 {
+        self.drafted
+    }
+
     /// Adds an own edit.
     pub fn predict(&mut self, own: u64, edit: Edit) {
         self.pending.push_back(Pending { own, edit });
-        self.is_outdated = true;
+        self.appended += 1;
+        self.is_outdated |= self.pending.len() < MANY;
+    }
+
+    /// The edit that is pending under a number.
+    pub fn pending_edit(&self, own: u64) -> Option<&Edit> {
+        let at = self.pending.binary_search_by_key(&own, |pending| pending.own).ok()?;
+        self.pending.get(at).map(|pending| &pending.edit)
     }
 
     /// The own edits that have no number yet.
@@ -153,15 +178,28 @@ impl Replica {
         self.pending.iter().map(|pending| (pending.own, &pending.edit))
     }
 
+    /// Numbers the own edits beyond a number anew, from the one after it on; returns the next number.
+    pub fn renumber(&mut self, own: u64) -> u64 {
+        let mut next = own + 1;
+        for pending in self.pending.iter_mut().filter(|pending| pending.own > own) {
+            pending.own = next;
+            next += 1;
+        }
+        next
+    }
+
     /// Takes an own edit back, say because it was refused; returns it if it was pending.
     pub fn take_back(&mut self, own: u64) -> Option<Edit> {
         let at = self.pending.iter().position(|pending| pending.own == own)?;
         self.is_outdated = true;
+        self.appended = 0;
         self.pending.remove(at).map(|pending| pending.edit)
     }
 
     /// Applies entries of the order. Own edits among them are no longer pending; `own` tells their numbers.
     pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
+        // Those may be among them.
+        self.is_outdated |= self.appended > 0;
         let (mut submitted, mut is_own, mut is_foreign) = (Vec::new(), false, false);
         let next_field = self.world().next_field();
         self.is_outdated |= self.is_apart && entries.iter().any(|entry| own(entry).is_some());
@@ -190,7 +228,10 @@ impl Replica {
                 }
                 None => match entry {
                     Entry::Edit { .. } | Entry::Parts { .. } => is_foreign = true,
-                    Entry::Rules(_) | Entry::Loose(_) => self.is_outdated = true,
+                    Entry::Rules(_) | Entry::Loose(_) => {
+                        self.is_outdated = true;
+                        self.shown = None;
+                    }
                     Entry::Mark => {}
                 },
             }
@@ -282,6 +323,7 @@ impl Replica {
         self.confirmed = Terrain::restore(self.confirmed.world().shared_ground(), &settings, parts)?;
         never_shown(&mut self.confirmed);
         self.is_outdated = true;
+        self.shown = None;
         Ok(())
     }
 
@@ -326,9 +368,92 @@ impl Replica {
             && self.before.bricks.keys().all(|pos| !is_read(pos) && !self.bricks.contains_key(pos))
     }
 
-    /// Brings what is shown up to date: the change that is to be put there, if there is one, and the receipts of pending edits,
-    /// in order, if they were drafted.
+    /// Brings what is shown up to date: the change that is to be put there, if there is one, and the receipts of the last pending edits
+    /// that were worked out, in order.
     pub fn update(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
+        // Names of fields may differ that were drafted one after the other.
+        self.is_outdated |= self.pending.is_empty() && !(self.bricks.is_empty() && self.fields.is_empty());
+        let updated = match self.can_append().then(|| self.append()).flatten() {
+            Some((change, receipts)) => (change, Some(receipts)),
+            None => {
+                self.is_outdated |= self.appended > 0;
+                let updated = self.update_all();
+                if let (Some(shown), Some(ShownChange { change, hash })) = (&mut self.shown, &updated.0)
+                    && shown.apply_change(change.clone(), Some(*hash)).is_err()
+                {
+                    self.shown = None;
+                }
+                updated
+            }
+        };
+        if self.pending.is_empty() {
+            self.shown = None;
+        }
+        updated
+    }
+
+    /// Whether the last pending edits can be worked out alone, as long as no entries are applied.
+    pub fn can_append(&self) -> bool {
+        self.appended > 0 && !self.is_outdated && !self.is_apart
+    }
+
+    /// Works out the last pending edits over what is shown. `None` where that can't be held.
+    fn append(&mut self) -> Option<(Option<ShownChange>, Vec<Receipt>)> {
+        if self.shown.is_none() {
+            self.shown = self.fork_shown();
+        }
+        let shown = self.shown.as_mut()?;
+        let from = self.pending.len() - self.appended;
+        let edits: Vec<Edit> = self.pending.iter().skip(from).map(|pending| pending.edit.clone()).collect();
+        (self.drafts, self.drafted) = (self.drafts + 1, self.drafted + edits.len() as u64);
+        self.appended = 0;
+        shown.submit_edits(&edits);
+        let mut receipts = shown.take_answered();
+        let (mut bricks, mut fields) = (BTreeMap::new(), BTreeMap::new());
+        while let Some(transaction) = shown.begin() {
+            let commit = transaction.run();
+            let WorldChange { bricks: new, fields: renamed, .. } = commit.change();
+            bricks.extend(new);
+            fields.extend(renamed);
+            // It is the one under way.
+            receipts.extend(shown.commit(commit).unwrap_or_default());
+        }
+        let world = self.confirmed.world();
+        for (pos, brick) in &bricks {
+            if Brick::is_same(brick.as_ref(), world.brick(*pos)) {
+                self.bricks.remove(pos);
+            } else {
+                self.bricks.insert(*pos, brick.clone());
+            }
+        }
+        for (chunk, own) in &fields {
+            if *own == fields_of(world, *chunk) {
+                self.fields.remove(chunk);
+            } else {
+                self.fields.insert(*chunk, own.clone());
+            }
+        }
+        (self.samples, self.next_field) = (shown.world().regions_hash(), shown.world().next_field());
+        self.more = self.samples.wrapping_sub(world.regions_hash());
+        let (bricks, fields) = (bricks.into_iter().collect(), fields.into_iter().collect());
+        let change = WorldChange { bricks, fields, next_field: self.next_field };
+        let is_empty = change.bricks.is_empty() && change.fields.is_empty();
+        let hash = self.shown_hash();
+        Some(((!is_empty).then_some(ShownChange { change, hash }), receipts))
+    }
+
+    /// What is shown, as a terrain.
+    fn fork_shown(&self) -> Option<Terrain> {
+        let mut shown = self.confirmed.fork().ok()?;
+        never_shown(&mut shown);
+        let bricks = self.bricks.iter().map(|(pos, brick)| (*pos, brick.clone())).collect();
+        let fields = self.fields.iter().map(|(chunk, fields)| (*chunk, fields.clone())).collect();
+        let change = WorldChange { bricks, fields, next_field: self.next_field };
+        shown.apply_change(change, Some(self.shown_hash())).ok()?;
+        Some(shown)
+    }
+
+    fn update_all(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
         if self.is_apart && !self.is_outdated {
             self.is_apart = false;
             return (self.follow_apart(), None);
@@ -338,6 +463,7 @@ impl Replica {
         }
         (self.is_outdated, self.is_apart) = (false, false);
         self.drafts += u64::from(!self.pending.is_empty());
+        (self.appended, self.drafted) = (0, self.drafted + self.pending.len() as u64);
         let edits: Vec<Edit> = self.pending.iter().map(|pending| pending.edit.clone()).collect();
         let draft = self.confirmed.draft(&edits);
         let (world, before) = (self.confirmed.world(), std::mem::take(&mut self.before));

@@ -6,6 +6,7 @@ use super::model::Terrain;
 use super::queue::{Queue, Taken, Together, WorkLimits};
 use super::receipt::Receipt;
 use super::record::WorldChange;
+use super::settings::{TerrainError, TerrainSettings};
 use super::transaction::{Transaction, Work};
 use super::unmeshed::Meshing;
 use super::world::{World, unique};
@@ -53,6 +54,19 @@ impl Terrain {
         Draft { receipts: commit.receipts, change, hash, regions_hash }
     }
 
+    /// A terrain with the same world, rules and settings, in which nothing waits. Both share the world until one of them changes.
+    ///
+    /// # Errors
+    /// Never, as this one has the same settings.
+    pub fn fork(&self) -> Result<Self, TerrainError> {
+        let chunk_size = self.world.grid().size() as u32;
+        let settings = TerrainSettings { chunk_size, voxel_size: self.voxel_size() };
+        let mut fork = Self::new(self.world.shared_ground(), &settings)?;
+        fork.world = Arc::clone(&self.world);
+        (fork.rules, fork.loose) = (self.rules.clone(), self.loose);
+        Ok(fork)
+    }
+
     /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as they are.
     pub fn share_bricks<'a>(&mut self, bricks: impl IntoIterator<Item = (BrickPos, &'a Arc<Brick>)>) {
         for (pos, brick) in bricks {
@@ -72,7 +86,7 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::{Ground, MaterialId, NoiseHeights};
-    use crate::terrain::{LooseSettings, TerrainSettings};
+    use crate::terrain::LooseSettings;
     use crate::volume::DiggingRules;
 
     fn terrain() -> Terrain {

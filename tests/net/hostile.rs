@@ -99,6 +99,8 @@ impl Messages {
                     );
                 }
                 bots[round % 3].undo(round as u64 % 3 + 1);
+                // That of another player is refused.
+                bots[0].undo(2);
             }
             match round % 20 {
                 5 => server.set_rules(DiggingRules::default().with_bedrock(3)).unwrap(),

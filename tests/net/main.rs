@@ -4,9 +4,12 @@ mod bots;
 mod follower;
 mod hostile;
 mod laws;
+mod limits;
 mod link;
 mod load;
 mod one_hash;
 mod server;
+mod sessions;
+mod siege;
 #[path = "../worlds/mod.rs"]
 mod worlds;

@@ -134,7 +134,8 @@ fn an_edit_is_refused_where_its_player_does_not_reach() {
     scene.play(&mut [&mut a], 1);
     assert_eq!(a.refused, [(1, Refusal::TooFar)], "nobody knows where the player is");
     scene.server.set_place(ClientId(1), Some(IVec3::new(30, 20, 30)));
-    a.edit([dig(30.0, 42.0), dig(30.0, 44.0), dig(17.5, 30.0), dig(10.0, 30.0)]);
+    // All of a ball of 3 has to be within 13.
+    a.edit([dig(30.0, 39.0), dig(30.0, 42.0), dig(20.5, 30.0), dig(10.0, 30.0)]);
     scene.play(&mut [&mut a], 1);
     assert_eq!(a.refused[1..], [(3, Refusal::TooFar), (5, Refusal::TooFar)]);
     assert_eq!(a.confirmed, [2, 4]);

@@ -70,4 +70,6 @@ pub struct ClientFigures {
     pub malformed: u64,
     /// Times that edits which the server had not answered were worked out, at first and where others met what they read.
     pub drafts: u64,
+    /// The edits that were worked out at these times, in all.
+    pub drafted: u64,
 }

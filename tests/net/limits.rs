@@ -1,0 +1,611 @@
+//! What a player may cost: by player and not by connection, in memory, numbers and time; and what an honest one never loses by it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use allocation_counter::measure;
+use bevy_burrow::brush::Edit;
+use bevy_burrow::lattice::RegionPos;
+use bevy_burrow::net::{
+    Client, ClientEvent, ClientId, Hello, Kick, Lane, MOST_OWN_JUMP, PROTOCOL, Reach, Refusal, Server,
+    ServerSettings, Stamps, ToClient, ToServer, UndoPolicy,
+};
+use bevy_burrow::prelude::*;
+use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
+use bevy_burrow::terrain::{SIMULATION, WorldChange};
+use glam::{DVec3, IVec3, Vec2, Vec3};
+
+use crate::follower::terrain;
+
+const FRAME: Duration = Duration::from_millis(50);
+const BEGIN: Duration = Duration::from_secs(1);
+const ONE: ClientId = ClientId(1);
+
+fn flat(side: u32) -> Arc<Ground> {
+    Arc::new(Ground::flat(side, side, 20.0).expect("a valid ground"))
+}
+
+fn ball(x: f32, z: f32, radius: f32) -> Brush {
+    Brush::dig(Shape::sphere(Vec3::new(x, 20.0, z), radius))
+}
+
+fn edit(brush: &Brush) -> Edit {
+    Edit::quantize(brush).expect("a valid brush")
+}
+
+/// A client of the test's own, which sends what it likes, greets and is let in.
+fn let_in(server: &mut Server, id: ClientId, ground: &Ground, now: Duration) {
+    let (chunk_size, ground, place) = (32, ground.hash(), IVec3::splat(20));
+    let (protocol, simulation) = (PROTOCOL, SIMULATION);
+    let hello = Hello { protocol, simulation, ground, chunk_size, epoch: None, place };
+    server.connect(id, now);
+    server.receive(id, &ToServer::Hello(hello).to_bytes(), now);
+    server.advance(now);
+    drop(server.take_outgoing());
+}
+
+fn send(server: &mut Server, id: ClientId, first: u64, edits: Vec<Edit>, now: Duration) {
+    server.receive(id, &ToServer::Edits { first, edits }.to_bytes(), now);
+}
+
+/// A server and clients of the crate's; lines between them lose nothing.
+struct Play {
+    ground: Arc<Ground>,
+    server: Server,
+    players: Vec<Player>,
+    now: Duration,
+}
+
+struct Player {
+    id: ClientId,
+    client: Client,
+    is_connected: bool,
+    events: Vec<ClientEvent>,
+}
+
+impl Player {
+    fn count(&self, is_such: impl Fn(&ClientEvent) -> bool) -> usize {
+        self.events.iter().filter(|event| is_such(event)).count()
+    }
+
+    fn confirmed(&self) -> usize {
+        self.count(|event| matches!(event, ClientEvent::Confirmed { .. }))
+    }
+
+    fn refused(&self) -> usize {
+        self.count(|event| matches!(event, ClientEvent::Refused { .. }))
+    }
+
+    fn kicked(&self) -> usize {
+        self.count(|event| matches!(event, ClientEvent::Kicked(_)))
+    }
+}
+
+impl Play {
+    fn new(ground: &Arc<Ground>, settings: ServerSettings) -> Self {
+        Self::of(ground, Server::new(terrain(ground), settings))
+    }
+
+    fn of(ground: &Arc<Ground>, server: Server) -> Self {
+        Self { ground: Arc::clone(ground), server, players: Vec::new(), now: BEGIN }
+    }
+
+    fn join(&mut self, id: u64) -> usize {
+        let client = Client::new(Arc::clone(&self.ground), &TerrainSettings::default()).expect("valid");
+        self.players.push(Player { id: ClientId(id), client, is_connected: false, events: Vec::new() });
+        self.connect(self.players.len() - 1);
+        self.frames(4);
+        self.players.len() - 1
+    }
+
+    fn connect(&mut self, at: usize) {
+        let player = &mut self.players[at];
+        self.server.connect(player.id, self.now);
+        player.client.connect(self.now);
+        player.is_connected = true;
+    }
+
+    fn cut(&mut self, at: usize) {
+        let player = &mut self.players[at];
+        self.server.disconnect(player.id);
+        player.client.disconnect();
+        player.is_connected = false;
+    }
+
+    fn dig(&mut self, at: usize, brush: &Brush) {
+        self.players[at].client.dig(edit(brush));
+    }
+
+    fn frames(&mut self, count: u32) {
+        for _ in 0..count {
+            self.now += FRAME;
+            for player in self.players.iter_mut().filter(|player| player.is_connected) {
+                for message in player.client.take_outgoing() {
+                    self.server.receive(player.id, &message, self.now);
+                }
+            }
+            self.server.advance(self.now);
+            for (to, lane, bytes) in self.server.take_outgoing() {
+                let player = self.players.iter_mut().find(|player| player.id == to && player.is_connected);
+                player.into_iter().for_each(|player| player.client.receive(lane, bytes.clone()));
+            }
+            for player in &mut self.players {
+                while player.client.advance(self.now) {}
+                drop(player.client.take_shown());
+                player.events.extend(player.client.take_events());
+            }
+        }
+    }
+
+    fn hash(&self) -> u64 {
+        self.server.terrain().world().hash()
+    }
+
+    fn is_solid(&self, x: f64, z: f64) -> bool {
+        self.server.terrain().world().is_solid(DVec3::new(x, 18.0, z))
+    }
+}
+
+/// What the server holds more after frames in which a client digs, and fetches regions or not; it acknowledges nothing.
+fn held(fetches: bool) -> i64 {
+    let ground = flat(512);
+    let mut dug = terrain(&ground);
+    let pit = |x: f32, z: f32| Shape::cuboid(Vec3::new(x, 0.0, z), Vec3::new(100.0, 30.0, 100.0));
+    dug.apply([(128.0, 128.0), (384.0, 384.0)].map(|(x, z)| Brush::dig(pit(x, z))));
+    let mut server = Server::new(dug, ServerSettings::default());
+    let mut now = BEGIN;
+    let_in(&mut server, ONE, &ground, now);
+    let held = measure(|| {
+        for own in 1..=300 {
+            let brush = [ball(256.0, 256.0, 1.0), Brush::add(ball(256.0, 256.0, 1.0).shape, MaterialId(1))];
+            send(&mut server, ONE, own, vec![edit(&brush[own as usize % 2])], now);
+            if fetches {
+                let (number, regions) = (server.applied(), vec![RegionPos(IVec3::ZERO)]);
+                server.receive(ONE, &ToServer::Fetch { number, regions }.to_bytes(), now);
+            }
+            server.advance(now);
+            drop(server.take_outgoing());
+            now += Duration::from_secs(1) / 60;
+        }
+    })
+    .bytes_current;
+    assert_eq!(server.figures().kicked + server.figures().refused + server.figures().malformed, 0);
+    println!("fetches: {fetches}: {} MiB more", held >> 20);
+    held
+}
+
+#[test]
+fn fetches_that_nobody_takes_keep_one_world_in_memory() {
+    let without = held(false);
+    assert!(held(true) < without + (8 << 20));
+}
+
+#[test]
+fn what_a_player_may_spend_does_not_grow_with_connections() {
+    let ground = flat(64);
+    let ordered = |connections: u64| {
+        let mut server = Server::new(terrain(&ground), ServerSettings::default());
+        for round in 0..10 {
+            let now = BEGIN + FRAME * round as u32;
+            if round < connections {
+                let_in(&mut server, ONE, &ground, now);
+            }
+            for part in 0..3 {
+                let edits = vec![edit(&ball(30.0, 30.0, 2.0)); 200];
+                send(&mut server, ONE, 1 + 600 * round + 200 * part, edits, now);
+            }
+            server.advance(now);
+        }
+        assert!(connections > 1 || server.figures().kicked == 1);
+        server.figures().ordered
+    };
+    let (one, ten) = (ordered(1), ordered(10));
+    assert!(ten <= one + one / 5, "{ten} edits instead of {one}");
+}
+
+#[test]
+fn bytes_of_the_bulk_lane_are_those_of_a_player() {
+    let ground = flat(512);
+    let sent = |connections: u32| {
+        let mut dug = terrain(&ground);
+        dug.apply((0..400).map(|at| ball(8.0 + (at * 37 % 490) as f32, 8.0 + (at * 53 % 490) as f32, 7.0)));
+        let mut server = Server::new(dug, ServerSettings::default());
+        for round in 0..40 {
+            let now = BEGIN + FRAME * round;
+            if round < connections {
+                let_in(&mut server, ONE, &ground, now);
+            }
+            server.advance(now);
+        }
+        server.figures().bulk_bytes
+    };
+    let (one, many) = (sent(1), sent(40));
+    assert!(one > 100 << 10 && many <= one + one / 5, "{many} bytes instead of {one}");
+}
+
+/// What becomes of digs of player 7, after somebody came under that number and sent an edit with the own number `first`: confirmed,
+/// pending, kicked.
+fn after_a_stranger(first: u64) -> (usize, usize, usize) {
+    let ground = flat(128);
+    let mut server = Server::new(terrain(&ground), ServerSettings::default());
+    let_in(&mut server, ClientId(7), &ground, BEGIN);
+    send(&mut server, ClientId(7), first, vec![edit(&ball(30.0, 30.0, 2.0))], BEGIN);
+    server.advance(BEGIN);
+    server.disconnect(ClientId(7));
+    drop(server.take_outgoing());
+    let mut play = Play::of(&ground, server);
+    let at = play.join(7);
+    for turn in 0..12 {
+        play.dig(at, &ball(20.0 + 8.0 * turn as f32, 60.0, 3.0));
+        play.frames(3);
+    }
+    play.frames(40);
+    let player = &play.players[at];
+    (player.confirmed(), player.client.pending(), player.kicked())
+}
+
+#[test]
+fn whoever_comes_under_a_players_number_can_not_lock_that_player_out() {
+    for first in [1, MOST_OWN_JUMP, 1_000_000, u64::MAX / 2, u64::MAX - 4, u64::MAX - 1] {
+        assert_eq!(after_a_stranger(first), (12, 0, 0), "{first}");
+    }
+}
+
+#[test]
+fn numbers_at_the_end_of_their_range_are_counted() {
+    let ground = flat(64);
+    for (first, count) in [(u64::MAX, 1), (u64::MAX - 1, 1), (u64::MAX - 1, 2), (1 << 40, 3), (0, 0), (0, 1)]
+    {
+        let mut server = Server::new(terrain(&ground), ServerSettings::default());
+        let_in(&mut server, ONE, &ground, BEGIN);
+        send(&mut server, ONE, first, vec![edit(&ball(30.0, 30.0, 2.0)); count], BEGIN);
+        server.receive(ONE, &ToServer::Undo { own: first, of: ONE }.to_bytes(), BEGIN);
+        server.advance(BEGIN);
+        assert_eq!((server.figures().malformed, server.figures().ordered), (2, 0), "{first} {count}");
+    }
+}
+
+/// A server that was replaced by one that knows nothing does not refuse the numbers of those who have dug for long.
+#[test]
+fn who_has_dug_for_long_goes_on_at_a_server_that_knows_less() {
+    let ground = flat(64);
+    let mut play = Play::new(&ground, ServerSettings::default());
+    let at = play.join(1);
+    // As after hours of play.
+    let mut first = 1;
+    for _ in 0..3 {
+        play.now += Duration::from_secs(1);
+        first += MOST_OWN_JUMP - 1;
+        send(&mut play.server, ONE, first, vec![edit(&ball(30.0, 30.0, 2.0))], play.now);
+    }
+    play.cut(at);
+    play.connect(at);
+    play.frames(4);
+    play.dig(at, &ball(40.0, 40.0, 3.0));
+    play.frames(4);
+    assert_eq!(play.players[at].confirmed(), 1);
+    play.cut(at);
+    play.dig(at, &ball(20.0, 40.0, 3.0));
+    play.server = Server::new(terrain(&ground), ServerSettings::default());
+    play.connect(at);
+    play.frames(10);
+    assert_eq!((play.players[at].confirmed(), play.players[at].client.pending()), (2, 0));
+    assert_eq!(play.server.figures().malformed, 0);
+}
+
+#[test]
+fn nobody_digs_beyond_the_reach() {
+    let ground = flat(128);
+    let reach = Some(Reach { distance: 8, speed: 0, latency: Duration::ZERO });
+    let is_left = |shape: Shape| {
+        let settings = ServerSettings { reach, ..ServerSettings::default() };
+        let mut server = Server::new(terrain(&ground), settings);
+        server.set_place(ONE, Some(IVec3::new(64, 15, 64)));
+        let_in(&mut server, ONE, &ground, BEGIN);
+        send(&mut server, ONE, 1, vec![edit(&Brush::dig(shape))], BEGIN);
+        server.advance(BEGIN);
+        let world = server.terrain().world();
+        [10.0, 64.0].map(|x| world.is_solid(DVec3::new(x, 15.0, 64.0)))
+    };
+    let at = |x: f32| Vec3::new(x, 15.0, 64.0);
+    assert_eq!(is_left(Shape::capsule(at(4.0), at(124.0), 2.0)), [true, true]);
+    assert_eq!(is_left(Shape::cuboid(at(64.0), Vec3::new(60.0, 2.0, 2.0))), [true, true]);
+    assert_eq!(is_left(Shape::sphere(at(10.0), 2.0)), [true, true]);
+    assert_eq!(is_left(Shape::sphere(at(66.0), 4.0)), [true, false], "what is near is dug");
+}
+
+#[test]
+fn games_keys_are_not_those_of_the_server() {
+    for key in ["net/number", "net/own/1", "number", "bevy_burrow/net/number"] {
+        let (ground, disk) = (flat(64), Arc::new(SimulatedDisk::new()));
+        let mut saved = terrain(&ground);
+        let mut store =
+            Store::create_in(disk.clone(), &mut saved, StoreOptions::default()).expect("a new world");
+        let mut server = Server::open(saved, &store, ServerSettings::default());
+        for turn in 0..5 {
+            server.edit(edit(&ball(10.0 + 8.0 * turn as f32, 30.0, 3.0))).expect("no stamp");
+            server.advance(BEGIN);
+            server.save(&mut store).expect("the thread runs");
+        }
+        let applied = server.applied();
+        store.put(key, 0_u64.to_le_bytes());
+        drop((server, store));
+        let (store, opened) = Store::open_in(disk, ground, StoreOptions::default()).expect("a saved world");
+        assert_eq!(opened.terrain.world().revision(), 5);
+        let server = Server::open(opened.terrain, &store, ServerSettings::default());
+        assert_eq!(server.applied(), applied, "{key}");
+        assert_eq!(store.get(key), Some(&[0; 8][..]));
+    }
+}
+
+/// Digs of four minutes without a connection.
+#[test]
+fn what_was_dug_without_a_connection_is_done_when_it_is_back() {
+    for digs in [300_u32, 1200, 2400] {
+        let ground = flat(128);
+        let mut play = Play::new(&ground, ServerSettings::default());
+        let at = play.join(1);
+        play.cut(at);
+        for turn in 0..digs {
+            let (x, z) = (16.0 + (turn * 37 % 96) as f32, 16.0 + (turn * 53 % 96) as f32);
+            play.dig(at, &ball(x, z, 4.0).with_tag(turn.into()));
+            if turn % 4 == 0 {
+                play.players[at].client.advance(play.now);
+            }
+        }
+        let drafted = play.players[at].client.figures().drafted;
+        assert!(drafted < 2 * u64::from(digs) + 500, "{drafted} edits were worked out for {digs}");
+        play.now += Duration::from_secs(240);
+        play.connect(at);
+        play.frames(1000);
+        let player = &play.players[at];
+        assert_eq!((player.confirmed(), player.refused(), player.kicked()), (digs as usize, 0, 0));
+        assert_eq!((player.client.pending(), player.client.world().hash()), (0, play.hash()));
+        assert_eq!(player.client.shown_hash(), play.hash());
+        assert_eq!(player.count(|event| matches!(event, ClientEvent::Predicted(_))), digs as usize);
+    }
+}
+
+/// An honest client's bucket is empty, and it comes back: what it does then waits until it may be done.
+#[test]
+fn who_comes_back_with_an_empty_bucket_is_not_refused() {
+    let ground = flat(128);
+    let mut play = Play::new(&ground, ServerSettings::default());
+    let at = play.join(1);
+    for round in 0..6_u32 {
+        for turn in 0..150_u32 {
+            let (x, z) = (16.0 + (turn * 37 % 96) as f32, 16.0 + ((turn + round) * 53 % 96) as f32);
+            play.dig(at, &ball(x, z, 4.0));
+        }
+        play.frames(2);
+        play.cut(at);
+        play.connect(at);
+    }
+    play.frames(1000);
+    let player = &play.players[at];
+    assert_eq!((player.confirmed(), player.refused(), player.kicked()), (900, 0, 0));
+}
+
+/// Whether the first of two digs is undone, and the second stays.
+fn stays(frames: u32) -> bool {
+    let ground = flat(128);
+    let mut play = Play::new(&ground, ServerSettings { undo: UndoPolicy::Own, ..ServerSettings::default() });
+    let at = play.join(1);
+    play.dig(at, &ball(30.0, 30.0, 4.0).with_stroke(1));
+    play.frames(frames);
+    play.players[at].client.undo(None);
+    play.frames(frames);
+    play.dig(at, &ball(90.0, 90.0, 4.0).with_stroke(2));
+    play.frames(20);
+    play.is_solid(30.0, 30.0) && !play.is_solid(90.0, 90.0)
+}
+
+#[test]
+fn an_undo_takes_back_what_was_dug_before_it_and_not_what_was_dug_after() {
+    assert!(stays(5) && stays(1) && stays(0));
+}
+
+#[test]
+fn undos_among_digs_are_done_in_order_while_the_server_is_behind() {
+    let ground = flat(128);
+    let settings = ServerSettings { undo: UndoPolicy::Own, work: 1, ..ServerSettings::default() };
+    let mut play = Play::new(&ground, settings);
+    let (a, b) = (play.join(1), play.join(2));
+    for turn in 0..8_u32 {
+        let at = 16.0 + 12.0 * turn as f32;
+        play.dig(a, &ball(at, 30.0, 4.0).with_stroke(turn.into()));
+        if turn % 2 == 0 {
+            play.players[a].client.undo(None);
+        }
+        play.dig(b, &ball(at, 90.0, 4.0));
+    }
+    play.frames(60);
+    for turn in 0..8 {
+        let at = 16.0 + 12.0 * f64::from(turn);
+        assert_eq!(play.is_solid(at, 30.0), turn % 2 == 0, "{turn}");
+        assert!(!play.is_solid(at, 90.0));
+    }
+    for player in &play.players {
+        assert_eq!((player.client.world().hash(), player.refused()), (play.hash(), 0));
+    }
+}
+
+/// How many answers an undo gets in ten seconds, while another player digs so often a frame on a server that may do little.
+fn answers(digs: u32) -> usize {
+    let ground = flat(128);
+    let settings = ServerSettings { undo: UndoPolicy::Own, work: 60, ..ServerSettings::default() };
+    let mut play = Play::new(&ground, settings);
+    let (a, b) = (play.join(1), play.join(2));
+    play.dig(a, &ball(30.0, 30.0, 3.0));
+    play.frames(5);
+    play.players[a].client.undo(None);
+    for turn in 0..200 {
+        (0..digs).for_each(|step| play.dig(b, &ball(10.0 + ((turn * digs + step) % 100) as f32, 90.0, 3.0)));
+        play.frames(1);
+    }
+    play.players[a].count(|event| matches!(event, ClientEvent::Undone(_) | ClientEvent::UndoRefused(_)))
+}
+
+#[test]
+fn an_undo_is_answered_though_others_keep_the_server_busy() {
+    assert_eq!([answers(0), answers(4)], [1, 1]);
+}
+
+#[test]
+fn an_undo_that_nobody_may_do_is_forbidden() {
+    let ground = flat(64);
+    let mut play = Play::new(&ground, ServerSettings::default());
+    let at = play.join(1);
+    play.dig(at, &ball(30.0, 30.0, 3.0));
+    play.players[at].client.undo(None);
+    play.frames(4);
+    let forbidden = ClientEvent::UndoRefused(Some(Refusal::Forbidden));
+    assert_eq!(play.players[at].count(|event| *event == forbidden), 1);
+}
+
+#[test]
+fn who_is_made_an_administrator_is_one() {
+    for when in ["before", "now", "came back"] {
+        let ground = flat(128);
+        let settings = ServerSettings { undo: UndoPolicy::Administrators, ..ServerSettings::default() };
+        let mut play = Play::new(&ground, settings);
+        let pristine = play.hash();
+        if when == "before" {
+            play.server.set_administrator(ClientId(2), true);
+        }
+        let (a, b) = (play.join(1), play.join(2));
+        play.server.set_administrator(ClientId(2), true);
+        if when == "came back" {
+            play.cut(b);
+            play.connect(b);
+            play.frames(4);
+        }
+        play.dig(a, &ball(30.0, 30.0, 3.0));
+        play.frames(4);
+        assert_ne!(play.hash(), pristine);
+        play.players[b].client.undo(Some(ONE));
+        play.frames(4);
+        assert_eq!(play.hash(), pristine, "{when}");
+        play.server.set_administrator(ClientId(2), false);
+        play.dig(a, &ball(30.0, 30.0, 3.0));
+        play.players[b].client.undo(Some(ONE));
+        play.frames(4);
+        assert_ne!(play.hash(), pristine, "{when}");
+    }
+}
+
+#[test]
+fn who_is_not_admitted_is_told_why() {
+    let ground = flat(64);
+    let mut play = Play::new(&ground, ServerSettings::default());
+    play.server.set_admission(|client| if client == ClientId(2) { Err(42) } else { Ok(()) });
+    let (a, b) = (play.join(1), play.join(2));
+    assert!(play.players[a].client.has_joined() && !play.players[b].client.has_joined());
+    assert_eq!(play.players[b].events, [ClientEvent::Kicked(Kick::Refused(42))]);
+    assert_eq!(play.server.clients().collect::<Vec<_>>(), [ONE]);
+    play.server.kick_for(ONE, Kick::Refused(7));
+    play.frames(2);
+    assert_eq!(play.players[a].events.last(), Some(&ClientEvent::Kicked(Kick::Refused(7))));
+}
+
+fn image(side: u32) -> Arc<GreyImage> {
+    let samples = (0..side * side).map(|at| (at * 900 % 60_000) as u16).collect();
+    Arc::new(GreyImage::from_samples(side, side, samples).expect("an image"))
+}
+
+fn stamp(image: &Arc<GreyImage>, x: f32) -> Brush {
+    let at = Vec3::new(x, 20.0, 64.0);
+    Brush::stamp(Shape::sphere(at, 6.0), Stamp::new(Arc::clone(image), at, Vec2::splat(9.0), 3.0))
+}
+
+/// Players without an image get it, while they play, in the log that they join with, and when it was added later.
+#[test]
+fn who_lacks_the_image_of_a_stamp_gets_it() {
+    let ground = flat(128);
+    let mut play = Play::new(&ground, ServerSettings::default());
+    let (first, later) = (image(8), image(100));
+    let (a, b) = (play.join(1), play.join(2));
+    for (image, x) in [(&first, 40.0), (&later, 80.0)] {
+        play.server.stamps_mut().add(Arc::clone(image));
+        play.players[a].client.stamps_mut().add(Arc::clone(image));
+        play.dig(a, &stamp(image, x));
+        play.dig(a, &ball(30.0, 30.0, 4.0));
+        play.frames(40);
+        for player in &play.players {
+            assert_eq!(player.client.world().hash(), play.hash());
+        }
+    }
+    let c = play.join(3);
+    play.frames(40);
+    assert!(play.players[c].client.has_joined());
+    assert_eq!(play.players[c].client.world().hash(), play.hash());
+    for player in [b, c].map(|at| &play.players[at]) {
+        assert_eq!((player.client.figures().malformed, player.kicked()), (0, 0));
+    }
+    assert_eq!(play.server.figures().malformed, 0);
+}
+
+/// An image that the server lacks: the edit is refused, and those beside it are done.
+#[test]
+fn a_stamp_that_the_server_does_not_know_is_refused() {
+    let ground = flat(128);
+    let mut play = Play::new(&ground, ServerSettings::default());
+    let (unknown, at) = (image(8), play.join(1));
+    play.players[at].client.stamps_mut().add(Arc::clone(&unknown));
+    play.dig(at, &ball(30.0, 30.0, 4.0));
+    play.dig(at, &stamp(&unknown, 64.0).with_tag(5));
+    play.dig(at, &ball(90.0, 90.0, 4.0));
+    play.frames(10);
+    let player = &play.players[at];
+    let refused = ClientEvent::Refused { tag: 5, why: Some(Refusal::UnknownStamp) };
+    assert_eq!((player.count(|event| *event == refused), player.confirmed()), (1, 2));
+    assert_eq!((player.client.pending(), play.server.figures().malformed), (0, 0));
+}
+
+/// What a game puts goes out as it is acknowledged, and to all in the end; who acknowledges nothing gets no more than a window.
+#[test]
+fn the_order_lane_keeps_within_its_window() {
+    let ground = flat(512);
+    let mut other = terrain(&ground);
+    let mut rng = fastrand::Rng::with_seed(2);
+    let mut any = || Vec3::new(rng.f32() * 500.0, rng.f32() * 60.0 - 40.0, rng.f32() * 500.0);
+    other.apply((0..600).map(|at| match at % 2 {
+        0 => Brush::dig(Shape::sphere(any(), 7.0)),
+        _ => Brush::add(Shape::sphere(any(), 7.0), MaterialId(1 + (at % 5) as u8)),
+    }));
+    let bricks = other.parts().change.bricks;
+    let mut play = Play::new(&ground, ServerSettings::default());
+    let at = play.join(1);
+    let_in(&mut play.server, ClientId(9), &ground, play.now);
+    let window = play.server.settings().window as usize;
+    let (mut silent, mut longest) = (0, 0);
+    for part in bricks.chunks(bricks.len() / 6) {
+        let change = WorldChange { bricks: part.to_vec(), ..WorldChange::default() };
+        play.server.put(change).expect("it is below the limit of a message");
+    }
+    for _ in 0..100 {
+        play.now += FRAME;
+        for message in play.players[at].client.take_outgoing() {
+            play.server.receive(ONE, &message, play.now);
+        }
+        play.server.advance(play.now);
+        let mut at_once = 0;
+        for (to, lane, bytes) in play.server.take_outgoing() {
+            let length = bytes.len();
+            if to == ONE {
+                at_once += if lane == Lane::Order { length } else { 0 };
+                play.players[at].client.receive(lane, bytes);
+            } else if let Ok(ToClient::Entries(_)) = ToClient::from_bytes(&bytes, &ground, &Stamps::default())
+            {
+                silent += length;
+                longest = longest.max(length);
+            }
+        }
+        assert!(at_once <= window.max(longest) + 4096, "{at_once} bytes at once");
+        while play.players[at].client.advance(play.now) {}
+    }
+    println!("{silent} bytes to one that is silent, {longest} in a message");
+    assert_eq!(play.players[at].client.world().hash(), play.hash());
+    assert!(play.server.figures().order_bytes as usize > 2 * window, "there is too little to send");
+    assert!(silent <= window.max(longest));
+}
