@@ -120,6 +120,11 @@ pub enum BurrowSystems {
     Propagate,
 }
 
+/// Systems that look at what was just committed, still in [`BurrowSystems::Commit`].
+#[cfg(feature = "replicon")]
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct FollowCommits;
+
 /// Transactions, entities and messages; works in `MinimalPlugins`.
 #[derive(Default)]
 pub struct TerrainPlugin;
@@ -184,6 +189,11 @@ impl Plugin for TerrainPlugin {
                     diagnostics::measure_frame.after(BurrowSystems::Begin),
                 ),
             );
+        #[cfg(feature = "replicon")]
+        app.configure_sets(
+            Update,
+            FollowCommits.in_set(BurrowSystems::Commit).after(commit::commit_transactions),
+        );
         app.add_systems(Update, engine::trim_engines.run_if(on_timer(engine::TRIMMED_EVERY)));
         diagnostics::register(app);
         propagate::add(app);

@@ -75,6 +75,9 @@ pub enum HistoryRejection {
     /// Too much work [waits](super::WorkLimits::waiting).
     #[error("too much work waits already")]
     Overloaded,
+    /// The terrain is shared, and its server does not do the step.
+    #[error("the server refuses the step")]
+    Refused,
     /// The step panicked. World and history are unchanged.
     #[error("the step panicked; this is a bug of the plugin's")]
     Panicked,

@@ -8,6 +8,7 @@
 //! | `replica` | the world of the order, and what is shown of it |
 
 mod events;
+mod give_up;
 mod join;
 mod repair;
 

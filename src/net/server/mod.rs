@@ -267,7 +267,7 @@ impl Server {
         self.kick_for(client, Kick::ByGame);
     }
 
-    fn kick_for(&mut self, client: ClientId, why: Kick) {
+    pub(crate) fn kick_for(&mut self, client: ClientId, why: Kick) {
         if self.sessions.remove(&client).is_some() {
             self.figures.kicked += 1;
             self.outgoing.retain(|(to, ..)| *to != client);
