@@ -1,5 +1,6 @@
 //! Whatever keeps a player from digging together is answered, reported, and said once.
 
+use bevy::math::DVec3;
 use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::{Refusal, Server, ServerSettings};
