@@ -361,8 +361,8 @@ pub mod prelude {
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
         Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
-        MaterialColors, Redo, ShownLevels, SlimVertices, TargetedBrush, TerrainHit, TerrainReady, Terrains,
-        Tile, Undo,
+        LoosePieceReturned, MaterialColors, Redo, ShownLevels, SlimVertices, TargetedBrush, TerrainHit,
+        TerrainReady, Terrains, Tile, Undo,
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{
@@ -371,7 +371,8 @@ pub mod prelude {
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,
-        PieceFate, Receipt, Rejection, Restored, ScenarioCounts, Span, Terrain, TerrainSettings,
+        PieceFate, PieceId, Receipt, Rejection, Restored, ReturnedPiece, ScenarioCounts, Span, Terrain,
+        TerrainSettings,
     };
     #[cfg(feature = "render")]
     pub use crate::view::{

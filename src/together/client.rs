@@ -8,14 +8,14 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy_replicon::prelude::{ClientId, FromClient};
 
-use super::link::{Ask, Link, MOST_PENDING, Session, Standing};
+use super::link::{Ask, Link, MOST_PENDING, PieceMessage, Session, Standing};
 use super::messages::{BulkLane, FromPlayer, OrderLane};
 use super::service::Service;
 use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 use super::trouble::{SharingTrouble, SharingTroubleFound};
 use crate::net::{Client, ClientEvent, Lane, Refusal, ShownChange};
 use crate::plugin::{
-    BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, ThreadTask, Threads, free_later, pieces,
+    BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads, free_later,
 };
 use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain};
 
@@ -79,14 +79,20 @@ pub(super) fn receive(
     }
 }
 
-/// Lets pieces of ground appear in the frame in which the ground loses them.
+/// Lets pieces of ground appear in the frame in which the ground loses them, and go in the frame in which it has them again.
 pub(super) fn release_pieces(
     mut shared: Query<(&mut SharedTerrain, &mut Terrain)>,
     mut found: MessageWriter<LoosePieceFound>,
+    mut returned: MessageWriter<LoosePieceReturned>,
 ) {
     for (mut shared, mut terrain) in &mut shared {
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
-        found.write_batch(link.display.follow(terrain.bypass_change_detection()));
+        for message in link.display.follow(terrain.bypass_change_detection()) {
+            match message {
+                PieceMessage::Found(message) => drop(found.write(message)),
+                PieceMessage::Returned(message) => drop(returned.write(message)),
+            }
+        }
     }
 }
 
@@ -343,7 +349,6 @@ impl Answers<'_> {
         let edited = |tag, outcome| GroundEdited { terrain, tag, outcome };
         match event {
             ClientEvent::Predicted(receipt) => {
-                link.display.add_pieces(pieces(terrain, std::slice::from_ref(&receipt)));
                 self.edited.write(edited(receipt.tag, WhatBecame::Predicted(receipt)));
             }
             ClientEvent::Confirmed { tag, receipt } => {
@@ -357,8 +362,12 @@ impl Answers<'_> {
                 link.answer(tag);
                 self.refused(terrain, tag, why);
             }
-            ClientEvent::Others { receipt, .. } => {
-                link.display.add_pieces(pieces(terrain, std::slice::from_ref(&receipt)));
+            ClientEvent::Others { .. } => {}
+            ClientEvent::PiecesChanged { tag, found, returned } => {
+                let found = found.into_iter().map(|piece| LoosePieceFound::new(terrain, tag, piece));
+                let returned = returned.into_iter().map(|piece| LoosePieceReturned { terrain, piece });
+                let found = found.map(PieceMessage::Found);
+                link.display.add_pieces(found.chain(returned.map(PieceMessage::Returned)));
             }
             ClientEvent::UndoRefused(why) => {
                 link.undos = link.undos.saturating_sub(1);

@@ -9,7 +9,7 @@ use super::service::Service;
 use super::trouble::SharingTrouble;
 use crate::brush::Edit;
 use crate::net::{self, Client, Kick, Lane, Stamps};
-use crate::plugin::{LoosePieceFound, ThreadTask};
+use crate::plugin::{LoosePieceFound, LoosePieceReturned, ThreadTask};
 use crate::terrain::{HistoryStep, Terrain, TerrainError, TerrainSettings, Version};
 use crate::volume::DiggingRules;
 
@@ -74,8 +74,15 @@ pub(super) struct Display {
     pub answered: u64,
     /// What is shown is not what should be: all of it has to be put.
     pub is_broken: bool,
-    /// Pieces that appear once so many changes are answered: the ground loses them with these.
-    pub pieces: VecDeque<(u64, LoosePieceFound)>,
+    /// What happens to pieces once so many changes are answered: the ground changes with these.
+    pub pieces: VecDeque<(u64, PieceMessage)>,
+}
+
+/// What happens to a piece.
+#[derive(Clone, Debug)]
+pub(super) enum PieceMessage {
+    Found(LoosePieceFound),
+    Returned(LoosePieceReturned),
 }
 
 /// What a shared terrain does now.
@@ -189,8 +196,8 @@ impl Display {
         }
     }
 
-    /// Looks at what became of changes in the terrain, and returns the pieces whose ground is gone by now.
-    pub fn follow(&mut self, terrain: &mut Terrain) -> Vec<LoosePieceFound> {
+    /// Looks at what became of changes in the terrain, and returns what happens to pieces with those.
+    pub fn follow(&mut self, terrain: &mut Terrain) -> Vec<PieceMessage> {
         let version = terrain.world().version();
         if !version.is_same_world(self.version) {
             // Another terrain took its place, and what waited there is gone.
@@ -205,7 +212,7 @@ impl Display {
             self.is_broken = true;
             self.hold_pieces();
         }
-        let is_shown = |(due, _): &(u64, LoosePieceFound)| *due <= self.answered;
+        let is_shown = |(due, _): &(u64, PieceMessage)| *due <= self.answered;
         let count = self.pieces.iter().take_while(|piece| is_shown(piece)).count();
         self.pieces.drain(..count).map(|(_, piece)| piece).collect()
     }
@@ -221,8 +228,8 @@ impl Display {
         self.answered >= self.submitted
     }
 
-    /// Holds pieces that the ground loses with what was submitted last.
-    pub fn add_pieces(&mut self, pieces: impl IntoIterator<Item = LoosePieceFound>) {
+    /// Holds what happens to pieces with what was submitted last.
+    pub fn add_pieces(&mut self, pieces: impl IntoIterator<Item = PieceMessage>) {
         let due = self.submitted + u64::from(self.is_broken);
         self.pieces.extend(pieces.into_iter().map(|piece| (due, piece)));
     }

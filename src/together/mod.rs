@@ -46,7 +46,7 @@ use bevy::prelude::*;
 use bevy_replicon::prelude::*;
 
 use crate::plugin::{
-    BrushApplied, BurrowSystems, FollowCommits, HistoryMoved, LoosePieceFound, TerrainPlugin,
+    BrushApplied, BurrowSystems, FollowCommits, HistoryMoved, LoosePieceFound, LoosePieceReturned, TerrainPlugin,
 };
 
 /// Digging together: add it after `RepliconPlugins` and [`BurrowPlugins`](crate::plugin::BurrowPlugins), on the server and on all
@@ -88,6 +88,7 @@ impl Plugin for TogetherPlugin {
             .add_message::<BrushApplied>()
             .add_message::<HistoryMoved>()
             .add_message::<LoosePieceFound>()
+            .add_message::<LoosePieceReturned>()
             .add_observer(service::drop_messages)
             .add_observer(shared::begin)
             .add_observer(shared::end)

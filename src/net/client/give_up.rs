@@ -7,6 +7,7 @@ impl Client {
     /// [`advance`](Self::advance), and all of them are reported as refused.
     pub fn give_up(&mut self) {
         let numbers: Vec<u64> = self.replica.pending().map(|(number, _)| number).collect();
+        numbers.iter().for_each(|number| self.refuse_pieces(*number));
         let pending = numbers.into_iter().filter_map(|number| self.replica.take_back(number));
         for edit in pending.chain(std::mem::take(&mut self.early)) {
             self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });

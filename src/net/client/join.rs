@@ -92,6 +92,7 @@ impl Client {
     fn take_answered(&mut self, own: u64) -> Vec<u64> {
         let answered: Vec<u64> =
             self.replica.pending().map(|(number, _)| number).filter(|number| *number <= own).collect();
+        answered.iter().for_each(|number| self.settle_pieces(*number));
         answered.into_iter().filter_map(|number| Some(self.replica.take_back(number)?.tag())).collect()
     }
 
@@ -147,6 +148,7 @@ impl Client {
     fn follow_from_now(&mut self) {
         self.stage = Stage::Following;
         self.is_part = false;
+        self.check_pieces(None);
         if !self.is_playable {
             self.is_playable = true;
             self.events.push(ClientEvent::Playable);
