@@ -33,8 +33,18 @@ impl BulkReader {
     /// The next message that is there as a whole. It is never a piece itself.
     ///
     /// # Errors
-    /// When it is invalid, or longer than a message may be. Nothing more can be read then.
+    /// When it is invalid: the next call looks at the message after it. Or when it is longer than a message may be: nothing more can
+    /// be read then.
     pub fn next(&mut self, ground: &Ground, stamps: &Stamps) -> Result<Option<ToClient>, FormatError> {
+        let Some(message) = self.next_bytes()? else { return Ok(None) };
+        match ToClient::from_bytes(&message, ground, stamps)? {
+            ToClient::Piece(_) => Err(FormatError::Invalid("piece inside a stream")),
+            message => Ok(Some(message)),
+        }
+    }
+
+    /// The bytes of the next message that is there as a whole.
+    pub(super) fn next_bytes(&mut self) -> Result<Option<Vec<u8>>, FormatError> {
         let mut reader = Reader(&self.bytes);
         let length = match reader.number() {
             Ok(length) => length,
@@ -45,12 +55,8 @@ impl BulkReader {
             return Err(FormatError::TooLarge { length, limit: MOST_TO_CLIENT as u64 });
         }
         let Ok(message) = reader.take(length as usize) else { return Ok(None) };
-        let message = ToClient::from_bytes(message, ground, stamps)?;
-        let left = reader.0.len();
+        let (message, left) = (message.to_vec(), reader.0.len());
         self.bytes.drain(..self.bytes.len() - left);
-        match message {
-            ToClient::Piece(_) => Err(FormatError::Invalid("piece inside a stream")),
-            message => Ok(Some(message)),
-        }
+        Ok(Some(message))
     }
 }

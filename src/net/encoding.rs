@@ -4,6 +4,7 @@
 //! Whatever bytes are read, the result is a message or a [`FormatError`]: nothing panics, and memory is taken by the length of
 //! the input, which has limits of its own.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::message::*;
@@ -24,6 +25,8 @@ const EDITS: u8 = 1;
 const UNDO: u8 = 2;
 const FETCH: u8 = 3;
 const ACK: u8 = 4;
+const GREETING: u8 = 5;
+const IMAGES: u8 = 6;
 
 const WELCOME: u8 = 0;
 const KICKED: u8 = 1;
@@ -34,11 +37,14 @@ const HASHES: u8 = 5;
 const TABLE: u8 = 6;
 const REGION: u8 = 7;
 const DURABLE: u8 = 8;
-const PIECE: u8 = 9;
+pub(super) const PIECE: u8 = 9;
 /// Before a message that is packed.
 const PACKED: u8 = 10;
 /// Most bytes of a message that is packed: bytes that say much would take much memory.
 const MOST_PACKED: usize = 64 << 10;
+const STREAM: u8 = 11;
+const GREET: u8 = 12;
+const IMAGE: u8 = 13;
 
 /// Heads of edits are smaller.
 const RULES: u8 = 128;
@@ -51,7 +57,7 @@ const LOG: u8 = 0;
 const REGIONS: u8 = 1;
 const COMPARE: u8 = 2;
 
-const REFUSALS: [Refusal; 9] = [
+const REFUSALS: [Refusal; 10] = [
     Refusal::TooFar,
     Refusal::Cost,
     Refusal::Forbidden,
@@ -61,9 +67,10 @@ const REFUSALS: [Refusal; 9] = [
     Refusal::Touched,
     Refusal::TooLarge,
     Refusal::NotJoined,
+    Refusal::UnknownStamp,
 ];
 
-const KICKS: [Kick; 7] = [
+const KICKS: [Kick; 8] = [
     Kick::Protocol,
     Kick::Simulation,
     Kick::Ground,
@@ -71,7 +78,10 @@ const KICKS: [Kick; 7] = [
     Kick::Malformed,
     Kick::Flood,
     Kick::ByGame,
+    Kick::Stamp,
 ];
+/// Before the number of a game's own reason.
+const REFUSED_BY_GAME: u8 = 255;
 
 impl ToServer {
     /// Its bytes.
@@ -80,13 +90,12 @@ impl ToServer {
         match self {
             Self::Hello(hello) => {
                 to.push(HELLO);
-                put_number(&mut to, hello.protocol.into());
-                put_number(&mut to, hello.simulation.into());
-                to.extend_from_slice(&hello.ground.to_le_bytes());
-                put_number(&mut to, hello.chunk_size.into());
-                put_point(&mut to, hello.place);
-                to.push(hello.epoch.is_some().into());
-                hello.epoch.iter().for_each(|epoch| put_epoch(&mut to, epoch));
+                put_hello(&mut to, hello);
+            }
+            Self::Greeting { stream, hello } => {
+                to.push(GREETING);
+                put_number(&mut to, *stream);
+                put_hello(&mut to, hello);
             }
             Self::Edits { first, edits } => {
                 to.push(EDITS);
@@ -110,6 +119,11 @@ impl ToServer {
                 put_number(&mut to, *bulk);
                 put_number(&mut to, *number);
             }
+            Self::Images { images } => {
+                to.push(IMAGES);
+                put_number(&mut to, images.len() as u64);
+                images.iter().for_each(|image| to.extend_from_slice(&image.0.to_le_bytes()));
+            }
         }
         to
     }
@@ -119,24 +133,29 @@ impl ToServer {
     /// # Errors
     /// When anything is invalid, longer than it may be, or a stamp has an image that the list lacks.
     pub fn from_bytes(bytes: &[u8], stamps: &Stamps) -> Result<Self, FormatError> {
+        match Self::read(bytes, stamps)? {
+            (message, unknown) if unknown.is_empty() => Ok(message),
+            _ => Err(FormatError::Invalid("image of a stamp")),
+        }
+    }
+
+    /// Reads a message from a client. Edits whose stamps have images that the list lacks get another image; their places in the
+    /// message are returned too.
+    pub(super) fn read(bytes: &[u8], stamps: &Stamps) -> Result<(Self, Vec<usize>), FormatError> {
         within(bytes.len(), MOST_TO_SERVER)?;
-        let mut reader = Reader(bytes);
+        let (mut reader, mut unknown) = (Reader(bytes), Vec::new());
         let message = match reader.byte()? {
-            HELLO => Self::Hello(Hello {
-                protocol: small(&mut reader)?,
-                simulation: small(&mut reader)?,
-                ground: u64::from_le_bytes(reader.array()?),
-                chunk_size: small(&mut reader)?,
-                place: point(&mut reader)?,
-                epoch: if flag(&mut reader)? { Some(epoch(&mut reader)?) } else { None },
-            }),
+            HELLO => Self::Hello(read_hello(&mut reader)?),
+            GREETING => Self::Greeting { stream: reader.number()?, hello: read_hello(&mut reader)? },
             EDITS => {
                 let (first, count) = (reader.number()?, reader.count()?);
                 within(count, MOST_EDITS)?;
                 let (mut edits, mut sequence) = (Vec::with_capacity(count), EditSequence::default());
-                for _ in 0..count {
+                for place in 0..count {
                     let head = reader.byte()?;
-                    edits.push(read_edit(&mut reader, head, stamps, &mut sequence, |_| Ok(()))?.1);
+                    let read = read_edit(&mut reader, head, stamps, &mut sequence, |_| Ok(()))?;
+                    unknown.extend(read.missing.map(|_| place));
+                    edits.push(read.edit);
                 }
                 Self::Edits { first, edits }
             }
@@ -147,11 +166,38 @@ impl ToServer {
                 Self::Fetch { number, regions: regions.into_iter().map(|(pos, ())| pos).collect() }
             }
             ACK => Self::Ack { bulk: reader.number()?, number: reader.number()? },
+            IMAGES => {
+                let count = reader.count()?;
+                within(count, MOST_IMAGES)?;
+                let image = |_| Ok(StampId(u64::from_le_bytes(reader.array()?)));
+                Self::Images { images: (0..count).map(image).collect::<Result<_, FormatError>>()? }
+            }
             _ => return Err(FormatError::Invalid("tag of a message")),
         };
         reader.end()?;
-        Ok(message)
+        Ok((message, unknown))
     }
+}
+
+fn put_hello(to: &mut Vec<u8>, hello: &Hello) {
+    put_number(to, hello.protocol.into());
+    put_number(to, hello.simulation.into());
+    to.extend_from_slice(&hello.ground.to_le_bytes());
+    put_number(to, hello.chunk_size.into());
+    put_point(to, hello.place);
+    to.push(hello.epoch.is_some().into());
+    hello.epoch.iter().for_each(|epoch| put_epoch(to, epoch));
+}
+
+fn read_hello(reader: &mut Reader) -> Result<Hello, FormatError> {
+    Ok(Hello {
+        protocol: small(reader)?,
+        simulation: small(reader)?,
+        ground: u64::from_le_bytes(reader.array()?),
+        chunk_size: small(reader)?,
+        place: point(reader)?,
+        epoch: if flag(reader)? { Some(epoch(reader)?) } else { None },
+    })
 }
 
 impl ToClient {
@@ -162,6 +208,10 @@ impl ToClient {
             Self::Welcome(welcome) => {
                 to.push(WELCOME);
                 put_welcome(&mut to, welcome);
+            }
+            Self::Kicked(Kick::Refused(reason)) => {
+                to.extend([KICKED, REFUSED_BY_GAME]);
+                put_number(&mut to, (*reason).into());
             }
             Self::Kicked(why) => to.extend([KICKED, place_in(&KICKS, why)]),
             Self::Entries(Entries { first, entries }) => {
@@ -198,6 +248,17 @@ impl ToClient {
                 to.push(PIECE);
                 to.extend_from_slice(bytes);
             }
+            Self::Stream { stream } => {
+                to.push(STREAM);
+                put_number(&mut to, *stream);
+            }
+            Self::Greet => to.push(GREET),
+            Self::Image(image) => {
+                to.push(IMAGE);
+                put_number(&mut to, image.width().into());
+                put_number(&mut to, image.height().into());
+                image.samples().iter().for_each(|sample| to.extend_from_slice(&sample.to_le_bytes()));
+            }
         }
         to
     }
@@ -207,16 +268,36 @@ impl ToClient {
     /// # Errors
     /// When anything is invalid, longer than it may be, or a stamp has an image that the list lacks.
     pub fn from_bytes(bytes: &[u8], ground: &Ground, stamps: &Stamps) -> Result<Self, FormatError> {
+        match Self::read(bytes, ground, stamps)? {
+            (message, missing) if missing.is_empty() => Ok(message),
+            _ => Err(FormatError::Invalid("image of a stamp")),
+        }
+    }
+
+    /// Reads a message from a server. Stamps whose images the list lacks get another image; the names of these are returned too.
+    pub(super) fn read(
+        bytes: &[u8],
+        ground: &Ground,
+        stamps: &Stamps,
+    ) -> Result<(Self, BTreeSet<StampId>), FormatError> {
         within(bytes.len(), MOST_TO_CLIENT)?;
-        let mut reader = Reader(bytes);
+        let (mut reader, mut missing) = (Reader(bytes), BTreeSet::new());
         let message = match reader.byte()? {
             WELCOME => Self::Welcome(read_welcome(&mut reader)?),
-            KICKED => Self::Kicked(at_place(&KICKS, reader.byte()?)?),
+            KICKED => Self::Kicked(match reader.byte()? {
+                REFUSED_BY_GAME => Kick::Refused(small(&mut reader)?),
+                place => at_place(&KICKS, place)?,
+            }),
             ENTRIES => {
                 let (first, count) = (reader.number()?, reader.count()?);
+                if first.checked_add(count as u64).is_none() {
+                    return Err(FormatError::Invalid("number of an entry"));
+                }
                 let (mut entries, mut sequence) = (Vec::new(), EditSequence::default());
                 for _ in 0..count {
-                    entries.push(read_entry(&mut reader, ground, stamps, &mut sequence)?);
+                    let (entry, unknown) = read_entry(&mut reader, ground, stamps, &mut sequence)?;
+                    missing.extend(unknown);
+                    entries.push(entry);
                 }
                 Self::Entries(Entries { first, entries })
             }
@@ -239,14 +320,28 @@ impl ToClient {
                 if message.first() == Some(&PACKED) {
                     return Err(FormatError::Invalid("message that is packed twice"));
                 }
-                Self::from_bytes(&message, ground, stamps)?
+                return Self::read(&message, ground, stamps);
             }
             PIECE => Self::Piece(std::mem::take(&mut reader.0).to_vec()),
+            STREAM => Self::Stream { stream: reader.number()? },
+            GREET => Self::Greet,
+            IMAGE => Self::Image(read_image(&mut reader)?),
             _ => return Err(FormatError::Invalid("tag of a message")),
         };
         reader.end()?;
-        Ok(message)
+        Ok((message, missing))
     }
+}
+
+fn read_image(reader: &mut Reader) -> Result<Arc<GreyImage>, FormatError> {
+    let [width, height] = [small(reader)?, small(reader)?];
+    let (samples, rest) = std::mem::take(&mut reader.0).as_chunks();
+    if !rest.is_empty() {
+        return Err(FormatError::Invalid("image"));
+    }
+    let samples = samples.iter().map(|sample| u16::from_le_bytes(*sample)).collect();
+    let image = GreyImage::from_samples(width, height, samples);
+    image.map(Arc::new).map_err(|_| FormatError::Invalid("image"))
 }
 
 fn within(length: usize, limit: usize) -> Result<(), FormatError> {
@@ -293,6 +388,15 @@ fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, sequence: &mut EditSe
     }
 }
 
+/// An edit as it was read.
+struct ReadEdit<T> {
+    /// What stood between.
+    before: T,
+    edit: Edit,
+    /// The image of its stamp, if it is missing: the edit has another one then.
+    missing: Option<StampId>,
+}
+
 /// Reads what [`put_edit`] appended after the first byte; `before` reads what stands between.
 fn read_edit<T>(
     reader: &mut Reader,
@@ -300,21 +404,23 @@ fn read_edit<T>(
     stamps: &Stamps,
     sequence: &mut EditSequence,
     before: impl FnOnce(&mut Reader) -> Result<T, FormatError>,
-) -> Result<(T, Edit), FormatError> {
+) -> Result<ReadEdit<T>, FormatError> {
     let stamp = (head == STAMP).then(|| reader.array().map(u64::from_le_bytes)).transpose()?;
     let head = if stamp.is_some() { reader.byte()? } else { head };
-    let first = before(reader)?;
+    let before = before(reader)?;
     let edit = sequence.read(head, reader)?;
-    let edit = match (stamp.map(StampId), edit.stamp_image()) {
-        (None, None) => edit,
-        (Some(id), Some(_)) => {
-            let image = stamps.get(id).ok_or(FormatError::Invalid("image of a stamp"))?;
-            let error = |error| FormatError::Edit(format!("{error}"));
-            edit.with_stamp_image(Arc::clone(image)).map_err(error)?
-        }
+    let (edit, missing) = match (stamp.map(StampId), edit.stamp_image()) {
+        (None, None) => (edit, None),
+        (Some(id), Some(_)) => match stamps.get(id) {
+            Some(image) => {
+                let error = |error| FormatError::Edit(format!("{error}"));
+                (edit.with_stamp_image(Arc::clone(image)).map_err(error)?, None)
+            }
+            None => (edit, Some(id)),
+        },
         _ => return Err(FormatError::Invalid("image of a stamp")),
     };
-    Ok((first, edit))
+    Ok(ReadEdit { before, edit, missing })
 }
 
 /// What stands for an image that is named.
@@ -366,6 +472,11 @@ impl OrderWriter {
         self.count += 1;
     }
 
+    /// Entries so far.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
     /// Bytes so far.
     pub fn len(&self) -> usize {
         self.bytes.len()
@@ -412,8 +523,8 @@ fn read_entry(
     ground: &Ground,
     stamps: &Stamps,
     sequence: &mut EditSequence,
-) -> Result<Entry, FormatError> {
-    Ok(match reader.byte()? {
+) -> Result<(Entry, Option<StampId>), FormatError> {
+    let entry = match reader.byte()? {
         RULES => Entry::Rules(read_rules(reader.bytes()?)?.map(Arc::new)),
         LOOSE => Entry::Loose(plain::from_bytes(reader.bytes()?, "search for loose pieces")?),
         PARTS => {
@@ -426,10 +537,12 @@ fn read_entry(
         MARK => Entry::Mark,
         head => {
             let from = |reader: &mut Reader| Ok((ClientId(reader.number()?), reader.number()?));
-            let ((author, own), edit) = read_edit(reader, head, stamps, sequence, from)?;
-            Entry::Edit { author, own, edit }
+            let ReadEdit { before: (author, own), edit, missing } =
+                read_edit(reader, head, stamps, sequence, from)?;
+            return Ok((Entry::Edit { author, own, edit }, missing));
         }
-    })
+    };
+    Ok((entry, None))
 }
 
 fn read_rules(bytes: &[u8]) -> Result<Option<DiggingRules>, FormatError> {
@@ -455,6 +568,7 @@ fn put_welcome(to: &mut Vec<u8>, welcome: &Welcome) {
     put_number(to, welcome.client.0);
     put_epoch(to, &welcome.epoch);
     put_number(to, welcome.own);
+    put_number(to, welcome.left);
     // No distance is as great as `u32::MAX + 1`.
     put_number(to, welcome.reach.map_or(0, |reach| u64::from(reach) + 1));
     welcome.cost.iter().for_each(|&number| put_number(to, number));
@@ -481,7 +595,8 @@ fn put_welcome(to: &mut Vec<u8>, welcome: &Welcome) {
 }
 
 fn read_welcome(reader: &mut Reader) -> Result<Welcome, FormatError> {
-    let (client, epoch, own) = (ClientId(reader.number()?), epoch(reader)?, reader.number()?);
+    let (client, epoch) = (ClientId(reader.number()?), epoch(reader)?);
+    let (own, left) = (reader.number()?, reader.number()?);
     let reach = match reader.number()? {
         0 => None,
         more => Some(u32::try_from(more - 1).map_err(|_| FormatError::Invalid("reach"))?),
@@ -500,7 +615,7 @@ fn read_welcome(reader: &mut Reader) -> Result<Welcome, FormatError> {
         COMPARE => Join::Compare { terms: read_terms(reader)? },
         _ => return Err(FormatError::Invalid("way to join")),
     };
-    Ok(Welcome { client, epoch, own, reach, cost, join })
+    Ok(Welcome { client, epoch, own, reach, cost, left, join })
 }
 
 fn put_terms(to: &mut Vec<u8>, terms: &Terms) {

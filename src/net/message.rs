@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! client                                   server
-//!   Hello                             ->
+//!   Greeting                          ->
+//!                                     <-   Stream: what follows in this lane answers that greeting (in both lanes)
 //!                                     <-   Welcome: the number n that it starts from, and what comes in the bulk lane
 //!                                     <-   Piece ...      (bulk) regions or old entries, up to n
 //!                                     <-   Entries ...    (order) all that is ordered after n
@@ -12,7 +13,13 @@
 //!                                     <-   Hashes after a mark
 //!   Fetch, where hashes differ        ->
 //!                                     <-   Piece ...      (bulk) these regions at a later number
+//!   Images, where stamps have others  ->
+//!                                     <-   Piece ...      (bulk) these images
 //! ```
+//!
+//! A session can begin again at any moment, over the same connection or a new one. Each greeting names a new **stream**; whatever
+//! comes in a lane before the mark of that stream belongs to an earlier one and is dropped. A client repeats its greeting until it
+//! is answered, and a server that does not know a connected client asks it to [greet](ToClient::Greet).
 //!
 //! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the pristine world
 //! after the entries 1 to n. Whoever has applied them in order has the same world.
@@ -21,14 +28,16 @@ use std::sync::Arc;
 
 use glam::IVec3;
 
+use super::stamps::StampId;
 use crate::brush::Edit;
+use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
 use crate::store::WorldId;
 use crate::terrain::{LooseSettings, WorldChange};
 use crate::volume::{Brick, DiggingRules, Fields};
 
 /// Changes when messages are no longer what they were.
-pub const PROTOCOL: u32 = 2;
+pub const PROTOCOL: u32 = 3;
 
 /// Most bytes of a message to a server.
 pub const MOST_TO_SERVER: usize = 64 << 10;
@@ -38,6 +47,11 @@ pub const MOST_TO_CLIENT: usize = 8 << 20;
 pub const MOST_EDITS: usize = 256;
 /// Most regions that a message names.
 pub const MOST_REGIONS: usize = 4096;
+/// Most images that a message asks for.
+pub const MOST_IMAGES: usize = 64;
+/// The most by which the number of a client's own edit may exceed the one before. Larger jumps are invalid, so nobody can use up the
+/// numbers of a player.
+pub const MOST_OWN_JUMP: u64 = 1 << 16;
 
 /// Names a player. The caller gives these numbers: whoever comes back with the same one is the same player, and small ones are
 /// short in messages.
@@ -128,8 +142,16 @@ pub struct Hello {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ToServer {
-    /// The client begins.
+    /// The client begins, once on this connection: the answer has no [stream](ToClient::Stream) marks.
     Hello(Hello),
+    /// The client begins, or begins again. Both lanes of the answer begin with a [`ToClient::Stream`] of this number.
+    Greeting {
+        /// The stream that the client wants to begin; it has not used this number before. The same number again is the same greeting:
+        /// one that was answered already is ignored.
+        stream: u64,
+        /// How the client begins.
+        hello: Hello,
+    },
     /// Edits, numbered on from `first`. A client numbers its edits and undos together, from 1, one after the other.
     Edits {
         /// The number of the first.
@@ -137,7 +159,7 @@ pub enum ToServer {
         /// At most [`MOST_EDITS`].
         edits: Vec<Edit>,
     },
-    /// Takes back the last stroke of a client.
+    /// Takes back the last stroke of a client, as of this place among its edits.
     Undo {
         /// Its number among the client's edits and undos.
         own: u64,
@@ -153,10 +175,15 @@ pub enum ToServer {
     },
     /// What has come.
     Ack {
-        /// Bytes of the bulk lane's stream, from the beginning of the connection.
+        /// Bytes of the bulk lane's stream, since it began.
         bulk: u64,
         /// The number that the client's world is at.
         number: u64,
+    },
+    /// Asks for images of stamps that the client does not have.
+    Images {
+        /// At most [`MOST_IMAGES`].
+        images: Vec<StampId>,
     },
 }
 
@@ -209,6 +236,8 @@ pub struct Welcome {
     /// The client's cost bucket: what comes back each second, and the most that it holds. An edit costs 20, and 1 for
     /// each brick that it reaches, or 4 if it sculpts.
     pub cost: [u64; 2],
+    /// What is left in that bucket now.
+    pub left: u64,
     /// What comes in the bulk lane.
     pub join: Join,
 }
@@ -278,6 +307,15 @@ pub enum ToClient {
     },
     /// Bytes of the bulk lane's stream: see [`BulkReader`](super::BulkReader).
     Piece(Vec<u8>),
+    /// What follows in this lane answers the [greeting](ToServer::Greeting) with this number.
+    Stream {
+        /// The number.
+        stream: u64,
+    },
+    /// The server does not know the client, which is connected: it has to greet. One that has greeted waits for the answer.
+    Greet,
+    /// An image that the client asked for.
+    Image(Arc<GreyImage>),
 }
 
 /// Why an edit or an undo was refused.
@@ -311,6 +349,9 @@ pub enum Refusal {
     /// The edit came before the client had begun.
     #[error("the client has not joined")]
     NotJoined,
+    /// The server does not have the image of the stamp.
+    #[error("the server does not have the image of the stamp")]
+    UnknownStamp,
 }
 
 /// Why a client has to go.
@@ -338,4 +379,10 @@ pub enum Kick {
     /// The game wants it.
     #[error("kicked")]
     ByGame,
+    /// The game [does not admit](super::Server::set_admission) the player. The number is the game's own, say of a text that it shows.
+    #[error("refused by the game, reason {0}")]
+    Refused(u32),
+    /// It lacks the image of a stamp, which is too large to be sent.
+    #[error("the image of a stamp is missing and too large to be sent")]
+    Stamp,
 }

@@ -8,9 +8,10 @@
 //! | --- | --- |
 //! | [`message`] | what client and server tell each other |
 //! | `encoding` | these in bytes |
-//! | `stamps` | images of stamps, which are named and not sent |
+//! | `stamps` | images of stamps, which are named, and sent to clients that lack them |
 //! | `bulk` | the lane of what takes long: regions and old entries, as one stream that is cut into pieces |
 //! | `regions` | regions as they are compared and sent |
+//! | `price`, `bucket` | what edits cost, and how much may be spent |
 //! | `client` | the client: prediction, joins, repair |
 //! | `replica` | the world of the order, and what is shown of it |
 //! | `server` | the server: order, validation, undo, joins |
@@ -54,26 +55,29 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bucket;
 mod bulk;
 mod client;
 mod encoding;
 pub mod message;
+mod price;
 mod regions;
 mod replica;
 mod server;
 mod stamps;
 
 use crate::terrain::{Meshing, Terrain, WorkLimits};
+pub use bucket::Rate;
 pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
 pub use message::{
-    ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent, RegionHashes,
-    Terms, ToClient, ToServer, Welcome,
+    ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, MOST_OWN_JUMP, MOST_TO_SERVER, PROTOCOL,
+    Refusal, RegionContent, RegionHashes, Terms, ToClient, ToServer, Welcome,
 };
 pub use regions::{region_hash, touched_regions};
 pub use replica::ShownChange;
 pub use server::{
-    Outgoing, Permission, Rate, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
+    Admission, Outgoing, Permission, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
     UnknownStamp,
 };
 pub use stamps::{StampId, Stamps};

@@ -153,6 +153,16 @@ impl Replica {
         self.pending.iter().map(|pending| (pending.own, &pending.edit))
     }
 
+    /// Numbers the own edits beyond a number anew, from the one after it on; returns the next number.
+    pub fn renumber(&mut self, own: u64) -> u64 {
+        let mut next = own + 1;
+        for pending in self.pending.iter_mut().filter(|pending| pending.own > own) {
+            pending.own = next;
+            next += 1;
+        }
+        next
+    }
+
     /// Takes an own edit back, say because it was refused; returns it if it was pending.
     pub fn take_back(&mut self, own: u64) -> Option<Edit> {
         let at = self.pending.iter().position(|pending| pending.own == own)?;

@@ -1,4 +1,4 @@
-//! Images of stamps: both sides have them, messages name them.
+//! Images of stamps: messages name them, and a client that lacks one gets it from the server.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::brush::Edit;
 use crate::ground::GreyImage;
 
 /// Names an image by its content.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct StampId(pub u64);
 
 impl StampId {
@@ -27,7 +27,8 @@ impl StampId {
     }
 }
 
-/// The images that stamps may have. Edits with other images are not sent, and refused where they come.
+/// The images that stamps may have. A client sends no edits with other images, and a server refuses them. Clients that lack an image
+/// of the server's get it when it is used first, so only players who stamp need images of their own.
 #[derive(Clone, Debug, Default)]
 pub struct Stamps(FxHashMap<StampId, Arc<GreyImage>>);
 

@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::IVec3;
 
 use super::super::message::{
-    Join, MOST_EDITS, MOST_REGIONS, RegionContent, RegionHashes, Terms, ToServer, Welcome,
+    Join, MOST_OWN_JUMP, MOST_REGIONS, RegionContent, RegionHashes, Terms, ToServer, Welcome,
 };
 use super::super::regions::{region_hash, regions_of};
-use super::{Client, ClientEvent};
+use super::outbox::Outbox;
+use super::{Client, ClientEvent, MOST_NUMBER};
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
 use crate::terrain::WorldChange;
@@ -32,7 +33,13 @@ pub(super) enum Stage {
 impl Client {
     /// The server has welcomed it.
     pub(super) fn begin(&mut self, welcome: Welcome) {
-        let Welcome { client, epoch, own, reach, join, .. } = welcome;
+        let Welcome { client, epoch, own, reach, cost, left, join } = welcome;
+        if !matches!(self.stage, Stage::Greeting) || own.max(epoch.number) > MOST_NUMBER {
+            self.figures.malformed += 1;
+            return;
+        }
+        self.outbox = Outbox::new(cost, left, self.now);
+        self.wanted.clear();
         self.repair = None;
         self.marks.clear();
         if self.epoch.is_none_or(|known| known.run != epoch.run || known.world != epoch.world) {
@@ -66,6 +73,7 @@ impl Client {
             }
         }
         self.events.push(ClientEvent::Welcomed { client, reach });
+        self.renumber(own);
         // Undos are not sent again: by now they would be of other strokes.
         for _ in self.undos.split_off(&own.saturating_add(1)) {
             self.events.push(ClientEvent::UndoRefused(None));
@@ -104,23 +112,31 @@ impl Client {
 
     /// Sends own edits that the server has not seen, and those from before the first welcome.
     fn send_again(&mut self, own: u64) {
-        self.unsent.clear();
-        let pending: Vec<(u64, Edit)> = self
-            .replica
-            .pending()
-            .filter(|(number, _)| *number > own)
-            .map(|(number, edit)| (number, edit.clone()))
-            .collect();
-        let mut rest = pending.as_slice();
-        while let Some((first, _)) = rest.first() {
-            let in_row = rest.iter().zip(*first..).take_while(|((number, _), expected)| number == expected);
-            let count = in_row.count().min(MOST_EDITS);
-            let (row, others) = rest.split_at(count);
-            let edits = row.iter().map(|(_, edit)| edit.clone()).collect();
-            self.outgoing.push(ToServer::Edits { first: *first, edits }.to_bytes());
-            rest = others;
-        }
+        let pending = self.replica.pending().filter(|(number, _)| *number > own);
+        let pending: Vec<(u64, Edit)> = pending.map(|(number, edit)| (number, edit.clone())).collect();
+        pending.into_iter().for_each(|(number, edit)| self.send_edit(number, edit));
         std::mem::take(&mut self.early).into_iter().for_each(|edit| self.dig(edit));
+    }
+
+    /// Lets own edits that the server has not seen have numbers that it accepts, if theirs are too far from the last one that it has
+    /// seen: so it is where a server was replaced by one that knows less.
+    fn renumber(&mut self, own: u64) {
+        let mut last = own;
+        let unseen = self.replica.pending().map(|(number, _)| number).filter(|number| *number > own);
+        let is_far = unseen.chain([self.next_own]).any(|number| {
+            let jump = number.saturating_sub(last);
+            last = number;
+            jump > MOST_OWN_JUMP / 2
+        });
+        if is_far {
+            let told =
+                self.replica.pending().filter(|(number, _)| (own + 1..=self.told).contains(number)).count();
+            self.told = own + told as u64;
+            let before: Vec<u64> = self.replica.pending().map(|(number, _)| number).collect();
+            self.next_own = self.replica.renumber(own);
+            let after = self.replica.pending().map(|(number, _)| number);
+            self.pieces.renumber(before.into_iter().zip(after));
+        }
     }
 
     /// Has it come to the end of old entries?
@@ -171,11 +187,21 @@ impl Client {
         };
         let mut wanted: Vec<RegionPos> = all.into_iter().filter(differs).collect();
         wanted.sort_by_key(|region| distance(*region, self.place));
-        for regions in wanted.chunks(MOST_REGIONS) {
-            self.outgoing.push(ToServer::Fetch { number, regions: regions.to_vec() }.to_bytes());
-        }
         self.stage = Stage::ByRegions { to, left: wanted.len() };
+        self.wanted = wanted.into();
+        self.fetch_more();
         self.finish_regions();
+    }
+
+    /// Asks for more of the regions that differ, once most of those have come that were asked for.
+    fn fetch_more(&mut self) {
+        let Stage::ByRegions { to, left } = self.stage else { return };
+        let awaited = left.saturating_sub(self.wanted.len());
+        if !self.wanted.is_empty() && awaited <= MOST_REGIONS / 2 {
+            let count = self.wanted.len().min(MOST_REGIONS);
+            let regions = self.wanted.drain(..count).collect();
+            self.outgoing.push(ToServer::Fetch { number: to, regions }.to_bytes());
+        }
     }
 
     fn put(&mut self, change: WorldChange) {
@@ -204,6 +230,7 @@ impl Client {
             self.lower_names(next_field);
         }
         self.stage = Stage::ByRegions { to, left: left - 1 };
+        self.fetch_more();
         self.finish_regions();
     }
 

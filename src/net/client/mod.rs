@@ -4,12 +4,16 @@
 //! | --- | --- |
 //! | `client` | what a game calls, and messages that come |
 //! | `join` | getting to where the server is: old entries, regions, a comparison |
+//! | `outbox` | own edits and undos on their way, as fast as the server's limits allow |
 //! | `repair` | marks, and regions that differ |
+//! | `images` | images of stamps that are missing |
 //! | `replica` | the world of the order, and what is shown of it |
 
 mod events;
 mod give_up;
+mod images;
 mod join;
+mod outbox;
 mod pieces;
 mod repair;
 
@@ -20,17 +24,22 @@ use std::time::Duration;
 use glam::IVec3;
 
 use super::bulk::BulkReader;
+use super::encoding::{PIECE, entry_bytes};
 use super::message::{
-    ClientId, Entries, Entry, Epoch, Hello, Kick, Lane, MOST_EDITS, PROTOCOL, Refusal, ToClient, ToServer,
+    ClientId, Entries, Entry, Epoch, Hello, Kick, Lane, PROTOCOL, Refusal, ToClient, ToServer,
 };
+use super::price::{UNDO, UNDO_BYTES, cost};
 use super::replica::{Replica, ShownChange};
 use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{LatticeBox, RegionPos};
+use crate::store::WorldId;
 use crate::terrain::{Receipt, SIMULATION, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
+use images::Images;
 use join::Stage;
+use outbox::Outbox;
 use pieces::Pieces;
 use repair::{Marks, Reaches, Repair};
 
@@ -40,6 +49,12 @@ const BATCH: usize = 2048;
 /// The time between acknowledgements, and the bytes of the bulk lane after which one is sent sooner.
 const ACK: Duration = Duration::from_millis(100);
 const ACK_BYTES: u64 = 16 << 10;
+
+/// A greeting is repeated after so long, until it is answered.
+const GREET_AGAIN: Duration = Duration::from_secs(1);
+
+/// No honest server tells greater numbers, so that counting on can never overflow.
+const MOST_NUMBER: u64 = u64::MAX / 2;
 
 /// A client: bytes in, bytes out.
 ///
@@ -59,7 +74,15 @@ pub struct Client {
     /// Does the world lack regions of its number?
     is_part: bool,
     stage: Stage,
+    now: Duration,
+    /// The stream that it greeted for last.
+    stream: u64,
+    /// When it greeted last.
+    greeted: Duration,
+    /// By lane: has the stream begun there? What comes before belongs to an earlier one.
+    has_begun: [bool; 2],
     inbox: VecDeque<(Lane, Vec<u8>)>,
+    images: Images,
     bulk: BulkReader,
     acknowledged: (u64, u64, Duration),
     /// Entries that came and are not applied yet.
@@ -69,6 +92,8 @@ pub struct Client {
     marks: Marks,
     reaches: Reaches,
     repair: Option<Repair>,
+    /// Regions that differ and were not asked for yet.
+    wanted: VecDeque<RegionPos>,
     /// Entries to come that the server could not apply.
     voids: BTreeSet<u64>,
     /// Regions that are to be fetched, whatever their hashes are.
@@ -81,7 +106,7 @@ pub struct Client {
     told: u64,
     /// Edits from before the first welcome.
     early: Vec<Edit>,
-    unsent: Vec<Edit>,
+    outbox: Outbox,
     /// The numbers of undos that the server has not answered.
     undos: BTreeSet<u64>,
     pieces: Pieces,
@@ -98,7 +123,7 @@ impl Client {
     /// When the chunk size or the voxel size is out of range.
     pub fn new(ground: impl Into<Arc<Ground>>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
         let replica = Replica::new(ground.into(), settings)?;
-        let (inbox, bulk, waiting, marks, reaches, early, unsent, undos, outgoing) = Default::default();
+        let (inbox, images, bulk, waiting, marks, reaches, early, undos, outgoing) = Default::default();
         Ok(Self {
             replica,
             stamps: Stamps::default(),
@@ -109,7 +134,13 @@ impl Client {
             epoch: None,
             is_part: false,
             stage: Stage::Apart,
+            now: Duration::ZERO,
+            // Others may have greeted on the same connection.
+            stream: WorldId::random().0 as u64 >> 1,
+            greeted: Duration::ZERO,
+            has_begun: [false; 2],
             inbox,
+            images,
             bulk,
             acknowledged: (0, 0, Duration::ZERO),
             waiting,
@@ -117,13 +148,14 @@ impl Client {
             marks,
             reaches,
             repair: None,
+            wanted: VecDeque::new(),
             voids: BTreeSet::new(),
             doubtful: BTreeSet::new(),
             is_playable: false,
             next_own: 1,
             told: 0,
             early,
-            unsent,
+            outbox: Outbox::new([0; 2], 0, Duration::ZERO),
             undos,
             pieces: Pieces::default(),
             outgoing,
@@ -148,12 +180,11 @@ impl Client {
         self.near = near;
     }
 
-    /// Greets the server, over a connection that has just begun. What was under way on another one is forgotten; the world, and edits
-    /// that the server has not answered, stay.
+    /// Greets the server: over a connection that has just begun, or again over one that goes on. What was under way is forgotten; the
+    /// world, and edits that the server has not answered, stay.
     pub fn connect(&mut self, now: Duration) {
+        self.now = now;
         self.inbox.clear();
-        self.bulk = BulkReader::default();
-        self.acknowledged = (0, 0, now);
         self.outgoing.clear();
         self.greet();
     }
@@ -164,9 +195,21 @@ impl Client {
         self.inbox.clear();
     }
 
+    /// Begins a new stream.
     fn greet(&mut self) {
         self.stage = Stage::Greeting;
         self.repair = None;
+        self.stream = self.stream.wrapping_add(1);
+        self.has_begun = [false; 2];
+        self.bulk = BulkReader::default();
+        self.acknowledged = (0, 0, self.now);
+        self.images.clear();
+        self.say_hello();
+    }
+
+    /// Sends the greeting, once more if it was not answered.
+    fn say_hello(&mut self) {
+        self.greeted = self.now;
         let hello = Hello {
             protocol: PROTOCOL,
             simulation: SIMULATION,
@@ -178,7 +221,7 @@ impl Client {
                 .map(|epoch| if self.is_part { Epoch { number: u64::MAX, ..epoch } } else { epoch }),
             place: self.place,
         };
-        self.outgoing.push(ToServer::Hello(hello).to_bytes());
+        self.outgoing.push(ToServer::Greeting { stream: self.stream, hello }.to_bytes());
     }
 
     /// The world after the entries up to [`number`](Self::number). While regions come, it is a part of it.
@@ -229,35 +272,31 @@ impl Client {
         } else if !self.stamps.can_send(&edit) {
             self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
         } else {
-            self.replica.predict(self.next_own, edit.clone());
+            let own = self.next_own;
+            self.replica.predict(own, edit.clone());
             self.next_own += 1;
-            self.unsent.push(edit);
-            if self.unsent.len() == MOST_EDITS {
-                self.flush();
+            // All others are sent with the next welcome.
+            if self.is_welcome() {
+                self.send_edit(own, edit);
             }
         }
     }
 
-    /// Asks the server to take back the last stroke of a player, by default the own one. If it may be, it comes as an entry;
-    /// [`ClientEvent::Undone`] or [`ClientEvent::UndoRefused`] tell of it.
-    pub fn undo(&mut self, of: Option<ClientId>) {
-        let Some(of) = of.or(self.id).filter(|_| self.is_welcome()) else {
-            // Its number would hide those of edits that are sent again.
-            return self.events.push(ClientEvent::UndoRefused(Some(Refusal::NotJoined)));
-        };
-        self.flush();
-        self.undos.insert(self.next_own);
-        self.outgoing.push(ToServer::Undo { own: self.next_own, of }.to_bytes());
-        self.next_own += 1;
+    fn send_edit(&mut self, own: u64, edit: Edit) {
+        let cost = cost(self.replica.world().grid(), &edit).unwrap_or_default();
+        self.outbox.edit(own, edit, cost);
     }
 
-    /// Makes a message of edits that were not sent.
-    fn flush(&mut self) {
-        let edits = std::mem::take(&mut self.unsent);
-        if !edits.is_empty() && self.is_welcome() {
-            let first = self.next_own - edits.len() as u64;
-            self.outgoing.push(ToServer::Edits { first, edits }.to_bytes());
-        }
+    /// Asks the server to take back the last stroke of a player, by default the own one, as of this place among the player's edits.
+    /// If it may be, it comes as an entry; [`ClientEvent::Undone`] or [`ClientEvent::UndoRefused`] tell of it.
+    pub fn undo(&mut self, of: Option<ClientId>) {
+        let Some(of) = of.or(self.id).filter(|_| self.is_welcome()) else {
+            // By the time it could be sent, it may be of another stroke.
+            return self.events.push(ClientEvent::UndoRefused(Some(Refusal::NotJoined)));
+        };
+        self.undos.insert(self.next_own);
+        self.outbox.undo(self.next_own, of);
+        self.next_own += 1;
     }
 
     /// Has the server welcomed it on this connection?
@@ -267,7 +306,9 @@ impl Client {
 
     /// Messages to the server, in order; each is returned once.
     pub fn take_outgoing(&mut self) -> Vec<Vec<u8>> {
-        self.flush();
+        if self.is_welcome() {
+            self.outgoing.extend(self.outbox.take(self.now));
+        }
         std::mem::take(&mut self.outgoing)
     }
 
@@ -289,14 +330,14 @@ impl Client {
 
     /// Looks at what came, applies entries, and brings what is shown up to date. Returns whether there is more to do at once.
     pub fn advance(&mut self, now: Duration) -> bool {
+        self.now = self.now.max(now);
         while let Some((lane, bytes)) = self.inbox.pop_front() {
-            let ground = self.replica.world().shared_ground();
-            match ToClient::from_bytes(&bytes, &ground, &self.stamps) {
-                Ok(message) => self.take(lane, message),
-                Err(_) => self.figures.malformed += 1,
-            }
+            self.read(lane, bytes);
         }
         self.read_bulk();
+        if matches!(self.stage, Stage::Greeting) && self.now.saturating_sub(self.greeted) >= GREET_AGAIN {
+            self.say_hello();
+        }
         let is_busy = self.follow();
         if !self.is_history() {
             let (shown, receipts) = self.replica.update();
@@ -326,25 +367,61 @@ impl Client {
         }
     }
 
+    /// Looks at a message. Entries with stamps whose images are missing wait for these.
+    fn read(&mut self, lane: Lane, bytes: Vec<u8>) {
+        let ground = self.replica.world().shared_ground();
+        match ToClient::read(&bytes, &ground, &self.stamps) {
+            Ok((message, missing)) if missing.is_empty() => self.take(lane, message),
+            Ok((ToClient::Entries(entries), missing)) => {
+                if self.has_begun[lane as usize] {
+                    self.note_received(lane, &entries);
+                    self.outgoing.extend(self.images.park(lane, bytes, missing));
+                }
+            }
+            _ => self.figures.malformed += 1,
+        }
+    }
+
     fn take(&mut self, lane: Lane, message: ToClient) {
+        if !self.has_begun[lane as usize]
+            && !matches!(message, ToClient::Stream { .. } | ToClient::Kicked(_) | ToClient::Greet)
+        {
+            return;
+        }
         match message {
+            ToClient::Stream { stream } => self.has_begun[lane as usize] = stream == self.stream,
+            ToClient::Greet => {
+                // One that has greeted waits for the answer.
+                if self.is_welcome() {
+                    self.greet();
+                }
+            }
             ToClient::Welcome(welcome) => self.begin(welcome),
             ToClient::Kicked(why) => self.leave(why),
             ToClient::Entries(entries) => self.take_entries(lane, entries),
             ToClient::Void { number } => self.take_void(number),
-            ToClient::Refused { own, why } => {
-                if self.undos.remove(&own) {
-                    self.events.push(ClientEvent::UndoRefused(Some(why)));
-                } else if let Some(edit) = self.replica.take_back(own) {
-                    self.refuse_pieces(own);
-                    self.events.push(ClientEvent::Refused { tag: edit.tag(), why: Some(why) });
-                }
-            }
+            ToClient::Refused { own, why } => self.take_refusal(own, why),
             ToClient::Hashes { number, regions } => self.marks.take_theirs(number, regions),
             ToClient::Table { number, regions } => self.take_table(number, &regions),
             ToClient::Region(content) => self.take_region(content),
             ToClient::Durable { number } => self.events.push(ClientEvent::Durable(number)),
             ToClient::Piece(piece) => self.bulk.add(&piece),
+            ToClient::Image(image) => self.take_image(image),
+        }
+    }
+
+    fn take_refusal(&mut self, own: u64, why: Refusal) {
+        self.outbox.answer(own, None, self.now);
+        if self.undos.remove(&own) {
+            self.events.push(ClientEvent::UndoRefused(Some(why)));
+        } else if why == Refusal::NotJoined {
+            // The server has forgotten the session: the edit is sent again.
+            if self.is_welcome() {
+                self.greet();
+            }
+        } else if let Some(edit) = self.replica.take_back(own) {
+            self.refuse_pieces(own);
+            self.events.push(ClientEvent::Refused { tag: edit.tag(), why: Some(why) });
         }
     }
 
@@ -355,31 +432,41 @@ impl Client {
 
     /// Looks at what has come in the bulk lane. What comes there before the welcome waits for it: there is no order between lanes.
     fn read_bulk(&mut self) {
-        let ground = self.replica.world().shared_ground();
         while self.is_welcome() {
-            match self.bulk.next(&ground, &self.stamps) {
-                Ok(Some(message)) => self.take(Lane::Bulk, message),
+            match self.bulk.next_bytes() {
+                Ok(Some(message)) if !matches!(message.first(), Some(&PIECE)) => {
+                    self.read(Lane::Bulk, message)
+                }
                 Ok(None) => return,
-                Err(_) => {
+                _ => {
+                    // Nothing more can be read of this stream.
                     self.figures.malformed += 1;
-                    return;
+                    return self.greet();
                 }
             }
         }
     }
 
-    fn take_entries(&mut self, lane: Lane, Entries { first, entries }: Entries) {
+    /// Notes that entries have come; greets anew where others are missing before them.
+    fn note_received(&mut self, lane: Lane, Entries { first, entries }: &Entries) {
         let last = first.saturating_add(entries.len() as u64).saturating_sub(1);
         if lane == Lane::Order && self.is_welcome() {
-            if first > self.received.saturating_add(1) {
+            if *first > self.received.saturating_add(1) {
                 // Something is missing: what follows waits until it has come.
                 self.figures.gaps += 1;
                 self.greet();
             }
             self.received = self.received.max(last);
         }
+    }
+
+    fn take_entries(&mut self, lane: Lane, entries: Entries) {
+        self.note_received(lane, &entries);
         let from = self.number();
-        self.waiting.extend((first..).zip(entries).filter(|(number, _)| *number > from));
+        let Entries { first, entries } = entries;
+        let numbered =
+            entries.into_iter().enumerate().map(|(at, entry)| (first.saturating_add(at as u64), entry));
+        self.waiting.extend(numbered.filter(|(number, _)| *number > from));
     }
 
     /// Applies entries that have come, as many as one call may; returns whether more could be.
@@ -435,6 +522,18 @@ impl Client {
         };
         let is_told = !self.is_history();
         let tags: BTreeMap<u64, u64> = self.replica.pending().map(|(own, edit)| (own, edit.tag())).collect();
+        for entry in &batch {
+            match entry {
+                Entry::Edit { .. } => {
+                    own(entry).into_iter().for_each(|own| self.outbox.answer(own, None, self.now))
+                }
+                Entry::Parts { by: Some((by, own)), .. } if Some(*by) == id => {
+                    let cost = UNDO + entry_bytes(entry) as u64 / UNDO_BYTES;
+                    self.outbox.answer(*own, Some(cost), self.now);
+                }
+                _ => {}
+            }
+        }
         let applied = self.replica.apply(&batch, own);
         let (mut receipts, mut restored) = (applied.receipts.into_iter(), applied.restored.into_iter());
         for entry in &batch {

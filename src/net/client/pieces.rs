@@ -54,6 +54,13 @@ impl Pieces {
         self.gone.drain(..excess);
     }
 
+    /// Gives own edits other numbers: pairs of those before and after.
+    pub fn renumber(&mut self, numbers: impl Iterator<Item = (u64, u64)>) {
+        let mut before = std::mem::take(&mut self.predicted);
+        let renumbered = numbers.filter_map(|(old, new)| Some((new, before.remove(&old)?)));
+        self.predicted = renumbered.collect();
+    }
+
     fn take_ground(
         &mut self,
         within: Option<LatticeBox>,

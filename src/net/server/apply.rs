@@ -4,16 +4,14 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::strokes::NoUndo;
-use super::{Ordered, Server, ServerEvent, UndoPolicy, UndoRequest};
+use super::{Later, Ordered, Server, ServerEvent, UndoPolicy, UndoRequest};
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
 use crate::net::encoding::entry_bytes;
 use crate::net::message::{Entry, Refusal, RegionHashes, ToClient};
+use crate::net::price::{MOST_UNDO_BYTES, UNDO, UNDO_BYTES};
 use crate::net::regions::{region_hash, touched_regions};
 use crate::terrain::{ChangeError, Receipt, Rejection, WorldChange};
-
-/// Most bytes of what an undo puts back: it goes to all clients in one message.
-const MOST_PARTS: usize = 1 << 20;
 
 impl Server {
     /// Applies entries, as much as one call may.
@@ -22,8 +20,10 @@ impl Server {
         while left > 0 {
             let work = if !self.waiting.is_empty() {
                 self.apply_some(left)
-            } else if let Some(request) = self.undos.pop_front() {
-                self.undo(&request)
+            } else if let Some(Later::Undo(request)) = self.later.pop_front() {
+                let work = self.undo(&request);
+                self.release();
+                work
             } else {
                 return;
             };
@@ -158,25 +158,38 @@ impl Server {
         regions.into_iter().map(|region| (region, hash(region))).collect()
     }
 
-    /// Takes a stroke back in the world as it is, with all entries applied; returns the work.
+    /// Takes a stroke back in the world as it is, with all entries applied that were ordered before it; returns the work.
     fn undo(&mut self, request: &UndoRequest) -> u64 {
+        self.waiting_cost = self.waiting_cost.saturating_sub(UNDO);
         let change = self.strokes.undo(request.of, self.terrain.world()).map_err(|why| match why {
             NoUndo::Nothing => Refusal::Nothing,
             NoUndo::Touched => Refusal::Touched,
         });
         let entry = change.and_then(|change| {
             let entry = Entry::Parts { by: Some((request.by, request.own)), change: Arc::new(change) };
-            if entry_bytes(&entry) <= MOST_PARTS { Ok(entry) } else { Err(Refusal::TooLarge) }
+            let bytes = entry_bytes(&entry);
+            if bytes <= MOST_UNDO_BYTES { Ok((entry, bytes)) } else { Err(Refusal::TooLarge) }
         });
         match entry {
-            Ok(entry) => {
-                self.order(entry);
+            Ok((entry, bytes)) => {
+                let now = self.now;
+                self.players.player(request.by).cost.charge(now, bytes as u64 / UNDO_BYTES);
+                self.number(Ordered { entry, labels: (0, None), cost: 0 });
                 self.apply_some(u64::MAX)
             }
             Err(why) => {
                 self.refuse(request.by, request.own, why);
                 1
             }
+        }
+    }
+
+    /// Orders what came after an undo that is answered, up to the next one.
+    fn release(&mut self) {
+        while let Some(Later::Entry(ordered)) =
+            self.later.pop_front_if(|later| matches!(later, Later::Entry(_)))
+        {
+            self.number(ordered);
         }
     }
 }

@@ -1,125 +1,169 @@
 //! Clients that come, come back, or have another world.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
 use glam::IVec3;
 
-use super::sender::Job;
-use super::session::Stage;
+use super::sender::{Snapshot, region_bytes};
+use super::session::{Fetch, Stage};
 use super::{Server, ServerEvent};
 use crate::lattice::RegionPos;
-use crate::net::message::{ClientId, Epoch, Hello, Join, Lane, Terms, ToClient, Welcome};
+use crate::net::message::{ClientId, Epoch, Hello, Join, Kick, Lane, Terms, ToClient, Welcome};
 use crate::net::regions::regions_of;
-use crate::terrain::World;
 
-/// Regions that are encoded to tell how many bytes all of them take.
+/// Regions that are encoded to estimate how many bytes all of them take.
 const MEASURED: usize = 16;
 
-/// Regions that a client asked for.
-pub(super) struct Fetch {
-    pub client: ClientId,
-    /// The number that its world is at.
-    number: u64,
-    regions: Vec<RegionPos>,
+/// Fetches are answered so often at most: each time the world is kept as it is, and its index is copied once it changes.
+const FETCH_INTERVAL: Duration = Duration::from_millis(100);
+
+/// A client that is connected and says nothing is asked to greet this often.
+const ASK_INTERVAL: Duration = Duration::from_secs(1);
+
+/// What comes in the bulk lane after a welcome.
+enum Bulk {
+    /// These messages.
+    Messages(Vec<Arc<[u8]>>),
+    /// These regions of the world as it is.
+    Regions(Vec<RegionPos>),
 }
 
 impl Server {
-    /// Welcomes clients that have greeted, and answers fetches.
-    pub(super) fn welcome_all(&mut self) {
-        self.flush();
-        let greeted: Vec<(ClientId, Hello)> = self
-            .sessions
-            .iter_mut()
-            .filter_map(|(client, session)| match std::mem::replace(&mut session.stage, Stage::Joined) {
-                Stage::Greeted(hello) => Some((*client, hello)),
-                stage => {
-                    session.stage = stage;
-                    None
-                }
-            })
-            .collect();
-        for (client, hello) in greeted {
-            self.welcome(client, &hello);
+    /// Takes a greeting.
+    pub(super) fn greet(&mut self, client: ClientId, stream: Option<u64>, hello: Hello) {
+        let world = self.terrain.world();
+        let checks = [
+            (hello.protocol == crate::net::PROTOCOL, Kick::Protocol),
+            (hello.simulation == crate::terrain::SIMULATION, Kick::Simulation),
+            (hello.ground == world.ground().hash(), Kick::Ground),
+            (i64::from(hello.chunk_size) == i64::from(world.grid().size()), Kick::ChunkSize),
+        ];
+        if let Some((_, why)) = checks.into_iter().find(|(is_same, _)| !is_same) {
+            return self.kick_for(client, why);
         }
-        let (due, later) =
-            std::mem::take(&mut self.fetches).into_iter().partition(|fetch| fetch.number <= self.applied);
-        self.fetches = later;
-        due.into_iter().for_each(|fetch| self.answer(fetch));
+        if let Err(reason) = (self.admission)(client) {
+            return self.kick_for(client, Kick::Refused(reason));
+        }
+        let Some(session) = self.sessions.get_mut(&client) else { return };
+        let is_repeated = stream.is_some() && stream == session.stream;
+        if is_repeated && !matches!(session.stage, Stage::Connected) {
+            return;
+        }
+        session.begin(stream, hello, &self.settings);
+        // It would be dropped there.
+        self.outgoing.retain(|(to, ..)| *to != client);
     }
 
-    fn welcome(&mut self, client: ClientId, hello: &Hello) {
-        let ours = hello.epoch.filter(|epoch| epoch.world == self.epoch.world);
-        let (join, jobs) = match ours {
-            Some(epoch) if epoch.run == self.epoch.run && epoch.number <= self.epoch.number => {
-                match self.entries_after(epoch.number) {
-                    Some(log) => log,
-                    None => self.compare(client),
+    /// Welcomes clients that have greeted, asks others to greet, and answers fetches.
+    pub(super) fn welcome_all(&mut self, now: Duration) {
+        self.flush();
+        let (mut greeted, mut silent) = (Vec::new(), Vec::new());
+        for (client, session) in &mut self.sessions {
+            match std::mem::replace(&mut session.stage, Stage::Joined) {
+                Stage::Greeted(hello) if self.players.player(*client).greetings.spend(now, 1) => {
+                    greeted.push((*client, hello));
                 }
+                stage => session.stage = stage,
             }
+            if matches!(session.stage, Stage::Connected) && now.saturating_sub(session.asked) >= ASK_INTERVAL
+            {
+                session.asked = now;
+                silent.push(*client);
+            }
+        }
+        let all = greeted.iter().any(|(_, hello)| hello.epoch.is_none());
+        let all: Vec<RegionPos> =
+            if all { regions_of(self.terrain.world()).into_iter().collect() } else { Vec::new() };
+        for (client, hello) in greeted {
+            self.welcome(client, &hello, &all);
+        }
+        silent.into_iter().for_each(|client| self.send(client, &ToClient::Greet));
+        if now.saturating_sub(self.fetched) >= FETCH_INTERVAL {
+            self.answer_fetches(now);
+        }
+    }
+
+    /// `all` are the regions of the world.
+    fn welcome(&mut self, client: ClientId, hello: &Hello, all: &[RegionPos]) {
+        let (join, bulk) = match hello.epoch {
+            Some(epoch)
+                if (epoch.world, epoch.run) == (self.epoch.world, self.epoch.run)
+                    && epoch.number <= self.epoch.number =>
+            {
+                self.entries_after(epoch.number).unwrap_or_else(|| self.compare(client))
+            }
+            // Whatever it has, it needs what differs.
             Some(_) => self.compare(client),
-            // It has the pristine world, or another one.
-            None => match self.entries_after(0).filter(|_| self.is_whole && hello.epoch.is_none()) {
+            // It has the pristine world.
+            None => match self.entries_after(0).filter(|_| self.is_whole) {
                 Some(log) => log,
-                None => self.all_regions(hello.place),
+                None => self.all_regions(hello.place, all),
             },
         };
         // Old entries lead up to the last one, regions are those of the world as it is.
         let number = if matches!(join, Join::Log { .. }) { self.epoch.number } else { self.applied };
+        let now = self.now;
         let welcome = Welcome {
             client,
             epoch: Epoch { number, ..self.epoch },
             own: self.own_numbers.last(client),
             reach: self.settings.reach.map(|reach| reach.allowed()),
             cost: [self.settings.cost.per_second, self.settings.cost.burst],
+            left: self.players.player(client).cost.left(now),
             join,
         };
+        let Some(session) = self.sessions.get_mut(&client) else { return };
+        session.order = super::sender::OrderSender::new(&self.settings, number);
+        match bulk {
+            Bulk::Messages(messages) => messages.into_iter().for_each(|message| session.bulk.push(message)),
+            Bulk::Regions(regions) => {
+                session.bulk.push_regions((self.applied, self.terrain.snapshot()), &regions);
+            }
+        }
+        if let Some(stream) = session.stream {
+            let mark = ToClient::Stream { stream };
+            self.send(client, &mark);
+            self.outgoing.push((client, Lane::Bulk, mark.to_bytes()));
+        }
         self.send(client, &ToClient::Welcome(welcome));
-        for message in self.log.after(number).unwrap_or_default() {
-            self.figures.order_bytes += message.len() as u64;
-            self.outgoing.push((client, Lane::Order, message.to_vec()));
-        }
-        if let Some(session) = self.sessions.get_mut(&client) {
-            jobs.into_iter().for_each(|job| session.bulk.push(job));
-        }
         self.tell(ServerEvent::Joined(client));
     }
 
     /// The messages with all entries after a number, if they are there, and take fewer bytes than the regions that changed since.
-    fn entries_after(&self, number: u64) -> Option<(Join, Vec<Job>)> {
+    fn entries_after(&self, number: u64) -> Option<(Join, Bulk)> {
         let messages = self.log.after(number)?;
         let bytes: usize = messages.iter().map(|message| message.len()).sum();
         // A few entries are sent in any case.
         if bytes > super::FULL_MESSAGE {
             let changed = self.changed.iter().filter(|(_, at)| **at > number);
             let changed: Vec<RegionPos> = changed.map(|(region, _)| *region).collect();
-            if bytes > bytes_of(&self.terrain.snapshot(), &changed) {
+            if bytes > bytes_of(&(0, self.terrain.snapshot()), &changed) {
                 return None;
             }
         }
         let voids = self.voids.range(number.saturating_add(1)..).copied().collect();
-        Some((Join::Log { voids }, messages.into_iter().map(Job::Message).collect()))
+        Some((Join::Log { voids }, Bulk::Messages(messages)))
     }
 
     /// All regions, nearest first.
-    fn all_regions(&self, place: IVec3) -> (Join, Vec<Job>) {
-        let world = self.terrain.snapshot();
-        let mut regions: Vec<RegionPos> = regions_of(&world).into_iter().collect();
+    fn all_regions(&self, place: IVec3, all: &[RegionPos]) -> (Join, Bulk) {
+        let mut regions = all.to_vec();
         regions.sort_by_cached_key(|region| squared_distance(*region, place));
         let terms = Box::new(self.terms());
-        let jobs = jobs(&world, self.applied, &regions);
-        (Join::Regions { regions: regions.len() as u32, terms }, jobs)
+        (Join::Regions { regions: regions.len() as u32, terms }, Bulk::Regions(regions))
     }
 
     /// The table of all regions. The world stays as it is for the client, until it goes on.
-    fn compare(&mut self, client: ClientId) -> (Join, Vec<Job>) {
+    fn compare(&mut self, client: ClientId) -> (Join, Bulk) {
         let (world, number) = (self.terrain.snapshot(), self.applied);
-        let regions = self.hashes_of(regions_of(&world));
-        let table = ToClient::Table { number, regions }.to_bytes();
+        let regions: BTreeSet<RegionPos> = regions_of(&world);
+        let table = ToClient::Table { number, regions: self.hashes_of(regions) }.to_bytes();
         if let Some(session) = self.sessions.get_mut(&client) {
             session.compared = Some((number, world));
         }
-        (Join::Compare { terms: Box::new(self.terms()) }, vec![Job::Message(table.into())])
+        (Join::Compare { terms: Box::new(self.terms()) }, Bulk::Messages(vec![table.into()]))
     }
 
     fn terms(&self) -> Terms {
@@ -130,33 +174,59 @@ impl Server {
         }
     }
 
-    /// Notes that a client wants regions.
-    pub(super) fn fetch(&mut self, client: ClientId, number: u64, regions: Vec<RegionPos>) {
-        self.fetches.push(Fetch { client, number, regions });
+    /// Answers fetches, with one world for each client at a time: those of another one wait until its regions are sent.
+    fn answer_fetches(&mut self, now: Duration) {
+        let mut repaired = Vec::new();
+        for (client, session) in &mut self.sessions {
+            while let Some(Fetch { number, .. }) = session.fetches.front() {
+                let compared = session.compared.as_ref().filter(|(own, _)| own == number);
+                let is_repair = compared.is_none();
+                let snapshot = match compared {
+                    Some((number, world)) => (*number, Arc::clone(world)),
+                    None if *number <= self.applied => (self.applied, self.terrain.snapshot()),
+                    None => break,
+                };
+                if !session.bulk.takes(snapshot.0) {
+                    break;
+                }
+                let Some(fetch) = session.fetches.pop_front() else { break };
+                session.bulk.push_regions(snapshot, &fetch.regions);
+                self.fetched = now;
+                if is_repair {
+                    repaired.push((*client, fetch.regions));
+                }
+            }
+        }
+        for (client, regions) in repaired {
+            self.figures.repairs += regions.len() as u64;
+            self.tell(ServerEvent::Repaired(client, regions));
+        }
     }
 
-    /// How many regions wait to be answered.
-    pub(super) fn fetches_of(&self, client: ClientId) -> usize {
-        let own = self.fetches.iter().filter(|fetch| fetch.client == client);
-        own.map(|fetch| fetch.regions.len() + 1).sum()
-    }
-
-    fn answer(&mut self, fetch: Fetch) {
-        let Some(session) = self.sessions.get_mut(&fetch.client) else { return };
-        let compared = session.compared.as_ref().filter(|(number, _)| *number == fetch.number);
-        let is_repair = compared.is_none();
-        let (number, world) = compared.cloned().unwrap_or_else(|| (self.applied, self.terrain.snapshot()));
-        jobs(&world, number, &fetch.regions).into_iter().for_each(|job| session.bulk.push(job));
-        if is_repair {
-            self.figures.repairs += fetch.regions.len() as u64;
-            self.tell(ServerEvent::Repaired(fetch.client, fetch.regions));
+    /// Sends entries to clients that were not sent all of them, as far as they have acknowledged what came before. One for which
+    /// entries are missing has to begin again.
+    pub(super) fn catch_up(&mut self) {
+        for (client, session) in &mut self.sessions {
+            while session.has_joined() && session.order.sent() < self.epoch.number {
+                let message = match self.log.next_after(session.order.sent()) {
+                    Some((last, message)) if session.order.send(last, message.len()) => message.to_vec(),
+                    Some(_) => break,
+                    None => {
+                        (session.stage, session.asked) = (Stage::Connected, self.now);
+                        ToClient::Greet.to_bytes()
+                    }
+                };
+                self.figures.order_bytes += message.len() as u64;
+                self.outgoing.push((*client, Lane::Order, message));
+            }
         }
     }
 
     /// Sends of the bulk lanes what may be sent.
     pub(super) fn send_bulk(&mut self, now: Duration) {
         for (client, session) in &mut self.sessions {
-            while let Some(piece) = session.bulk.next_piece(now) {
+            let bucket = &mut self.players.player(*client).bulk;
+            while let Some(piece) = session.bulk.next_piece(bucket, now) {
                 let message = ToClient::Piece(piece).to_bytes();
                 self.figures.bulk_bytes += message.len() as u64;
                 self.outgoing.push((*client, Lane::Bulk, message));
@@ -165,18 +235,11 @@ impl Server {
     }
 }
 
-fn jobs(world: &Arc<World>, number: u64, regions: &[RegionPos]) -> Vec<Job> {
-    let left = (0..regions.len() as u32).rev();
-    let job =
-        |(pos, left): (&RegionPos, u32)| Job::Region { world: Arc::clone(world), number, pos: *pos, left };
-    regions.iter().zip(left).map(job).collect()
-}
-
 /// About how many bytes regions take in messages, as some of them do.
-fn bytes_of(world: &Arc<World>, regions: &[RegionPos]) -> usize {
+fn bytes_of(world: &Snapshot, regions: &[RegionPos]) -> usize {
     let step = regions.len().div_ceil(MEASURED).max(1);
     let some: Vec<RegionPos> = regions.iter().step_by(step).copied().collect();
-    let bytes: usize = jobs(world, 0, &some).iter().map(|job| job.to_bytes().len()).sum();
+    let bytes: usize = some.iter().map(|region| region_bytes(world, *region, 0).len()).sum();
     bytes * regions.len() / some.len().max(1)
 }
 

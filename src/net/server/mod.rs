@@ -4,8 +4,8 @@
 //! | file | what it does |
 //! | --- | --- |
 //! | `settings`, `events` | what it allows, what it tells and counts |
-//! | `session` | a client that is connected |
-//! | `receive`, `validation`, `bucket` | messages that come, and what is refused |
+//! | `session`, `players` | a client that is connected, what is remembered of its player |
+//! | `receive`, `validation` | messages that come, and what is refused |
 //! | `order_log` | the latest entries, in long messages |
 //! | `own_numbers` | the last numbers of players' own edits |
 //! | `apply` | entries become the world |
@@ -14,11 +14,11 @@
 //! | `save` | a server that survives a restart |
 
 mod apply;
-mod bucket;
 mod events;
 mod join;
 mod order_log;
 mod own_numbers;
+mod players;
 mod receive;
 mod save;
 mod sender;
@@ -44,11 +44,10 @@ use crate::lattice::RegionPos;
 use crate::store::{FormatError, WorldId};
 use crate::terrain::{LooseSettings, Terrain, WorldChange};
 use crate::volume::{DiggingRules, RulesError};
-pub use bucket::Rate;
 pub use events::{ServerEvent, ServerFigures};
-use join::Fetch;
 use order_log::OrderLog;
 use own_numbers::OwnNumbers;
+use players::Players;
 use session::Session;
 pub use settings::{Reach, ServerSettings, UndoPolicy};
 use strokes::Strokes;
@@ -56,11 +55,11 @@ use strokes::Strokes;
 /// Says whether a client may do an edit.
 pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
 
+/// Says whether a player may take part, or for which reason not.
+pub type Admission = Box<dyn Fn(ClientId) -> Result<(), u32> + Send + Sync>;
+
 /// The most events that wait to be taken.
 const MOST_EVENTS: usize = 4096;
-
-/// Places of clients that are not connected yet, at most.
-const MOST_EARLY_PLACES: usize = 1024;
 
 /// A message with entries is sent once it has so many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
@@ -82,11 +81,17 @@ struct Ordered {
     cost: u64,
 }
 
-/// An undo that waits until all entries before it are applied.
+/// An undo that waits until all entries before it are applied: what it restores is known only then.
 struct UndoRequest {
     by: ClientId,
     own: u64,
     of: ClientId,
+}
+
+/// What came after an undo that waits, or that undo.
+enum Later {
+    Undo(UndoRequest),
+    Entry(Ordered),
 }
 
 /// The server of a world: bytes in, bytes out.
@@ -98,6 +103,9 @@ pub struct Server {
     settings: ServerSettings,
     stamps: Stamps,
     permission: Permission,
+    admission: Admission,
+    /// The latest time.
+    now: Duration,
     /// The world, this run, and the number of the last entry.
     epoch: Epoch,
     /// The number of the last entry that is applied.
@@ -110,7 +118,8 @@ pub struct Server {
     voids: BTreeSet<u64>,
     /// Does the order lead from the pristine world to this one?
     is_whole: bool,
-    undos: VecDeque<UndoRequest>,
+    /// An undo, and all that came after it: it gets numbers once the undo has one, so an undo is of what came before it.
+    later: VecDeque<Later>,
     strokes: Strokes,
     /// Regions that were touched since the last mark.
     touched: BTreeSet<RegionPos>,
@@ -122,10 +131,10 @@ pub struct Server {
     /// The number of the last mark.
     marked: u64,
     sessions: BTreeMap<ClientId, Session>,
-    /// Places of clients that are not connected yet.
-    early_places: BTreeMap<ClientId, IVec3>,
+    players: Players,
     own_numbers: OwnNumbers,
-    fetches: Vec<Fetch>,
+    /// When fetches were answered last.
+    fetched: Duration,
     durable: u64,
     /// Revisions of a store, and the numbers that are durable with them.
     saved: VecDeque<(u64, u64)>,
@@ -170,6 +179,8 @@ impl Server {
             settings,
             stamps: Stamps::default(),
             permission: Box::new(|_, _| true),
+            admission: Box::new(|_| Ok(())),
+            now: Duration::ZERO,
             epoch: Epoch { world: id, run, number },
             applied: number,
             waiting: VecDeque::new(),
@@ -178,7 +189,7 @@ impl Server {
             log: OrderLog::new(settings.log_bytes, number),
             voids: BTreeSet::new(),
             is_whole,
-            undos: VecDeque::new(),
+            later: VecDeque::new(),
             strokes: Strokes::new(settings.undo_bytes),
             touched: BTreeSet::new(),
             changed: BTreeMap::new(),
@@ -186,9 +197,9 @@ impl Server {
             last_mark: Duration::ZERO,
             marked: number,
             sessions: BTreeMap::new(),
-            early_places: BTreeMap::new(),
+            players: Players::new(settings),
             own_numbers: OwnNumbers::default(),
-            fetches: Vec::new(),
+            fetched: Duration::ZERO,
             durable: number,
             saved: VecDeque::new(),
             saved_revision: 0,
@@ -247,18 +258,26 @@ impl Server {
         self.permission = Box::new(permission);
     }
 
-    /// Enters that a client is connected. If it was so already, it begins anew.
+    /// Sets who may take part; asked at each greeting. `Err` sends a player away with [`Kick::Refused`] and a number of the game's
+    /// own. By default everybody may. For those who are here already, see [`kick_for`](Self::kick_for).
+    pub fn set_admission(&mut self, admission: impl Fn(ClientId) -> Result<(), u32> + Send + Sync + 'static) {
+        self.admission = Box::new(admission);
+    }
+
+    /// Enters that a client is connected. If it was so already, it begins anew. What it may spend is what its player has left from
+    /// connections before.
     pub fn connect(&mut self, client: ClientId, now: Duration) {
+        self.now = self.now.max(now);
         self.disconnect(client);
-        let place = self.early_places.remove(&client);
-        self.sessions.insert(client, Session { place, ..Session::new(&self.settings, now) });
+        self.sessions.insert(client, Session::new(&self.settings, now));
+        self.players.player(client);
+        self.players.trim(|client| self.sessions.contains_key(&client));
         self.own_numbers.trim(|client| self.sessions.contains_key(&client));
     }
 
     /// Enters that a client is gone. What was to be sent to it is dropped.
     pub fn disconnect(&mut self, client: ClientId) {
         self.sessions.remove(&client);
-        self.fetches.retain(|fetch| fetch.client != client);
         self.outgoing.retain(|(to, ..)| *to != client);
     }
 
@@ -267,7 +286,8 @@ impl Server {
         self.kick_for(client, Kick::ByGame);
     }
 
-    pub(crate) fn kick_for(&mut self, client: ClientId, why: Kick) {
+    /// Sends a client away for a reason that it is told; close its connection then.
+    pub fn kick_for(&mut self, client: ClientId, why: Kick) {
         if self.sessions.remove(&client).is_some() {
             self.figures.kicked += 1;
             self.outgoing.retain(|(to, ..)| *to != client);
@@ -288,21 +308,19 @@ impl Server {
     }
 
     /// Says where a client's player is, in voxels: from there its [reach](ServerSettings::reach) counts. `None`: nowhere. It holds
-    /// for clients that are about to connect as well.
+    /// until it is set again: before the client connects, and over its connections.
     pub fn set_place(&mut self, client: ClientId, place: Option<IVec3>) {
-        match (self.sessions.get_mut(&client), place) {
-            (Some(session), place) => session.place = place,
-            (None, Some(place)) if self.early_places.len() < MOST_EARLY_PLACES => {
-                self.early_places.insert(client, place);
-            }
-            (None, _) => drop(self.early_places.remove(&client)),
+        if place.is_some() || self.players.get(client).is_some() {
+            self.players.player(client).place = place;
+            self.players.trim(|client| self.sessions.contains_key(&client));
         }
     }
 
-    /// Says whether a client may take back what others did: see [`UndoPolicy`].
+    /// Says whether a client may take back what others did: see [`UndoPolicy`]. It holds until it is set again: before the client
+    /// connects, and over its connections. It is not saved.
     pub fn set_administrator(&mut self, client: ClientId, is_one: bool) {
-        if let Some(session) = self.sessions.get_mut(&client) {
-            session.is_administrator = is_one;
+        if is_one || self.players.get(client).is_some() {
+            self.players.player(client).is_administrator = is_one;
         }
     }
 
@@ -360,9 +378,17 @@ impl Server {
     }
 
     fn enter(&mut self, ordered: Ordered) {
+        self.waiting_cost += ordered.cost;
+        if self.later.is_empty() {
+            self.number(ordered);
+        } else {
+            self.later.push_back(Later::Entry(ordered));
+        }
+    }
+
+    fn number(&mut self, ordered: Ordered) {
         self.epoch.number += 1;
         self.figures.ordered += 1;
-        self.waiting_cost += ordered.cost;
         self.writer.put(&ordered.entry);
         self.log.push(&ordered.entry);
         self.waiting.push_back(ordered);
@@ -371,12 +397,16 @@ impl Server {
         }
     }
 
-    /// Sends what was ordered.
+    /// Sends what was ordered to all clients that have everything before it, and room for it.
     fn flush(&mut self) {
-        let last = self.epoch.number;
-        let Some(message) = std::mem::take(&mut self.writer).message(last) else { return };
-        for (client, session) in &self.sessions {
-            if session.has_joined() {
+        let (last, writer) = (self.epoch.number, std::mem::take(&mut self.writer));
+        let Some(message) = writer.message(last) else { return };
+        let before = last - writer.count();
+        for (client, session) in &mut self.sessions {
+            if session.has_joined()
+                && session.order.sent() == before
+                && session.order.send(last, message.len())
+            {
                 self.figures.order_bytes += message.len() as u64;
                 self.outgoing.push((*client, Lane::Order, message.clone()));
             }
@@ -410,14 +440,16 @@ impl Server {
 
     /// Applies what was ordered, welcomes clients that have come, and sends what takes long, as much as may be sent by now.
     pub fn advance(&mut self, now: Duration) {
-        if now.saturating_sub(self.last_mark) >= self.settings.mark && self.epoch.number > self.marked {
+        self.now = self.now.max(now);
+        let is_due = now.saturating_sub(self.last_mark) >= self.settings.mark;
+        if is_due && self.epoch.number > self.marked && self.later.is_empty() {
             self.order(Entry::Mark);
             (self.last_mark, self.marked) = (now, self.epoch.number);
         }
         self.apply();
         self.log.trim(self.applied);
         self.voids = self.voids.split_off(&self.log.first());
-        self.welcome_all();
+        self.welcome_all(now);
         self.send_bulk(now);
     }
 
@@ -425,6 +457,7 @@ impl Server {
     /// order.
     pub fn take_outgoing(&mut self) -> Vec<Outgoing> {
         self.flush();
+        self.catch_up();
         std::mem::take(&mut self.outgoing)
     }
 

@@ -62,6 +62,17 @@ impl OrderLog {
         self.first
     }
 
+    /// The first of the messages [after](Self::after) a number, and the number of its last entry.
+    pub fn next_after(&self, number: u64) -> Option<(u64, Arc<[u8]>)> {
+        if self.first > number.saturating_add(1) || number >= self.last {
+            return None;
+        }
+        match self.blocks.get(self.blocks.partition_point(|block| block.last <= number)) {
+            Some(block) => Some((block.last, Arc::clone(&block.message))),
+            None => Some((self.last, pack(&self.writer.message(self.last)?).into())),
+        }
+    }
+
     /// Messages with all entries after a number, which may hold entries before it too. `None` if some are gone or to come.
     pub fn after(&self, number: u64) -> Option<Vec<Arc<[u8]>>> {
         if self.first > number.saturating_add(1) || number > self.last {
@@ -118,6 +129,12 @@ mod tests {
         assert!(log.blocks.len() > 3);
         for number in [7, 8, 5000, 20_006, 20_007] {
             assert_eq!(numbers(&log, number), Some((number + 1..=20_007).collect()), "{number}");
+            let (mut at, mut messages) = (number, Vec::new());
+            while let Some((last, message)) = log.next_after(at) {
+                messages.push(message);
+                at = last;
+            }
+            assert_eq!((at, Some(messages)), (20_007, log.after(number)));
         }
         assert_eq!((numbers(&log, 6), numbers(&log, 20_008), numbers(&log, u64::MAX)), (None, None, None));
     }

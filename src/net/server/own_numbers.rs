@@ -2,14 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::net::message::ClientId;
+use super::save::RESERVED;
+use crate::net::message::{ClientId, MOST_OWN_JUMP};
 use crate::store::Store;
 
-/// The beginning of keys under which a store keeps the number of the last edit of a player that its world holds.
-const KEY: &str = "net/own/";
+/// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its world holds.
+const KEY: &str = "own/";
 
 /// Players whose numbers are remembered, at most, beside those that are connected.
 const MOST_SEEN: usize = 1 << 16;
+
+/// No player has numbers beyond this one, so that counting on can never overflow.
+const MOST_OWN: u64 = u64::MAX / 2;
 
 /// Players whose numbers are saved, at most: those who dug last.
 const MOST_SAVED: usize = 1024;
@@ -23,10 +27,29 @@ struct Applied {
     number: u64,
 }
 
+/// What a number of a player's is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OwnNumber {
+    New,
+    /// It was seen before.
+    Old,
+    /// No honest client has it.
+    Impossible,
+}
+
+/// The last number that was seen.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    own: u64,
+    /// Counts the uses of all players.
+    used: u64,
+}
+
 /// The last numbers of all players' edits.
 #[derive(Default)]
 pub struct OwnNumbers {
-    seen: BTreeMap<ClientId, u64>,
+    seen: BTreeMap<ClientId, Seen>,
+    uses: u64,
     applied: BTreeMap<ClientId, Applied>,
     /// Players whose last edit that is applied is another than the one that is saved.
     changed: BTreeSet<ClientId>,
@@ -35,22 +58,39 @@ pub struct OwnNumbers {
 impl OwnNumbers {
     /// The last number that was seen.
     pub fn last(&self, client: ClientId) -> u64 {
-        self.seen.get(&client).copied().unwrap_or_default()
+        self.seen.get(&client).map_or(0, |seen| seen.own)
     }
 
-    /// Notes a number that came. Was it not seen before?
-    pub fn is_new(&mut self, client: ClientId, own: u64) -> bool {
-        let last = self.seen.entry(client).or_default();
-        let is_new = own > *last;
-        *last = own.max(*last);
-        is_new
-    }
-
-    /// Forgets most players, where there are too many; `is_kept` tells which ones stay.
-    pub fn trim(&mut self, is_kept: impl Fn(ClientId) -> bool) {
-        if self.seen.len() > MOST_SEEN {
-            self.seen.retain(|client, _| is_kept(*client));
+    /// What a number is that came.
+    pub fn judge(&self, client: ClientId, own: u64) -> OwnNumber {
+        let last = self.last(client);
+        if own == 0 || own > last.saturating_add(MOST_OWN_JUMP).min(MOST_OWN) {
+            OwnNumber::Impossible
+        } else if own > last {
+            OwnNumber::New
+        } else {
+            OwnNumber::Old
         }
+    }
+
+    /// Notes that a number was seen.
+    pub fn note(&mut self, client: ClientId, own: u64) {
+        self.uses += 1;
+        let seen = self.seen.entry(client).or_default();
+        *seen = Seen { own: own.max(seen.own), used: self.uses };
+    }
+
+    /// Forgets those who sent nothing for the longest time, where there are too many; `is_kept` tells who stays in any case.
+    pub fn trim(&mut self, is_kept: impl Fn(ClientId) -> bool) {
+        if self.seen.len() <= MOST_SEEN {
+            return;
+        }
+        let away = self.seen.iter().filter(|(client, _)| !is_kept(**client));
+        let mut uses: Vec<u64> = away.map(|(_, seen)| seen.used).collect();
+        uses.sort_unstable();
+        // Half of them at once, so that this is rare.
+        let Some(&oldest) = uses.get(uses.len() / 2) else { return };
+        self.seen.retain(|client, seen| seen.used >= oldest || is_kept(*client));
     }
 
     /// Notes that an edit of a player's is applied.
@@ -72,7 +112,7 @@ impl OwnNumbers {
     /// Hands over to a store what it does not have yet.
     pub fn save(&mut self, store: &mut Store) {
         for client in std::mem::take(&mut self.changed) {
-            let key = format!("{KEY}{}", client.0);
+            let key = format!("{RESERVED}{KEY}{}", client.0);
             match self.applied.get(&client) {
                 Some(Applied { own, number }) => {
                     store.put(key, [own.to_le_bytes(), number.to_le_bytes()].concat());
@@ -85,15 +125,19 @@ impl OwnNumbers {
     /// What a store has.
     pub fn open(store: &Store) -> Self {
         let mut numbers = Self::default();
-        for (key, bytes) in store.game_data().range(KEY.to_owned()..) {
-            let Some(id) = key.strip_prefix(KEY) else { break };
+        let prefix = format!("{}{KEY}", super::save::prefix(store));
+        for (key, bytes) in store.game_data().range(prefix.clone()..) {
+            let Some(id) = key.strip_prefix(&prefix) else { break };
             if let Ok(id) = id.parse()
                 && let Some((own, number)) = bytes.split_first_chunk()
                 && let Ok(number) = number.try_into()
             {
                 let [own, number] = [*own, number].map(u64::from_le_bytes);
-                numbers.seen.insert(ClientId(id), own);
-                numbers.applied.insert(ClientId(id), Applied { own, number });
+                // One beyond the limit was never an honest player's.
+                if own <= MOST_OWN {
+                    numbers.note(ClientId(id), own);
+                    numbers.applied.insert(ClientId(id), Applied { own, number });
+                }
             }
         }
         numbers
@@ -124,10 +168,13 @@ mod tests {
         numbers.apply(ClientId(5000), 3, most + 2);
         numbers.apply(ClientId::SERVER, 4, most + 3);
         numbers.save(&mut store);
-        store.put("net/owner", [0; 16]);
-        store.put("net/own/nobody", [0; 16]);
-        store.put("net/own/6000", [0; 15]);
-        store.put("net/own/6001", [0; 17]);
+        let key = |id: &str| format!("{RESERVED}own{id}");
+        store.put(key("er"), [0; 16]);
+        store.put(key("/nobody"), [0; 16]);
+        store.put(key("/6000"), [0; 15]);
+        store.put(key("/6001"), [0; 17]);
+        store.put(key("/6002"), [255; 16]);
+        store.put(format!("{RESERVED}number"), [0; 8]);
         let again = OwnNumbers::open(&store);
         assert_eq!(again.seen.len(), MOST_SAVED);
         for (id, own) in [(1, 77), (2, 0), (3, 30), (most, 10 * most), (5000, 3), (6000, 0), (u64::MAX, 0)] {
@@ -136,11 +183,44 @@ mod tests {
     }
 
     #[test]
-    fn what_came_is_not_new_again() {
+    fn what_came_is_not_new_again_and_nothing_jumps_far() {
+        use OwnNumber::{Impossible, New, Old};
         let mut numbers = OwnNumbers::default();
-        let came = [(1, 1), (1, 1), (2, 1), (1, 5), (1, 3), (1, 6)];
-        let is_new = came.map(|(id, own)| numbers.is_new(ClientId(id), own));
-        assert_eq!(is_new, [true, false, true, true, false, true]);
-        assert_eq!([1, 2, 3].map(|id| numbers.last(ClientId(id))), [6, 1, 0]);
+        let far = 6 + MOST_OWN_JUMP;
+        for (id, own, expected) in [
+            (1, 0, Impossible),
+            (1, 1, New),
+            (1, 1, Old),
+            (2, 1, New),
+            (1, 5, New),
+            (1, 3, Old),
+            (1, 6, New),
+            (1, far + 1, Impossible),
+            (1, u64::MAX, Impossible),
+            (1, far, New),
+            (3, MOST_OWN_JUMP + 1, Impossible),
+        ] {
+            assert_eq!(numbers.judge(ClientId(id), own), expected, "{id} {own}");
+            if expected == New {
+                numbers.note(ClientId(id), own);
+            }
+        }
+        assert_eq!([1, 2, 3].map(|id| numbers.last(ClientId(id))), [far, 1, 0]);
+        numbers.note(ClientId(4), MOST_OWN);
+        assert_eq!(numbers.judge(ClientId(4), MOST_OWN + 1), Impossible);
+    }
+
+    #[test]
+    fn the_table_is_bounded_and_keeps_who_was_there_last() {
+        let mut numbers = OwnNumbers::default();
+        let most = 2 * MOST_SEEN as u64;
+        for id in 1..=most {
+            numbers.note(ClientId(id), 9);
+            if id % 1024 == 0 {
+                numbers.trim(|client| client == ClientId(1));
+            }
+        }
+        assert!(numbers.seen.len() <= MOST_SEEN + 1024);
+        assert_eq!([1, 2, most].map(|id| numbers.last(ClientId(id))), [9, 0, 9]);
     }
 }

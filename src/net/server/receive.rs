@@ -2,30 +2,32 @@
 
 use std::time::Duration;
 
-use super::session::Stage;
-use super::validation::{UNDO, cost};
-use super::{Server, UndoRequest};
+use super::own_numbers::OwnNumber;
+use super::session::Fetch;
+use super::{Later, Server, UndoRequest};
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
-use crate::net::message::{ClientId, Hello, Kick, PROTOCOL, Refusal, ToClient, ToServer};
+use crate::net::message::{ClientId, Kick, MOST_REGIONS, MOST_TO_CLIENT, Refusal, ToClient, ToServer};
+use crate::net::price::{UNDO, cost};
+use crate::net::stamps::StampId;
 use crate::store::format::bricks::is_possible;
-use crate::terrain::SIMULATION;
 
-/// What beginning costs, as flooding is counted: regions are listed, or hashed.
-const HELLO: u64 = 4000;
+/// What a greeting costs, as flooding is counted. So many as are [answered](super::players) a second cost more work than that.
+const HELLO: u64 = 200;
 /// What each region costs that is fetched.
 const REGION: u64 = 1;
 /// Bytes of a message that cost 1.
 const BYTES: u64 = 64;
 
-/// Most undos that wait.
-const MOST_UNDOS: usize = 256;
 /// Most messages and regions that wait in a client's bulk lane before it may fetch more.
-const MOST_JOBS: usize = 2 * crate::net::message::MOST_REGIONS;
+const MOST_JOBS: usize = 2 * MOST_REGIONS;
+/// Most bytes of an image that is sent.
+const MOST_IMAGE: usize = MOST_TO_CLIENT / 2;
 
 impl Server {
     /// Takes a message of a client's. Whatever its bytes are, it is answered, or counted as invalid.
     pub fn receive(&mut self, client: ClientId, bytes: &[u8], now: Duration) {
+        self.now = self.now.max(now);
         self.figures.messages += 1;
         if !self.sessions.contains_key(&client) {
             self.figures.strays += 1;
@@ -34,67 +36,88 @@ impl Server {
         if !self.may_go_on(client, 1 + bytes.len() as u64 / BYTES, now) {
             return;
         }
-        let is_valid = match ToServer::from_bytes(bytes, &self.stamps) {
-            Ok(ToServer::Hello(hello)) => self.greet(client, hello, now),
-            Ok(ToServer::Edits { first, edits }) => self.receive_edits(client, first, edits, now),
-            Ok(ToServer::Undo { own, of }) => self.receive_undo(client, own, of, now),
-            Ok(ToServer::Fetch { number, regions }) => self.receive_fetch(client, number, regions, now),
-            Ok(ToServer::Ack { bulk, number }) => self.receive_ack(client, bulk, number),
+        let is_valid = match ToServer::read(bytes, &self.stamps) {
+            Ok((ToServer::Hello(hello), _)) if self.may_go_on(client, HELLO, now) => {
+                self.greet(client, None, hello);
+                true
+            }
+            Ok((ToServer::Greeting { stream, hello }, _)) if self.may_go_on(client, HELLO, now) => {
+                self.greet(client, Some(stream), hello);
+                true
+            }
+            Ok((ToServer::Hello(_) | ToServer::Greeting { .. }, _)) => true,
+            Ok((ToServer::Edits { first, edits }, unknown)) => {
+                self.receive_edits(client, first, edits, &unknown, now)
+            }
+            Ok((ToServer::Undo { own, of }, _)) => self.receive_undo(client, own, of, now),
+            Ok((message, _)) => {
+                // What comes of an earlier stream means nothing.
+                let has_joined = self.sessions.get(&client).is_some_and(|session| session.has_joined());
+                !has_joined || self.receive_joined(client, message, now)
+            }
             Err(_) => false,
         };
         if !is_valid {
             self.figures.malformed += 1;
-            let session = self.sessions.get_mut(&client);
-            if session.is_some_and(|session| !session.malformed.spend(now, 1)) {
+            if self.sessions.contains_key(&client) && !self.players.player(client).malformed.spend(now, 1) {
                 self.kick_for(client, Kick::Malformed);
             }
         }
     }
 
+    /// Takes a message that only clients send that have joined.
+    fn receive_joined(&mut self, client: ClientId, message: ToServer, now: Duration) -> bool {
+        match message {
+            ToServer::Fetch { number, regions } => self.receive_fetch(client, number, regions, now),
+            ToServer::Ack { bulk, number } => self.receive_ack(client, bulk, number),
+            ToServer::Images { images } => self.receive_images(client, images),
+            _ => false,
+        }
+    }
+
     /// Counts what messages cost, and kicks a client that floods.
     fn may_go_on(&mut self, client: ClientId, cost: u64, now: Duration) -> bool {
-        let session = self.sessions.get_mut(&client);
-        let may = session.is_some_and(|session| session.flood.spend(now, cost));
+        let may = self.players.player(client).flood.spend(now, cost);
         if !may {
             self.kick_for(client, Kick::Flood);
         }
         may
     }
 
-    fn greet(&mut self, client: ClientId, hello: Hello, now: Duration) -> bool {
-        let world = self.terrain.world();
-        let checks = [
-            (hello.protocol == PROTOCOL, Kick::Protocol),
-            (hello.simulation == SIMULATION, Kick::Simulation),
-            (hello.ground == world.ground().hash(), Kick::Ground),
-            (i64::from(hello.chunk_size) == i64::from(world.grid().size()), Kick::ChunkSize),
-        ];
-        if let Some((_, why)) = checks.into_iter().find(|(is_same, _)| !is_same) {
-            self.kick_for(client, why);
-        } else if self.may_go_on(client, HELLO, now)
-            && let Some(session) = self.sessions.get_mut(&client)
-        {
-            session.stage = Stage::Greeted(hello);
-            session.bulk.cancel();
-            session.compared = None;
-        }
-        true
-    }
-
-    fn receive_edits(&mut self, client: ClientId, first: u64, edits: Vec<Edit>, now: Duration) -> bool {
-        if first == 0 || first.checked_add(edits.len() as u64).is_none() {
+    /// `unknown` are the places of edits whose stamps have images that are not here.
+    fn receive_edits(
+        &mut self,
+        client: ClientId,
+        first: u64,
+        edits: Vec<Edit>,
+        unknown: &[usize],
+        now: Duration,
+    ) -> bool {
+        if self.own_numbers.judge(client, first) == OwnNumber::Impossible {
             return false;
         }
-        for (own, edit) in (first..).zip(edits) {
+        for (place, edit) in edits.into_iter().enumerate() {
+            let own = first + place as u64;
             self.figures.edits += 1;
-            if !self.own_numbers.is_new(client, own) {
+            if !self.sessions.get(&client).is_some_and(|session| session.has_joined()) {
+                // It counts as not seen: the client may send it again once it has joined.
+                self.refuse(client, own, Refusal::NotJoined);
                 continue;
+            }
+            match self.own_numbers.judge(client, own) {
+                OwnNumber::New => self.own_numbers.note(client, own),
+                OwnNumber::Old => continue,
+                OwnNumber::Impossible => return false,
             }
             // One that is too large is refused, however often it comes: that is no flood.
             let cost = cost(self.terrain.world().grid(), &edit).unwrap_or_default();
             let counted = cost.min(self.settings.cost.burst / 16);
             if !self.may_go_on(client, counted, now) {
                 return true;
+            }
+            if unknown.contains(&place) {
+                self.refuse(client, own, Refusal::UnknownStamp);
+                continue;
             }
             match self.validate(client, &edit, now) {
                 Ok(cost) => self.order_edit(client, own, edit, cost),
@@ -105,16 +128,24 @@ impl Server {
     }
 
     fn receive_undo(&mut self, client: ClientId, own: u64, of: ClientId, now: Duration) -> bool {
-        if own == 0 {
-            return false;
+        match self.own_numbers.judge(client, own) {
+            OwnNumber::Impossible => return false,
+            OwnNumber::Old => return true,
+            OwnNumber::New => {}
         }
-        if !self.own_numbers.is_new(client, own) || !self.may_go_on(client, UNDO, now) {
+        if !self.sessions.get(&client).is_some_and(|session| session.has_joined()) {
+            self.refuse(client, own, Refusal::NotJoined);
             return true;
         }
-        let is_full = self.undos.len() >= MOST_UNDOS;
+        self.own_numbers.note(client, own);
+        if !self.may_go_on(client, UNDO, now) {
+            return true;
+        }
         match self.validate_undo(client, of, now) {
-            Ok(()) if is_full => self.refuse(client, own, Refusal::Overloaded),
-            Ok(()) => self.undos.push_back(UndoRequest { by: client, own, of }),
+            Ok(()) => {
+                self.waiting_cost += UNDO;
+                self.later.push_back(Later::Undo(UndoRequest { by: client, own, of }));
+            }
             Err(why) => self.refuse(client, own, why),
         }
         true
@@ -128,24 +159,40 @@ impl Server {
         now: Duration,
     ) -> bool {
         let Some(session) = self.sessions.get(&client) else { return true };
-        let waiting = session.bulk.waiting().saturating_add(self.fetches_of(client));
-        let is_valid = session.has_joined()
-            && number <= self.epoch.number
-            && waiting.saturating_add(regions.len()) <= MOST_JOBS
+        let is_valid = number <= self.epoch.number
+            && session.regions_waiting().saturating_add(regions.len()) <= MOST_JOBS
             && regions.iter().all(|region| is_possible(*region));
-        if is_valid && self.may_go_on(client, REGION * regions.len() as u64, now) {
-            self.fetch(client, number, regions);
+        if is_valid
+            && self.may_go_on(client, REGION * regions.len() as u64, now)
+            && let Some(session) = self.sessions.get_mut(&client)
+        {
+            session.fetches.push_back(Fetch { number, regions });
         }
         is_valid
     }
 
     fn receive_ack(&mut self, client: ClientId, bulk: u64, number: u64) -> bool {
         let Some(session) = self.sessions.get_mut(&client) else { return true };
-        if !session.has_joined() || number > self.epoch.number || !session.bulk.acknowledge(bulk) {
+        if number > self.epoch.number || !session.bulk.acknowledge(bulk) {
             return false;
         }
         session.acknowledged = number;
+        session.order.acknowledge(number);
         session.compared.take_if(|(compared, _)| number > *compared);
+        true
+    }
+
+    /// Sends images that a client lacks, each once.
+    fn receive_images(&mut self, client: ClientId, images: Vec<StampId>) -> bool {
+        for id in images {
+            let Some(image) = self.stamps.get(id) else { return false };
+            let Some(session) = self.sessions.get_mut(&client) else { return true };
+            if size_of_val(image.samples()) > MOST_IMAGE {
+                self.kick_for(client, Kick::Stamp);
+            } else if session.images.insert(id) {
+                session.bulk.push_image(std::sync::Arc::clone(image));
+            }
+        }
         true
     }
 

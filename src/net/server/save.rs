@@ -5,15 +5,29 @@ use super::{Server, ServerSettings, ToClient};
 use crate::store::{Store, StoreError};
 use crate::terrain::Terrain;
 
-/// The key under which a store keeps the number of the last entry that its world holds.
-const NUMBER: &str = "net/number";
+/// The beginning of the keys that a server has in a store beside the game's data. No key that a person would write begins so.
+pub const RESERVED: &str = "\u{1}bevy_burrow/net/";
+
+/// The beginning of the keys that servers had before.
+const FORMER: &str = "net/";
+
+/// Below these, the key under which a store keeps the number of the last entry that its world holds.
+const NUMBER: &str = "number";
+
+/// The beginning of a server's keys in a store. Where a server of now has saved, what has former keys is the game's.
+pub fn prefix(store: &Store) -> &'static str {
+    if store.get(&format!("{RESERVED}{NUMBER}")).is_some() { RESERVED } else { FORMER }
+}
 
 impl Server {
     /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or one that a store
     /// was created of. What its clients send again that the world holds already is not done twice: the last numbers of the 1024
     /// players who dug last are saved with it.
     pub fn open(terrain: Terrain, store: &Store, settings: ServerSettings) -> Self {
-        let number = store.get(NUMBER).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);
+        let number = store
+            .get(&format!("{}{NUMBER}", prefix(store)))
+            .and_then(|bytes| bytes.try_into().ok())
+            .map(u64::from_le_bytes);
         // Numbers near the end of their range were never given.
         let number = number.filter(|number| *number < u64::MAX / 2).unwrap_or_default();
         let server = Self::at(terrain, store.world_id(), number, settings);
@@ -29,7 +43,7 @@ impl Server {
     /// When the store's thread has ended.
     pub fn save(&mut self, store: &mut Store) -> Result<(), StoreError> {
         if self.saved_number != self.applied {
-            store.put(NUMBER, self.applied.to_le_bytes());
+            store.put(format!("{RESERVED}{NUMBER}"), self.applied.to_le_bytes());
             self.own_numbers.save(store);
             store.follow(&mut self.terrain)?;
             self.saved_number = self.applied;

@@ -1,111 +1,184 @@
-//! The bulk lane of a client: so many bytes a second, and never more on their way than the window.
+//! What is sent to a client, and what waits until it has acknowledged what came before.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::bucket::Bucket;
 use super::settings::ServerSettings;
+use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
+use crate::net::bucket::Bucket;
 use crate::net::bulk::put_message;
 use crate::net::message::{RegionContent, ToClient};
 use crate::net::regions::chunks_of;
 use crate::terrain::World;
 
-/// What is to be sent.
-pub enum Job {
-    /// A message in bytes.
-    Message(Arc<[u8]>),
-    /// A region of a world at a number, with so many others to follow. It is made into bytes when its turn comes.
-    Region { world: Arc<World>, number: u64, pos: RegionPos, left: u32 },
+/// Entries on their way to a client in the order lane: never more bytes than the window, or one message.
+pub struct OrderSender {
+    /// The number of the last entry that was sent.
+    sent: u64,
+    /// Messages that are not acknowledged: the numbers of their last entries, and their bytes.
+    on_the_way: VecDeque<(u64, u64)>,
+    bytes: u64,
+    window: u64,
 }
 
-impl Job {
-    pub fn to_bytes(&self) -> Arc<[u8]> {
-        match self {
-            Self::Message(bytes) => Arc::clone(bytes),
-            Self::Region { world, number, pos, left } => {
-                let content = content(world, *number, *pos, *left);
-                ToClient::Region(content).to_bytes().into()
-            }
+impl OrderSender {
+    /// For a client that starts from this number.
+    pub fn new(settings: &ServerSettings, number: u64) -> Self {
+        Self { sent: number, on_the_way: VecDeque::new(), bytes: 0, window: settings.window }
+    }
+
+    /// The number of the last entry that was sent.
+    pub fn sent(&self) -> u64 {
+        self.sent
+    }
+
+    /// Notes that a message with entries up to a number is sent, if there is room for it. Returns `true` if there is.
+    pub fn send(&mut self, last: u64, bytes: usize) -> bool {
+        let bytes = bytes as u64;
+        let has_room = self.on_the_way.is_empty() || self.bytes.saturating_add(bytes) <= self.window;
+        if has_room {
+            self.sent = last;
+            self.bytes += bytes;
+            self.on_the_way.push_back((last, bytes));
+        }
+        has_room
+    }
+
+    /// Notes that the client has applied all entries up to a number.
+    pub fn acknowledge(&mut self, number: u64) {
+        while let Some((_, bytes)) = self.on_the_way.pop_front_if(|(last, _)| *last <= number) {
+            self.bytes -= bytes;
         }
     }
 }
 
-/// A region of a world.
-fn content(world: &World, number: u64, pos: RegionPos, left: u32) -> RegionContent {
+/// What is to be sent in the bulk lane.
+pub enum Job {
+    /// A message in bytes.
+    Message(Arc<[u8]>),
+    /// An image.
+    Image(Arc<GreyImage>),
+    /// A region of the lane's world, with so many others to follow. It is made into bytes when its turn comes.
+    Region { pos: RegionPos, left: u32 },
+}
+
+/// A world at a number.
+pub type Snapshot = (u64, Arc<World>);
+
+/// A region of a world in a message.
+pub fn region_bytes((number, world): &Snapshot, pos: RegionPos, left: u32) -> Vec<u8> {
     let bricks = world.bricks_in(pos).map(|(at, brick)| (at, Arc::clone(brick))).collect();
     let chunks = chunks_of(world.grid(), pos);
     let fields = chunks.filter_map(|chunk| Some((chunk, world.fields_of(chunk)?.clone()))).collect();
-    RegionContent { number, pos, left, next_field: world.next_field(), bricks, fields }
+    let next_field = world.next_field();
+    ToClient::Region(RegionContent { number: *number, pos, left, next_field, bricks, fields }).to_bytes()
 }
 
-/// What waits for one client.
+/// The bulk lane of a client: so many bytes a second, and never more on their way than the window.
 pub struct BulkSender {
     jobs: VecDeque<Job>,
+    /// Regions among these.
+    regions: usize,
+    /// The world of all regions that wait. There is one, as each takes as much memory as what has changed since.
+    world: Option<Snapshot>,
     /// Bytes of the stream that were not sent yet, from `at` on.
     stream: Vec<u8>,
     at: usize,
     sent: u64,
     acknowledged: u64,
-    bucket: Bucket,
     window: u64,
     piece: usize,
 }
 
 impl BulkSender {
-    pub fn new(settings: &ServerSettings, now: Duration) -> Self {
+    pub fn new(settings: &ServerSettings) -> Self {
         Self {
             jobs: VecDeque::new(),
+            regions: 0,
+            world: None,
             stream: Vec::new(),
             at: 0,
             sent: 0,
             acknowledged: 0,
-            bucket: Bucket::new(settings.bulk, now),
             window: settings.window,
             piece: (settings.piece as u64).min(settings.bulk.burst).min(settings.window).max(1) as usize,
         }
     }
 
-    pub fn push(&mut self, job: Job) {
-        self.jobs.push_back(job);
+    /// Adds a message after all others.
+    pub fn push(&mut self, message: Arc<[u8]>) {
+        self.jobs.push_back(Job::Message(message));
     }
 
-    /// Jobs that wait.
+    /// Adds an image before all others that were not begun: entries that have come wait for it.
+    pub fn push_image(&mut self, image: Arc<GreyImage>) {
+        self.jobs.push_front(Job::Image(image));
+    }
+
+    /// Whether regions of this world can be added: of another one only where no regions wait.
+    pub fn takes(&self, number: u64) -> bool {
+        self.world.as_ref().is_none_or(|(other, _)| *other == number)
+    }
+
+    /// Adds regions of a world that the lane [takes](Self::takes).
+    pub fn push_regions(&mut self, world: Snapshot, regions: &[RegionPos]) {
+        if regions.is_empty() || !self.takes(world.0) {
+            return;
+        }
+        let left = (0..regions.len() as u32).rev();
+        self.jobs.extend(regions.iter().zip(left).map(|(pos, left)| Job::Region { pos: *pos, left }));
+        self.regions += regions.len();
+        self.world = Some(world);
+    }
+
+    /// Messages and regions that wait.
     pub fn waiting(&self) -> usize {
         self.jobs.len()
     }
 
-    /// Forgets what was not begun.
-    pub fn cancel(&mut self) {
-        self.jobs.clear();
-    }
-
-    /// Notes that so many bytes have come. Is that possible?
+    /// Notes that so many bytes have come. Returns `false` if that is impossible.
     pub fn acknowledge(&mut self, bytes: u64) -> bool {
         self.acknowledged = self.acknowledged.max(bytes.min(self.sent));
         bytes <= self.sent
     }
 
     /// The next piece that may be sent.
-    pub fn next_piece(&mut self, now: Duration) -> Option<Vec<u8>> {
+    pub fn next_piece(&mut self, bucket: &mut Bucket, now: Duration) -> Option<Vec<u8>> {
         if self.at == self.stream.len() {
+            let message = self.next_message()?;
             self.stream.clear();
             self.at = 0;
-            put_message(&mut self.stream, &self.jobs.pop_front()?.to_bytes());
+            put_message(&mut self.stream, &message);
         }
         let rest = self.stream.get(self.at..)?;
         let on_the_way = self.sent - self.acknowledged;
-        let room = self.window.saturating_sub(on_the_way).min(self.bucket.left(now));
+        let room = self.window.saturating_sub(on_the_way).min(bucket.left(now));
         let whole = rest.len().min(self.piece);
         // A crumb is not worth a message.
         let is_worth_it = room >= whole as u64;
-        if !is_worth_it || !self.bucket.spend(now, whole as u64) {
+        if !is_worth_it || !bucket.spend(now, whole as u64) {
             return None;
         }
         let piece = rest.get(..whole)?.to_vec();
         self.at += whole;
         self.sent += whole as u64;
         Some(piece)
+    }
+
+    fn next_message(&mut self) -> Option<Arc<[u8]>> {
+        match self.jobs.pop_front()? {
+            Job::Message(bytes) => Some(bytes),
+            Job::Image(image) => Some(ToClient::Image(image).to_bytes().into()),
+            Job::Region { pos, left } => {
+                let bytes = region_bytes(self.world.as_ref()?, pos, left).into();
+                self.regions -= 1;
+                if self.regions == 0 {
+                    self.world = None;
+                }
+                Some(bytes)
+            }
+        }
     }
 }

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::bucket::Rate;
+use crate::net::bucket::Rate;
 
-/// How far from its player a client may dig, measured to the middle of the edit. A player that moves is where the server knows it
+/// How far from its player a client may dig: all of the edit's shape has to be so near, to the voxel. A player that moves is where the server knows it
 /// to be, or as far from there as it comes in the latency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reach {
@@ -58,7 +58,7 @@ pub struct ServerSettings {
     pub log_bytes: usize,
     /// Bytes of the bulk lane for each client.
     pub bulk: Rate,
-    /// Bytes of the bulk lane that a client may not have acknowledged.
+    /// Bytes of each lane that a client may not have acknowledged. In the order lane, one message is sent in any case.
     pub window: u64,
     /// Most bytes of a piece of the bulk lane.
     pub piece: usize,

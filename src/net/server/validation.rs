@@ -2,54 +2,53 @@
 
 use std::time::Duration;
 
-use glam::IVec3;
+use glam::{I64Vec3, IVec3};
 
 use super::{Server, UndoPolicy};
-use crate::brush::Edit;
-use crate::edits::reach;
-use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
+use crate::brush::{Edit, Shape};
 use crate::net::message::{ClientId, Refusal};
+use crate::net::price::{UNDO, cost};
 
-/// What every edit costs.
-const EDIT: u64 = 20;
-/// How many times as much a brick costs for an edit that sculpts.
-const SCULPTED: u64 = 4;
-/// What an undo costs.
-pub(super) const UNDO: u64 = 200;
+/// Samples beyond a shape that its edit may change.
+const BAND_VOXELS: i64 = 2;
 
-/// What an edit costs: see [`ServerSettings::cost`](super::ServerSettings::cost). `None` for one that reaches nothing of the world.
-pub fn cost(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
-    let weight = if edit.blend().is_some() { SCULPTED } else { 1 };
-    let bricks = BrickPos::range(reach(grid, edit)?).volume();
-    Some(EDIT + weight * bricks)
+/// Whether all of an edit's shape, with its roughness, lies within a distance of a place.
+fn is_within(place: IVec3, edit: &Edit, allowed: u32) -> bool {
+    let samples = edit.reach();
+    // Its reach is what its shape and its roughness take up, and the band around them.
+    let middle = (samples.min.as_i64vec3() + samples.max.as_i64vec3()).div_euclid(I64Vec3::splat(2));
+    let min = (samples.min.as_i64vec3() + BAND_VOXELS).min(middle);
+    let max = (samples.max.as_i64vec3() - BAND_VOXELS).max(middle);
+    let place = place.as_i64vec3();
+    if let Shape::Sphere(_) = edit.shape() {
+        // In half voxels, with one voxel for rounding.
+        let way = min + max - 2 * place;
+        let radius = (max - min).max_element().unsigned_abs();
+        let left = (2 * (u64::from(allowed) + 1)).checked_sub(radius);
+        return left.is_some_and(|left| squared_length(way) <= u128::from(left).pow(2));
+    }
+    let farthest = (min - place).abs().max((max - place).abs());
+    squared_length(farthest) <= u128::from(u64::from(allowed) + 1).pow(2)
 }
 
-/// May an edit with this reach be done from there?
-fn is_near(place: IVec3, samples: LatticeBox, allowed: u32) -> bool {
-    let (min, max) = (samples.min.as_i64vec3(), samples.max.as_i64vec3());
-    // In half voxels.
-    let way = min + max - 2 * place.as_i64vec3();
-    let squared = |way: i64| u128::from(way.unsigned_abs()).pow(2);
-    way.to_array().into_iter().map(squared).sum::<u128>() <= (2 * u128::from(allowed)).pow(2)
+fn squared_length(way: I64Vec3) -> u128 {
+    way.to_array().into_iter().map(|way| u128::from(way.unsigned_abs()).pow(2)).sum()
 }
 
 impl Server {
     /// Checks an edit, and takes its cost out of the client's bucket; returns the cost.
     pub(super) fn validate(&mut self, client: ClientId, edit: &Edit, now: Duration) -> Result<u64, Refusal> {
-        let session = self.sessions.get_mut(&client).ok_or(Refusal::NotJoined)?;
-        if !session.has_joined() {
-            return Err(Refusal::NotJoined);
-        }
         let cost = cost(self.terrain.world().grid(), edit).ok_or(Refusal::OutsideWorld)?;
+        let player = self.players.player(client);
         if let Some(reach) = self.settings.reach
-            && !session.place.is_some_and(|place| is_near(place, edit.reach(), reach.allowed()))
+            && !player.place.is_some_and(|place| is_within(place, edit, reach.allowed()))
         {
             return Err(Refusal::TooFar);
         }
         if self.waiting_cost.saturating_add(cost) > self.settings.waiting {
             return Err(Refusal::Overloaded);
         }
-        if !session.cost.spend(now, cost) {
+        if !player.cost.spend(now, cost) {
             return Err(Refusal::Cost);
         }
         if !(self.permission)(client, edit) {
@@ -65,40 +64,55 @@ impl Server {
         of: ClientId,
         now: Duration,
     ) -> Result<(), Refusal> {
-        let session = self.sessions.get_mut(&client).ok_or(Refusal::NotJoined)?;
-        if !session.has_joined() {
-            return Err(Refusal::NotJoined);
-        }
+        let player = self.players.player(client);
         let is_allowed = match self.settings.undo {
             UndoPolicy::Nobody => false,
-            UndoPolicy::Administrators => session.is_administrator,
-            UndoPolicy::Own => session.is_administrator || of == client,
+            UndoPolicy::Administrators => player.is_administrator,
+            UndoPolicy::Own => player.is_administrator || of == client,
         };
         if !is_allowed {
             return Err(Refusal::Forbidden);
         }
-        if session.cost.spend(now, UNDO) { Ok(()) } else { Err(Refusal::Cost) }
+        if self.waiting_cost.saturating_add(UNDO) > self.settings.waiting {
+            return Err(Refusal::Overloaded);
+        }
+        if player.cost.spend(now, UNDO) { Ok(()) } else { Err(Refusal::Cost) }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
+    use crate::brush::Brush;
 
     #[test]
-    fn distances_are_to_the_middle_of_what_an_edit_reaches() {
-        let samples = LatticeBox { min: IVec3::new(10, 0, -3), max: IVec3::new(13, 4, 3) };
-        // The middle is (11.5, 2, 0).
-        for (place, allowed, near) in [
-            (IVec3::new(11, 2, 0), 0, false),
-            (IVec3::new(11, 2, 0), 1, true),
-            (IVec3::new(1, 2, 0), 10, false),
-            (IVec3::new(1, 2, 0), 11, true),
-            (IVec3::splat(i32::MIN), u32::MAX, true),
-            (IVec3::splat(i32::MIN), i32::MAX as u32, false),
-            (IVec3::splat(i32::MAX), 9, false),
+    fn all_of_a_shape_has_to_be_within_the_distance() {
+        let within = |shape: Shape, allowed: u32| {
+            let edit = Edit::quantize(&Brush::dig(shape)).expect("a valid brush");
+            is_within(IVec3::new(64, 15, 64), &edit, allowed)
+        };
+        let ball = |x: f32, radius: f32| Shape::sphere(Vec3::new(x, 15.0, 64.0), radius);
+        let pole = |x: f32| Shape::capsule(Vec3::new(x, 15.0, 64.0), Vec3::new(128.0 - x, 15.0, 64.0), 2.0);
+        let slab = |half: f32| Shape::cuboid(Vec3::new(64.0, 15.0, 64.0), Vec3::new(half, 1.0, 1.0));
+        for (shape, allowed, expected) in [
+            (ball(64.0, 8.0), 8, true),
+            (ball(69.0, 2.0), 8, true),
+            (ball(70.0, 2.0), 8, true),
+            (ball(74.0, 2.0), 8, false),
+            (ball(69.0, 7.0), 8, false),
+            (ball(64.0, 20.0), 8, false),
+            (ball(64.0, 0.5), 0, true),
+            (pole(60.0), 8, true),
+            (pole(4.0), 8, false),
+            (pole(4.0), 64, true),
+            (slab(6.0), 8, true),
+            (slab(12.0), 8, false),
+            (ball(1.0e5, 4.0), 8, false),
+            (ball(1.0e5, 4.0), u32::MAX, true),
         ] {
-            assert_eq!(is_near(place, samples, allowed), near, "{place} {allowed}");
+            assert_eq!(within(shape, allowed), expected, "{shape:?} {allowed}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-const SECOND: u128 = 1_000_000_000;
+const SECOND: i128 = 1_000_000_000;
 
 /// How much may be spent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,33 +25,45 @@ impl Rate {
 #[derive(Clone, Debug)]
 pub struct Bucket {
     rate: Rate,
-    /// In billionths.
-    left: u128,
+    /// In billionths; less than 0 where more was charged than was there.
+    left: i128,
     at: Duration,
 }
 
 impl Bucket {
     /// A full one.
     pub fn new(rate: Rate, now: Duration) -> Self {
-        Self { rate, left: u128::from(rate.burst) * SECOND, at: now }
+        Self { rate, left: i128::from(rate.burst) * SECOND, at: now }
     }
 
     /// What may be spent now. Time does not run back: an earlier one counts as the latest.
     pub fn left(&mut self, now: Duration) -> u64 {
         let passed = now.saturating_sub(self.at).as_nanos();
         self.at = self.at.max(now);
-        let back = passed.saturating_mul(self.rate.per_second.into());
-        self.left = self.left.saturating_add(back).min(u128::from(self.rate.burst) * SECOND);
-        (self.left / SECOND) as u64
+        let back = i128::try_from(passed).unwrap_or(i128::MAX).saturating_mul(self.rate.per_second.into());
+        self.left = self.left.saturating_add(back).min(i128::from(self.rate.burst) * SECOND);
+        (self.left / SECOND).max(0) as u64
     }
 
     /// Spends so much, if it is there.
     pub fn spend(&mut self, now: Duration, amount: u64) -> bool {
         let is_there = amount <= self.left(now);
         if is_there {
-            self.left -= u128::from(amount) * SECOND;
+            self.left -= i128::from(amount) * SECOND;
         }
         is_there
+    }
+
+    /// Puts back what was spent and not needed.
+    pub fn refund(&mut self, now: Duration, amount: u64) {
+        self.left = self.left.saturating_add(i128::from(amount) * SECOND);
+        self.left(now);
+    }
+
+    /// Takes so much out, even if it is not there: then nothing may be spent until it has come back.
+    pub fn charge(&mut self, now: Duration, amount: u64) {
+        self.left(now);
+        self.left -= i128::from(amount) * SECOND;
     }
 }
 
@@ -73,6 +85,15 @@ mod tests {
         }
         // Two are asked for 40 times a second on average, so that none is left for long.
         assert!(spent as f64 > 9.9 * now.as_secs_f64(), "{spent} in {now:?}");
+    }
+
+    #[test]
+    fn what_is_charged_has_to_come_back() {
+        let at = Duration::from_secs;
+        let mut bucket = Bucket::new(Rate { per_second: 10, burst: 10 }, at(5));
+        bucket.charge(at(5), 30);
+        assert!(!bucket.spend(at(6), 1) && bucket.left(at(7)) == 0);
+        assert!(bucket.spend(at(8), 10) && !bucket.spend(at(8), 1));
     }
 
     #[test]

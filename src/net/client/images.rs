@@ -1,0 +1,45 @@
+//! Images of stamps that this client lacks: entries with them wait until the server has sent them.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::super::message::{Lane, MOST_IMAGES, ToServer};
+use super::super::stamps::StampId;
+use super::Client;
+use crate::ground::GreyImage;
+
+/// Messages that wait for images.
+#[derive(Default)]
+pub(super) struct Images {
+    parked: Vec<(Lane, Vec<u8>)>,
+    /// Images that were asked for and have not come.
+    awaited: BTreeSet<StampId>,
+}
+
+impl Images {
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Lets a message wait for images; returns the messages that ask for them.
+    pub fn park(&mut self, lane: Lane, bytes: Vec<u8>, missing: BTreeSet<StampId>) -> Vec<Vec<u8>> {
+        self.parked.push((lane, bytes));
+        let new: Vec<StampId> = missing.into_iter().filter(|id| self.awaited.insert(*id)).collect();
+        new.chunks(MOST_IMAGES).map(|some| ToServer::Images { images: some.to_vec() }.to_bytes()).collect()
+    }
+}
+
+impl Client {
+    /// An image has come: what waited for it is looked at again.
+    pub(super) fn take_image(&mut self, image: Arc<GreyImage>) {
+        if !self.images.awaited.remove(&StampId::of(&image)) {
+            self.figures.malformed += 1;
+            return;
+        }
+        self.stamps.add(image);
+        for (lane, bytes) in std::mem::take(&mut self.images.parked) {
+            self.read(lane, bytes);
+        }
+    }
+}

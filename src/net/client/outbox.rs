@@ -1,0 +1,107 @@
+//! Own edits and undos on their way to the server, in order, as fast as its limits allow: however much was done without a
+//! connection, nothing of it is refused for its cost.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use super::super::bucket::{Bucket, Rate};
+use super::super::message::{ClientId, MOST_EDITS, ToServer};
+use super::super::price::{MOST_UNDO_BYTES, UNDO, UNDO_BYTES};
+use crate::brush::Edit;
+
+/// What is to be sent.
+enum Own {
+    Edit(Edit),
+    Undo(ClientId),
+}
+
+/// What waits to be sent, and what the server has not answered.
+///
+/// The server's bucket is mirrored. So much of it as messages on their way may cost is left out: however these are delayed, it is there
+/// when they arrive, all at once too.
+pub struct Outbox {
+    waiting: VecDeque<(u64, u64, Own)>,
+    bucket: Bucket,
+    burst: u64,
+    /// The most that the part of the bucket holds that is mirrored.
+    mirrored: u64,
+    /// What is on its way and what it costs, by own number.
+    on_the_way: BTreeMap<u64, u64>,
+    cost: u64,
+}
+
+impl Outbox {
+    /// For a server that has just told what its bucket gets each second, holds at most, and has left.
+    pub fn new([per_second, burst]: [u64; 2], left: u64, now: Duration) -> Self {
+        let mirrored = burst - burst / 4;
+        // Clocks differ.
+        let rate = Rate { per_second: per_second - per_second / 32, burst: mirrored };
+        let mut bucket = Bucket::new(rate, now);
+        bucket.charge(now, burst.saturating_sub(left));
+        let (waiting, on_the_way) = Default::default();
+        Self { waiting, bucket, burst, mirrored, on_the_way, cost: 0 }
+    }
+
+    /// Adds an edit that costs so much.
+    pub fn edit(&mut self, own: u64, edit: Edit, cost: u64) {
+        // What costs too much is refused, whatever is left.
+        let counted = if cost <= self.burst { cost } else { 0 };
+        self.waiting.push_back((own, counted, Own::Edit(edit)));
+    }
+
+    /// Adds an undo.
+    pub fn undo(&mut self, own: u64, of: ClientId) {
+        // What it restores is charged too, and not known yet.
+        let counted =
+            if UNDO <= self.burst { (UNDO + MOST_UNDO_BYTES as u64 / UNDO_BYTES).min(self.burst) } else { 0 };
+        self.waiting.push_back((own, counted, Own::Undo(of)));
+    }
+
+    /// Notes that the server has answered what has this number. It has cost so much, if that is known.
+    pub fn answer(&mut self, own: u64, cost: Option<u64>, now: Duration) {
+        if let Some(counted) = self.on_the_way.remove(&own) {
+            self.cost -= counted;
+            self.bucket.refund(now, counted.saturating_sub(cost.unwrap_or(counted)));
+        }
+    }
+
+    /// Messages that may be sent now.
+    pub fn take(&mut self, now: Duration) -> Vec<Vec<u8>> {
+        let (mut messages, mut first, mut edits) = (Vec::new(), 0, Vec::new());
+        while self.waiting.front().map(|(_, cost, _)| *cost).is_some_and(|cost| self.may_send(cost, now))
+            && let Some((own, cost, what)) = self.waiting.pop_front()
+        {
+            self.bucket.charge(now, cost);
+            self.on_the_way.insert(own, cost);
+            self.cost += cost;
+            if edits.len() == MOST_EDITS || own != first + edits.len() as u64 || matches!(what, Own::Undo(_))
+            {
+                messages.extend(edits_message(first, &mut edits));
+                first = own;
+            }
+            match what {
+                Own::Edit(edit) => edits.push(edit),
+                Own::Undo(of) => {
+                    messages.push(ToServer::Undo { own, of }.to_bytes());
+                    first = own + 1;
+                }
+            }
+        }
+        messages.extend(edits_message(first, &mut edits));
+        messages
+    }
+
+    fn may_send(&mut self, cost: u64, now: Duration) -> bool {
+        let left = self.bucket.left(now);
+        if cost > self.mirrored {
+            // All of the server's bucket has to be there.
+            return left == self.mirrored && self.on_the_way.is_empty();
+        }
+        cost <= left && (self.on_the_way.is_empty() || self.cost + cost <= self.burst - self.mirrored)
+    }
+}
+
+fn edits_message(first: u64, edits: &mut Vec<Edit>) -> Option<Vec<u8>> {
+    let edits = std::mem::take(edits);
+    (!edits.is_empty()).then(|| ToServer::Edits { first, edits }.to_bytes())
+}

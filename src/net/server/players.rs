@@ -1,0 +1,109 @@
+//! What a server remembers of players, whether they are connected or not: whoever comes back under the same number has what was left.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use glam::IVec3;
+
+use super::settings::ServerSettings;
+use crate::net::bucket::{Bucket, Rate};
+use crate::net::message::ClientId;
+
+/// Players who are remembered, at most, beside those that are connected and administrators. Whoever is forgotten begins with full
+/// buckets.
+const MOST_PLAYERS: usize = 1 << 14;
+
+/// Greetings that are answered; others wait.
+const GREETINGS: Rate = Rate { per_second: 1, burst: 8 };
+
+/// What is known of a player.
+pub struct Player {
+    pub cost: Bucket,
+    pub flood: Bucket,
+    pub malformed: Bucket,
+    pub greetings: Bucket,
+    pub bulk: Bucket,
+    pub place: Option<IVec3>,
+    pub is_administrator: bool,
+    /// Counts the uses of all players.
+    used: u64,
+}
+
+impl Player {
+    fn new(settings: &ServerSettings) -> Self {
+        // A full one is full at any later time.
+        let full = |rate| Bucket::new(rate, Duration::ZERO);
+        Self {
+            cost: full(settings.cost),
+            flood: full(settings.cost.times(settings.flood)),
+            malformed: full(settings.malformed),
+            greetings: full(GREETINGS),
+            bulk: full(settings.bulk),
+            place: None,
+            is_administrator: false,
+            used: 0,
+        }
+    }
+}
+
+/// What is known of all players.
+pub struct Players {
+    players: BTreeMap<ClientId, Player>,
+    settings: ServerSettings,
+    uses: u64,
+}
+
+impl Players {
+    pub fn new(settings: ServerSettings) -> Self {
+        Self { players: BTreeMap::new(), settings, uses: 0 }
+    }
+
+    /// A player as it is remembered, or a new one.
+    pub fn player(&mut self, client: ClientId) -> &mut Player {
+        self.uses += 1;
+        let player = self.players.entry(client).or_insert_with(|| Player::new(&self.settings));
+        player.used = self.uses;
+        player
+    }
+
+    /// A player, if it is remembered.
+    pub fn get(&self, client: ClientId) -> Option<&Player> {
+        self.players.get(&client)
+    }
+
+    /// Forgets those who were away for the longest time, where there are too many.
+    pub fn trim(&mut self, is_connected: impl Fn(ClientId) -> bool) {
+        if self.players.len() <= MOST_PLAYERS {
+            return;
+        }
+        let is_kept = |client: ClientId, player: &Player| player.is_administrator || is_connected(client);
+        let away = self.players.iter().filter(|(client, player)| !is_kept(**client, player));
+        let mut uses: Vec<u64> = away.map(|(_, player)| player.used).collect();
+        uses.sort_unstable();
+        // Half of them at once, so that this is rare.
+        let Some(&oldest) = uses.get(uses.len() / 2) else { return };
+        self.players.retain(|client, player| player.used >= oldest || is_kept(*client, player));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_is_bounded_and_keeps_who_was_there_last() {
+        let mut players = Players::new(ServerSettings::default());
+        players.player(ClientId(1)).is_administrator = true;
+        let connected = ClientId(2);
+        for id in 2..4 * MOST_PLAYERS as u64 {
+            assert!(players.player(ClientId(id)).cost.spend(Duration::ZERO, 1));
+            players.trim(|client| client == connected);
+            assert!(players.players.len() <= MOST_PLAYERS + 2);
+        }
+        assert!(players.get(ClientId(1)).is_some_and(|player| player.is_administrator));
+        assert!(players.get(connected).is_some() && players.get(ClientId(3)).is_none());
+        let burst = ServerSettings::default().cost.burst;
+        let last = ClientId(4 * MOST_PLAYERS as u64 - 1);
+        assert_eq!(players.player(last).cost.left(Duration::ZERO), burst - 1, "nothing is refilled");
+    }
+}
