@@ -35,9 +35,7 @@ impl Plugin for ReconnectPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(
             Update,
-            reconnect
-                .run_if(in_state(ClientState::Disconnected))
-                .run_if(resource_exists::<StayConnected>),
+            reconnect.run_if(in_state(ClientState::Disconnected)).run_if(resource_exists::<StayConnected>),
         );
     }
 }

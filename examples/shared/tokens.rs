@@ -47,7 +47,9 @@ impl Key {
         let digits = text.trim();
         let is_key = digits.len() == 2 * key.len() && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
         if !is_key {
-            return Err(format!("{} holds no key of {} hexadecimal digits", path.display(), 2 * key.len()).into());
+            return Err(
+                format!("{} holds no key of {} hexadecimal digits", path.display(), 2 * key.len()).into()
+            );
         }
         for (byte, at) in key.iter_mut().zip((0..).step_by(2)) {
             *byte = u8::from_str_radix(&digits[at..at + 2], 16)?;

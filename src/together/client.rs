@@ -8,14 +8,15 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy_replicon::prelude::{ClientId, FromClient};
 
-use super::link::{Ask, Link, MOST_PENDING, PieceMessage, Session, Standing};
+use super::link::{Ask, Link, MOST_PENDING, PieceMessage, Standing};
 use super::messages::{BulkLane, FromPlayer, OrderLane};
 use super::service::Service;
 use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 use super::trouble::{SharingTrouble, SharingTroubleFound};
 use crate::net::{Client, ClientEvent, Lane, Refusal, ShownChange};
 use crate::plugin::{
-    BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads, free_later,
+    BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads,
+    free_later,
 };
 use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain};
 
@@ -24,7 +25,6 @@ use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rej
 pub(super) struct Sharing {
     active: Option<Entity>,
     orders: u64,
-    sessions: u32,
 }
 
 impl Sharing {
@@ -32,12 +32,6 @@ impl Sharing {
     pub fn next_order(&mut self) -> u64 {
         self.orders += 1;
         self.orders
-    }
-
-    /// The number of a new session. Those of an app that was started again may be the same: its connection is another one.
-    fn next_session(&mut self) -> u32 {
-        self.sessions = self.sessions.wrapping_add(1);
-        self.sessions
     }
 
     /// Keeps the terrain that is shared, or takes the one that was inserted first.
@@ -59,23 +53,22 @@ pub(super) struct Answers<'w> {
     moved: MessageWriter<'w, HistoryMoved>,
 }
 
-/// Takes what the server sent in the session that goes on.
+/// Takes what the server sent. What it sent before it was greeted last is left out by the client.
 pub(super) fn receive(
     mut shared: Query<&mut SharedTerrain>,
     mut order: MessageReader<OrderLane>,
     mut bulk: MessageReader<BulkLane>,
 ) {
-    let order = order.read().map(|message| (Lane::Order, message.session, &message.bytes));
-    let bulk = bulk.read().map(|message| (Lane::Bulk, message.session, &message.bytes));
-    let messages: Vec<_> = order.chain(bulk).collect();
+    let order = order.read().map(|message| (Lane::Order, &message.0));
+    let messages: Vec<_> = order.chain(bulk.read().map(|message| (Lane::Bulk, &message.0))).collect();
     if messages.is_empty() {
         return;
     }
     for mut shared in &mut shared {
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
-        let Some(session) = link.session else { continue };
-        let own = messages.iter().filter(|(_, number, _)| *number == session.number);
-        link.inbox.extend(own.map(|(lane, _, bytes)| (*lane, Vec::clone(bytes))));
+        if link.greeted.is_some() {
+            link.inbox.extend(messages.iter().map(|(lane, bytes)| (*lane, Vec::clone(bytes))));
+        }
     }
 }
 
@@ -107,15 +100,15 @@ pub(super) fn send(
 ) {
     let with_terrain = shared.iter().filter(|(_, _, _, terrain)| terrain.is_some());
     sharing.choose(with_terrain.map(|(entity, shared, ..)| (entity, shared.order)));
+    let active = sharing.active;
     for (entity, mut shared, outbox, terrain) in &mut shared {
         let is_changed = shared.is_changed();
         let shared = shared.bypass_change_detection();
         let asks = outbox.map(take_asks).unwrap_or_default();
-        let active = sharing.active;
         let trouble = match (terrain, active) {
             (Some(mut terrain), Some(active)) if active == entity => {
                 let terrain = terrain.bypass_change_detection();
-                let mut turn = Turn { entity, sharing: &mut sharing, answers: &mut answers };
+                let mut turn = Turn { entity, answers: &mut answers };
                 turn.send(*service, (shared, is_changed), terrain, asks, &mut messages)
             }
             (terrain, active) => {
@@ -144,7 +137,6 @@ fn take_asks(mut outbox: Mut<EditOutbox>) -> Vec<Ask> {
 /// The turn of the terrain that is shared, in a frame.
 struct Turn<'a, 'w> {
     entity: Entity,
-    sharing: &'a mut Sharing,
     answers: &'a mut Answers<'w>,
 }
 
@@ -180,55 +172,29 @@ impl Turn<'_, '_> {
             Standing::Follows(invitation) => Some(invitation),
             _ => None,
         };
-        let is_same = follows.is_some() && follows == link.session.map(|session| session.invitation);
-        link.facts.has_joined &= is_same;
+        link.facts.has_joined &= follows.is_some() && follows == link.greeted;
         link.has_new_stamps |= is_changed;
         let Some(mut client) = link.client.take() else { return standing.trouble() };
         if std::mem::take(&mut link.has_new_stamps) {
             *client.stamps_mut() = shared.stamps.clone();
         }
         client.set_place(shared.place);
-        if !is_same {
-            self.change_session(link, &mut client, follows, service, messages);
+        if follows != link.greeted {
+            change_server(link, &mut client, follows, service, messages);
         }
         if let Standing::Refuses(_) = standing {
             client.give_up();
         }
         self.hand_over(link, &mut client, standing);
-        if let Some(Session { number: session, .. }) = link.session {
-            let outgoing = client.take_outgoing().into_iter();
-            messages.write_batch(outgoing.map(|bytes| FromPlayer::Bytes { session, bytes }));
+        if link.greeted.is_some() {
+            messages.write_batch(client.take_outgoing().into_iter().map(FromPlayer::Bytes));
         }
         link.inbox.drain(..).for_each(|(lane, bytes)| client.receive(lane, bytes));
         link.facts.number = client.number();
         link.facts.id = client.id();
-        link.facts.has_joined = link.session.is_some() && client.has_joined();
+        link.facts.has_joined = link.greeted.is_some() && client.has_joined();
         link.client = Some(client);
         standing.trouble()
-    }
-
-    /// Ends the session, and begins one that follows this invitation.
-    fn change_session(
-        &mut self,
-        link: &mut Link,
-        client: &mut Client,
-        invitation: Option<u64>,
-        service: Service,
-        messages: &mut MessageWriter<FromPlayer>,
-    ) {
-        link.inbox.clear();
-        let before = link.session.take();
-        if let Some(invitation) = invitation {
-            let number = self.sharing.next_session();
-            messages.write(FromPlayer::Begin { session: number });
-            client.connect(link.start.elapsed());
-            (link.session, link.was_served, link.kicked) = (Some(Session { number, invitation }), true, None);
-        } else if before.is_some() {
-            client.disconnect();
-            if service != Service::Apart {
-                messages.write(FromPlayer::Left);
-            }
-        }
     }
 
     /// Hands over what the player asked for, in order.
@@ -249,6 +215,27 @@ impl Turn<'_, '_> {
                     self.answers.refuse(self.entity, ask, Some(link));
                 }
             }
+        }
+    }
+}
+
+/// Leaves the server that was followed, and greets the one of this invitation.
+fn change_server(
+    link: &mut Link,
+    client: &mut Client,
+    invitation: Option<u64>,
+    service: Service,
+    messages: &mut MessageWriter<FromPlayer>,
+) {
+    link.inbox.clear();
+    link.greeted = invitation;
+    if invitation.is_some() {
+        client.connect(link.start.elapsed());
+        (link.was_served, link.kicked) = (true, None);
+    } else {
+        client.disconnect();
+        if service != Service::Apart {
+            messages.write(FromPlayer::Left);
         }
     }
 }
@@ -327,8 +314,9 @@ impl Answers<'_> {
     fn close(&mut self, terrain: Entity, link: Option<Link>, messages: &mut MessageWriter<FromPlayer>) {
         let Some(link) = link else { return };
         link.tags.iter().for_each(|tag| self.refused(terrain, *tag, None));
-        (0..link.undos).for_each(|_| self.stepped(terrain, HistoryStep::Undo, Err(HistoryRejection::Refused)));
-        if link.session.is_some() {
+        (0..link.undos)
+            .for_each(|_| self.stepped(terrain, HistoryStep::Undo, Err(HistoryRejection::Refused)));
+        if link.greeted.is_some() {
             messages.write(FromPlayer::Left);
         }
         // It holds a world.
@@ -386,8 +374,8 @@ impl Answers<'_> {
             }
             event => {
                 link.is_playable |= event == ClientEvent::Playable;
-                if let (ClientEvent::Kicked(why), Some(session)) = (&event, link.session) {
-                    link.kicked = Some((*why, session.invitation));
+                if let (ClientEvent::Kicked(why), Some(invitation)) = (&event, link.greeted) {
+                    link.kicked = Some((*why, invitation));
                 }
                 self.joined.write(GroundJoined { terrain, event });
             }
@@ -410,7 +398,7 @@ pub(super) fn send_last(
             link.client = link.task.as_mut().and_then(ThreadTask::finish);
             std::thread::sleep(Duration::from_millis(1));
         }
-        let (Some(client), Some(session)) = (&mut link.client, link.session) else { continue };
+        let Some(client) = link.client.as_mut().filter(|_| link.greeted.is_some()) else { continue };
         for ask in link.asks.drain(..) {
             match ask {
                 Ask::Edit(edit) => client.dig(edit),
@@ -418,9 +406,11 @@ pub(super) fn send_last(
                 Ask::Step(HistoryStep::Redo) => {}
             }
         }
-        messages.write_batch(client.take_outgoing().into_iter().map(|bytes| FromClient {
-            client_id: ClientId::Server,
-            message: FromPlayer::Bytes { session: session.number, bytes },
-        }));
+        messages.write_batch(
+            client
+                .take_outgoing()
+                .into_iter()
+                .map(|bytes| FromClient { client_id: ClientId::Server, message: FromPlayer::Bytes(bytes) }),
+        );
     }
 }

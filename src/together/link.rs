@@ -1,4 +1,4 @@
-//! What a shared terrain knows of its server: the client, the session, and what waits.
+//! What a shared terrain knows of its server: the client, the invitation that it follows, and what waits.
 
 use std::collections::VecDeque;
 
@@ -29,10 +29,11 @@ pub(super) struct Link {
     pub task: Option<ThreadTask<Client>>,
     /// The ground that the client was made for.
     pub ground: GroundId,
-    pub session: Option<Session>,
-    /// Whether there was a session.
+    /// The invitation of the server that the client has greeted; `None` while there is none to greet.
+    pub greeted: Option<u64>,
+    /// Whether there was one.
     pub was_served: bool,
-    /// The server has sent the player away, in the session of this invitation.
+    /// The server of this invitation has sent the player away.
     pub kicked: Option<(Kick, u64)>,
     pub inbox: Vec<(Lane, Vec<u8>)>,
     pub asks: Vec<Ask>,
@@ -47,14 +48,6 @@ pub(super) struct Link {
     pub display: Display,
     /// The rules of the terrain, which have no effect.
     pub rules: Option<DiggingRules>,
-}
-
-/// A session with a server.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Session {
-    pub number: u32,
-    /// The invitation that it follows.
-    pub invitation: u64,
 }
 
 /// What the client said last.
@@ -112,7 +105,7 @@ impl Link {
             client: Some(client),
             task: None,
             ground,
-            session: None,
+            greeted: None,
             was_served: false,
             kicked: None,
             inbox: Vec::new(),

@@ -1,7 +1,4 @@
 //! The messages that carry the bytes of clients and server. Replicon sends each kind in a channel of its own, reliably and in order.
-//!
-//! A *session* lies between one shared terrain and one ground server. The client begins it, numbers it, and every message of either
-//! side names that number, so whatever was on its way when a session ended is ignored.
 
 use bevy::prelude::*;
 use bevy_replicon::bytes::Bytes;
@@ -10,8 +7,7 @@ use bevy_replicon::prelude::*;
 use bevy_replicon::shared::message::ctx::{ClientSendCtx, ServerReceiveCtx};
 use serde::{Deserialize, Serialize};
 
-use crate::net::Server;
-use crate::net::message::MOST_TO_SERVER;
+use crate::net::{MOST_TO_SERVER, Server};
 use crate::terrain::World;
 
 /// Bytes of a [`FromPlayer`] beside those that it carries, at most.
@@ -20,11 +16,9 @@ const OVERHEAD: usize = 16;
 /// From a client to the server.
 #[derive(Message, Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum FromPlayer {
-    /// A session begins, and the one before is over.
-    Begin { session: u32 },
-    /// What the client of this session says.
-    Bytes { session: u32, bytes: Vec<u8> },
-    /// The session is over: nobody digs there any more.
+    /// What the client says.
+    Bytes(Vec<u8>),
+    /// Nobody digs there any more.
     Left,
     /// The message was longer than any may be, and was not kept.
     #[serde(skip)]
@@ -33,19 +27,13 @@ pub(super) enum FromPlayer {
 
 /// From the server to a client, in the lane of what has to come soon.
 #[derive(Message, Clone, Debug, Serialize, Deserialize)]
-pub(super) struct OrderLane {
-    pub session: u32,
-    pub bytes: Vec<u8>,
-}
+pub(super) struct OrderLane(pub Vec<u8>);
 
 /// From the server to a client, in the lane of what takes long.
 #[derive(Message, Clone, Debug, Serialize, Deserialize)]
-pub(super) struct BulkLane {
-    pub session: u32,
-    pub bytes: Vec<u8>,
-}
+pub(super) struct BulkLane(pub Vec<u8>);
 
-/// Invites an authorised client to begin a session, or with `None` says that no ground is served any more.
+/// Invites an authorised client to greet, or with `None` says that no ground is served any more.
 #[derive(Message, Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Invitation(pub Option<Served>);
 

@@ -46,7 +46,8 @@ use bevy::prelude::*;
 use bevy_replicon::prelude::*;
 
 use crate::plugin::{
-    BrushApplied, BurrowSystems, FollowCommits, HistoryMoved, LoosePieceFound, LoosePieceReturned, TerrainPlugin,
+    BrushApplied, BurrowSystems, FollowCommits, HistoryMoved, LoosePieceFound, LoosePieceReturned,
+    TerrainPlugin,
 };
 
 /// Digging together: add it after `RepliconPlugins` and [`BurrowPlugins`](crate::plugin::BurrowPlugins), on the server and on all

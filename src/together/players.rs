@@ -1,4 +1,4 @@
-//! The players of a ground server: who they are, and which session is theirs.
+//! The players of a ground server: who they are, and which clients are theirs.
 
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
@@ -18,7 +18,8 @@ const MESSAGE_BYTES: usize = 128;
 /// The players of a ground server.
 #[derive(Default)]
 pub(super) struct Players {
-    sessions: HashMap<net::ClientId, (ClientId, u32)>,
+    /// Those who have spoken.
+    clients: HashMap<net::ClientId, ClientId>,
     /// Clients that were sent away: nothing is taken from them on the same connection.
     kicked: HashSet<Entity>,
     /// Bytes that wait for the server.
@@ -27,15 +28,15 @@ pub(super) struct Players {
 
 /// What a message comes to.
 pub(super) enum Said {
-    /// A session begins.
-    Begins,
-    /// The client of the session says this.
-    Bytes(Vec<u8>),
+    /// The client says this, for the first time if it `begins`.
+    Bytes {
+        begins: bool,
+        bytes: Vec<u8>,
+    },
     /// The player has left.
     Leaves,
     /// The player has sent far more than the server could take by now.
     TooMuch,
-    /// It is of a session that is over.
     Nothing,
 }
 
@@ -63,21 +64,17 @@ impl Players {
 
     /// Takes a message of a player's.
     pub fn hear(&mut self, player: net::ClientId, client: ClientId, message: &FromPlayer) -> Said {
-        let is_session = |sessions: &HashMap<_, _>, session| sessions.get(&player) == Some(&(client, session));
         let said = match message {
-            FromPlayer::Begin { session } => {
-                self.sessions.insert(player, (client, *session));
-                Said::Begins
+            FromPlayer::Left if self.clients.remove(&player).is_some() => Said::Leaves,
+            FromPlayer::Left => return Said::Nothing,
+            // One that was too long is counted as an invalid message.
+            FromPlayer::Bytes(_) | FromPlayer::TooLong => {
+                let begins = self.clients.insert(player, client) != Some(client);
+                let bytes = if let FromPlayer::Bytes(bytes) = message { bytes.clone() } else { Vec::new() };
+                Said::Bytes { begins, bytes }
             }
-            FromPlayer::Bytes { session, bytes } if is_session(&self.sessions, *session) => {
-                Said::Bytes(bytes.clone())
-            }
-            // It is counted as an invalid message.
-            FromPlayer::TooLong => Said::Bytes(Vec::new()),
-            FromPlayer::Left if self.sessions.remove(&player).is_some() => Said::Leaves,
-            FromPlayer::Bytes { .. } | FromPlayer::Left => return Said::Nothing,
         };
-        let length = if let Said::Bytes(bytes) = &said { bytes.len() } else { 0 };
+        let length = if let Said::Bytes { bytes, .. } = &said { bytes.len() } else { 0 };
         let waiting = self.waiting.entry(player).or_default();
         let before = *waiting;
         *waiting = waiting.saturating_add(length + MESSAGE_BYTES);
@@ -94,13 +91,13 @@ impl Players {
     }
 
     /// Where to send what the server has for a player.
-    pub fn session(&self, player: net::ClientId) -> Option<(ClientId, u32)> {
-        self.sessions.get(&player).copied()
+    pub fn client(&self, player: net::ClientId) -> Option<ClientId> {
+        self.clients.get(&player).copied()
     }
 
     /// Forgets a player that was kicked; returns the client whose connection has to be closed.
     pub fn kick(&mut self, player: net::ClientId) -> Option<Entity> {
-        let client = self.sessions.remove(&player)?.0.entity()?;
+        let client = self.clients.remove(&player)?.entity()?;
         self.kicked.insert(client);
         Some(client)
     }
@@ -109,6 +106,6 @@ impl Players {
     pub fn take_gone(&mut self, clients: &Query<Option<&NetworkId>, Authorised>) -> Vec<net::ClientId> {
         self.kicked.retain(|client| clients.contains(*client));
         let is_gone = |client: &ClientId| client.entity().is_some_and(|entity| !clients.contains(entity));
-        self.sessions.extract_if(|_, (client, _)| is_gone(client)).map(|(player, _)| player).collect()
+        self.clients.extract_if(|_, client| is_gone(client)).map(|(player, _)| player).collect()
     }
 }

@@ -245,8 +245,12 @@ impl GroundServer {
         }
         for (player, said) in said {
             match said {
-                Said::Begins => self.ask(move |parts, now| parts.server.connect(player, now)),
-                Said::Bytes(bytes) => self.ask(move |parts, now| parts.server.receive(player, &bytes, now)),
+                Said::Bytes { begins, bytes } => self.ask(move |parts, now| {
+                    if begins {
+                        parts.server.connect(player, now);
+                    }
+                    parts.server.receive(player, &bytes, now);
+                }),
                 Said::Leaves => self.ask(move |parts, _| parts.server.disconnect(player)),
                 Said::TooMuch => self.ask(move |parts, _| parts.server.kick_for(player, Kick::Flood)),
                 Said::Nothing => {}
@@ -288,11 +292,11 @@ pub(super) fn serve(
         events.write_batch(store.take_troubles().into_iter().map(GroundServerEvent::Trouble));
     }
     for (player, lane, bytes) in parts.server.take_outgoing() {
-        let Some((client, session)) = ground.players.session(player) else { continue };
+        let Some(client) = ground.players.client(player) else { continue };
         let targets = SendTargets::Single(client);
         match lane {
-            Lane::Order => drop(order.write(ToClients { targets, message: OrderLane { session, bytes } })),
-            Lane::Bulk => drop(bulk.write(ToClients { targets, message: BulkLane { session, bytes } })),
+            Lane::Order => drop(order.write(ToClients { targets, message: OrderLane(bytes) })),
+            Lane::Bulk => drop(bulk.write(ToClients { targets, message: BulkLane(bytes) })),
         }
     }
     for player in kicked {

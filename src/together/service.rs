@@ -118,9 +118,7 @@ fn drop_for<M: Message>(gone: Entity, messages: &mut Messages<ToClients<M>>)
 where
     ToClients<M>: Message,
 {
-    let is_for = |targets: &SendTargets| {
-        matches!(targets, SendTargets::Single(ClientId::Client(client)) if *client == gone)
-    };
+    let is_for = |targets: &SendTargets| matches!(targets, SendTargets::Single(ClientId::Client(client)) if *client == gone);
     if messages.get_cursor().read(messages).any(|message| is_for(&message.targets)) {
         let others: Vec<_> = messages.drain().filter(|message| !is_for(&message.targets)).collect();
         messages.write_batch(others);

@@ -12,7 +12,9 @@ pub enum SharingTrouble {
     #[error("the connection to the server is lost; connect again, and what is dug until then is sent")]
     ConnectionLost,
     /// The server's `GroundServer` was removed. Digs are refused until there is another one.
-    #[error("the server has stopped serving its ground; digs are refused until it inserts a GroundServer again")]
+    #[error(
+        "the server has stopped serving its ground; digs are refused until it inserts a GroundServer again"
+    )]
     NotServed,
     /// The server has another ground or chunk size than the terrain. Digs are refused until they are the same.
     #[error(
@@ -34,7 +36,9 @@ pub enum SharingTrouble {
     Kicked(Kick),
     /// Another terrain of this app is shared already, and a connection carries one ground. Digs on this one are refused until that one
     /// is despawned or no longer shared.
-    #[error("{0} is shared already, and an app shares one terrain at a time; remove SharedTerrain from one of them")]
+    #[error(
+        "{0} is shared already, and an app shares one terrain at a time; remove SharedTerrain from one of them"
+    )]
     AnotherIsShared(Entity),
     /// There is no `Terrain` beside the `SharedTerrain`. Sharing begins once there is one.
     #[error("a SharedTerrain needs a Terrain beside it; sharing begins once it is inserted")]

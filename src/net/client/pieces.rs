@@ -93,7 +93,8 @@ impl Client {
         let mut predicted = own.and_then(|own| self.pieces.predicted.remove(&own)).unwrap_or_default();
         let mut found = Vec::new();
         for piece in all(receipt) {
-            match predicted.iter().position(|gone| gone.piece.id == piece.id && gone.piece.fate == piece.fate) {
+            match predicted.iter().position(|gone| gone.piece.id == piece.id && gone.piece.fate == piece.fate)
+            {
                 Some(at) => drop(predicted.remove(at)),
                 None => found.push(piece.clone()),
             }

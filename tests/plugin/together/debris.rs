@@ -40,8 +40,12 @@ fn saw(tag: u64) -> Brush {
 }
 
 fn player() -> Stage {
-    let plugins =
-        (MinimalPlugins, StatesPlugin, RepliconPlugins.set(ServerPlugin::new(PostUpdate)), PhysicsPlugins::default());
+    let plugins = (
+        MinimalPlugins,
+        StatesPlugin,
+        RepliconPlugins.set(ServerPlugin::new(PostUpdate)),
+        PhysicsPlugins::default(),
+    );
     let step = Duration::from_secs_f32(1.0 / 64.0);
     let mut stage = Stage::with_all(plugins, (TogetherPlugin, TerrainPhysicsPlugin, DebrisPlugin));
     stage

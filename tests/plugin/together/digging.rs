@@ -115,7 +115,9 @@ fn undos_and_brushes_of_several_frames_keep_their_order() {
         party.send(0, dig(40.0, 20.0, 40.0, 5.0));
         party.round();
         party.players[0].0.write(Undo::default());
-        party.rounds_until("all of it is answered", |party| party.agrees() && party.terrain_hash(0) == pristine);
+        party.rounds_until("all of it is answered", |party| {
+            party.agrees() && party.terrain_hash(0) == pristine
+        });
         let outcomes: Vec<_> = party.players[0]
             .0
             .recorded::<HistoryMoved>()

@@ -156,7 +156,11 @@ fn the_next_level_is_joined_whoever_changes_first() {
         }
         for player in 0..2 {
             let trouble = party.shared(player).trouble();
-            assert_eq!(server_first, matches!(trouble, Some(SharingTrouble::OtherGround { .. })), "{trouble:?}");
+            assert_eq!(
+                server_first,
+                matches!(trouble, Some(SharingTrouble::OtherGround { .. })),
+                "{trouble:?}"
+            );
             let terrain = party.players[player].1;
             party.world_mut(player).entity_mut(terrain).insert(other_ground());
         }
@@ -210,7 +214,10 @@ fn one_of_two_shared_terrains_is_shared() {
     party.rounds_until("the first one is dug", |party| {
         party.agrees() && party.terrain_hash(0) != ground().world().hash()
     });
-    assert_eq!(party.outcomes(0).iter().filter(|outcome| matches!(outcome, WhatBecame::Refused(None))).count(), 1);
+    assert_eq!(
+        party.outcomes(0).iter().filter(|outcome| matches!(outcome, WhatBecame::Refused(None))).count(),
+        1
+    );
     let pristine = ground().world().hash();
     assert_eq!(party.players[0].0.hash(second), pristine);
     // Once the first one is gone, the second one is shared.
@@ -225,11 +232,14 @@ fn nothing_is_sent_to_a_player_that_is_gone() {
     struct Gone(Option<Entity>);
 
     let mut party = Party::new(0);
-    party.server.init_resource::<Gone>().add_systems(Update, |mut commands: Commands, mut gone: ResMut<Gone>| {
-        if let Some(gone) = gone.0.take() {
-            commands.entity(gone).despawn();
-        }
-    });
+    party.server.init_resource::<Gone>().add_systems(
+        Update,
+        |mut commands: Commands, mut gone: ResMut<Gone>| {
+            if let Some(gone) = gone.0.take() {
+                commands.entity(gone).despawn();
+            }
+        },
+    );
     party.join();
     party.all_join();
     for turn in 0..20 {
@@ -261,7 +271,9 @@ fn nothing_is_sent_to_a_player_that_is_gone() {
             numbers
         };
         let count = connected(&mut party.server);
-        party.rounds_until("the server says who is there", |_| *count.lock().expect("nobody panics") != usize::MAX);
+        party.rounds_until("the server says who is there", |_| {
+            *count.lock().expect("nobody panics") != usize::MAX
+        });
         assert_eq!(*count.lock().expect("nobody panics"), 1, "a ghost is left");
     }
 }

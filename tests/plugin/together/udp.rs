@@ -28,8 +28,11 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 fn app() -> App {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, RepliconRenetPlugins))
-        .add_plugins((BurrowPlugins, TogetherPlugin, ReconnectPlugin));
+    app.add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, RepliconRenetPlugins)).add_plugins((
+        BurrowPlugins,
+        TogetherPlugin,
+        ReconnectPlugin,
+    ));
     app.finish();
     app.cleanup();
     app
@@ -113,7 +116,8 @@ fn who_has_no_token_of_the_server_does_not_connect() {
 fn players_come_back_by_themselves() {
     let folder = std::env::temp_dir().join(format!("burrow-come-back-{}", std::process::id()));
     drop(std::fs::remove_dir_all(&folder));
-    let ground = || GroundServer::saved(&SavedWorld::new(&folder), &super::ground(), ServerSettings::default());
+    let ground =
+        || GroundServer::saved(&SavedWorld::new(&folder), &super::ground(), ServerSettings::default());
     let key = Key::random();
     let (mut first, address) = server((Ipv4Addr::LOCALHOST, 0).into(), key, ground());
     let mut player = player(address, key, 5);
@@ -142,7 +146,9 @@ fn players_come_back_by_themselves() {
     until("it is back, and what it dug is done", &mut second, &mut player, |player| {
         shared(player).has_joined() && shared(player).pending() == 0
     });
-    until("all of it is shown", &mut second, &mut player, |player| hash(player) != before || shared(player).number() > 1);
+    until("all of it is shown", &mut second, &mut player, |player| {
+        hash(player) != before || shared(player).number() > 1
+    });
     let shown = player.0.world().get::<Terrain>(player.1).expect("it is there").world();
     for x in [20.0, 70.0] {
         assert!(!shown.is_solid(DVec3::new(x, 20.0, 40.0)), "what was dug at {x} is lost");
