@@ -15,7 +15,7 @@ pub(super) enum Service {
     Apart,
     /// There is a connection, or was a server in this app, and no ground is served.
     Unserved,
-    /// A ground is served. The number is that of the invitation: a session is begun for each.
+    /// A ground is served. The number is that of the invitation: each is greeted once.
     Served(Served, u64),
 }
 
