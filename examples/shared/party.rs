@@ -68,29 +68,28 @@ pub fn listen_as(
     Ok(local)
 }
 
-/// What a player of this number says to a server that asks for no token.
-pub fn unsecure(server: SocketAddr, player: u64) -> ClientAuthentication {
-    ClientAuthentication::Unsecure {
+/// Connects to a server that asks for no token, as the player of this number, and ends what was there before.
+///
+/// # Errors
+/// When there is no network.
+pub fn connect(world: &mut World, server: SocketAddr, player: u64) -> Result {
+    let authentication = ClientAuthentication::Unsecure {
         client_id: player,
         protocol_id: PROTOCOL,
         server_addr: server,
         user_data: None,
-    }
+    };
+    connect_as(world, server, authentication)
 }
 
-/// Connects to a server, and ends what was there before.
+/// Connects to a server as a player who proves who it is in this way, and ends what was there before.
 ///
 /// # Errors
 /// When there is no network.
-pub fn connect(world: &mut World, authentication: ClientAuthentication) -> Result {
+pub fn connect_as(world: &mut World, server: SocketAddr, authentication: ClientAuthentication) -> Result {
     // Replicon notices a connection when its resource is added, and not when it replaces another one.
     leave(world);
-    let server = match &authentication {
-        ClientAuthentication::Unsecure { server_addr, .. } => Some(*server_addr),
-        ClientAuthentication::Secure { connect_token } => connect_token.server_addresses[0],
-    };
-    let is_here = server.is_some_and(|server| server.ip().is_loopback());
-    let any = if is_here { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
+    let any = if server.ip().is_loopback() { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
     let socket = UdpSocket::bind((any, 0))?;
     let client = RenetClient::new(config(world));
     world.insert_resource(client);

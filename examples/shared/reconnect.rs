@@ -4,28 +4,22 @@ use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy_replicon::prelude::ClientState;
-use bevy_replicon_renet::netcode::ClientAuthentication;
 
-use super::party;
-
-/// What the player says to the server at the next try. A token is good for one connection, so each try asks for a new one.
-type Authenticate = Box<dyn FnMut() -> Result<ClientAuthentication> + Send + Sync>;
+/// Makes a connection. A token is good for one, so each try asks for a new one.
+type Connect = Box<dyn FnMut(&mut World) -> Result + Send + Sync>;
 
 /// Keeps an app connected while this is there.
 #[derive(Resource)]
 pub struct StayConnected {
-    authenticate: Authenticate,
+    connect: Connect,
     /// The time between two tries.
     pause: Duration,
     last: Option<Instant>,
 }
 
 impl StayConnected {
-    pub fn new(
-        pause: Duration,
-        authenticate: impl FnMut() -> Result<ClientAuthentication> + Send + Sync + 'static,
-    ) -> Self {
-        Self { authenticate: Box::new(authenticate), pause, last: None }
+    pub fn new(pause: Duration, connect: impl FnMut(&mut World) -> Result + Send + Sync + 'static) -> Self {
+        Self { connect: Box::new(connect), pause, last: None }
     }
 }
 
@@ -47,8 +41,7 @@ fn reconnect(world: &mut World) {
             return;
         }
         stay.last = Some(Instant::now());
-        let done = (stay.authenticate)().and_then(|authentication| party::connect(world, authentication));
-        if let Err(why) = done {
+        if let Err(why) = (stay.connect)(world) {
             warn!("there is no way to the server: {why}");
         }
     });

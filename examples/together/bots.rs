@@ -108,9 +108,9 @@ impl Bot {
         app.add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, RepliconRenetPlugins))
             .add_plugins((BurrowPlugins, TogetherPlugin, ReconnectPlugin))
             .init_resource::<Seen>()
-            .insert_resource(StayConnected::new(RETRY, move || match key {
-                Some(key) => key.issue(player, vec![server]),
-                None => Ok(party::unsecure(server, player)),
+            .insert_resource(StayConnected::new(RETRY, move |world| match key {
+                Some(key) => party::connect_as(world, server, key.issue(player, vec![server])?),
+                None => party::connect(world, server, player),
             }))
             .add_systems(Last, watch);
         app.finish();

@@ -13,7 +13,7 @@ use super::messages::{BulkLane, FromPlayer, OrderLane};
 use super::service::Service;
 use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 use super::trouble::{SharingTrouble, SharingTroubleFound};
-use crate::net::{Client, ClientEvent, Lane, Refusal, ShownChange};
+use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
 use crate::plugin::{
     BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads,
     free_later,
@@ -120,6 +120,13 @@ pub(super) fn send(
         };
         if trouble != shared.trouble {
             shared.trouble = trouble;
+            if let Some(SharingTrouble::OtherGround { ours, theirs, .. }) = trouble
+                && !shared.was_served
+            {
+                // As over other transports. The connection stays.
+                let why = if ours == theirs { Kick::ChunkSize } else { Kick::Ground };
+                answers.joined.write(GroundJoined { terrain: entity, event: ClientEvent::Kicked(why) });
+            }
             trouble.into_iter().for_each(|trouble| answers.warn(entity, trouble));
         }
     }
@@ -176,11 +183,13 @@ impl Turn<'_, '_> {
         link.has_new_stamps |= is_changed;
         let Some(mut client) = link.client.take() else { return standing.trouble() };
         if std::mem::take(&mut link.has_new_stamps) {
-            *client.stamps_mut() = shared.stamps.clone();
+            // It may have got others from the server.
+            client.stamps_mut().add_all(&shared.stamps);
         }
         client.set_place(shared.place);
         if follows != link.greeted {
             change_server(link, &mut client, follows, service, messages);
+            shared.was_served |= link.was_served;
         }
         if let Standing::Refuses(_) = standing {
             client.give_up();
@@ -204,12 +213,14 @@ impl Turn<'_, '_> {
         for ask in std::mem::take(&mut link.asks) {
             match ask {
                 Ask::Edit(edit) if !is_refused && room > 0 => {
+                    link.is_full = false;
                     room -= 1;
                     client.dig(edit);
                 }
                 Ask::Step(HistoryStep::Undo) if !is_refused => client.undo(None),
                 ask => {
-                    if !is_refused && matches!(ask, Ask::Edit(_)) {
+                    let is_full = !is_refused && matches!(ask, Ask::Edit(_));
+                    if is_full && !std::mem::replace(&mut link.is_full, true) {
                         self.answers.warn(self.entity, SharingTrouble::TooManyPending(MOST_PENDING));
                     }
                     self.answers.refuse(self.entity, ask, Some(link));

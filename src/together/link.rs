@@ -37,6 +37,8 @@ pub(super) struct Link {
     pub kicked: Option<(Kick, u64)>,
     pub inbox: Vec<(Lane, Vec<u8>)>,
     pub asks: Vec<Ask>,
+    /// So many edits wait that no more are taken.
+    pub is_full: bool,
     /// Tags of edits, and the number of undos, that are asked for and not answered.
     pub tags: VecDeque<u64>,
     pub undos: usize,
@@ -100,7 +102,7 @@ impl Link {
         let settings =
             TerrainSettings { chunk_size: ground.chunk_size as u32, voxel_size: terrain.voxel_size() };
         let mut client = Client::new(world.shared_ground(), &settings)?;
-        *client.stamps_mut() = stamps.clone();
+        client.stamps_mut().add_all(stamps);
         Ok(Self {
             client: Some(client),
             task: None,
@@ -110,6 +112,7 @@ impl Link {
             kicked: None,
             inbox: Vec::new(),
             asks: Vec::new(),
+            is_full: false,
             tags: VecDeque::new(),
             undos: 0,
             start: Instant::now(),

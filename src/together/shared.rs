@@ -19,13 +19,15 @@ use crate::terrain::Receipt;
 #[derive(Component, Default)]
 #[component(on_add = warn_without_plugin)]
 pub struct SharedTerrain {
-    /// Images that stamps may have: the same as those of the server.
+    /// Images that the player may stamp with. The server needs them too; players who lack one get it from there.
     pub stamps: Stamps,
     /// Where the player is, in voxels of the terrain: the ground comes from there outwards.
     pub place: IVec3,
     pub(super) link: Option<Link>,
     /// The place among all shared terrains, in the order in which they were inserted.
     pub(super) order: u64,
+    /// Whether it has greeted a server, with this ground or another.
+    pub(super) was_served: bool,
     /// What was reported last, if it is still so.
     pub(super) trouble: Option<SharingTrouble>,
 }

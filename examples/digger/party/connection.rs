@@ -217,7 +217,7 @@ fn connect(
     next.0 = RETRY_PAUSE;
     let number = own.0;
     commands.queue(move |world: &mut World| {
-        if let Err(why) = udp::connect(world, udp::unsecure(server, number)) {
+        if let Err(why) = udp::connect(world, server, number) {
             world.write_message(Hint(format!("there is no way to {server}: {why}")));
         }
     });

@@ -56,8 +56,9 @@ fn server(address: SocketAddr, key: Key, ground: GroundServer) -> (App, SocketAd
 /// A player who asks for a token at each try.
 fn player(address: SocketAddr, key: Key, number: u64) -> (App, Entity) {
     let mut app = app();
-    let authenticate = move || key.issue(number, vec![address]);
-    app.insert_resource(StayConnected::new(Duration::from_millis(300), authenticate));
+    let connect =
+        move |world: &mut World| party::connect_as(world, address, key.issue(number, vec![address])?);
+    app.insert_resource(StayConnected::new(Duration::from_millis(300), connect));
     let terrain = app.world_mut().spawn((ground(), SharedTerrain::default())).id();
     (app, terrain)
 }
@@ -95,10 +96,13 @@ fn who_has_no_token_of_the_server_does_not_connect() {
     let key = Key::random();
     let ground = || GroundServer::new(Server::new(super::ground(), ServerSettings::default()));
     let (mut server, address) = server((Ipv4Addr::LOCALHOST, 0).into(), key, ground());
-    let mut stranger = app();
-    stranger.insert_resource(StayConnected::new(Duration::from_millis(300), move || {
-        Ok(party::unsecure(address, 1))
-    }));
+    let stranger_to = |address: SocketAddr| {
+        let mut app = app();
+        let connect = move |world: &mut World| party::connect(world, address, 1);
+        app.insert_resource(StayConnected::new(Duration::from_millis(300), connect));
+        app
+    };
+    let mut stranger = stranger_to(address);
     let mut forger = player(address, Key::random(), 1);
     let mut honest = player(address, key, 1);
     until("who has a token joins", &mut server, &mut honest, |player| shared(player).has_joined());
@@ -110,6 +114,11 @@ fn who_has_no_token_of_the_server_does_not_connect() {
     assert!(is_connected(&honest.0) && !is_connected(&stranger) && !is_connected(&forger.0));
     let clients = server.world_mut().query::<&ConnectedClient>().iter(server.world()).count();
     assert_eq!(clients, 1);
+    // A control: a server that asks for no token.
+    let mut open = app();
+    let address = party::listen(open.world_mut(), (Ipv4Addr::LOCALHOST, 0).into(), 8).expect("a free port");
+    let mut stranger = stranger_to(address);
+    frames_until("anybody connects", &mut [&mut open, &mut stranger], |apps| is_connected(apps[1]));
 }
 
 #[test]
