@@ -121,7 +121,7 @@ impl Client {
         if self.pieces.gone.is_empty() {
             return Vec::new();
         }
-        let view = self.replica.world().view();
+        let view = self.replica.world().samples();
         let returned = self.pieces.take_ground(within, |sample| view.is_solid(sample));
         self.tell_pieces(0, Vec::new(), returned.clone());
         returned
