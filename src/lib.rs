@@ -405,6 +405,7 @@ mod guide {
         Determinism "docs/guide/src/determinism.md"
         Servers "docs/guide/src/servers.md"
         Together "docs/guide/src/together.md"
+        WhoMayConnect "docs/guide/src/who-may-connect.md"
         Cuda "docs/guide/src/cuda.md"
         Performance "docs/guide/src/performance.md"
         Mining "docs/guide/src/recipes/mining.md"
