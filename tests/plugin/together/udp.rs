@@ -1,6 +1,7 @@
 //! Over UDP, with the code of the examples: players need tokens, and come back by themselves.
 
 #[path = "../../../examples/shared/party.rs"]
+#[allow(dead_code, reason = "programs use its port")]
 mod party;
 #[path = "../../../examples/shared/reconnect.rs"]
 mod reconnect;
@@ -119,6 +120,21 @@ fn who_has_no_token_of_the_server_does_not_connect() {
     let address = party::listen(open.world_mut(), (Ipv4Addr::LOCALHOST, 0).into(), 8).expect("a free port");
     let mut stranger = stranger_to(address);
     frames_until("anybody connects", &mut [&mut open, &mut stranger], |apps| is_connected(apps[1]));
+}
+
+#[test]
+fn the_key_of_a_file_is_made_once() {
+    let folder = std::env::temp_dir().join(format!("burrow-key-{}", std::process::id()));
+    drop(std::fs::remove_dir_all(&folder));
+    let file = folder.join("server.key");
+    let read = || std::fs::read_to_string(&file).expect("it is there");
+    Key::of_file(&file).expect("there is room");
+    let text = read();
+    Key::of_file(&file).expect("it is a key");
+    assert_eq!((read(), text.trim().len()), (text.clone(), 64));
+    std::fs::write(&file, "no key").expect("there is room");
+    assert!(Key::of_file(&file).is_err());
+    drop(std::fs::remove_dir_all(&folder));
 }
 
 #[test]
