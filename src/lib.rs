@@ -361,8 +361,8 @@ pub mod prelude {
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
         Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
-        MaterialColors, Redo, ShownLevels, SlimVertices, TargetedBrush, TerrainHit, TerrainReady, Terrains,
-        Tile, Undo,
+        LoosePieceReturned, MaterialColors, Redo, ShownLevels, SlimVertices, TargetedBrush, TerrainHit,
+        TerrainReady, Terrains, Tile, Undo,
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{
@@ -371,7 +371,8 @@ pub mod prelude {
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,
-        PieceFate, Receipt, Rejection, Restored, ScenarioCounts, Span, Terrain, TerrainSettings,
+        PieceFate, PieceId, Receipt, Rejection, Restored, ReturnedPiece, ScenarioCounts, Span, Terrain,
+        TerrainSettings,
     };
     #[cfg(feature = "render")]
     pub use crate::view::{
@@ -404,6 +405,7 @@ mod guide {
         Determinism "docs/guide/src/determinism.md"
         Servers "docs/guide/src/servers.md"
         Together "docs/guide/src/together.md"
+        WhoMayConnect "docs/guide/src/who-may-connect.md"
         Cuda "docs/guide/src/cuda.md"
         Performance "docs/guide/src/performance.md"
         Mining "docs/guide/src/recipes/mining.md"

@@ -536,3 +536,183 @@ fn corners_and_edges_connect_nothing() {
     assert_eq!(pieces.iter().map(|piece| piece.voxels).collect::<Vec<_>>(), [64, 64]);
     assert!(pieces.iter().all(|piece| piece.runs.len() == 16 && piece.fate == PieceFate::Left));
 }
+
+/// What a terrain's last edit cut off: the names of pieces that are gone, sorted.
+fn names<'a>(pieces: impl IntoIterator<Item = &'a LoosePiece>) -> Vec<PieceId> {
+    let gone = pieces.into_iter().filter(|piece| piece.is_gone());
+    let mut names: Vec<PieceId> = gone.map(|piece| piece.id).collect();
+    names.sort_unstable();
+    names
+}
+
+fn returned(restored: &Restored) -> Vec<PieceId> {
+    let mut names: Vec<PieceId> = restored.returned.iter().map(|piece| piece.id).collect();
+    names.sort_unstable();
+    names
+}
+
+#[test]
+fn an_undo_brings_back_the_pieces_of_its_edits_and_a_redo_cuts_them_off_again() {
+    let (mut steps, mut all) = (0, BTreeSet::new());
+    for index in 0..world_count(60) {
+        let mut rng = Rng::with_seed(54_000 + index);
+        let (ground, chunk_size) = small_world(&mut rng, index);
+        let brushes: Vec<Brush> = (0..10).map(|_| crumbling_brush(&mut rng, &ground, chunk_size)).collect();
+        let mut terrain = terrain(ground, chunk_size);
+        terrain.set_loose(Some(LooseSettings { largest: 2000, crumbs: 4, debris: 1500 }));
+        // Of each step: the pieces that its edits took out, and what an inventory gained by it.
+        let mut done: Vec<(Vec<LoosePiece>, [i64; 2])> = Vec::new();
+        let total = |counts: &MaterialCounts| counts.total() as i64;
+        let voxels = |pieces: &[LoosePiece]| pieces.iter().map(|piece| piece.voxels as i64).sum::<i64>();
+        for group in brushes.chunks(2) {
+            let before = terrain.history().undos;
+            let (mut pieces, mut gained) = (Vec::new(), 0);
+            for receipt in terrain.apply(group) {
+                let Ok(applied) = receipt.outcome else { continue };
+                gained += total(&applied.removed) - total(&applied.added);
+                pieces.extend(applied.loose.into_iter().filter(LoosePiece::is_gone));
+            }
+            if terrain.history().undos > before {
+                let fallen = voxels(&pieces);
+                done.push((pieces, [gained, fallen]));
+            }
+        }
+        for (pieces, [gained, fallen]) in done.iter().rev() {
+            let restored = terrain.undo().outcome.expect("it can be undone");
+            assert_eq!(returned(&restored), names(pieces), "world {index}");
+            assert!(restored.loose.is_empty());
+            let back: i64 = restored.returned.iter().map(|piece| total(&piece.materials)).sum();
+            assert_eq!(back, *fallen, "world {index}");
+            assert_eq!(total(&restored.added) - total(&restored.removed) - back, *gained, "world {index}");
+        }
+        for (pieces, [gained, _]) in &done {
+            let restored = terrain.redo().outcome.expect("it can be redone");
+            let again: Vec<LoosePiece> = restored.loose.into_iter().map(|(_, piece)| piece).collect();
+            assert_eq!(&again, pieces, "world {index}: with names and meshes");
+            assert!(restored.returned.is_empty());
+            assert_eq!(total(&restored.removed) - total(&restored.added) - voxels(pieces), *gained);
+            steps += usize::from(!pieces.is_empty());
+            all.extend(names(pieces));
+        }
+    }
+    assert!(steps > 40 && all.len() > 80, "{steps} steps with {} pieces", all.len());
+}
+
+#[test]
+fn a_piece_has_the_same_name_on_every_machine_and_after_it_was_saved() {
+    let cut = |tag: u64, is_dug_elsewhere: bool| {
+        let mut terrain = table();
+        terrain.set_loose(Some(LooseSettings { largest: 10_000, crumbs: 0, debris: 10_000 }));
+        if is_dug_elsewhere {
+            terrain.apply([Brush::dig(Shape::sphere(Vec3::new(8.0, 8.0, 8.0), 4.0))]);
+        }
+        let receipt = terrain.apply([saw().with_tag(tag).with_stroke(tag)]).remove(0);
+        receipt.outcome.expect("it reaches the pillar").loose.remove(0)
+    };
+    let piece = cut(1, false);
+    assert_eq!(piece.id, cut(2, true).id, "neither its tag nor other digs name a piece");
+    assert_eq!(piece.id, PieceId(0x290d_3a66_8563_701c), "names are part of what machines exchange");
+    let saved = serde_json::to_string(&piece).expect("it can be saved");
+    assert_eq!(serde_json::from_str::<LoosePiece>(&saved).expect("it can be read").id, piece.id);
+}
+
+#[test]
+fn history_counts_the_pieces_that_it_holds() {
+    let bytes = |debris: u32| {
+        let mut terrain = table();
+        terrain.set_loose(Some(LooseSettings { largest: 10_000, crumbs: 10_000 - debris, debris }));
+        terrain.clear_history();
+        let loose = terrain.apply([saw()]).remove(0).outcome.expect("it reaches the pillar").loose;
+        (terrain.history().bytes, loose[0].mesh.as_ref().map_or(0, |mesh| mesh.bytes()))
+    };
+    let ((with_mesh, mesh), (without, none)) = (bytes(10_000), bytes(0));
+    assert!(mesh > 10_000 && none == 0);
+    assert!(with_mesh >= without + mesh, "{with_mesh} bytes, {without} without a mesh of {mesh}");
+}
+
+/// A comb: a block whose upper part is poles of 2 x 2 voxels, `height` voxels high, from x = `low` on.
+fn comb(height: i32) -> Terrain {
+    let mut terrain = terrain(Ground::flat(64, 64, 8.0).expect("flat ground"), 32);
+    let (middle, half) = (8.0 + height as f32 / 2.0, height as f32 / 2.0);
+    let block = Shape::cuboid(Vec3::new(32.0, middle, 32.0), Vec3::new(16.0, half, 16.0));
+    let gaps = (0..10).flat_map(|at| {
+        let at = 17.0 + 3.0 * at as f32;
+        let gap = |x: f32, z: f32, half: Vec3| Brush::dig(Shape::cuboid(Vec3::new(x, middle, z), half));
+        [gap(at, 32.0, Vec3::new(0.5, half + 1.0, 18.0)), gap(32.0, at, Vec3::new(18.0, half + 1.0, 0.5))]
+    });
+    terrain.apply(std::iter::once(Brush::add(block, MaterialId(1))).chain(gaps));
+    terrain
+}
+
+/// Cuts all poles of a comb near their feet.
+fn cut_comb() -> Brush {
+    Brush::dig(Shape::cuboid(Vec3::new(32.0, 20.0, 32.0), Vec3::new(18.0, 1.0, 18.0)))
+}
+
+#[test]
+fn what_an_edit_costs_bounds_what_its_search_finds() {
+    let settings = LooseSettings { debris: 4096, ..LooseSettings::default() };
+    let cut = |terrain: &mut Terrain| {
+        let receipt = terrain.apply([cut_comb()]).remove(0);
+        receipt.outcome.expect("it reaches the comb")
+    };
+    // A short comb falls whole.
+    let mut short = comb(40);
+    short.set_loose(Some(settings));
+    let applied = cut(&mut short);
+    assert!(!applied.has_unsearched);
+    assert!(applied.loose.len() > 60, "{} pieces", applied.loose.len());
+
+    let mut tall = comb(900);
+    let in_air = |terrain: &Terrain| {
+        let cut = LatticeBox { min: IVec3::new(14, 21, 14), max: IVec3::new(50, 23, 50) };
+        terrain.world().loose_pieces(cut, &settings).len()
+    };
+    assert_eq!(in_air(&tall), 0, "all poles stand");
+    assert!(tall.world().is_solid(DVec3::new(18.0, 900.0, 18.0)), "up to the top");
+    tall.set_loose(Some(settings));
+    let applied = cut(&mut tall);
+    assert!(applied.has_unsearched, "the receipt says that not all is found");
+    let runs: usize = applied.loose.iter().map(|piece| piece.runs.len()).sum();
+    let voxels: u64 = applied.loose.iter().map(|piece| piece.voxels).sum();
+    assert!(voxels <= 4 * u64::from(settings.largest) && runs <= voxels as usize);
+    let left = in_air(&tall);
+    assert!(left > 0, "what is beyond the budget stays as ground");
+    assert!(tall.world().check_seams().is_flawless());
+
+    // The same everywhere, however it is batched; and it is undone as a whole.
+    let mut other = comb(900);
+    let before = other.world().hash();
+    other.set_loose(Some(settings));
+    let brushes = [Brush::dig(Shape::sphere(Vec3::new(4.0, 8.0, 4.0), 2.0)), cut_comb()];
+    let again = other.apply(&brushes).remove(1).outcome.expect("it reaches the comb");
+    assert_eq!((again.loose, again.has_unsearched), (applied.loose.clone(), true));
+    assert!(other.undo().outcome.is_ok());
+    assert_eq!(other.world().hash(), before);
+
+    // Later digs beside them find the others.
+    let mut turns = 0;
+    while in_air(&tall) > 0 {
+        tall.apply([Brush::dig(Shape::cuboid(
+            Vec3::new(32.0, 23.0 + turns as f32, 32.0),
+            Vec3::new(18.0, 1.0, 18.0),
+        ))]);
+        turns += 1;
+        assert!(turns < 60, "{} of {left} are left", in_air(&tall));
+    }
+}
+
+#[test]
+fn an_honest_search_ends_before_its_budget() {
+    // A sheet one voxel thick with as many voxels as a search looks for, on a neck.
+    let mut terrain = terrain(Ground::flat(128, 64, 8.0).expect("flat ground"), 32);
+    let sheet = Shape::cuboid(Vec3::new(64.0, 280.0, 32.0), Vec3::new(31.2, 256.0, 0.6));
+    let neck = Shape::cuboid(Vec3::new(64.0, 16.0, 32.0), Vec3::new(2.2, 12.0, 2.2));
+    terrain.apply([Brush::add(sheet, MaterialId(2)), Brush::add(neck, MaterialId(1))]);
+    terrain.set_loose(Some(LooseSettings::default()));
+    let cut = Brush::dig(Shape::cuboid(Vec3::new(64.0, 16.0, 32.0), Vec3::new(4.0, 1.2, 4.0)));
+    let applied = terrain.apply([cut]).remove(0).outcome.expect("it reaches the neck");
+    assert!(!applied.has_unsearched);
+    assert_eq!(applied.loose.len(), 1);
+    assert!(applied.loose[0].voxels > 31_000, "{} voxels", applied.loose[0].voxels);
+}

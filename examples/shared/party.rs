@@ -1,6 +1,8 @@
 //! Connections over UDP, for programs whose players dig together.
 //!
-//! They are not encrypted, and anybody may join under any number: for machines of friends. Games use the tokens of `netcode`.
+//! How players prove who they are is in [`ServerAuthentication`] and [`ClientAuthentication`]. `Unsecure` connections are not
+//! encrypted, and anybody may join under any number: they are for machines of friends. `Secure` ones need a token for each
+//! connection, as `tokens.rs` issues them.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, SystemTime};
@@ -17,7 +19,7 @@ use bevy_replicon_renet::{RenetChannelsExt, RenetClient, RenetServer};
 pub const PORT: u16 = 5100;
 
 /// Programs with another number do not understand each other.
-const PROTOCOL: u64 = 0x6275_7272_6f77;
+pub const PROTOCOL: u64 = 0x6275_7272_6f77;
 
 /// Bytes a second that are sent to each player at most.
 const BYTES: u64 = 4 << 20;
@@ -31,19 +33,34 @@ fn config(world: &World) -> ConnectionConfig {
     }
 }
 
-/// Listens for players, at most so many. Everything that is replicated has to be registered.
+/// Listens for players who need no token, at most so many. Everything that is replicated has to be registered.
 ///
 /// # Errors
 /// When the address is taken.
 pub fn listen(world: &mut World, address: SocketAddr, players: usize) -> Result<SocketAddr> {
+    listen_as(world, address, None, players, ServerAuthentication::Unsecure)
+}
+
+/// Listens for players who prove who they are in this way. Tokens have to name the address that is returned, or the public one if
+/// there is one.
+///
+/// # Errors
+/// When the address is taken.
+pub fn listen_as(
+    world: &mut World,
+    address: SocketAddr,
+    public: Option<SocketAddr>,
+    players: usize,
+    authentication: ServerAuthentication,
+) -> Result<SocketAddr> {
     let socket = UdpSocket::bind(address)?;
     let local = socket.local_addr()?;
     let config = ServerConfig {
         current_time: now()?,
         max_clients: players,
         protocol_id: PROTOCOL,
-        authentication: ServerAuthentication::Unsecure,
-        public_addresses: vec![local],
+        authentication,
+        public_addresses: vec![public.unwrap_or(local)],
     };
     let server = RenetServer::new(self::config(world));
     world.insert_resource(server);
@@ -51,21 +68,29 @@ pub fn listen(world: &mut World, address: SocketAddr, players: usize) -> Result<
     Ok(local)
 }
 
-/// Connects to a server, as the player of this number, and ends what was there before.
+/// Connects to a server that asks for no token, as the player of this number, and ends what was there before.
 ///
 /// # Errors
 /// When there is no network.
 pub fn connect(world: &mut World, server: SocketAddr, player: u64) -> Result {
-    // Replicon notices a connection when its resource is added, and not when it replaces another one.
-    leave(world);
-    let any = if server.ip().is_loopback() { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
-    let socket = UdpSocket::bind((any, 0))?;
     let authentication = ClientAuthentication::Unsecure {
         client_id: player,
         protocol_id: PROTOCOL,
         server_addr: server,
         user_data: None,
     };
+    connect_as(world, server, authentication)
+}
+
+/// Connects to a server as a player who proves who it is in this way, and ends what was there before.
+///
+/// # Errors
+/// When there is no network.
+pub fn connect_as(world: &mut World, server: SocketAddr, authentication: ClientAuthentication) -> Result {
+    // Replicon notices a connection when its resource is added, and not when it replaces another one.
+    leave(world);
+    let any = if server.ip().is_loopback() { Ipv4Addr::LOCALHOST } else { Ipv4Addr::UNSPECIFIED };
+    let socket = UdpSocket::bind((any, 0))?;
     let client = RenetClient::new(config(world));
     world.insert_resource(client);
     world.insert_resource(NetcodeClientTransport::new(now()?, authentication, socket)?);
@@ -85,6 +110,7 @@ pub fn leave(world: &mut World) {
     world.remove_resource::<RenetServer>();
 }
 
-fn now() -> Result<Duration> {
+/// Time since 1970, which connections and tokens count in.
+pub fn now() -> Result<Duration> {
     Ok(SystemTime::now().duration_since(SystemTime::UNIX_EPOCH)?)
 }

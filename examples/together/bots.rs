@@ -12,10 +12,15 @@ use bevy_replicon::prelude::*;
 use bevy_replicon_renet::RepliconRenetPlugins;
 use fastrand::Rng;
 
+use crate::reconnect::{ReconnectPlugin, StayConnected};
+use crate::tokens::Key;
 use crate::{Digging, party};
 
 /// Time between two frames.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
+
+/// Time between two tries to connect.
+const RETRY: Duration = Duration::from_secs(1);
 
 /// How long bots wait at the end until all that they did is confirmed, and all of them see the same.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -42,8 +47,9 @@ pub struct Bots {
 }
 
 impl Bots {
-    pub fn new(server: SocketAddr, digging: Digging) -> Result<Self> {
-        let all = (0..digging.count as u64).map(|number| Bot::new(server, number + 1));
+    /// Bots that connect with tokens of this key, if there is one, in the place of a login service.
+    pub fn new(server: SocketAddr, key: Option<Key>, digging: Digging) -> Result<Self> {
+        let all = (0..digging.count as u64).map(|number| Bot::new(server, key, number + 1));
         Ok(Self { all: all.collect::<Result<_>>()?, digging })
     }
 
@@ -97,16 +103,19 @@ impl Bots {
 }
 
 impl Bot {
-    fn new(server: SocketAddr, player: u64) -> Result<Self> {
+    fn new(server: SocketAddr, key: Option<Key>, player: u64) -> Result<Self> {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, RepliconRenetPlugins))
-            .add_plugins((BurrowPlugins, TogetherPlugin))
+            .add_plugins((BurrowPlugins, TogetherPlugin, ReconnectPlugin))
             .init_resource::<Seen>()
+            .insert_resource(StayConnected::new(RETRY, move |world| match key {
+                Some(key) => party::connect_as(world, server, key.issue(player, vec![server])?),
+                None => party::connect(world, server, player),
+            }))
             .add_systems(Last, watch);
         app.finish();
         app.cleanup();
         let terrain = app.world_mut().spawn((crate::terrain()?, SharedTerrain::default())).id();
-        party::connect(app.world_mut(), server, player)?;
         Ok(Self { app, terrain, next: Duration::ZERO })
     }
 

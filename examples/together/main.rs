@@ -7,21 +7,31 @@
 //! ```
 //!
 //! The server meshes nothing and draws nothing. With `--world DIR` it saves what is dug, and goes on with it when it is started
-//! again; players stay, and come back by themselves. Each second it prints a line of JSON with the number of the last edit, the hash
+//! again: bots connect again by themselves, and what they dug meanwhile is done then. Each second it prints a line of JSON with the number of the last edit, the hash
 //! of the world and what was sent. Bots print what their edits came to; in the end all of them say which world they see: `loopback`
 //! compares these, and fails if they differ, or if anything had to be repaired.
+//!
+//! Who connects to the server needs a token, which nobody makes without the server's key. It is made when the server starts for the first
+//! time, in `out/together.key`; bots read it there, in the place of a login service that a game has. Connections are encrypted.
 //!
 //! | file | subject |
 //! | --- | --- |
 //! | `server.rs` | the dedicated server |
 //! | `bots.rs` | players that dig at random |
 //! | `proxy.rs` | a bad network |
+//! | `../shared/party.rs` | connections over UDP |
+//! | `../shared/tokens.rs` | keys and tokens |
+//! | `../shared/reconnect.rs` | players come back by themselves |
 
 mod bots;
 #[path = "../shared/party.rs"]
 mod party;
 mod proxy;
+#[path = "../shared/reconnect.rs"]
+mod reconnect;
 mod server;
+#[path = "../shared/tokens.rs"]
+mod tokens;
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -34,7 +44,11 @@ use clap::Parser;
 
 use crate::bots::Bots;
 use crate::proxy::{Proxy, Weather};
-use crate::server::Dedicated;
+use crate::server::{Access, Dedicated};
+use crate::tokens::Key;
+
+/// The file with the server's key.
+const KEY: &str = "out/together.key";
 
 /// Players dig one world.
 #[derive(Parser, Clone, Debug)]
@@ -44,6 +58,12 @@ enum Options {
         /// Where it listens.
         #[arg(long, default_value_t = SocketAddr::from((Ipv4Addr::LOCALHOST, party::PORT)))]
         address: SocketAddr,
+        /// The address at which players find it, if that is another one.
+        #[arg(long)]
+        public: Option<SocketAddr>,
+        /// The file with the key of connect tokens; it is made if it is not there.
+        #[arg(long, value_name = "FILE", default_value = KEY)]
+        key: PathBuf,
         /// The folder that keeps the world.
         #[arg(long, value_name = "DIR")]
         world: Option<PathBuf>,
@@ -56,6 +76,9 @@ enum Options {
         /// The server's address.
         #[arg(long, default_value_t = SocketAddr::from((Ipv4Addr::LOCALHOST, party::PORT)))]
         address: SocketAddr,
+        /// The file with the server's key.
+        #[arg(long, value_name = "FILE", default_value = KEY)]
+        key: PathBuf,
         #[command(flatten)]
         digging: Digging,
     },
@@ -112,23 +135,24 @@ fn main() -> ExitCode {
 
 fn run(options: Options) -> Result<bool> {
     match options {
-        Options::Server { address, world, seconds } => {
-            let mut server = Dedicated::new(address, world.as_deref())?;
+        Options::Server { address, public, key, world, seconds } => {
+            let access = Access { key: Key::of_file(&key)?, public };
+            let mut server = Dedicated::new(address, Some(access), world.as_deref())?;
             let length = seconds.map(Duration::from_secs_f64);
             server.run_for(length);
             server.finish();
             Ok(true)
         }
-        Options::Bots { address, digging } => {
-            let mut bots = Bots::new(address, digging)?;
+        Options::Bots { address, key, digging } => {
+            let mut bots = Bots::new(address, Some(Key::of_file(&key)?), digging)?;
             bots.dig(|| {});
             Ok(bots.report(None))
         }
         Options::Loopback { digging, loss, latency, jitter } => {
-            let mut server = Dedicated::new((Ipv4Addr::LOCALHOST, 0).into(), None)?;
+            let mut server = Dedicated::new((Ipv4Addr::LOCALHOST, 0).into(), None, None)?;
             let (latency, jitter) = (Duration::from_millis(latency), Duration::from_millis(jitter));
             let proxy = Proxy::new(server.address, Weather { loss, latency, jitter })?;
-            let mut bots = Bots::new(proxy.address, digging)?;
+            let mut bots = Bots::new(proxy.address, None, digging)?;
             bots.dig(|| server.update());
             let hash = server.hash();
             let is_right = bots.report(hash);

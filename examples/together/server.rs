@@ -15,12 +15,20 @@ use bevy_replicon::prelude::*;
 use bevy_replicon_renet::RepliconRenetPlugins;
 
 use crate::party;
+use crate::tokens::Key;
 
 /// Time between two frames.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 
 /// Most players.
 const PLAYERS: usize = 64;
+
+/// Who may connect.
+pub struct Access {
+    pub key: Key,
+    /// The address that tokens name, if it is another one than the server listens at.
+    pub public: Option<SocketAddr>,
+}
 
 /// A server without a window.
 pub struct Dedicated {
@@ -31,7 +39,8 @@ pub struct Dedicated {
 }
 
 impl Dedicated {
-    pub fn new(address: SocketAddr, world: Option<&Path>) -> Result<Self> {
+    /// Players need tokens that were made with the key, if there is one.
+    pub fn new(address: SocketAddr, access: Option<Access>, world: Option<&Path>) -> Result<Self> {
         let settings = ServerSettings::default();
         let terrain = crate::terrain()?;
         let ground = match world {
@@ -53,7 +62,12 @@ impl Dedicated {
                 return Err(Arc::clone(why).into());
             }
         }
-        let address = party::listen(app.world_mut(), address, PLAYERS)?;
+        let address = match access {
+            Some(Access { key, public }) => {
+                party::listen_as(app.world_mut(), address, public, PLAYERS, key.server())?
+            }
+            None => party::listen(app.world_mut(), address, PLAYERS)?,
+        };
         Ok(Self { app, address, next_line: Instant::now() + Duration::from_secs(1) })
     }
 

@@ -41,6 +41,11 @@ impl Stamps {
         id
     }
 
+    /// Adds all images of others.
+    pub fn add_all(&mut self, others: &Self) {
+        self.0.extend(others.0.iter().map(|(id, image)| (*id, Arc::clone(image))));
+    }
+
     /// The image of this name.
     pub fn get(&self, id: StampId) -> Option<&Arc<GreyImage>> {
         self.0.get(&id)

@@ -23,6 +23,9 @@ use crate::terrain::Drawn;
 struct Shared {
     near: RwLock<Neighbourhood>,
     shapes: RwLock<HashMap<(Entity, Drawn), Arc<GroundShape>>>,
+    /// How many more colliders panic while they are built.
+    #[cfg(test)]
+    panics: std::sync::atomic::AtomicU32,
 }
 
 /// Where colliders are wanted, and the shapes of those that exist.
@@ -59,9 +62,27 @@ impl GroundColliders {
 
     /// Builds a collider. Call it in a task.
     pub fn build_collider(&self, part: &Part, surface: &SurfaceMesh) -> BuiltCollider {
+        #[cfg(test)]
+        self.panic_if_asked();
         let shape = GroundShape::new(surface, part.voxel_size).map(Arc::new);
         let changed = GroundShape::difference(self.shape(part).as_deref(), shape.as_deref());
         BuiltCollider { colliders: self.clone(), part: *part, shape, changed }
+    }
+}
+
+#[cfg(test)]
+impl GroundColliders {
+    pub fn panic_times(&self) -> &std::sync::atomic::AtomicU32 {
+        &self.0.panics
+    }
+
+    fn panic_if_asked(&self) {
+        use std::sync::atomic::Ordering::Relaxed;
+        let less = |left: u32| (left > 0).then(|| if left == u32::MAX { left } else { left - 1 });
+        if self.0.panics.fetch_update(Relaxed, Relaxed, less).is_ok() {
+            // Without a message: many do.
+            std::panic::resume_unwind(Box::new("on purpose"));
+        }
     }
 }
 
@@ -102,6 +123,29 @@ fn body_of(part: &EntityWorldMut) -> Option<Entity> {
     children.find(|&child| part.world().get::<GroundBody>(child).is_some())
 }
 
+/// How far from 1 a scale may be by rounding.
+const ROUNDING: f32 = 1e-4;
+
+/// Inserts a collider. Avian scales a new one at once by the scale of the body's `GlobalTransform`, and that of a rotated
+/// terrain is not exactly 1: the shape would be copied here, on the main thread, and be a plain mesh until the next step. So
+/// the body's place has no rotation while the collider is inserted.
+fn insert_unscaled(body: &mut EntityWorldMut, collider: Collider) {
+    let place = body.get::<GlobalTransform>().copied();
+    let rounded = place.filter(|place| place.scale().abs_diff_eq(Vec3::ONE, ROUNDING));
+    let set = |body: &mut EntityWorldMut, place: GlobalTransform| {
+        if let Some(mut own) = body.get_mut::<GlobalTransform>() {
+            *own.bypass_change_detection() = place;
+        }
+    };
+    if let Some(place) = rounded {
+        set(body, GlobalTransform::from_translation(place.translation()));
+    }
+    body.insert(collider);
+    if let Some(place) = rounded {
+        set(body, place);
+    }
+}
+
 impl BuiltCollider {
     /// Replaces the part's collider, unless its surface has changed since this one was built.
     pub fn attach(self, mut part: EntityWorldMut) {
@@ -126,7 +170,7 @@ impl BuiltCollider {
                 world.resource_mut::<PhysicsFigures>().changes = count;
             }
             world.resource_mut::<PhysicsFigures>().swaps += 1;
-            let contact = world.resource::<GroundContact>().clone();
+            let contact = GroundContact::of(world, self.part.terrain);
             match (self.shape, old.and_then(|old| world.get_entity_mut(old).ok())) {
                 (None, None) => {}
                 (None, Some(old)) => old.despawn(),
@@ -139,7 +183,7 @@ impl BuiltCollider {
                         old.insert((bounds, EnlargedAabb::new(bounds)));
                     }
                     contact.apply(&mut old);
-                    old.insert(collider);
+                    insert_unscaled(&mut old, collider);
                 }
                 (Some(shape), None) => {
                     let mut body = world.spawn((
@@ -147,8 +191,8 @@ impl BuiltCollider {
                         // Shapes are in metres, parts in voxels.
                         Transform::from_scale(Vec3::splat(self.part.voxel_size.recip())),
                         ChildOf(owner),
-                        Collider::from(SharedShape(shape)),
                     ));
+                    insert_unscaled(&mut body, Collider::from(SharedShape(shape)));
                     contact.apply(&mut body);
                 }
             }

@@ -1,22 +1,27 @@
 //! Loose pieces of ground that fall as rigid bodies.
 
+use std::time::Duration;
+
 use avian3d::prelude::*;
 use bevy::prelude::*;
 
 use super::debris_collider;
 use crate::ground::MaterialId;
-use crate::lattice::{LatticeBox, SNAP};
+use crate::lattice::SNAP;
 use crate::plugin::{
-    BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, ThreadTask, Threads,
-    trigger_if_alive,
+    BurrowSystems, GroundPiece, LoosePieceFound, LoosePieceReturned, MaterialColors, ThreadTask, Threads,
+    panic_message, trigger_if_alive,
 };
 use crate::surface::SurfaceMesh;
-use crate::terrain::{PieceFate, Restored, Terrain};
+use crate::terrain::{PieceFate, PieceId, Terrain};
 
 /// Lets ground that broke off fall as a rigid body. Put a [`LooseGround`](crate::plugin::LooseGround) on the terrain; its
 /// `debris` is the largest piece that falls, in voxels. If the app has `Assets<Mesh>`, a piece is drawn from the frame in
 /// which the ground loses it. It becomes a body as soon as a task has built its collider. Its mesh is built with the
 /// transaction; only if a game commits by itself is it built on the main thread.
+///
+/// Matter is neither doubled nor lost: when a piece becomes ground again, by an undo of any player or because a server refused
+/// the dig, its debris is despawned wherever it has rolled, and no other is. A redo lets it fall again.
 ///
 /// Requires avian's `PhysicsPlugins`, the [`TerrainPhysicsPlugin`](super::TerrainPhysicsPlugin), and a
 /// [`ColliderSource`](super::ColliderSource) nearby, so that there is ground to fall on.
@@ -39,7 +44,7 @@ pub struct DebrisPlugin;
 pub struct DebrisSettings {
     /// The most pieces at once. Further ones vanish.
     pub most: usize,
-    /// Seconds from when a piece becomes a body until it crumbles.
+    /// Seconds of physics from when a piece becomes a body until it crumbles. They stand still while `Time<Physics>` does.
     pub stay: f32,
     /// Friction of the pieces.
     pub friction: Friction,
@@ -58,6 +63,8 @@ impl Default for DebrisSettings {
 #[derive(Component, Clone, Debug, PartialEq)]
 #[require(RigidBody::Dynamic, Visibility, TransformInterpolation)]
 pub struct Debris {
+    /// Which piece it is.
+    pub id: PieceId,
     /// The tag of the brush that cut it off.
     pub tag: u64,
     /// Its most common material.
@@ -66,7 +73,7 @@ pub struct Debris {
     pub voxels: u64,
     /// Half the sides of its bounds as it was in the ground, in metres.
     pub half: Vec3,
-    /// Seconds until it crumbles.
+    /// Seconds of physics until it crumbles.
     pub left: f32,
 }
 
@@ -90,6 +97,16 @@ pub struct DebrisCrumbled {
     pub entity: Entity,
 }
 
+/// Tells debris of pieces with the same name apart: the piece that was cut off last is the first to return.
+#[derive(Component, Clone, Copy, Debug)]
+struct Origin {
+    id: PieceId,
+    /// Counts pieces.
+    number: u64,
+    /// Pieces of this name that were cut off later, and whose debris is gone, since it crumbled or had no room.
+    gone_since: usize,
+}
+
 /// A piece that is drawn, but not a body yet, since its collider is being built. It stays where it was in the ground.
 #[derive(Component)]
 #[require(Transform, Visibility)]
@@ -102,7 +119,7 @@ impl Plugin for DebrisPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<DebrisSettings>().add_observer(clear).add_systems(
             Update,
-            (break_off, despawn_in_restored_ground, become_body, crumble)
+            (break_off, return_to_ground, become_body, crumble)
                 .chain()
                 .after(BurrowSystems::Commit)
                 .before(BurrowSystems::Propagate),
@@ -119,6 +136,7 @@ fn break_off(
     places: TransformHelper,
     pieces: Query<(), With<DebrisOf>>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
+    mut number: Local<u64>,
 ) {
     let mut room = settings.most.saturating_sub(pieces.count());
     // A terrain without colours has pieces without colours.
@@ -126,7 +144,13 @@ fn break_off(
     for found in found.read().filter(|found| found.piece.fate == PieceFate::BrokeOff) {
         let Ok((terrain, colors)) = terrains.get(found.terrain) else { continue };
         let Ok(ground) = places.compute_global_transform(found.terrain) else { continue };
-        let Some(surface) = found.piece.mesh.clone().filter(|_| room > 0) else { continue };
+        *number += 1;
+        let origin = Origin { id: found.piece.id, number: *number, gone_since: 0 };
+        let Some(surface) = found.piece.mesh.clone().filter(|_| room > 0) else {
+            let terrain = found.terrain;
+            commands.queue(move |world: &mut World| forget(world, terrain, origin));
+            continue;
+        };
         room -= 1;
         let (scale, bounds) = (ground.scale().x, found.piece.bounds);
         let size = bounds.max - bounds.min;
@@ -134,7 +158,7 @@ fn break_off(
         let middle = ground.transform_point(found.origin() + size.as_vec3() / 2.0);
         let place = Transform::from_translation(middle).with_rotation(ground.rotation());
         let corner = Transform::from_translation(-debris.half).with_scale(Vec3::splat(scale));
-        let task = ThreadTask::start(Threads::Background, move || {
+        let task = ThreadTask::start(Threads::Colliders, move || {
             let mut surface = SurfaceMesh::clone(&surface);
             surface.vertices.iter_mut().for_each(|vertex| vertex.position -= size * (SNAP / 2));
             debris_collider(&surface, scale)
@@ -142,6 +166,7 @@ fn break_off(
         let mut piece = commands.spawn((
             Name::new("debris"),
             DebrisOf(found.terrain),
+            origin,
             PendingDebris { debris, task },
             place,
         ));
@@ -157,6 +182,7 @@ fn break_off(
 fn describe(found: &LoosePieceFound, half: Vec3, stay: f32) -> Debris {
     let most = found.piece.materials.iter().max_by_key(|(_, voxels)| *voxels);
     Debris {
+        id: found.piece.id,
         tag: found.tag,
         material: most.map_or_else(MaterialId::default, |(material, _)| material),
         voxels: found.piece.voxels,
@@ -165,36 +191,50 @@ fn describe(found: &LoosePieceFound, half: Vec3, stay: f32) -> Debris {
     }
 }
 
-/// Despawns pieces where undo or redo restored ground.
-fn despawn_in_restored_ground(
-    mut commands: Commands,
-    mut steps: MessageReader<HistoryMoved>,
-    places: TransformHelper,
-    terrains: Query<&TerrainDebris>,
-    pieces: Query<(Entity, AnyOf<(&Debris, &PendingDebris)>, &Transform)>,
-) {
-    for HistoryMoved { terrain, receipt } in steps.read() {
-        let Some(entity) = *terrain else { continue };
-        let Ok(ground) = places.compute_global_transform(entity) else { continue };
-        let Ok(debris) = terrains.get(entity) else { continue };
-        let Ok(Restored { bounds: Some(bounds), added, .. }) = &receipt.outcome else { continue };
-        if added.total() == 0 {
-            continue;
-        }
-        let local = ground.affine().inverse();
-        for (entity, (fallen, pending), place) in pieces.iter_many(debris.iter()) {
-            let Some(debris) = fallen.or(pending.map(|pending| &pending.debris)) else { continue };
-            let middle = local.transform_point3(place.translation);
-            if meets(*bounds, middle, debris.half.length() / ground.scale().x) {
-                commands.entity(entity).try_despawn();
-            }
+/// Despawns the debris of pieces that are ground again.
+fn return_to_ground(mut commands: Commands, mut returned: MessageReader<LoosePieceReturned>) {
+    for LoosePieceReturned { terrain, piece } in returned.read() {
+        let (terrain, id) = (*terrain, piece.id);
+        if piece.fate == PieceFate::BrokeOff {
+            // Whatever was spawned for messages before this one is there by then.
+            commands.queue(move |world: &mut World| take_back(world, terrain, id));
         }
     }
 }
 
-/// Whether a ball intersects a box.
-fn meets(bounds: LatticeBox, middle: Vec3, reach: f32) -> bool {
-    middle.distance(middle.clamp(bounds.min.as_vec3(), bounds.max.as_vec3())) < reach
+/// The debris of one name that was cut off last, before the given number.
+fn latest(world: &World, terrain: Entity, id: PieceId, before: u64) -> Option<Entity> {
+    let pieces = world.get::<TerrainDebris>(terrain)?.iter();
+    let origins = pieces.filter_map(|piece| Some((piece, world.get::<Origin>(piece)?)));
+    let same = origins.filter(|(_, own)| own.id == id && own.number < before);
+    same.max_by_key(|(_, own)| own.number).map(|(piece, _)| piece)
+}
+
+/// Despawns the debris of the piece of this name that was cut off last, unless that one is gone already.
+fn take_back(world: &mut World, terrain: Entity, id: PieceId) {
+    let Some(piece) = latest(world, terrain, id, u64::MAX) else { return };
+    match world.get_mut::<Origin>(piece) {
+        Some(mut origin) if origin.gone_since > 0 => origin.gone_since -= 1,
+        _ => drop(world.despawn(piece)),
+    }
+}
+
+/// Enters that a piece has no debris any more, although it is not ground again.
+fn forget(world: &mut World, terrain: Entity, gone: Origin) {
+    let earlier = latest(world, terrain, gone.id, gone.number);
+    if let Some(mut origin) = earlier.and_then(|piece| world.get_mut::<Origin>(piece)) {
+        origin.gone_since += gone.gone_since + 1;
+    }
+}
+
+/// Despawns a piece that is not ground again.
+fn vanish(world: &mut World, piece: Entity) {
+    let Ok(entity) = world.get_entity(piece) else { return };
+    let known = entity.get::<DebrisOf>().copied().zip(entity.get::<Origin>().copied());
+    if let Some((DebrisOf(terrain), origin)) = known {
+        forget(world, terrain, origin);
+    }
+    world.despawn(piece);
 }
 
 /// Turns pieces whose colliders are built into bodies.
@@ -204,14 +244,21 @@ fn become_body(
     mut pending: Query<(Entity, &mut PendingDebris)>,
 ) {
     for (entity, mut piece) in &mut pending {
-        let Some(collider) = piece.task.finish() else { continue };
-        let mut entity = commands.entity(entity);
+        let Some(built) = piece.task.check() else { continue };
+        let collider = built.unwrap_or_else(|panic| {
+            let why = panic_message(panic.as_ref());
+            error!(
+                "{entity}, debris of {} voxels, vanishes: its collider panicked: {why}",
+                piece.debris.voxels
+            );
+            None
+        });
         let Some(collider) = collider else {
-            entity.try_despawn();
+            commands.queue(move |world: &mut World| vanish(world, entity));
             continue;
         };
         let DebrisSettings { friction, restitution, .. } = *settings;
-        entity.try_remove::<PendingDebris>().try_insert((
+        commands.entity(entity).try_remove::<PendingDebris>().try_insert((
             piece.debris.clone(),
             collider,
             friction,
@@ -220,12 +267,23 @@ fn become_body(
     }
 }
 
-fn crumble(mut commands: Commands, time: Res<Time>, mut pieces: Query<(Entity, &mut Debris)>) {
+/// Lets pieces age by the time that physics has advanced.
+fn crumble(
+    mut commands: Commands,
+    time: Res<Time<Physics>>,
+    mut last: Local<Duration>,
+    mut pieces: Query<(Entity, &mut Debris)>,
+) {
+    let now = time.elapsed();
+    let passed = now.saturating_sub(std::mem::replace(&mut last, now)).as_secs_f32();
+    if passed == 0.0 {
+        return;
+    }
     for (entity, mut debris) in &mut pieces {
-        debris.left -= time.delta_secs();
+        debris.left -= passed;
         if debris.left <= 0.0 {
             trigger_if_alive(&mut commands, DebrisCrumbled { entity });
-            commands.entity(entity).try_despawn();
+            commands.queue(move |world: &mut World| vanish(world, entity));
         }
     }
 }

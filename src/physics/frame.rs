@@ -1,5 +1,6 @@
 //! A terrain seen from bodies above it: whether the ground that they may soon reach has colliders.
 
+use avian3d::prelude::CollisionLayers;
 use bevy::math::bounding::{Aabb2d, AabbCast2d};
 use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
@@ -32,6 +33,8 @@ pub(super) struct TerrainFrame<'a> {
     pub size: f32,
     /// Whether its tiles and chunks show its current world.
     pub is_shown: bool,
+    /// The layers of its ground.
+    pub layers: CollisionLayers,
     entities: Option<&'a TerrainEntities>,
 }
 
@@ -41,10 +44,11 @@ impl<'a> TerrainFrame<'a> {
         model: &'a Terrain,
         entities: Option<&'a TerrainEntities>,
         place: &GlobalTransform,
+        layers: CollisionLayers,
     ) -> Self {
         let is_shown = entities.is_some_and(|entities| entities.show(model.world()));
         let inverse = place.affine().inverse();
-        Self { terrain, model, inverse, size: voxel_size(place), is_shown, entities }
+        Self { terrain, model, inverse, size: voxel_size(place), is_shown, layers, entities }
     }
 
     /// The distance from a place to a column along x or z, whichever is larger, in voxels.

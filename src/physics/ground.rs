@@ -25,8 +25,8 @@ pub struct GroundBody {
     pub drawn: Drawn,
 }
 
-/// The contact properties of ground. A change applies to each collider when it is next made; components that a game
-/// inserts on a [`GroundBody`] itself stay until then.
+/// The contact properties of ground, for all terrains without a [`TerrainContact`]. A change applies to each collider when
+/// it is next made; components that a game inserts on a [`GroundBody`] itself stay until then.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct GroundContact {
@@ -38,11 +38,64 @@ pub struct GroundContact {
     pub layers: CollisionLayers,
 }
 
+/// The contact properties of one terrain's ground, instead of those of the resource [`GroundContact`]. Put it on the
+/// terrain's entity. When it is inserted or removed, all colliders of the terrain change at once.
+///
+/// ```
+/// # use avian3d::prelude::*;
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::physics::{GroundContact, TerrainContact};
+/// # use bevy_burrow::prelude::*;
+/// # fn spawn(mut commands: Commands, ice: Terrain) {
+/// let contact = GroundContact { friction: Some(Friction::new(0.05)), ..default() };
+/// commands.spawn((ice, TerrainContact(contact)));
+/// # }
+/// ```
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default)]
+pub struct TerrainContact(pub GroundContact);
+
+/// Leaves a terrain out of physics: it gets no colliders and loses those that it has, and no body is held or lifted by it.
+/// For a backdrop, say. Put it on the terrain's entity; its [`EdgeWalls`](super::EdgeWalls) stay.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default)]
+pub struct TerrainPhysicsDisabled;
+
+/// Applies a terrain's contact properties to all of its colliders.
+pub(super) fn change_contact(new: On<Insert, TerrainContact>, mut commands: Commands) {
+    let terrain = new.entity;
+    commands.queue(move |world: &mut World| apply_to_all(world, terrain));
+}
+
+/// Applies those of the resource again.
+pub(super) fn reset_contact(gone: On<Remove, TerrainContact>, mut commands: Commands) {
+    let terrain = gone.entity;
+    commands.queue(move |world: &mut World| apply_to_all(world, terrain));
+}
+
+fn apply_to_all(world: &mut World, terrain: Entity) {
+    let contact = GroundContact::of(world, terrain);
+    let mut bodies = world.query::<(Entity, &GroundBody)>();
+    let own = bodies.iter(world).filter(|(_, body)| body.terrain == terrain);
+    let own: Vec<Entity> = own.map(|(body, _)| body).collect();
+    for body in own {
+        if let Ok(mut body) = world.get_entity_mut(body) {
+            contact.clone().apply(&mut body);
+        }
+    }
+}
+
 /// The [`GroundContact`] that was last applied to a body.
 #[derive(Component)]
 struct Applied(GroundContact);
 
 impl GroundContact {
+    /// That of a terrain's ground.
+    pub(super) fn of(world: &World, terrain: Entity) -> Self {
+        let own = world.get::<TerrainContact>(terrain).map(|own| own.0.clone());
+        own.unwrap_or_else(|| world.resource::<Self>().clone())
+    }
+
     /// Inserts these components on a body, unless the same ones were inserted last: the game's own components stay.
     pub(super) fn apply(self, body: &mut EntityWorldMut) {
         if body.get::<Applied>().is_none_or(|applied| applied.0 != self) {

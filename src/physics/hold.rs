@@ -10,7 +10,7 @@ use bevy::prelude::*;
 use super::columns::{ColumnKey, Columns};
 use super::frame::{AHEAD, TerrainFrame};
 use super::solids::{Extent, FARTHEST, Reach, Solids};
-use super::{ColliderSource, PhysicsFigures};
+use super::{ColliderSource, PhysicsFigures, TerrainPhysicsDisabled};
 use crate::lattice::ChunkGrid;
 use crate::plugin::TerrainEntities;
 use crate::terrain::Terrain;
@@ -169,13 +169,14 @@ pub(super) struct TerrainState {
     is_shown: bool,
     grid: ChunkGrid,
     ground: u64,
+    layers: CollisionLayers,
 }
 
 impl TerrainState {
     fn of(frame: &TerrainFrame) -> Self {
-        let TerrainFrame { terrain, model, inverse, is_shown, .. } = *frame;
+        let TerrainFrame { terrain, model, inverse, is_shown, layers, .. } = *frame;
         let (grid, ground) = (model.world().grid(), model.world().ground().hash());
-        Self { terrain, inverse, is_shown, grid, ground }
+        Self { terrain, inverse, is_shown, grid, ground, layers }
     }
 }
 
@@ -210,16 +211,23 @@ impl HoldCheck<'_, '_, '_> {
         !self.changed.is_empty() && self.frames.iter().any(has_changed)
     }
 
-    /// Whether a body of this extent may soon reach ground without a collider.
-    fn lacks_ground(&self, body: &BodyItem, reach: Reach) -> bool {
-        let (middle, half) = (reach.middle(), reach.half());
+    /// Whether a body collides with the ground of some terrain, and, if that has to be checked, may soon reach such ground where
+    /// it has no collider.
+    fn must_hold(&self, body: &BodyItem, solids: &Solids, must_check: bool) -> bool {
         let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
-        let lacks_ground_at = |place: Vec3| {
-            let lacks =
-                |frame: &TerrainFrame| frame.lacks_ground(self.columns, place + middle, towards, half);
-            self.frames.iter().any(lacks)
-        };
-        lacks_ground_at(body.position.0) || self.placed(body).is_some_and(lacks_ground_at)
+        let placed = if must_check { self.placed(body) } else { None };
+        // Most terrains have the same layers.
+        let mut known: Option<(CollisionLayers, Option<Reach>)> = None;
+        self.frames.iter().any(|frame| {
+            let known = match known {
+                Some(known) if known.0 == frame.layers => known,
+                _ => *known.insert((frame.layers, solids.reach(&body.extent, frame.layers))),
+            };
+            let Some(reach) = known.1 else { return false };
+            let lacks_ground_at =
+                |place: Vec3| frame.lacks_ground(self.columns, place + reach.middle(), towards, reach.half());
+            !must_check || lacks_ground_at(body.position.0) || placed.is_some_and(lacks_ground_at)
+        })
     }
 
     /// Where a game has just moved the body by its transform. Physics takes that over in its next step.
@@ -241,7 +249,7 @@ pub(super) fn hold_bodies(
     mut bodies: Query<Body, Without<super::GroundBody>>,
     places: TransformHelper,
     config: Option<Res<PhysicsTransformConfig>>,
-    terrains: Query<(Entity, &Terrain, Option<&TerrainEntities>)>,
+    terrains: Query<(Entity, &Terrain, Option<&TerrainEntities>), Without<TerrainPhysicsDisabled>>,
     sources: Query<(), With<ColliderSource>>,
     mut columns: ResMut<Columns>,
     solids: Solids,
@@ -253,7 +261,7 @@ pub(super) fn hold_bodies(
         .iter()
         .filter_map(|(entity, model, entities)| {
             let place = places.compute_global_transform(entity).ok()?;
-            Some(TerrainFrame::new(entity, model, entities, &place))
+            Some(TerrainFrame::new(entity, model, entities, &place, solids.layers(entity)))
         })
         .collect();
     let states: Vec<TerrainState> = frames.iter().map(TerrainState::of).collect();
@@ -269,9 +277,8 @@ pub(super) fn hold_bodies(
         if !must_check && body.hold.is_none() {
             continue;
         }
-        let reach = if body.can_be_held() { solids.reach(&body.extent) } else { None };
         // Without a check, a held body stays held.
-        if reach.is_some_and(|reach| !must_check || check.lacks_ground(&body, reach)) {
+        if body.can_be_held() && check.must_hold(&body, &solids, must_check) {
             held += 1;
             body.hold(&mut commands);
         } else {

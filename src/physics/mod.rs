@@ -26,6 +26,7 @@
 //! | finding the terrain of a collider that was hit | [`GroundBody`] on the collider's entity |
 //! | live figures | [`PhysicsFigures`] |
 //! | bodies that cannot leave the terrain | [`EdgeWalls`] on the terrain |
+//! | a terrain without physics | [`TerrainPhysicsDisabled`] on the terrain |
 //!
 //! # Guarantees
 //!
@@ -45,7 +46,7 @@
 //!   later. Sensors, bodies on layers that ignore the ground, sleeping bodies and those locked along y are left alone.
 //!
 //! Bodies are ordinary avian bodies, and ground is `RigidBody::Static`. [`GroundContact`] sets its `Friction`,
-//! `Restitution` and `CollisionLayers`.
+//! `Restitution` and `CollisionLayers`, and [`TerrainContact`] those of one terrain.
 
 mod character;
 mod character_plugin;
@@ -70,7 +71,7 @@ pub use character::{Character, CharacterMotion, CharacterSteering};
 pub use character_plugin::{CharacterPlugin, CharacterSystems};
 pub use debris::{Debris, DebrisCrumbled, DebrisOf, DebrisPlugin, DebrisSettings, TerrainDebris};
 pub use edge_walls::EdgeWalls;
-pub use ground::{GroundBody, GroundCollider, GroundContact};
+pub use ground::{GroundBody, GroundCollider, GroundContact, TerrainContact, TerrainPhysicsDisabled};
 pub use hold::HeldByGround;
 pub use hull::debris_collider;
 pub use shape::GroundShape;
@@ -120,6 +121,8 @@ pub struct PhysicsFigures {
     pub swaps: u64,
     /// Colliders dropped because their surface had changed again.
     pub stale: u64,
+    /// Colliders that could not be made: each is tried again, and then its tile or chunk keeps what it has.
+    pub failed: u64,
     /// Tiles and chunks checked so far, because they changed or a source arrived or left.
     pub looked_at: u64,
     /// Tiles and chunks that changed since bodies were last woken.
@@ -161,6 +164,9 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_observer(edge_walls::build)
             .add_observer(edge_walls::rebuild)
             .add_observer(edge_walls::remove)
+            .add_observer(edge_walls::remove_with_terrain)
+            .add_observer(ground::change_contact)
+            .add_observer(ground::reset_contact)
             .add_systems(First, |mut figures: ResMut<PhysicsFigures>| figures.main_thread = Duration::ZERO)
             .add_systems(Update, sources::find_near.in_set(TerrainPhysicsSystems::Near))
             .add_systems(

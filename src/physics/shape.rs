@@ -62,15 +62,28 @@ impl GroundShape {
         type Corners = [[u32; 3]; 3];
         let corners = |shape: &Self, triangle: usize| -> Corners {
             let Triangle { a, b, c } = shape.mesh.triangle(triangle as u32);
-            let mut corners = [a, b, c].map(|corner| corner.to_array().map(f32::to_bits));
-            corners.sort_unstable();
-            corners
+            [a, b, c].map(|corner| corner.to_array().map(f32::to_bits))
         };
-        let all = |shape: Option<&'_ Self>| -> Vec<Corners> {
-            shape.map_or_else(Vec::new, |shape| (0..shape.triangles()).map(|t| corners(shape, t)).collect())
+        let counts = [old, new].map(|shape| shape.map_or(0, Self::triangles));
+        // Both come in the same order, and most edits change few triangles of a part: those before and behind are equal.
+        let (mut front, mut back) = (0, 0);
+        if let (Some(old), Some(new)) = (old, new) {
+            let shorter = counts[0].min(counts[1]);
+            let is_same = |before: usize, after: usize| corners(old, before) == corners(new, after);
+            front = (0..shorter).take_while(|&at| is_same(at, at)).count();
+            let from_end = 1..=shorter - front;
+            back = from_end.take_while(|at| is_same(counts[0] - at, counts[1] - at)).count();
+        }
+        let rest = |shape: Option<&'_ Self>, count: usize| -> Vec<Corners> {
+            let sorted = |shape: &Self, triangle| {
+                let mut corners = corners(shape, triangle);
+                corners.sort_unstable();
+                corners
+            };
+            shape.map_or_else(Vec::new, |shape| (front..count - back).map(|t| sorted(shape, t)).collect())
         };
         let mut seen: FxHashMap<Corners, bool> = FxHashMap::default();
-        seen.extend(all(old).into_iter().map(|corners| (corners, false)));
+        seen.extend(rest(old, counts[0]).into_iter().map(|corners| (corners, false)));
         let mut found: Option<(Vec3, Vec3)> = None;
         let mut include = |corners: &Corners| {
             for corner in corners.map(|corner| Vec3::from(corner.map(f32::from_bits))) {
@@ -78,7 +91,7 @@ impl GroundShape {
                 found = Some((low.min(corner), high.max(corner)));
             }
         };
-        for corners in all(new) {
+        for corners in rest(new, counts[1]) {
             match seen.get_mut(&corners) {
                 Some(is_kept) => *is_kept = true,
                 None => include(&corners),
@@ -260,7 +273,8 @@ impl Shape for GroundShape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ground::Ground;
+    use crate::brush::{Brush, Shape as BrushShape};
+    use crate::ground::{Ground, MaterialId};
     use crate::terrain::{Drawn, Terrain, TerrainSettings};
 
     /// How steep the roof's slopes are: rise over run.
@@ -301,5 +315,57 @@ mod tests {
             let other = Vector::new(-slope.x, slope.y, 0.0);
             assert!(beyond.abs_diff_eq(other, 1e-5), "{beyond} beside {face}");
         }
+    }
+
+    /// The box around all triangles that only one of two shapes has, by comparing each with each.
+    fn naive_difference(old: Option<&GroundShape>, new: Option<&GroundShape>) -> Option<(Vec3, Vec3)> {
+        let all = |shape: Option<&GroundShape>| -> Vec<Vec<[u32; 3]>> {
+            let triangles = shape.into_iter().flat_map(|shape| {
+                (0..shape.triangles() as u32).map(|number| {
+                    let Triangle { a, b, c } = shape.mesh.triangle(number);
+                    let mut corners = [a, b, c].map(|corner| corner.to_array().map(f32::to_bits)).to_vec();
+                    corners.sort_unstable();
+                    corners
+                })
+            });
+            triangles.collect()
+        };
+        let (old, new) = (all(old), all(new));
+        let only_one =
+            old.iter().filter(|own| !new.contains(own)).chain(new.iter().filter(|own| !old.contains(own)));
+        let corners = only_one.flatten().map(|corner| Vec3::from(corner.map(f32::from_bits)));
+        corners.map(|corner| (corner, corner)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    #[test]
+    fn the_difference_of_two_shapes_bounds_the_triangles_that_only_one_has() {
+        let mut rng = fastrand::Rng::with_seed(3);
+        let ground = Ground::from_fn(32, 32, |x, z| 10.0 + f64::from((x * 7 + z * 3) % 5)).expect("valid");
+        let settings = TerrainSettings { chunk_size: 16, voxel_size: 1.0 };
+        let mut terrain = Terrain::new(ground, &settings).expect("valid");
+        let shapes = |terrain: &Terrain| -> Vec<(Drawn, GroundShape)> {
+            let world = terrain.world();
+            let meshes =
+                world.drawn().filter_map(|(drawn, mesh)| Some((drawn, GroundShape::new(&mesh, 1.0)?)));
+            meshes.collect()
+        };
+        let (mut before, mut changed) = (shapes(&terrain), 0);
+        for _ in 0..12 {
+            let place = Vec3::new(rng.f32() * 32.0, 8.0 + rng.f32() * 6.0, rng.f32() * 32.0);
+            let ball = BrushShape::sphere(place, 1.0 + rng.f32() * 4.0);
+            let dig = if rng.bool() { Brush::dig(ball) } else { Brush::add(ball, MaterialId(1)) };
+            terrain.apply([dig]);
+            let after = shapes(&terrain);
+            let find = |all: &'_ [(Drawn, GroundShape)], drawn| all.iter().position(|own| own.0 == drawn);
+            for &(drawn, _) in before.iter().chain(&after) {
+                let old = find(&before, drawn).map(|at| &before[at].1);
+                let new = find(&after, drawn).map(|at| &after[at].1);
+                let found = GroundShape::difference(old, new);
+                assert_eq!(found, naive_difference(old, new), "{drawn:?}");
+                changed += usize::from(found.is_some());
+            }
+            before = after;
+        }
+        assert!(changed > 20, "{changed}");
     }
 }

@@ -6,7 +6,7 @@ use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 
 use super::character::Character;
-use super::ground::GroundContact;
+use super::ground::{GroundContact, TerrainContact};
 
 /// The largest distance that a body reaches from its position, in metres. Boxes of fast bodies are long.
 pub(super) const FARTHEST: Vec3 = Vec3::splat(8.0);
@@ -106,30 +106,42 @@ impl Reach {
     }
 }
 
+/// Whether a collider collides with ground on these layers.
+fn meets(collider: &SolidColliderItem, ground: CollisionLayers) -> bool {
+    !collider.is_sensor && !collider.is_disabled && ground.interacts_with(collider.layers())
+}
+
+/// The same for a character, which finds ground by casting its own collider with its own filters.
+fn carries(walker: &SolidColliderItem, ground: CollisionLayers) -> bool {
+    (walker.layers().filters & ground.memberships) != LayerMask::NONE
+}
+
 /// Finds which colliders collide with ground.
 #[derive(SystemParam)]
 pub(super) struct Solids<'w, 's> {
     colliders: Query<'w, 's, SolidCollider>,
     characters: Query<'w, 's, (), With<Character>>,
     ground: Res<'w, GroundContact>,
+    terrains: Query<'w, 's, &'static TerrainContact>,
 }
 
 impl Solids<'_, '_> {
-    fn meets(&self, collider: &SolidColliderItem) -> bool {
-        !collider.is_sensor && !collider.is_disabled && self.ground.layers.interacts_with(collider.layers())
+    /// The layers of a terrain's ground.
+    pub fn layers(&self, terrain: Entity) -> CollisionLayers {
+        self.terrains.get(terrain).map_or(self.ground.layers, |own| own.0.layers)
     }
 
-    /// The same for a character, which finds ground by casting its own collider with its own filters.
-    fn carries(&self, walker: &SolidColliderItem) -> bool {
-        (walker.layers().filters & self.ground.layers.memberships) != LayerMask::NONE
-    }
-
-    /// The box around a body's colliders that collide with ground; `None` if there are none, or if the body is static.
-    pub fn bounds(&self, entity: Entity, body: &RigidBody, own: &RigidBodyColliders) -> Option<ColliderAabb> {
+    /// The box around a body's colliders that collide with ground on these layers; `None` if there are none, or if the body is
+    /// static.
+    pub fn bounds(
+        &self,
+        (entity, body, own): (Entity, &RigidBody, &RigidBodyColliders),
+        ground: CollisionLayers,
+    ) -> Option<ColliderAabb> {
         if !body.is_dynamic() && !self.characters.contains(entity) {
             return None;
         }
-        let solid = self.colliders.iter_many(own).filter(|collider| self.meets(collider));
+        let solid = self.colliders.iter_many(own).filter(|collider| meets(collider, ground));
         solid.map(|collider| *collider.bounds).reduce(|a, b| a.merged(b))
     }
 
@@ -141,22 +153,23 @@ impl Solids<'_, '_> {
         position: &Position,
         rotation: &Rotation,
         middle: Vec3,
+        ground: CollisionLayers,
     ) -> Vec3 {
-        let solid = self.colliders.iter_many(own).filter(|collider| self.meets(collider));
+        let solid = self.colliders.iter_many(own).filter(|collider| meets(collider, ground));
         let places = solid.filter_map(|collider| collider.inside(position, rotation, middle));
         places.min_by(|(a, _), (b, _)| a.total_cmp(b)).map_or(middle, |(_, place)| place)
     }
 
-    /// The extent of a body's colliders that collide with ground; `None` if there are none.
-    pub fn reach(&self, body: &ExtentItem) -> Option<Reach> {
+    /// The extent of a body's colliders that collide with ground on these layers; `None` if there are none.
+    pub fn reach(&self, body: &ExtentItem, ground: CollisionLayers) -> Option<Reach> {
         let all = body.all.map_or(&[][..], |all| &all[..]);
         let is_single = all.is_empty() || all == [body.entity];
         match &body.own {
-            Some(own) if body.is_character => self.carries(own).then(|| body.reach(own)),
-            Some(own) if is_single => self.meets(own).then(|| body.reach(own)),
+            Some(own) if body.is_character => carries(own, ground).then(|| body.reach(own)),
+            Some(own) if is_single => meets(own, ground).then(|| body.reach(own)),
             None if is_single => Some(Reach::UNKNOWN),
             _ => {
-                let solid = self.colliders.iter_many(all).filter(|collider| self.meets(collider));
+                let solid = self.colliders.iter_many(all).filter(|collider| meets(collider, ground));
                 solid.map(|collider| body.reach(&collider)).reduce(Reach::merged)
             }
         }

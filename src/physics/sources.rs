@@ -1,6 +1,7 @@
 //! Sources: entities around which ground has colliders.
 
 use avian3d::prelude::*;
+use bevy::ecs::entity::EntityHashSet;
 use bevy::math::Vec3A;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -8,7 +9,8 @@ use bevy::prelude::*;
 use super::colliders::GroundColliders;
 use super::near::{Neighbourhood, ahead, stops, voxel_size};
 use super::solids::{Extent, Solids};
-use super::{HeldByGround, PhysicsFigures};
+use super::{HeldByGround, PhysicsFigures, TerrainPhysicsDisabled};
+use crate::lattice::ChunkGrid;
 use crate::plugin::{LevelsOfDetail, WantedTiles};
 use crate::terrain::Terrain;
 
@@ -21,7 +23,7 @@ const AHEAD: f32 = 1.0;
 ///
 /// A source that enters another voxel costs main-thread time for each column of chunks within its radius and on its way
 /// ahead; one that reaches the whole terrain does so only when it enters another column. Each collider costs time in a task,
-/// and memory.
+/// and memory: some 190 MB for a square of 1000 x 1000 voxels. A source that wants more than 256 MB is warned of once.
 ///
 /// With a `LinearVelocity`, ground where the source will be in a second has colliders too, up to 64 chunks ahead. Bodies
 /// need not be sources: those too far from any are [held](super::HeldByGround).
@@ -39,15 +41,37 @@ impl Default for ColliderSource {
     }
 }
 
+/// About how many bytes colliders take for each cell (x, z): two triangles, with their share of vertices and of the tree.
+const CELL_BYTES: f32 = 186.0;
+
+/// A source that wants colliders of more bytes than this is warned of.
+const MUCH: f32 = 256e6;
+
+/// About how many bytes the colliders within a radius take, in voxels.
+fn bytes_within(grid: ChunkGrid, radius: f32) -> f32 {
+    let all = grid.width() as f32 * grid.depth() as f32;
+    (std::f32::consts::PI * radius * radius).min(all) * CELL_BYTES
+}
+
+fn warn_of_radius(source: Entity, terrain: Entity, bytes: f32) {
+    warn!(
+        "the ColliderSource of {source} wants colliders of about {:.0} MB on the terrain {terrain}, which take long to make \
+         and stay in memory: give it a radius of what moves there in a few seconds, and a source of its own to everything \
+         else that needs ground",
+        bytes / 1e6
+    );
+}
+
 /// Finds where sources want colliders.
 pub(super) fn find_near(
     colliders: Res<GroundColliders>,
     places: TransformHelper,
-    terrains: Query<(Entity, &Terrain, Has<LevelsOfDetail>)>,
+    terrains: Query<(Entity, &Terrain, Has<LevelsOfDetail>), Without<TerrainPhysicsDisabled>>,
     sources: Query<(Entity, &ColliderSource, Option<&LinearVelocity>, Option<&HeldByGround>, Extent)>,
     solids: Solids,
     mut known: Local<Neighbourhood>,
     mut wanted: ResMut<WantedTiles>,
+    mut warned: Local<EntityHashSet>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
@@ -55,7 +79,7 @@ pub(super) fn find_near(
     for (terrain, model, _) in &terrains {
         let Ok(place) = places.compute_global_transform(terrain) else { continue };
         let (inverse, size) = (place.affine().inverse(), voxel_size(&place));
-        let grid = model.world().grid();
+        let (grid, layers) = (model.world().grid(), solids.layers(terrain));
         let mut all = Vec::new();
         for (source, &ColliderSource { radius }, velocity, hold, extent) in &sources {
             let Ok(place) = places.compute_global_transform(source) else { continue };
@@ -67,9 +91,13 @@ pub(super) fn find_near(
                 continue;
             }
             // A source reaches at least its own size, or it could be held for ever.
-            let reach = solids.reach(&extent).map_or(Vec3::ZERO, |reach| reach.farthest());
+            let reach = solids.reach(&extent, layers).map_or(Vec3::ZERO, |reach| reach.farthest());
             let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(reach)).xz().length();
-            all.extend(stops(grid, from.xz(), ahead(way, grid).xz(), (radius / size).max(own)));
+            let radius = (radius / size).max(own);
+            all.extend(stops(grid, from.xz(), ahead(way, grid).xz(), radius));
+            if bytes_within(grid, radius) > MUCH && warned.insert(source) {
+                warn_of_radius(source, terrain, bytes_within(grid, radius));
+            }
         }
         near.insert(terrain, grid, all, &known);
     }

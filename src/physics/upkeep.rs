@@ -1,8 +1,11 @@
 //! Adds colliders where a source arrives, and removes them where it leaves. Commits bring all others.
 
+use std::any::Any;
 use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
+use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use rayon::prelude::*;
@@ -10,9 +13,9 @@ use rayon::prelude::*;
 use super::PhysicsFigures;
 use super::colliders::{BuiltCollider, GroundColliders, detach};
 use super::columns::{Columns, PartState, Parts};
-use super::ground::GroundBody;
+use super::ground::{GroundBody, GroundCollider};
 use super::near::Neighbourhood;
-use crate::plugin::{Part, TerrainEntities, ThreadTask, Threads};
+use crate::plugin::{Part, TerrainEntities, ThreadTask, Threads, panic_message};
 use crate::terrain::{SurfaceDraft, Terrain};
 
 /// Colliders built by one task; few, so that the nearest ones are ready soon.
@@ -21,18 +24,37 @@ const BATCH: usize = 16;
 /// Time in a frame for attaching colliders. At least one is attached, and all of them while a body is held.
 const FRAME_TIME: Duration = Duration::from_micros(150);
 
+/// How often a collider is built that panics.
+const ATTEMPTS: u32 = 3;
+
+/// What a task made for a tile or chunk: its collider, or if that panicked, what the panic said.
+type Built = (Entity, Result<BuiltCollider, Failure>);
+
+/// Building the collider of a part panicked.
+struct Failure {
+    part: Part,
+    why: String,
+}
+
 /// Colliders being built, and those to be attached.
 #[derive(Resource, Default)]
 pub(super) struct ColliderTasks {
-    task: Option<ThreadTask<Vec<(Entity, BuiltCollider)>>>,
+    task: Option<ThreadTask<Vec<Built>>>,
     /// Built, but not attached yet.
-    done: VecDeque<(Entity, BuiltCollider)>,
+    done: VecDeque<Built>,
+    /// How often the colliders of tiles and chunks failed in a row.
+    failures: HashMap<Entity, u32>,
 }
 
 /// Attaches colliders that are built.
 pub(super) fn finish(mut commands: Commands, mut tasks: ResMut<ColliderTasks>) {
-    if let Some(done) = tasks.task.as_mut().and_then(ThreadTask::finish) {
-        (tasks.task, tasks.done) = (None, done.into());
+    if let Some(done) = tasks.task.as_mut().and_then(ThreadTask::check) {
+        tasks.task = None;
+        match done {
+            Ok(done) => tasks.done = done.into(),
+            // They are missing as before, so the next task builds them.
+            Err(panic) => error!("a task for colliders panicked: {}", panic_message(panic.as_ref())),
+        }
     }
     if !tasks.done.is_empty() {
         commands.queue(attach);
@@ -41,15 +63,40 @@ pub(super) fn finish(mut commands: Commands, mut tasks: ResMut<ColliderTasks>) {
 
 fn attach(world: &mut World) {
     let start = Instant::now();
-    while let Some((entity, collider)) = world.resource_mut::<ColliderTasks>().done.pop_front() {
-        if let Ok(part) = world.get_entity_mut(entity) {
-            collider.attach(part);
+    while let Some((entity, built)) = world.resource_mut::<ColliderTasks>().done.pop_front() {
+        match built {
+            Ok(collider) => {
+                world.resource_mut::<ColliderTasks>().failures.remove(&entity);
+                if let Ok(part) = world.get_entity_mut(entity) {
+                    collider.attach(part);
+                }
+            }
+            Err(failure) => fail(world, entity, &failure),
         }
         if start.elapsed() >= FRAME_TIME && world.resource::<PhysicsFigures>().held == 0 {
             break;
         }
     }
     world.resource_mut::<PhysicsFigures>().main_thread += start.elapsed();
+}
+
+/// Reports a collider that could not be built. It is missing, so it is built again; after some attempts its tile or chunk stays
+/// as it is until its surface changes, as bodies would be held over it for ever.
+fn fail(world: &mut World, entity: Entity, Failure { part, why }: &Failure) {
+    let failures = &mut world.resource_mut::<ColliderTasks>().failures;
+    let count = failures.entry(entity).or_default();
+    *count += 1;
+    let gives_up = *count >= ATTEMPTS;
+    let then = if gives_up { "it keeps the one that it had, or has none" } else { "it is built again" };
+    error!("building the collider of {:?} of {} panicked, {then}: {why}", part.drawn, part.terrain);
+    if gives_up {
+        failures.remove(&entity);
+        world.resource_mut::<PhysicsFigures>().failed += 1;
+        let Ok(mut owner) = world.get_entity_mut(entity) else { return };
+        if owner.get::<GroundCollider>().is_none_or(|old| old.revision < part.revision) {
+            owner.insert(GroundCollider { revision: part.revision });
+        }
+    }
 }
 
 /// Checks the columns that changed, or that sources entered or left. Removes colliders far from all sources, and starts to
@@ -108,7 +155,7 @@ fn begin(
     terrains: &Query<(&Terrain, &TerrainEntities)>,
     columns: &Columns,
     near: &Neighbourhood,
-) -> Option<ThreadTask<Vec<(Entity, BuiltCollider)>>> {
+) -> Option<ThreadTask<Vec<Built>>> {
     let is_shown =
         |&terrain: &Entity| terrains.get(terrain).is_ok_and(|(model, entities)| entities.show(model.world()));
     let missing = columns.waiting().filter(is_shown).flat_map(|terrain| {
@@ -136,10 +183,87 @@ fn begin(
         })
         .collect();
     let colliders = colliders.clone();
-    Some(ThreadTask::start(Threads::Background, move || {
+    Some(ThreadTask::start(Threads::Colliders, move || {
         let build = |(entity, part, draft): &(Entity, Part, SurfaceDraft)| {
-            (*entity, colliders.build_collider(part, &draft.surface()))
+            let build = AssertUnwindSafe(|| colliders.build_collider(part, &draft.surface()));
+            let failure = |panic: Box<dyn Any + Send>| Failure {
+                part: *part,
+                why: panic_message(panic.as_ref()).to_owned(),
+            };
+            (*entity, catch_unwind(build).map_err(failure))
         };
         batch.par_iter().map(build).collect()
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering;
+    use std::time::Duration;
+
+    use avian3d::prelude::*;
+    use bevy::time::TimeUpdateStrategy;
+
+    use super::*;
+    use crate::ground::Ground;
+    use crate::physics::{ColliderSource, HeldByGround, TerrainPhysicsPlugin};
+    use crate::plugin::BurrowPlugins;
+    use crate::terrain::TerrainSettings;
+
+    /// An app with level ground of four tiles, where building so many colliders panics.
+    fn app(panics: u32) -> App {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, PhysicsPlugins::default(), BurrowPlugins, TerrainPhysicsPlugin))
+            .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
+        app.finish();
+        app.cleanup();
+        let ground = Ground::flat(32, 32, 8.0).expect("valid ground");
+        let settings = TerrainSettings { chunk_size: 16, voxel_size: 1.0 };
+        let terrain = Terrain::new(ground, &settings).expect("valid settings");
+        app.world().resource::<GroundColliders>().panic_times().store(panics, Ordering::Relaxed);
+        app.world_mut().spawn(terrain);
+        // It arrives when the ground is there, so that a task builds the colliders, and not the load.
+        let is_shown = |app: &App| app.world().resource::<Columns>().counts() != (0, 0);
+        for _ in 0..200 {
+            app.update();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(!is_shown(&app), "without a source there are no colliders");
+        app.world_mut().spawn((Transform::from_xyz(16.0, 8.0, 16.0), ColliderSource { radius: 100.0 }));
+        app
+    }
+
+    fn run_until(app: &mut App, is_so: impl Fn(&PhysicsFigures) -> bool) {
+        let start = Instant::now();
+        while !is_so(app.world().resource::<PhysicsFigures>()) {
+            assert!(
+                start.elapsed() < Duration::from_secs(60),
+                "{:?}",
+                app.world().resource::<PhysicsFigures>()
+            );
+            app.update();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn a_collider_that_panics_once_is_built_again() {
+        let mut app = app(2);
+        run_until(&mut app, |figures| figures.colliders == 4 && figures.missing == 0);
+        assert_eq!(app.world().resource::<PhysicsFigures>().failed, 0);
+    }
+
+    #[test]
+    fn colliders_that_always_panic_are_given_up_and_hold_nothing() {
+        let mut app = app(u32::MAX);
+        run_until(&mut app, |figures| figures.missing > 0);
+        let ball = (RigidBody::Dynamic, Collider::sphere(0.5), Transform::from_xyz(16.0, 9.0, 16.0));
+        let ball = app.world_mut().spawn(ball).id();
+        run_until(&mut app, |figures| figures.missing == 0);
+        assert_eq!(app.world().resource::<PhysicsFigures>().failed, 4);
+        for _ in 0..5 {
+            app.update();
+        }
+        assert!(!app.world().entity(ball).contains::<HeldByGround>(), "a body is held for ever");
+    }
 }

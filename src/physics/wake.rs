@@ -11,7 +11,7 @@ use bevy::prelude::*;
 
 use super::character::CharacterMotion;
 use super::solids::Solids;
-use super::{GroundBody, PhysicsFigures};
+use super::{GroundBody, PhysicsFigures, TerrainPhysicsDisabled};
 use crate::plugin::TerrainEntities;
 use crate::terrain::{Drawn, Terrain, World as TerrainWorld};
 
@@ -111,19 +111,28 @@ pub(super) fn wake(
     let start = Instant::now();
     let changes = changes.take();
     figures.changes = 0;
+    let mut terrains: Vec<Entity> = changes.iter().map(|change| change.terrain).collect();
+    terrains.sort_unstable();
+    terrains.dedup();
+    let terrains: Vec<_> = terrains.into_iter().map(|terrain| (terrain, solids.layers(terrain))).collect();
     for (entity, body, own, bounds, sleeps) in &bodies {
         // Fast path: most bodies are far away and are their own only collider.
         let is_far = |bounds: &ColliderAabb| !changes.iter().any(|change| change.meets(bounds));
         if own[..] == [entity] && bounds.is_some_and(is_far) {
             continue;
         }
-        let Some(bounds) = solids.bounds(entity, body, own) else { continue };
-        let mut near = changes.iter().filter(|change| change.meets(&bounds)).peekable();
-        if near.peek().is_some() && sleeps {
+        let mut is_near = false;
+        for &(terrain, layers) in &terrains {
+            let Some(bounds) = solids.bounds((entity, body, own), layers) else { continue };
+            if changes.iter().any(|change| change.terrain == terrain && change.meets(&bounds)) {
+                is_near = true;
+                watched.0.insert((entity, terrain), WATCHED_FRAMES);
+            }
+        }
+        if is_near && sleeps {
             commands.queue_silenced(WakeBody(entity));
             figures.woken += 1;
         }
-        watched.0.extend(near.map(|change| ((entity, change.terrain), WATCHED_FRAMES)));
     }
     figures.main_thread += start.elapsed();
 }
@@ -146,7 +155,7 @@ pub(super) fn find_buried(
         (Without<GroundBody>, Without<Sleeping>, Without<RigidBodyDisabled>),
     >,
     solids: Solids,
-    terrains: Query<(Entity, &Terrain, &GlobalTransform, &TerrainEntities)>,
+    terrains: Query<(Entity, &Terrain, &GlobalTransform, &TerrainEntities), Without<TerrainPhysicsDisabled>>,
     mut turn: Local<usize>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
@@ -173,7 +182,7 @@ pub(super) fn find_buried(
         };
         for (terrain, world, inverse) in &ground {
             if world.is_buried(local(inverse))
-                && solids.bounds(entity, body, own).is_some()
+                && solids.bounds((entity, body, own), solids.layers(*terrain)).is_some()
                 && !ground.iter().any(is_in_air)
             {
                 watched.0.entry((entity, *terrain)).or_insert(1);
@@ -203,7 +212,12 @@ pub(super) struct BodyLifter<'w, 's> {
         ),
     >,
     solids: Solids<'w, 's>,
-    terrains: Query<'w, 's, (Entity, &'static Terrain, &'static GlobalTransform, &'static TerrainEntities)>,
+    terrains: Query<
+        'w,
+        's,
+        (Entity, &'static Terrain, &'static GlobalTransform, &'static TerrainEntities),
+        Without<TerrainPhysicsDisabled>,
+    >,
     time: Option<Res<'w, Time<Physics>>>,
     figures: ResMut<'w, PhysicsFigures>,
 }
@@ -225,7 +239,7 @@ impl BodyLifter<'_, '_> {
         watched.0.retain(|&(entity, terrain), frames| {
             *frames -= u8::from(counts);
             let terrain = terrains.iter().find(|known| known.0 == terrain);
-            let (Ok(body), Some((_, world, place, inverse))) = (bodies.get_mut(entity), terrain) else {
+            let (Ok(body), Some((known, world, place, inverse))) = (bodies.get_mut(entity), terrain) else {
                 return false;
             };
             let (body, own, mut position, rotation, center, mut velocity, transform, motion, is_child) = body;
@@ -235,8 +249,9 @@ impl BodyLifter<'_, '_> {
             if !is_in_ground(middle) {
                 return *frames > 0;
             }
-            let Some(bounds) = solids.bounds(entity, body, own) else { return false };
-            let inside = solids.inside(own, &position, rotation, middle);
+            let layers = solids.layers(*known);
+            let Some(bounds) = solids.bounds((entity, body, own), layers) else { return false };
+            let inside = solids.inside(own, &position, rotation, middle, layers);
             if !is_in_ground(inside) {
                 return *frames > 0;
             }

@@ -1,17 +1,19 @@
 //! Moves messages into the queues of terrains: brushes, undo, redo.
 
+use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::reach::reaches;
 use super::{
-    BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LooseGround, LoosePieceFound, Redo, TargetedBrush,
-    Undo, free_later,
+    BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LooseGround, LoosePieceFound, LoosePieceReturned,
+    Redo, TargetedBrush, Undo, free_later,
 };
 use crate::brush::{Brush, BrushError, Edit, Operation};
 use crate::lattice::ChunkGrid;
 use crate::terrain::{
-    HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain, Together, unique,
+    HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, ReturnedPiece, Terrain, Together,
+    unique,
 };
 
 /// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected at
@@ -120,7 +122,8 @@ pub(super) fn collect_steps(
     mut undos: MessageReader<Undo>,
     mut redos: MessageReader<Redo>,
     mut terrains: Query<(Entity, &mut Terrain, Option<&mut EditOutbox>)>,
-    mut moved: MessageWriter<HistoryMoved>,
+    mut messages: HistoryMessages,
+    mut found: MessageWriter<LoosePieceFound>,
     mut figures: ResMut<BurrowFigures>,
 ) {
     let start = Instant::now();
@@ -143,12 +146,13 @@ pub(super) fn collect_steps(
             None => terrains.iter_mut().for_each(|(_, terrain, outbox)| submit(terrain, outbox)),
         }
         if !is_taken {
-            moved.write(gone(target, step));
+            messages.moved.write(gone(target, step));
         }
     }
     // Results of steps that the queue had no room for, and of steps that the game took itself.
     for (entity, mut terrain, _) in &mut terrains {
-        send_history(entity, &mut terrain, &mut moved);
+        let receipts = send_history(entity, &mut terrain, &mut messages);
+        found.write_batch(receipts.iter().flat_map(|receipt| pieces_again(entity, receipt)));
     }
     figures.main_thread += start.elapsed();
 }
@@ -164,6 +168,15 @@ pub(crate) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Ite
             mesh: None,
         })
     })
+}
+
+/// The pieces that a redo cut off again.
+pub(super) fn pieces_again(
+    terrain: Entity,
+    receipt: &HistoryReceipt,
+) -> impl Iterator<Item = LoosePieceFound> {
+    let pieces = receipt.outcome.iter().flat_map(|restored| &restored.loose);
+    pieces.map(move |(tag, piece)| LoosePieceFound { terrain, tag: *tag, piece: piece.clone(), mesh: None })
 }
 
 /// A terrain with [`LooseGround`] looks for pieces at once.
@@ -183,16 +196,30 @@ pub(super) fn disable_loose_search(gone: On<Remove, LooseGround>, mut terrains: 
     }
 }
 
-/// Sends the results of a terrain's undo and redo steps.
+/// The messages that tell of undo and redo steps.
+#[derive(SystemParam)]
+pub(super) struct HistoryMessages<'w> {
+    pub moved: MessageWriter<'w, HistoryMoved>,
+    returned: MessageWriter<'w, LoosePieceReturned>,
+}
+
+/// Sends the results of a terrain's undo and redo steps, and returns them.
 pub(super) fn send_history(
     entity: Entity,
     terrain: &mut Mut<Terrain>,
-    moved: &mut MessageWriter<HistoryMoved>,
-) {
-    if terrain.has_history_receipts() {
-        let receipts = terrain.take_history_receipts().into_iter();
-        moved.write_batch(receipts.map(|receipt| HistoryMoved { terrain: Some(entity), receipt }));
+    messages: &mut HistoryMessages,
+) -> Vec<HistoryReceipt> {
+    if !terrain.has_history_receipts() {
+        return Vec::new();
     }
+    let receipts = terrain.take_history_receipts();
+    for receipt in &receipts {
+        let returned = receipt.outcome.iter().flat_map(|restored| &restored.returned);
+        let message = |piece: &ReturnedPiece| LoosePieceReturned { terrain: entity, piece: piece.clone() };
+        messages.returned.write_batch(returned.map(message));
+        messages.moved.write(HistoryMoved { terrain: Some(entity), receipt: receipt.clone() });
+    }
+    receipts
 }
 
 fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
@@ -207,18 +234,18 @@ pub(super) fn answer_removed(
     mut commands: Commands,
     mut terrains: Query<&mut Terrain>,
     mut answers: MessageWriter<BrushApplied>,
-    mut moved: MessageWriter<HistoryMoved>,
+    mut messages: HistoryMessages,
 ) {
     let Ok(mut terrain) = terrains.get_mut(gone.entity) else { return };
     let answered = terrain.take_answered().into_iter();
     answers.write_batch(answered.map(|receipt| BrushApplied { terrain: Some(gone.entity), receipt }));
-    send_history(gone.entity, &mut terrain, &mut moved);
+    send_history(gone.entity, &mut terrain, &mut messages);
     let answer = |tag| BrushApplied {
         terrain: Some(gone.entity),
         receipt: Receipt { tag, outcome: Err(Rejection::TerrainGone) },
     };
     answers.write_batch(terrain.unanswered().map(answer));
-    moved.write_batch(terrain.unanswered_steps().map(|step| self::gone(Some(gone.entity), step)));
+    messages.moved.write_batch(terrain.unanswered_steps().map(|step| self::gone(Some(gone.entity), step)));
     terrain.forget();
     let world = terrain.snapshot();
     commands.queue(move |_: &mut World| free_later(world));

@@ -5,7 +5,7 @@ use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::collect::send_history;
+use super::collect::{HistoryMessages, send_history};
 use super::diagnostics::measure_commit;
 use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive};
 use super::figures::{TaskTimes, start_measuring, stop_measuring};
@@ -16,7 +16,7 @@ use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
-    HistoryMoved, LoosePieceFound, MaterialColors, SlimVertices, SurfaceProcessors, free_later,
+    LoosePieceFound, MaterialColors, SlimVertices, SurfaceProcessors, free_later,
 };
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, FieldNews, Rejection, Terrain, World as Ground};
@@ -39,7 +39,7 @@ pub(super) fn begin_transactions(
     processors: Res<SurfaceProcessors>,
     engine: Res<BurrowEngine>,
     mut figures: ResMut<BurrowFigures>,
-    mut moved: MessageWriter<HistoryMoved>,
+    mut history: HistoryMessages,
     mut counter: ResMut<TaskCounter>,
 ) {
     let start = Instant::now();
@@ -53,7 +53,7 @@ pub(super) fn begin_transactions(
             continue;
         }
         let transaction = terrain.begin_for(true);
-        send_history(entity, &mut terrain, &mut moved);
+        send_history(entity, &mut terrain, &mut history);
         let Some(transaction) = transaction else { continue };
         if let Some(mut levels) = levels {
             levels.count_edit();
@@ -83,7 +83,7 @@ pub(super) struct Display<'w, 's> {
 #[derive(SystemParam)]
 pub(super) struct CommitMessages<'w> {
     receipts: MessageWriter<'w, BrushApplied>,
-    moved: MessageWriter<'w, HistoryMoved>,
+    history: HistoryMessages<'w>,
     found: MessageWriter<'w, LoosePieceFound>,
 }
 
@@ -191,7 +191,7 @@ fn commit(
         free_later(waste);
     }
     let is_step = terrain.has_history_receipts();
-    send_history(entity, &mut terrain, &mut messages.moved);
+    send_history(entity, &mut terrain, &mut messages.history);
     // Another world is loaded like a new terrain; until then the old one is shown.
     if !is_whole {
         entities.shown = terrain.world().version();

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use super::MaterialColors;
 use super::meshes::{MeshBuilder, VertexExtras};
 use crate::brush::Brush;
-use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, Terrain};
+use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, ReturnedPiece, Terrain};
 
 /// A brush in world space. It edits every terrain that it reaches, hidden ones too.
 ///
@@ -77,7 +77,8 @@ pub struct HistoryMoved {
 }
 
 /// A brush cut off a piece of ground, on a terrain with [`LooseGround`](super::LooseGround). A piece that vanishes or breaks
-/// off is gone from the ground in the frame of this message. The brush's receipt lists its pieces as well.
+/// off is gone from the ground in the frame of this message. The brush's receipt lists its pieces as well. A redo that cuts
+/// a piece off again sends this again, with the same [id](LoosePiece::id).
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct LoosePieceFound {
     /// The terrain. Positions of the piece are in its space, in voxels.
@@ -90,7 +91,24 @@ pub struct LoosePieceFound {
     pub(super) mesh: Option<Arc<Mesh>>,
 }
 
+/// A piece that had been cut off is ground again from this frame on: by an undo, a player's own or another's, or because a
+/// server refused the dig. What a game made of the piece has to go; `DebrisPlugin` does that for its debris, wherever it has
+/// rolled. Of several pieces with the same [id](ReturnedPiece::id) this is the one that was cut off last.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct LoosePieceReturned {
+    /// The terrain.
+    pub terrain: Entity,
+    /// The piece.
+    pub piece: ReturnedPiece,
+}
+
 impl LoosePieceFound {
+    /// A piece whose mesh is built where it is needed.
+    #[cfg(feature = "replicon")]
+    pub(crate) fn new(terrain: Entity, tag: u64, piece: LoosePiece) -> Self {
+        Self { terrain, tag, piece, mesh: None }
+    }
+
     /// The origin of the piece's mesh in voxels of the terrain: the translation for a child of the terrain that shows it.
     pub fn origin(&self) -> Vec3 {
         self.piece.bounds.min.as_vec3()

@@ -7,7 +7,8 @@
 //! gets everything but the meshes.
 //!
 //! [`Undo`] and [`Redo`] messages work by whole strokes, and are answered by [`HistoryMoved`]. On terrains with
-//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off.
+//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`] for each
+//! that an undo brings back.
 //!
 //! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`], and,
 //! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. They follow when such a component is inserted, changed
@@ -41,8 +42,6 @@ mod task;
 mod threads;
 mod times;
 
-#[cfg(feature = "replicon")]
-pub(crate) use collect::pieces;
 pub use components::{
     Chunk, EditOutbox, Field, GroundPiece, GroundPieces, Held, MaterialColors, MeshBytes, ShownSurface,
     SlimVertices, Tile,
@@ -58,15 +57,18 @@ pub use level_state::{LevelsOfDetail, ShownLevels};
 pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
-    LoosePieceFound, Redo, TargetedBrush, TerrainReady, Undo,
+    LoosePieceFound, LoosePieceReturned, Redo, TargetedBrush, TerrainReady, Undo,
 };
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 #[cfg(feature = "render")]
 pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_inherited};
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
+pub use threads::ThreadSettings;
 pub(crate) use threads::free_later;
 #[cfg(any(feature = "render", feature = "avian", feature = "store"))]
+#[cfg(feature = "avian")]
+pub(crate) use threads::panic_message;
 pub(crate) use threads::{ThreadTask, Threads};
 pub use times::Times;
 
@@ -120,6 +122,11 @@ pub enum BurrowSystems {
     Propagate,
 }
 
+/// Systems that look at what was just committed, still in [`BurrowSystems::Commit`].
+#[cfg(feature = "replicon")]
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct FollowCommits;
+
 /// Transactions, entities and messages; works in `MinimalPlugins`.
 #[derive(Default)]
 pub struct TerrainPlugin;
@@ -129,6 +136,7 @@ impl Plugin for TerrainPlugin {
         app.init_resource::<BurrowSettings>()
             .init_resource::<BurrowFigures>()
             .init_resource::<BurrowEngine>()
+            .init_resource::<ThreadSettings>()
             .init_resource::<task::TaskCounter>()
             .init_resource::<SurfaceProcessors>()
             .init_resource::<levels::Eyes>()
@@ -140,6 +148,7 @@ impl Plugin for TerrainPlugin {
             .add_message::<Redo>()
             .add_message::<HistoryMoved>()
             .add_message::<LoosePieceFound>()
+            .add_message::<LoosePieceReturned>()
             .register_required_components::<Terrain, Transform>()
             .register_required_components::<Terrain, Visibility>()
             .register_required_components::<Terrain, MaterialColors>()
@@ -184,6 +193,12 @@ impl Plugin for TerrainPlugin {
                     diagnostics::measure_frame.after(BurrowSystems::Begin),
                 ),
             );
+        #[cfg(feature = "replicon")]
+        app.configure_sets(
+            Update,
+            FollowCommits.in_set(BurrowSystems::Commit).after(commit::commit_transactions),
+        );
+        app.add_systems(First, threads::resize_pools.run_if(resource_exists_and_changed::<ThreadSettings>));
         app.add_systems(Update, engine::trim_engines.run_if(on_timer(engine::TRIMMED_EVERY)));
         diagnostics::register(app);
         propagate::add(app);

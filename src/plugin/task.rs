@@ -6,7 +6,7 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::LoosePieceFound;
-use super::collect::pieces;
+use super::collect::{pieces, pieces_again};
 use super::figures::TaskTimes;
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::threads::{ThreadTask, Threads};
@@ -81,7 +81,8 @@ impl InFlight {
             let _span = info_span!("burrow_mesh").entered();
             let surfaces = builder.build_all(tiles.chain(chunks).collect(), drawn_cut.as_deref());
             let nodes = builder.build_nodes(updates.nodes);
-            let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).collect();
+            let again = commit.step().into_iter().flat_map(|step| pieces_again(terrain, step));
+            let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).chain(again).collect();
             if let Some(mesh_builder) = &builder.mesh_builder {
                 pieces.iter_mut().for_each(|piece| piece.build_mesh(mesh_builder));
             }

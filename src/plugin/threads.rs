@@ -1,48 +1,127 @@
-//! Threads for long work: transactions, and background work that may take longer.
+//! Threads for long work: transactions, colliders, and background work that may take longer.
 //!
 //! Bevy's task pools are shared: `AsyncComputeTaskPool` compiles pipelines and has one thread on four cores, so work
-//! of seconds would block other users, and rayon's global pool belongs to the game. There are two pools, so that a world that
-//! loads does not delay the transactions of another one. Their threads sleep while there is no work.
+//! of seconds would block other users, and rayon's global pool belongs to the game. There are three pools, each of which works
+//! first in, first out: a world that loads delays neither the transactions of another one nor the colliders that bodies wait
+//! for. Their threads sleep while there is no work. [`ThreadSettings`] says how many there are.
 //!
 //! On platforms without threads, work is done at once.
 
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, PoisonError, RwLock};
 use std::thread;
 
 use bevy::platform::cell::SyncCell;
+use bevy::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// How many threads each of the plugin's pools has, besides those of Bevy. Insert it before the plugins, or change it at any
+/// time: work under way ends on the threads that it began on.
+///
+/// The pools belong to the process. If several apps run in one, the settings that changed last hold for all of them.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::plugin::ThreadSettings;
+/// // A game that needs most cores for itself.
+/// App::new().insert_resource(ThreadSettings { transactions: 2, background: 1, ..default() });
+/// ```
+#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Resource, Default)]
+pub struct ThreadSettings {
+    /// Threads for transactions, which players wait for.
+    pub transactions: usize,
+    /// Threads for what may take seconds: loads, textures, saves, seam checks, freeing memory.
+    pub background: usize,
+    /// Threads for colliders and debris, which bodies wait for.
+    pub colliders: usize,
+}
+
+impl ThreadSettings {
+    /// The default on a machine with so many cores.
+    ///
+    /// Transactions use all cores, as their work is short. Background work leaves a core to the frame, since it takes
+    /// seconds. Colliders need few: the batches are small.
+    fn on(cores: usize) -> Self {
+        Self { transactions: cores, background: (cores - 1).max(1), colliders: (cores / 4).clamp(1, 4) }
+    }
+}
+
+impl Default for ThreadSettings {
+    fn default() -> Self {
+        Self::on(thread::available_parallelism().map_or(1, |cores| cores.get()))
+    }
+}
 
 /// A pool of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Threads {
     /// For transactions, which players wait for.
     Transactions,
-    /// For everything that may take longer: loads, colliders, textures, freeing memory.
+    /// For everything that may take longer: loads, textures, saves, freeing memory.
     Background,
+    /// For colliders and debris, which bodies wait for.
+    #[cfg_attr(not(feature = "avian"), expect(dead_code))]
+    Colliders,
 }
 
 /// Bytes of a thread's stack. A thread that waits inside one job may run another one on top of it.
 const STACK: usize = 8 << 20;
 
+/// The pools, in order of [`Threads`], each with how many threads were asked for. It has none where threads can't be started.
+static POOLS: RwLock<[Option<(usize, Option<Arc<ThreadPool>>)>; 3]> = RwLock::new([None, None, None]);
+
 impl Threads {
-    /// The pool, with as many threads as rayon's own has; `None` where there are none.
-    fn pool(self) -> Option<&'static ThreadPool> {
-        static TRANSACTIONS: OnceLock<Option<ThreadPool>> = OnceLock::new();
-        static BACKGROUND: OnceLock<Option<ThreadPool>> = OnceLock::new();
-        let (pool, name) = match self {
-            Self::Transactions => (&TRANSACTIONS, "burrow transactions"),
-            Self::Background => (&BACKGROUND, "burrow background"),
+    const ALL: [Self; 3] = [Self::Transactions, Self::Background, Self::Colliders];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Transactions => "burrow transactions",
+            Self::Background => "burrow background",
+            Self::Colliders => "burrow colliders",
+        }
+    }
+
+    /// How many threads it should have.
+    fn count(self, settings: &ThreadSettings) -> usize {
+        let count = match self {
+            Self::Transactions => settings.transactions,
+            Self::Background => settings.background,
+            Self::Colliders => settings.colliders,
         };
-        let build = || {
-            ThreadPoolBuilder::new()
-                .stack_size(STACK)
-                .thread_name(move |number| format!("{name} {number}"))
-                .build()
-                .ok()
-        };
-        pool.get_or_init(build).as_ref()
+        count.max(1)
+    }
+
+    /// The pool; `None` where there are no threads.
+    fn pool(self) -> Option<Arc<ThreadPool>> {
+        let pools = POOLS.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, pool)) = &pools[self as usize] {
+            return pool.clone();
+        }
+        drop(pools);
+        self.start(self.count(&ThreadSettings::default()), false)
+    }
+
+    /// Starts the pool with so many threads. If there is one already, it stays, or is replaced if it has another number. What
+    /// a replaced pool was given is still done.
+    fn start(self, count: usize, replaces: bool) -> Option<Arc<ThreadPool>> {
+        let mut pools = POOLS.write().unwrap_or_else(PoisonError::into_inner);
+        let own = &mut pools[self as usize];
+        if let Some((known, pool)) = own
+            && (!replaces || *known == count)
+        {
+            return pool.clone();
+        }
+        let builder = ThreadPoolBuilder::new()
+            .stack_size(STACK)
+            .num_threads(count)
+            .thread_name(move |number| format!("{} {number}", self.name()))
+            // Of work that nobody waits for, such as freeing memory. Otherwise it would end the process.
+            .panic_handler(|panic| error!("background work panicked: {}", panic_message(panic.as_ref())));
+        let pool = builder.build();
+        own.insert((count, pool.ok().map(Arc::new))).1.clone()
     }
 
     /// Runs work on this pool.
@@ -54,9 +133,22 @@ impl Threads {
     }
 }
 
+/// Gives the pools the number of threads that the settings say.
+pub(super) fn resize_pools(settings: Res<ThreadSettings>) {
+    for pool in Threads::ALL {
+        pool.start(pool.count(&settings), true);
+    }
+}
+
 /// Drops a large value on another thread.
 pub(crate) fn free_later(waste: impl Send + 'static) {
     Threads::Background.spawn(move || drop(waste));
+}
+
+/// What a panic said.
+pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic without a message")
 }
 
 /// Work on one of these pools. Dropping this cancels work that has not begun; otherwise its result is dropped.

@@ -106,6 +106,12 @@ impl Commit {
         &self.receipts
     }
 
+    /// The receipt of its step through history, if it is one.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn step(&self) -> Option<&HistoryReceipt> {
+        self.step.as_ref()
+    }
+
     /// Makes this the world.
     pub(super) fn install(self, world: &mut World) -> Installed {
         let mut replaced = self.changes;

@@ -2,15 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use super::loose::{self, LoosePiece, LooseSettings};
+use super::loose::{self, Fallen, LoosePiece, LooseSettings};
 use super::queue::Submission;
 use super::world::World;
 use crate::brush::{Edit, Operation};
 use crate::edits::{Draft, Drafter, MergedBricks};
 use crate::volume::DiggingRules;
 
-/// Loose pieces by the number of the edit that cut them off.
-pub(super) type LoosePieces = BTreeMap<usize, Vec<LoosePiece>>;
+/// What the search after an edit found.
+#[derive(Default)]
+pub(super) struct Found {
+    pub pieces: Vec<LoosePiece>,
+    /// Whether its budget ended it.
+    pub has_unsearched: bool,
+}
+
+/// What the searches found, by the number of the edit before them. Those that found nothing are left out.
+pub(super) type LoosePieces = BTreeMap<usize, Found>;
 
 /// What a group of edits makes of the samples so far.
 pub(super) fn draft_group(
@@ -48,10 +56,12 @@ fn one_by_one(
         let seeds = can_cut_off.then(|| loose::seeds(world, drafter.samples(), &draft.bricks));
         drafter.overlay.lay(&draft.bricks);
         if let Some(seeds) = seeds {
-            let (found, removed) = loose::fall(world, rules, &drafter.overlay, &seeds, settings);
+            let seeds = (&seeds, draft.bricks.len());
+            let Fallen { pieces: found, has_unsearched, removed } =
+                loose::fall(world, rules, &drafter.overlay, seeds, settings);
             drafter.extend(&mut draft, removed);
-            if !found.is_empty() {
-                pieces.insert(all.effects.len(), found);
+            if has_unsearched || !found.is_empty() {
+                pieces.insert(all.effects.len(), Found { pieces: found, has_unsearched });
             }
         }
         all.effects.append(&mut draft.effects);

@@ -59,7 +59,7 @@ impl<'a> FieldLog<'a> {
             chunks.push(self.absorb(part.chunk, part.bounds));
         }
         let EditEffect { removed, added, painted, refused, .. } = effect;
-        Ok(Applied { chunks, bounds, removed, added, painted, refused, loose: Vec::new() })
+        Ok(Applied { chunks, bounds, removed, added, painted, refused, ..Applied::default() })
     }
 
     /// All fields of each chunk that a field changed in since the last call, by chunk.

@@ -11,9 +11,10 @@ use super::by_brick::ByBrick;
 use super::change::{Change, ChangedBrick, brick_bytes, replaced_bytes};
 use super::commit::Commit;
 use super::dirty::{dirty_cells, joined_mask};
-use super::draft_group::{LoosePieces, draft_group};
+use super::draft_group::{Found, LoosePieces, draft_group};
 use super::field_log::{FieldLog, FieldNews};
 use super::history::UndoDelta;
+use super::loose::LoosePiece;
 use super::queue::Submission;
 use super::receipt::{Applied, Receipt, Rejection};
 use super::redraw;
@@ -55,6 +56,8 @@ struct EnteredGroup {
     /// Bytes of bricks that it takes away from the world.
     replaced_bytes: usize,
     tags: Vec<u64>,
+    /// The pieces that it took out of the ground, with the tags of its edits.
+    pieces: Vec<(u64, LoosePiece)>,
 }
 
 /// A list of exactly this capacity: capacity counts as history's bytes.
@@ -141,11 +144,11 @@ pub(super) fn edit(transaction: &Transaction, submissions: &[Submission], backen
     groups.push(Group { submissions: last, bricks: draft.bricks, mask, sample_hash: draft.hash });
     let changes = groups.into_iter().zip(entered.groups).map(|(group, own)| {
         let Group { submissions, bricks, mask, sample_hash } = group;
-        let EnteredGroup { fields, replaced_bytes, tags } = own;
+        let EnteredGroup { fields, replaced_bytes, tags, pieces } = own;
         let mask = exact(mask.word_count(), mask.words());
         let change = Change { bricks: changed_bricks(bricks), fields, mask, sample_hash };
         let number = submissions.first().map_or(0, |first| first.terms.group);
-        UndoDelta::new(change, replaced_bytes, number, tags)
+        UndoDelta::new(change, replaced_bytes, number, (tags, pieces))
     });
     let commit = transaction.commit(changes.collect(), draft.hash, meshes);
     stages.whole = start.elapsed();
@@ -170,7 +173,7 @@ fn enter<'a>(
     let mut entered = Vec::with_capacity(1);
     while let Some(((submissions, bricks), (effects, mut pieces))) = groups.next() {
         let mut effects = effects.into_iter().enumerate();
-        let mut tags = Vec::new();
+        let (mut tags, mut taken) = (Vec::new(), Vec::new());
         receipts.reserve_exact(submissions.len());
         for submission in submissions {
             let outcome = submission.edit.as_ref().map_err(Rejection::clone).and_then(|edit| {
@@ -179,12 +182,15 @@ fn enter<'a>(
                 if !applied.chunks.is_empty() {
                     tags.push(submission.tag);
                 }
-                let loose = pieces.remove(&number).unwrap_or_default();
-                Ok(Applied { loose, ..applied })
+                let Found { pieces: loose, has_unsearched } = pieces.remove(&number).unwrap_or_default();
+                let gone = loose.iter().filter(|piece| piece.is_gone());
+                taken.extend(gone.map(|piece| (submission.tag, piece.clone())));
+                Ok(Applied { loose, has_unsearched, ..applied })
             });
             receipts.push(Receipt { tag: submission.tag, outcome });
         }
         tags.shrink_to_fit();
+        taken.shrink_to_fit();
         // Bricks of an earlier group take the place of the world's.
         let replaced = |drafted: &DraftedBrick| match newer.get(&drafted.pos) {
             Some(brick) => brick_bytes(brick),
@@ -194,7 +200,7 @@ fn enter<'a>(
         if groups.peek().is_some() {
             newer.extend(bricks.iter().map(|drafted| (drafted.pos, &*drafted.brick)));
         }
-        entered.push(EnteredGroup { fields: log.take_changed(), replaced_bytes, tags });
+        entered.push(EnteredGroup { fields: log.take_changed(), replaced_bytes, tags, pieces: taken });
     }
     Entered { groups: entered, receipts, news: log.news(), next_field: log.next_field }
 }

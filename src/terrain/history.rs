@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::change::{Change, ChangedBrick};
+use super::loose::{LoosePiece, ReturnedPiece};
 use super::record::CommitRecord;
 use super::world::World;
 use crate::lattice::LatticeBox;
@@ -43,8 +44,11 @@ pub struct HistoryReceipt {
     pub outcome: Result<Restored, HistoryRejection>,
 }
 
-/// What a step through history changed. Inventories that follow receipts must follow this too. Loose pieces count here,
-/// although a receipt's `removed` leaves them out.
+/// What a step through history changed.
+///
+/// Inventories that follow receipts must follow this too. Voxels of loose pieces count in `removed` and `added` here, although
+/// a receipt's `removed` leaves them out: what an inventory has to give for an undo is `added` less the materials of
+/// `returned`, and what it gets from a redo is `removed` less those of `loose`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Restored {
     /// The tags of the undone or redone brushes, in order, without those that had changed nothing.
@@ -57,6 +61,10 @@ pub struct Restored {
     pub added: MaterialCounts,
     /// Solid voxels whose material changed, by the new one.
     pub painted: MaterialCounts,
+    /// The pieces that had been cut off, and that are ground again: an undo brings them back.
+    pub returned: Vec<ReturnedPiece>,
+    /// The pieces that a redo took out of the ground again, as receipts had listed them, each with the tag of its brush.
+    pub loose: Vec<(u64, LoosePiece)>,
 }
 
 /// Why a step changed nothing.
@@ -75,6 +83,9 @@ pub enum HistoryRejection {
     /// Too much work [waits](super::WorkLimits::waiting).
     #[error("too much work waits already")]
     Overloaded,
+    /// The terrain is shared, and its server does not do the step.
+    #[error("the server refuses the step")]
+    Refused,
     /// The step panicked. World and history are unchanged.
     #[error("the step panicked; this is a bug of the plugin's")]
     Panicked,
@@ -102,13 +113,20 @@ pub(super) struct UndoDelta {
     pub group: u64,
     /// The tags of its edits that changed something.
     pub tags: Vec<u64>,
+    /// The pieces that its edits took out of the ground, with the tags of these.
+    pub pieces: Vec<(u64, LoosePiece)>,
 }
 
 impl UndoDelta {
     /// A change by a group of edits, which replaces bricks of so many bytes.
-    pub fn new(change: Change, replaced_bytes: usize, group: u64, tags: Vec<u64>) -> Self {
+    pub fn new(
+        change: Change,
+        replaced_bytes: usize,
+        group: u64,
+        (tags, pieces): (Vec<u64>, Vec<(u64, LoosePiece)>),
+    ) -> Self {
         let bounds = change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
-        Self { change, bounds, brick_bytes: replaced_bytes, group, tags }
+        Self { change, bounds, brick_bytes: replaced_bytes, group, tags, pieces }
     }
 
     /// Adds what later edits of the same group replaced; returns those bricks that earlier ones had replaced already.
@@ -118,13 +136,16 @@ impl UndoDelta {
         self.bounds = self.bounds.into_iter().chain(later.bounds).reduce(LatticeBox::union);
         self.tags.reserve_exact(later.tags.len());
         self.tags.extend(later.tags);
+        self.pieces.reserve_exact(later.pieces.len());
+        self.pieces.extend(later.pieces);
         left
     }
 
     /// Bytes that dropping it frees, the counters of its `Arc` included.
     fn bytes(&self) -> usize {
         let own = 2 * size_of::<usize>() + size_of::<Self>() + size_of_val(&self.tags[..]);
-        own + self.change.bytes() + self.brick_bytes
+        let pieces = self.pieces.iter().map(|(tag, piece)| size_of_val(tag) + piece.bytes()).sum::<usize>();
+        own + pieces + self.change.bytes() + self.brick_bytes
     }
 }
 

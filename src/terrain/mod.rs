@@ -71,7 +71,7 @@ pub(crate) use ground::brick_over;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
 pub use known_nodes::KnownNodes;
 pub use level_meshes::GroundFacts;
-pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
+pub use loose::{LoosePiece, LooseSettings, PieceFate, PieceId, ReturnedPiece, Run};
 pub use model::{StaleCommit, Terrain};
 pub use put::ChangeError;
 pub use query::{RayHit, Span};

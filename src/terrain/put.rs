@@ -204,8 +204,8 @@ fn checked_put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> R
     let Placed { meshes, news } = place(transaction, &change, &whole, &changed, backend, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let EditEffect { removed, added, painted, .. } = effect;
-    let restored = Restored { tags: Vec::new(), bounds, removed, added, painted };
-    let delta = UndoDelta::new(change, replaced, 0, Vec::new());
+    let restored = Restored { bounds, removed, added, painted, ..Restored::default() };
+    let delta = UndoDelta::new(change, replaced, 0, Default::default());
     Ok(Commit {
         put: Some(Ok(restored)),
         news,

@@ -32,6 +32,9 @@ pub struct Applied {
     /// Pieces of ground that it cut off, where the terrain [looks for them](super::Terrain::set_loose). Those that are gone
     /// are not among `removed`.
     pub loose: Vec<LoosePiece>,
+    /// Whether the search for loose pieces ended at its [budget](super::LooseSettings) before it had looked everywhere. Pieces
+    /// that it did not find stay as ground.
+    pub has_unsearched: bool,
 }
 
 impl Applied {

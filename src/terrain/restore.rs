@@ -10,6 +10,7 @@ use super::commit::Commit;
 use super::dirty::dirty_cells;
 use super::field_log::{FieldNews, news_of_replaced};
 use super::history::{HistoryReceipt, HistoryStep, Restored, UndoDelta};
+use super::loose::ReturnedPiece;
 use super::redraw::{self, MeshUpdates};
 use super::stages::Stages;
 use super::transaction::Transaction;
@@ -80,10 +81,18 @@ pub(super) fn step(
     let Placed { meshes, news } = place(transaction, &change, &bricks, &changed, backend, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let EditEffect { removed, added, painted, .. } = effect;
-    let restored = Restored { tags: target.tags.clone(), bounds, removed, added, painted };
+    let (mut returned, mut loose) = (Vec::new(), Vec::new());
+    match step {
+        HistoryStep::Undo => {
+            returned.extend(target.pieces.iter().map(|(tag, piece)| ReturnedPiece::new(*tag, piece)))
+        }
+        HistoryStep::Redo => loose.clone_from(&target.pieces),
+    }
+    let tags = target.tags.clone();
+    let restored = Restored { tags: tags.clone(), bounds, removed, added, painted, returned, loose };
     let replaced_bytes = change.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
     let sample_hash = change.sample_hash;
-    let delta = UndoDelta::new(change, replaced_bytes, target.group, target.tags.clone());
+    let delta = UndoDelta::new(change, replaced_bytes, target.group, (tags, target.pieces.clone()));
     stages.whole = start.elapsed();
     Commit {
         step: Some(HistoryReceipt { step, outcome: Ok(restored) }),

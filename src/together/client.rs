@@ -1,327 +1,427 @@
-//! A terrain that a player shares with others.
+//! What a player's app does with its shared terrain in each frame.
 
+use std::time::Duration;
+
+use bevy::ecs::lifecycle::Discard;
+use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
-use bevy_replicon::prelude::*;
+use bevy_replicon::prelude::{ClientId, FromClient};
 
+use super::link::{Ask, Link, MOST_PENDING, PieceMessage, Standing};
 use super::messages::{BulkLane, FromPlayer, OrderLane};
-use super::server::GroundServer;
-use crate::brush::Edit;
-use crate::net::{self, Client, ClientEvent, Lane, Refusal, ShownChange, Stamps};
-use crate::plugin::{BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, ThreadTask, Threads, pieces};
-use crate::terrain::{
-    HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain, TerrainSettings,
+use super::service::Service;
+use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
+use super::trouble::{SharingTrouble, SharingTroubleFound};
+use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
+use crate::plugin::{
+    BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads,
+    free_later,
 };
+use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain};
 
-/// Insert it with a pristine [`Terrain`] of the same ground and chunk size as the server's: the world that players share takes its
-/// place, and brushes for it go to the server. It joins as soon as there is a connection, or a
-/// [`GroundServer`] in this app, and again whenever there is a new one.
-#[derive(Component, Default)]
-#[require(EditOutbox)]
-pub struct SharedTerrain {
-    /// Images that stamps may have: the same as those of the server.
-    pub stamps: Stamps,
-    /// Where the player is, in voxels of the terrain: the ground comes from there outwards.
-    pub place: IVec3,
-    link: Option<Link>,
+/// What the shared terrains of an app have in common: a connection carries one ground, so one of them is shared.
+#[derive(Resource, Default)]
+pub(super) struct Sharing {
+    active: Option<Entity>,
+    orders: u64,
 }
 
-/// What is known of the connection.
-struct Link {
-    /// What is not under way.
-    client: Option<Client>,
-    under_way: Option<ThreadTask<Client>>,
-    inbox: Vec<(Lane, Vec<u8>)>,
-    edits: Vec<Edit>,
-    undos: usize,
-    wants: Option<Connection>,
-    start: Instant,
-    facts: Facts,
-    /// The changes whose receipts are still to come.
-    waiting: usize,
-    /// Something went wrong with what is shown.
-    is_broken: bool,
-    is_playable: bool,
-}
-
-/// A change of the connection that the client was not told of yet.
-#[derive(Clone, Copy, PartialEq)]
-enum Connection {
-    Begun,
-    Gone,
-}
-
-/// What the client said last.
-#[derive(Clone, Copy, Default)]
-struct Facts {
-    number: u64,
-    pending: usize,
-    id: Option<net::ClientId>,
-    has_joined: bool,
-}
-
-impl SharedTerrain {
-    /// The number in the server's order of the last entry that the player's world holds.
-    pub fn number(&self) -> u64 {
-        self.facts().number
+impl Sharing {
+    /// The place of a new shared terrain among all.
+    pub fn next_order(&mut self) -> u64 {
+        self.orders += 1;
+        self.orders
     }
 
-    /// The player's edits that the server has not answered.
-    pub fn pending(&self) -> usize {
-        self.facts().pending
-    }
-
-    /// Who the player is for the server; `None` before it has joined once.
-    pub fn id(&self) -> Option<net::ClientId> {
-        self.facts().id
-    }
-
-    /// Is the ground around the player there?
-    pub fn is_playable(&self) -> bool {
-        self.link.as_ref().is_some_and(|link| link.is_playable)
-    }
-
-    /// Is all of the world there, and does it follow the server?
-    pub fn has_joined(&self) -> bool {
-        self.facts().has_joined
-    }
-
-    fn facts(&self) -> Facts {
-        self.link.as_ref().map_or_else(Facts::default, |link| link.facts)
-    }
-}
-
-/// What became of an edit.
-#[derive(Clone, Debug, PartialEq)]
-pub enum WhatBecame {
-    /// It is shown, as far as the player's machine can tell now.
-    Predicted(Receipt),
-    /// The server has ordered it; this is what it came to for all. `None` where the player was away when that happened.
-    Confirmed(Option<Receipt>),
-    /// It is not done, and no longer shown. `None` where it could not be sent, or the player was away when that was told.
-    Refused(Option<Refusal>),
-}
-
-/// Something became of an edit on a [`SharedTerrain`]. A [`BrushApplied`] follows for those that are confirmed or refused, so inventories
-/// need nothing else.
-#[derive(Message, Clone, Debug, PartialEq)]
-pub struct GroundEdited {
-    /// The terrain.
-    pub terrain: Entity,
-    /// The tag of the brush.
-    pub tag: u64,
-    /// What became of it.
-    pub outcome: WhatBecame,
-}
-
-/// How far a [`SharedTerrain`] has come, or that its player has to go.
-#[derive(Message, Clone, Debug, PartialEq)]
-pub struct GroundJoined {
-    /// The terrain.
-    pub terrain: Entity,
-    /// `Welcomed`, `Playable`, `Joined`, `Durable`, `Repaired` or `Kicked`.
-    pub event: ClientEvent,
-}
-
-/// Makes the client of a new shared terrain.
-pub(super) fn begin(
-    new: On<Insert, SharedTerrain>,
-    mut shared: Query<(&mut SharedTerrain, &Terrain)>,
-    server: Option<Res<GroundServer>>,
-    state: Option<Res<State<ClientState>>>,
-) {
-    let Ok((mut shared, terrain)) = shared.get_mut(new.entity) else {
-        error!("a SharedTerrain needs a Terrain beside it");
-        return;
-    };
-    let world = terrain.world();
-    let settings =
-        TerrainSettings { chunk_size: world.grid().size() as u32, voxel_size: terrain.voxel_size() };
-    let is_connected = server.is_some() || state.is_some_and(|state| *state.get() == ClientState::Connected);
-    match Client::new(world.shared_ground(), &settings) {
-        Ok(mut client) => {
-            *client.stamps_mut() = shared.stamps.clone();
-            client.set_place(shared.place);
-            shared.link = Some(Link {
-                client: Some(client),
-                under_way: None,
-                inbox: Vec::new(),
-                edits: Vec::new(),
-                undos: 0,
-                wants: is_connected.then_some(Connection::Begun),
-                start: Instant::now(),
-                facts: Facts::default(),
-                waiting: 0,
-                is_broken: world.revision() != 0,
-                is_playable: false,
-            });
+    /// Keeps the terrain that is shared, or takes the one that was inserted first.
+    fn choose(&mut self, all: impl Iterator<Item = (Entity, u64)> + Clone) {
+        let is_there = |entity| all.clone().any(|(other, _)| other == entity);
+        if !self.active.is_some_and(is_there) {
+            self.active = all.clone().min_by_key(|(_, order)| *order).map(|(entity, _)| entity);
         }
-        Err(why) => error!("the terrain can't be shared: {why}"),
     }
 }
 
-/// Brushes on a terrain that is no longer shared are its own again.
-pub(super) fn end(gone: On<Remove, SharedTerrain>, mut commands: Commands) {
-    commands.entity(gone.entity).try_remove::<EditOutbox>();
+/// The messages that say what became of edits.
+#[derive(SystemParam)]
+pub(super) struct Answers<'w> {
+    edited: MessageWriter<'w, GroundEdited>,
+    joined: MessageWriter<'w, GroundJoined>,
+    troubles: MessageWriter<'w, SharingTroubleFound>,
+    applied: MessageWriter<'w, BrushApplied>,
+    moved: MessageWriter<'w, HistoryMoved>,
 }
 
-/// There is a connection.
-pub(super) fn connect(mut shared: Query<&mut SharedTerrain>) {
-    for link in shared.iter_mut().filter_map(|shared| shared.into_inner().link.as_mut()) {
-        link.inbox.clear();
-        link.wants = Some(Connection::Begun);
-    }
-}
-
-/// The connection is gone.
-pub(super) fn disconnect(mut shared: Query<&mut SharedTerrain>) {
-    for link in shared.iter_mut().filter_map(|shared| shared.into_inner().link.as_mut()) {
-        link.inbox.clear();
-        link.wants = Some(Connection::Gone);
-    }
-}
-
-/// Takes what the server sent.
+/// Takes what the server sent. What it sent before it was greeted last is left out by the client.
 pub(super) fn receive(
     mut shared: Query<&mut SharedTerrain>,
     mut order: MessageReader<OrderLane>,
     mut bulk: MessageReader<BulkLane>,
 ) {
-    let messages = order.read().map(|message| (Lane::Order, &message.0));
-    let messages: Vec<_> = messages.chain(bulk.read().map(|message| (Lane::Bulk, &message.0))).collect();
-    for link in shared.iter_mut().filter_map(|shared| shared.into_inner().link.as_mut()) {
-        link.inbox.extend(messages.iter().map(|(lane, bytes)| (*lane, Vec::clone(bytes))));
+    let order = order.read().map(|message| (Lane::Order, &message.0));
+    let messages: Vec<_> = order.chain(bulk.read().map(|message| (Lane::Bulk, &message.0))).collect();
+    if messages.is_empty() {
+        return;
+    }
+    for mut shared in &mut shared {
+        let Some(link) = &mut shared.bypass_change_detection().link else { continue };
+        if link.greeted.is_some() {
+            link.inbox.extend(messages.iter().map(|(lane, bytes)| (*lane, Vec::clone(bytes))));
+        }
     }
 }
 
-/// Takes what the player asked for, and sends it as soon as the client is not at work.
-pub(super) fn send(
-    mut shared: Query<(Entity, &mut SharedTerrain, &mut EditOutbox, &mut Terrain)>,
-    mut messages: MessageWriter<FromPlayer>,
-    mut moved: MessageWriter<HistoryMoved>,
+/// Lets pieces of ground appear in the frame in which the ground loses them, and go in the frame in which it has them again.
+pub(super) fn release_pieces(
+    mut shared: Query<(&mut SharedTerrain, &mut Terrain)>,
+    mut found: MessageWriter<LoosePieceFound>,
+    mut returned: MessageWriter<LoosePieceReturned>,
 ) {
-    for (entity, mut shared, mut outbox, mut terrain) in &mut shared {
-        let place = shared.place;
+    for (mut shared, mut terrain) in &mut shared {
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
-        if !outbox.edits.is_empty() || !outbox.steps.is_empty() {
-            link.edits.append(&mut outbox.edits);
-            for step in outbox.steps.drain(..) {
-                match step {
-                    HistoryStep::Undo => link.undos += 1,
-                    // Others may have dug there: the player digs again.
-                    HistoryStep::Redo => {
-                        let receipt = HistoryReceipt { step, outcome: Err(HistoryRejection::NothingToRedo) };
-                        moved.write(HistoryMoved { terrain: Some(entity), receipt });
+        for message in link.display.follow(terrain.bypass_change_detection()) {
+            match message {
+                PieceMessage::Found(message) => drop(found.write(message)),
+                PieceMessage::Returned(message) => drop(returned.write(message)),
+            }
+        }
+    }
+}
+
+/// Takes what the player asked for, follows the server that there is, and sends what is to be sent as soon as the client is not at
+/// work.
+pub(super) fn send(
+    service: Res<Service>,
+    mut sharing: ResMut<Sharing>,
+    mut shared: Query<(Entity, &mut SharedTerrain, Option<&mut EditOutbox>, Option<&mut Terrain>)>,
+    mut answers: Answers,
+    mut messages: MessageWriter<FromPlayer>,
+) {
+    let with_terrain = shared.iter().filter(|(_, _, _, terrain)| terrain.is_some());
+    sharing.choose(with_terrain.map(|(entity, shared, ..)| (entity, shared.order)));
+    let active = sharing.active;
+    for (entity, mut shared, outbox, terrain) in &mut shared {
+        let is_changed = shared.is_changed();
+        let shared = shared.bypass_change_detection();
+        let asks = outbox.map(take_asks).unwrap_or_default();
+        let trouble = match (terrain, active) {
+            (Some(mut terrain), Some(active)) if active == entity => {
+                let terrain = terrain.bypass_change_detection();
+                let mut turn = Turn { entity, answers: &mut answers };
+                turn.send(*service, (shared, is_changed), terrain, asks, &mut messages)
+            }
+            (terrain, active) => {
+                asks.into_iter().for_each(|ask| answers.refuse(entity, ask, None));
+                answers.close(entity, shared.link.take(), &mut messages);
+                let other = active.filter(|_| terrain.is_some()).map(SharingTrouble::AnotherIsShared);
+                Some(other.unwrap_or(SharingTrouble::NoTerrain))
+            }
+        };
+        if trouble != shared.trouble {
+            shared.trouble = trouble;
+            if let Some(SharingTrouble::OtherGround { ours, theirs, .. }) = trouble
+                && !shared.was_served
+            {
+                // As over other transports. The connection stays.
+                let why = if ours == theirs { Kick::ChunkSize } else { Kick::Ground };
+                answers.joined.write(GroundJoined { terrain: entity, event: ClientEvent::Kicked(why) });
+            }
+            trouble.into_iter().for_each(|trouble| answers.warn(entity, trouble));
+        }
+    }
+}
+
+/// Empties a list of what a player asked for.
+fn take_asks(mut outbox: Mut<EditOutbox>) -> Vec<Ask> {
+    if outbox.edits.is_empty() && outbox.steps.is_empty() {
+        return Vec::new();
+    }
+    let EditOutbox { edits, steps } = std::mem::take(&mut *outbox);
+    edits.into_iter().map(Ask::Edit).chain(steps.into_iter().map(Ask::Step)).collect()
+}
+
+/// The turn of the terrain that is shared, in a frame.
+struct Turn<'a, 'w> {
+    entity: Entity,
+    answers: &'a mut Answers<'w>,
+}
+
+impl Turn<'_, '_> {
+    /// Returns what keeps the terrain from following a server.
+    fn send(
+        &mut self,
+        service: Service,
+        (shared, is_changed): (&mut SharedTerrain, bool),
+        terrain: &mut Terrain,
+        asks: Vec<Ask>,
+        messages: &mut MessageWriter<FromPlayer>,
+    ) -> Option<SharingTrouble> {
+        let ground = super::messages::GroundId::of(terrain.world());
+        if shared.link.as_ref().is_some_and(|link| link.ground != ground) {
+            self.answers.close(self.entity, shared.link.take(), messages);
+        }
+        if shared.link.is_none() {
+            // A terrain that is there has valid settings.
+            shared.link = Link::new(terrain, &shared.stamps).ok();
+        }
+        let link = shared.link.as_mut()?;
+        asks.into_iter().for_each(|ask| link.ask(ask));
+        if terrain.rules() != link.rules.as_ref() {
+            link.rules = terrain.rules().cloned();
+            self.answers.warn(self.entity, SharingTrouble::RulesIgnored);
+        }
+        if let Some(client) = link.task.as_mut().and_then(ThreadTask::finish) {
+            (link.client, link.task) = (Some(client), None);
+        }
+        let standing = link.standing(service);
+        let follows = match standing {
+            Standing::Follows(invitation) => Some(invitation),
+            _ => None,
+        };
+        link.facts.has_joined &= follows.is_some() && follows == link.greeted;
+        link.has_new_stamps |= is_changed;
+        let Some(mut client) = link.client.take() else { return standing.trouble() };
+        if std::mem::take(&mut link.has_new_stamps) {
+            // It may have got others from the server.
+            client.stamps_mut().add_all(&shared.stamps);
+        }
+        client.set_place(shared.place);
+        if follows != link.greeted {
+            change_server(link, &mut client, follows, service, messages);
+            shared.was_served |= link.was_served;
+        }
+        if let Standing::Refuses(_) = standing {
+            client.give_up();
+        }
+        self.hand_over(link, &mut client, standing);
+        if link.greeted.is_some() {
+            messages.write_batch(client.take_outgoing().into_iter().map(FromPlayer::Bytes));
+        }
+        link.inbox.drain(..).for_each(|(lane, bytes)| client.receive(lane, bytes));
+        link.facts.number = client.number();
+        link.facts.id = client.id();
+        link.facts.has_joined = link.greeted.is_some() && client.has_joined();
+        link.client = Some(client);
+        standing.trouble()
+    }
+
+    /// Hands over what the player asked for, in order.
+    fn hand_over(&mut self, link: &mut Link, client: &mut Client, standing: Standing) {
+        let is_refused = matches!(standing, Standing::Refuses(_));
+        let mut room = MOST_PENDING.saturating_sub(client.pending());
+        for ask in std::mem::take(&mut link.asks) {
+            match ask {
+                Ask::Edit(edit) if !is_refused && room > 0 => {
+                    link.is_full = false;
+                    room -= 1;
+                    client.dig(edit);
+                }
+                Ask::Step(HistoryStep::Undo) if !is_refused => client.undo(None),
+                ask => {
+                    let is_full = !is_refused && matches!(ask, Ask::Edit(_));
+                    if is_full && !std::mem::replace(&mut link.is_full, true) {
+                        self.answers.warn(self.entity, SharingTrouble::TooManyPending(MOST_PENDING));
                     }
+                    self.answers.refuse(self.entity, ask, Some(link));
                 }
             }
         }
-        if let Some(client) = link.under_way.as_mut().and_then(ThreadTask::finish) {
-            (link.client, link.under_way) = (Some(client), None);
-        }
-        let now = link.start.elapsed();
-        let Some(mut client) = link.client.take() else { continue };
-        client.set_place(place);
-        match link.wants.take() {
-            Some(Connection::Begun) => client.connect(now),
-            Some(Connection::Gone) => client.disconnect(),
-            None => {}
-        }
-        link.edits.drain(..).for_each(|edit| client.dig(edit));
-        (0..std::mem::take(&mut link.undos)).for_each(|_| client.undo(None));
-        messages.write_batch(client.take_outgoing().into_iter().map(FromPlayer));
-        link.inbox.drain(..).for_each(|(lane, bytes)| client.receive(lane, bytes));
-        // What is put in place comes out of the client in order, so all of it waits for what is shown to be whole again.
-        let receipts = terrain.bypass_change_detection().take_change_receipts();
-        link.waiting = link.waiting.saturating_sub(receipts.len());
-        link.is_broken |= receipts.iter().any(Result::is_err);
-        link.facts = Facts {
-            number: client.number(),
-            pending: client.pending(),
-            id: client.id(),
-            has_joined: client.has_joined(),
-        };
-        link.client = Some(client);
     }
 }
 
-/// The messages that tell what became of edits.
-#[derive(bevy::ecs::system::SystemParam)]
-pub(super) struct Answers<'w> {
-    edited: MessageWriter<'w, GroundEdited>,
-    joined: MessageWriter<'w, GroundJoined>,
-    applied: MessageWriter<'w, BrushApplied>,
-    moved: MessageWriter<'w, HistoryMoved>,
-    pieces: MessageWriter<'w, LoosePieceFound>,
+/// Leaves the server that was followed, and greets the one of this invitation.
+fn change_server(
+    link: &mut Link,
+    client: &mut Client,
+    invitation: Option<u64>,
+    service: Service,
+    messages: &mut MessageWriter<FromPlayer>,
+) {
+    link.inbox.clear();
+    link.greeted = invitation;
+    if invitation.is_some() {
+        client.connect(link.start.elapsed());
+        (link.was_served, link.kicked) = (true, None);
+    } else {
+        client.disconnect();
+        if service != Service::Apart {
+            messages.write(FromPlayer::Left);
+        }
+    }
 }
 
-/// Puts into terrains what is to be shown, and tells what happened.
+/// Puts into terrains what is to be shown, and says what happened.
 pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>, mut answers: Answers) {
     for (entity, mut shared, mut terrain) in &mut shared {
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
-        let Some(client) = &mut link.client else { continue };
+        let Some(mut client) = link.client.take() else { continue };
         let mut changes = client.take_shown();
-        if link.is_broken {
+        let display = &mut link.display;
+        if display.is_broken {
             // All of it comes once those that wait are answered.
             changes.clear();
-            if link.waiting == 0 {
-                link.is_broken = false;
+            if display.is_idle() {
+                display.is_broken = false;
                 changes.push(client.show_whole(terrain.world()));
             }
         }
         for ShownChange { change, hash } in changes {
             // One that finds no room comes again with all others.
             match terrain.bypass_change_detection().submit_change(change, Some(hash)) {
-                Ok(()) => link.waiting += 1,
-                Err(_) => link.is_broken = true,
+                Ok(()) => display.submitted += 1,
+                Err(_) => display.is_broken = true,
             }
         }
-        for event in client.take_events() {
-            link.is_playable |= event == ClientEvent::Playable;
-            answers.tell(entity, event);
-        }
-        let Some(mut client) = link.client.take() else { continue };
+        client.take_events().into_iter().for_each(|event| answers.tell(entity, link, event));
         let now = link.start.elapsed();
-        link.under_way = Some(ThreadTask::start(Threads::Transactions, move || {
+        link.task = Some(ThreadTask::start(Threads::Transactions, move || {
             client.advance(now);
             client
         }));
     }
 }
 
+/// Answers what waits for a terrain that is no longer shared, and tells the server.
+pub(super) fn close(
+    gone: On<Discard, SharedTerrain>,
+    mut shared: Query<(&mut SharedTerrain, Option<&mut EditOutbox>)>,
+    mut answers: Answers,
+    mut messages: MessageWriter<FromPlayer>,
+) {
+    let Ok((mut shared, outbox)) = shared.get_mut(gone.entity) else { return };
+    answers.close(gone.entity, shared.link.take(), &mut messages);
+    let asks = outbox.map(take_asks).unwrap_or_default();
+    asks.into_iter().for_each(|ask| answers.refuse(gone.entity, ask, None));
+}
+
 impl Answers<'_> {
-    fn tell(&mut self, terrain: Entity, event: ClientEvent) {
+    /// Reports what is wrong.
+    fn warn(&mut self, terrain: Entity, trouble: SharingTrouble) {
+        warn!("{terrain}: {trouble}");
+        self.troubles.write(SharingTroubleFound { terrain, trouble });
+    }
+
+    /// Answers something that is not sent to a server.
+    fn refuse(&mut self, terrain: Entity, ask: Ask, link: Option<&mut Link>) {
+        match ask {
+            Ask::Edit(edit) => {
+                link.into_iter().for_each(|link| link.answer(edit.tag()));
+                self.refused(terrain, edit.tag(), None);
+            }
+            Ask::Step(step) => {
+                link.into_iter().for_each(|link| link.undos = link.undos.saturating_sub(1));
+                let why = match step {
+                    HistoryStep::Undo => HistoryRejection::Refused,
+                    // Others may have dug there: the player digs again.
+                    HistoryStep::Redo => HistoryRejection::NothingToRedo,
+                };
+                self.stepped(terrain, step, Err(why));
+            }
+        }
+    }
+
+    /// Answers what waits, and drops the link.
+    fn close(&mut self, terrain: Entity, link: Option<Link>, messages: &mut MessageWriter<FromPlayer>) {
+        let Some(link) = link else { return };
+        link.tags.iter().for_each(|tag| self.refused(terrain, *tag, None));
+        (0..link.undos)
+            .for_each(|_| self.stepped(terrain, HistoryStep::Undo, Err(HistoryRejection::Refused)));
+        if link.greeted.is_some() {
+            messages.write(FromPlayer::Left);
+        }
+        // It holds a world.
+        free_later(link);
+    }
+
+    fn refused(&mut self, terrain: Entity, tag: u64, why: Option<Refusal>) {
+        let receipt = Receipt { tag, outcome: Err(Rejection::Refused) };
+        self.applied.write(BrushApplied { terrain: Some(terrain), receipt });
+        self.edited.write(GroundEdited { terrain, tag, outcome: WhatBecame::Refused(why) });
+    }
+
+    fn stepped(&mut self, terrain: Entity, step: HistoryStep, outcome: Result<Restored, HistoryRejection>) {
+        self.moved.write(HistoryMoved { terrain: Some(terrain), receipt: HistoryReceipt { step, outcome } });
+    }
+
+    fn tell(&mut self, terrain: Entity, link: &mut Link, event: ClientEvent) {
         let edited = |tag, outcome| GroundEdited { terrain, tag, outcome };
         match event {
             ClientEvent::Predicted(receipt) => {
-                self.pieces.write_batch(pieces(terrain, std::slice::from_ref(&receipt)));
                 self.edited.write(edited(receipt.tag, WhatBecame::Predicted(receipt)));
             }
             ClientEvent::Confirmed { tag, receipt } => {
+                link.answer(tag);
                 if let Some(receipt) = receipt.clone() {
                     self.applied.write(BrushApplied { terrain: Some(terrain), receipt });
                 }
                 self.edited.write(edited(tag, WhatBecame::Confirmed(receipt)));
             }
             ClientEvent::Refused { tag, why } => {
-                let receipt = Receipt { tag, outcome: Err(Rejection::Refused) };
-                self.applied.write(BrushApplied { terrain: Some(terrain), receipt });
-                self.edited.write(edited(tag, WhatBecame::Refused(why)));
+                link.answer(tag);
+                self.refused(terrain, tag, why);
             }
-            ClientEvent::Others { receipt, .. } => {
-                self.pieces.write_batch(pieces(terrain, std::slice::from_ref(&receipt)));
+            ClientEvent::Others { .. } => {}
+            ClientEvent::PiecesChanged { tag, found, returned } => {
+                let found = found.into_iter().map(|piece| LoosePieceFound::new(terrain, tag, piece));
+                let returned = returned.into_iter().map(|piece| LoosePieceReturned { terrain, piece });
+                let found = found.map(PieceMessage::Found);
+                link.display.add_pieces(found.chain(returned.map(PieceMessage::Returned)));
             }
-            ClientEvent::UndoRefused(_) => {
-                self.moved.write(undone(terrain, Err(HistoryRejection::NothingToUndo)));
+            ClientEvent::UndoRefused(why) => {
+                link.undos = link.undos.saturating_sub(1);
+                let outcome = match why {
+                    Some(Refusal::Nothing) => HistoryRejection::NothingToUndo,
+                    _ => HistoryRejection::Refused,
+                };
+                if let Some(why) = why.filter(|why| *why != Refusal::Nothing) {
+                    self.warn(terrain, SharingTrouble::UndoRefused(why));
+                }
+                self.stepped(terrain, HistoryStep::Undo, Err(outcome));
             }
             ClientEvent::Undone(restored) => {
-                self.moved.write(undone(terrain, Ok(restored.unwrap_or_default())));
+                link.undos = link.undos.saturating_sub(1);
+                self.stepped(terrain, HistoryStep::Undo, Ok(restored.unwrap_or_default()));
             }
-            event => drop(self.joined.write(GroundJoined { terrain, event })),
+            event => {
+                link.is_playable |= event == ClientEvent::Playable;
+                if let (ClientEvent::Kicked(why), Some(invitation)) = (&event, link.greeted) {
+                    link.kicked = Some((*why, invitation));
+                }
+                self.joined.write(GroundJoined { terrain, event });
+            }
         }
     }
 }
 
-fn undone(terrain: Entity, outcome: Result<Restored, HistoryRejection>) -> HistoryMoved {
-    HistoryMoved { terrain: Some(terrain), receipt: HistoryReceipt { step: HistoryStep::Undo, outcome } }
+/// How long the app's last frame waits for a client that is at work.
+const LAST_FRAME: Duration = Duration::from_secs(2);
+
+/// Hands over to the server in this app what its player asked for in the app's last frame, so that it is saved.
+pub(super) fn send_last(
+    mut shared: Query<&mut SharedTerrain>,
+    mut messages: MessageWriter<FromClient<FromPlayer>>,
+) {
+    for mut shared in &mut shared {
+        let Some(link) = &mut shared.bypass_change_detection().link else { continue };
+        let start = Instant::now();
+        while link.client.is_none() && link.task.is_some() && start.elapsed() < LAST_FRAME {
+            link.client = link.task.as_mut().and_then(ThreadTask::finish);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let Some(client) = link.client.as_mut().filter(|_| link.greeted.is_some()) else { continue };
+        for ask in link.asks.drain(..) {
+            match ask {
+                Ask::Edit(edit) => client.dig(edit),
+                Ask::Step(HistoryStep::Undo) => client.undo(None),
+                Ask::Step(HistoryStep::Redo) => {}
+            }
+        }
+        messages.write_batch(
+            client
+                .take_outgoing()
+                .into_iter()
+                .map(|bytes| FromClient { client_id: ClientId::Server, message: FromPlayer::Bytes(bytes) }),
+        );
+    }
 }

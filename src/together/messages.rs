@@ -1,12 +1,29 @@
 //! The messages that carry the bytes of clients and server. Replicon sends each kind in a channel of its own, reliably and in order.
 
 use bevy::prelude::*;
+use bevy_replicon::bytes::Bytes;
+use bevy_replicon::postcard_utils;
 use bevy_replicon::prelude::*;
+use bevy_replicon::shared::message::ctx::{ClientSendCtx, ServerReceiveCtx};
 use serde::{Deserialize, Serialize};
 
+use crate::net::{MOST_TO_SERVER, Server};
+use crate::terrain::World;
+
+/// Bytes of a [`FromPlayer`] beside those that it carries, at most.
+const OVERHEAD: usize = 16;
+
 /// From a client to the server.
-#[derive(Message, Clone, Debug, Serialize, Deserialize)]
-pub(super) struct FromPlayer(pub Vec<u8>);
+#[derive(Message, Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) enum FromPlayer {
+    /// What the client says.
+    Bytes(Vec<u8>),
+    /// Nobody digs there any more.
+    Left,
+    /// The message was longer than any may be, and was not kept.
+    #[serde(skip)]
+    TooLong,
+}
 
 /// From the server to a client, in the lane of what has to come soon.
 #[derive(Message, Clone, Debug, Serialize, Deserialize)]
@@ -16,11 +33,54 @@ pub(super) struct OrderLane(pub Vec<u8>);
 #[derive(Message, Clone, Debug, Serialize, Deserialize)]
 pub(super) struct BulkLane(pub Vec<u8>);
 
+/// Invites an authorised client to greet, or with `None` says that no ground is served any more.
+#[derive(Message, Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct Invitation(pub Option<Served>);
+
+/// Which ground is served, and in which run of a server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Served {
+    pub run: u64,
+    pub ground: GroundId,
+}
+
+/// Clients and server have to agree on this.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct GroundId {
+    pub hash: u64,
+    pub chunk_size: i32,
+}
+
+impl Served {
+    pub fn by(server: &Server) -> Self {
+        Self { run: server.epoch().run, ground: GroundId::of(server.terrain().world()) }
+    }
+}
+
+impl GroundId {
+    pub fn of(world: &World) -> Self {
+        Self { hash: world.ground().hash(), chunk_size: world.grid().size() }
+    }
+}
+
 pub(super) fn register(app: &mut App) {
-    app.add_client_message::<FromPlayer>(Channel::Ordered)
+    app.add_client_message_with::<FromPlayer>(Channel::Ordered, write, read)
         .add_server_message::<OrderLane>(Channel::Ordered)
         .add_server_message::<BulkLane>(Channel::Ordered)
+        .add_server_message::<Invitation>(Channel::Ordered)
         // They say themselves what they depend on, and nothing that is replicated is part of it.
         .make_message_independent::<OrderLane>()
-        .make_message_independent::<BulkLane>();
+        .make_message_independent::<BulkLane>()
+        .make_message_independent::<Invitation>();
+}
+
+fn write(_: &mut ClientSendCtx, message: &FromPlayer, bytes: &mut Vec<u8>) -> Result<()> {
+    Ok(postcard_utils::to_extend_mut(message, bytes)?)
+}
+
+fn read(_: &mut ServerReceiveCtx, bytes: &mut Bytes) -> Result<FromPlayer> {
+    if bytes.len() > MOST_TO_SERVER + OVERHEAD {
+        return Ok(FromPlayer::TooLong);
+    }
+    Ok(postcard_utils::from_buf(bytes)?)
 }

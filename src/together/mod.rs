@@ -30,48 +30,98 @@
 //! [bevy_replicon]: https://docs.rs/bevy_replicon
 
 mod client;
+mod link;
 mod messages;
+mod players;
 mod saved_or_shared;
 mod server;
+mod service;
+mod shared;
+mod trouble;
 
-pub use client::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 pub use server::{GroundServer, GroundServerEvent};
+pub use shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
+pub use trouble::{SharingTrouble, SharingTroubleFound};
 
 use bevy::prelude::*;
 use bevy_replicon::prelude::*;
 
-use crate::plugin::BurrowSystems;
+use crate::plugin::{
+    BrushApplied, BurrowSystems, FollowCommits, HistoryMoved, LoosePieceFound, LoosePieceReturned,
+    TerrainPlugin,
+};
 
 /// Digging together: add it after `RepliconPlugins` and [`BurrowPlugins`](crate::plugin::BurrowPlugins), on the server and on all
 /// clients, in the same place among all that registers something with replicon.
+///
+/// A server of `MinimalPlugins` needs `StatesPlugin` for `RepliconPlugins`, and a transport:
+///
+/// ```no_run
+/// # use bevy::prelude::*;
+/// # use bevy::state::app::StatesPlugin;
+/// # use bevy_burrow::prelude::*;
+/// # use bevy_burrow::together::TogetherPlugin;
+/// # use bevy_replicon::prelude::*;
+/// # let mut app = App::new();
+/// app.add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, BurrowPlugins, TogetherPlugin));
+/// ```
 #[derive(Default)]
 pub struct TogetherPlugin;
 
+/// What has to be there before the plugin is added.
+const NEEDS_REPLICON: &str = "TogetherPlugin does nothing: it needs RepliconPlugins before it, and these need StatesPlugin, which \
+    DefaultPlugins have and MinimalPlugins have not: add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, BurrowPlugins, \
+    TogetherPlugin)), and a transport such as RepliconRenetPlugins";
+
 impl Plugin for TogetherPlugin {
     fn build(&self, app: &mut App) {
+        if !app.is_plugin_added::<RepliconSharedPlugin>() {
+            error!("{NEEDS_REPLICON}");
+            return;
+        }
         messages::register(app);
-        app.add_message::<GroundServerEvent>()
+        app.init_resource::<client::Sharing>()
+            .init_resource::<service::Service>()
+            .add_message::<GroundServerEvent>()
             .add_message::<GroundEdited>()
             .add_message::<GroundJoined>()
-            .add_observer(server::forget_player)
-            .add_observer(client::begin)
-            .add_observer(client::end)
+            .add_message::<SharingTroubleFound>()
+            // Those of the terrains, if BurrowPlugins come later.
+            .add_message::<BrushApplied>()
+            .add_message::<HistoryMoved>()
+            .add_message::<LoosePieceFound>()
+            .add_message::<LoosePieceReturned>()
+            .add_observer(service::drop_messages)
+            .add_observer(shared::begin)
+            .add_observer(shared::end)
+            .add_observer(client::close)
             .add_observer(saved_or_shared::close_own_world)
             .add_observer(saved_or_shared::refuse_own_world)
-            .add_systems(OnEnter(ClientState::Connected), client::connect)
-            .add_systems(OnExit(ClientState::Connected), client::disconnect)
+            .add_systems(OnExit(ClientState::Connected), service::forget_connection)
             .add_systems(
                 Update,
                 (
-                    client::connect.run_if(resource_added::<GroundServer>).before(client::send),
-                    client::receive.before(BurrowSystems::Collect),
+                    (service::find_service, client::receive).chain().before(BurrowSystems::Collect),
+                    client::release_pieces.in_set(FollowCommits),
                     (client::send, client::show)
                         .chain()
-                        .after(BurrowSystems::Collect)
+                        .after(BurrowSystems::Commit)
                         .before(BurrowSystems::Begin),
-                    server::serve.run_if(resource_exists::<GroundServer>),
+                    (server::serve.run_if(resource_exists::<GroundServer>), service::invite).chain(),
                 ),
             )
-            .add_systems(Last, server::finish_at_exit.run_if(resource_exists::<GroundServer>));
+            .add_systems(
+                Last,
+                (client::send_last, server::finish_at_exit)
+                    .chain()
+                    .run_if(on_message::<AppExit>)
+                    .run_if(resource_exists::<GroundServer>),
+            );
+    }
+
+    fn finish(&self, app: &mut App) {
+        if !app.is_plugin_added::<TerrainPlugin>() {
+            error!("TogetherPlugin shares no terrain without BurrowPlugins");
+        }
     }
 }

@@ -4,14 +4,16 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use bevy::platform::collections::HashMap;
+use bevy::ecs::message::MessageCursor;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;
 
-use super::messages::{BulkLane, FromPlayer, OrderLane};
-use crate::net::{self, Lane, Server, ServerEvent, ServerSettings};
+use super::messages::{BulkLane, FromPlayer, OrderLane, Served};
+use super::players::{Players, Said};
+use super::service::Authorised;
+use crate::net::{self, Kick, Lane, Server, ServerEvent, ServerSettings};
 use crate::plugin::{ThreadTask, Threads};
 use crate::saves::{ReadWorld, SavedWorld, WorldReader};
 use crate::store::{Progress, Store, StoreError, StoreTrouble};
@@ -22,10 +24,13 @@ use crate::terrain::Terrain;
 #[derive(Resource)]
 pub struct GroundServer {
     work: Work,
+    /// What is served; `None` until it is there.
+    served: Option<Served>,
     waiting: Vec<Request>,
     start: Instant,
-    /// Players that are connected, by their numbers.
-    players: HashMap<net::ClientId, ClientId>,
+    players: Players,
+    /// The messages of players that were read.
+    read: MessageCursor<FromClient<FromPlayer>>,
     data: BTreeMap<String, Vec<u8>>,
 }
 
@@ -45,7 +50,7 @@ struct Parts {
     store: Option<Store>,
 }
 
-/// Most that waits until a world is read; what comes then is dropped.
+/// Most requests of the game that wait until a world is read; what comes then is dropped.
 const MOST_WAITING: usize = 1 << 14;
 
 /// What waits for the server to come back.
@@ -94,13 +99,21 @@ impl GroundServer {
     }
 
     fn working(work: Work) -> Self {
+        let served = if let Work::Here(parts) = &work { Some(Served::by(&parts.server)) } else { None };
         Self {
             work,
+            served,
             waiting: Vec::new(),
             start: Instant::now(),
-            players: HashMap::default(),
+            players: Players::default(),
+            read: MessageCursor::default(),
             data: BTreeMap::new(),
         }
+    }
+
+    /// What is served; `None` while its world is read, and if it can't be.
+    pub(super) fn served(&self) -> Option<Served> {
+        self.served
     }
 
     /// Does something with the server as soon as it is not at work, in the order of these calls: sets where a player is, changes
@@ -119,6 +132,7 @@ impl GroundServer {
     /// Serves this world where the saved one [can't be read](GroundServerEvent::Opened). Players who have come meanwhile join it.
     pub fn serve_instead(&mut self, server: Server) {
         if let Work::Gone = self.work {
+            self.served = Some(Served::by(&server));
             self.work = Work::Here(Box::new(Parts { server, store: None }));
         }
     }
@@ -139,14 +153,14 @@ impl GroundServer {
         self.data.get(key).map(Vec::as_slice)
     }
 
-    /// The number of a player on the server: one more than the transport's, so it stays over connections. A player on the
-    /// server's own machine has the number 0.
+    /// The number of a player on the server: one more than the transport's [`NetworkId`], so it stays the same over connections. A
+    /// player on the server's own machine has the number 0.
+    ///
+    /// The two greatest network ids have no number: [`net::ClientId::SERVER`] is returned, and such clients are not served. A transport
+    /// without network ids gives a new number to each connection, so a player who comes back is somebody else to the server.
     pub fn player(client: ClientId, ids: &Query<&NetworkId>) -> net::ClientId {
-        let known =
-            client.entity().and_then(|entity| ids.get(entity).ok()).map(|id| id.get().saturating_add(1));
-        let unknown = client.entity().map_or(0, Entity::to_bits);
-        // The greatest number is the server's own.
-        net::ClientId(known.unwrap_or(unknown).min(u64::MAX - 1))
+        let id = client.entity().and_then(|entity| ids.get(entity).ok());
+        super::players::number(client, id).unwrap_or(net::ClientId::SERVER)
     }
 
     /// Waits until all that was asked for is done and saved: before the app ends. A world that is still read has nothing to save.
@@ -165,6 +179,7 @@ impl GroundServer {
         let now = self.start.elapsed();
         if let Work::Here(parts) = &mut self.work {
             self.waiting.drain(..).for_each(|request| request(parts, now));
+            self.players.forget_waiting();
             parts.advance(now);
             if let Some(Err(why)) = parts.store.as_mut().map(Store::flush) {
                 error!("the last edits are not saved: {why}");
@@ -188,6 +203,7 @@ impl GroundServer {
                     let newer = std::mem::take(&mut self.data);
                     self.data.extend(parts.store.iter().flat_map(|store| store.game_data().clone()));
                     self.data.extend(newer);
+                    self.served = Some(Served::by(&parts.server));
                     troubles.into_iter().map(GroundServerEvent::Trouble).for_each(&mut tell);
                     tell(GroundServerEvent::Opened(Ok(())));
                     return Some(parts);
@@ -213,31 +229,58 @@ impl Parts {
     }
 }
 
+impl GroundServer {
+    /// Reads what players sent. What comes while no world is there is dropped: nobody was invited.
+    fn receive(
+        &mut self,
+        messages: &Messages<FromClient<FromPlayer>>,
+        clients: &Query<Option<&NetworkId>, Authorised>,
+    ) {
+        let is_open = matches!(self.work, Work::Here(_) | Work::UnderWay(_));
+        let mut said = Vec::new();
+        for FromClient { client_id, message } in self.read.read(messages) {
+            if is_open && let Some(number) = self.players.find(*client_id, clients) {
+                said.push((number, self.players.hear(number, *client_id, message)));
+            }
+        }
+        for (player, said) in said {
+            match said {
+                Said::Bytes { begins, bytes } => self.ask(move |parts, now| {
+                    if begins {
+                        parts.server.connect(player, now);
+                    }
+                    parts.server.receive(player, &bytes, now);
+                }),
+                Said::Leaves => self.ask(move |parts, _| parts.server.disconnect(player)),
+                Said::TooMuch => self.ask(move |parts, _| parts.server.kick_for(player, Kick::Flood)),
+                Said::Nothing => {}
+            }
+        }
+        for player in self.players.take_gone(clients) {
+            self.ask(move |parts, _| parts.server.disconnect(player));
+        }
+    }
+}
+
 /// Hands messages of players to the server, and sends what it has for them.
 pub(super) fn serve(
     mut ground: ResMut<GroundServer>,
-    mut messages: MessageReader<FromClient<FromPlayer>>,
-    ids: Query<&NetworkId>,
+    messages: Res<Messages<FromClient<FromPlayer>>>,
+    clients: Query<Option<&NetworkId>, Authorised>,
     mut order: MessageWriter<ToClients<OrderLane>>,
     mut bulk: MessageWriter<ToClients<BulkLane>>,
     mut events: MessageWriter<GroundServerEvent>,
     mut leave: MessageWriter<DisconnectRequest>,
 ) {
     let ground = &mut *ground;
-    for FromClient { client_id, message } in messages.read() {
-        let player = GroundServer::player(*client_id, &ids);
-        if ground.players.insert(player, *client_id) != Some(*client_id) {
-            ground.ask(move |parts, now| parts.server.connect(player, now));
-        }
-        let bytes = message.0.clone();
-        ground.ask(move |parts, now| parts.server.receive(player, &bytes, now));
-    }
+    ground.receive(&messages, &clients);
     let parts = ground.take_parts(|event| {
         events.write(event);
     });
     let Some(mut parts) = parts else { return };
     let now = ground.start.elapsed();
     ground.waiting.drain(..).for_each(|request| request(&mut parts, now));
+    ground.players.forget_waiting();
     let mut kicked = Vec::new();
     for event in parts.server.take_events() {
         if let ServerEvent::Kicked(player, _) = event {
@@ -249,7 +292,7 @@ pub(super) fn serve(
         events.write_batch(store.take_troubles().into_iter().map(GroundServerEvent::Trouble));
     }
     for (player, lane, bytes) in parts.server.take_outgoing() {
-        let Some(&client) = ground.players.get(&player) else { continue };
+        let Some(client) = ground.players.client(player) else { continue };
         let targets = SendTargets::Single(client);
         match lane {
             Lane::Order => drop(order.write(ToClients { targets, message: OrderLane(bytes) })),
@@ -257,7 +300,7 @@ pub(super) fn serve(
         }
     }
     for player in kicked {
-        if let Some(client) = ground.players.remove(&player).and_then(ClientId::entity) {
+        if let Some(client) = ground.players.kick(player) {
             leave.write(DisconnectRequest { client });
         }
     }
@@ -267,22 +310,12 @@ pub(super) fn serve(
     }));
 }
 
-/// Tells the server that a player is gone.
-pub(super) fn forget_player(gone: On<Remove, ConnectedClient>, ground: Option<ResMut<GroundServer>>) {
-    let Some(mut ground) = ground else { return };
-    let left: Vec<net::ClientId> = ground
-        .players
-        .extract_if(|_, client| client.entity() == Some(gone.entity))
-        .map(|(id, _)| id)
-        .collect();
-    for player in left {
-        ground.with(move |server| server.disconnect(player));
-    }
-}
-
-/// Saves everything before the app ends.
-pub(super) fn finish_at_exit(mut exits: MessageReader<AppExit>, mut ground: ResMut<GroundServer>) {
-    if exits.read().next().is_some() {
-        ground.finish();
-    }
+/// Does what players asked for in the last frame, and saves everything before the app ends.
+pub(super) fn finish_at_exit(
+    mut ground: ResMut<GroundServer>,
+    messages: Res<Messages<FromClient<FromPlayer>>>,
+    clients: Query<Option<&NetworkId>, Authorised>,
+) {
+    ground.receive(&messages, &clients);
+    ground.finish();
 }

@@ -43,6 +43,11 @@ impl MaterialCounts {
         }
     }
 
+    /// Bytes of the list.
+    pub(crate) fn bytes(&self) -> usize {
+        self.0.capacity() * size_of::<(MaterialId, u64)>()
+    }
+
     /// Voxels of one material.
     pub fn of(&self, material: MaterialId) -> u64 {
         self.0.binary_search_by_key(&material, |entry| entry.0).map_or(0, |at| self.0[at].1)

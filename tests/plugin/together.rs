@@ -1,40 +1,103 @@
 //! Digging together over replicon, without a transport: messages are handed from app to app.
 
+mod access;
+#[cfg(feature = "avian")]
+mod debris;
+mod digging;
+mod scripts;
+mod sessions;
+mod troubles;
+#[cfg(feature = "examples")]
+mod udp;
+
 use std::time::{Duration, Instant};
 
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
-use bevy_burrow::net::{ClientEvent, Refusal, Server, ServerSettings, UndoPolicy};
+use bevy_burrow::net::{Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{
-    GroundEdited, GroundJoined, GroundServer, SharedTerrain, TogetherPlugin, WhatBecame,
+    GroundEdited, GroundJoined, GroundServer, SharedTerrain, SharingTrouble, SharingTroubleFound,
+    TogetherPlugin, WhatBecame,
 };
 use bevy_replicon::prelude::*;
-use bevy_replicon::test_app::ServerTestAppExt;
+use bevy_replicon::test_app::{ServerTestAppExt, TestClientEntity};
 
-use crate::stage::{Stage, dig};
+use crate::stage::Stage;
+
+/// How long a party waits for something: the machine may be busy.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn terrain(ground: Ground, chunk_size: u32) -> Terrain {
+    Terrain::new(ground, &TerrainSettings { chunk_size, ..default() }).expect("valid settings")
+}
 
 fn ground() -> Terrain {
     let noise = NoiseHeights { seed: 4, scale: 30.0, amplitude: 10.0, base: 20.0, ..default() };
-    let ground = Ground::from_noise(96, 96, &noise).expect("valid ground");
-    Terrain::new(ground, &TerrainSettings { chunk_size: 16, ..default() }).expect("valid settings")
+    terrain(Ground::from_noise(96, 96, &noise).expect("valid ground"), 16)
 }
 
-fn player() -> Stage {
+/// Another ground of the same size.
+fn other_ground() -> Terrain {
+    terrain(Ground::flat(96, 96, 20.0).expect("valid ground"), 16)
+}
+
+/// Ground that takes many messages to join.
+fn large_ground() -> Terrain {
+    let noise = NoiseHeights { seed: 4, scale: 60.0, amplitude: 30.0, base: 40.0, ..default() };
+    terrain(Ground::from_noise(384, 384, &noise).expect("valid ground"), 32)
+}
+
+/// This ground, with rough digs everywhere.
+fn dug(mut terrain: Terrain, count: u64) -> Terrain {
+    let side = f64::from(terrain.world().ground().width());
+    let brushes: Vec<Brush> = (0..count)
+        .map(|number| {
+            let (x, z) = (number as f64 * 12.0 % side, (number as f64 * 12.0 / side).floor() * 12.0 % side);
+            let y = terrain.world().height(x, z).unwrap_or_default();
+            let shape = Shape::sphere(Vec3::new(x as f32, y as f32, z as f32), 6.0);
+            Brush::dig(shape).with_roughness(Roughness::new(1.5, 3.0, number as u32))
+        })
+        .collect();
+    terrain.apply(brushes);
+    terrain
+}
+
+/// An app of a player, with this login.
+fn player_with(auth_method: AuthMethod) -> Stage {
     let plugins = (MinimalPlugins, StatesPlugin, AssetPlugin::default(), MeshPlugin, TransformPlugin);
-    let replicon = RepliconPlugins.set(ServerPlugin::new(PostUpdate));
+    let replicon =
+        RepliconPlugins.set(ServerPlugin::new(PostUpdate)).set(RepliconSharedPlugin { auth_method });
     Stage::with_all((plugins, replicon), TogetherPlugin)
         .recording::<GroundEdited>()
         .recording::<GroundJoined>()
+        .recording::<HistoryMoved>()
+        .recording::<SharingTroubleFound>()
+}
+
+fn player() -> Stage {
+    player_with(AuthMethod::ProtocolCheck)
+}
+
+fn settings() -> ServerSettings {
+    ServerSettings { undo: UndoPolicy::Own, ..default() }
 }
 
 /// A server that lets players take back their own strokes, and refuses edits above a height.
 fn server() -> GroundServer {
-    let settings = ServerSettings { undo: UndoPolicy::Own, ..default() };
-    let mut server = Server::new(ground(), settings);
+    let mut server = Server::new(ground(), settings());
     server.set_permission(|_, edit| edit.reach().max.y < 60);
     GroundServer::new(server)
+}
+
+/// An app of a server, with this login and without ground.
+fn server_app(auth_method: AuthMethod) -> App {
+    let mut server = App::new();
+    let replicon =
+        RepliconPlugins.set(ServerPlugin::new(PostUpdate)).set(RepliconSharedPlugin { auth_method });
+    server.add_plugins((MinimalPlugins, StatesPlugin, replicon, BurrowPlugins, TogetherPlugin)).finish();
+    server
 }
 
 /// A server and players, who exchange messages in each round.
@@ -45,40 +108,82 @@ struct Party {
 
 impl Party {
     fn new(players: usize) -> Self {
-        let mut server = App::new();
-        let replicon = RepliconPlugins.set(ServerPlugin::new(PostUpdate));
-        server
-            .add_plugins((MinimalPlugins, StatesPlugin, replicon, BurrowPlugins, TogetherPlugin))
-            .insert_resource(self::server())
-            .finish();
-        let mut party = Self { server, players: Vec::new() };
+        let mut party = Self::without_ground(AuthMethod::ProtocolCheck);
+        party.server.insert_resource(self::server());
         (0..players).for_each(|_| party.join());
         party
     }
 
+    fn without_ground(auth_method: AuthMethod) -> Self {
+        Self { server: server_app(auth_method), players: Vec::new() }
+    }
+
     fn join(&mut self) {
-        let mut stage = player();
-        let terrain = stage.app.world_mut().spawn((ground(), SharedTerrain::default())).id();
+        self.join_with(ground(), AuthMethod::ProtocolCheck);
+    }
+
+    fn join_with(&mut self, terrain: Terrain, auth_method: AuthMethod) {
+        let mut stage = player_with(auth_method);
+        let terrain = stage.app.world_mut().spawn((terrain, SharedTerrain::default())).id();
+        self.connect(stage, terrain);
+    }
+
+    /// Lets an app of a player connect.
+    fn connect(&mut self, mut stage: Stage, terrain: Entity) {
         self.server.connect_client(&mut stage.app);
         self.players.push((stage, terrain));
+    }
+
+    fn disconnect(&mut self, player: usize) {
+        self.server.disconnect_client(&mut self.players[player].0.app);
+    }
+
+    fn reconnect(&mut self, player: usize) {
+        self.server.connect_client(&mut self.players[player].0.app);
+    }
+
+    fn is_connected(&self, player: usize) -> bool {
+        self.players[player].0.app.world().contains_resource::<TestClientEntity>()
+    }
+
+    /// The server's entity of a player.
+    fn client(&self, player: usize) -> Entity {
+        **self.players[player].0.app.world().resource::<TestClientEntity>()
     }
 
     fn round(&mut self) {
         self.server.update();
         for (stage, _) in &mut self.players {
-            self.server.exchange_with_client(&mut stage.app);
+            let is_connected = stage.app.world().contains_resource::<TestClientEntity>();
+            if is_connected {
+                self.server.exchange_with_client(&mut stage.app);
+            }
             stage.app.update();
-            self.server.exchange_with_client(&mut stage.app);
+            if is_connected {
+                self.server.exchange_with_client(&mut stage.app);
+            }
         }
         std::thread::sleep(Duration::from_millis(1));
+    }
+
+    fn rounds(&mut self, count: usize) {
+        (0..count).for_each(|_| self.round());
     }
 
     fn rounds_until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
         let start = Instant::now();
         while !is_so(self) {
-            assert!(start.elapsed() < Duration::from_secs(120), "never: {what}");
+            assert!(start.elapsed() < PATIENCE, "never: {what}");
             self.round();
         }
+    }
+
+    fn all_join(&mut self) {
+        self.rounds_until("all have joined", Self::agrees);
+    }
+
+    fn world_mut(&mut self, player: usize) -> &mut World {
+        self.players[player].0.app.world_mut()
     }
 
     fn shared(&self, player: usize) -> &SharedTerrain {
@@ -86,17 +191,22 @@ impl Party {
         stage.app.world().get(*terrain).expect("it is shared")
     }
 
+    fn terrain_hash(&self, player: usize) -> u64 {
+        let (stage, terrain) = &self.players[player];
+        stage.terrain(*terrain).world().hash()
+    }
+
     /// Does each player show the same world as all others, with nothing under way?
     fn agrees(&self) -> bool {
-        let states: Vec<_> = (0..self.players.len())
-            .map(|player| {
-                let (stage, terrain) = &self.players[player];
-                (self.shared(player).number(), stage.terrain(*terrain).world().hash())
-            })
-            .collect();
-        let is_settled = (0..states.len())
-            .all(|player| self.shared(player).has_joined() && self.shared(player).pending() == 0);
-        is_settled && states.windows(2).all(|pair| pair[0] == pair[1])
+        let count = self.players.len();
+        let state = |player| (self.shared(player).number(), self.terrain_hash(player));
+        let is_settled = |player| self.shared(player).has_joined() && self.shared(player).pending() == 0;
+        (0..count).all(is_settled) && (1..count).all(|player| state(player) == state(0))
+    }
+
+    /// Have all joined the world of this hash?
+    fn all_show(&self, hash: u64) -> bool {
+        self.agrees() && (0..self.players.len()).all(|player| self.terrain_hash(player) == hash)
     }
 
     fn height_at(&self, player: usize, x: f64, z: f64) -> f32 {
@@ -107,94 +217,22 @@ impl Party {
     fn send(&mut self, player: usize, brush: Brush) {
         self.players[player].0.send(brush);
     }
-}
 
-#[test]
-fn what_one_digs_all_see() {
-    let mut party = Party::new(3);
-    party.rounds_until("all have joined", |party| (0..3).all(|player| party.shared(player).has_joined()));
-    let pristine = ground().world().hash();
-    for turn in 0..30 {
-        let player = turn % 3;
-        let (x, z) = (20.0 + (turn * 7 % 50) as f64, 20.0 + (turn * 13 % 50) as f64);
-        let height = party.height_at(player, x, z);
-        party.send(player, dig(x as f32, height, z as f32, 4.0));
-        party.round();
+    /// Digs a ball out of the surface.
+    fn dig_at(&mut self, player: usize, x: f32, z: f32) {
+        let y = self.height_at(player, x.into(), z.into());
+        self.send(player, Brush::dig(Shape::sphere(Vec3::new(x, y, z), 4.0)));
     }
-    party.rounds_until("all agree", |party| {
-        let (stage, terrain) = &party.players[0];
-        party.agrees() && party.shared(0).number() >= 30 && stage.terrain(*terrain).world().hash() != pristine
-    });
-    for player in 0..3 {
-        let (stage, terrain) = &mut party.players[player];
-        let terrain = *terrain;
-        stage.assert_whole(terrain, "digging together");
-        let edited = stage.recorded::<GroundEdited>();
-        let count = |is_such: fn(&WhatBecame) -> bool| {
-            edited.iter().filter(|edited| is_such(&edited.outcome)).count()
-        };
-        assert_eq!(count(|outcome| matches!(outcome, WhatBecame::Predicted(_))), 10);
-        assert_eq!(count(|outcome| matches!(outcome, WhatBecame::Confirmed(Some(_)))), 10);
-        let receipts = stage.receipts();
-        assert_eq!(receipts.iter().filter(|receipt| receipt.receipt.outcome.is_ok()).count(), 10);
-        let events = stage.recorded::<GroundJoined>();
-        let repairs = events.iter().filter(|joined| matches!(joined.event, ClientEvent::Repaired(_)));
-        assert_eq!(repairs.count(), 0);
+
+    /// What became of a player's edits since the last call.
+    fn outcomes(&mut self, player: usize) -> Vec<WhatBecame> {
+        let edited = self.players[player].0.recorded::<GroundEdited>();
+        edited.into_iter().map(|edited| edited.outcome).collect()
     }
-    // One who comes later sees the same.
-    party.join();
-    party.rounds_until("the late one agrees", Party::agrees);
-}
 
-#[test]
-fn what_the_server_refuses_is_gone_again_and_undo_takes_back() {
-    let mut party = Party::new(2);
-    party.rounds_until("both have joined", |party| (0..2).all(|player| party.shared(player).has_joined()));
-    let pristine = ground().world().hash();
-    let high = Brush::add(Shape::sphere(Vec3::new(40.0, 66.0, 40.0), 5.0), MaterialId(3)).with_tag(7);
-    party.send(0, high);
-    party.rounds_until("the answer comes", |party| {
-        let (stage, terrain) = &party.players[0];
-        party.agrees() && stage.terrain(*terrain).world().revision() > 1
-    });
-    let (stage, terrain) = &mut party.players[0];
-    assert_eq!(stage.terrain(*terrain).world().hash(), pristine);
-    let edited: Vec<WhatBecame> =
-        stage.recorded::<GroundEdited>().into_iter().map(|edited| edited.outcome).collect();
-    assert!(
-        matches!(edited[..], [WhatBecame::Predicted(_), WhatBecame::Refused(Some(Refusal::Forbidden))]),
-        "{edited:?}"
-    );
-    let receipt = stage.receipts().last().expect("an answer").receipt.clone();
-    assert_eq!((receipt.tag, receipt.outcome), (7, Err(Rejection::Refused)));
-
-    let height = party.height_at(1, 50.0, 50.0);
-    party.send(1, dig(50.0, height, 50.0, 5.0));
-    party.rounds_until("it is dug", |party| {
-        let (stage, terrain) = &party.players[0];
-        party.agrees() && stage.terrain(*terrain).world().hash() != pristine
-    });
-    party.players[1].0.app.world_mut().write_message(Undo::default());
-    party.rounds_until("it is taken back", |party| {
-        let (stage, terrain) = &party.players[0];
-        party.agrees() && stage.terrain(*terrain).world().hash() == pristine
-    });
-}
-
-#[test]
-fn a_host_plays_too() {
-    let mut stage = player();
-    stage.app.insert_resource(server());
-    stage.app.world_mut().resource_mut::<NextState<ServerState>>().set(ServerState::Running);
-    let terrain = stage.app.world_mut().spawn((ground(), SharedTerrain::default())).id();
-    let pristine = ground().world().hash();
-    stage.frames_until("it has joined", |stage| {
-        stage.app.world().get::<SharedTerrain>(terrain).is_some_and(SharedTerrain::has_joined)
-    });
-    stage.send(dig(40.0, 20.0, 40.0, 6.0));
-    stage.frames_until("it is dug and confirmed", |stage| {
-        let shared = stage.app.world().get::<SharedTerrain>(terrain).expect("it is shared");
-        shared.pending() == 0 && shared.number() > 0 && stage.terrain(terrain).world().hash() != pristine
-    });
-    stage.assert_whole(terrain, "the host's world");
+    /// What was reported to a player since the last call.
+    fn troubles(&mut self, player: usize) -> Vec<SharingTrouble> {
+        let found = self.players[player].0.recorded::<SharingTroubleFound>();
+        found.into_iter().map(|found| found.trouble).collect()
+    }
 }

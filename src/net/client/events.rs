@@ -2,7 +2,7 @@
 
 use super::super::message::{ClientId, Kick, Refusal};
 use crate::lattice::RegionPos;
-use crate::terrain::{Receipt, Restored};
+use crate::terrain::{LoosePiece, Receipt, Restored, ReturnedPiece};
 
 /// What a game may want to know.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +46,17 @@ pub enum ClientEvent {
         author: ClientId,
         /// What it came to. Its tag is 0.
         receipt: Receipt,
+    },
+    /// Pieces of ground were cut off or are ground again, in what is shown from the next [change](super::Client::take_shown) on. Whatever a
+    /// game makes of pieces should follow this, and not the receipts of edits: predictions may have been wrong, the server may refuse
+    /// an edit, and other players undo theirs.
+    PiecesChanged {
+        /// The tag of the edit that cut pieces off.
+        tag: u64,
+        /// Pieces that were cut off.
+        found: Vec<LoosePiece>,
+        /// Pieces that had been cut off, and are ground again.
+        returned: Vec<ReturnedPiece>,
     },
     /// Everything up to this number is saved on the server.
     Durable(u64),

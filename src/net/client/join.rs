@@ -100,6 +100,7 @@ impl Client {
     fn take_answered(&mut self, own: u64) -> Vec<u64> {
         let answered: Vec<u64> =
             self.replica.pending().map(|(number, _)| number).filter(|number| *number <= own).collect();
+        answered.iter().for_each(|number| self.settle_pieces(*number));
         answered.into_iter().filter_map(|number| Some(self.replica.take_back(number)?.tag())).collect()
     }
 
@@ -131,7 +132,10 @@ impl Client {
             let told =
                 self.replica.pending().filter(|(number, _)| (own + 1..=self.told).contains(number)).count();
             self.told = own + told as u64;
+            let before: Vec<u64> = self.replica.pending().map(|(number, _)| number).collect();
             self.next_own = self.replica.renumber(own);
+            let after = self.replica.pending().map(|(number, _)| number);
+            self.pieces.renumber(before.into_iter().zip(after));
         }
     }
 
@@ -160,6 +164,7 @@ impl Client {
     fn follow_from_now(&mut self) {
         self.stage = Stage::Following;
         self.is_part = false;
+        self.check_pieces(None);
         if !self.is_playable {
             self.is_playable = true;
             self.events.push(ClientEvent::Playable);

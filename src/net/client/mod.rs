@@ -10,9 +10,11 @@
 //! | `replica` | the world of the order, and what is shown of it |
 
 mod events;
+mod give_up;
 mod images;
 mod join;
 mod outbox;
+mod pieces;
 mod repair;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -38,6 +40,7 @@ pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
 use outbox::Outbox;
+use pieces::Pieces;
 use repair::{Marks, Reaches, Repair};
 
 /// Most entries that one [`advance`](Client::advance) applies.
@@ -106,6 +109,7 @@ pub struct Client {
     outbox: Outbox,
     /// The numbers of undos that the server has not answered.
     undos: BTreeSet<u64>,
+    pieces: Pieces,
     outgoing: Vec<Vec<u8>>,
     shown: Vec<ShownChange>,
     events: Vec<ClientEvent>,
@@ -153,6 +157,7 @@ impl Client {
             early,
             outbox: Outbox::new([0; 2], 0, Duration::ZERO),
             undos,
+            pieces: Pieces::default(),
             outgoing,
             shown: Vec::new(),
             events: Vec::new(),
@@ -372,11 +377,16 @@ impl Client {
 
     fn tell_predictions(&mut self, receipts: Vec<Receipt>) {
         let before = self.replica.pending().count().saturating_sub(receipts.len());
+        let mut new = Vec::new();
         for ((own, _), receipt) in self.replica.pending().skip(before).zip(receipts) {
             if own > self.told {
                 self.told = own;
-                self.events.push(ClientEvent::Predicted(receipt));
+                new.push((own, receipt));
             }
+        }
+        for (own, receipt) in new {
+            self.predict_pieces(own, &receipt);
+            self.events.push(ClientEvent::Predicted(receipt));
         }
     }
 
@@ -437,6 +447,7 @@ impl Client {
                 self.greet();
             }
         } else if let Some(edit) = self.replica.take_back(own) {
+            self.refuse_pieces(own);
             self.events.push(ClientEvent::Refused { tag: edit.tag(), why: Some(why) });
         }
     }
@@ -510,7 +521,7 @@ impl Client {
         }
     }
 
-    /// The next entries up to a number, at most so many. A mark ends them.
+    /// The next entries up to a number, at most so many. A mark ends them, and so do parts: what is ground again is looked for then.
     fn next_batch(&mut self, end: u64, most: usize) -> Vec<Entry> {
         let (mut batch, mut number) = (Vec::new(), self.number());
         while number < end
@@ -520,8 +531,9 @@ impl Client {
             number += 1;
             let entry = self.valid(number, entry);
             let is_compared = matches!((&entry, &self.stage), (Entry::Mark, Stage::Following));
+            let is_checked = is_compared || matches!(&entry, Entry::Parts { .. });
             batch.push(entry);
-            if is_compared {
+            if is_checked {
                 break;
             }
         }
@@ -561,22 +573,26 @@ impl Client {
                     // Its player may have been here before, in another client.
                     match own(entry).and_then(|own| tags.get(&own).copied()) {
                         Some(tag) => {
-                            let receipt = Some(Receipt { tag, ..receipt });
-                            self.events.push(ClientEvent::Confirmed { tag, receipt });
+                            let receipt = Receipt { tag, ..receipt };
+                            self.confirm_pieces(own(entry), &receipt);
+                            self.events.push(ClientEvent::Confirmed { tag, receipt: Some(receipt) });
                         }
                         None if is_told => {
+                            self.confirm_pieces(None, &receipt);
                             self.events.push(ClientEvent::Others { author: *author, receipt });
                         }
                         None => {}
                     }
                 }
                 Entry::Parts { by, change } => {
-                    let restored = restored.next().flatten();
+                    let mut restored = restored.next().flatten();
                     let is_missing = restored.is_none();
+                    let reach = change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
+                    let returned = reach.map(|reach| self.check_pieces(Some(reach))).unwrap_or_default();
+                    restored.iter_mut().for_each(|restored| restored.returned.clone_from(&returned));
                     if by.is_some_and(|(by, own)| Some(by) == id && self.undos.remove(&own)) {
                         self.events.push(ClientEvent::Undone(restored));
                     }
-                    let reach = change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
                     reach.into_iter().for_each(|reach| self.reaches.note(epoch.number, reach));
                     if applied.is_void && is_missing {
                         let regions = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos));

@@ -197,6 +197,7 @@ impl Client {
         match entry {
             Entry::Edit { author, own, .. } if Some(author) == self.id => {
                 if let Some(edit) = self.replica.take_back(own) {
+                    self.refuse_pieces(own);
                     self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
                 }
             }

@@ -6,8 +6,12 @@
 //! path inside the drawn surface connects them.
 //!
 //! **Anchored** is a piece that reaches ground below everything that was ever edited. The world's sides anchor
-//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further, which bounds
-//! the search; its result does not depend on the order of the search.
+//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further. Its result
+//! does not depend on the order of the search.
+//!
+//! **Budget.** The search after an edit visits a bounded number of bricks, and what it finds has a bounded number of voxels:
+//! see [`LooseSettings`]. What lies beyond stays as ground, and the receipt says so. Seeds are taken in a fixed order, so the
+//! outcome is the same on every machine.
 //!
 //! **Removal.** The samples of a removed piece get the density of air in the middle of a dig, and so does air that touches
 //! them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this belongs to
@@ -15,6 +19,7 @@
 
 mod bits;
 mod mesh;
+mod piece;
 mod search;
 
 use std::sync::Arc;
@@ -25,16 +30,22 @@ use serde::{Deserialize, Serialize};
 use super::world::World;
 use crate::edits::{DraftedBrick, EditDelta, Overlay, take_out};
 use crate::lattice::{BrickPos, Column, LatticeBox};
-use crate::surface::SurfaceMesh;
 use crate::volume::layers::{self, Layers, NONE};
-use crate::volume::{DiggingRules, MaterialCounts, SampleView};
+use crate::volume::{DiggingRules, SampleView};
 use bits::{SIDES, Samples};
-use search::{Component, Solid};
+pub use piece::{LoosePiece, PieceFate, PieceId, ReturnedPiece, Run};
+use search::{Budget, Component, Solid};
 
 /// Which loose pieces to search for after a dig, and what happens to them.
 ///
 /// Each edit that can remove ground is followed by a search before the next edit applies, so the result does not depend on how
 /// edits are batched.
+///
+/// A search is as bounded as its edit: it visits at most 4096 bricks of 8x8x8 samples and 16 more for each brick that the edit
+/// changed, or an eighth of [`largest`](Self::largest) if that is more; all pieces that it finds have at most four times
+/// `largest` voxels together, or 131,072 if that is more. Pieces beyond these bounds stay as ground, and
+/// [`Applied::has_unsearched`](super::Applied::has_unsearched) says that there may be some. A later dig beside them finds
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
@@ -67,76 +78,9 @@ impl LooseSettings {
     }
 }
 
-/// What happened to a loose piece.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum PieceFate {
-    /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`] protect a part.
-    Left,
-    /// It was taken out of the ground.
-    Removed,
-    /// It was taken out of the ground, and its mesh is there to make a body of.
-    BrokeOff,
-}
-
-/// Solid samples in a row along x.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct Run {
-    /// The first of them.
-    pub start: IVec3,
-    /// How many.
-    pub len: u32,
-}
-
-/// A piece of ground that is not connected to the world. It can be saved as it is, with its mesh: pieces that broke off are the
-/// game's, not the terrain's.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Plain", into = "Plain")]
-pub struct LoosePiece {
-    /// What happened to it.
-    pub fate: PieceFate,
-    /// Box around its samples.
-    pub bounds: LatticeBox,
-    /// How many samples it has.
-    pub voxels: u64,
-    /// Its voxels by material: times the density and volume of a voxel, its mass.
-    pub materials: MaterialCounts,
-    /// Its samples, by y, then z, then x.
-    pub runs: Arc<[Run]>,
-    /// Its surface as marching cubes draws it, closed, with positions counted from the lowest corner of `bounds`; for
-    /// those that broke off.
-    pub mesh: Option<Arc<SurfaceMesh>>,
-}
-
-/// A piece without shared parts, as it is saved.
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "LoosePiece")]
-struct Plain {
-    fate: PieceFate,
-    bounds: LatticeBox,
-    voxels: u64,
-    materials: MaterialCounts,
-    runs: Vec<Run>,
-    mesh: Option<SurfaceMesh>,
-}
-
-impl From<LoosePiece> for Plain {
-    fn from(piece: LoosePiece) -> Self {
-        let LoosePiece { fate, bounds, voxels, materials, runs, mesh } = piece;
-        let mesh = mesh.map(Arc::unwrap_or_clone);
-        Self { fate, bounds, voxels, materials, runs: runs.to_vec(), mesh }
-    }
-}
-
-impl From<Plain> for LoosePiece {
-    fn from(of: Plain) -> Self {
-        let Plain { fate, bounds, voxels, materials, runs, mesh } = of;
-        Self { fate, bounds, voxels, materials, runs: runs.into(), mesh: mesh.map(Arc::new) }
-    }
-}
-
 impl World {
     /// The loose pieces of up to `largest` voxels that hold some sample of a box, in order of their lowest samples there.
-    /// Says what the settings would make of each, but takes none out, and makes no meshes.
+    /// Says what the settings would make of each, but takes none out, and makes no meshes. The search has no budget.
     pub fn loose_pieces(&self, around: LatticeBox, settings: &LooseSettings) -> Vec<LoosePiece> {
         let solid = Solid::new(self, self.samples(), None);
         let Some(around) = around.intersection(self.grid.edit_bounds()) else { return Vec::new() };
@@ -153,8 +97,9 @@ impl World {
                 seeds.insert(pos, layers::within(pos, around));
             }
         }
-        let found = search::search(&solid, &seeds, settings.largest.into());
-        found.iter().map(|piece| describe(self.samples(), piece, settings)).collect()
+        let mut budget = Budget::unbounded();
+        let found = search::search(&solid, &seeds, settings.largest.into(), &mut budget);
+        found.iter().map(|piece| LoosePiece::new(self.samples(), piece, settings)).collect()
     }
 }
 
@@ -163,25 +108,36 @@ pub(super) fn seeds(world: &World, before: SampleView, drafted: &[DraftedBrick])
     search::seeds(&Solid::new(world, before, None), drafted)
 }
 
+/// What a search after an edit found, and what taking pieces out changed.
+#[derive(Default)]
+pub(super) struct Fallen {
+    pub pieces: Vec<LoosePiece>,
+    /// Whether the budget ended the search.
+    pub has_unsearched: bool,
+    /// The changes, as those of edit 0.
+    pub removed: EditDelta,
+}
+
 /// Looks for loose pieces at seeds, in a world under newer bricks, and takes them out where the settings and rules say so.
-/// Returns the pieces, and what taking them out changed, as changes of edit 0.
+/// `changed` is the number of bricks that the edit changed.
 pub(super) fn fall(
     world: &World,
     rules: Option<&DiggingRules>,
     newer: &Overlay,
-    seeds: &Samples,
+    (seeds, changed): (&Samples, usize),
     settings: &LooseSettings,
-) -> (Vec<LoosePiece>, EditDelta) {
+) -> Fallen {
     let (mut pieces, mut removed) = (Vec::new(), EditDelta::default());
     if seeds.is_empty() {
-        return (pieces, removed);
+        return Fallen::default();
     }
     let samples = newer.over(world.samples());
     let solid = Solid::new(world, samples, Some(newer));
-    let found = search::search(&solid, seeds, settings.largest.into());
+    let mut budget = Budget::of_edit(settings, changed);
+    let found = search::search(&solid, seeds, settings.largest.into(), &mut budget);
     let mut gone = Samples::default();
     for component in &found {
-        let mut piece = describe(samples, component, settings);
+        let mut piece = LoosePiece::new(samples, component, settings);
         if rules.is_some_and(|rules| keep(rules, component, &piece)) {
             piece.fate = PieceFate::Left;
         }
@@ -207,7 +163,7 @@ pub(super) fn fall(
     for (pos, gone) in &gone {
         take_out(samples, world.grid, *pos, gone, 0, &mut removed);
     }
-    (pieces, removed)
+    Fallen { pieces, has_unsearched: budget.has_run_out, removed }
 }
 
 /// Do the rules keep some part of a piece from being taken away, whatever the brush?
@@ -248,30 +204,4 @@ fn air_around(solid: &Solid, pieces: &Samples) -> Samples {
         bits::include(&mut air, pos, &layers::without(&near, &other));
     }
     air
-}
-
-/// Describes a piece; the settings decide what becomes of it.
-fn describe(samples: SampleView, piece: &Component, settings: &LooseSettings) -> LoosePiece {
-    let mut runs: Vec<Run> = Vec::new();
-    let (mut voxels, mut materials) = (0, MaterialCounts::default());
-    for (pos, layers) in search::bricks(piece) {
-        runs.extend(
-            layers::indices(layers).map(|index| Run { start: pos.origin() + layers::offset(index), len: 1 }),
-        );
-        voxels += layers::count(layers);
-    }
-    runs.sort_unstable_by_key(|run| [run.start.y, run.start.z, run.start.x]);
-    runs.dedup_by(|next, run| {
-        let goes_on = next.start == run.start + IVec3::X * run.len as i32;
-        run.len += if goes_on { next.len } else { 0 };
-        goes_on
-    });
-    let mut bounds: Option<LatticeBox> = None;
-    for run in &runs {
-        let end = run.start + IVec3::X * (run.len as i32 - 1);
-        LatticeBox::include(&mut bounds, LatticeBox { min: run.start, max: end });
-        materials.count_each((0..run.len as i32).map(|x| samples.material(run.start + IVec3::X * x)));
-    }
-    let bounds = bounds.unwrap_or(LatticeBox::point(IVec3::ZERO));
-    LoosePiece { fate: settings.fate(voxels), bounds, voxels, materials, runs: runs.into(), mesh: None }
 }

@@ -3,9 +3,13 @@
 //! From each seed a component of solid samples grows, brick by brick and the lowest brick first. Two things end it early:
 //! a brick without any stored one below it, whose solid samples stand on pristine ground all the way down; and a sample
 //! that an earlier search reached, which ended early itself. A component that is neither and ends by itself is loose.
+//!
+//! Seeds are taken lowest brick first, and so are the bricks of a component. So it depends on the world alone what a search
+//! had reached when its budget ran out.
 
 use std::collections::BTreeMap;
 
+use super::LooseSettings;
 use super::bits::{self, SIDES, Samples};
 use crate::edits::{DraftedBrick, Overlay};
 use crate::lattice::{BrickPos, LatticeBox};
@@ -57,8 +61,50 @@ pub(super) fn bricks(component: &Component) -> impl Iterator<Item = (BrickPos, &
     component.iter().map(|(&place, layers)| (BrickPos::from_layer_order(place), layers))
 }
 
-/// Every loose component of at most `largest` samples that holds one of the seeds, in order of their seeds.
-pub(super) fn search(solid: &Solid, seeds: &Samples, largest: u64) -> Vec<Component> {
+/// What a search may still cost.
+pub(super) struct Budget {
+    /// Bricks that it may visit. One that is reached again later counts again.
+    bricks: u64,
+    /// Voxels of what it finds.
+    voxels: u64,
+    /// Whether something was left out.
+    pub has_run_out: bool,
+}
+
+impl Budget {
+    /// For queries, where the caller chooses the box.
+    pub fn unbounded() -> Self {
+        Self { bricks: u64::MAX, voxels: u64::MAX, has_run_out: false }
+    }
+
+    /// For the search after an edit that changed so many bricks: see [`LooseSettings`].
+    pub fn of_edit(settings: &LooseSettings, changed: usize) -> Self {
+        let largest = u64::from(settings.largest);
+        let bricks = (largest / 8).max(4096) + 16 * changed as u64;
+        Self { bricks, voxels: (4 * largest).max(1 << 17), has_run_out: false }
+    }
+
+    /// Whether there was some left of it.
+    fn visit_brick(&mut self) -> bool {
+        take(&mut self.bricks, 1, &mut self.has_run_out)
+    }
+
+    fn find(&mut self, voxels: u64) -> bool {
+        take(&mut self.voxels, voxels, &mut self.has_run_out)
+    }
+}
+
+/// Takes some of what is left, or notes that there is not as much.
+fn take(left: &mut u64, some: u64, has_run_out: &mut bool) -> bool {
+    let rest = left.checked_sub(some);
+    *has_run_out |= rest.is_none();
+    *left = rest.unwrap_or(*left);
+    rest.is_some()
+}
+
+/// Every loose component of at most `largest` samples that holds one of the seeds, in order of their seeds, as far as the
+/// budget goes.
+pub(super) fn search(solid: &Solid, seeds: &Samples, largest: u64, budget: &mut Budget) -> Vec<Component> {
     let mut order: Vec<(BrickPos, &Layers)> = seeds.iter().map(|(&pos, layers)| (pos, layers)).collect();
     order.sort_unstable_by_key(|(pos, _)| pos.layer_order());
     let (mut seen, mut found) = (Samples::default(), Vec::new());
@@ -70,11 +116,15 @@ pub(super) fn search(solid: &Solid, seeds: &Samples, largest: u64) -> Vec<Compon
             if rest == NONE {
                 break;
             }
-            let is_loose = growth.grow(solid, &seen, pos, &bits::first(&rest), largest);
+            if budget.bricks == 0 {
+                budget.has_run_out = true;
+                return found;
+            }
+            let voxels = growth.grow(solid, &seen, (pos, &bits::first(&rest)), largest, budget);
             for (pos, layers) in &growth.reached {
                 bits::include(&mut seen, *pos, layers);
             }
-            if is_loose {
+            if voxels.is_some_and(|voxels| budget.find(voxels)) {
                 found
                     .push(growth.reached.iter().map(|(&pos, layers)| (pos.layer_order(), *layers)).collect());
             }
@@ -92,13 +142,23 @@ struct Growth {
 }
 
 impl Growth {
-    /// Grows from a seed; says whether it ended by itself.
-    fn grow(&mut self, solid: &Solid, seen: &Samples, at: BrickPos, seed: &Layers, largest: u64) -> bool {
+    /// Grows from a seed; returns how many voxels it has, if it ended by itself.
+    fn grow(
+        &mut self,
+        solid: &Solid,
+        seen: &Samples,
+        (at, seed): (BrickPos, &Layers),
+        largest: u64,
+        budget: &mut Budget,
+    ) -> Option<u64> {
         self.reached.clear();
         self.waiting.clear();
         self.waiting.insert(at.layer_order(), *seed);
         let mut voxels = 0;
         while let Some((next, from)) = self.waiting.pop_first() {
+            if !budget.visit_brick() {
+                return None;
+            }
             let pos = BrickPos::from_layer_order(next);
             let layers = solid.layers(pos);
             let before = self.reached.get(&pos).copied().unwrap_or(NONE);
@@ -111,7 +171,7 @@ impl Growth {
             voxels += layers::count(&fresh);
             let met = seen.get(&pos).is_some_and(|seen| layers::and(seen, &fresh) != NONE);
             if met || voxels > largest || solid.is_bottomless(pos) {
-                return false;
+                return None;
             }
             for side in SIDES {
                 let (beside, beyond) = (BrickPos(pos.0 + side), bits::beyond(&fresh, side));
@@ -119,13 +179,13 @@ impl Growth {
                     continue;
                 }
                 if seen.get(&beside).is_some_and(|seen| layers::and(seen, &beyond) != NONE) {
-                    return false;
+                    return None;
                 }
                 let waiting = self.waiting.entry(beside.layer_order()).or_insert(NONE);
                 *waiting = layers::or(waiting, &beyond);
             }
         }
-        true
+        Some(voxels)
     }
 }
 

@@ -1,0 +1,135 @@
+//! Loose pieces that are out of the ground that is shown, so that each is either there or with the game.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use glam::IVec3;
+
+use super::{Client, ClientEvent};
+use crate::lattice::LatticeBox;
+use crate::terrain::{LoosePiece, PieceFate, Receipt, ReturnedPiece, Run};
+
+/// Most pieces that are remembered.
+const MOST: usize = 1 << 13;
+
+/// A piece that is out of the ground.
+struct Gone {
+    piece: ReturnedPiece,
+    bounds: LatticeBox,
+    runs: Arc<[Run]>,
+}
+
+/// Pieces that the game knows of.
+#[derive(Default)]
+pub(super) struct Pieces {
+    /// Those of own edits that the server has not answered, by the numbers of these.
+    predicted: BTreeMap<u64, Vec<Gone>>,
+    /// All others, in the order in which they were cut off.
+    gone: VecDeque<Gone>,
+}
+
+impl Gone {
+    fn of(tag: u64, piece: &LoosePiece) -> Option<Self> {
+        let LoosePiece { id, fate, ref materials, bounds, ref runs, .. } = *piece;
+        let piece = ReturnedPiece { id, tag, fate, materials: materials.clone() };
+        (fate != PieceFate::Left).then(|| Self { piece, bounds, runs: Arc::clone(runs) })
+    }
+
+    /// Whether all of its samples are ground.
+    fn is_ground(&self, is_solid: impl Fn(IVec3) -> bool) -> bool {
+        let mut samples =
+            self.runs.iter().flat_map(|run| (0..run.len as i32).map(move |x| run.start + IVec3::X * x));
+        samples.all(is_solid)
+    }
+}
+
+fn all(receipt: &Receipt) -> impl Iterator<Item = &LoosePiece> {
+    receipt.outcome.iter().flat_map(|applied| &applied.loose)
+}
+
+impl Pieces {
+    fn add(&mut self, gone: impl IntoIterator<Item = Gone>) {
+        self.gone.extend(gone);
+        let excess = self.gone.len().saturating_sub(MOST);
+        self.gone.drain(..excess);
+    }
+
+    /// Gives own edits other numbers: pairs of those before and after.
+    pub fn renumber(&mut self, numbers: impl Iterator<Item = (u64, u64)>) {
+        let mut before = std::mem::take(&mut self.predicted);
+        let renumbered = numbers.filter_map(|(old, new)| Some((new, before.remove(&old)?)));
+        self.predicted = renumbered.collect();
+    }
+
+    fn take_ground(
+        &mut self,
+        within: Option<LatticeBox>,
+        is_solid: impl Fn(IVec3) -> bool,
+    ) -> Vec<ReturnedPiece> {
+        let is_near = |gone: &Gone| within.is_none_or(|within| within.intersection(gone.bounds).is_some());
+        let mut returned = Vec::new();
+        // The one that was cut off last comes back first.
+        for at in (0..self.gone.len()).rev() {
+            if is_near(&self.gone[at]) && self.gone[at].is_ground(&is_solid) {
+                returned.extend(self.gone.remove(at).map(|gone| gone.piece));
+            }
+        }
+        returned
+    }
+}
+
+impl Client {
+    /// An own edit is predicted.
+    pub(super) fn predict_pieces(&mut self, own: u64, receipt: &Receipt) {
+        let gone: Vec<Gone> = all(receipt).filter_map(|piece| Gone::of(receipt.tag, piece)).collect();
+        if !gone.is_empty() {
+            self.pieces.predicted.insert(own, gone);
+        }
+        self.tell_pieces(receipt.tag, all(receipt).cloned().collect(), Vec::new());
+    }
+
+    /// The order has an edit, an own one with this number. What was predicted otherwise is put right.
+    pub(super) fn confirm_pieces(&mut self, own: Option<u64>, receipt: &Receipt) {
+        let mut predicted = own.and_then(|own| self.pieces.predicted.remove(&own)).unwrap_or_default();
+        let mut found = Vec::new();
+        for piece in all(receipt) {
+            match predicted.iter().position(|gone| gone.piece.id == piece.id && gone.piece.fate == piece.fate)
+            {
+                Some(at) => drop(predicted.remove(at)),
+                None => found.push(piece.clone()),
+            }
+        }
+        let tag = receipt.tag;
+        self.pieces.add(all(receipt).filter_map(|piece| Gone::of(tag, piece)));
+        self.tell_pieces(tag, found, predicted.into_iter().map(|gone| gone.piece).collect());
+    }
+
+    /// An own edit is not done.
+    pub(super) fn refuse_pieces(&mut self, own: u64) {
+        let predicted = self.pieces.predicted.remove(&own).unwrap_or_default();
+        self.tell_pieces(0, Vec::new(), predicted.into_iter().map(|gone| gone.piece).collect());
+    }
+
+    /// An own edit was answered while the client was away. [`Self::check_pieces`] finds out what came of it.
+    pub(super) fn settle_pieces(&mut self, own: u64) {
+        let predicted = self.pieces.predicted.remove(&own).unwrap_or_default();
+        self.pieces.add(predicted);
+    }
+
+    /// Parts were put into the world: pieces within a box, or anywhere, may be ground again. Returns those that are.
+    pub(super) fn check_pieces(&mut self, within: Option<LatticeBox>) -> Vec<ReturnedPiece> {
+        if self.pieces.gone.is_empty() {
+            return Vec::new();
+        }
+        let view = self.replica.world().samples();
+        let returned = self.pieces.take_ground(within, |sample| view.is_solid(sample));
+        self.tell_pieces(0, Vec::new(), returned.clone());
+        returned
+    }
+
+    fn tell_pieces(&mut self, tag: u64, found: Vec<LoosePiece>, returned: Vec<ReturnedPiece>) {
+        if !found.is_empty() || !returned.is_empty() {
+            self.events.push(ClientEvent::PiecesChanged { tag, found, returned });
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! What a shared terrain knows of its server: the client, the invitation that it follows, and what waits.
+
+use std::collections::VecDeque;
+
+use bevy::platform::time::Instant;
+
+use super::messages::GroundId;
+use super::service::Service;
+use super::trouble::SharingTrouble;
+use crate::brush::Edit;
+use crate::net::{self, Client, Kick, Lane, Stamps};
+use crate::plugin::{LoosePieceFound, LoosePieceReturned, ThreadTask};
+use crate::terrain::{HistoryStep, Terrain, TerrainError, TerrainSettings, Version};
+use crate::volume::DiggingRules;
+
+/// Most edits that wait for the server's answer.
+pub(super) const MOST_PENDING: usize = 1 << 16;
+
+/// What a player asked for. One list holds all of it, in order.
+pub(super) enum Ask {
+    Edit(Edit),
+    Step(HistoryStep),
+}
+
+/// What a shared terrain knows of its server.
+pub(super) struct Link {
+    /// `None` while a task works with it.
+    pub client: Option<Client>,
+    pub task: Option<ThreadTask<Client>>,
+    /// The ground that the client was made for.
+    pub ground: GroundId,
+    /// The invitation of the server that the client has greeted; `None` while there is none to greet.
+    pub greeted: Option<u64>,
+    /// Whether there was one.
+    pub was_served: bool,
+    /// The server of this invitation has sent the player away.
+    pub kicked: Option<(Kick, u64)>,
+    pub inbox: Vec<(Lane, Vec<u8>)>,
+    pub asks: Vec<Ask>,
+    /// So many edits wait that no more are taken.
+    pub is_full: bool,
+    /// Tags of edits, and the number of undos, that are asked for and not answered.
+    pub tags: VecDeque<u64>,
+    pub undos: usize,
+    pub start: Instant,
+    pub facts: Facts,
+    pub is_playable: bool,
+    /// The game may have changed the images of stamps.
+    pub has_new_stamps: bool,
+    pub display: Display,
+    /// The rules of the terrain, which have no effect.
+    pub rules: Option<DiggingRules>,
+}
+
+/// What the client said last.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Facts {
+    pub number: u64,
+    pub id: Option<net::ClientId>,
+    pub has_joined: bool,
+}
+
+/// What is put into the shown terrain, and what waits for it.
+pub(super) struct Display {
+    /// The world that is shown.
+    pub version: Version,
+    /// Changes that were submitted, and those that were answered.
+    pub submitted: u64,
+    pub answered: u64,
+    /// What is shown is not what should be: all of it has to be put.
+    pub is_broken: bool,
+    /// What happens to pieces once so many changes are answered: the ground changes with these.
+    pub pieces: VecDeque<(u64, PieceMessage)>,
+}
+
+/// What happens to a piece.
+#[derive(Clone, Debug)]
+pub(super) enum PieceMessage {
+    Found(LoosePieceFound),
+    Returned(LoosePieceReturned),
+}
+
+/// What a shared terrain does now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Standing {
+    /// It follows the server that has sent this invitation.
+    Follows(u64),
+    /// There was no server yet. Edits wait for it.
+    Waits,
+    /// There is no connection. Edits are shown, and wait for another one.
+    Lost,
+    /// Edits are refused.
+    Refuses(SharingTrouble),
+}
+
+impl Link {
+    /// # Errors
+    /// When the terrain's settings are those of no terrain.
+    pub fn new(terrain: &Terrain, stamps: &Stamps) -> Result<Self, TerrainError> {
+        let world = terrain.world();
+        let ground = GroundId::of(world);
+        let settings =
+            TerrainSettings { chunk_size: ground.chunk_size as u32, voxel_size: terrain.voxel_size() };
+        let mut client = Client::new(world.shared_ground(), &settings)?;
+        client.stamps_mut().add_all(stamps);
+        Ok(Self {
+            client: Some(client),
+            task: None,
+            ground,
+            greeted: None,
+            was_served: false,
+            kicked: None,
+            inbox: Vec::new(),
+            asks: Vec::new(),
+            is_full: false,
+            tags: VecDeque::new(),
+            undos: 0,
+            start: Instant::now(),
+            facts: Facts::default(),
+            is_playable: false,
+            has_new_stamps: false,
+            display: Display::of(terrain),
+            rules: terrain.rules().cloned(),
+        })
+    }
+
+    /// Edits that are not answered.
+    pub fn unanswered(&self) -> usize {
+        self.tags.len()
+    }
+
+    /// Notes what a player asks for.
+    pub fn ask(&mut self, ask: Ask) {
+        match &ask {
+            Ask::Edit(edit) => self.tags.push_back(edit.tag()),
+            Ask::Step(_) => self.undos += 1,
+        }
+        self.asks.push(ask);
+    }
+
+    /// Notes that an edit with this tag was answered.
+    pub fn answer(&mut self, tag: u64) {
+        if let Some(at) = self.tags.iter().position(|asked| *asked == tag) {
+            self.tags.remove(at);
+        }
+    }
+
+    /// What it does, given who serves.
+    pub fn standing(&self, service: Service) -> Standing {
+        if let Some((kick, at)) = self.kicked
+            && !matches!(service, Service::Served(_, invitation) if invitation != at)
+        {
+            return Standing::Refuses(SharingTrouble::Kicked(kick));
+        }
+        match service {
+            Service::Served(served, invitation) if served.ground == self.ground => {
+                Standing::Follows(invitation)
+            }
+            Service::Served(served, _) => Standing::Refuses(SharingTrouble::OtherGround {
+                ours: self.ground.hash,
+                our_chunks: self.ground.chunk_size,
+                theirs: served.ground.hash,
+                their_chunks: served.ground.chunk_size,
+            }),
+            _ if !self.was_served => Standing::Waits,
+            Service::Apart => Standing::Lost,
+            Service::Unserved => Standing::Refuses(SharingTrouble::NotServed),
+        }
+    }
+}
+
+impl Standing {
+    pub fn trouble(self) -> Option<SharingTrouble> {
+        match self {
+            Self::Follows(_) | Self::Waits => None,
+            Self::Lost => Some(SharingTrouble::ConnectionLost),
+            Self::Refuses(why) => Some(why),
+        }
+    }
+}
+
+impl Display {
+    /// Of a terrain in which nothing was put yet.
+    fn of(terrain: &Terrain) -> Self {
+        let world = terrain.world();
+        Self {
+            version: world.version(),
+            submitted: 0,
+            answered: 0,
+            is_broken: world.revision() != 0,
+            pieces: VecDeque::new(),
+        }
+    }
+
+    /// Looks at what became of changes in the terrain, and returns what happens to pieces with those.
+    pub fn follow(&mut self, terrain: &mut Terrain) -> Vec<PieceMessage> {
+        let version = terrain.world().version();
+        if !version.is_same_world(self.version) {
+            // Another terrain took its place, and what waited there is gone.
+            let pieces = std::mem::take(&mut self.pieces);
+            *self = Self { is_broken: true, pieces, ..Self::of(terrain) };
+            self.hold_pieces();
+        }
+        self.version = version;
+        let receipts = terrain.take_change_receipts();
+        self.answered += receipts.len() as u64;
+        if receipts.iter().any(Result::is_err) {
+            self.is_broken = true;
+            self.hold_pieces();
+        }
+        let is_shown = |(due, _): &(u64, PieceMessage)| *due <= self.answered;
+        let count = self.pieces.iter().take_while(|piece| is_shown(piece)).count();
+        self.pieces.drain(..count).map(|(_, piece)| piece).collect()
+    }
+
+    /// Lets the pieces wait until all that should be shown is put.
+    fn hold_pieces(&mut self) {
+        let due = self.submitted + 1;
+        self.pieces.iter_mut().for_each(|(at, _)| *at = due);
+    }
+
+    /// Whether nothing waits for the terrain.
+    pub fn is_idle(&self) -> bool {
+        self.answered >= self.submitted
+    }
+
+    /// Holds what happens to pieces with what was submitted last.
+    pub fn add_pieces(&mut self, pieces: impl IntoIterator<Item = PieceMessage>) {
+        let due = self.submitted + u64::from(self.is_broken);
+        self.pieces.extend(pieces.into_iter().map(|piece| (due, piece)));
+    }
+}

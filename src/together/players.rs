@@ -1,0 +1,111 @@
+//! The players of a ground server: who they are, and which clients are theirs.
+
+use bevy::platform::collections::{HashMap, HashSet};
+use bevy::prelude::*;
+use bevy_replicon::prelude::*;
+use bevy_replicon::shared::backend::connected_client::NetworkId;
+
+use super::messages::FromPlayer;
+use super::service::Authorised;
+use crate::net;
+
+/// Bytes of a player's messages that wait for the server while it is at work. Who sends more is kicked.
+const MOST_WAITING_BYTES: usize = 1 << 20;
+
+/// Bytes that a message takes beside its own, about.
+const MESSAGE_BYTES: usize = 128;
+
+/// The players of a ground server.
+#[derive(Default)]
+pub(super) struct Players {
+    /// Those who have spoken.
+    clients: HashMap<net::ClientId, ClientId>,
+    /// Clients that were sent away: nothing is taken from them on the same connection.
+    kicked: HashSet<Entity>,
+    /// Bytes that wait for the server.
+    waiting: HashMap<net::ClientId, usize>,
+}
+
+/// What a message comes to.
+pub(super) enum Said {
+    /// The client says this, for the first time if it `begins`.
+    Bytes {
+        begins: bool,
+        bytes: Vec<u8>,
+    },
+    /// The player has left.
+    Leaves,
+    /// The player has sent far more than the server could take by now.
+    TooMuch,
+    Nothing,
+}
+
+/// The number of a player, from the transport's; `None` if it has none.
+pub(super) fn number(client: ClientId, id: Option<&NetworkId>) -> Option<net::ClientId> {
+    let number = match (client.entity(), id) {
+        (None, _) => 0,
+        (_, Some(id)) => id.get().checked_add(1)?,
+        (Some(entity), None) => entity.to_bits(),
+    };
+    Some(net::ClientId(number)).filter(|number| *number != net::ClientId::SERVER)
+}
+
+impl Players {
+    /// The number of a client that takes part: replicon has authorised it, and it was not kicked.
+    pub fn find(
+        &self,
+        client: ClientId,
+        clients: &Query<Option<&NetworkId>, Authorised>,
+    ) -> Option<net::ClientId> {
+        let Some(entity) = client.entity() else { return number(client, None) };
+        let id = clients.get(entity).ok()?;
+        number(client, id).filter(|_| !self.kicked.contains(&entity))
+    }
+
+    /// Takes a message of a player's.
+    pub fn hear(&mut self, player: net::ClientId, client: ClientId, message: &FromPlayer) -> Said {
+        let said = match message {
+            FromPlayer::Left if self.clients.remove(&player).is_some() => Said::Leaves,
+            FromPlayer::Left => return Said::Nothing,
+            // One that was too long is counted as an invalid message.
+            FromPlayer::Bytes(_) | FromPlayer::TooLong => {
+                let begins = self.clients.insert(player, client) != Some(client);
+                let bytes = if let FromPlayer::Bytes(bytes) = message { bytes.clone() } else { Vec::new() };
+                Said::Bytes { begins, bytes }
+            }
+        };
+        let length = if let Said::Bytes { bytes, .. } = &said { bytes.len() } else { 0 };
+        let waiting = self.waiting.entry(player).or_default();
+        let before = *waiting;
+        *waiting = waiting.saturating_add(length + MESSAGE_BYTES);
+        match (before <= MOST_WAITING_BYTES, *waiting <= MOST_WAITING_BYTES) {
+            (_, true) => said,
+            (true, false) => Said::TooMuch,
+            (false, false) => Said::Nothing,
+        }
+    }
+
+    /// Enters that the server has taken all that waited.
+    pub fn forget_waiting(&mut self) {
+        self.waiting.clear();
+    }
+
+    /// Where to send what the server has for a player.
+    pub fn client(&self, player: net::ClientId) -> Option<ClientId> {
+        self.clients.get(&player).copied()
+    }
+
+    /// Forgets a player that was kicked; returns the client whose connection has to be closed.
+    pub fn kick(&mut self, player: net::ClientId) -> Option<Entity> {
+        let client = self.clients.remove(&player)?.entity()?;
+        self.kicked.insert(client);
+        Some(client)
+    }
+
+    /// Forgets players whose clients are gone, or are no longer authorised; returns their numbers.
+    pub fn take_gone(&mut self, clients: &Query<Option<&NetworkId>, Authorised>) -> Vec<net::ClientId> {
+        self.kicked.retain(|client| clients.contains(*client));
+        let is_gone = |client: &ClientId| client.entity().is_some_and(|entity| !clients.contains(entity));
+        self.clients.extract_if(|_, client| is_gone(client)).map(|(player, _)| player).collect()
+    }
+}

@@ -1,0 +1,126 @@
+//! Who serves the ground: the server invites clients, and each app knows whether somebody serves it.
+
+use bevy::platform::collections::HashMap;
+use bevy::prelude::*;
+use bevy_replicon::prelude::*;
+
+use super::messages::{BulkLane, Invitation, OrderLane, Served};
+use super::server::GroundServer;
+
+/// Who serves the ground that is shared in this app.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Service {
+    /// There is no connection, and no server in this app.
+    #[default]
+    Apart,
+    /// There is a connection, or was a server in this app, and no ground is served.
+    Unserved,
+    /// A ground is served. The number is that of the invitation: each is greeted once.
+    Served(Served, u64),
+}
+
+/// What [`find_service`] has seen so far.
+#[derive(Default)]
+pub(super) struct Seen {
+    /// Invitations so far.
+    count: u64,
+    /// Whether a server was in this app in the last frame, and what it served.
+    local: Option<Option<Served>>,
+}
+
+impl Seen {
+    fn next(&mut self, served: Option<Served>) -> Service {
+        let Some(served) = served else { return Service::Unserved };
+        self.count += 1;
+        Service::Served(served, self.count)
+    }
+}
+
+/// Finds out who serves the ground: the server in this app, or else the one that this app is connected to.
+pub(super) fn find_service(
+    mut service: ResMut<Service>,
+    ground: Option<Res<GroundServer>>,
+    state: Res<State<ClientState>>,
+    mut messages: MessageReader<Invitation>,
+    mut seen: Local<Seen>,
+) {
+    let local = ground.map(|ground| ground.served());
+    let before = std::mem::replace(&mut seen.local, local);
+    if let Some(served) = local {
+        if before != local {
+            *service = seen.next(served);
+        }
+        messages.clear();
+        return;
+    }
+    let is_connected = *state.get() == ClientState::Connected;
+    if before.is_some() || (is_connected && *service == Service::Apart) {
+        *service = Service::Unserved;
+    }
+    if is_connected {
+        for Invitation(served) in messages.read() {
+            *service = seen.next(*served);
+        }
+    }
+}
+
+/// Forgets what came over a connection that has ended.
+pub(super) fn forget_connection(
+    mut service: ResMut<Service>,
+    mut invitations: ResMut<Messages<Invitation>>,
+    mut order: ResMut<Messages<OrderLane>>,
+    mut bulk: ResMut<Messages<BulkLane>>,
+) {
+    *service = Service::Apart;
+    invitations.clear();
+    order.clear();
+    bulk.clear();
+}
+
+/// A client that takes part in the game: replicon has authorised it.
+pub(super) type Authorised = (With<ConnectedClient>, With<AuthorizedClient>);
+
+/// Invites authorised clients to the ground that is served, and tells those who were invited when it is no longer.
+pub(super) fn invite(
+    ground: Option<Res<GroundServer>>,
+    clients: Query<(Entity, Has<AuthorizedClient>), With<ConnectedClient>>,
+    mut invited: Local<HashMap<Entity, Served>>,
+    mut messages: MessageWriter<ToClients<Invitation>>,
+) {
+    let served = ground.and_then(|ground| ground.served());
+    invited.retain(|client, _| clients.contains(*client));
+    for (client, is_authorised) in &clients {
+        let now = served.filter(|_| is_authorised);
+        let before = match now {
+            Some(now) => invited.insert(client, now),
+            None => invited.remove(&client),
+        };
+        if now != before {
+            let targets = SendTargets::Single(ClientId::Client(client));
+            messages.write(ToClients { targets, message: Invitation(now) });
+        }
+    }
+}
+
+/// Drops what was to be sent to a client that is gone, or no longer authorised. A backend may panic otherwise.
+pub(super) fn drop_messages(
+    gone: On<Remove, AuthorizedClient>,
+    mut invitations: ResMut<Messages<ToClients<Invitation>>>,
+    mut order: ResMut<Messages<ToClients<OrderLane>>>,
+    mut bulk: ResMut<Messages<ToClients<BulkLane>>>,
+) {
+    drop_for(gone.entity, &mut invitations);
+    drop_for(gone.entity, &mut order);
+    drop_for(gone.entity, &mut bulk);
+}
+
+fn drop_for<M: Message>(gone: Entity, messages: &mut Messages<ToClients<M>>)
+where
+    ToClients<M>: Message,
+{
+    let is_for = |targets: &SendTargets| matches!(targets, SendTargets::Single(ClientId::Client(client)) if *client == gone);
+    if messages.get_cursor().read(messages).any(|message| is_for(&message.targets)) {
+        let others: Vec<_> = messages.drain().filter(|message| !is_for(&message.targets)).collect();
+        messages.write_batch(others);
+    }
+}

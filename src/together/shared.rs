@@ -1,0 +1,124 @@
+//! A terrain that a player shares with others, and what is told of it.
+
+use bevy::prelude::*;
+
+use super::link::Link;
+use super::trouble::SharingTrouble;
+use crate::net::{self, ClientEvent, Refusal, Stamps};
+use crate::plugin::EditOutbox;
+use crate::terrain::Receipt;
+
+/// Insert it with a pristine [`Terrain`](crate::terrain::Terrain) of the same ground and chunk size as the server's: the world that
+/// players share takes its place, and brushes for it go to the server.
+///
+/// It joins as soon as a server that this app is connected to, or this app itself, has a [`GroundServer`](super::GroundServer), and
+/// again whenever there is a new connection or another server. It may be despawned, removed and inserted again at any time, and another
+/// `Terrain` may be inserted beside it. An app shares one terrain at a time: the first one, until it is gone.
+///
+/// Whatever keeps it from following a server is sent as a [`SharingTroubleFound`](super::SharingTroubleFound).
+#[derive(Component, Default)]
+#[component(on_add = warn_without_plugin)]
+pub struct SharedTerrain {
+    /// Images that the player may stamp with. The server needs them too; players who lack one get it from there.
+    pub stamps: Stamps,
+    /// Where the player is, in voxels of the terrain: the ground comes from there outwards.
+    pub place: IVec3,
+    pub(super) link: Option<Link>,
+    /// The place among all shared terrains, in the order in which they were inserted.
+    pub(super) order: u64,
+    /// Whether it has greeted a server, with this ground or another.
+    pub(super) was_served: bool,
+    /// What was reported last, if it is still so.
+    pub(super) trouble: Option<SharingTrouble>,
+}
+
+impl SharedTerrain {
+    /// The number in the server's order of the last entry that the player's world holds.
+    pub fn number(&self) -> u64 {
+        self.link.as_ref().map_or(0, |link| link.facts.number)
+    }
+
+    /// The player's edits that the server has not answered.
+    pub fn pending(&self) -> usize {
+        self.link.as_ref().map_or(0, |link| link.unanswered())
+    }
+
+    /// The number by which the server knows the player; `None` before it has joined once.
+    pub fn id(&self) -> Option<net::ClientId> {
+        self.link.as_ref().and_then(|link| link.facts.id)
+    }
+
+    /// Whether the ground around the player is there.
+    pub fn is_playable(&self) -> bool {
+        self.link.as_ref().is_some_and(|link| link.is_playable)
+    }
+
+    /// Whether all of the world is there, and follows the server.
+    pub fn has_joined(&self) -> bool {
+        self.link.as_ref().is_some_and(|link| link.facts.has_joined)
+    }
+
+    /// What keeps it from following a server; `None` while it follows one, joins it, or waits for the first one.
+    pub fn trouble(&self) -> Option<SharingTrouble> {
+        self.trouble
+    }
+}
+
+/// Without the plugin nothing would happen, and nothing would say so.
+fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lifecycle::HookContext) {
+    if world.get_resource::<super::client::Sharing>().is_none() {
+        error!(
+            "a SharedTerrain does nothing without TogetherPlugin: add it after RepliconPlugins and BurrowPlugins, before terrains are spawned"
+        );
+    }
+}
+
+/// What became of an edit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum WhatBecame {
+    /// It is shown, as far as the player's machine can tell now.
+    Predicted(Receipt),
+    /// The server has ordered it; this is what it came to for all. `None` where the player was away when that happened.
+    Confirmed(Option<Receipt>),
+    /// It is not done, and no longer shown. `None` where it could not be sent, or the player was away when that was told.
+    Refused(Option<Refusal>),
+}
+
+/// Something became of an edit on a [`SharedTerrain`]. A [`BrushApplied`](crate::plugin::BrushApplied) follows for those that are
+/// confirmed or refused, so inventories need nothing else.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct GroundEdited {
+    /// The terrain.
+    pub terrain: Entity,
+    /// The tag of the brush.
+    pub tag: u64,
+    /// What became of it.
+    pub outcome: WhatBecame,
+}
+
+/// How far a [`SharedTerrain`] has come, or that its player has to go.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct GroundJoined {
+    /// The terrain.
+    pub terrain: Entity,
+    /// `Welcomed`, `Playable`, `Joined`, `Durable`, `Repaired` or `Kicked`.
+    pub event: ClientEvent,
+}
+
+/// Gives a shared terrain the list that its edits go to.
+pub(super) fn begin(
+    new: On<Insert, SharedTerrain>,
+    mut commands: Commands,
+    mut shared: Query<&mut SharedTerrain>,
+    mut sharing: ResMut<super::client::Sharing>,
+) {
+    if let Ok(mut shared) = shared.get_mut(new.entity) {
+        shared.order = sharing.next_order();
+    }
+    commands.entity(new.entity).try_insert_if_new(EditOutbox::default());
+}
+
+/// Brushes on a terrain that is no longer shared are its own again.
+pub(super) fn end(gone: On<Remove, SharedTerrain>, mut commands: Commands) {
+    commands.entity(gone.entity).try_remove::<EditOutbox>();
+}

@@ -1,0 +1,68 @@
+//! Why a shared terrain follows no server, or why what was asked of it is not done.
+
+use bevy::prelude::*;
+
+use crate::net::{Kick, Refusal};
+
+/// Why a [`SharedTerrain`](super::SharedTerrain) follows no server, or why what was asked of it is not done. The text says what helps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SharingTrouble {
+    /// The connection is gone. Digging goes on, and what is dug is sent over the next connection.
+    #[error("the connection to the server is lost; connect again, and what is dug until then is sent")]
+    ConnectionLost,
+    /// The server's `GroundServer` was removed. Digs are refused until there is another one.
+    #[error(
+        "the server has stopped serving its ground; digs are refused until it inserts a GroundServer again"
+    )]
+    NotServed,
+    /// The server has another ground or chunk size than the terrain. Digs are refused until they are the same.
+    #[error(
+        "the server has ground {theirs:#018x} in chunks of {their_chunks}, and this terrain has {ours:#018x} in chunks of \
+         {our_chunks}; insert a Terrain of the server's ground, digs are refused until then"
+    )]
+    OtherGround {
+        /// The hash of the terrain's ground.
+        ours: u64,
+        /// The terrain's chunk size.
+        our_chunks: i32,
+        /// The hash of the server's ground.
+        theirs: u64,
+        /// The server's chunk size.
+        their_chunks: i32,
+    },
+    /// The server has sent the player away. Digs are refused until there is another connection.
+    #[error("the server has sent this player away: {0}")]
+    Kicked(Kick),
+    /// Another terrain of this app is shared already, and a connection carries one ground. Digs on this one are refused until that one
+    /// is despawned or no longer shared.
+    #[error(
+        "{0} is shared already, and an app shares one terrain at a time; remove SharedTerrain from one of them"
+    )]
+    AnotherIsShared(Entity),
+    /// There is no `Terrain` beside the `SharedTerrain`. Sharing begins once there is one.
+    #[error("a SharedTerrain needs a Terrain beside it; sharing begins once it is inserted")]
+    NoTerrain,
+    /// The rules of the terrain were changed, which changes nothing: rules come from the server.
+    #[error(
+        "rules that are set on a shared terrain do nothing; set them on the server, with \
+         GroundServer::with(|server| server.set_rules(rules))"
+    )]
+    RulesIgnored,
+    /// The server does not undo the player's last stroke.
+    #[error("the server does not undo the last stroke: {0}")]
+    UndoRefused(Refusal),
+    /// So many edits wait for the server that no more are taken.
+    #[error("the server has not answered {0} edits; further ones are refused until it does")]
+    TooManyPending(usize),
+}
+
+/// A [`SharedTerrain`](super::SharedTerrain) follows no server, or something that was asked of it is not done. It is logged as a
+/// warning as well.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SharingTroubleFound {
+    /// The terrain.
+    pub terrain: Entity,
+    /// What is wrong.
+    pub trouble: SharingTrouble,
+}
