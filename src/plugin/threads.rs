@@ -63,7 +63,6 @@ pub(crate) enum Threads {
     /// For everything that may take longer: loads, textures, saves, freeing memory.
     Background,
     /// For colliders and debris, which bodies wait for.
-    #[cfg_attr(not(feature = "avian"), expect(dead_code))]
     Colliders,
 }
 
@@ -208,7 +207,7 @@ mod tests {
 
     /// Keeps the threads of the background busy until what it returns is dropped.
     fn block_background() -> impl Sized {
-        let many = Threads::Background.pool().map_or(0, ThreadPool::current_num_threads);
+        let many = Threads::Background.pool().map_or(0, |pool| pool.current_num_threads());
         let (mut gate, (begun, begins)) = (Vec::new(), channel());
         for _ in 0..many {
             let (sender, receiver) = channel::<()>();

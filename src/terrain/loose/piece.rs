@@ -81,7 +81,7 @@ pub struct LoosePiece {
 pub struct ReturnedPiece {
     /// The name that it had when it was cut off.
     pub id: PieceId,
-    /// The tag of the brush that had cut it off; 0 if that was another player's.
+    /// The tag of the brush that had cut it off; 0 where players share the terrain.
     pub tag: u64,
     /// What had happened to it then: [`PieceFate::Removed`] or [`PieceFate::BrokeOff`].
     pub fate: PieceFate,
