@@ -130,8 +130,10 @@ impl LoosePiece {
 
     /// Bytes of its lists and of its mesh, as if nothing else held them.
     pub(in crate::terrain) fn bytes(&self) -> usize {
-        let mesh = self.mesh.as_ref().map_or(0, |mesh| size_of::<SurfaceMesh>() + mesh.bytes());
-        size_of::<Self>() + self.materials.bytes() + size_of_val(&self.runs[..]) + mesh
+        // The counters of an `Arc`.
+        let counters = 2 * size_of::<usize>();
+        let mesh = self.mesh.as_ref().map_or(0, |mesh| counters + size_of::<SurfaceMesh>() + mesh.bytes());
+        size_of::<Self>() + self.materials.bytes() + counters + size_of_val(&self.runs[..]) + mesh
     }
 }
 
