@@ -633,11 +633,12 @@ fn history_counts_the_pieces_that_it_holds() {
 /// A comb: a block whose upper part is poles of 2 x 2 voxels, `height` voxels high, from x = `low` on.
 fn comb(height: i32) -> Terrain {
     let mut terrain = terrain(Ground::flat(64, 64, 8.0).expect("flat ground"), 32);
-    let (middle, half) = (8.0 + height as f32 / 2.0, height as f32 / 2.0);
+    // It stands in the ground.
+    let (middle, half) = (4.0 + height as f32 / 2.0, height as f32 / 2.0);
     let block = Shape::cuboid(Vec3::new(32.0, middle, 32.0), Vec3::new(16.0, half, 16.0));
     let gaps = (0..10).flat_map(|at| {
         let at = 17.0 + 3.0 * at as f32;
-        let gap = |x: f32, z: f32, half: Vec3| Brush::dig(Shape::cuboid(Vec3::new(x, middle, z), half));
+        let gap = |x: f32, z: f32, half: Vec3| Brush::dig(Shape::cuboid(Vec3::new(x, middle + 8.0, z), half));
         [gap(at, 32.0, Vec3::new(0.5, half + 1.0, 18.0)), gap(32.0, at, Vec3::new(18.0, half + 1.0, 0.5))]
     });
     terrain.apply(std::iter::once(Brush::add(block, MaterialId(1))).chain(gaps));
@@ -669,7 +670,7 @@ fn what_an_edit_costs_bounds_what_its_search_finds() {
         terrain.world().loose_pieces(cut, &settings).len()
     };
     assert_eq!(in_air(&tall), 0, "all poles stand");
-    assert!(tall.world().is_solid(DVec3::new(18.0, 900.0, 18.0)), "up to the top");
+    assert!(tall.world().is_solid(DVec3::new(18.5, 890.0, 18.5)), "up to the top");
     tall.set_loose(Some(settings));
     let applied = cut(&mut tall);
     assert!(applied.has_unsearched, "the receipt says that not all is found");

@@ -213,9 +213,11 @@ fn latest(world: &World, terrain: Entity, id: PieceId, before: u64) -> Option<En
 /// Despawns the debris of the piece of this name that was cut off last, unless that one is gone already.
 fn take_back(world: &mut World, terrain: Entity, id: PieceId) {
     let Some(piece) = latest(world, terrain, id, u64::MAX) else { return };
-    match world.get_mut::<Origin>(piece) {
-        Some(mut origin) if origin.gone_since > 0 => origin.gone_since -= 1,
-        _ => drop(world.despawn(piece)),
+    let Some(mut origin) = world.get_mut::<Origin>(piece) else { return };
+    if origin.gone_since > 0 {
+        origin.gone_since -= 1;
+    } else {
+        world.despawn(piece);
     }
 }
 

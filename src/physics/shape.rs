@@ -356,7 +356,7 @@ mod tests {
             let dig = if rng.bool() { Brush::dig(ball) } else { Brush::add(ball, MaterialId(1)) };
             terrain.apply([dig]);
             let after = shapes(&terrain);
-            let find = |all: &'_ [(Drawn, GroundShape)], drawn| all.iter().position(|own| own.0 == drawn);
+            let find = |all: &[(Drawn, GroundShape)], drawn: Drawn| all.iter().position(|own| own.0 == drawn);
             for &(drawn, _) in before.iter().chain(&after) {
                 let old = find(&before, drawn).map(|at| &before[at].1);
                 let new = find(&after, drawn).map(|at| &after[at].1);

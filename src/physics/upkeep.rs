@@ -83,14 +83,16 @@ fn attach(world: &mut World) {
 /// Reports a collider that could not be built. It is missing, so it is built again; after some attempts its tile or chunk stays
 /// as it is until its surface changes, as bodies would be held over it for ever.
 fn fail(world: &mut World, entity: Entity, Failure { part, why }: &Failure) {
-    let failures = &mut world.resource_mut::<ColliderTasks>().failures;
-    let count = failures.entry(entity).or_default();
+    let mut tasks = world.resource_mut::<ColliderTasks>();
+    let count = tasks.failures.entry(entity).or_default();
     *count += 1;
     let gives_up = *count >= ATTEMPTS;
+    if gives_up {
+        tasks.failures.remove(&entity);
+    }
     let then = if gives_up { "it keeps the one that it had, or has none" } else { "it is built again" };
     error!("building the collider of {:?} of {} panicked, {then}: {why}", part.drawn, part.terrain);
     if gives_up {
-        failures.remove(&entity);
         world.resource_mut::<PhysicsFigures>().failed += 1;
         let Ok(mut owner) = world.get_entity_mut(entity) else { return };
         if owner.get::<GroundCollider>().is_none_or(|old| old.revision < part.revision) {

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use bevy::ecs::entity::EntityHashMap;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use rayon::prelude::*;
@@ -12,7 +13,7 @@ use super::level_state::{LevelState, LevelsOfDetail, ShownLevels};
 use super::meshes::{BuiltMesh, MeshFacts, VertexExtras};
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{InFlight, TaskCounter};
-use super::threads::{ThreadTask, Threads};
+use super::threads::{ThreadTask, Threads, panic_message};
 use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SlimVertices, SurfaceProcessors};
 use crate::lattice::ChunkPos;
 use crate::levels::Cut;
@@ -271,6 +272,41 @@ fn build_levels(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
     (chunks, Some(BuiltLevels { drawn, nodes: builder.build_nodes(updates), known }))
 }
 
+/// How often a terrain is loaded whose load panics.
+const ATTEMPTS: u32 = 3;
+
+/// What a load built; `None` if it panicked and is to be tried again. After some attempts the terrain is shown without
+/// surfaces: otherwise its brushes would have no answers, and bodies above it would be held for ever.
+fn loaded(
+    entity: Entity,
+    done: std::thread::Result<BuiltWorld>,
+    failures: &mut EntityHashMap<u32>,
+) -> Option<BuiltWorld> {
+    let count = failures.get(&entity).map_or(1, |count| count + 1);
+    match done {
+        Ok(built) => {
+            failures.remove(&entity);
+            Some(built)
+        }
+        Err(panic) if count < ATTEMPTS => {
+            failures.insert(entity, count);
+            error!(
+                "loading the terrain {entity} panicked; it is tried again: {}",
+                panic_message(panic.as_ref())
+            );
+            None
+        }
+        Err(panic) => {
+            failures.remove(&entity);
+            let why = panic_message(panic.as_ref());
+            error!(
+                "loading the terrain {entity} panicked {ATTEMPTS} times; only what is dug from now on is shown: {why}"
+            );
+            Some((Vec::new(), None))
+        }
+    }
+}
+
 /// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and chunks
 /// are despawned in that frame.
 pub(super) fn finish_loading(
@@ -278,11 +314,17 @@ pub(super) fn finish_loading(
     settings: Res<BurrowSettings>,
     mut assets: Option<ResMut<Assets<Mesh>>>,
     mut terrains: Query<(Entity, &mut Terrain, &mut Loading, Option<&TerrainEntities>, Option<&Children>)>,
+    mut failures: Local<EntityHashMap<u32>>,
 ) {
     let mut budget = if assets.is_some() { settings.loads_per_frame.max(1) } else { usize::MAX };
     for (entity, mut terrain, mut loading, old, children) in &mut terrains {
         if let Some(task) = &mut loading.task {
-            let Some(parts) = task.finish() else { continue };
+            let Some(done) = task.check() else { continue };
+            let Some(parts) = loaded(entity, done, &mut failures) else {
+                // It is loaded again.
+                commands.entity(entity).try_remove::<Loading>();
+                continue;
+            };
             (loading.task, (loading.waiting, loading.levels)) = (None, parts);
         }
         let rest = loading.waiting.len().saturating_sub(budget);
@@ -409,6 +451,23 @@ fn is_power_of_two(number: f32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_load_that_panics_is_tried_again_and_then_given_up() {
+        let terrain = Entity::PLACEHOLDER;
+        let mut failures = EntityHashMap::default();
+        let mut end = |is_ok: bool| {
+            let done = if is_ok {
+                Ok((Vec::new(), None))
+            } else {
+                Err(Box::new("on purpose") as Box<dyn std::any::Any + Send>)
+            };
+            loaded(terrain, done, &mut failures).is_some()
+        };
+        assert!(!end(false) && end(true), "once is no trouble");
+        assert_eq!([(); 3].map(|()| end(false)), [false, false, true], "it ends");
+        assert_eq!([(); 3].map(|()| end(false)), [false, false, true], "another time too");
+    }
 
     #[test]
     fn seams_keep_their_bits_on_whole_voxels_of_a_power_of_two() {

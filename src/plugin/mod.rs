@@ -66,9 +66,9 @@ pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 pub use threads::ThreadSettings;
 pub(crate) use threads::free_later;
-#[cfg(any(feature = "render", feature = "avian", feature = "store"))]
 #[cfg(feature = "avian")]
 pub(crate) use threads::panic_message;
+#[cfg(any(feature = "render", feature = "avian", feature = "store"))]
 pub(crate) use threads::{ThreadTask, Threads};
 pub use times::Times;
 

@@ -45,7 +45,11 @@ impl ThreadSettings {
     /// Transactions use all cores, as their work is short. Background work leaves a core to the frame, since it takes
     /// seconds. Colliders need few: the batches are small.
     fn on(cores: usize) -> Self {
-        Self { transactions: cores, background: (cores - 1).max(1), colliders: (cores / 4).clamp(1, 4) }
+        Self {
+            transactions: cores,
+            background: cores.saturating_sub(1).max(1),
+            colliders: (cores / 4).clamp(1, 4),
+        }
     }
 }
 
@@ -63,26 +67,69 @@ pub(crate) enum Threads {
     /// For everything that may take longer: loads, textures, saves, freeing memory.
     Background,
     /// For colliders and debris, which bodies wait for.
-    #[cfg_attr(not(feature = "avian"), expect(dead_code))]
     Colliders,
 }
 
 /// Bytes of a thread's stack. A thread that waits inside one job may run another one on top of it.
 const STACK: usize = 8 << 20;
 
-/// The pools, in order of [`Threads`], each with how many threads were asked for. It has none where threads can't be started.
-static POOLS: RwLock<[Option<(usize, Option<Arc<ThreadPool>>)>; 3]> = RwLock::new([None, None, None]);
+/// The pools, in order of [`Threads`].
+static POOLS: [Pool; 3] =
+    [Pool::new("burrow transactions"), Pool::new("burrow background"), Pool::new("burrow colliders")];
+
+/// A pool that is started when it is first used.
+struct Pool {
+    name: &'static str,
+    state: RwLock<PoolState>,
+}
+
+#[derive(Default)]
+struct PoolState {
+    /// How many threads it should have; `None` before the first settings.
+    count: Option<usize>,
+    /// Once it was started: the threads, or `None` where there are none.
+    threads: Option<Option<Arc<ThreadPool>>>,
+}
+
+impl Pool {
+    const fn new(name: &'static str) -> Self {
+        Self { name, state: RwLock::new(PoolState { count: None, threads: None }) }
+    }
+
+    /// Sets how many threads it has. What was given to it before is still done, by the threads of before.
+    fn resize(&self, count: usize) {
+        let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+        if state.count != Some(count) {
+            *state = PoolState { count: Some(count), threads: None };
+        }
+    }
+
+    /// Its threads; `None` where there are none. Until it has a number, it has the default one.
+    fn threads(&self, default: impl FnOnce() -> usize) -> Option<Arc<ThreadPool>> {
+        let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(threads) = &state.threads {
+            return threads.clone();
+        }
+        drop(state);
+        let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+        let count = state.count.unwrap_or_else(default);
+        state.threads.get_or_insert_with(|| self.start(count)).clone()
+    }
+
+    fn start(&self, count: usize) -> Option<Arc<ThreadPool>> {
+        let name = self.name;
+        let builder = ThreadPoolBuilder::new()
+            .stack_size(STACK)
+            .num_threads(count)
+            .thread_name(move |number| format!("{name} {number}"))
+            // Of work that nobody waits for, such as freeing memory. Otherwise it would end the process.
+            .panic_handler(|panic| error!("background work panicked: {}", panic_message(panic.as_ref())));
+        builder.build().ok().map(Arc::new)
+    }
+}
 
 impl Threads {
     const ALL: [Self; 3] = [Self::Transactions, Self::Background, Self::Colliders];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Transactions => "burrow transactions",
-            Self::Background => "burrow background",
-            Self::Colliders => "burrow colliders",
-        }
-    }
 
     /// How many threads it should have.
     fn count(self, settings: &ThreadSettings) -> usize {
@@ -94,34 +141,9 @@ impl Threads {
         count.max(1)
     }
 
-    /// The pool; `None` where there are no threads.
+    /// Its threads; `None` where there are none.
     fn pool(self) -> Option<Arc<ThreadPool>> {
-        let pools = POOLS.read().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, pool)) = &pools[self as usize] {
-            return pool.clone();
-        }
-        drop(pools);
-        self.start(self.count(&ThreadSettings::default()), false)
-    }
-
-    /// Starts the pool with so many threads. If there is one already, it stays, or is replaced if it has another number. What
-    /// a replaced pool was given is still done.
-    fn start(self, count: usize, replaces: bool) -> Option<Arc<ThreadPool>> {
-        let mut pools = POOLS.write().unwrap_or_else(PoisonError::into_inner);
-        let own = &mut pools[self as usize];
-        if let Some((known, pool)) = own
-            && (!replaces || *known == count)
-        {
-            return pool.clone();
-        }
-        let builder = ThreadPoolBuilder::new()
-            .stack_size(STACK)
-            .num_threads(count)
-            .thread_name(move |number| format!("{} {number}", self.name()))
-            // Of work that nobody waits for, such as freeing memory. Otherwise it would end the process.
-            .panic_handler(|panic| error!("background work panicked: {}", panic_message(panic.as_ref())));
-        let pool = builder.build();
-        own.insert((count, pool.ok().map(Arc::new))).1.clone()
+        POOLS[self as usize].threads(|| self.count(&ThreadSettings::default()))
     }
 
     /// Runs work on this pool.
@@ -136,7 +158,7 @@ impl Threads {
 /// Gives the pools the number of threads that the settings say.
 pub(super) fn resize_pools(settings: Res<ThreadSettings>) {
     for pool in Threads::ALL {
-        pool.start(pool.count(&settings), true);
+        POOLS[pool as usize].resize(pool.count(&settings));
     }
 }
 
@@ -208,7 +230,7 @@ mod tests {
 
     /// Keeps the threads of the background busy until what it returns is dropped.
     fn block_background() -> impl Sized {
-        let many = Threads::Background.pool().map_or(0, ThreadPool::current_num_threads);
+        let many = Threads::Background.pool().map_or(0, |pool| pool.current_num_threads());
         let (mut gate, (begun, begins)) = (Vec::new(), channel());
         for _ in 0..many {
             let (sender, receiver) = channel::<()>();
@@ -252,6 +274,36 @@ mod tests {
         while world.strong_count() > 0 {
             assert!(start.elapsed() < Duration::from_secs(60), "it is never freed");
             thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn a_pool_that_is_resized_finishes_what_it_was_given() {
+        let pool = Pool::new("burrow test");
+        let threads = || pool.threads(|| 1).expect("there are threads");
+        assert_eq!(threads().current_num_threads(), 1, "the default");
+        let ((open, gate), (done, is_done)) = (channel::<()>(), channel());
+        let later = done.clone();
+        threads().spawn_fifo(move || {
+            let _ = gate.recv();
+            let _ = done.send(1);
+        });
+        threads().spawn_fifo(move || drop(later.send(2)));
+        pool.resize(3);
+        assert_eq!(threads().current_num_threads(), 3);
+        assert!(is_done.try_recv().is_err());
+        drop(open);
+        assert_eq!(is_done.iter().collect::<Vec<_>>(), [1, 2]);
+        pool.resize(3);
+        assert_eq!(threads().current_num_threads(), 3);
+    }
+
+    #[test]
+    fn background_work_leaves_a_core_to_the_frame() {
+        for cores in 1..65 {
+            let ThreadSettings { transactions, background, colliders } = ThreadSettings::on(cores);
+            assert!(transactions == cores && background >= 1 && (1..=4).contains(&colliders));
+            assert!(background < cores || cores == 1, "{background} of {cores}");
         }
     }
 

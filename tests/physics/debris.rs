@@ -201,3 +201,23 @@ fn there_is_no_more_debris_than_the_settings_say() {
     stage.frames(100);
     assert!(pieces(&mut stage).is_empty());
 }
+
+#[test]
+fn debris_ages_with_physics() {
+    let (mut stage, _) = stage(1.0, Vec3::ZERO, 1.0);
+    stage.dig([saw(1.0, Vec3::ZERO)]);
+    stage.frames_until("it takes shape", |stage| !pieces(stage).is_empty());
+    let left = |stage: &mut Stage| pieces(stage)[0].0.left;
+    // A second has far fewer steps than these.
+    stage.app.world_mut().resource_mut::<Time<Physics>>().pause();
+    stage.frame();
+    let before = left(&mut stage);
+    stage.frames(200);
+    assert_eq!(left(&mut stage), before, "nothing ages while physics rests");
+    stage.app.world_mut().resource_mut::<Time<Physics>>().unpause();
+    let start = stage.seconds();
+    stage.frames(20);
+    let aged = before - left(&mut stage);
+    assert!(aged > 0.0 && (aged - (stage.seconds() - start)).abs() < 2.5 * STEP, "{aged}");
+    stage.frames_until("it crumbles", |stage| pieces(stage).is_empty());
+}

@@ -1,7 +1,9 @@
 //! Walls around a terrain, and how bodies collide with them.
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_burrow::physics::{CharacterSteering, EdgeWalls};
+use bevy_burrow::prelude::*;
 
 use crate::stage::{STEP, Stage, level};
 
@@ -63,4 +65,57 @@ fn walls_of_impossible_sizes_are_left_out_until_they_are_possible() {
     }
     stage.app.world_mut().entity_mut(terrain).insert(EdgeWalls::default());
     assert_eq!(walls_of(&mut stage).0, 4);
+}
+
+/// Level ground at a height above or below the origin, with walls.
+fn walled(height: f64) -> (Stage, Entity) {
+    let ground = Ground::flat(64, 64, height).expect("valid ground");
+    let settings = TerrainSettings { chunk_size: 16, voxel_size: 1.0 };
+    let (mut stage, entity) = Stage::with_ground(Terrain::new(ground, &settings).expect("valid settings"));
+    stage.app.world_mut().entity_mut(entity).insert(EdgeWalls { height: 20.0, ..default() });
+    stage.settle();
+    (stage, entity)
+}
+
+#[test]
+fn walls_are_where_the_ground_is() {
+    for height in [8.0, 2000.0, -700.0] {
+        let (mut stage, _) = walled(height);
+        let ball = stage.ball(Vec3::new(50.0, height as f32 + 1.0, 32.0), 0.5, Vec3::X * 10.0);
+        stage.frames((3.0 / STEP) as usize);
+        let at = stage.place(ball);
+        assert!(at.x < 65.0 && at.y > height as f32 - 1.0, "{at} on ground at {height}");
+    }
+}
+
+#[test]
+fn walls_rise_with_another_ground() {
+    let (mut stage, terrain) = walled(8.0);
+    let middle = |stage: &mut Stage| {
+        let mut names = stage.app.world_mut().query::<(&Name, &Transform)>();
+        let walls = names.iter(stage.app.world()).filter(|(name, _)| name.as_str() == "edge wall");
+        walls.map(|(_, place)| place.translation.y).fold(f32::NAN, f32::max)
+    };
+    assert_eq!(middle(&mut stage), 8.0);
+    let higher = Ground::flat(64, 64, 900.0).expect("valid ground");
+    let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("it is there");
+    model.set_ground(higher).expect("the same size");
+    stage.frames_until("the walls rise", |stage| middle(stage) == 900.0);
+}
+
+#[test]
+fn walls_go_with_their_terrain() {
+    let (mut stage, terrain) = walled(8.0);
+    assert_eq!(walls_of(&mut stage).0, 4);
+    stage.app.world_mut().entity_mut(terrain).remove::<Terrain>();
+    stage.frame();
+    assert_eq!(walls_of(&mut stage).0, 0);
+    // Those of a terrain that is disabled go too.
+    let (mut stage, terrain) = walled(8.0);
+    stage.app.world_mut().entity_mut(terrain).insert_recursive::<Children>(Disabled);
+    stage.app.world_mut().entity_mut(terrain).remove::<EdgeWalls>();
+    stage.frame();
+    let world = stage.app.world_mut();
+    let mut names = world.query_filtered::<&Name, With<Disabled>>();
+    assert_eq!(names.iter(world).filter(|name| name.as_str() == "edge wall").count(), 0);
 }

@@ -81,7 +81,7 @@ pub struct LoosePiece {
 pub struct ReturnedPiece {
     /// The name that it had when it was cut off.
     pub id: PieceId,
-    /// The tag of the brush that had cut it off; 0 if that was another player's.
+    /// The tag of the brush that had cut it off; 0 where players share the terrain.
     pub tag: u64,
     /// What had happened to it then: [`PieceFate::Removed`] or [`PieceFate::BrokeOff`].
     pub fate: PieceFate,
@@ -130,8 +130,10 @@ impl LoosePiece {
 
     /// Bytes of its lists and of its mesh, as if nothing else held them.
     pub(in crate::terrain) fn bytes(&self) -> usize {
-        let mesh = self.mesh.as_ref().map_or(0, |mesh| size_of::<SurfaceMesh>() + mesh.bytes());
-        size_of::<Self>() + self.materials.bytes() + size_of_val(&self.runs[..]) + mesh
+        // The counters of an `Arc`.
+        let counters = 2 * size_of::<usize>();
+        let mesh = self.mesh.as_ref().map_or(0, |mesh| counters + size_of::<SurfaceMesh>() + mesh.bytes());
+        size_of::<Self>() + self.materials.bytes() + counters + size_of_val(&self.runs[..]) + mesh
     }
 }
 
