@@ -22,7 +22,7 @@ pub(crate) struct EditDelta {
 }
 
 impl EditDelta {
-    /// An empty delta with room for so many bricks.
+    /// An empty delta with room for `bricks` bricks.
     pub fn with_room(bricks: usize) -> Self {
         Self {
             bricks: Vec::with_capacity(bricks),

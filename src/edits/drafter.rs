@@ -28,12 +28,12 @@ pub(crate) struct Draft {
 /// Applies prepared edits and hands out what they changed.
 pub(crate) type Apply<'a> = dyn Fn(&PreparedEdits, &mut dyn FnMut(&mut [EditDelta])) + 'a;
 
-/// Drafts edits over a world and over what it has drafted so far.
+/// Drafts edits over a world and over its own earlier drafts.
 pub(crate) struct Drafter<'a> {
     world: SampleView<'a>,
     grid: ChunkGrid,
     apply: &'a Apply<'a>,
-    /// Bricks drafted so far.
+    /// All bricks drafted up to now.
     pub overlay: Overlay,
     /// Hash of all samples.
     pub hash: u64,
@@ -53,12 +53,13 @@ impl<'a> Drafter<'a> {
         Self { world, grid, apply, overlay: Overlay::default(), hash, uniform: Cow::Borrowed(uniform) }
     }
 
-    /// The samples as they are so far.
+    /// The samples with all drafts up to now.
     pub fn samples(&self) -> SampleView<'_> {
         self.overlay.over(self.world)
     }
 
-    /// What edits make of the samples so far. [Lay](Overlay::lay) its bricks over these before the next draft.
+    /// Applies edits to the current samples. [Lay](Overlay::lay) the draft's bricks over these before the
+    /// next draft.
     pub fn draft(&mut self, edits: &[&Edit], rules: Option<&DiggingRules>) -> Draft {
         let edits: Vec<PreparedEdit> =
             edits.iter().map(|edit| PreparedEdit::new(self.grid, edit, rules)).collect();
@@ -66,7 +67,7 @@ impl<'a> Drafter<'a> {
         self.draft_batches(edits, &lengths, rules)
     }
 
-    /// The same with edits in batches of these lengths.
+    /// Like [`Self::draft`], with edits in batches of these lengths.
     fn draft_batches(
         &mut self,
         edits: Vec<PreparedEdit>,
@@ -95,7 +96,7 @@ impl<'a> Drafter<'a> {
         draft
     }
 
-    /// Adds to a draft what its edits did besides, and lays that over the samples so far.
+    /// Adds further changes of a draft's edits to the draft, and lays them over the current samples.
     pub fn extend(&mut self, draft: &mut Draft, delta: EditDelta) {
         let (edits, before) = (draft.effects.len(), draft.bricks.len());
         add(draft, 0, edits, &mut [delta], &mut self.hash, &mut self.uniform);

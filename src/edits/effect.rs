@@ -62,7 +62,7 @@ pub(crate) struct DraftedBrick {
     pub brick: Arc<Brick>,
     /// Box around the samples that changed.
     pub changed: LatticeBox,
-    /// Is a sample among them that had never been edited?
+    /// Whether any of them had never been edited before.
     pub is_extended: bool,
     /// What all samples were edited to, if that is the same for all.
     pub kind: Option<UniformKind>,

@@ -1,8 +1,8 @@
 //! Which edits may reach which bricks.
 //!
-//! Where there are many, threads share the bricks in slabs, one brick thick along x, whose results stand one after the other
-//! in order. Long thin brushes come near few bricks of the box around them, so up to 8x8x8 bricks are tested together before
-//! each is tested by itself.
+//! Where there are many, threads share the bricks in slabs, one brick thick along x, whose results stand one
+//! after the other in order. Long thin brushes come near few bricks of the box around them, so up to 8x8x8
+//! bricks are tested together before each is tested alone.
 
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ impl Job {
         self.pos
     }
 
-    /// Are both about the same brick?
+    /// Returns `true` if both concern the same brick.
     pub fn is_same_brick(a: &Self, b: &Self) -> bool {
         a.pos == b.pos
     }

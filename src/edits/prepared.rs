@@ -1,7 +1,7 @@
 //! Edits, sorted by the bricks that they may reach: the work that a [`backend`](crate::backend) does.
 //!
-//! Each brick takes its edits in order and by itself: bricks share no samples, so threads share no work, and what an edit
-//! changed is added up afterwards.
+//! Each brick applies its edits in order, independently of other bricks: bricks share no samples, so threads
+//! share no work. The changes of each edit are summed afterwards.
 
 use rayon::prelude::*;
 use wide::i16x8;
@@ -55,14 +55,14 @@ impl<'a> PreparedEdits<'a> {
         Self::of(base, grid, edits, None)
     }
 
-    /// The same edits under rules.
+    /// These edits, restricted by rules.
     #[cfg(feature = "cuda")]
     pub fn under(mut self, rules: Option<&'a DiggingRules>) -> Self {
         self.edits.iter_mut().for_each(|edit| edit.set_rules(rules));
         Self::of(self.base, self.grid, self.edits, rules)
     }
 
-    /// Does any edit read other samples than those that it changes?
+    /// Returns `true` if any edit reads other samples than those that it changes.
     #[cfg(feature = "cuda")]
     pub fn looks_around(&self) -> bool {
         self.edits.iter().any(PreparedEdit::looks_around)

@@ -41,7 +41,7 @@ impl PreparedEdit {
             rules.zip(self.reach).is_some_and(|(rules, own)| may_restrict(rules, own, self.power));
     }
 
-    /// Does the edit read other samples than those that it changes?
+    /// Returns `true` if the edit reads other samples than those that it changes.
     pub fn looks_around(&self) -> bool {
         self.sculptor.is_some() || self.is_ruled
     }
@@ -66,7 +66,7 @@ pub(crate) fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
     edit.reach().intersection(grid.edit_bounds())
 }
 
-/// May some rule restrict an edit of this power that changes these samples?
+/// Returns `true` if some rule may restrict an edit of this power that changes these samples.
 fn may_restrict(rules: &DiggingRules, samples: LatticeBox, power: u8) -> bool {
     let around = samples.grown(1);
     !rules.unbreakable.is_empty()

@@ -152,7 +152,8 @@ struct Below {
 }
 
 impl NearestGround {
-    /// The material for a point that becomes solid: of the ground straight below, else straight above, else beside it.
+    /// The material for a point that becomes solid: of the ground straight below, else straight above, else
+    /// next to it.
     fn material(&mut self, view: &SampleView, point: IVec3, around: &Stencil) -> MaterialId {
         let column = ((point.z & 7) * 8 + (point.x & 7)) as usize;
         let known = &mut self.below[column];

@@ -36,7 +36,7 @@ pub(super) struct OfBrick {
     pub brick: BrickPos,
     /// The box around the cells that changes reach.
     pub cells: LatticeBox,
-    /// May any cell of the brick join the mask?
+    /// Whether any cell of the brick may join the mask.
     pub may_join: bool,
 }
 
@@ -101,13 +101,14 @@ impl ByBrick {
     }
 }
 
-/// Do both bricks belong to the same stack?
+/// Returns `true` if both bricks belong to the same stack.
 pub(super) fn is_same_stack(a: &OfBrick, b: &OfBrick) -> bool {
     a.brick.stack() == b.brick.stack()
 }
 
-/// The box around some cells of a brick, as the sides of it that lie in the brick: bits 0 to 7 those along x, 8 to 15 along y,
-/// 16 to 23 along z. What is around two boxes is the one or the other. And may any of them join the mask?
+/// The box around some cells of a brick, as the sides of it that lie in the brick: bits 0 to 7 those along x,
+/// 8 to 15 along y, 16 to 23 along z. The box around two boxes is the bitwise or. Also whether any of the
+/// cells may join the mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Bits(u32);
 
@@ -174,7 +175,7 @@ struct Pile {
     sides: u32,
     /// The lowest and the highest one.
     cells: [i32; 2],
-    /// The same in bricks, of those that may join the mask.
+    /// The lowest and the highest cell, in bricks, that may join the mask.
     joining: Option<[i32; 2]>,
 }
 
@@ -239,7 +240,7 @@ mod tests {
         all
     }
 
-    /// The same, brick by brick.
+    /// A simple implementation, brick by brick.
     fn naive(changes: &[Reached]) -> Vec<OfBrick> {
         let mut all: BTreeMap<_, OfBrick> = BTreeMap::new();
         for (reached, cells) in changes.iter().filter_map(|reached| Some((reached, reached.cells?))) {
@@ -289,7 +290,7 @@ mod tests {
         }
     }
 
-    /// One box at each home alone reaches beside it; all others are in the way of nobody.
+    /// Only one box at each origin reaches the brick next to it; the others reach no other brick.
     #[test]
     fn cells_beside_their_home_are_found_in_every_slab() {
         let point = |home_x: i32, x: i32, y: i32| Reached {

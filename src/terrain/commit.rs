@@ -40,7 +40,7 @@ pub struct Commit {
     pub(super) outdated: Vec<ChunkPos>,
     /// What is drawn then, if that changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
-    /// Does it change only what is drawn?
+    /// Returns `true` if it changes only what is drawn.
     pub(super) is_cut: bool,
     /// The world that takes the place of the one that was there, if all of it changes.
     pub(super) whole: Option<Arc<World>>,
@@ -85,17 +85,17 @@ impl Commit {
         &self.news
     }
 
-    /// What is drawn once this is committed, if a cut is drawn.
+    /// The cut that is drawn after this commit, if any.
     pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
         self.drawn_cut.as_ref()
     }
 
-    /// Does it change only what is drawn?
+    /// Returns `true` if it changes only what is drawn.
     pub fn is_cut(&self) -> bool {
         self.is_cut
     }
 
-    /// Does another world take the place of this one, so that all of it has to be drawn anew?
+    /// Returns `true` if another world replaces this one, so that all meshes are made again.
     pub fn is_whole(&self) -> bool {
         self.whole.is_some()
     }
@@ -160,7 +160,7 @@ mod tests {
         Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 30.0), 5.0))
     }
 
-    /// What digging once more comes to, and whether the task's copy became the world.
+    /// Digs once more; returns whether the task's copy became the world, and the dropped world.
     fn dig_on(terrain: &mut Terrain, meanwhile: impl FnOnce(&mut Terrain)) -> (bool, Option<Arc<World>>) {
         terrain.submit(&dig(40.0));
         let commit = terrain.begin().expect("something waits").run();

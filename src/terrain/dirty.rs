@@ -108,7 +108,7 @@ fn in_world(grid: ChunkGrid, low: IVec3, high: IVec3) -> Option<LatticeBox> {
 }
 
 /// The box in a stack of bricks around the sheets of cells that join or leave the mask, and of the cells next to them, whose
-/// vertices may come to lie on the mask's border or leave it.
+/// vertices may move onto the mask's border or off it.
 fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) -> Option<LatticeBox> {
     if newer.is_empty() {
         return None;

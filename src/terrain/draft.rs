@@ -13,7 +13,7 @@ use crate::brush::Edit;
 use crate::lattice::BrickPos;
 use crate::volume::Brick;
 
-/// What edits would come to.
+/// The changes that edits would make.
 #[derive(Clone, Debug, Default)]
 pub struct Draft {
     /// A receipt for each edit.

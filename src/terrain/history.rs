@@ -19,7 +19,7 @@ use crate::volume::MaterialCounts;
 pub enum HistoryStep {
     /// Back to before the last group of edits: a stroke, or what was submitted together.
     Undo,
-    /// What was undone last is done again.
+    /// Repeats the step that was undone last.
     Redo,
 }
 
@@ -105,7 +105,7 @@ pub(super) struct UndoDelta {
 }
 
 impl UndoDelta {
-    /// A change by a group of edits, which replaces bricks of so many bytes.
+    /// A change by a group of edits, which replaces bricks of `replaced_bytes` bytes.
     pub fn new(change: Change, replaced_bytes: usize, group: u64, tags: Vec<u64>) -> Self {
         let bounds = change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
         Self { change, bounds, brick_bytes: replaced_bytes, group, tags }
@@ -138,7 +138,7 @@ pub(crate) struct DeferredDrop {
 }
 
 impl DeferredDrop {
-    /// Is there nothing to drop?
+    /// Returns `true` if there is nothing to drop.
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
         let Self { steps, bricks, records, copy } = self;
@@ -194,7 +194,7 @@ impl UndoStack {
         self.step_bytes + (self.undo.capacity() + self.redo.capacity()) * size_of::<Arc<UndoDelta>>()
     }
 
-    /// Does some step reach these samples?
+    /// Returns `true` if some step reaches these samples.
     pub fn reaches(&self, samples: LatticeBox) -> bool {
         let meets =
             |step: &Arc<UndoDelta>| step.bounds.is_some_and(|own| own.intersection(samples).is_some());

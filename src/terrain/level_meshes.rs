@@ -7,7 +7,7 @@ use crate::levels::{Cut, LevelGrid, Node, NodeFacts};
 use crate::surface::level::{self, LevelView, Stacks};
 use crate::surface::{SeamChecker, SeamReport, SurfaceMesh};
 
-/// Nodes are this many voxels wide at most: so far, 1/4096 of a voxel is exact in `f32`.
+/// Greatest width of a node in voxels: up to this width, 1/4096 of a voxel is exact in `f32`.
 const WIDEST: i32 = 4096;
 
 /// What of a node's [`NodeFacts`] depends on the ground alone.
@@ -70,7 +70,7 @@ impl World {
         LevelView::new(self.view(), cut, self.edited_stacks())
     }
 
-    /// Is the cut one of this world's tiles?
+    /// Returns `true` if the cut was made for a world of this size.
     pub(super) fn has_cut(&self, cut: &Cut) -> bool {
         cut.grid().chunks() == self.grid
     }
@@ -81,7 +81,8 @@ impl World {
         if self.has_cut(cut) { level::node_mesh(&self.level_view(cut), node) } else { SurfaceMesh::default() }
     }
 
-    /// Is a node of level 0 drawn by [its tile](Self::tile_mesh) and [the chunks](Self::chunk_mesh) below it as they are?
+    /// Returns `true` if a node of level 0 is drawn by [its tile](Self::tile_mesh) and [the
+    /// chunks](Self::chunk_mesh) below it, unchanged.
     pub fn is_plain(&self, cut: &Cut, node: Node) -> bool {
         self.has_cut(cut) && level::is_plain(&self.level_view(cut), node)
     }
@@ -111,7 +112,7 @@ impl World {
         NodeFacts { heights, error, has_edits: self.has_edits(grid, node) }
     }
 
-    /// Was anything dug or built in a node?
+    /// Returns `true` if a node contains edits.
     pub fn has_edits(&self, grid: LevelGrid, node: Node) -> bool {
         let (low, high) = grid.columns(node);
         grid.has(node) && self.edited_stacks().has_any(low, high)

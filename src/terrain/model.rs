@@ -46,8 +46,9 @@ pub struct StaleCommit;
 
 /// A world, the edits that wait for it, and the one transaction that may be under way.
 ///
-/// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
-/// to it. A game may also commit by itself, for example with [`apply`](Self::apply); the change is shown some frames later.
+/// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or
+/// [`submit`](Self::submit) to it. A game may also commit directly, for example with [`apply`](Self::apply);
+/// the change is shown some frames later.
 ///
 /// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and overwrites
 /// any other; a parent may scale it further.
@@ -91,7 +92,7 @@ pub(super) struct InFlight {
     pub work: Work,
     /// How much work that is, as the queue counts.
     estimate: u64,
-    /// Does the plugin run it?
+    /// Whether the plugin runs it.
     #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
     pub is_plugins: bool,
 }
@@ -124,8 +125,8 @@ impl Terrain {
         })
     }
 
-    /// Sets the engine that runs later transactions. The result is the same on every engine. By default it is the plugin's, or
-    /// without the plugin the processor.
+    /// Sets the engine that runs later transactions. The result is the same on every engine. The default is
+    /// the plugin's engine, or the CPU without the plugin.
     pub fn set_engine(&mut self, engine: Engine) {
         self.engine = Some(engine);
     }
@@ -186,7 +187,7 @@ impl Terrain {
         self.queue.len()
     }
 
-    /// Is a transaction under way?
+    /// Returns `true` while a transaction is running.
     pub fn is_busy(&self) -> bool {
         self.in_flight.is_some()
     }
@@ -266,7 +267,7 @@ impl Terrain {
         Ok(receipts)
     }
 
-    /// The same without a note for the plugin; the caller may drop what is no longer needed elsewhere.
+    /// Commits without notifying the plugin; the caller may drop the replaced data on another thread.
     pub(super) fn install(
         &mut self,
         mut commit: Commit,
@@ -301,7 +302,7 @@ impl Terrain {
         }
         self.log_terms();
         dropped.copy = copy;
-        // Steps of before hold parts that are gone.
+        // Undo steps recorded before the replacement refer to parts that no longer exist.
         if let (Work::Put(put), Some(Ok(_))) = (&done.work, &installed.put)
             && !put.is_empty()
         {
@@ -330,7 +331,8 @@ impl Terrain {
         keep(&mut self.step_receipts, receipt);
     }
 
-    /// Gives up the transaction that is under way, say because its task was lost. Its work is queued again, in front.
+    /// Abandons the running transaction, for example because its task was lost. Its work is queued again, in
+    /// front.
     pub fn abandon(&mut self) {
         let Some(lost) = self.in_flight.take() else { return };
         match lost.work {
@@ -360,13 +362,14 @@ impl Terrain {
             })
     }
 
-    /// What is drawn; `None` if all of the world is drawn in full.
+    /// The cut that is drawn; `None` if all of the world is drawn in full detail.
     pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
         self.drawn_cut.as_ref()
     }
 
-    /// Draws the nodes of a cut from now on, or with `None`, or a cut of a world of another size, all of the world in full. Everything has to be drawn anew:
-    /// [`World::draw_cut`] makes the meshes. A transaction under way is given up, and its work queued again.
+    /// Draws the nodes of a cut from now on. With `None`, or with a cut for a world of another size, draws
+    /// all of the world in full detail. All meshes have to be made again, with [`World::draw_cut`]. A running
+    /// transaction is abandoned, and its work queued again.
     pub fn set_drawn_cut(&mut self, drawn: Option<Arc<DrawnCut>>) {
         self.abandon();
         self.drawn_cut = drawn.filter(|drawn| self.world.has_cut(drawn.cut()));

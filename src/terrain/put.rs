@@ -77,19 +77,19 @@ pub(super) struct Put {
     pub change: WorldChange,
     /// The hash that the world must have afterwards.
     pub hash: Option<u64>,
-    /// Does its receipt count voxels?
+    /// Whether its receipt counts voxels.
     pub counts: bool,
     /// Another ground below all edits; nothing else changes then.
     pub ground: Option<Arc<Ground>>,
 }
 
 impl Put {
-    /// Does it certainly change nothing?
+    /// Returns `true` if it certainly changes nothing.
     pub fn is_empty(&self) -> bool {
         self.change.bricks.is_empty() && self.change.fields.is_empty() && self.ground.is_none()
     }
 
-    /// Does it certainly change none of these samples?
+    /// Returns `true` if it certainly changes none of these samples.
     pub fn misses(&self, samples: LatticeBox) -> bool {
         let misses = |pos: &BrickPos| pos.samples().intersection(samples).is_none();
         self.ground.is_none() && self.change.bricks.iter().all(|(pos, _)| misses(pos))
@@ -262,7 +262,8 @@ fn share_uniform(world: &World, new: &mut [NewBrick]) -> Option<UniformBricks> {
     grown
 }
 
-/// Rule 2 anew for the cells near changed bricks, as samples may have become pristine again: the words of the mask that change.
+/// Evaluates rule 2 again near changed bricks, as samples may have become pristine again. Returns the mask
+/// words that change.
 fn words_of(
     world: &World,
     bricks: &[(BrickPos, Arc<Brick>)],
@@ -296,10 +297,10 @@ fn words_of(
 }
 
 impl Terrain {
-    /// Queues parts that take the place of what the world holds, after everything that was submitted before: say a region of
-    /// another machine's world. They are checked in the transaction, where `hash` is given against the hash that the world must
-    /// have afterwards too. History begins anew then, as its steps hold parts of before.
-    /// [What came of it](Self::take_change_receipts) is told in order.
+    /// Queues parts that replace parts of the world, after everything that was submitted before; for example
+    /// a region of another machine's world. The transaction checks them, and if `hash` is given, also that
+    /// the world has this hash afterwards. The undo history is cleared, because its steps refer to the
+    /// replaced parts. The [receipts](Self::take_change_receipts) arrive in order.
     ///
     /// # Errors
     /// [`ChangeError::Overloaded`] where too much work waits.

@@ -17,8 +17,9 @@ use crate::volume::DiggingRules;
 
 /// How much work a terrain takes on, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
-/// A brick takes the processor about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose pieces are
-/// not counted, because their cost is not known before, and a step through history counts as a fixed amount.
+/// A brick takes the CPU about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose
+/// pieces are not counted, because their cost is not known before, and a step through history counts as a
+/// fixed amount.
 ///
 /// [`Terrain::set_work_limits`]: super::Terrain::set_work_limits
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -66,7 +67,7 @@ pub(crate) enum Together {
     Batch(u64),
 }
 
-/// What is fixed for an edit when it is submitted.
+/// Everything about an edit that is fixed when it is submitted.
 #[derive(Clone, Debug)]
 pub(super) struct Terms {
     /// Edits with the same number are one step of undo; later ones have greater numbers.
@@ -98,12 +99,12 @@ pub(crate) struct Submission {
 }
 
 impl Submission {
-    /// Does it belong to the same group, under the same rules and loose settings?
+    /// Returns `true` if it belongs to the same group, under the same rules and loose settings.
     pub(super) fn goes_with(&self, other: &Self) -> bool {
         self.terms.is_same(&other.terms)
     }
 
-    /// Does it certainly change none of these samples?
+    /// Returns `true` if it certainly changes none of these samples.
     pub(super) fn misses(&self, samples: LatticeBox) -> bool {
         self.edit.as_ref().map_or(true, |edit| edit.reach().intersection(samples).is_none())
     }
@@ -179,12 +180,12 @@ impl Queue {
         self.open = None;
     }
 
-    /// Is there room for an edit, valid or not?
+    /// Returns `true` if there is room for an edit, valid or not.
     pub fn has_room(&self, grid: ChunkGrid, edit: Option<&Edit>) -> bool {
         self.fits(edit.map_or(EDIT, |edit| work_of(grid, edit)))
     }
 
-    /// Is there room for a step?
+    /// Returns `true` if there is room for a step.
     pub fn has_room_for_step(&self) -> bool {
         self.fits(STEP)
     }

@@ -19,7 +19,7 @@ pub struct WorldChange {
     pub bricks: Vec<(BrickPos, Option<Arc<Brick>>)>,
     /// All fields of each chunk whose fields change, by chunk.
     pub fields: Vec<(ChunkPos, Fields)>,
-    /// The greatest name that a field has had so far.
+    /// The greatest name that any field has had.
     pub next_field: u64,
 }
 

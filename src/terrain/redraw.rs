@@ -1,4 +1,4 @@
-//! What a transaction draws anew: chunks with dirty blocks, touched tiles.
+//! The meshes that a transaction makes again: chunks with dirty blocks, touched tiles.
 
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;

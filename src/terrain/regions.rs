@@ -34,7 +34,7 @@ impl World {
         self.bricks.get(&pos)
     }
 
-    /// The greatest name that a field has had so far.
+    /// The greatest name that any field has had.
     pub fn next_field(&self) -> u64 {
         self.next_field
     }

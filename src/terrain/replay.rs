@@ -106,9 +106,9 @@ impl Terrain {
         Ok(terrain)
     }
 
-    /// Applies a record of a [log](Self::take_log) at once, after everything that waits, and compares the world with it: its
-    /// revision, and its hash. Returns the receipts of its edits. A log that this terrain keeps
-    /// tells of it too.
+    /// Applies a record of a [log](Self::take_log) at once, after everything that waits, and compares the
+    /// world with it: its revision, and its hash. Returns the receipts of its edits. A log that this terrain
+    /// keeps records it too.
     ///
     /// Fields of steps and of parts belong to the chunk size of the terrain that they were logged by, which this one needs too.
     ///

@@ -20,7 +20,7 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{Brick, Fields, pristine_layers};
 
-/// What is drawn otherwise, and what happens to fields, when parts are put in place.
+/// How meshes and fields change when parts are replaced.
 pub(super) struct Placed {
     pub meshes: MeshUpdates,
     pub news: Vec<(ChunkPos, FieldNews)>,

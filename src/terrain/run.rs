@@ -79,7 +79,7 @@ impl Transaction {
         Commit { copy, record, stages, ..commit }
     }
 
-    /// May it reach so many bricks that several threads will work on them?
+    /// Returns `true` if it may reach enough bricks for several threads.
     fn is_large(&self) -> bool {
         match &self.work {
             Work::Edits(submissions) => {

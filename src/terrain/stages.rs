@@ -12,7 +12,8 @@ pub struct Stages {
     pub edit: Duration,
     /// Marching cubes over dirty blocks, and finding these.
     pub meshing: Duration,
-    /// Assembling chunk meshes from new and old parts, the first ones while others are still being copied from a card.
+    /// Assembling chunk meshes from new and old parts, the first ones while others are still being copied
+    /// from the GPU.
     pub assembly: Duration,
     /// The mask, rings and index lists.
     pub ring: Duration,

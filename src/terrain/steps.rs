@@ -39,14 +39,14 @@ impl Terrain {
         self.undo_stack.figures()
     }
 
-    /// From now on, history takes at most so many bytes; 64 MiB unless set, and with 0 there is none. Where they do not
-    /// suffice, the oldest steps go first. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the surface of
-    /// some thousand digs of radius 8. What exceeds the budget is dropped before this returns.
+    /// Limits the history to `bytes` bytes; 64 MiB by default, and 0 turns history off. If it grows beyond
+    /// that, the oldest steps are dropped. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the
+    /// surface of some thousand digs of radius 8. What exceeds the budget is dropped before this returns.
     pub fn set_undo_budget(&mut self, bytes: usize) {
         drop(self.rebudget_undo(bytes));
     }
 
-    /// The same; the caller may drop what exceeds the budget elsewhere.
+    /// Like [`Self::set_undo_budget`]; the caller may drop the excess on another thread.
     pub(crate) fn rebudget_undo(&mut self, bytes: usize) -> DeferredDrop {
         self.undo_stack.set_budget(bytes)
     }
@@ -73,7 +73,7 @@ impl Terrain {
     /// ```
     pub fn clear_history(&mut self) {
         self.undo_stack.clear(&mut DeferredDrop::default());
-        // A stroke that goes on begins anew.
+        // An unfinished stroke starts a new group.
         self.queue.close_group();
     }
 
@@ -107,7 +107,7 @@ impl Terrain {
         std::mem::take(&mut self.step_receipts).into()
     }
 
-    /// Is there any to [take](Self::take_history_receipts)?
+    /// Returns `true` if there is a receipt to [take](Self::take_history_receipts).
     pub fn has_history_receipts(&self) -> bool {
         !self.step_receipts.is_empty()
     }

@@ -48,7 +48,8 @@ impl Terrain {
         }
     }
 
-    /// Queues an edit, say from a file or the network. It is checked like a brush, and a step of undo as one would be.
+    /// Queues an edit, for example from a file or the network. It is checked like a brush, and becomes a step
+    /// of undo as a brush does.
     pub fn submit_edit(&mut self, edit: &Edit) {
         self.submit_edits([edit]);
     }
@@ -147,7 +148,7 @@ impl Terrain {
         std::mem::take(&mut self.answered).into()
     }
 
-    /// Is there any receipt to [take](Self::take_answered)?
+    /// Returns `true` if there is a receipt to [take](Self::take_answered).
     pub fn has_answered(&self) -> bool {
         !self.answered.is_empty()
     }

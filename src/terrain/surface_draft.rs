@@ -88,7 +88,7 @@ impl World {
 }
 
 impl SurfaceDraft {
-    /// Is nothing drawn?
+    /// Returns `true` if nothing is drawn.
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
         match self {

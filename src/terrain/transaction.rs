@@ -33,12 +33,12 @@ pub struct Transaction {
     pub(super) ticket: u64,
     pub(super) world: Arc<World>,
     pub(super) work: Work,
-    /// Without one, the processor.
+    /// `None` runs on the CPU.
     pub(super) engine: Option<Engine>,
-    /// What is drawn; `None` where all of the world is drawn in full.
+    /// The cut that is drawn; `None` if all of the world is drawn in full detail.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     pub(super) meshing: Meshing,
-    /// Does the terrain keep a log?
+    /// Whether the terrain keeps a log.
     pub(super) is_logged: bool,
 }
 
@@ -66,7 +66,7 @@ impl Transaction {
         }
     }
 
-    /// Does it hold no edit?
+    /// Returns `true` if it holds no edit.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

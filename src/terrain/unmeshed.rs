@@ -1,4 +1,4 @@
-//! Chunks whose surface is not kept: it is made when it is asked for, say once a player comes near.
+//! Chunks whose surface is not kept: it is made on demand, for example when a player comes near.
 //!
 //! A terrain that is [restored](super::Terrain::restore) from a save has meshed nothing, and one that [never
 //! meshes](Meshing::Never) keeps no surface. Everything else about them is the same.
@@ -26,7 +26,7 @@ pub enum Meshing {
     /// All that change, ready to be shown.
     #[default]
     All,
-    /// None: for servers and tools that show nothing. Whoever asks for a mesh gets it nevertheless, made at that moment.
+    /// None: for servers and tools that show nothing. Meshes that are asked for are made at that moment.
     Never,
 }
 
@@ -134,7 +134,7 @@ impl World {
         self.surfaces.keys().chain(self.unmeshed.keys()).copied()
     }
 
-    /// Does the chunk draw something, or may it?
+    /// Returns `true` if the chunk draws something, or may do so.
     pub(crate) fn may_draw(&self, chunk: ChunkPos) -> bool {
         self.surfaces.contains_key(&chunk) || self.unmeshed.contains_key(&chunk)
     }
@@ -147,8 +147,9 @@ impl World {
 }
 
 impl Terrain {
-    /// Says which surfaces transactions make from now on. With [`Meshing::Never`] those that are kept are dropped: for terrains
-    /// that nobody looks at. A plugin that shows the terrain is not told of changes then.
+    /// Says which surfaces transactions make from now on. With [`Meshing::Never`] those that are kept are
+    /// dropped: for terrains that are never shown. A plugin that shows the terrain does not learn of changes
+    /// then.
     pub fn set_meshing(&mut self, meshing: Meshing) {
         if meshing == Meshing::Never && self.meshing != meshing {
             self.abandon();

@@ -1,4 +1,4 @@
-//! What a game committed by itself to a terrain, until the plugin shows it.
+//! Changes that a game committed to a terrain directly, until the plugin shows them.
 
 use std::collections::BTreeSet;
 
@@ -26,12 +26,12 @@ impl Unseen {
         self.to
     }
 
-    /// Is it of this world, whatever was committed to that since?
+    /// Returns `true` if it belongs to this world, regardless of later commits.
     pub fn is_of(&self, world: &World) -> bool {
         self.to.is_same_world(world.version())
     }
 
-    /// Is this the version before all of it?
+    /// Returns `true` if this is the version before all of it.
     pub fn follows(&self, shown: Version) -> bool {
         self.from == shown
     }

@@ -111,7 +111,7 @@ pub struct Version {
 }
 
 impl Version {
-    /// Is it the same world, whatever was committed to it in between?
+    /// Returns `true` if it is the same world, regardless of commits in between.
     #[cfg(feature = "plugin")]
     pub(crate) fn is_same_world(self, other: Self) -> bool {
         self.lineage == other.lineage
@@ -157,7 +157,7 @@ impl World {
         &self.ground
     }
 
-    /// The same, shared.
+    /// A shared handle to [`Self::ground`].
     #[cfg(any(feature = "plugin", feature = "store"))]
     pub(crate) fn shared_ground(&self) -> Arc<Ground> {
         Arc::clone(&self.ground)
@@ -273,8 +273,8 @@ impl World {
         checker.check(self.grid)
     }
 
-    /// Sets the pool of uniform bricks. Once it holds twice as many kinds as were left the last time, those are dropped that
-    /// nobody else holds: neither a brick of this world, nor its history, nor another world.
+    /// Sets the pool of uniform bricks. Once it holds twice as many kinds as were left the last time, those
+    /// are dropped that nothing else refers to: no brick of this world, no history, no other world.
     pub(super) fn set_uniform(&mut self, uniform: UniformBricks) {
         self.uniform = uniform;
         if self.uniform.len() >= self.many_kinds {
@@ -329,7 +329,7 @@ mod tests {
     use crate::ground::MaterialId;
     use crate::terrain::{Terrain, TerrainSettings};
 
-    /// One of the brick from (8, 24, 8) to (15, 31, 15), so many voxels larger on all sides.
+    /// A box around the brick from (8, 24, 8) to (15, 31, 15), `more` voxels larger on all sides.
     fn cube(more: f32) -> Shape {
         Shape::cuboid(Vec3::new(11.5, 27.5, 11.5), Vec3::splat(4.0 + more))
     }

@@ -130,8 +130,8 @@ impl Brick {
         brick
     }
 
-    /// A brick of a world over this ground, from its edited samples and their materials, both in order. Which samples are solid
-    /// is computed anew.
+    /// A brick of a world over this ground, from its edited samples and their materials, both in order. Which
+    /// samples are solid is computed again.
     ///
     /// `None` where there are not as many of them as `edited` has bits, where a density is [`i16::MIN`], or where a sample of air
     /// has a material.
@@ -164,7 +164,7 @@ impl Brick {
         Some(brick)
     }
 
-    /// The same edited samples, where these pristine ones are solid.
+    /// A brick with these edited samples over other pristine ones, which are solid where `solid` says so.
     pub(crate) fn on_pristine(&self, solid: &Layers) -> Self {
         let mut brick = self.clone();
         for (y, edited) in self.edited.iter().enumerate() {
@@ -238,7 +238,7 @@ impl Brick {
         self.samples[index] = sample;
     }
 
-    /// Enters which samples of a layer are edited now, beside those that are already, and which of them are solid.
+    /// Marks further samples of a layer as edited, and which of them are solid.
     #[inline]
     pub(crate) fn set_bits(&mut self, y: usize, edited: u64, solid: u64) {
         self.edited[y] |= edited;
@@ -283,7 +283,7 @@ impl Brick {
         Self::BYTES + self.material_bytes()
     }
 
-    /// Bytes that materials take beside the brick itself.
+    /// Bytes that materials take in addition to the brick.
     pub fn material_bytes(&self) -> usize {
         self.materials.as_deref().map_or(0, size_of_val)
     }

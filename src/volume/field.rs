@@ -67,7 +67,7 @@ impl Fields {
         self.0.len()
     }
 
-    /// Is there no field?
+    /// Returns `true` if there is no field.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -82,7 +82,8 @@ impl Fields {
         self.0.capacity() * size_of::<Field>()
     }
 
-    /// Takes in the box of an edit's changed samples. Of fields that merge the oldest goes on; `fresh` names a new one.
+    /// Takes in the box of an edit's changed samples. Of merged fields the oldest survives; `fresh` names a
+    /// new one.
     pub(crate) fn absorb(&mut self, edit: LatticeBox, fresh: impl FnOnce() -> FieldId) -> Absorbed {
         if let Some(field) = self.0.iter_mut().find(|field| field.bounds.encloses(edit)) {
             field.revision = field.revision.saturating_add(1);

@@ -8,8 +8,8 @@ use crate::lattice::{LatticeBox, ONE};
 
 /// What brushes may do to a world. Without rules, everything.
 ///
-/// The same edits under the same rules make the same world, bit for bit. Rules restrict every operation: it *takes away*
-/// wherever it makes a sample's density higher, whether the sample is solid or not.
+/// Equal edits under equal rules make equal worlds, bit for bit. Rules restrict every operation: it *takes
+/// away* wherever it makes a sample's density higher, whether the sample is solid or not.
 ///
 /// ```
 /// use bevy_burrow::prelude::*;
@@ -82,7 +82,7 @@ impl DiggingRules {
         Ok(())
     }
 
-    /// Is there no rule?
+    /// Returns `true` if there is no rule.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
@@ -137,7 +137,7 @@ pub struct Refused {
 }
 
 impl Refused {
-    /// Was nothing refused?
+    /// Returns `true` if nothing was refused.
     pub fn is_empty(&self) -> bool {
         self.total() == 0
     }

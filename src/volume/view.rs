@@ -42,12 +42,12 @@ impl<'a> SampleView<'a> {
         Self { ground, bricks, newer: None, latest: &[] }
     }
 
-    /// The same view with newer bricks in place of older ones.
+    /// This view with newer bricks in place of older ones.
     pub fn over(self, newer: &'a Bricks) -> Self {
         Self { newer: Some(newer), ..self }
     }
 
-    /// The same view with bricks of a list in place of all others.
+    /// This view with bricks of a list in place of all others.
     pub(crate) fn under(self, latest: &'a BrickList<'a>) -> Self {
         debug_assert!(latest.is_sorted_by(|a, b| a.0 < b.0));
         Self { latest, ..self }
@@ -106,7 +106,7 @@ impl<'a> SampleView<'a> {
         self.brick(BrickPos::of(point)).map_or(Sample::PRISTINE, |brick| brick.sample(point))
     }
 
-    /// Was the sample edited?
+    /// Returns `true` if the sample was edited.
     pub fn is_edited(&self, point: IVec3) -> bool {
         self.sample(point) != Sample::PRISTINE
     }
