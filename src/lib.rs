@@ -126,7 +126,7 @@
 //! # }
 //! ```
 //!
-//! **Digging rules**, and receipts that tell what they refused.
+//! **Digging rules**, and receipts that report what they refused.
 //!
 //! ```
 //! # #[cfg(feature = "plugin")] {
@@ -230,15 +230,15 @@
 //!
 //! From the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
 //! [`lattice`], [`levels`], [`ground`], [`brush`], [`volume`], `edits`, [`surface`], [`backend`], [`terrain`], `plugin`, `view`,
-//! `physics`, `panel`, `debug`. Beside them stands [`dense`], which meshes plain arrays and serves no terrain.
+//! `physics`, `panel`, `debug`. [`dense`], which meshes plain arrays, is independent of them.
 //!
 //! # How the seam closes
 //!
 //! 1. **Sentinel samples.** Only edited samples are stored; a pristine one is computed, d = y - h(x, z), and never rounded:
 //!    [`SampleView::distance`](volume::SampleView::distance).
-//! 2. **The mask follows edits, not boxes.** A cell is drawn by marching cubes when a corner of its *sheet*, the cubes
-//!    that the pristine surface crosses over it, is edited. All samples of the sheet beside the mask are pristine then:
-//!    [`surface::mask`].
+//! 2. **The mask follows edits, not boxes.** A cell is drawn by marching cubes when a corner of its *sheet*,
+//!    the cubes that the pristine surface crosses over it, is edited. All samples of the sheet outside the
+//!    mask are then pristine: [`surface::mask`].
 //! 3. **The ring is a fan** from the border polyline to the opposite heightmap vertex: [`fan`](surface::tile::fan).
 //! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers: [`vertex`](surface::vertex::vertex).
 //! 5. **The y-range covers every sign change** of the footprint, in as many chunks above and below as that takes:
@@ -265,12 +265,13 @@
 //!   -> commit in one frame, all or nothing: world, meshes, entities, receipts
 //! ```
 //!
-//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the others. Rules and
-//! loose settings bind the edits that are sent after them. A [stroke](brush::Brush::stroke), or what was sent in one frame, is a
-//! step of undo. A transaction holds as many edits as its [limit](terrain::WorkLimits) of work allows, and more work than may
-//! wait is rejected when it is sent; an edit that panics is rejected, and the others are applied without it.
-//! Integers decide what is solid, and floats are only drawn, so the same edits give the same
-//! [`hash`](terrain::World::hash) on every machine.
+//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the
+//! others. Rules and loose settings bind the edits that are sent after them. A
+//! [stroke](brush::Brush::stroke), or everything sent in one frame, is a step of undo. A transaction holds as
+//! many edits as its [limit](terrain::WorkLimits) of work allows, and more work than may wait is rejected
+//! when it is sent; an edit that panics is rejected, and the others are applied without it. Integers decide
+//! solidity, and floats are only drawn, so equal edits give an equal [`hash`](terrain::World::hash) on every
+//! machine.
 //!
 //! # What an edit costs
 //!
@@ -279,7 +280,7 @@
 //! on whole layers and looks at samples only around them. Parts of a chunk's mesh that did not change are copied from its
 //! last one, and so are rings of a tile. Nothing is allocated while meshing. Bricks, blocks and chunks of a large
 //! transaction are spread over rayon's threads; the result does not depend on how many there are.
-//! [`Commit::stages`](terrain::Commit::stages) tells where the time went.
+//! [`Commit::stages`](terrain::Commit::stages) reports where the time went.
 //!
 //! # System sets
 //!
@@ -290,7 +291,7 @@
 //!
 //! | feature | what it adds | default |
 //! | --- | --- | --- |
-//! | `cuda` | transactions on an NVIDIA card where one is found, see [`backend`]; compiles everywhere | |
+//! | `cuda` | transactions on an NVIDIA GPU where one is found, see [`backend`]; compiles everywhere | |
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
@@ -313,7 +314,7 @@
 //! [`TerrainSettings::voxel_size`](terrain::TerrainSettings::voxel_size) or by a parent: the scale of its own `Transform` is
 //! the plugin's. Rotated, stretched or moved by a part of a voxel, its seams lose their equal bits.
 
-// Tests of the crate share worlds with those beside it.
+// Unit tests share worlds with the integration tests.
 #[cfg(test)]
 extern crate self as bevy_burrow;
 

@@ -60,7 +60,7 @@ const EXAMPLES: [Example; 5] = [
     Example { name: "custom_material", arguments: "--headless", pictures: 2, ground: 0.6, black: 0.05 },
 ];
 
-/// Longest time for all pictures of an example; about twice what two busy cores without a graphics card need.
+/// Longest time for all pictures of an example; about twice what two busy cores without a GPU need.
 const LIMIT: Duration = Duration::from_secs(300);
 
 #[test]

@@ -5,7 +5,7 @@
 //! A world of 16 x 16 km (or so many) whose mountains are computed on demand, seen by an eye on a summit at 1440 lines and 45
 //! degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the whole cut take;
 //! what a node costs in a task, from noise and from an image; what a flight at 100 m/s with 20 digs a second needs; and the
-//! bytes that the ground and the meshes take, as a card gets them. `cdlod` sets triangles beside those of a published scheme.
+//! bytes that the ground and the meshes take, as a GPU gets them. `cdlod` sets triangles beside those of a published scheme.
 
 #[path = "../../examples/shared/mountains.rs"]
 mod mountains;
@@ -166,7 +166,7 @@ fn views(world: &World, summit: Vec3) {
     }
 }
 
-/// Bytes of meshes as a card gets them.
+/// Bytes of meshes as a GPU gets them.
 fn bytes(nodes: &[NodeUpdate]) -> usize {
     let of = |mesh: &bevy_burrow::surface::SurfaceMesh| {
         let index = if mesh.vertices.len() < 1 << 16 { 2 } else { 4 };

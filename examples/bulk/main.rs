@@ -1,4 +1,4 @@
-//! Much at once, on the processor and on a CUDA card: ground from noise, a meteor shower, a landscape cut into terraces and
+//! Much at once, on the CPU and on a CUDA GPU: ground from noise, a meteor shower, a landscape cut into terraces and
 //! smoothed as a whole, hundreds of strokes that sculpt it, and a world of thousands of edits replayed as when it is loaded.
 //!
 //! `cargo run --release --no-default-features --features cuda --example bulk [-- --help]`
@@ -14,7 +14,7 @@ use clap::Parser;
 use fastrand::Rng;
 use glam::{Quat, Vec2, Vec3};
 
-/// Times large transactions on the processor and on a CUDA card.
+/// Times large transactions on the CPU and on a CUDA GPU.
 #[derive(Parser)]
 struct Arguments {
     /// Cells along a side of the landscape.
@@ -173,10 +173,10 @@ fn compare_ground(side: u32, repeats: u16, engines: &[(Backend, Engine); 3]) {
 struct Outcome {
     commit: Commit,
     hash: u64,
-    /// The stages that went to the card, and those that did not though there was something to do.
+    /// The stages that went to the GPU, and those that did not though there was something to do.
     on_card: u64,
     left: usize,
-    /// What was expected of processor and card, in milliseconds: all choices together.
+    /// What was expected of CPU and GPU, in milliseconds: all choices together.
     expected: [f64; 2],
 }
 
@@ -215,9 +215,9 @@ fn main() {
     let engines = [Backend::Cpu, Backend::Cuda, Backend::Auto].map(|backend| (backend, Engine::new(backend)));
     for (backend, engine) in &engines {
         match engine.wait(Duration::from_secs(30)) {
-            EngineState::Cuda(name) => println!("{backend:?}: {name} beside the processor"),
-            EngineState::Lost(why) => println!("{backend:?}: the processor; {why}"),
-            _ => println!("{backend:?}: the processor, {} threads", rayon::current_num_threads()),
+            EngineState::Cuda(name) => println!("{backend:?}: {name} beside the CPU"),
+            EngineState::Lost(why) => println!("{backend:?}: the CPU; {why}"),
+            _ => println!("{backend:?}: the CPU, {} threads", rayon::current_num_threads()),
         }
     }
     let has_card = matches!(engines[1].1.state(), EngineState::Cuda(_));
@@ -255,7 +255,7 @@ fn main() {
                 let is_card = engines[i].0 == Backend::Cuda && has_card;
                 assert!(
                     !is_card || outcome.left == 0,
-                    "the processor did the card's work: {:?}",
+                    "the CPU did the GPU's work: {:?}",
                     engine.state()
                 );
                 let meshes = outcome.commit.meshes.chunks.iter();
@@ -276,7 +276,7 @@ fn main() {
         println!("{:<24}{:>9}{vertices:>10}{cpu}{cuda}{auto}", scene.name, brushes.len());
         assert!(hashes.windows(2).all(|pair| pair[0] == pair[1]), "all engines make the same world");
         let [cpu, cuda] = expected;
-        println!("{:<24}stages on the card: {on_card:?}; samples {:016x} on all", "", hashes[0]);
-        println!("{:<24}Auto expected {cpu:.1} ms of the processor, {cuda:.1} of the card", "");
+        println!("{:<24}stages on the GPU: {on_card:?}; samples {:016x} on all", "", hashes[0]);
+        println!("{:<24}Auto expected {cpu:.1} ms of the CPU, {cuda:.1} of the GPU", "");
     }
 }

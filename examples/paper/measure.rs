@@ -21,7 +21,7 @@ pub struct Measured {
     pub run: Run,
     /// Seconds of each edit, by repeat.
     pub repeats: Vec<Vec<f64>>,
-    /// The same in processor time. With several threads it is not available, and these are wall-clock seconds.
+    /// The same in CPU time. With several threads it is not available, and these are wall-clock seconds.
     pub processor: Vec<Vec<f64>>,
     /// Voxels that each edit dug or filled; `None` for a dense field.
     pub voxels: Vec<u64>,
@@ -175,7 +175,7 @@ fn keep(
     }
 }
 
-/// Seconds by both clocks. With several threads, processor time is not available, and wall-clock time replaces it.
+/// Seconds by both clocks. With several threads, CPU time is not available, and wall-clock time replaces it.
 pub fn both_clocks(laps: &[Lap], threads: usize) -> (Vec<f64>, Vec<f64>) {
     let processor = |lap: &Lap| if threads == 1 { lap.processor } else { lap.seconds };
     (laps.iter().map(|lap| lap.seconds).collect(), laps.iter().map(processor).collect())

@@ -17,7 +17,7 @@ pub struct Blend {
     /// shape is deep ends in its middle. With 0 the change ends in a step at the shape's surface.
     pub falloff: f32,
     /// What new ground is made of; `None`: the first ground straight below it, else straight above,
-    /// within 64 voxels, else beside it.
+    /// within 64 voxels, else next to it.
     pub material: Option<MaterialId>,
 }
 

@@ -49,7 +49,8 @@ impl Evaluator {
         distance[0]
     }
 
-    /// The same as [`distance`](Self::distance), bit for bit, for the samples `start`, `start + (1, 0, 0)` and so on.
+    /// Like [`distance`](Self::distance), bit for bit, for the samples `start`, `start + (1, 0, 0)` and so
+    /// on.
     pub fn row(&self, start: IVec3, out: &mut [i32]) {
         let mut x = i64::from(start.x);
         for run in out.chunks_mut(RUN) {
@@ -66,8 +67,7 @@ impl Evaluator {
         }
     }
 
-    /// The same for the rows of 8 samples along x from `origin` on, cut off at what 16 bits hold, far beyond where edits
-    /// tell distances apart: those with `y` and `z` in these ranges, counted from `origin`, go to `out[y * 8 + z]`;
+    /// Distances of rows of 8 samples along x from `origin` on, clamped to 16 bits, far beyond the distances that edits distinguish. Rows with `y` and `z` in these ranges, counted from `origin`, go to `out[y * 8 + z]`;
     /// other rows stay as they are.
     pub(crate) fn rows(&self, origin: IVec3, y: Range<i32>, z: Range<i32>, out: &mut [i16x8; 64]) {
         let along = |start: i32, home: i32, rest: i32| -> [f32; 8] {
@@ -88,7 +88,8 @@ impl Evaluator {
         });
     }
 
-    /// Is every sample of the box farther than [`BAND`] outside, so that the edit changes none of them (rule 6)?
+    /// Returns `true` if every sample of the box lies farther than [`BAND`] outside, so that the edit changes
+    /// none of them (rule 6).
     ///
     /// Cheap and conservative: `false` may also mean "not sure". It takes one distance, at the middle of the box, of
     /// which no corner can be nearer by more than half the diagonal.
@@ -129,7 +130,7 @@ fn units(at: i64, home: i32, rest: i32) -> f32 {
     (voxels(at, home) * ONE - rest) as f32
 }
 
-/// An evaluator as plain numbers, for the card.
+/// An evaluator as plain numbers, for the GPU.
 #[cfg(feature = "cuda")]
 pub(crate) struct Constants {
     /// The shape's origin in voxels, and 1/256 voxel from there.
@@ -145,7 +146,7 @@ pub(crate) struct Constants {
 
 #[cfg(feature = "cuda")]
 impl Evaluator {
-    /// Is the shape rough?
+    /// Returns `true` if the shape is rough.
     pub(crate) fn is_rough(&self) -> bool {
         self.roughness.is_some()
     }

@@ -50,7 +50,7 @@ fn is_full(power: &u8) -> bool {
     *power == FULL_POWER
 }
 
-/// Is it what is read where nothing is written?
+/// Returns `true` if the value is the default, which is left out when writing.
 pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }

@@ -45,13 +45,14 @@
 //!
 //! # Sculpting
 //!
-//! Dig and add know their shape's distance and nothing else. [`Operation::Smooth`], [`Sharpen`](Operation::Sharpen),
-//! [`Flatten`](Operation::Flatten), [`Level`](Operation::Level), [`Raise`](Operation::Raise), [`Lower`](Operation::Lower),
-//! [`Stamp`](Operation::Stamp) and [`Terrace`](Operation::Terrace) *sculpt*: they change the densities that are there,
-//! with a weight that rises from 0 at the shape's surface to the [`Blend`]'s strength over its falloff, so that nothing
-//! jumps at the rim. On pristine ground a density is the height above the surface, and so all of them do what
-//! the same tool does to a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls
-//! and ceilings too. A sample whose density stays as it is is not edited.
+//! Dig and add know their shape's distance and nothing else. [`Operation::Smooth`],
+//! [`Sharpen`](Operation::Sharpen), [`Flatten`](Operation::Flatten), [`Level`](Operation::Level),
+//! [`Raise`](Operation::Raise), [`Lower`](Operation::Lower), [`Stamp`](Operation::Stamp) and
+//! [`Terrace`](Operation::Terrace) *sculpt*: they change the densities that are there, with a weight that
+//! rises from 0 at the shape's surface to the [`Blend`]'s strength over its falloff, so that nothing jumps at
+//! the rim. On pristine ground a density is the height above the surface, and so they act like the same tools
+//! on a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls and
+//! ceilings too. A sample whose density stays as it is is not edited.
 //!
 //! What becomes solid is of the blend's material; without one, of the first solid voxel straight below within 64 voxels,
 //! else straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
@@ -127,6 +128,6 @@ pub const FULL_POWER: u8 = u8::MAX;
 /// How far outside its shape an edit still changes samples, in 1/256 voxel (rule 6).
 pub const BAND: i32 = 2 * ONE;
 
-/// How deep inside its shape an edit's distances are told apart, in 1/256 voxel. Two voxels are what surface and normals
-/// look at; the rest is for rough shapes, whose distances change faster than the point moves.
+/// Depth inside its shape down to which an edit distinguishes distances, in 1/256 voxel. Surface and normals
+/// need two voxels; the rest is for rough shapes, whose distances change faster than the point moves.
 pub const DEPTH: i32 = 4 * ONE;

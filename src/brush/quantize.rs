@@ -53,7 +53,7 @@ pub(super) fn voxels(units: i32) -> f32 {
     units as f32 / ONE as f32
 }
 
-/// Is a shape with this box around it, and of this volume in cubic voxels, small enough?
+/// Checks that a shape with this bounding box, and of this volume in cubic voxels, is small enough.
 pub(super) fn check_extent((low, high): (IVec3, IVec3), volume: f64) -> Result<(), BrushError> {
     let side = (high - low).max_element();
     if side > LONGEST {

@@ -60,7 +60,7 @@ impl QuantizedOperation {
         })
     }
 
-    /// Is it within every limit?
+    /// Checks every limit.
     pub fn check(&self) -> Result<(), BrushError> {
         match self {
             Self::Flatten { point, normal } => {

@@ -107,12 +107,12 @@ impl Brush {
         Self::new(shape, Operation::Level { height })
     }
 
-    /// A brush that raises the ground by so many voxels.
+    /// A brush that raises the ground by `amount` voxels.
     pub fn raise(shape: Shape, amount: f32) -> Self {
         Self::new(shape, Operation::Raise { amount })
     }
 
-    /// A brush that lowers the ground by so many voxels.
+    /// A brush that lowers the ground by `amount` voxels.
     pub fn lower(shape: Shape, amount: f32) -> Self {
         Self::new(shape, Operation::Lower { amount })
     }
@@ -134,7 +134,7 @@ impl Brush {
         Self { blend: Blend { strength, ..self.blend }, ..self }
     }
 
-    /// The brush with another falloff, if it sculpts: over so many voxels its change fades in.
+    /// The brush with another falloff, if it sculpts: its change fades in over this many voxels.
     #[must_use]
     pub fn with_falloff(self, falloff: f32) -> Self {
         Self { blend: Blend { falloff, ..self.blend }, ..self }
@@ -170,9 +170,9 @@ impl Brush {
         Self { stroke: Some(stroke), ..self }
     }
 
-    /// The brush after every point p moved to `rotation * (p * scale) + translation`: from world space to terrain
-    /// space, say. Sizes and roughness grow with `scale`, which should be positive; the roughness pattern itself stays
-    /// tied to the lattice.
+    /// The brush after every point p moved to `rotation * (p * scale) + translation`: for example from world
+    /// space to terrain space. Sizes and roughness grow with `scale`, which should be positive; the roughness
+    /// pattern itself stays tied to the lattice.
     ///
     /// `rotation` should have length 1. Other numbers give a brush that [`Edit::quantize`](super::Edit::quantize)
     /// refuses or that is deformed.

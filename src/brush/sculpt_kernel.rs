@@ -1,20 +1,22 @@
 //! What operations that sculpt make of a sample: integers throughout.
 //!
-//! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], and what is stored ends at
-//! [`FARTHEST`], so exactly these numbers say "at least as far". Operations that move a surface have to know how far away
-//! it is, or the whole middle of a cave would turn solid at once. So a sample that was *cut off* at `DEPTH` counts as one
-//! voxel farther than its nearest face neighbour, and is left alone while all of those were cut off too. One that was cut off
-//! at `FARTHEST` is left alone unless it lies beside the surface, one voxel from which it counts as then. Beyond the world's
-//! rim all goes on as it is at the rim.
+//! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], and what is stored
+//! ends at [`FARTHEST`], so exactly these numbers say "at least as far". Operations that move a surface have
+//! to know how far away it is, or the whole middle of a cave would turn solid at once. So a sample that was
+//! *cut off* at `DEPTH` counts as one voxel farther than its nearest face neighbour, and is left alone while
+//! all of those were cut off too. One that was cut off at `FARTHEST` is left alone unless it lies next to the
+//! surface; it then counts as one voxel from the surface. Beyond the world's rim everything continues as at
+//! the rim.
 //!
-//! Raise and lower have to give back what the other one took, and they change neighbours by different amounts where they
-//! fade. Any guess may leave crumbs and holes there, so they ask for more:
+//! Raise and lower have to reverse each other, and they change neighbours by different amounts where they
+//! fade. Any guess may leave crumbs and holes there, so they have further conditions:
 //!
-//! - What was cut off at `DEPTH` is left alone if its neighbours lie deeper. They were moved away, and it was not.
-//! - Samples at `FARTHEST`, and pristine ones beyond it, are left alone even beside the surface, unless that surface is
-//!   known to be beyond what nature made: of ground that was built or raised, for a raise; of air that was dug or lowered, for
-//!   a lower. So natural ground that was lowered and raised again is never higher than before, however often; and raising on
-//!   fills the pit that is left of it.
+//! - A sample cut off at `DEPTH` is left alone if its neighbours lie deeper. They were moved away, and it was
+//!   not.
+//! - Samples at `FARTHEST`, and pristine ones beyond it, are left alone even next to the surface, unless that
+//!   surface is known to be artificial: of ground that was built or raised, for a raise; of air
+//!   that was dug or lowered, for a lower. So natural ground that was lowered and raised again is never
+//!   higher than before, however often; and raising on fills the pit that is left of it.
 //! - Neither makes a sample `DEPTH` that was not cut off.
 
 use glam::IVec3;
@@ -105,7 +107,7 @@ impl Stencil {
         [4, 10, 12, 14, 16, 22].map(|index| (self.densities[index], index)).into_iter()
     }
 
-    /// Do any of the neighbours that these say lie on the other side of the surface?
+    /// Returns `true` if any of the neighbours selected by `which` lies on the other side of the surface.
     fn is_beside(&self, which: impl Fn(usize) -> bool) -> bool {
         self.faces().any(|(other, index)| (other < 0) != (self.own() < 0) && which(index))
     }
@@ -152,7 +154,7 @@ impl Stencil {
             own
         };
         let after = middle + by;
-        // It must not come to say that it is cut off: the opposite shift would not know it again.
+        // The result must not look like a cut-off sample, or the opposite shift would not recognise it.
         Some(if after.abs() == DEPTH { after + by.signum() } else { after })
     }
 
@@ -172,8 +174,8 @@ impl Stencil {
         PAIRS.iter().filter_map(pair).sum()
     }
 
-    /// The density after a change that may make the sample solid only beside a solid one, and air only beside air: no
-    /// crumb comes from nowhere.
+    /// The density after a change that may make the sample solid only next to a solid one, and air only next
+    /// to air, so that no crumb appears in isolation.
     fn attached(&self, after: i32) -> i32 {
         let was_solid = self.densities[Self::MIDDLE] < 0;
         if (after < 0) == was_solid || self.faces().any(|(other, _)| (other < 0) == (after < 0)) {
@@ -422,7 +424,7 @@ mod tests {
             for end in [FARTHEST, FARTHEST + 5000] {
                 let is_moved = 1 << below;
                 assert_eq!(far(end, FARTHEST - 9, is_moved).shifted(nearer, 256), None, "as far as it says");
-                assert_eq!(far(end, -40, 0).shifted(nearer, 256), None, "beside natural ground");
+                assert_eq!(far(end, -40, 0).shifted(nearer, 256), None, "next to natural ground");
                 assert_eq!(far(end, -40, is_moved).shifted(away, 256), None, "farther is as far");
                 assert_eq!(far(end, -40, is_moved).shifted(nearer, 256), Some(side * ONE + nearer));
             }

@@ -33,7 +33,7 @@ pub struct Stamp {
     /// From the stamp's axes to those of the terrain; of length 1. It may be left out in a line of JSON.
     #[serde(default, skip_serializing_if = "is_default")]
     pub rotation: Quat,
-    /// The image's sides in voxels, along its columns and its rows. Nothing changes beside the image.
+    /// The image's sides in voxels, along its columns and its rows. Nothing changes outside the image.
     pub size: Vec2,
     /// How high white lies above black, in voxels; -256 to 256.
     pub height: f32,
@@ -197,7 +197,8 @@ impl QuantizedStamp {
         self.half[0].min(self.half[1])
     }
 
-    /// How far a lattice point lies beside the image, negative inside, and how far above its relief; in 1/256 voxel.
+    /// Distance of a lattice point outside the image, negative inside, and its height above the relief; in
+    /// 1/256 voxel.
     pub fn at(&self, at: IVec3) -> (i32, i32) {
         let (rows, squared) = matrix(self.rotation);
         let from = at.as_i64vec3() * i64::from(ONE) - IVec3::from_array(self.center).as_i64vec3();
@@ -217,7 +218,7 @@ impl QuantizedStamp {
     }
 }
 
-/// A stamp as plain numbers, for the card.
+/// A stamp as plain numbers, for the GPU.
 #[cfg(feature = "cuda")]
 pub(crate) struct StampParams<'a> {
     pub center: [i32; 3],

@@ -105,7 +105,7 @@ impl Cells {
         self.edges.iter().map(Stream::len).sum()
     }
 
-    /// Must the edges get their vertices before the next layer is added?
+    /// Returns `true` if the edges must get their vertices before the next layer is added.
     pub(super) fn is_full(&self) -> bool {
         self.pending() >= BATCH
     }

@@ -15,7 +15,7 @@ pub(super) mod sealed {
 
     /// What the mesher asks of a density.
     pub trait Wide: Copy {
-        /// Is this sample solid?
+        /// Returns `true` if this sample is solid.
         fn is_solid(self) -> bool;
         /// Bit `i` is set when sample `i` is solid.
         fn signs(samples: &[Self; 16]) -> u64;

@@ -100,7 +100,7 @@ impl DenseMesher {
 
     /// Meshes a grid. What `out` held is replaced, its memory is used again.
     ///
-    /// The same samples give the same bits on every machine.
+    /// Equal samples give equal bits on every machine.
     pub fn mesh<S: Density>(&mut self, grid: DenseGrid<S>, normals: Normals, out: &mut DenseMesh) {
         let depth = grid.meshed()[2];
         self.cells.start(&grid);

@@ -97,7 +97,7 @@ impl Signs {
         &self.words
     }
 
-    /// Is the layer one with `other`: both all air, or both all solid?
+    /// Returns `true` if the layer and `other` are both all air, or both all solid.
     pub(super) fn is_uniform_with(&self, other: &Self) -> bool {
         self.content != Content::Mixed && self.content == other.content
     }

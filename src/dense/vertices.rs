@@ -93,7 +93,7 @@ impl Lattice {
         [index(a), index(b), index(c), index(d)]
     }
 
-    /// Do all neighbours of both ends of these edges lie in the grid?
+    /// Returns `true` if all neighbours of both ends of these edges lie in the grid.
     #[inline(always)]
     fn are_inside(&self, points: &[Point; LANES]) -> bool {
         let inside = |all, point| all & ((point | TOP) - self.first) & (self.last - point);
@@ -127,14 +127,15 @@ fn coordinates(&[a, b, c, d]: &[Point; LANES]) -> Vectors {
     [f32x4::from_i32x4(xy & i32x4::splat(0xffff)), f32x4::from_i32x4(xy >> 16), f32x4::from_i32x4(z)]
 }
 
-/// The samples around edges along one axis, each as a slice of its own that begins at the first edge's sample. All are of
-/// the same length, so that a single check covers the twelve samples of an edge.
+/// The samples around edges along one axis, each as a slice of its own that begins at the first edge's
+/// sample. All have equal length, so that a single check covers the twelve samples of an edge.
 struct Taps<'a, S, const AXIS: usize> {
     /// How far the slices begin behind the grid's first sample.
     first: usize,
     /// From one before the start of the edge to one behind its end.
     along: [&'a [S]; 4],
-    /// Beside the start and beside the end, along the next axis, then along the one after that: before and behind.
+    /// Neighbours of the start and of the end, along the next axis, then along the one after that: before and
+    /// behind.
     across: [[&'a [S]; 4]; 2],
 }
 

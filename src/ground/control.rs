@@ -11,7 +11,7 @@ use crate::lattice::hash::hash_words;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MaterialControl {
-    /// The same for every column.
+    /// One material for every column.
     Uniform(ColumnMaterial),
     /// By height and slope: `base` everywhere, and over it the rules like coats of paint, the first on top. A column
     /// shows as overlay the rule that covers most of it, blended by how much all rules together cover.
@@ -48,7 +48,7 @@ impl Default for MaterialControl {
 }
 
 impl MaterialControl {
-    /// Can ground be made of these materials?
+    /// Checks that ground can be made of these materials.
     pub(super) fn check(&self) -> Result<(), GroundError> {
         let check_base = |base: &MaterialId| base.check("the base material");
         match self {

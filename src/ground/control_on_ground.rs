@@ -14,7 +14,7 @@ impl MaterialControl {
         self.of_column(ground, column, || (ground.height(column), ground.slope(column)))
     }
 
-    /// The same, where height and slope may be asked for.
+    /// The material of a column, with access to its height and slope.
     pub(super) fn of_column(
         &self,
         ground: &Ground,
@@ -41,7 +41,7 @@ impl MaterialControl {
 }
 
 impl Ground {
-    /// The same heights, with materials as `control` decides.
+    /// This ground, with materials as `control` decides.
     ///
     /// # Errors
     /// [`GroundError::Parameter`] for a rule with a parameter out of its range, and if a material is

@@ -12,7 +12,7 @@
 //! | materials by slope, height or image | [`Ground::with_materials`] |
 //! | strata and ore below the surface | [`Ground::with_strata`], [`Ground::with_material_fn`] |
 //!
-//! The same input gives the same bits on every machine: heights and materials are computed with additions,
+//! Equal input gives equal bits on every machine: heights and materials are computed with additions,
 //! multiplications, divisions and square roots in a fixed order, then rounded to integers. [`Ground::hash`] sums it up.
 //! All input is checked, and invalid input is refused with an error that names the value.
 
@@ -65,7 +65,8 @@ pub const MAX_SIZE: u32 = 16_384;
 /// Most cells along one side of a world with a [`HeightSource`]: the same as brushes [reach](crate::lattice::REACH).
 ///
 /// Positions in 1/4096 voxel, counted from the world's origin, would fit 32 bits up to 524,287 voxels. But a
-/// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536 voxels from the origin,
-/// and to 1/64 voxel at the far end of such a world. Meshes lie beside their own origins and lose nothing; a camera that goes
-/// that far needs an origin that follows it, as in any game with `f32` transforms.
+/// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536
+/// voxels from the origin, and to 1/64 voxel at the far end of such a world. Meshes are stored relative to
+/// their own origins and lose nothing; a camera that goes that far needs an origin that follows it, as in any
+/// game with `f32` transforms.
 pub const MAX_SOURCE_SIZE: u32 = crate::lattice::REACH.cast_unsigned();

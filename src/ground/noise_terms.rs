@@ -1,4 +1,5 @@
-//! The parameters of noise as numbers, for computing the same heights, bit by bit, row by row or on a graphics card.
+//! The parameters of noise as plain numbers, from which rows and the GPU compute heights that are equal bit
+//! by bit.
 
 use bytemuck::{Pod, Zeroable};
 use noise::permutationtable::{NoiseHasher, PermutationTable};
@@ -23,7 +24,7 @@ pub(crate) struct NoiseTerms {
 }
 
 /// At the column (x, z) the first octave is looked up at `(x, z) / scale + origin`, times `frequency`; each further one
-/// `lacunarity` times as far out. What is made of their sum is in `kernels/heights.cuh`, and in the crate `noise`.
+/// `lacunarity` times as far out. `kernels/heights.cuh` and the crate `noise` define how their sum is used.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct NoiseNumbers {
@@ -31,7 +32,7 @@ pub(crate) struct NoiseNumbers {
     pub origin: [f64; 2],
     pub frequency: f64,
     pub lacunarity: f64,
-    /// How strong an octave is beside the one before.
+    /// Amplitude of an octave relative to the previous one.
     pub persistence: f64,
     /// What a ridged octave is multiplied with to be the weight of the next; 0 if not ridged.
     pub weighting: f64,
@@ -84,7 +85,7 @@ impl NoiseHeights {
 
 #[cfg(all(test, feature = "cuda"))]
 impl NoiseHeights {
-    /// The processor's noise over columns, before it becomes heights.
+    /// The CPU's noise over columns, before it becomes heights.
     pub(crate) fn by_column(&self) -> impl Fn(i32, i32) -> f64 {
         self.generator().expect("parameters in range")
     }
@@ -127,8 +128,8 @@ fn fractal_factor(noise: &Fbm<Perlin>) -> f64 {
     1.0 / strengths.fold(0.0, |sum, strength| sum + strength)
 }
 
-/// The same for ridges: two by the sum of what octaves come to that are 1 before they are weighted. The crate counts one
-/// octave more than there is, and its first one last.
+/// The factor for ridges: 2 divided by the sum of the weighted octaves if every octave is 1. The crate counts
+/// one octave too many, and its first one last.
 fn ridged_factor(noise: &RidgedMulti<Perlin>) -> f64 {
     let (mut strength, mut last, mut sum) = (1.0, 1.0, 0.0);
     for octave in 1..=noise.octaves {

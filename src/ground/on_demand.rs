@@ -14,11 +14,12 @@ use crate::lattice::Column;
 use crate::lattice::hash::hash_words;
 
 impl Ground {
-    /// Ground of `width` x `depth` cells whose heights, and materials if it has any, a source gives when they are needed.
+    /// Ground of `width` x `depth` cells whose heights, and materials if any, come from a source on demand.
     ///
-    /// Memory follows what is looked at: 64 x 64 columns at a time are computed, some 18 kB for their heights and up to 4 bytes
-    /// more a column for materials and strata, and kept [within a budget](Self::with_page_budget). All else is as if the same
-    /// heights were in memory, but for [`Self::hash`] and [`Self::height_range`], which say what the source promised.
+    /// Memory depends on the columns in use: pages of 64 x 64 columns are computed, with about 18 kB for
+    /// their heights and up to 4 bytes a column for materials and strata, and kept [within a
+    /// budget](Self::with_page_budget). All else is as if the same heights were in memory, but for
+    /// [`Self::hash`] and [`Self::height_range`], which say what the source promised.
     ///
     /// # Errors
     /// [`GroundError::SourceSize`] unless width and depth are 1 to [`MAX_SOURCE_SIZE`](super::MAX_SOURCE_SIZE).
@@ -27,14 +28,14 @@ impl Ground {
         Ok(Self::of_pages(extent, Pages::new(Box::new(source), extent)))
     }
 
-    /// The same ground, which keeps at most so many bytes of computed pages; 32 MiB unless told otherwise. Each thread keeps up to
-    /// four pages beyond that. A small budget costs time, and changes nothing else. Does nothing without a
+    /// This ground with another budget for computed pages, in bytes; 32 MiB by default. Each thread keeps up
+    /// to four pages beyond that. A small budget costs time, and changes nothing else. Does nothing without a
     /// [source](Self::from_source).
     pub fn with_page_budget(self, bytes: usize) -> Self {
         self.with_empty_pages(Some(bytes))
     }
 
-    /// Bytes that a page has for each column, beside its height.
+    /// Bytes that a page has for each column, in addition to its height.
     pub(super) fn on_demand_column_bytes(&self) -> usize {
         let has_materials = matches!(self.materials(), Materials::OnDemand(_));
         // Tops, and a bit for a steep cell.

@@ -142,7 +142,8 @@ impl Pages {
         empty.emptied(0, DEFAULT_BUDGET)
     }
 
-    /// The same without pages; from now on a page has so many bytes for each column beside its height.
+    /// This cache without its pages, which from now on have `column_bytes` bytes for each column in addition
+    /// to its height.
     pub fn emptied(self, column_bytes: usize, budget: usize) -> Self {
         static LAST: AtomicU64 = AtomicU64::new(0);
         let number = LAST.fetch_add(1, Ordering::Relaxed) + 1;
@@ -203,7 +204,7 @@ impl Pages {
         (place.0 & 1 | (place.1 & 1) << 1) as usize
     }
 
-    /// The same for what a page may not know yet: `make` lets it know.
+    /// Reads data that a page may not hold yet; `make` computes it.
     pub fn read_or_make<R>(
         &self,
         place: Place,
@@ -248,7 +249,7 @@ impl Pages {
         heights
     }
 
-    /// The same for the source's materials.
+    /// The source's materials at single points.
     pub fn point_materials(&self, columns: [&[i32]; 2], stride: i32) -> Vec<ColumnMaterial> {
         let mut materials = vec![ColumnMaterial::default(); columns[0].len() * columns[1].len()];
         fill_columns(columns, stride, &mut materials, |grid, own| self.source.fill_materials(grid, own));

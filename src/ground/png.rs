@@ -77,7 +77,7 @@ mod tests {
         file
     }
 
-    /// A PNG of 5 x 4 samples of 16 bits and so many noisy bytes that it cannot be compressed to nothing.
+    /// A PNG of 5 x 4 samples of 16 bits, noisy enough not to be compressed to nothing.
     fn noisy_png() -> Vec<u8> {
         let samples: Vec<u8> =
             (0..20_u32).flat_map(|i| (i * i * 40_503).to_ne_bytes()[..2].to_vec()).collect();
@@ -173,7 +173,7 @@ mod tests {
     fn a_png_cut_off_anywhere_is_truncated() {
         let file = noisy_png();
         assert!(decode(&file).is_ok());
-        // The last 16 bytes, a checksum and the end chunk, say nothing about the samples.
+        // The last 16 bytes, a checksum and the end chunk, do not affect the samples.
         for length in 1..file.len() - 16 {
             assert_eq!(decode(&file[..length]), Err(ImageError::Truncated { bytes: length as u64 }));
         }

@@ -1,4 +1,4 @@
-//! The ground by columns of regions, so that a save tells where the ground below it has changed.
+//! Hashes of the ground by region, so that a save detects where the ground below it has changed.
 
 use super::Ground;
 use crate::lattice::hash::hash_words;

@@ -150,7 +150,7 @@ impl Ground {
         self.pages.as_deref()
     }
 
-    /// The same ground, none of whose pages are computed, and which keeps so many bytes of them.
+    /// This ground without computed pages, and with another budget for them.
     pub(super) fn with_empty_pages(mut self, budget: Option<usize>) -> Self {
         let column_bytes = self.on_demand_column_bytes();
         self.pages = self.pages.map(|pages| {
@@ -164,17 +164,17 @@ impl Ground {
         &self.materials
     }
 
-    /// The same heights with other materials; `Columns` hold one for each column.
+    /// This ground with other materials; `Columns` hold one for each column.
     pub(super) fn replace_materials(self, materials: Materials) -> Self {
         Self { materials, ..self }.hashed()
     }
 
-    /// The same ground with something else below its surface.
+    /// This ground with something else below its surface.
     pub(super) fn replace_below(self, below: Below) -> Self {
         Self { below: Some(below), ..self }.hashed()
     }
 
-    /// The same ground with what is below its surface stored otherwise.
+    /// This ground with another representation of what is below its surface.
     pub(super) fn map_below(mut self, map: impl FnOnce(Below) -> Below) -> Self {
         self.below = self.below.map(map);
         self
@@ -270,7 +270,8 @@ impl Ground {
         Self::normal_of(self.rises(column))
     }
 
-    /// The same as [`Self::normal`], by the heights of the columns before and after along x and z; `None` at the rim.
+    /// Like [`Self::normal`], from the heights of the columns before and after along x and z; `None` at the
+    /// rim.
     pub(crate) fn inner_normal(&self, column: Column, x: [i32; 2], z: [i32; 2]) -> Option<Vec3> {
         let is_inner = (1..self.width()).contains(&column.x) && (1..self.depth()).contains(&column.z);
         let rise = |[before, after]: [i32; 2]| Rise { rise: after - before, run: 2 };
@@ -284,10 +285,9 @@ impl Ground {
         Vec3::new(-x / length, 1.0 / length, -z / length)
     }
 
-    /// Columns of a row that all lie in the world, from one on: their heights, normals and materials, which are what
-    /// [`Self::height`], [`Self::normal`] and [`Self::surface_material`] give for each. What is computed goes into a buffer of
-    /// the caller's.
-    /// Of columns beyond the rim, none.
+    /// Columns of a row that all lie in the world, from one on: their heights, normals and materials, equal
+    /// to [`Self::height`], [`Self::normal`] and [`Self::surface_material`] of each. Computed values go into
+    /// the caller's buffer. Of columns beyond the rim, none.
     pub(crate) fn row<'a>(
         &'a self,
         low: Column,

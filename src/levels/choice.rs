@@ -34,7 +34,7 @@ pub struct NodeFacts {
     pub heights: [f32; 2],
     /// How far it is from the finer surface, in voxels.
     pub error: f32,
-    /// Was anything dug or built there?
+    /// Whether anything was dug or built there.
     pub has_edits: bool,
 }
 
@@ -53,9 +53,9 @@ pub struct Choice {
     /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing changes
     /// back and forth while somebody moves to and fro.
     pub stay: f32,
-    /// Eyes are also thought to be where they will be in so many seconds; 0.5 unless set otherwise.
+    /// The choice also considers where each eye will be in this many seconds; 0.5 by default.
     pub look_ahead: f32,
-    /// Voxels; what is farther from all eyes is not split. 8,192 unless set otherwise.
+    /// Nodes farther from all eyes than this many voxels are not split; 8,192 by default.
     pub view_distance: f32,
     /// The most nodes, about 2,400 unless set otherwise: beyond them, all limits grow.
     pub most_nodes: usize,
@@ -98,8 +98,8 @@ impl Choice {
         cut
     }
 
-    /// Is a node so near and so large on the screen that it should be split? Limits are taken for this share of them, times their
-    /// growth.
+    /// Returns `true` if a node is near and large enough on the screen to be split. The limits are scaled by
+    /// `share`, times their growth.
     fn is_split(
         &self,
         grid: LevelGrid,

@@ -64,12 +64,12 @@ impl Cut {
         self.grid
     }
 
-    /// Is a node split, so that finer ones are drawn in its place?
+    /// Returns `true` if a node is split, so that finer ones are drawn in its place.
     pub fn is_split(&self, node: Node) -> bool {
         self.split.contains(&node)
     }
 
-    /// Is a node drawn?
+    /// Returns `true` if a node is drawn.
     pub fn contains(&self, node: Node) -> bool {
         self.grid.has(node)
             && !self.is_split(node)
@@ -81,7 +81,7 @@ impl Cut {
         if !self.grid.chunks().has_tile(tile) {
             return None;
         }
-        // From below: whoever is split has parents that are, and fine nodes are asked for most often.
+        // From below: the parents of a split node are split too, and fine nodes are asked for most often.
         let nodes = (0..=self.grid.top()).map(|level| Node::over(tile, level));
         nodes.into_iter().find(|node| node.level == self.grid.top() || self.is_split(node.parent()))
     }
@@ -191,7 +191,7 @@ pub(super) mod tests {
             let grid = LevelGrid::new(ChunkGrid::new(size, width, depth), top);
             let cut = random_cut(grid, seed, percent);
             assert_is_cut(&cut);
-            // Whoever wants to be split is, if it exists at all.
+            // Every node that should be split is split, if it exists.
             for node in cut.nodes().filter(|node| node.level > 0) {
                 prop_assert!((dice(node, seed) >> 7) % 100 >= percent, "{node:?}");
             }

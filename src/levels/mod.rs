@@ -5,7 +5,7 @@
 //! [`Choice`] says which cut an eye needs, and [`Cut::step_to`] leads from one cut to another without ever leaving
 //! that rule.
 //!
-//! Nothing here knows heights or meshes: how rough a node is, it is told.
+//! Nothing here knows heights or meshes: the roughness of nodes is an input.
 
 mod choice;
 mod cut;

@@ -110,7 +110,8 @@ fn bands<T: Copy, H: PartialOrd>(
     let mut at = [0, 0];
     while at != most {
         let next = [ahead(at[0] + 1), back(at[1] + 1)];
-        // At the same height, the long side comes last: its vertex lies beside that of the others, never below a corner.
+        // At equal height, the long side comes last: its vertex lies next to that of the others, never below
+        // a corner.
         let goes_ahead = match (at[0] < most[0], at[1] < most[1]) {
             (true, true) if is_long_ahead => height(next[0]) < height(next[1]),
             (true, true) => height(next[0]) <= height(next[1]),

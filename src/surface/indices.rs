@@ -5,7 +5,7 @@ use std::ops::Range;
 /// The indices of a triangle mesh, three for each triangle.
 ///
 /// They have 16 bits in a mesh of up to [`Indices::MOST_SHORT`] vertices, 32 in a larger one: half the memory to keep, to
-/// copy at each edit and to send to a graphics card. The same mesh always has the same ones.
+/// copy at each edit and to upload to a GPU. Equal meshes have equal indices.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Indices {
     /// 16 bits each, for up to [`Indices::MOST_SHORT`] vertices.
@@ -50,7 +50,7 @@ impl Indices {
         }
     }
 
-    /// Are there none?
+    /// Returns `true` if there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -119,7 +119,7 @@ impl Indices {
         }
     }
 
-    /// Does this range equal a part whose indices count from vertex `base`?
+    /// Returns `true` if this range equals a part whose indices count from vertex `base`.
     pub(crate) fn is_part(&self, range: Range<usize>, part: &[u16], base: usize) -> bool {
         match self {
             Self::U16(list) => {

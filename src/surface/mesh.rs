@@ -141,7 +141,7 @@ impl TryFrom<Unchecked> for SurfaceMesh {
 }
 
 impl SurfaceMesh {
-    /// Is there nothing to draw?
+    /// Returns `true` if there is nothing to draw.
     pub fn is_empty(&self) -> bool {
         self.indices.is_empty()
     }

@@ -1,4 +1,4 @@
-//! The surfaces of the blocks that a transaction has meshed: in [`Parts`], or packed as a graphics card writes them. They are
+//! The surfaces of the blocks that a transaction has meshed: in [`Parts`], or packed as a GPU writes them. They are
 //! unpacked when they are copied into a chunk's mesh.
 
 use super::block::Parts;
@@ -44,7 +44,7 @@ impl BlockVertices<'_> {
         }
     }
 
-    /// Are they equal to these, bit by bit?
+    /// Returns `true` if they equal these, bit by bit.
     pub fn are_same(&self, others: &[Vertex]) -> bool {
         self.len() == others.len()
             && match self {

@@ -1,10 +1,10 @@
-//! Vertices as a graphics card writes them: smaller than those of a mesh, so that less is sent.
+//! Vertices as a GPU writes them: smaller than those of a mesh, so that less is sent.
 
 use glam::IVec3;
 
 use super::mesh::{MaterialMix, Vertex};
 
-/// Vertices as a graphics card writes them.
+/// Vertices as a GPU writes them.
 #[derive(Clone, Copy)]
 pub(crate) struct PackedVertices<'a> {
     /// Where positions count from.

@@ -60,7 +60,8 @@ impl PristineStack {
         sheet([self.range.0, self.range.1])
     }
 
-    /// Are the samples of the nine layers from `y` on all solid (`Some(true)`), or all air (`Some(false)`)?
+    /// Returns `Some(true)` if the samples of the nine layers from `y` on are all solid, `Some(false)` if all
+    /// are air, and `None` otherwise.
     pub fn side(&self, y: i32) -> Option<bool> {
         match self.filled(y) {
             [_, 0] => Some(false),

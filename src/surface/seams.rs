@@ -58,7 +58,7 @@ pub struct SeamReport {
 }
 
 impl SeamReport {
-    /// Is every edge off the rim closed and balanced, and is there a surface at all?
+    /// Returns `true` if every edge off the rim is closed and balanced, and there is a surface at all.
     pub fn is_closed(&self) -> bool {
         self.triangles > 0 && self.open == 0 && self.unbalanced == 0
     }
@@ -146,7 +146,7 @@ impl SeamChecker {
         number
     }
 
-    /// Checks everything added so far. The rim of the world, where x or z is at its end, may be open.
+    /// Checks everything that was added. The rim of the world, where x or z is at its end, may be open.
     pub fn check(&self, grid: ChunkGrid) -> SeamReport {
         let mut report = SeamReport {
             triangles: self.triangles.len(),

@@ -126,7 +126,8 @@ impl Rings {
         drawing.finish()
     }
 
-    /// The same rings, but with those of some patches of 8x8 cells made again: `(z, x)` in units of 8 cells, ascending.
+    /// These rings, with those of some patches of 8x8 cells made again: `(z, x)` in units of 8 cells,
+    /// ascending.
     pub(crate) fn updated(
         &self,
         world: &WorldView,
@@ -156,7 +157,7 @@ impl Rings {
         }
     }
 
-    /// Does no cell of the tile border on the mask, and is none steep?
+    /// Returns `true` if no cell of the tile borders on the mask, and none is steep.
     pub fn is_empty(&self) -> bool {
         self.patches.is_empty()
     }

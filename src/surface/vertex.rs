@@ -15,7 +15,7 @@ use crate::volume::SampleView;
 pub trait Lattice {
     /// Density at a lattice point, 1/256 voxel. Gradients look one point beyond the world's rim.
     fn distance(&self, point: IVec3) -> i32;
-    /// Was the sample at a lattice point edited?
+    /// Returns `true` if the sample at a lattice point was edited.
     fn is_edited(&self, point: IVec3) -> bool;
     /// The material stored there; [`MaterialId::GROUND`] where it was never changed.
     fn stored_material(&self, point: IVec3) -> MaterialId;
@@ -85,7 +85,7 @@ pub(super) fn linear(dp: i32, dq: i32) -> i32 {
     linear_over(dp, dq, 1)
 }
 
-/// The same between points that are `length` voxels apart.
+/// The step of a linear crossing between points that are `length` voxels apart.
 #[inline(always)]
 pub(super) fn linear_over(dp: i32, dq: i32, length: i32) -> i32 {
     let (dp, dq) = (i64::from(dp).abs(), i64::from(dq).abs());
@@ -151,7 +151,8 @@ fn is_stencil_pristine(lattice: &impl Lattice, p: IVec3, q: IVec3) -> bool {
     })
 }
 
-/// Does the edge lie in the border of the mask: between a volumetric cell and one that stays heightmap?
+/// Returns `true` if the edge lies in the border of the mask: between a volumetric cell and one that stays
+/// heightmap.
 fn is_on_mask_border(lattice: &impl Lattice, column: Column, axis: usize) -> bool {
     let Column { x, z } = column;
     let cells: &[Column] = match axis {
@@ -179,7 +180,7 @@ pub(super) fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
     lerp_normal_over(a, b, step, 1)
 }
 
-/// The same between points that are `length` voxels apart.
+/// The unit normal between points that are `length` voxels apart.
 #[inline(always)]
 pub(super) fn lerp_normal_over(a: Vec3, b: Vec3, step: i32, length: i32) -> Vec3 {
     let t = step as f32 / (SNAP * length) as f32;

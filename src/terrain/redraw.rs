@@ -61,13 +61,13 @@ pub(super) fn updates(
         return MeshUpdates { outdated, ..MeshUpdates::default() };
     }
     let tiles = TileWork::new(world, view, newer);
-    let mut chunks = |meanwhile: &(dyn Fn() + Sync)| {
+    let mut chunks = |overlap: &(dyn Fn() + Sync)| {
         let blocks = Stages::time(meshing, || {
             let mut blocks = dirty_blocks(world, view, newer, dirty);
             unmeshed::complete(world, view, &mut blocks);
             blocks
         });
-        mesh_blocks(world, view, backend, &blocks, meanwhile, meshing, assembly)
+        mesh_blocks(world, view, backend, &blocks, overlap, meshing, assembly)
     };
     // Tiles and chunks do not depend on each other: each is made while the other leaves threads idle.
     let chunks = if !ItemCost::Brick.is_shared(dirty.len()) {
@@ -108,7 +108,7 @@ fn mesh_blocks(
     view: &WorldView,
     backend: &dyn Compute,
     blocks: &[Block],
-    meanwhile: &(dyn Fn() + Sync),
+    overlap: &(dyn Fn() + Sync),
     meshing: &mut Duration,
     assembly: &mut Duration,
 ) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
@@ -117,7 +117,7 @@ fn mesh_blocks(
     let order = OnceLock::new();
     let order = || order.get_or_init(|| ByChunk::new(blocks));
     let meshed = || {
-        backend.mesh(view, blocks, meanwhile, &mut |parts| {
+        backend.mesh(view, blocks, overlap, &mut |parts| {
             chunks = Stages::time(&mut own, || assemble(world, blocks, order(), parts));
         });
     };

@@ -67,7 +67,7 @@ impl Session {
         self.heights_in_slices(terms, heights, SLICE)
     }
 
-    /// The same in slices of `slice` columns.
+    /// Computes heights in slices of `slice` columns.
     pub(super) fn heights_in_slices(
         &mut self,
         terms: &NoiseTerms,

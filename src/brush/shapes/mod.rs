@@ -59,7 +59,7 @@ pub(super) trait ShapeGeometry {
     /// The point that distances are computed relative to.
     fn origin(&self) -> [i32; 3];
 
-    /// Is it within limits that no number has by itself?
+    /// Checks limits that concern several numbers together.
     fn check(&self) -> Result<(), BrushError> {
         Ok(())
     }
@@ -77,7 +77,7 @@ pub(super) trait ShapeGeometry {
     fn distance(&self) -> Self::Distance;
 }
 
-/// Where a shape lies, roughly: between two points, and so far around them.
+/// Approximate bounds of a shape: a segment between two points, and a radius around it.
 #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
 pub(crate) struct Extent {
     pub ends: [Vec3; 2],

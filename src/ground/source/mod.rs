@@ -102,12 +102,12 @@ pub trait HeightSource: Send + Sync + 'static {
     /// which is as long as the grid.
     fn fill_heights(&self, grid: ColumnGrid, heights: &mut [i32]);
 
-    /// Does it give materials too?
+    /// Returns `true` if it provides materials too.
     fn has_materials(&self) -> bool {
         false
     }
 
-    /// The same for materials, if [`Self::has_materials`] says that it gives any: every place then holds material 0.
+    /// Fills in materials, if [`Self::has_materials`] returns `true`. On entry every place holds material 0.
     /// [`MaterialId::GROUND`](super::MaterialId::GROUND) is no material, and becomes 0.
     fn fill_materials(&self, _grid: ColumnGrid, _materials: &mut [ColumnMaterial]) {}
 

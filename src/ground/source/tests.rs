@@ -51,7 +51,7 @@ impl HeightSource for Striped {
     }
 }
 
-/// The same ground with heights in memory.
+/// An equal ground with its heights in memory.
 fn resident(ground: &Ground) -> Ground {
     let (width, depth) = (ground.width(), ground.depth());
     let columns = (0..=depth).flat_map(|z| (0..=width).map(move |x| Column::new(x, z)));

@@ -107,7 +107,7 @@ fn depth(height: i32, y: i32) -> i32 {
 }
 
 impl BrickStrata {
-    /// Begins anew, with another brick.
+    /// Starts over with another brick.
     fn fill(&mut self, ground: &Ground, records: &StrataRecords, pos: BrickPos) {
         self.key = (records.id, pos.0);
         self.heights = ground.heights(Column::of(pos.origin()));
@@ -293,7 +293,7 @@ impl BrickStrata {
         ones(voxels).filter(is_held).fold(0, |held, column| held | 1 << column)
     }
 
-    /// May the body of a stratum be in an eighth?
+    /// Returns `true` if the body of a stratum may be in an eighth.
     fn may_hold(&mut self, records: &StrataRecords, number: usize, eighth: usize) -> bool {
         let record = &records.strata[number];
         let Noises { body, .. } = self.noises(records, number);
@@ -333,7 +333,7 @@ impl BrickStrata {
     }
 }
 
-/// May a bed be in a box of a brick, where the bedding's noise has these corners?
+/// Returns `true` if a bed may be in a box of a brick, where the bedding's noise has these corner values.
 fn may_hold_bed(
     records: &StrataRecords,
     record: &StratumRecord,

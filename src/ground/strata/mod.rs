@@ -4,8 +4,8 @@
 //! first one that holds it; where none does, of what its column has ([`ColumnMaterial`](super::ColumnMaterial)). All of
 //! the model asks the same function: receipts, rules, queries, loose pieces, and the vertices that are drawn.
 //!
-//! The function is computed with integers (`records`), for a brick at a time (`in_brick`), and gives the same on every
-//! machine and on the graphics card.
+//! The function is computed with integers (`records`), for a brick at a time (`in_brick`), and has equal
+//! results on every machine and on the GPU.
 
 mod check;
 mod in_brick;

@@ -145,7 +145,7 @@ impl StratumRecord {
         (self.rough * noise) >> 15
     }
 
-    /// Is a height, in 1/256 voxel as the bedding has it, in a bed?
+    /// Returns `true` if a height, in 1/256 voxel along the bedding, is in a bed.
     pub(super) fn is_in_bed(&self, height: i64) -> bool {
         let [from, thickness, every] = self.bed.map(i64::from);
         let above = height - from;
@@ -165,7 +165,7 @@ impl BeddingRecord {
         (x * i64::from(column.x) + z * i64::from(column.z)) >> 8
     }
 
-    /// The same by folds, where the noise is this.
+    /// The displacement by folds for this noise value.
     pub(super) fn fold_at(&self, noise: i32) -> i32 {
         (self.fold * noise) >> 15
     }
@@ -183,13 +183,13 @@ impl ColumnCondition {
         stratum.has_column_condition().then(|| Self { slope, bounds: stratum.bounds.clone() })
     }
 
-    /// May the stratum be in this column of the world?
+    /// Returns `true` if the stratum may be in this column of the world.
     #[inline]
     pub(super) fn admits(&self, ground: &Ground, column: Column) -> bool {
         self.admits_slope(ground, column, || ground.squared_slope(column))
     }
 
-    /// The same, given the square of its slope.
+    /// Like [`Self::admits`], given the square of the column's slope.
     fn admits_slope(&self, ground: &Ground, column: Column, squared_slope: impl FnOnce() -> u64) -> bool {
         let is_inside = match &self.bounds {
             StratumBounds::World => true,
@@ -250,7 +250,7 @@ impl StrataRecords {
         Self { id, strata, bedding, conditions, hash }
     }
 
-    /// Does a column of the world fulfil a condition, given by its bit?
+    /// Returns `true` if a column of the world fulfils the condition with this bit.
     #[inline]
     pub fn meets(&self, ground: &Ground, column: Column, condition: u32) -> bool {
         let own = self.conditions.get(condition.trailing_zeros() as usize);

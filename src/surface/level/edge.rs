@@ -108,8 +108,8 @@ impl Edge {
         Self { p, length: (q - p)[self.axis], ..self }
     }
 
-    /// The vertex of an edge with a crossing, relative to `origin`. `is_between_levels` says if there are nodes of different levels
-    /// beside it, `is_on_border` if it lies on the border of the mask of its level.
+    /// The vertex of an edge with a crossing, relative to `origin`. `is_between_levels` says whether nodes of
+    /// different levels meet at it, `is_on_border` whether it lies on the border of the mask of its level.
     pub fn vertex(
         self,
         view: &LevelView,

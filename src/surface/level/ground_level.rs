@@ -1,7 +1,8 @@
 //! Nodes of level 0: the tile and the chunks below it, most often as they are drawn without levels.
 //!
-//! Beside coarser nodes the mask differs from the world's: their cells are not in it, and cells that are promoted for their sake
-//! are. Where that shows in a node, its tile and its blocks are made from scratch with that *drawn mask*.
+//! Next to coarser nodes the mask differs from the world's: their cells are not in it, and cells that are
+//! promoted because of them are. Where that shows in a node, its tile and its blocks are made from scratch
+//! with that *drawn mask*.
 
 use glam::IVec3;
 use rustc_hash::FxHashSet;

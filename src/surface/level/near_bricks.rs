@@ -22,7 +22,7 @@ impl<'a> Stacks<'a> {
         Self { committed, newer: &[] }
     }
 
-    /// The same with the bricks that a running transaction changes, in order.
+    /// These bricks together with those that a running transaction changes, in order.
     pub fn over(self, newer: &'a [BrickPos]) -> Self {
         debug_assert!(newer.is_sorted());
         Self { newer, ..self }
@@ -49,7 +49,7 @@ impl<'a> Stacks<'a> {
         inside.for_each(|brick| each(brick.stack(), &[brick.0.y]));
     }
 
-    /// Is there a brick over some of these columns, both ends included?
+    /// Returns `true` if there is a brick over some of these columns, both ends included.
     pub fn has_any(&self, low: Column, high: Column) -> bool {
         let mut has_any = false;
         self.for_stacks((low.x >> 3, low.z >> 3), (high.x >> 3, high.z >> 3), |_, _| has_any = true);
@@ -95,7 +95,7 @@ impl<'a> NearBricks<'a> {
         Self { stacks: heights.into_iter().filter_map(with_bricks).collect(), last: (last.x, last.z) }
     }
 
-    /// Is nothing edited?
+    /// Returns `true` if nothing is edited.
     pub fn is_empty(&self) -> bool {
         self.stacks.is_empty()
     }
@@ -106,7 +106,8 @@ impl<'a> NearBricks<'a> {
         (self.stacks.get(&(x >> 3, z >> 3)).map_or(&[], Vec::as_slice), bit)
     }
 
-    /// Is a sample of a column edited, of those in `rows` that are `step` apart, beginning at the first?
+    /// Returns `true` if any sample of a column is edited, of every `step`-th one in `rows`, beginning at the
+    /// first.
     pub fn is_any_edited(&self, column: Column, rows: RangeInclusive<i32>, step: i32) -> bool {
         if self.is_empty() {
             return false;

@@ -88,7 +88,8 @@ impl<'a> LevelView<'a> {
         (ceil(low) - 1) * stride..ceil(high) * stride
     }
 
-    /// Are nodes of different levels on both sides of the lattice edge from `p` along `axis`, or around it if it is upright?
+    /// Returns `true` if nodes of different levels lie on both sides of the lattice edge from `p` along
+    /// `axis`, or around it if it is upright.
     pub(super) fn is_between_levels(&self, p: IVec3, axis: usize) -> bool {
         let at = |dx: i32, dz: i32| self.level_at(Column::new(p.x + dx, p.z + dz));
         let levels = match axis {
@@ -101,7 +102,7 @@ impl<'a> LevelView<'a> {
         levels.any(|level| Some(level) != first)
     }
 
-    /// Is this rule broken on purpose?
+    /// Returns `true` if this rule is broken on purpose.
     #[cfg(test)]
     pub(super) fn has(&self, fault: super::Fault) -> bool {
         self.fault == Some(fault)

@@ -18,11 +18,11 @@ pub(super) struct Volumetric<'a> {
 }
 
 impl<'a> Volumetric<'a> {
-    /// Those in a node, and so far around it as its mesh depends on them.
+    /// The volumetric cells in a node, and around it as far as its mesh depends on them.
     pub fn new(view: &LevelView<'a>, node: Node) -> Self {
         let (low, high) = view.cut.grid().columns(node);
         let (stride, last) = (node.stride(), view.last());
-        // A cell beside the node may be promoted by an interval twice its width.
+        // A neighbouring cell may be promoted by an interval twice its width.
         let by = 2 * stride;
         let clamp = |column: Column| Column::new(column.x.clamp(0, last.x), column.z.clamp(0, last.z));
         let around = [clamp(low.offset(-by, -by)), clamp(high.offset(by, by))];
@@ -30,7 +30,7 @@ impl<'a> Volumetric<'a> {
         Self { view: *view, near, known: FxHashMap::default() }
     }
 
-    /// Does marching cubes draw the sheet of this cell, which must lie in a node of its level?
+    /// Returns `true` if marching cubes draws the sheet of this cell, which must lie in a node of its level.
     pub fn contains(&mut self, cell: Cell) -> bool {
         if self.near.is_empty() {
             return false;

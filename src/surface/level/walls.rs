@@ -98,7 +98,7 @@ impl Drawing<'_> {
         segments
     }
 
-    /// The rule of the case table for a face: where it is ambiguous, a solid corner is cut off on its own.
+    /// The rule of the case table for a face: where it is ambiguous, a solid corner is cut off separately.
     fn square(&mut self, corners: [IVec3; 4], segments: &mut Vec<Segment>) {
         let solid = corners.map(|corner| self.view.is_solid(corner));
         let count = solid.iter().filter(|&&is| is).count();

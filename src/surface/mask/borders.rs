@@ -1,4 +1,4 @@
-//! The border of the mask and of steep cells: which cells beside them stay heightmap.
+//! The border of the mask and of steep cells: neighbouring cells that stay heightmap.
 
 use std::ops::Range;
 
@@ -9,8 +9,8 @@ use crate::lattice::{ChunkGrid, Column};
 pub(crate) const WINDOW: i32 = 10;
 
 impl MaskView<'_> {
-    /// Looks at every cell from `low` up to and without `high`, and at those beside them. `steep` has the steep ones of 8x8
-    /// cells, (x, z) in units of 8 cells, as bits `z * 8 + x`.
+    /// Examines every cell from `low` up to and excluding `high`, and their neighbours. `steep` has the steep
+    /// ones of 8x8 cells, (x, z) in units of 8 cells, as bits `z * 8 + x`.
     pub fn borders(&self, low: Column, high: Column, steep: impl Fn((i32, i32)) -> u64) -> Borders {
         let (first, last) = ((low.x >> 3, low.z >> 3), ((high.x - 1) >> 3, (high.z - 1) >> 3));
         // With those around them, each looked up once.
@@ -153,7 +153,7 @@ impl Borders {
         std::iter::from_fn(next).filter(move |&(_, cell)| is_inside(cell))
     }
 
-    /// Does any cell border on the mask?
+    /// Returns `true` if any cell borders on the mask.
     pub fn has_bordering(&self) -> bool {
         let places = (self.first.1..).flat_map(|z| (self.first.0..).take(self.across).map(move |x| (z, x)));
         self.patches.iter().zip(places).any(|(patch, at)| self.cells(patch.at_mask, at).next().is_some())

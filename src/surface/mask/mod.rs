@@ -24,7 +24,7 @@ impl Mask {
         ((cell.x >> 3, cell.z >> 3), 1 << ((cell.z & 7) << 3 | (cell.x & 7)))
     }
 
-    /// Does marching cubes draw the sheet of this cell?
+    /// Returns `true` if marching cubes draws the sheet of this cell.
     pub fn contains(&self, cell: Column) -> bool {
         let (word, bit) = Self::place(cell);
         self.0.get(&word).is_some_and(|bits| bits & bit != 0)
@@ -88,7 +88,7 @@ impl Mask {
         self.0.values().map(|bits| bits.count_ones() as usize).sum()
     }
 
-    /// Is the whole world heightmap?
+    /// Returns `true` if the whole world is heightmap.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -121,12 +121,12 @@ impl<'a> MaskView<'a> {
         Self { committed, newer: None }
     }
 
-    /// The same mask with newer words in place of its own.
+    /// This mask with newer words in place of its own.
     pub(crate) fn over(self, newer: &'a Mask) -> Self {
         Self { newer: Some(newer), ..self }
     }
 
-    /// Does marching cubes draw the sheet of this cell?
+    /// Returns `true` if marching cubes draws the sheet of this cell.
     pub fn contains(&self, cell: Column) -> bool {
         let (word, bit) = Mask::place(cell);
         self.word(word) & bit != 0

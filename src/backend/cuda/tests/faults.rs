@@ -7,8 +7,8 @@ use super::super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark
 use super::*;
 use crate::backend::Stage;
 
-/// Number of calls until a device fails, and the fault. Only allocations count for [`Fault::Memory`]; only waits
-/// for marks count for [`refused`].
+/// Number of calls until a device fails, and the fault. [`Fault::Memory`] counts only allocations;
+/// [`refused`] counts only waits for marks.
 struct FaultPlan(Arc<Mutex<Option<(u32, Fault)>>>);
 
 /// A device that fails as planned.
@@ -120,11 +120,11 @@ impl log::Log for Log {
 
 static LOG: Log = Log(Mutex::new(Vec::new()));
 
-/// How many messages so far contain this text. Messages are collected from the first call on.
+/// Number of logged messages that contain this text. Messages are collected from the first call on.
 pub(super) fn logged(what: &str) -> usize {
     static KEPT: Once = Once::new();
     KEPT.call_once(|| {
-        log::set_logger(&LOG).expect("nobody else logs");
+        log::set_logger(&LOG).expect("no other logger is set");
         log::set_max_level(log::LevelFilter::Warn);
     });
     lock(&LOG.0).iter().filter(|line| line.contains(what)).count()
