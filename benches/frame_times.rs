@@ -1,14 +1,14 @@
-//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT [horizon]]`;
-//! with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with levels of detail and a plain material,
-//! with views of 0.5 to 16 km, is compared with the real landscape in full detail.
+//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT
+//! [horizon]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with levels of
+//! detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full detail.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
-//! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
-//! dug ground without digging. Colliders are made near a body that moves along, and balls lie about there. A frame is
-//! timed from its start until the GPU has drawn it, so unlike in a game, frames never overlap. The plugin's
-//! time on the main thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same
-//! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
-//! times the plain material's part of the frame the look takes.
+//! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the dug
+//! ground without digging. Colliders are made near a body that moves along, and balls lie about there. A frame is timed
+//! from its start until the GPU has drawn it, so unlike in a game, frames never overlap. The plugin's time on the main
+//! thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same meshes in
+//! place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many times
+//! the plain material's part of the frame the look takes.
 
 #[path = "../examples/shared/mountains.rs"]
 mod mountains;

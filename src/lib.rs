@@ -157,8 +157,9 @@
 //! # }
 //! ```
 //!
-//! **Loose pieces**: what a dig cuts off falls, lies about and crumbles (feature `avian`); without that it is a message.
-//! `DebrisPlugin` wants the `PhysicsPlugins`, the `TerrainPhysicsPlugin` and a `ColliderSource` of the part below.
+//! **Loose pieces**: what a dig cuts off falls, lies about and crumbles (feature `avian`); without that it is a
+//! message. `DebrisPlugin` wants the `PhysicsPlugins`, the `TerrainPhysicsPlugin` and a `ColliderSource` of the part
+//! below.
 //!
 //! ```
 //! # #[cfg(feature = "avian")] {
@@ -188,8 +189,8 @@
 //! # }
 //! ```
 //!
-//! **A panel** (feature `egui`) with live figures, the terrain's rules and look, and the brush in hand to read; **views** of
-//! what the model holds (feature `debug`).
+//! **A panel** (feature `egui`) with live figures, the terrain's rules and look, and the brush in hand to read;
+//! **views** of what the model holds (feature `debug`).
 //!
 //! ```
 //! # #[cfg(all(feature = "egui", feature = "debug"))] {
@@ -228,34 +229,37 @@
 //!
 //! # Rooms
 //!
-//! From the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`levels`], [`ground`], [`brush`], [`volume`], `edits`, [`surface`], [`backend`], [`terrain`], `plugin`, `view`,
+//! From the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy: [`lattice`],
+//! [`levels`], [`ground`], [`brush`], [`volume`], `edits`, [`surface`], [`backend`], [`terrain`], `plugin`, `view`,
 //! `physics`, `panel`, `debug`. [`dense`], which meshes plain arrays, is independent of them.
 //!
 //! # How the seam closes
 //!
-//! 1. **Sentinel samples.** Only edited samples are stored; a pristine one is computed, d = y - h(x, z), and never rounded:
-//!    [`SampleView::distance`](volume::SampleView::distance).
+//! 1. **Sentinel samples.** Only edited samples are stored; a pristine one is computed, d = y - h(x, z), and never
+//!    rounded: [`SampleView::distance`](volume::SampleView::distance).
 //! 2. **The mask follows edits, not boxes.** A cell is drawn by marching cubes when a corner of its *sheet*,
 //!    the cubes that the pristine surface crosses over it, is edited. All samples of the sheet outside the
 //!    mask are then pristine: [`surface::mask`].
 //! 3. **The ring is a fan** from the border polyline to the opposite heightmap vertex: [`fan`](surface::tile::fan).
-//! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers: [`vertex`](surface::vertex::vertex).
+//! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers:
+//!    [`vertex`](surface::vertex::vertex).
 //! 5. **The y-range covers every sign change** of the footprint, in as many chunks above and below as that takes:
 //!    [`sheet`](surface::mask::sheet) gives it.
 //! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes:
 //!    [`Edit::reach`](brush::Edit::reach).
 //!
-//! Three more close what lies between [levels of detail](levels): a coarse cell fans over the line of its finer neighbours, a
-//! coarse vertex of an edit is a vertex of the finest level, and what lies beyond the rim is the rim's ([`surface::level`]).
+//! Three more close what lies between [levels of detail](levels): a coarse cell fans over the line of its finer
+//! neighbours, a coarse vertex of an edit is a vertex of the finest level, and what lies beyond the rim is the rim's
+//! ([`surface::level`]).
 //!
 //! What was not chosen, and why: *snapping* border vertices to the nearest point of the other surface tears on steep
-//! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep caves
-//! pay for the meadow above; *transition cells* need a second case table and still leave the heightmap out.
+//! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep
+//! caves pay for the meadow above; *transition cells* need a second case table and still leave the heightmap out.
 //!
 //! The method is that of P. Andersson and S. Johansson, *Rendering with Marching Cubes, looking at Hybrid Solutions*
-//! (2012): heightmap, fields in chunks, five scenarios of an edit. They ended with cuts and holes on steep ground and with
-//! an index buffer that took 15 seconds to rebuild; the six rules and the transaction are what it took to finish that.
+//! (2012): heightmap, fields in chunks, five scenarios of an edit. They ended with cuts and holes on steep ground and
+//! with an index buffer that took 15 seconds to rebuild; the six rules and the transaction are what it took to finish
+//! that.
 //!
 //! # An edit is a transaction
 //!
@@ -275,17 +279,17 @@
 //!
 //! # What an edit costs
 //!
-//! What its brush reaches, whatever the chunk size. Bricks of 8x8x8 samples are copied, changed and shared; each keeps a
-//! bit per sample for solid and for edited, so that [`block`](surface::block) finds the cubes to draw by a few operations
-//! on whole layers and looks at samples only around them. Parts of a chunk's mesh that did not change are copied from its
-//! last one, and so are rings of a tile. Nothing is allocated while meshing. Bricks, blocks and chunks of a large
-//! transaction are spread over rayon's threads; the result does not depend on how many there are.
+//! What its brush reaches, whatever the chunk size. Bricks of 8x8x8 samples are copied, changed and shared; each keeps
+//! a bit per sample for solid and for edited, so that [`block`](surface::block) finds the cubes to draw by a few
+//! operations on whole layers and looks at samples only around them. Parts of a chunk's mesh that did not change are
+//! copied from its last one, and so are rings of a tile. Nothing is allocated while meshing. Bricks, blocks and chunks
+//! of a large transaction are spread over rayon's threads; the result does not depend on how many there are.
 //! [`Commit::stages`](terrain::Commit::stages) reports where the time went.
 //!
 //! # System sets
 //!
-//! `BurrowSystems`, in `Update`: `Load`, `Collect`, `Commit`, `Begin`, `Propagate`. A brush that is sent before `Collect`
-//! starts in the same frame; its receipt comes in `Commit` of the frame in which its meshes are shown.
+//! `BurrowSystems`, in `Update`: `Load`, `Collect`, `Commit`, `Begin`, `Propagate`. A brush that is sent before
+//! `Collect` starts in the same frame; its receipt comes in `Commit` of the frame in which its meshes are shown.
 //!
 //! # Features
 //!
@@ -303,16 +307,16 @@
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
-//! Without any feature the model alone is built, with no Bevy at all. Where there are threads, transactions, loads and textures
-//! have their own, whatever features of Bevy's are on.
+//! Without any feature the model alone is built, with no Bevy at all. Where there are threads, transactions, loads and
+//! textures have their own, whatever features of Bevy's are on.
 //!
 //! # Interval
 //!
 //! Heights stay within 32768 voxels. A world's sides have up to 16384 cells, or 262144 where its heights come from a
-//! [source](ground::HeightSource). All of it is drawn in full detail, or with `LevelsOfDetail` what is far coarsely.
-//! A terrain may be moved by whole voxels and scaled by powers of two, by
-//! [`TerrainSettings::voxel_size`](terrain::TerrainSettings::voxel_size) or by a parent: the scale of its own `Transform` is
-//! the plugin's. Rotated, stretched or moved by a part of a voxel, its seams lose their equal bits.
+//! [source](ground::HeightSource). All of it is drawn in full detail, or with `LevelsOfDetail` what is far coarsely. A
+//! terrain may be moved by whole voxels and scaled by powers of two, by
+//! [`TerrainSettings::voxel_size`](terrain::TerrainSettings::voxel_size) or by a parent: the scale of its own
+//! `Transform` is the plugin's. Rotated, stretched or moved by a part of a voxel, its seams lose their equal bits.
 
 // Unit tests share worlds with the integration tests.
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! A log that loses records never looks whole, and one that loses none is whole: whatever is submitted, begun, given up, taken or
-//! held meanwhile. `BURROW_WORLDS` is the number of random sequences.
+//! A log that loses records never looks whole, and one that loses none is whole: whatever is submitted, begun, given
+//! up, taken or held meanwhile. `BURROW_WORLDS` is the number of random sequences.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -286,8 +286,8 @@ fn shown(triangle: &[Vertex; 3], weights: Vec3) -> MaterialId {
     MaterialId(strongest.unwrap_or_default())
 }
 
-/// How much farther from a point than the nearest solid voxel is the nearest one of this material; `None` if there is none
-/// within 2 voxels.
+/// How much farther from a point than the nearest solid voxel is the nearest one of this material; `None` if there is
+/// none within 2 voxels.
 fn error_at(world: &World, at: Vec3, shown: MaterialId) -> Option<f32> {
     let middle = at.floor().as_ivec3();
     let last = IVec3::new(world.ground().width(), middle.y + 3, world.ground().depth());
@@ -319,9 +319,9 @@ fn dug_cliffs(index: u64) -> Terrain {
     terrain
 }
 
-/// The border between two materials that are drawn is at most half a voxel off, so what is shown may be a voxel farther away
-/// than what is nearest. Where heights are whole numbers, the surface lies a voxel above the highest solid points, which adds
-/// 0.083 at most.
+/// The border between two materials that are drawn is at most half a voxel off, so what is shown may be a voxel farther
+/// away than what is nearest. Where heights are whole numbers, the surface lies a voxel above the highest solid points,
+/// which adds 0.083 at most.
 #[test]
 fn every_point_shows_what_a_dig_there_yields() {
     let (mut points, mut far, mut misses) = ([0; 2], 0, Vec::new());

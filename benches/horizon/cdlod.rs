@@ -1,10 +1,12 @@
-//! Triangles of the published scheme CDLOD (F. Strugar, "Continuous Distance-Dependent Level of Detail for Rendering Heightmaps",
-//! Journal of Graphics, GPU, and Game Tools 14(4), 2009) beside those of a cut, for the same ground, eye and limits.
+//! Triangles of the published scheme CDLOD (F. Strugar, "Continuous Distance-Dependent Level of Detail for Rendering
+//! Heightmaps", Journal of Graphics, GPU, and Game Tools 14(4), 2009) beside those of a cut, for the same ground, eye
+//! and limits.
 //!
-//! CDLOD draws a node of its quadtree as a grid of fixed size. A level is drawn within a range around the eye that doubles from
-//! level to level; where a node reaches into the range of the next finer level, only quarters of it are drawn, with a quarter of
-//! the grid each. Ranges are the same everywhere, so they follow from the greatest error that a level has anywhere. What is
-//! farther than the view is not drawn. Its morphing costs no triangles and is left out: with it, ranges would be larger.
+//! CDLOD draws a node of its quadtree as a grid of fixed size. A level is drawn within a range around the eye that
+//! doubles from level to level; where a node reaches into the range of the next finer level, only quarters of it are
+//! drawn, with a quarter of the grid each. Ranges are the same everywhere, so they follow from the greatest error that
+//! a level has anywhere. What is farther than the view is not drawn. Its morphing costs no triangles and is left out:
+//! with it, ranges would be larger.
 
 use bevy_burrow::levels::{Choice, Cut, LevelGrid, Node};
 use bevy_burrow::terrain::{GroundFacts, World};
@@ -80,8 +82,8 @@ fn greatest_errors(world: &World, grid: LevelGrid) -> Vec<f32> {
     (0..=grid.top()).map(greatest).collect()
 }
 
-/// How far level 0 is drawn: where level 1 begins, its error or its cells are within the limits, and so for the levels above,
-/// each at twice the distance.
+/// How far level 0 is drawn: where level 1 begins, its error or its cells are within the limits, and so for the levels
+/// above, each at twice the distance.
 fn first_range(errors: &[f32], choice: &Choice, pixels: f32) -> f32 {
     let by_error = errors.iter().zip(0..).skip(1).map(|(error, level)| {
         let distance = error * pixels / choice.error_pixels;

@@ -1,5 +1,6 @@
 //! Much at once, on the CPU and on a CUDA GPU: ground from noise, a meteor shower, a landscape cut into terraces and
-//! smoothed as a whole, hundreds of strokes that sculpt it, and a world of thousands of edits replayed as when it is loaded.
+//! smoothed as a whole, hundreds of strokes that sculpt it, and a world of thousands of edits replayed as when it is
+//! loaded.
 //!
 //! `cargo run --release --no-default-features --features cuda --example bulk [-- --help]`
 
@@ -79,8 +80,8 @@ fn terraces(ground: &Ground, _: &mut Rng) -> Vec<Brush> {
     places.map(cut).collect()
 }
 
-/// All of the ground smoothed in overlapping squares. Those of one colour, of four, lie apart, so that they need not wait
-/// for each other.
+/// All of the ground smoothed in overlapping squares. Those of one colour, of four, lie apart, so that they need not
+/// wait for each other.
 fn smooth(ground: &Ground, _: &mut Rng) -> Vec<Brush> {
     let (step, overlap) = (64, 4);
     let square = |x: i32, z: i32| {
@@ -241,8 +242,8 @@ fn main() {
         let mut first: Option<Commit> = None;
         // The first round warms memory and threads.
         for round in 0..=arguments.repeats {
-            // In turns: whoever comes later finds caches warm. Every other round runs backwards, so that nobody always comes
-            // after the same one.
+            // In turns: whoever comes later finds caches warm. Every other round runs backwards, so that nobody always
+            // comes after the same one.
             for turn in 0..engines.len() {
                 let turn = if round.is_multiple_of(2) { turn } else { engines.len() - 1 - turn };
                 let i = (turn + usize::from(round) / 2) % engines.len();
@@ -253,11 +254,7 @@ fn main() {
                 // In the end, of Auto.
                 expected = if i == 2 { outcome.expected } else { expected };
                 let is_card = engines[i].0 == Backend::Cuda && has_card;
-                assert!(
-                    !is_card || outcome.left == 0,
-                    "the CPU did the GPU's work: {:?}",
-                    engine.state()
-                );
+                assert!(!is_card || outcome.left == 0, "the CPU did the GPU's work: {:?}", engine.state());
                 let meshes = outcome.commit.meshes.chunks.iter();
                 vertices = meshes.map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
                 if round > 0 {

@@ -14,8 +14,8 @@
 //! | `Space` | throws a ball |
 //! | `P` | stops the digging machine, or lets it go on |
 //!
-//! Without a display, or with `--headless`, it plays by itself for some seconds of the game's time and leaves pictures and
-//! `report.json` in `--out`; it fails if a ball is below the ground then.
+//! Without a display, or with `--headless`, it plays by itself for some seconds of the game's time and leaves pictures
+//! and `report.json` in `--out`; it fails if a ball is below the ground then.
 
 #[path = "../shared/display.rs"]
 mod display;

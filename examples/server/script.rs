@@ -162,8 +162,8 @@ fn send(
 }
 
 impl Source {
-    /// Lines of one tick, at most. Of those that come as somebody says them each is one of its own: how many are there by
-    /// now is chance.
+    /// Lines of one tick, at most. Of those that come as somebody says them each is one of its own: how many are there
+    /// by now is chance.
     fn due(&self) -> u64 {
         if matches!(self.feed, Feed::Coming(_)) { 1 } else { self.per_tick }
     }

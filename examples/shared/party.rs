@@ -1,6 +1,7 @@
 //! Connections over UDP, for programs whose players dig together.
 //!
-//! They are not encrypted, and anybody may join under any number: for machines of friends. Games use the tokens of `netcode`.
+//! They are not encrypted, and anybody may join under any number: for machines of friends. Games use the tokens of
+//! `netcode`.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, SystemTime};

@@ -1,8 +1,8 @@
 //! Chooses the backend for a stage: the one that recently took less time for such stages.
 //!
-//! There is a row for each kind of stage and each power of two of its amount. A row has the last three times of each backend,
-//! and their median is what the next stage is expected to take. A backend that was never timed in a row is expected to take
-//! as little as its times in other rows allow, so it is tried once where that could pay.
+//! There is a row for each kind of stage and each power of two of its amount. A row has the last three times of each
+//! backend, and their median is what the next stage is expected to take. A backend that was never timed in a row is
+//! expected to take as little as its times in other rows allow, so it is tried once where that could pay.
 //!
 //! The slower backend of a row is timed again occasionally: each stage done by the faster one earns [`SHARE`]
 //! of its time as credit for the row. Once the credit covers the expected loss, the slower one runs a stage.
@@ -171,7 +171,8 @@ impl Costs {
     /// Seconds on the CPU and on the GPU. The times of edits include the meshing that follows: that stage
     /// makes its own choice, but bricks edited on the CPU have to be uploaded before a GPU can mesh them.
     fn expected(&self, load: Load, statistic: Statistic) -> [f64; 2] {
-        let own = [CPU, gpu_index(load)].map(|who| self.times[load.kind as usize][who].at(load.amount, statistic));
+        let own =
+            [CPU, gpu_index(load)].map(|who| self.times[load.kind as usize][who].at(load.amount, statistic));
         if load.kind == Kind::Mesh {
             return own;
         }

@@ -180,8 +180,8 @@ impl Edit {
     }
 }
 
-/// A brush that asks for the edit: quantised, it is the same again. Only how a box is turned and which way a slope faces may
-/// be rounded once more.
+/// A brush that asks for the edit: quantised, it is the same again. Only how a box is turned and which way a slope
+/// faces may be rounded once more.
 impl From<&Edit> for Brush {
     fn from(edit: &Edit) -> Self {
         Self {

@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-/// Why a [`Brush`](super::Brush) cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes in cubic voxels.
+/// Why a [`Brush`](super::Brush) cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes in cubic
+/// voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BrushError {
@@ -41,7 +42,8 @@ pub enum BrushError {
         what: &'static str,
         /// The coordinate.
         value: f32,
-        /// The largest coordinate along that axis: [`LIMIT`](crate::lattice::LIMIT), or [`REACH`](crate::lattice::REACH).
+        /// The largest coordinate along that axis: [`LIMIT`](crate::lattice::LIMIT), or
+        /// [`REACH`](crate::lattice::REACH).
         most: f32,
     },
     /// The axis of a cylinder or cone is too short to have a direction.

@@ -67,8 +67,9 @@ impl Evaluator {
         }
     }
 
-    /// Distances of rows of 8 samples along x from `origin` on, clamped to 16 bits, far beyond the distances that edits distinguish. Rows with `y` and `z` in these ranges, counted from `origin`, go to `out[y * 8 + z]`;
-    /// other rows stay as they are.
+    /// Distances of rows of 8 samples along x from `origin` on, clamped to 16 bits, far beyond the distances that edits
+    /// distinguish. Rows with `y` and `z` in these ranges, counted from `origin`, go to `out[y * 8 + z]`; other rows
+    /// stay as they are.
     pub(crate) fn rows(&self, origin: IVec3, y: Range<i32>, z: Range<i32>, out: &mut [i16x8; 64]) {
         let along = |start: i32, home: i32, rest: i32| -> [f32; 8] {
             std::array::from_fn(|i| units(i64::from(start) + i as i64, home, rest))
@@ -108,7 +109,8 @@ impl Evaluator {
         f64::from(distance - rounding) > f64::from(BAND + amplitude) + diagonal
     }
 
-    /// Distances without roughness, not rounded, for a run of at most [`RUN`] from (`x`, `start.y`, `start.z`) along +x.
+    /// Distances without roughness, not rounded, for a run of at most [`RUN`] from (`x`, `start.y`, `start.z`) along
+    /// +x.
     fn smooth(&self, x: i64, start: IVec3, out: &mut [f32]) {
         let first = voxels(x, self.home.x);
         let xs: [f32; RUN] = std::array::from_fn(|i| ((first + i as i32) * ONE - self.rest.x) as f32);

@@ -54,8 +54,8 @@
 //! on a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls and
 //! ceilings too. A sample whose density stays as it is is not edited.
 //!
-//! What becomes solid is of the blend's material; without one, of the first solid voxel straight below within 64 voxels,
-//! else straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
+//! What becomes solid is of the blend's material; without one, of the first solid voxel straight below within 64
+//! voxels, else straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
 //!
 //! ```
 //! use bevy_burrow::prelude::*;

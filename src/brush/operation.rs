@@ -149,8 +149,8 @@ pub(crate) enum Kind {
 
 impl Kind {
     /// The density of a sample after a dig, an add or a paint, from its density `before` and its signed distance to the
-    /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt look
-    /// at more than that: for them, it gives `before`.
+    /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt
+    /// look at more than that: for them, it gives `before`.
     ///
     /// A shape counts as [`DEPTH`] deep at most: beyond, no surface shows the difference, and the middle of a large
     /// cave or hill is all one number. Applying an operation twice is the same as once, and neither a dig ever adds

@@ -7,8 +7,8 @@ use super::line::Line;
 use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
-/// A wish to change the ground, in voxels of terrain space. One that is sent to the plugin as a message is in world space
-/// and its units, metres: each terrain takes it into its own.
+/// A wish to change the ground, in voxels of terrain space. One that is sent to the plugin as a message is in world
+/// space and its units, metres: each terrain takes it into its own.
 ///
 /// Nothing is checked here: [`Edit::quantize`](super::Edit::quantize) does, and says what is wrong.
 ///
@@ -25,9 +25,9 @@ use crate::ground::MaterialId;
 /// {"shape":"sphere","center":[8,0,8],"radius":6,"op":"smooth","strength":0.5}
 /// ```
 ///
-/// The fields are those of its [`Shape`] (a cuboid is a `box`), those of its [`Operation`] (the base of a terrace is its
-/// `height`), and for operations that sculpt those of the [`Blend`]. Fields of the blend, `rotation`, `roughness`, `power`, `tag` and
-/// `stroke` may be left out; other fields are refused.
+/// The fields are those of its [`Shape`] (a cuboid is a `box`), those of its [`Operation`] (the base of a terrace is
+/// its `height`), and for operations that sculpt those of the [`Blend`]. Fields of the blend, `rotation`, `roughness`,
+/// `power`, `tag` and `stroke` may be left out; other fields are refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Line", into = "Line")]
 pub struct Brush {
@@ -39,9 +39,9 @@ pub struct Brush {
     pub roughness: Option<Roughness>,
     /// Any number of the game's own; the receipt carries it back.
     pub tag: u64,
-    /// What one undo takes back: brushes of one stroke that follow each other are one step, over however many frames they
-    /// come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply). A brush of another
-    /// stroke in between, a second player's say, ends a step.
+    /// What one undo takes back: brushes of one stroke that follow each other are one step, over however many frames
+    /// they come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply). A
+    /// brush of another stroke in between, a second player's say, ends a step.
     pub stroke: Option<u64>,
     /// How operations that sculpt fade, and what they build of.
     pub blend: Blend,
@@ -117,8 +117,8 @@ impl Brush {
         Self::new(shape, Operation::Lower { amount })
     }
 
-    /// A brush that gives the ground in its shape the relief of an image. It fades over a single voxel at the rim of the
-    /// image and of the shape, unless told otherwise.
+    /// A brush that gives the ground in its shape the relief of an image. It fades over a single voxel at the rim of
+    /// the image and of the shape, unless told otherwise.
     pub fn stamp(shape: Shape, stamp: Stamp) -> Self {
         Self::new(shape, Operation::Stamp { stamp }).with_falloff(1.0)
     }

@@ -68,8 +68,8 @@ pub(crate) struct Stencil {
     pub moved: u32,
 }
 
-/// Is a sample farther from the surface, by a voxel or more, than it was before anybody edited it? Then it is solid that was
-/// built or raised, or air that was dug or lowered.
+/// Is a sample farther from the surface, by a voxel or more, than it was before anybody edited it? Then it is solid
+/// that was built or raised, or air that was dug or lowered.
 pub(crate) fn is_moved(density: i32, pristine: i32) -> bool {
     let by = density - pristine;
     if density < 0 { by <= -ONE } else { by >= ONE }
@@ -134,8 +134,8 @@ impl Stencil {
         Some(own.signum() * (nearest.max(0) + ONE))
     }
 
-    /// The density in the middle with a part of `by` added, which an opposite shift takes away again: to the bit, or to 1/256
-    /// voxel where one of both would end at exactly [`DEPTH`].
+    /// The density in the middle with a part of `by` added, which an opposite shift takes away again: to the bit, or to
+    /// 1/256 voxel where one of both would end at exactly [`DEPTH`].
     fn shifted(&self, by: i32, weight: i32) -> Option<i32> {
         let by = by.signum() * ((by.abs() * weight + ONE / 2) >> 8);
         if by == 0 {
@@ -209,8 +209,8 @@ impl SculptKernel {
         self.blend.material
     }
 
-    /// The density at a lattice point after the operation, from its distance to the shape and from what is around; `None`
-    /// where it stays as it is.
+    /// The density at a lattice point after the operation, from its distance to the shape and from what is around;
+    /// `None` where it stays as it is.
     pub fn density(&self, at: IVec3, outside: i32, around: impl FnOnce() -> Stencil) -> Option<i32> {
         if outside > 0 {
             return None;

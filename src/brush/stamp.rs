@@ -17,11 +17,12 @@ use crate::lattice::ONE;
 
 /// An image that gives the surface its relief: black lies on the stamp's plane, white `height` above it.
 ///
-/// The stamp's own axes are the image's columns (x), up (y) and the image's rows (z); without a rotation, they are those of
-/// the terrain, and the image lies as a [`Ground`](crate::ground::Ground) made of it would.
+/// The stamp's own axes are the image's columns (x), up (y) and the image's rows (z); without a rotation, they are
+/// those of the terrain, and the image lies as a [`Ground`](crate::ground::Ground) made of it would.
 ///
 /// The surface is the image, interpolated linearly between its samples, to within 1/8 voxel in each lattice column that
-/// the brush covers with full weight: heights are rounded to 1/256 voxel, and the rest is marching cubes between voxels.
+/// the brush covers with full weight: heights are rounded to 1/256 voxel, and the rest is marching cubes between
+/// voxels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stamp {
@@ -51,7 +52,8 @@ impl Stamp {
         Self { rotation, ..self }
     }
 
-    /// The stamp on a plane: its up becomes `normal`, by the shortest turn. A normal of no direction leaves it as it is.
+    /// The stamp on a plane: its up becomes `normal`, by the shortest turn. A normal of no direction leaves it as it
+    /// is.
     #[must_use]
     pub fn onto(self, normal: Vec3) -> Self {
         match normal.try_normalize() {

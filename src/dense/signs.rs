@@ -7,8 +7,9 @@
 //! word 1: samples 63 ..= 126   columns 63 ..= 125
 //! ```
 //!
-//! So both samples of a cell's edge along x always lie in one word, and no bit is ever carried. The last sample of a row is
-//! repeated: the column that it starts is no cell, and no edge along x is crossed there. The last row is repeated as well.
+//! So both samples of a cell's edge along x always lie in one word, and no bit is ever carried. The last sample of a
+//! row is repeated: the column that it starts is no cell, and no edge along x is crossed there. The last row is
+//! repeated as well.
 
 use super::density::Density;
 use super::grid::DenseGrid;

@@ -1,7 +1,8 @@
 //! Vertices from the lists of crossed edges, four at a time.
 //!
-//! All edges of a list run along the same axis, so all four take the same steps: read the samples around both ends, then
-//! calculate with four numbers at once. Only + - * / and square roots in a fixed order, so all machines agree on every bit.
+//! All edges of a list run along the same axis, so all four take the same steps: read the samples around both ends,
+//! then calculate with four numbers at once. Only + - * / and square roots in a fixed order, so all machines agree on
+//! every bit.
 
 use wide::{f32x4, i32x4};
 
@@ -21,8 +22,8 @@ pub(super) const SLACK: usize = LANES + 1;
 /// Three numbers for each of four edges.
 type Vectors = [f32x4; 3];
 
-/// Writes the vertices of the edges along `AXIS` that start at `points`, whose number is a multiple of [`LANES`]. The slot
-/// behind them is overwritten too. Without `NORMALS` no normal is written.
+/// Writes the vertices of the edges along `AXIS` that start at `points`, whose number is a multiple of [`LANES`]. The
+/// slot behind them is overwritten too. Without `NORMALS` no normal is written.
 pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
     grid: &DenseGrid<S>,
     points: &[Point],
@@ -183,8 +184,8 @@ impl<'a, S: Density, const AXIS: usize> Taps<'a, S, AXIS> {
     }
 }
 
-/// The gradients at both ends of edges that may lie in the grid's border. Where a neighbour is missing, the difference to
-/// the other one counts twice.
+/// The gradients at both ends of edges that may lie in the grid's border. Where a neighbour is missing, the difference
+/// to the other one counts twice.
 #[inline(never)]
 fn border_gradients<S: Density, const AXIS: usize>(
     grid: &DenseGrid<S>,

@@ -11,10 +11,10 @@ const LONGEST: usize = 1 << 12;
 /// Most bricks around all edits of a batch, unless it is a single edit: their jobs take 16 MiB.
 pub(super) const MOST_BRICKS: u64 = 1 << 20;
 
-/// Splits edits into batches, in order, in which no edit reads what an earlier edit of the batch may write, except for the
-/// samples that it changes itself. Digs, adds and paint read nothing else; edits that sculpt, and edits that rules restrict,
-/// read what is [around](PreparedEdit::reads) them. A batch also ends before there would be more than `most` bricks around
-/// its edits.
+/// Splits edits into batches, in order, in which no edit reads what an earlier edit of the batch may write, except for
+/// the samples that it changes itself. Digs, adds and paint read nothing else; edits that sculpt, and edits that rules
+/// restrict, read what is [around](PreparedEdit::reads) them. A batch also ends before there would be more than `most`
+/// bricks around its edits.
 pub(super) fn batches(edits: &[PreparedEdit], most: u64) -> Vec<Range<usize>> {
     let mut batches = Vec::new();
     let (mut first, mut bricks) = (0, 0);

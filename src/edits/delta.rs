@@ -33,8 +33,8 @@ impl EditDelta {
         }
     }
 
-    /// Enters a brick. Neighbouring uniform bricks are mostly equal and share memory at once, so fewer of them have to be
-    /// freed when deltas are added up.
+    /// Enters a brick. Neighbouring uniform bricks are mostly equal and share memory at once, so fewer of them have to
+    /// be freed when deltas are added up.
     pub fn change(&mut self, mut drafted: DraftedBrick) {
         // Materials may be stored though all of them are the ground's own.
         let key = |of: &DraftedBrick| (of.kind, of.brick.bytes());
@@ -56,8 +56,8 @@ impl EditDelta {
         }
     }
 
-    /// Where an edit counts voxels. All entries of the edit at the end of the list are searched, so one brick never gets two
-    /// entries for the same outcome and material.
+    /// Where an edit counts voxels. All entries of the edit at the end of the list are searched, so one brick never
+    /// gets two entries for the same outcome and material.
     pub fn counts(&mut self, edit: usize) -> Counts<'_> {
         let own = self.counts.iter().rev().take_while(|count| count.edit == edit).count();
         Counts { edit, first: self.counts.len() - own, list: &mut self.counts }

@@ -1,6 +1,7 @@
 //! Edits of a transaction drafted as new bricks, before anything is committed.
 //!
-//! Edits are split into batches, a [`backend`](crate::backend) applies each batch, and what they changed is added up here.
+//! Edits are split into batches, a [`backend`](crate::backend) applies each batch, and what they changed is added up
+//! here.
 
 use std::borrow::Cow;
 use std::sync::Arc;

@@ -5,8 +5,9 @@
 //!   --brick_editor, per brick--> EditDelta --drafter--> new bricks, effects, hash
 //! ```
 //!
-//! Edits that read samples around those they change, such as sculpting or those that [rules](crate::volume::DiggingRules)
-//! restrict, take the slower path of `stencil_edit`; all others are applied row by row by `plain_edit`.
+//! Edits that read samples around those they change, such as sculpting or those that
+//! [rules](crate::volume::DiggingRules) restrict, take the slower path of `stencil_edit`; all others are applied row by
+//! row by `plain_edit`.
 
 mod batches;
 mod brick_editor;

@@ -15,11 +15,12 @@ use super::rule_scope::{BatchRules, BrickRules};
 use crate::lattice::{ChunkGrid, ItemCost, pieces};
 use crate::volume::{DiggingRules, SampleView};
 
-/// How many jobs are done before their deltas are added up. With many edits deltas take more memory than bricks, and most
-/// bricks of a large cave are replaced by a shared one.
+/// How many jobs are done before their deltas are added up. With many edits deltas take more memory than bricks, and
+/// most bricks of a large cave are replaced by a shared one.
 const JOBS_AT_ONCE: usize = 8192;
 
-/// Least and most jobs of a delta: few, so that all threads end together, but not so few that there are many deltas to add up.
+/// Least and most jobs of a delta: few, so that all threads end together, but not so few that there are many deltas to
+/// add up.
 const GROUP: [usize; 2] = [16, 64];
 
 /// How many groups there should be for each thread.
@@ -89,8 +90,8 @@ impl<'a> PreparedEdits<'a> {
         &self.jobs
     }
 
-    /// Applies all edits on the CPU and calls `each` with what they changed, brick by brick. The result does not depend on how
-    /// many threads there are.
+    /// Applies all edits on the CPU and calls `each` with what they changed, brick by brick. The result does not depend
+    /// on how many threads there are.
     pub fn run(&self, mut each: impl FnMut(&mut [EditDelta])) {
         let work = |jobs: &[Job]| {
             let mut delta = EditDelta::with_room(jobs.len().min(GROUP[1]));

@@ -58,7 +58,8 @@ impl<'a> BrickRules<'a> {
         self.protected[at.y][at.z] >> at.x & 1 == 1
     }
 
-    /// The density that rules allow a sample of the brick in place of the proposed one, and why, where it is another one.
+    /// The density that rules allow a sample of the brick in place of the proposed one, and why, where it is another
+    /// one.
     pub fn judge(
         &self,
         view: &SampleView,

@@ -16,8 +16,8 @@ pub const OVERLAY_DEPTH: i32 = ONE + ONE / 2;
 pub struct MaterialId(pub u8);
 
 impl MaterialId {
-    /// The ground's own material at that place, computed and never stored: that of samples that were never built or painted.
-    /// Painting with it restores the ground's own look. No ground can be made of it.
+    /// The ground's own material at that place, computed and never stored: that of samples that were never built or
+    /// painted. Painting with it restores the ground's own look. No ground can be made of it.
     pub const GROUND: Self = Self(u8::MAX);
 
     /// Checks a parameter of this name: ground cannot be made of [`Self::GROUND`].

@@ -12,8 +12,8 @@ pub const MAX_OCTAVES: u32 = 16;
 /// Largest size of a noise's features, in voxels; the smallest is 1.
 pub const MAX_SCALE: f64 = 1_048_576.0;
 
-/// The kind of landscape that the noise makes. Both use Perlin's gradient noise, which needs no function whose last bits differ
-/// from machine to machine.
+/// The kind of landscape that the noise makes. Both use Perlin's gradient noise, which needs no function whose last
+/// bits differ from machine to machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -75,8 +75,8 @@ pub(super) const ORIGIN: [f64; 2] = [0.37, 0.71];
 /// A sum of octaves of Perlin's gradient noise, of checked parameters.
 pub(super) enum Octaves {
     Fractal(Fbm<Perlin>),
-    /// It starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that every ridged noise has
-    /// at its own origin, counted from -1.
+    /// It starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that every ridged noise
+    /// has at its own origin, counted from -1.
     Ridged(RidgedMulti<Perlin>, f64),
 }
 

@@ -1,5 +1,5 @@
-//! Octaves of Perlin noise over rows of columns, bit by bit those of the crate `noise`: the same operations in the same order,
-//! as in `kernels/heights.cuh`, but several columns at a time, and what a row shares only once.
+//! Octaves of Perlin noise over rows of columns, bit by bit those of the crate `noise`: the same operations in the same
+//! order, as in `kernels/heights.cuh`, but several columns at a time, and what a row shares only once.
 
 use std::array::from_fn;
 use std::f64::consts::SQRT_2;

@@ -179,7 +179,8 @@ mod tests {
                 noise.get([0.0; 2]),
                 "{octaves} octaves"
             );
-            // A ridge where the first octave is 0, none where another is 1. The last bit is safe from the 1 that comes off.
+            // A ridge where the first octave is 0, none where another is 1. The last bit is safe from the 1 that comes
+            // off.
             let noise =
                 RidgedMulti::<Fixed>::new(0).set_octaves(octaves as usize).set_sources(fixed(0.0, 1.0));
             let factor = terms(NoiseKind::Ridged, octaves).numbers.factor;

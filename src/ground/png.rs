@@ -44,8 +44,8 @@ impl GreyImage {
     }
 }
 
-/// Width, height and bits per channel that a PNG declares in its header; `None` where there is none, which the decoder then
-/// reports. They are read here because the decoder reserves memory for them at once.
+/// Width, height and bits per channel that a PNG declares in its header; `None` where there is none, which the decoder
+/// then reports. They are read here because the decoder reserves memory for them at once.
 fn declared(bytes: &[u8]) -> Option<(u32, u32, u8)> {
     let is_png = image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Png);
     let (&width, rest) = bytes.get(16..).filter(|_| is_png)?.split_first_chunk()?;

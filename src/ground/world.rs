@@ -426,9 +426,9 @@ impl Ground {
         self.height_range
     }
 
-    /// Hash of the dimensions, heights and materials: equal for equal worlds, on every machine. The heights and materials of a
-    /// [source](Self::from_source) are hashed by its [id](HeightSource::id), so it differs from the hash of the same heights in
-    /// memory.
+    /// Hash of the dimensions, heights and materials: equal for equal worlds, on every machine. The heights and
+    /// materials of a [source](Self::from_source) are hashed by its [id](HeightSource::id), so it differs from the hash
+    /// of the same heights in memory.
     pub fn hash(&self) -> u64 {
         self.hash
     }

@@ -6,8 +6,8 @@ use rustc_hash::FxHashMap;
 
 /// Bytes of a hash table: its buckets, and one byte for each to find them by.
 pub(crate) fn table_bytes<K, V>(table: &FxHashMap<K, V>) -> usize {
-    // One bucket of eight stays free, in small tables a single one, and the first group of control bytes is repeated at the
-    // end. Removed entries may still occupy buckets until the table grows. The number of buckets is a power of two.
+    // One bucket of eight stays free, in small tables a single one, and the first group of control bytes is repeated at
+    // the end. Removed entries may still occupy buckets until the table grows. The number of buckets is a power of two.
     let least = match table.capacity() {
         0 => return 0,
         few @ 1..8 => few + 1,

@@ -23,7 +23,8 @@ pub struct Eye {
     pub position: Vec3,
     /// Voxels a second.
     pub velocity: Vec3,
-    /// Pixels that one voxel covers one voxel away: the height of the picture over twice the tangent of half the angle of view.
+    /// Pixels that one voxel covers one voxel away: the height of the picture over twice the tangent of half the angle
+    /// of view.
     pub pixels: f32,
 }
 
@@ -40,8 +41,8 @@ pub struct NodeFacts {
 
 /// Limits by which nodes are split. Each is a size on the screen in pixels.
 ///
-/// A node is split if its cells are larger than `cell_pixels` and its error larger than `error_pixels`; or if it has edits and its
-/// cells are larger than `edited_pixels`.
+/// A node is split if its cells are larger than `cell_pixels` and its error larger than `error_pixels`; or if it has
+/// edits and its cells are larger than `edited_pixels`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     /// The least size of cells, 12 unless set otherwise.
@@ -50,8 +51,8 @@ pub struct Choice {
     pub error_pixels: f32,
     /// The greatest size of cells in nodes with edits, 4 unless set otherwise.
     pub edited_pixels: f32,
-    /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing changes
-    /// back and forth while somebody moves to and fro.
+    /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing
+    /// changes back and forth while somebody moves to and fro.
     pub stay: f32,
     /// The choice also considers where each eye will be in this many seconds; 0.5 by default.
     pub look_ahead: f32,
@@ -76,8 +77,8 @@ impl Default for Choice {
 }
 
 impl Choice {
-    /// The cut that these eyes need, all together, wherever they look: turning changes nothing. `before` is the one that they
-    /// had. Eyes whose numbers are not finite see nothing.
+    /// The cut that these eyes need, all together, wherever they look: turning changes nothing. `before` is the one
+    /// that they had. Eyes whose numbers are not finite see nothing.
     pub fn cut(&self, before: &Cut, eyes: &[Eye], facts: impl Fn(Node) -> NodeFacts) -> Cut {
         let grid = before.grid();
         let is_somewhere = |eye: &&Eye| eye.position.is_finite() && eye.pixels.is_finite();

@@ -5,8 +5,8 @@ use rustc_hash::FxHashSet;
 use super::{LevelGrid, Node};
 use crate::lattice::TilePos;
 
-/// Nodes that together cover the world once. Those that share an edge differ by at most one level; across a corner they may
-/// differ by more.
+/// Nodes that together cover the world once. Those that share an edge differ by at most one level; across a corner they
+/// may differ by more.
 ///
 /// It is kept as the set of nodes that are split. A node of the cut is one that is not split, of a parent that is.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,8 +21,8 @@ impl Cut {
         Self { grid, split: FxHashSet::default() }
     }
 
-    /// The coarsest cut in which every node is split that ought to be. Nodes are asked about from above; the children of one that
-    /// neither ought to be split nor has to be, for the sake of its neighbours, are not.
+    /// The coarsest cut in which every node is split that ought to be. Nodes are asked about from above; the children
+    /// of one that neither ought to be split nor has to be, for the sake of its neighbours, are not.
     pub fn new(grid: LevelGrid, mut is_split: impl FnMut(Node) -> bool) -> Self {
         let mut cut = Self::coarsest(grid);
         let mut asked: Vec<Node> = grid.roots().collect();
@@ -92,7 +92,8 @@ impl Cut {
         self.grid.roots().chain(children).filter(|&node| self.grid.has(node) && !self.is_split(node))
     }
 
-    /// The nodes that are drawn and touch a node, over an edge or at a corner: those whose meshes may change with its level.
+    /// The nodes that are drawn and touch a node, over an edge or at a corner: those whose meshes may change with its
+    /// level.
     pub fn touching(&self, node: Node) -> Vec<Node> {
         let (TilePos { x, z }, size) = (node.tile(), node.stride());
         let beside = (-1..=size).flat_map(|at| [(at, -1), (at, size), (-1, at), (size, at)]);

@@ -31,9 +31,9 @@ impl Step {
 impl Cut {
     /// Takes one step towards another cut of the same quadtree; `None` once they are equal.
     ///
-    /// It makes `most_meshes` meshes at most, or more if a single split or merge does. Nodes with a small `rank` are split first and
-    /// merged last. Nodes are merged first while there are more of them than the other cut has, so that on the way there
-    /// are at most three more than at one of its ends.
+    /// It makes `most_meshes` meshes at most, or more if a single split or merge does. Nodes with a small `rank` are
+    /// split first and merged last. Nodes are merged first while there are more of them than the other cut has, so that
+    /// on the way there are at most three more than at one of its ends.
     pub fn step_to(&mut self, other: &Self, most_meshes: usize, rank: impl Fn(Node) -> u64) -> Option<Step> {
         // Most steps lead all the way.
         let all = self.changes_to(other);

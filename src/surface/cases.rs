@@ -152,8 +152,8 @@ fn flat_diagonals(triangles: &[[Edge; 3]], polygon: &[Edge]) -> usize {
 }
 
 /// How little a triangulation is like a tile's, which splits its cells along (x, z)-(x + 1, z + 1): first without that
-/// diagonal, then by triangles that touch none of its ends. Where the ground is gentle, cubes so draw the very triangles
-/// of the tile.
+/// diagonal, then by triangles that touch none of its ends. Where the ground is gentle, cubes so draw the very
+/// triangles of the tile.
 fn unlike_tile(triangles: &[[Edge; 3]]) -> (bool, usize) {
     const OVER_LOW_COLUMN: Edge = 4;
     const OVER_HIGH_COLUMN: Edge = 7;

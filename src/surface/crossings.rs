@@ -38,8 +38,8 @@ pub(super) struct Crossings {
 }
 
 impl Crossings {
-    /// Adds the vertex of each listed edge of the brick whose lowest sample is `low`, relative to `origin`: all along x,
-    /// then along y, then along z.
+    /// Adds the vertex of each listed edge of the brick whose lowest sample is `low`, relative to `origin`: all along
+    /// x, then along y, then along z.
     pub fn make(
         &self,
         samples: &PaddedSamples,
@@ -65,8 +65,8 @@ impl Crossings {
     }
 }
 
-/// The ground's own materials at the solid ends of edges of a block. Several edges end at the same voxel, and neighbours are asked
-/// together.
+/// The ground's own materials at the solid ends of edges of a block. Several edges end at the same voxel, and
+/// neighbours are asked together.
 fn solid_materials(ends: &[LayerBits; 9], ground: &Ground, low: IVec3) -> SolidMaterials {
     let mut materials = [[[MaterialId::GROUND; 64]; 4]; 9];
     let brick = BrickPos::of(low).0;
@@ -301,8 +301,8 @@ mod tests {
     use super::super::vertex::linear;
     use super::*;
 
-    /// The steps from air of one density to ground of another one, and the other way round, which are those of the vertex
-    /// function.
+    /// The steps from air of one density to ground of another one, and the other way round, which are those of the
+    /// vertex function.
     fn steps(air: i32, ground: i32) -> [i32; 2] {
         let [there, back] = [[air, -ground], [-ground, air]];
         let lanes = |end: usize| i32x4::new([there[end], back[end], there[end], back[end]]);

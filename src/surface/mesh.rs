@@ -36,8 +36,8 @@ impl MaterialMix {
         }
     }
 
-    /// The mix at `step` of [`SNAP`] steps from `a` to `b`, in integers. Equal ends give themselves; where nothing has any
-    /// weight, it is `a`.
+    /// The mix at `step` of [`SNAP`] steps from `a` to `b`, in integers. Equal ends give themselves; where nothing has
+    /// any weight, it is `a`.
     pub fn lerp(a: Self, b: Self, step: i32) -> Self {
         if a == b {
             return a;

@@ -8,8 +8,8 @@ pub(crate) use super::packed::{PackedMixes, PackedVertices};
 
 /// The surfaces of blocks, by the blocks' numbers.
 pub(crate) trait MeshedBlocks: Sync {
-    /// Waits until the surfaces of the first `blocks` blocks are ready; returns how many of them are. If these are fewer, the
-    /// others will never be ready, and what was made of any surface must be dropped.
+    /// Waits until the surfaces of the first `blocks` blocks are ready; returns how many of them are. If these are
+    /// fewer, the others will never be ready, and what was made of any surface must be dropped.
     fn wait_for(&self, _blocks: usize) -> usize {
         usize::MAX
     }

@@ -21,7 +21,8 @@ pub fn cell_sheet(ground: &Ground, cell: Column) -> Range<i32> {
     sheet(cell.corners().map(|column| ground.height(column)))
 }
 
-/// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on, given as bits `z * 8 + x`.
+/// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on, given as bits
+/// `z * 8 + x`.
 pub(crate) fn sheet_rows(ground: &Ground, low: Column, cells: u64) -> Range<i32> {
     let heights = ground.heights::<9>(low);
     let cells = layer_bits::spread(cells);

@@ -54,8 +54,8 @@ impl Lattice for WorldView<'_> {
     }
 }
 
-/// Density at a point, from those of the world's own points. Points beyond the rim are never edited; there densities are
-/// extrapolated linearly, so that ground dug at the rim isn't shaded as a wall.
+/// Density at a point, from those of the world's own points. Points beyond the rim are never edited; there densities
+/// are extrapolated linearly, so that ground dug at the rim isn't shaded as a wall.
 fn extrapolated(grid: ChunkGrid, point: IVec3, own: impl Fn(IVec3) -> i32) -> i32 {
     let last = IVec3::new(grid.width(), point.y, grid.depth());
     let rim = point.clamp(IVec3::Y * point.y, last);
@@ -70,8 +70,8 @@ const UNIT: [IVec3; 4] = [IVec3::X, IVec3::Y, IVec3::Z, IVec3::new(1, 0, 1)];
 
 /// Where the surface crosses the lattice edge from `p` along `axis`, in steps of 1/4096 voxel from `p`.
 ///
-/// A pristine vertical edge is crossed exactly at h, its upper end included. Any other crossing is linear, rounded to the
-/// nearest step, and at least one step away from both ends. `d = 0` is air.
+/// A pristine vertical edge is crossed exactly at h, its upper end included. Any other crossing is linear, rounded to
+/// the nearest step, and at least one step away from both ends. `d = 0` is air.
 pub fn crossing(lattice: &impl Lattice, p: IVec3, axis: usize) -> i32 {
     let q = p + UNIT[axis];
     if axis == 1 && !lattice.is_edited(p) && !lattice.is_edited(q) {
@@ -195,8 +195,8 @@ pub(super) fn between(low: i32, high: i32, step: i32) -> i32 {
 }
 
 /// Materials at a crossing where the ground shows its own. With strata, that of the solid end: what a dig there yields.
-/// Otherwise those of both columns, blended as the tile does: the overlay within its depth below the pristine surface, the
-/// base below.
+/// Otherwise those of both columns, blended as the tile does: the overlay within its depth below the pristine surface,
+/// the base below.
 pub(super) fn own_materials(ground: &Ground, [p, q]: [IVec3; 2], step: i32, solid: IVec3) -> MaterialMix {
     if ground.has_own_materials() {
         return MaterialMix::pure(ground.material(solid));

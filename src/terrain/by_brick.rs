@@ -1,8 +1,8 @@
 //! Boxes of cells, sorted into the bricks that hold them.
 //!
-//! A change in a brick also shows in cells of the bricks next to it. Where there are many boxes, each thread takes a slab of
-//! bricks, one brick thick along x: all cells in it belong to boxes whose home is that slab or one next to it. The bricks that
-//! are found are split into pieces again, so that many threads share a few long slabs as well.
+//! A change in a brick also shows in cells of the bricks next to it. Where there are many boxes, each thread takes a
+//! slab of bricks, one brick thick along x: all cells in it belong to boxes whose home is that slab or one next to it.
+//! The bricks that are found are split into pieces again, so that many threads share a few long slabs as well.
 //!
 //! ```text
 //! home_x           3         4         5         6
@@ -59,8 +59,8 @@ pub(super) struct Reached {
 }
 
 impl ByBrick {
-    /// The bricks that hold cells which changes reach, each with the box around its own of them. Changes must be sorted by
-    /// where they are at home.
+    /// The bricks that hold cells which changes reach, each with the box around its own of them. Changes must be sorted
+    /// by where they are at home.
     pub fn new<T: Sync>(changes: &[T], reached: impl Fn(&T) -> Reached + Sync) -> Self {
         let (Some(first), Some(last)) = (changes.first(), changes.last()) else { return Self::default() };
         let home_x = |change: &T| reached(change).home_x;
@@ -82,8 +82,8 @@ impl ByBrick {
         self.slabs.iter().map(Vec::len).sum()
     }
 
-    /// Collects what `work` makes of all stacks, in order; in parallel where there are many. `work` gets several whole stacks at
-    /// a time.
+    /// Collects what `work` makes of all stacks, in order; in parallel where there are many. `work` gets several whole
+    /// stacks at a time.
     pub fn collect<R: Clone + Send + Sync>(&self, work: impl Fn(&[OfBrick], &mut Vec<R>) + Sync) -> Vec<R> {
         if !ItemCost::Lookup.is_shared(self.len()) {
             let mut found = Vec::with_capacity(self.len());
@@ -188,8 +188,8 @@ impl Pile {
     }
 }
 
-/// Enters the cells of changes into some bricks of each: `enter` gets the lowest and the highest one of bricks above each other,
-/// and their cells.
+/// Enters the cells of changes into some bricks of each: `enter` gets the lowest and the highest one of bricks above
+/// each other, and their cells.
 fn enter_all<'r>(
     changes: impl Iterator<Item = (&'r Reached, LatticeBox)>,
     mut enter: impl FnMut(IVec3, i32, &Pile),

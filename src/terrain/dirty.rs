@@ -16,8 +16,8 @@ use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack};
 use super::world::World;
 use crate::volume::layers::FIRST_X;
 
-/// The cells that changed samples show in. `changed` gives the brick of each change, the box around its samples, and whether
-/// one of them is edited for the first time: only then may cells join the mask.
+/// The cells that changed samples show in. `changed` gives the brick of each change, the box around its samples, and
+/// whether one of them is edited for the first time: only then may cells join the mask.
 pub(super) fn dirty_cells<T: Sync>(
     grid: ChunkGrid,
     changes: &[T],
@@ -32,8 +32,8 @@ pub(super) fn dirty_cells<T: Sync>(
     })
 }
 
-/// Rule 2 for the sheet over some cells: the words of the mask that change. Edited samples stay edited, so cells only ever
-/// join it.
+/// Rule 2 for the sheet over some cells: the words of the mask that change. Edited samples stay edited, so cells only
+/// ever join it.
 pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> Mask {
     let words = dirty.collect(|stacks, found| {
         let mut bricks = Vec::with_capacity(stacks.len());
@@ -66,8 +66,8 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
     mask
 }
 
-/// Adds to `bricks` those of a stack that the pristine surface crosses and that may have cells that join the mask. Returns that
-/// surface, or `None` where there are no such bricks.
+/// Adds to `bricks` those of a stack that the pristine surface crosses and that may have cells that join the mask.
+/// Returns that surface, or `None` where there are no such bricks.
 fn at_sheet(
     world: &World,
     view: &WorldView,
@@ -85,8 +85,8 @@ fn at_sheet(
     (bricks.len() > before).then_some(sheet)
 }
 
-/// Every block that has to be drawn again, by stacks of bricks, each from below. A word of the mask changes only where samples
-/// do, so its cells lie in stacks that have `dirty` cells.
+/// Every block that has to be drawn again, by stacks of bricks, each from below. A word of the mask changes only where
+/// samples do, so its cells lie in stacks that have `dirty` cells.
 pub(super) fn dirty_blocks(world: &World, view: &WorldView, newer: &Mask, dirty: &ByBrick) -> Vec<Block> {
     let blocks_of = |&OfBrick { brick, cells, .. }: &OfBrick| {
         view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk })
@@ -107,8 +107,8 @@ fn in_world(grid: ChunkGrid, low: IVec3, high: IVec3) -> Option<LatticeBox> {
     LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last))
 }
 
-/// The box in a stack of bricks around the sheets of cells that join or leave the mask, and of the cells next to them, whose
-/// vertices may move onto the mask's border or off it.
+/// The box in a stack of bricks around the sheets of cells that join or leave the mask, and of the cells next to them,
+/// whose vertices may move onto the mask's border or off it.
 fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) -> Option<LatticeBox> {
     if newer.is_empty() {
         return None;

@@ -27,8 +27,9 @@ pub struct Draft {
 }
 
 impl Terrain {
-    /// What these edits would make of the world as last committed, under the rules and settings of edits that are submitted now.
-    /// Nothing changes. It takes as long as their transaction on a terrain that [never meshes](Meshing::Never).
+    /// What these edits would make of the world as last committed, under the rules and settings of edits that are
+    /// submitted now. Nothing changes. It takes as long as their transaction on a terrain that [never
+    /// meshes](Meshing::Never).
     pub fn draft(&self, edits: &[Edit]) -> Draft {
         let mut queue = Queue::default();
         queue.limits = WorkLimits::UNBOUNDED;
@@ -53,7 +54,8 @@ impl Terrain {
         Draft { receipts: commit.receipts, change, hash, regions_hash }
     }
 
-    /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as they are.
+    /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as
+    /// they are.
     pub fn share_bricks<'a>(&mut self, bricks: impl IntoIterator<Item = (BrickPos, &'a Arc<Brick>)>) {
         for (pos, brick) in bricks {
             let Some(own) = self.world.bricks.get(&pos) else { continue };

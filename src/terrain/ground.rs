@@ -25,7 +25,8 @@ impl Terrain {
     /// are 0.
     ///
     /// # Errors
-    /// [`ChangeError::GroundSize`] where the size is another one, and [`ChangeError::Overloaded`] where too much work waits.
+    /// [`ChangeError::GroundSize`] where the size is another one, and [`ChangeError::Overloaded`] where too much work
+    /// waits.
     pub fn submit_ground(&mut self, ground: impl Into<Arc<Ground>>) -> Result<(), ChangeError> {
         let put = self.ground_put(ground.into())?;
         if !self.queue.has_room_for_step() {
@@ -35,8 +36,8 @@ impl Terrain {
         Ok(())
     }
 
-    /// Sets another ground of the same size at once, after everything that waits; like [`submit_ground`](Self::submit_ground)
-    /// otherwise. A transaction that is under way elsewhere is given up first.
+    /// Sets another ground of the same size at once, after everything that waits; like
+    /// [`submit_ground`](Self::submit_ground) otherwise. A transaction that is under way elsewhere is given up first.
     ///
     /// # Errors
     /// [`ChangeError::GroundSize`] where the size is another one; nothing changed then.

@@ -1,4 +1,5 @@
-//! The edits of a transaction, group by group: each group is one step of undo, and has its own rules and loose settings.
+//! The edits of a transaction, group by group: each group is one step of undo, and has its own rules and loose
+//! settings.
 //!
 //! Only history and receipts are made group by group. Meshes are made once for all groups.
 

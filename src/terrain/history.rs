@@ -1,9 +1,9 @@
 //! Undo and redo: what edits replaced, kept as far back as a budget of bytes allows.
 //!
 //! A step holds the bricks, fields and words of the mask that one group of edits replaced: a stroke, or edits that were
-//! submitted together. Groups are independent of transactions: one transaction may hold many groups, and a stroke may take
-//! many transactions. Bricks are shared, so a step costs only the bytes of bricks that are held by it alone. Undo swaps the old
-//! parts with the new ones, which redo then needs.
+//! submitted together. Groups are independent of transactions: one transaction may hold many groups, and a stroke may
+//! take many transactions. Bricks are shared, so a step costs only the bytes of bricks that are held by it alone. Undo
+//! swaps the old parts with the new ones, which redo then needs.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -128,7 +128,8 @@ impl UndoDelta {
     }
 }
 
-/// What a terrain no longer needs: steps, bricks, records of the log, and a copy of the world. Dropping these is slow; do it off the main thread.
+/// What a terrain no longer needs: steps, bricks, records of the log, and a copy of the world. Dropping these is slow;
+/// do it off the main thread.
 #[derive(Default)]
 pub(crate) struct DeferredDrop {
     steps: Vec<Arc<UndoDelta>>,
@@ -220,8 +221,8 @@ impl UndoStack {
         (self.undo, self.redo, self.step_bytes) = Default::default();
     }
 
-    /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can be
-    /// redone.
+    /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can
+    /// be redone.
     pub fn record(&mut self, replaced: UndoDelta, dropped: &mut DeferredDrop) {
         let first = dropped.steps.len();
         dropped.steps.extend(self.redo.drain(..));
@@ -278,8 +279,8 @@ impl UndoStack {
         }
     }
 
-    /// Shrinks the lists. Their capacity depends only on how many steps there are; otherwise what is trimmed would depend on how
-    /// many there were before.
+    /// Shrinks the lists. Their capacity depends only on how many steps there are; otherwise what is trimmed would
+    /// depend on how many there were before.
     fn shrink(&mut self) {
         for list in [&mut self.undo, &mut self.redo] {
             let room = if list.is_empty() { 0 } else { list.len().next_power_of_two().max(4) };

@@ -103,8 +103,8 @@ impl World {
         })
     }
 
-    /// The stacks of bricks in a box of height one: all positions of the box, or those with bricks where the world has fewer
-    /// stacks than the box has positions.
+    /// The stacks of bricks in a box of height one: all positions of the box, or those with bricks where the world has
+    /// fewer stacks than the box has positions.
     fn stacks_in(&self, columns: LatticeBox) -> Box<dyn Iterator<Item = (i32, i32)> + '_> {
         if columns.volume() <= self.stacks.len() as u64 {
             return Box::new(columns.points().map(|column| (column.x, column.z)));
@@ -126,8 +126,8 @@ impl World {
     }
 }
 
-/// The chunks of a table whose positions lie in a box, in no order. Looks up each position of the box, or goes through the
-/// table where that is shorter.
+/// The chunks of a table whose positions lie in a box, in no order. Looks up each position of the box, or goes through
+/// the table where that is shorter.
 fn found_in<T>(table: &FxHashMap<ChunkPos, T>, places: LatticeBox) -> Vec<ChunkPos> {
     if places.volume() <= table.len() as u64 {
         places.points().map(ChunkPos::from_ivec3).filter(|chunk| table.contains_key(chunk)).collect()

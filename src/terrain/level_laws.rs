@@ -1,5 +1,5 @@
-//! Laws of levels that look inside: of vertices and nesting, of running transactions; and negative controls, each of which
-//! breaks one rule and must be noticed.
+//! Laws of levels that look inside: of vertices and nesting, of running transactions; and negative controls, each of
+//! which breaks one rule and must be noticed.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

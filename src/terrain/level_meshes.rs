@@ -53,8 +53,8 @@ impl GroundFacts {
 }
 
 impl World {
-    /// The quadtree over the world's tiles, with levels up to `top`; fewer where one node would cover the world or be wider than
-    /// 4,096 voxels.
+    /// The quadtree over the world's tiles, with levels up to `top`; fewer where one node would cover the world or be
+    /// wider than 4,096 voxels.
     pub fn level_grid(&self, top: u8) -> LevelGrid {
         let widest = (0..=top).take_while(|&level| i64::from(self.grid.size()) << level <= i64::from(WIDEST));
         LevelGrid::new(self.grid, widest.last().unwrap_or_default())
@@ -75,8 +75,8 @@ impl World {
         cut.grid().chunks() == self.grid
     }
 
-    /// The mesh of a node of a cut, relative to its lowest column at y = 0. What it draws depends on the nodes of the cut that
-    /// touch it. Empty where the world has no such node, or if the cut is of a world of another size.
+    /// The mesh of a node of a cut, relative to its lowest column at y = 0. What it draws depends on the nodes of the
+    /// cut that touch it. Empty where the world has no such node, or if the cut is of a world of another size.
     pub fn node_mesh(&self, cut: &Cut, node: Node) -> SurfaceMesh {
         if self.has_cut(cut) { level::node_mesh(&self.level_view(cut), node) } else { SurfaceMesh::default() }
     }
@@ -96,8 +96,8 @@ impl World {
 
     /// Checks that everything that a cut draws is one closed surface. Visits each triangle of the cut.
     ///
-    /// Where four nodes meet whose levels go fine, coarse, fine, coarse, an edge may serve four triangles. Triangles without area
-    /// may lie in the planes between levels.
+    /// Where four nodes meet whose levels go fine, coarse, fine, coarse, an edge may serve four triangles. Triangles
+    /// without area may lie in the planes between levels.
     pub fn check_seams_in(&self, cut: &Cut) -> SeamReport {
         let mut checker = SeamChecker::default();
         for (node, mesh) in self.drawn_in(cut) {

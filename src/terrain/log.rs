@@ -88,7 +88,8 @@ impl Commit {
     }
 }
 
-/// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main thread.
+/// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main
+/// thread.
 fn bytes_of(entries: &[LogEntry], change: &WorldChange) -> usize {
     let rules = entries.iter().map(rule_bytes);
     let bricks = change.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));

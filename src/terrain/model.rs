@@ -50,11 +50,11 @@ pub struct StaleCommit;
 /// [`submit`](Self::submit) to it. A game may also commit directly, for example with [`apply`](Self::apply);
 /// the change is shown some frames later.
 ///
-/// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and overwrites
-/// any other; a parent may scale it further.
+/// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and
+/// overwrites any other; a parent may scale it further.
 ///
-/// To change levels, insert a new one on the same entity. A terrain that is assigned through `&mut Terrain` is shown too, but
-/// edits that waited in the old one get no receipts, and its debris stays.
+/// To change levels, insert a new one on the same entity. A terrain that is assigned through `&mut Terrain` is shown
+/// too, but edits that waited in the old one get no receipts, and its debris stays.
 pub struct Terrain {
     pub(super) world: Arc<World>,
     engine: Option<Engine>,
@@ -131,12 +131,12 @@ impl Terrain {
         self.engine = Some(engine);
     }
 
-    /// Sets the rules for edits that are submitted later. Edits that wait or are under way keep theirs. A journal is replayed
-    /// exactly only if rules change at the same edits.
+    /// Sets the rules for edits that are submitted later. Edits that wait or are under way keep theirs. A journal is
+    /// replayed exactly only if rules change at the same edits.
     ///
     /// # Errors
-    /// When the rules name [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND), which no ground has; nothing is changed
-    /// then.
+    /// When the rules name [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND), which no ground has; nothing is
+    /// changed then.
     pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
         rules.check()?;
         self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
@@ -164,14 +164,14 @@ impl Terrain {
         &self.world
     }
 
-    /// The world as last committed, to be read elsewhere. Drop it soon: while a snapshot is held, the next transaction has to
-    /// copy the world's index, or its commit does, if the snapshot was taken in between.
+    /// The world as last committed, to be read elsewhere. Drop it soon: while a snapshot is held, the next transaction
+    /// has to copy the world's index, or its commit does, if the snapshot was taken in between.
     pub fn snapshot(&self) -> Arc<World> {
         Arc::clone(&self.world)
     }
 
-    /// Lets edits that are submitted later search for pieces of ground that they cut off, which receipts then list. `None`, the
-    /// default, turns that off. Terrains that must have equal worlds need equal settings.
+    /// Lets edits that are submitted later search for pieces of ground that they cut off, which receipts then list.
+    /// `None`, the default, turns that off. Terrains that must have equal worlds need equal settings.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
         self.loose = settings;
         self.log_terms();
@@ -344,8 +344,8 @@ impl Terrain {
         }
     }
 
-    /// Whether no queued or running edit changes these samples. A queued step counts as reaching everything in the history.
-    /// Loose pieces are not predicted: a piece may reach farther than the edit that cuts it off.
+    /// Whether no queued or running edit changes these samples. A queued step counts as reaching everything in the
+    /// history. Loose pieces are not predicted: a piece may reach farther than the edit that cuts it off.
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
         let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
             Work::Edits(submissions) => submissions.iter().all(|submission| submission.misses(bounds)),
@@ -375,8 +375,9 @@ impl Terrain {
         self.drawn_cut = drawn.filter(|drawn| self.world.has_cut(drawn.cut()));
     }
 
-    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](super::MeshUpdates::nodes) are what has to
-    /// be drawn. `None` while another transaction is under way, and where all of the world is drawn in full.
+    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](super::MeshUpdates::nodes)
+    /// are what has to be drawn. `None` while another transaction is under way, and where all of the world is drawn in
+    /// full.
     #[must_use = "the terrain waits for the commit of its transaction"]
     pub fn begin_cut(&mut self, choose: Arc<ChooseCut>) -> Option<Transaction> {
         self.begin_cut_for(choose, false)

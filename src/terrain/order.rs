@@ -1,8 +1,8 @@
-//! The law of order: the result depends only on the order of submissions, and not on frames, threads, or when transactions
-//! begin, are abandoned or are split.
+//! The law of order: the result depends only on the order of submissions, and not on frames, threads, or when
+//! transactions begin, are abandoned or are split.
 //!
-//! A random script is played twice with irregular transactions, and once by a simple model that applies one edit after the
-//! other, undoes single edits, and groups them itself. `BURROW_WORLDS` is the number of scripts.
+//! A random script is played twice with irregular transactions, and once by a simple model that applies one edit after
+//! the other, undoes single edits, and groups them itself. `BURROW_WORLDS` is the number of scripts.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

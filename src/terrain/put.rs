@@ -329,8 +329,8 @@ impl Terrain {
         self.change_receipts.pop_back().unwrap_or(Err(ChangeError::Panicked))
     }
 
-    /// What became of parts that were [submitted](Self::submit_change), in order; each is returned once. If they are not taken,
-    /// the latest 65,536 are kept.
+    /// What became of parts that were [submitted](Self::submit_change), in order; each is returned once. If they are
+    /// not taken, the latest 65,536 are kept.
     pub fn take_change_receipts(&mut self) -> Vec<Result<Restored, ChangeError>> {
         std::mem::take(&mut self.change_receipts).into()
     }

@@ -141,7 +141,8 @@ impl World {
     /// The stretches of air over (x, z), lowest first; empty outside the world. Coordinates are taken to the nearest
     /// 2^-20 voxel.
     pub fn spans(&self, x: f64, z: f64) -> Vec<Span> {
-        // The deep is solid and the surface closed: floors and ceilings take turns, whatever rounding does to equal heights.
+        // The deep is solid and the surface closed: floors and ceilings take turns, whatever rounding does to equal
+        // heights.
         let crossings = self.crossings(x, z);
         let span =
             |pair: &[Crossing]| Span { floor: pair[0].y, ceiling: pair.get(1).map(|ceiling| ceiling.y) };
@@ -160,8 +161,8 @@ impl World {
         !place.y.is_nan() && !spans.is_empty() && !spans.iter().any(is_open)
     }
 
-    /// Whether all samples around the place are solid. Faster than [`is_solid`](Self::is_solid), which is also true nearer to
-    /// the surface.
+    /// Whether all samples around the place are solid. Faster than [`is_solid`](Self::is_solid), which is also true
+    /// nearer to the surface.
     pub fn is_buried(&self, place: DVec3) -> bool {
         let limit = DVec3::splat(f64::from(LIMIT)).with_x(f64::from(REACH)).with_z(f64::from(REACH));
         let cell = place.clamp(-limit, limit).floor().as_ivec3();

@@ -8,8 +8,8 @@ use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos};
 use crate::volume::{Brick, DiggingRules, Fields};
 
-/// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was written
-/// under another number can't be replayed.
+/// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was
+/// written under another number can't be replayed.
 pub const SIMULATION: u32 = 1;
 
 /// Parts of a world that take the place of others.
@@ -42,8 +42,8 @@ pub enum LogEntry {
 /// A commit: what was asked for, and what came of it.
 #[derive(Clone, Debug)]
 pub struct CommitRecord {
-    /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same where only
-    /// rules or settings changed.
+    /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same
+    /// where only rules or settings changed.
     pub revision: u64,
     /// The world's [hash](super::World::hash) after it.
     pub hash: u64,

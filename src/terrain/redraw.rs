@@ -32,8 +32,8 @@ pub struct MeshUpdates {
     pub tiles: Vec<(TilePos, TileUpdate)>,
     /// Chunks whose surface changed.
     pub chunks: Vec<(ChunkPos, Arc<ChunkSurface>)>,
-    /// Nodes that are drawn otherwise than before, where a [cut](super::DrawnCut) is drawn. Tiles and chunks that change are
-    /// listed above, whether they are drawn or not.
+    /// Nodes that are drawn otherwise than before, where a [cut](super::DrawnCut) is drawn. Tiles and chunks that
+    /// change are listed above, whether they are drawn or not.
     pub nodes: Vec<NodeUpdate>,
     /// What is drawn then, if that changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
@@ -102,7 +102,8 @@ fn areas(dirty: &ByBrick) -> Vec<(Column, Column)> {
     })
 }
 
-/// Has blocks meshed and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
+/// Has blocks meshed and puts their parts among those of their chunks that stay; leaves out chunks where nothing
+/// changed.
 fn mesh_blocks(
     world: &World,
     view: &WorldView,
@@ -187,8 +188,8 @@ fn as_number(key: Key, number: u32) -> u128 {
 /// A chunk, and its surface.
 type Updated = (ChunkPos, Arc<ChunkSurface>);
 
-/// The surfaces of chunks with the parts of these blocks, in order, in place of old ones. Threads begin with those whose parts
-/// are here.
+/// The surfaces of chunks with the parts of these blocks, in order, in place of old ones. Threads begin with those
+/// whose parts are here.
 fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn MeshedBlocks) -> Vec<Updated> {
     let fresh = |&number: &u32| {
         let number = number as usize;

@@ -1,5 +1,5 @@
-//! Bricks, fields and mask of another time, put in place of those of now: a step through history, and what that shares with
-//! parts from a save.
+//! Bricks, fields and mask of another time, put in place of those of now: a step through history, and what that shares
+//! with parts from a save.
 
 use std::sync::Arc;
 
@@ -26,7 +26,8 @@ pub(super) struct Placed {
     pub news: Vec<(ChunkPos, FieldNews)>,
 }
 
-/// Draws the world with a change; `bricks` are those of the change with pristine ones made, `changed` says where samples differ.
+/// Draws the world with a change; `bricks` are those of the change with pristine ones made, `changed` says where
+/// samples differ.
 pub(super) fn place(
     transaction: &Transaction,
     change: &Change,

@@ -6,8 +6,8 @@
 pub struct TerrainSettings {
     /// Cells along a chunk's side, 8..=128. Small chunks redraw faster, large ones need fewer draws.
     pub chunk_size: u32,
-    /// Metres along a voxel's side: a power of two from 1/8 to 8, so that scaling loses no bits. The model itself counts
-    /// in voxels.
+    /// Metres along a voxel's side: a power of two from 1/8 to 8, so that scaling loses no bits. The model itself
+    /// counts in voxels.
     pub voxel_size: f32,
 }
 

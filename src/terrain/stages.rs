@@ -17,7 +17,8 @@ pub struct Stages {
     pub assembly: Duration,
     /// The mask, rings and index lists.
     pub ring: Duration,
-    /// The whole transaction: the above, fields and receipts, and a copy of the world's index where others hold the world.
+    /// The whole transaction: the above, fields and receipts, and a copy of the world's index where others hold the
+    /// world.
     pub whole: Duration,
 }
 

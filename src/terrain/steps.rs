@@ -5,17 +5,18 @@ use super::model::Terrain;
 use super::world::Memory;
 
 impl Terrain {
-    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last group of edits
-    /// that changed the world. Its [`HistoryReceipt`] says what came of it. Where there is [no room](Self::set_work_limits)
-    /// for it, it is answered at once.
+    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last group of
+    /// edits that changed the world. Its [`HistoryReceipt`] says what came of it. Where there is [no
+    /// room](Self::set_work_limits) for it, it is answered at once.
     ///
     /// Groups are decided when edits are submitted, not when their transactions begin: brushes of one
     /// [stroke](crate::brush::Brush::stroke) that follow each other, those that one call of [`apply`](Self::apply) or
     /// [`submit_all`](Self::submit_all) was given, or a single brush. One that changed nothing is no step.
     ///
-    /// Afterwards all is as it was before that group, bit by bit: [`World::hash`](super::World::hash), samples, materials, fields with
-    /// their names, boxes and revisions, mask, meshes and rings. Other than before are [`World::revision`](super::World::revision), which counts
-    /// this as one more commit, and the names that fields will get from then on: none is ever used for two.
+    /// Afterwards all is as it was before that group, bit by bit: [`World::hash`](super::World::hash), samples,
+    /// materials, fields with their names, boxes and revisions, mask, meshes and rings. Other than before are
+    /// [`World::revision`](super::World::revision), which counts this as one more commit, and the names that fields
+    /// will get from then on: none is ever used for two.
     pub fn submit_undo(&mut self) {
         self.submit_step(HistoryStep::Undo);
     }
@@ -56,8 +57,8 @@ impl Terrain {
         self.undo_stack.budget()
     }
 
-    /// Clears what can be undone and redone; the budget stays. Edits that wait or are under way enter history once they are
-    /// committed, and steps that wait find nothing.
+    /// Clears what can be undone and redone; the budget stays. Edits that wait or are under way enter history once they
+    /// are committed, and steps that wait find nothing.
     ///
     /// ```
     /// # use bevy_burrow::prelude::*;
@@ -101,8 +102,8 @@ impl Terrain {
         self.step_receipts.pop_back().unwrap_or_else(|| step.nothing())
     }
 
-    /// What became of steps through history that were submitted, in order; each is returned once. If they are not taken,
-    /// the latest 65,536 are kept.
+    /// What became of steps through history that were submitted, in order; each is returned once. If they are not
+    /// taken, the latest 65,536 are kept.
     pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
         std::mem::take(&mut self.step_receipts).into()
     }

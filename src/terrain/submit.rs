@@ -9,9 +9,9 @@ use super::world::unique;
 use crate::brush::{Brush, Edit};
 
 impl Terrain {
-    /// Queues a brush as a step of undo of its own, unless it is part of a [stroke](Brush::stroke). An invalid brush is queued
-    /// too: its receipt says why it was rejected. A brush that exceeds the [limits](Self::set_work_limits) is answered
-    /// [at once](Self::take_answered).
+    /// Queues a brush as a step of undo of its own, unless it is part of a [stroke](Brush::stroke). An invalid brush is
+    /// queued too: its receipt says why it was rejected. A brush that exceeds the [limits](Self::set_work_limits) is
+    /// answered [at once](Self::take_answered).
     pub fn submit(&mut self, brush: &Brush) {
         self.submit_all([brush]);
     }
@@ -111,14 +111,15 @@ impl Terrain {
         self.queue.work()
     }
 
-    /// Applies brushes at once, after everything that waits: queue, transactions and commits in one call, on this thread.
-    /// Returns the receipts of these brushes; those of brushes that waited are kept for
+    /// Applies brushes at once, after everything that waits: queue, transactions and commits in one call, on this
+    /// thread. Returns the receipts of these brushes; those of brushes that waited are kept for
     /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
     ///
     /// All of them are one step of undo, except for strokes among them; a game that replays a journal may want to
     /// [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.
     ///
-    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as [stale](super::StaleCommit).
+    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as
+    /// [stale](super::StaleCommit).
     pub fn apply<B: Borrow<Brush>>(&mut self, brushes: impl IntoIterator<Item = B>) -> Vec<Receipt> {
         self.abandon();
         let waiting = self.queue.edits().count();
@@ -142,8 +143,8 @@ impl Terrain {
         receipts
     }
 
-    /// Receipts of brushes that waited when [`apply`](Self::apply) was called, and of those that there was no room for, in
-    /// order; each is returned once. If they are not taken, the latest 65,536 are kept.
+    /// Receipts of brushes that waited when [`apply`](Self::apply) was called, and of those that there was no room for,
+    /// in order; each is returned once. If they are not taken, the latest 65,536 are kept.
     pub fn take_answered(&mut self) -> Vec<Receipt> {
         std::mem::take(&mut self.answered).into()
     }

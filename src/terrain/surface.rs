@@ -54,7 +54,8 @@ impl ChunkSurface {
         self.parts.binary_search_by(|part| part.key.cmp(&key)).ok()
     }
 
-    /// The surface with these parts, in order, in place of old ones; others are copied. `None` where that changes nothing.
+    /// The surface with these parts, in order, in place of old ones; others are copied. `None` where that changes
+    /// nothing.
     pub(super) fn updated<'a>(&self, fresh: impl Iterator<Item = Fresh<'a>>) -> Option<Self> {
         let changes: Vec<Fresh> = fresh.filter(|part| self.differs(part)).collect();
         if changes.is_empty() {

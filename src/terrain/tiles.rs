@@ -23,8 +23,8 @@ const FOUND: u8 = 1;
 /// Set when the caller allows drawing to start.
 const ALLOWED: u8 = 2;
 
-/// The tiles that a transaction draws. The touched ones can be found early; drawing starts once they are known and the caller
-/// allows it.
+/// The tiles that a transaction draws. The touched ones can be found early; drawing starts once they are known and the
+/// caller allows it.
 pub(super) struct TileWork<'a> {
     world: &'a World,
     view: &'a WorldView<'a>,

@@ -26,8 +26,8 @@ pub(super) enum Work {
     Cut(Arc<ChooseCut>),
 }
 
-/// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
-/// terrain takes one of them.
+/// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit;
+/// a terrain takes one of them.
 #[derive(Clone)]
 pub struct Transaction {
     pub(super) ticket: u64,

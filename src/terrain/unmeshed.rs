@@ -89,8 +89,8 @@ fn columns(low: IVec3, high: IVec3) -> impl Iterator<Item = (i32, i32)> {
     (low.x..=high.x).flat_map(move |x| (low.z..=high.z).map(move |z| (x, z)))
 }
 
-/// The blocks of a chunk that may draw something of a world with this mask, by stacks, each from below: those of stored bricks
-/// and next to them, and those of the mask's sheet.
+/// The blocks of a chunk that may draw something of a world with this mask, by stacks, each from below: those of stored
+/// bricks and next to them, and those of the mask's sheet.
 fn blocks_of(world: &World, mask: MaskView, chunk: ChunkPos) -> Vec<Block> {
     let own = BrickPos::range(world.grid.chunk_cells(chunk));
     let mut blocks = Vec::new();

@@ -88,10 +88,11 @@ pub struct World {
     pub(super) fields: FxHashMap<ChunkPos, Fields>,
     pub(super) mask: Mask,
     pub(super) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
-    /// Chunks that may draw something and whose surface is not kept: a table without values, counted and shrunk like the others.
+    /// Chunks that may draw something and whose surface is not kept: a table without values, counted and shrunk like
+    /// the others.
     pub(super) unmeshed: FxHashMap<ChunkPos, ()>,
-    /// Of tiles that bordered on the mask when they were last drawn; some may have none. Those of a tile that is not among them
-    /// are made when they are needed.
+    /// Of tiles that bordered on the mask when they were last drawn; some may have none. Those of a tile that is not
+    /// among them are made when they are needed.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
     /// With this many kinds, unused ones are removed from the pool.
@@ -193,14 +194,14 @@ impl World {
         WorldView { samples: self.samples(), mask: MaskView::new(&self.mask), grid: self.grid }
     }
 
-    /// Hash of the ground and of every edited sample. It does not depend on chunk size, on how edits were batched, nor on
-    /// the machine.
+    /// Hash of the ground and of every edited sample. It does not depend on chunk size, on how edits were batched, nor
+    /// on the machine.
     pub fn hash(&self) -> u64 {
         Self::hash_of(self.ground.hash(), self.sample_hash)
     }
 
-    /// The hash of a world over a ground with this [hash](Ground::hash), whose [regions](Self::region_hash) have hashes with this
-    /// sum, which wraps around.
+    /// The hash of a world over a ground with this [hash](Ground::hash), whose [regions](Self::region_hash) have hashes
+    /// with this sum, which wraps around.
     pub fn hash_of(ground: u64, regions: u64) -> u64 {
         hash::mix(ground ^ hash::mix(regions))
     }
@@ -220,8 +221,8 @@ impl World {
         self.bricks.iter().map(|(&pos, brick)| (pos, brick.as_ref()))
     }
 
-    /// The chunks that draw something, in no order. Of a world that was [restored](super::Terrain::restore), or whose terrain
-    /// [never meshes](super::Meshing::Never), some may turn out to draw nothing.
+    /// The chunks that draw something, in no order. Of a world that was [restored](super::Terrain::restore), or whose
+    /// terrain [never meshes](super::Meshing::Never), some may turn out to draw nothing.
     pub fn drawn_chunks(&self) -> impl Iterator<Item = ChunkPos> {
         self.maybe_drawn()
     }

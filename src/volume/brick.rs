@@ -133,8 +133,8 @@ impl Brick {
     /// A brick of a world over this ground, from its edited samples and their materials, both in order. Which
     /// samples are solid is computed again.
     ///
-    /// `None` where there are not as many of them as `edited` has bits, where a density is [`i16::MIN`], or where a sample of air
-    /// has a material.
+    /// `None` where there are not as many of them as `edited` has bits, where a density is [`i16::MIN`], or where a
+    /// sample of air has a material.
     pub fn restored(
         ground: &Ground,
         pos: BrickPos,
@@ -297,8 +297,8 @@ impl Brick {
         is_uniform.then_some(UniformKind { sample, material })
     }
 
-    /// What some edited samples add to the world's hash, where `y` is the height of the brick's lowest sample and `columns` are
-    /// the [hashes](column_hash) of its columns.
+    /// What some edited samples add to the world's hash, where `y` is the height of the brick's lowest sample and
+    /// `columns` are the [hashes](column_hash) of its columns.
     pub(crate) fn hash(&self, y: i32, samples: &Layers, columns: &[u64; 64]) -> u64 {
         let of_layer = |(layer, &samples): (usize, &u64)| {
             let height = y + layer as i32;
@@ -342,8 +342,8 @@ impl Brick {
     }
 }
 
-/// The pool of uniform bricks, all of whose samples are alike, one of each kind: the middle of every large cave is the same
-/// brick.
+/// The pool of uniform bricks, all of whose samples are alike, one of each kind: the middle of every large cave is the
+/// same brick.
 pub(crate) type UniformBricks = FxHashMap<UniformKind, Arc<Brick>>;
 
 /// What all samples of a uniform brick were edited to.

@@ -29,16 +29,16 @@ use crate::lattice::{LatticeBox, ONE};
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DiggingRules {
-    /// How hard materials are; others have hardness 0. A brush with at least that power digs at full speed, one with half of
-    /// it or less takes nothing away, and in between its speed grows linearly. Painting is not restricted: ground that is
-    /// painted with a softer material is softer from then on.
+    /// How hard materials are; others have hardness 0. A brush with at least that power digs at full speed, one with
+    /// half of it or less takes nothing away, and in between its speed grows linearly. Painting is not restricted:
+    /// ground that is painted with a softer material is softer from then on.
     pub hardness: BTreeMap<MaterialId, u8>,
     /// Materials that no brush takes away, nor paints over.
     pub unbreakable: BTreeSet<MaterialId>,
     /// Nothing solid below this height, in voxels, is taken away.
     pub bedrock: Option<i32>,
-    /// Samples that no operation changes at all, paint included. Each edit searches all boxes, each brick only those near
-    /// the edits of its batch.
+    /// Samples that no operation changes at all, paint included. Each edit searches all boxes, each brick only those
+    /// near the edits of its batch.
     pub protected: Vec<LatticeBox>,
 }
 
@@ -98,7 +98,8 @@ impl DiggingRules {
         self.unbreakable.contains(&material)
     }
 
-    /// Which part of a change that takes away solid ground a brush of this power makes, in 1/256, and why not all of it.
+    /// Which part of a change that takes away solid ground a brush of this power makes, in 1/256, and why not all of
+    /// it.
     pub(crate) fn pace(&self, material: MaterialId, y: i32, power: u8) -> (i32, Option<VoxelOutcome>) {
         if self.bedrock.is_some_and(|bedrock| y < bedrock) || self.is_unbreakable(material) {
             return (0, Some(VoxelOutcome::Unbreakable));

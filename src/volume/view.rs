@@ -58,7 +58,8 @@ impl<'a> SampleView<'a> {
         self.ground
     }
 
-    /// Calls `each` with the bricks at all positions of a box. Where several lie over each other, the topmost comes last.
+    /// Calls `each` with the bricks at all positions of a box. Where several lie over each other, the topmost comes
+    /// last.
     pub(crate) fn for_bricks(&self, places: LatticeBox, mut each: impl FnMut(BrickPos, &'a Brick)) {
         for table in std::iter::once(self.bricks).chain(self.newer) {
             if (table.len() as u64) < places.volume() {

@@ -1,8 +1,8 @@
 //! The ground is what it looks like: each pixel shows what a dig there yields.
 //!
-//! A cliff, a cave and a trench through beds and ores are drawn by the look with one flat colour for each material, without
-//! light. What every pixel shows is compared with the solid voxels next to the point that it is a picture of. Borders may
-//! stray by half a voxel: then what shows is up to a voxel farther away than what is nearest.
+//! A cliff, a cave and a trench through beds and ores are drawn by the look with one flat colour for each material,
+//! without light. What every pixel shows is compared with the solid voxels next to the point that it is a picture of.
+//! Borders may stray by half a voxel: then what shows is up to a voxel farther away than what is nearest.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::core_pipeline::tonemapping::Tonemapping;
@@ -35,11 +35,12 @@ const COLORS: [[u8; 3]; 14] = [
     [188, 0, 255],
 ];
 
-/// How much farther than the nearest solid voxel one may be whose material shows: half a voxel on either side of a border,
-/// and what a surface at a whole height lies above its highest sample.
+/// How much farther than the nearest solid voxel one may be whose material shows: half a voxel on either side of a
+/// border, and what a surface at a whole height lies above its highest sample.
 const FARTHER: f64 = 1.1;
 
-/// One pixel in so many may show what lies a little farther: noise moves borders, by less than half the way to the next vertex.
+/// One pixel in so many may show what lies a little farther: noise moves borders, by less than half the way to the next
+/// vertex.
 const SELDOM: usize = 5000;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {

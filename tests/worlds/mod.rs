@@ -45,8 +45,8 @@ pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) ->
     Ground::from_fn(width, depth, |i, k| grey(x + i, z + k) * relief).expect("finite heights")
 }
 
-/// A random ground, from flat to steep, and the chunk size of its world. In every third one, materials vary by column; every
-/// fifth one has strata.
+/// A random ground, from flat to steep, and the chunk size of its world. In every third one, materials vary by column;
+/// every fifth one has strata.
 pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let chunk_size = CHUNK_SIZES[(index % 4) as usize];
     // Sizes that are no multiples of the chunk size: the last chunks are cut at the rim.

@@ -218,8 +218,8 @@ impl Cuda {
     /// result while it is still in the session's memory. If the result does not arrive completely, the output of
     /// `on_done` is discarded.
     ///
-    /// The lock is held until `on_done` returns. Meanwhile `on_done` may run other tasks of its thread pool, even on this
-    /// thread. That cannot deadlock: other callers only try the lock, and continue without the device.
+    /// The lock is held until `on_done` returns. Meanwhile `on_done` may run other tasks of its thread pool, even on
+    /// this thread. That cannot deadlock: other callers only try the lock, and continue without the device.
     fn attempt_stage<T, R>(
         &self,
         choice: &mut Choice,

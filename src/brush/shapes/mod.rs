@@ -1,7 +1,7 @@
 //! The shapes that a brush can have: a file for each, and here what they have in common.
 //!
-//! A shape is a struct over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). To add one,
-//! write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
+//! A shape is a struct over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). To
+//! add one, write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
 //! `kernels/shapes.cuh`.
 
 /// Converts a shape field by field, as in `convert!(Sphere { center: point, radius: length })`.
@@ -86,8 +86,8 @@ pub(crate) struct Extent {
 
 macro_rules! shapes {
     ($($(#[$attribute:meta])* $name:ident,)*) => {
-        /// The shape of a brush, in voxels of terrain space; in a [`Brush`](super::Brush) that is a message of the plugin's, in
-        /// units of world space.
+        /// The shape of a brush, in voxels of terrain space; in a [`Brush`](super::Brush) that is a message of the
+        /// plugin's, in units of world space.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "shape", rename_all = "snake_case")]
         #[non_exhaustive]

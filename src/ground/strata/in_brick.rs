@@ -1,8 +1,9 @@
 //! The strata in one brick, and the bricks that a thread asked for last.
 //!
-//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks. Most strata are ruled out
-//! for 4x4x4 voxels at a time, an eighth of a brick: by their ranges when the first voxel of the eighth is asked for, and by
-//! bounds of their noise when one comes that the ranges leave open. The corners of the noise are hashed once for a brick.
+//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks. Most strata are
+//! ruled out for 4x4x4 voxels at a time, an eighth of a brick: by their ranges when the first voxel of the eighth is
+//! asked for, and by bounds of their noise when one comes that the ranges leave open. The corners of the noise are
+//! hashed once for a brick.
 
 use std::cell::RefCell;
 
@@ -152,7 +153,8 @@ impl BrickStrata {
         self.eighths[number] = eighth;
     }
 
-    /// The voxels of a set that are the highest solid ones of their columns. Sets are bits `z * 8 + x` of the layer at a y.
+    /// The voxels of a set that are the highest solid ones of their columns. Sets are bits `z * 8 + x` of the layer at
+    /// a y.
     #[inline]
     pub fn tops(&self, y: i32, voxels: u64) -> u64 {
         let heights = self.heights.as_flattened();
@@ -160,8 +162,8 @@ impl BrickStrata {
         ones(voxels).filter(is_top).fold(0, |tops, column| tops | 1 << column)
     }
 
-    /// Calls `each` with the materials of a set of voxels, and which of them each holds; [`MaterialId::GROUND`] for those
-    /// that no stratum holds. Sets are bits `z * 8 + x` of the layer at a y.
+    /// Calls `each` with the materials of a set of voxels, and which of them each holds; [`MaterialId::GROUND`] for
+    /// those that no stratum holds. Sets are bits `z * 8 + x` of the layer at a y.
     #[inline]
     pub fn for_materials(
         &mut self,

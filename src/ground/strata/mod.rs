@@ -1,8 +1,8 @@
 //! Strata: what every voxel of the pristine ground is made of, computed and never stored.
 //!
-//! [`Strata`] is a list of bodies of material, [`Stratum`], each with conditions for where it lies. A voxel is made of the
-//! first one that holds it; where none does, of what its column has ([`ColumnMaterial`](super::ColumnMaterial)). All of
-//! the model asks the same function: receipts, rules, queries, loose pieces, and the vertices that are drawn.
+//! [`Strata`] is a list of bodies of material, [`Stratum`], each with conditions for where it lies. A voxel is made of
+//! the first one that holds it; where none does, of what its column has ([`ColumnMaterial`](super::ColumnMaterial)).
+//! All of the model asks the same function: receipts, rules, queries, loose pieces, and the vertices that are drawn.
 //!
 //! The function is computed with integers (`records`), for a brick at a time (`in_brick`), and has equal
 //! results on every machine and on the GPU.
@@ -113,8 +113,8 @@ pub struct Stratum {
     pub material: MaterialId,
     /// Its shape.
     pub body: StratumBody,
-    /// The depth below the pristine surface, in voxels: from 0 on and below 1 for the highest solid voxel of a column, below 2
-    /// for the next. Voxels above the surface are at depth 0.
+    /// The depth below the pristine surface, in voxels: from 0 on and below 1 for the highest solid voxel of a column,
+    /// below 2 for the next. Voxels above the surface are at depth 0.
     pub depth: Interval,
     /// The height, in voxels.
     pub height: Interval,
@@ -262,8 +262,8 @@ impl From<Interval> for (Option<f32>, Option<f32>) {
     }
 }
 
-/// A game's own function in place of [`Strata`]: the material at a lattice point that lies so deep, in 1/256 voxel; `None` for
-/// what the column has.
+/// A game's own function in place of [`Strata`]: the material at a lattice point that lies so deep, in 1/256 voxel;
+/// `None` for what the column has.
 pub(crate) type MaterialFn = dyn Fn(IVec3, i32) -> Option<MaterialId> + Send + Sync;
 
 /// What a ground has instead of its columns' materials.

@@ -44,17 +44,17 @@ impl Ground {
     /// [`Self::hash`].
     ///
     /// # Errors
-    /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the machine
-    /// has too little.
+    /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the
+    /// machine has too little.
     pub fn with_strata(self, strata: &Strata) -> Result<Self, GroundError> {
         strata.check()?;
         let records = Arc::new(StrataRecords::new(strata));
         self.with_below(OwnMaterials::Strata { given: Arc::new(strata.clone()), records })
     }
 
-    /// This ground with a material function in place of [`Strata`]: given a lattice point and its depth in
-    /// 1/256 voxel, as [`Stratum::depth`](super::Stratum::depth) counts it, it returns the material there, or `None`
-    /// (or [`MaterialId::GROUND`]) for what the column has. For a point beyond the rim it is asked at the nearest column.
+    /// This ground with a material function in place of [`Strata`]: given a lattice point and its depth in 1/256 voxel,
+    /// as [`Stratum::depth`](super::Stratum::depth) counts it, it returns the material there, or `None` (or
+    /// [`MaterialId::GROUND`]) for what the column has. For a point beyond the rim it is asked at the nearest column.
     ///
     /// It must always return the same material for a point, or worlds would depend on timing. `id` represents
     /// it in [`Self::hash`]: use a different one for every function. The GPU can't run it, so such worlds are
@@ -134,8 +134,8 @@ impl Ground {
     }
 
     /// Material of a pristine voxel: of the first stratum that holds it; else, down to
-    /// [`OVERLAY_DEPTH`](crate::ground::OVERLAY_DEPTH) below the surface, the column's overlay if it covers at least half
-    /// (`blend >= 128`); else the column's base.
+    /// [`OVERLAY_DEPTH`](crate::ground::OVERLAY_DEPTH) below the surface, the column's overlay if it covers at least
+    /// half (`blend >= 128`); else the column's base.
     pub fn material(&self, point: IVec3) -> MaterialId {
         let Some(below) = self.below() else { return self.material_of_column(point) };
         let (column, y) = (self.nearest_column(point), point.y.clamp(-HIGHEST, HIGHEST));
@@ -160,8 +160,8 @@ impl Ground {
         found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| self.material_of_column(point))
     }
 
-    /// Calls `each` with the materials of pristine voxels, and which are of each, in one call or several. Voxels are bits
-    /// `z * 8 + x` of layer `y` of a brick.
+    /// Calls `each` with the materials of pristine voxels, and which are of each, in one call or several. Voxels are
+    /// bits `z * 8 + x` of layer `y` of a brick.
     pub(crate) fn for_materials(
         &self,
         pos: BrickPos,
@@ -241,8 +241,8 @@ impl Ground {
         found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| of_column.at_distance(-depth - 1))
     }
 
-    /// The cells whose tops do not show all materials of their face; `None` if there are none, as on any ground whose materials
-    /// are those of its columns.
+    /// The cells whose tops do not show all materials of their face; `None` if there are none, as on any ground whose
+    /// materials are those of its columns.
     pub(crate) fn steep_cells(&self) -> Option<Steep<'_>> {
         match &self.below()?.steep {
             Some(cells) => Some(Steep::Resident(cells)),

@@ -8,8 +8,8 @@ use crate::lattice::{Column, ceil};
 
 /// The steep cells of a ground, one bit each.
 ///
-/// A cell is steep if two lattice levels or more separate the ends of one of its sides or of its diagonal, and not all voxels
-/// along these lines, its columns' tops included, are of the same material.
+/// A cell is steep if two lattice levels or more separate the ends of one of its sides or of its diagonal, and not all
+/// voxels along these lines, its columns' tops included, are of the same material.
 #[derive(Clone, PartialEq)]
 pub(crate) struct SteepCells {
     /// Words along x.

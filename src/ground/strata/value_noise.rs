@@ -26,8 +26,8 @@ pub(super) struct ValueNoise {
 /// The noise at the corners of a cell: x fastest, then z, then y. In the plane, the last four are 0.
 pub(super) type Corners = i16x8;
 
-/// Along each axis noise is linear in the weight, so the least and the greatest of a box are at its corners, but for this much
-/// of rounding.
+/// Along each axis noise is linear in the weight, so the least and the greatest of a box are at its corners, but for
+/// this much of rounding.
 const ROUNDING: i32 = 4;
 
 impl ValueNoise {

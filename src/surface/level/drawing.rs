@@ -1,5 +1,5 @@
-//! A node of level 1 or above: its cells as two triangles each, as fans where they meet finer or volumetric ones (rules 3 and 7),
-//! or as cubes.
+//! A node of level 1 or above: its cells as two triangles each, as fans where they meet finer or volumetric ones (rules
+//! 3 and 7), or as cubes.
 
 use glam::IVec3;
 use rustc_hash::FxHashMap;
@@ -230,8 +230,8 @@ impl<'a> Drawing<'a> {
             .collect()
     }
 
-    /// The lattice y of the cubes that marching cubes draws over a cell: those that touch an edited sample, and all of a volumetric
-    /// cell's sheet; of another cell's sheet none.
+    /// The lattice y of the cubes that marching cubes draws over a cell: those that touch an edited sample, and all of
+    /// a volumetric cell's sheet; of another cell's sheet none.
     fn cube_rows(&self, cell: Cell, is_volumetric: bool, rows: &mut Vec<i32>) {
         rows.clear();
         let corners = cell.corners();

@@ -18,7 +18,8 @@ use crate::surface::mask::cell_sheet;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Indices, Mask, MaskView, SurfaceMesh, Vertex, tile};
 
-/// The mask by which a node of level 0 is drawn, right for its cells and those around them; `None` if it is the world's.
+/// The mask by which a node of level 0 is drawn, right for its cells and those around them; `None` if it is the
+/// world's.
 pub(super) fn drawn_mask(view: &LevelView, node: Node) -> Option<Mask> {
     if view.cut.touching(node).iter().all(|other| other.level == 0) {
         return None;

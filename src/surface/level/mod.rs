@@ -2,11 +2,11 @@
 //!
 //! Rules 1 to 6 hold at each level, on a lattice of its own; three more close what lies between levels:
 //!
-//! 7. **Fan.** At an undisturbed interval, where the side of a coarse cell meets two finer ones, the coarse cell fans over the line
-//!    of its finer neighbours (`drawing`). Where it is volumetric, a zipper joins both lines. A disturbed interval makes the
-//!    cells along it volumetric, on both sides (`volumetric`), and is closed by walls (`walls`).
-//! 8. **Descent.** The vertex of a lattice edge with an edited end is that of its half whose ends differ in sign, down to an edge
-//!    of one voxel or one without an edited end (`edge`).
+//! 7. **Fan.** At an undisturbed interval, where the side of a coarse cell meets two finer ones, the coarse cell fans
+//!    over the line of its finer neighbours (`drawing`). Where it is volumetric, a zipper joins both lines. A disturbed
+//!    interval makes the cells along it volumetric, on both sides (`volumetric`), and is closed by walls (`walls`).
+//! 8. **Descent.** The vertex of a lattice edge with an edited end is that of its half whose ends differ in sign, down
+//!    to an edge of one voxel or one without an edited end (`edge`).
 //! 9. **Rim.** A column beyond the rim is the rim's, heights and edits, and is drawn there.
 //!
 //! The mesh of a node depends on its own level and on the levels of the nodes that touch it. A node of level

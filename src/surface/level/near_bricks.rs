@@ -28,8 +28,8 @@ impl<'a> Stacks<'a> {
         Self { newer, ..self }
     }
 
-    /// Calls `each` with every stack of a rectangle, both ends included, and the heights of bricks in it; some twice, and in no
-    /// order. Looks at the rectangle's places or at all stacks, whichever are fewer.
+    /// Calls `each` with every stack of a rectangle, both ends included, and the heights of bricks in it; some twice,
+    /// and in no order. Looks at the rectangle's places or at all stacks, whichever are fewer.
     fn for_stacks(&self, low: (i32, i32), high: (i32, i32), mut each: impl FnMut((i32, i32), &[i32])) {
         let along = |low: i32, high: i32| (i64::from(high) - i64::from(low) + 1).max(0);
         let is_inside = |(x, z): (i32, i32)| (low.0..=high.0).contains(&x) && (low.1..=high.1).contains(&z);
@@ -67,8 +67,8 @@ pub(super) struct NearBricks<'a> {
 }
 
 impl<'a> NearBricks<'a> {
-    /// The bricks over the columns from `low` to `high` with samples of a lattice of this step. Columns that lie beyond the rim,
-    /// whose last column is `last`, are the rim's.
+    /// The bricks over the columns from `low` to `high` with samples of a lattice of this step. Columns that lie beyond
+    /// the rim, whose last column is `last`, are the rim's.
     pub fn new(
         samples: &SampleView<'a>,
         stacks: &Stacks,
@@ -137,7 +137,8 @@ impl<'a> NearBricks<'a> {
         self.stacks.iter().flat_map(move |(&stack, bricks)| bricks.iter().map(move |(y, _)| at(stack, *y)))
     }
 
-    /// The lattice columns of a step under which samples may be edited, in no order. Those beyond the rim are there, too.
+    /// The lattice columns of a step under which samples may be edited, in no order. Those beyond the rim are there,
+    /// too.
     pub fn columns(&self, step: i32) -> impl Iterator<Item = Column> {
         let (last_x, last_z) = self.last;
         self.stacks.keys().flat_map(move |&(x, z)| {
@@ -153,7 +154,8 @@ fn multiples(low: i32, end: i32, step: i32) -> impl Iterator<Item = i32> {
     (first..=end).step_by(step as usize)
 }
 
-/// The coordinates of a lattice of this step in the bricks at `at`, where `last` is the rim: beyond it, the next one is the rim's.
+/// The coordinates of a lattice of this step in the bricks at `at`, where `last` is the rim: beyond it, the next one is
+/// the rim's.
 fn lattice_in(at: i32, step: i32, last: i32) -> impl Iterator<Item = i32> {
     let (low, high) = (at * BRICK, at * BRICK + BRICK - 1);
     let beyond = (last + step - 1).div_euclid(step) * step;

@@ -79,8 +79,8 @@ impl<'a> LevelView<'a> {
             .map(|node| node.level)
     }
 
-    /// Lattice y of the lowest points of the cubes of this stride that the pristine surface crosses over some columns; they end
-    /// at the end of the range. A height on a lattice point counts below it.
+    /// Lattice y of the lowest points of the cubes of this stride that the pristine surface crosses over some columns;
+    /// they end at the end of the range. A height on a lattice point counts below it.
     pub(super) fn sheet(&self, columns: &[Column], stride: i32) -> Range<i32> {
         let heights = columns.iter().map(|&column| self.ground().height(column));
         let (low, high) = heights.fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));

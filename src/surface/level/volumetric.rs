@@ -1,5 +1,5 @@
-//! Which cells of which level marching cubes draws (rule 2): those over whose sheet something is edited, and those that are
-//! promoted because something is edited at an interval between two levels.
+//! Which cells of which level marching cubes draws (rule 2): those over whose sheet something is edited, and those that
+//! are promoted because something is edited at an interval between two levels.
 
 use rustc_hash::FxHashMap;
 

@@ -29,7 +29,8 @@ impl MaskView<'_> {
     /// Lattice edges along x, y and z between a cell of the mask and one that stays heightmap, in and around the word
     /// (x, z): bit `(z + 1) * 10 + x + 1`.
     pub(crate) fn border_edges(&self, grid: ChunkGrid, (x, z): (i32, i32)) -> [u128; 3] {
-        // Rows of a word are bytes. A window row is one bit of the word before, eight of the own, one of the word after.
+        // Rows of a word are bytes. A window row is one bit of the word before, eight of the own, one of the word
+        // after.
         let row = |words: [u64; 3], z: i32| {
             let [before, own, after] = words.map(|word| u128::from(word >> (z * 8) & 0xff));
             before >> 7 | own << 1 | (after & 1) << 9
@@ -58,7 +59,8 @@ impl MaskView<'_> {
     }
 }
 
-/// For each cell of a rectangle: is it in the mask, is it steep, and which of its sides border on a cell that is either?
+/// For each cell of a rectangle: is it in the mask, is it steep, and which of its sides border on a cell that is
+/// either?
 #[derive(Clone, Debug)]
 pub struct Borders {
     low: Column,
@@ -130,8 +132,9 @@ impl Borders {
         self.patches.get(z * self.across + x)
     }
 
-    /// The cells of 8x8 that lie in the rectangle, are not in the mask, and border on it or on a steep cell or are steep: row
-    /// by row, each with a bit for every side where it borders, or with [`Self::STEEP`]. `(z, x)` in units of 8 cells.
+    /// The cells of 8x8 that lie in the rectangle, are not in the mask, and border on it or on a steep cell or are
+    /// steep: row by row, each with a bit for every side where it borders, or with [`Self::STEEP`]. `(z, x)` in units
+    /// of 8 cells.
     pub fn bordering(&self, (z, x): (i32, i32)) -> impl Iterator<Item = (Column, u8)> {
         let patch = self.patch((x, z)).copied().unwrap_or_default();
         self.cells(patch.touched & !patch.own, (z, x)).map(move |(bit, cell)| {

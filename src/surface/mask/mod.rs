@@ -1,7 +1,7 @@
 //! The volumetric mask: cells whose sheet marching cubes draws.
 //!
-//! Rule 2: a cell is in the mask when a corner of its [sheet](cell_sheet), the cubes that the pristine surface crosses over it,
-//! is edited. `rule::joined_cells` finds these cells.
+//! Rule 2: a cell is in the mask when a corner of its [sheet](cell_sheet), the cubes that the pristine surface crosses
+//! over it, is edited. `rule::joined_cells` finds these cells.
 
 mod borders;
 mod rule;

@@ -127,7 +127,8 @@ fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
     bricks.sort_unstable_by_key(|brick| (brick.0.x, brick.0.z, brick.0.y));
     let block = |&brick: &BrickPos| Block { brick, chunk: view.grid.chunk_of(brick.origin()) };
     let blocks: Vec<Block> = bricks.iter().map(block).collect();
-    let mesh = |on_done: &mut dyn FnMut(&dyn MeshedBlocks)| engine.compute().mesh(&view, &blocks, &|| {}, on_done);
+    let mesh =
+        |on_done: &mut dyn FnMut(&dyn MeshedBlocks)| engine.compute().mesh(&view, &blocks, &|| {}, on_done);
     let drawn = catch_unwind(AssertUnwindSafe(|| mesh(&mut |_| panic!("as planned"))));
     assert!(drawn.is_err());
     let mut found = Parts::default();
