@@ -17,7 +17,7 @@
 //!
 //! | in a brush, floats | in an edit, integers | ready to be applied |
 //! | --- | --- | --- |
-//! | [`Shape`] | `QuantizedShape` | `Form`, in the [`Evaluator`] |
+//! | [`Shape`] | `QuantizedShape` | `ShapeSdf`, in the [`Evaluator`] |
 //! | [`Roughness`] | `QuantizedRoughness` | the same, in the [`Evaluator`] |
 //! | [`Operation`] | `QuantizedOperation` | `Kind`, and a `SculptKernel` for those that sculpt |
 //! | [`Blend`] | `QuantizedBlend` | the same, in the `SculptKernel` |
@@ -113,7 +113,7 @@ pub use operation::Operation;
 pub use request::Brush;
 pub use roughness::Roughness;
 #[cfg(feature = "cuda")]
-pub(crate) use sculpt_kernel::Stroke;
+pub(crate) use sculpt_kernel::SculptOp;
 pub(crate) use sculpt_kernel::{FARTHEST, SculptKernel, Stencil, is_moved};
 #[cfg(feature = "plugin")]
 pub(crate) use shapes::Extent;

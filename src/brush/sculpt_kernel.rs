@@ -262,19 +262,19 @@ impl SculptKernel {
     }
 }
 
-/// A sculptor as plain numbers, for other machines.
+/// A sculpting operation as plain numbers, for the GPU.
 #[cfg(feature = "cuda")]
 pub(crate) struct SculptParams<'a> {
     pub strength: i32,
     /// Not wider than the shape is deep.
     pub falloff: i32,
     pub material: Option<MaterialId>,
-    pub stroke: Stroke<'a>,
+    pub operation: SculptOp<'a>,
 }
 
-/// What a sculptor does to a surface.
+/// A sculpting operation with its parameters.
 #[cfg(feature = "cuda")]
-pub(crate) enum Stroke<'a> {
+pub(crate) enum SculptOp<'a> {
     Smooth,
     Sharpen,
     /// A point of the plane, its normal, and what that measures.
@@ -289,25 +289,25 @@ pub(crate) enum Stroke<'a> {
 
 #[cfg(feature = "cuda")]
 impl SculptKernel {
-    /// All that densities are computed from; `None` for what is no sculptor's deed.
+    /// All that densities are computed from; `None` unless the operation sculpts.
     pub(crate) fn constants(&self) -> Option<SculptParams<'_>> {
-        let stroke = match &self.operation {
-            QuantizedOperation::Smooth => Stroke::Smooth,
-            QuantizedOperation::Sharpen => Stroke::Sharpen,
+        let operation = match &self.operation {
+            QuantizedOperation::Smooth => SculptOp::Smooth,
+            QuantizedOperation::Sharpen => SculptOp::Sharpen,
             QuantizedOperation::Flatten { point, normal } => {
-                Stroke::Flatten(*point, *normal, measure(normal.map(i32::from)))
+                SculptOp::Flatten(*point, *normal, measure(normal.map(i32::from)))
             }
-            QuantizedOperation::Level { height } => Stroke::Level(*height),
-            QuantizedOperation::Raise { amount } => Stroke::Shift(-amount),
-            QuantizedOperation::Lower { amount } => Stroke::Shift(*amount),
-            QuantizedOperation::Stamp { stamp } => Stroke::Stamp(stamp.constants()),
-            QuantizedOperation::Terrace { step, base } => Stroke::Terrace(*step, *base),
+            QuantizedOperation::Level { height } => SculptOp::Level(*height),
+            QuantizedOperation::Raise { amount } => SculptOp::Shift(-amount),
+            QuantizedOperation::Lower { amount } => SculptOp::Shift(*amount),
+            QuantizedOperation::Stamp { stamp } => SculptOp::Stamp(stamp.constants()),
+            QuantizedOperation::Terrace { step, base } => SculptOp::Terrace(*step, *base),
             QuantizedOperation::Dig | QuantizedOperation::Add { .. } | QuantizedOperation::Paint { .. } => {
                 return None;
             }
         };
         let QuantizedBlend { strength, falloff, material } = self.blend;
-        Some(SculptParams { strength, falloff: falloff.min(self.deep), material, stroke })
+        Some(SculptParams { strength, falloff: falloff.min(self.deep), material, operation })
     }
 }
 

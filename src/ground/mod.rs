@@ -25,8 +25,8 @@ mod grey_image;
 mod image_heights;
 mod material;
 mod noise_heights;
+mod noise_params;
 mod noise_rows;
-mod noise_terms;
 mod on_demand;
 mod page;
 mod pages;
@@ -45,7 +45,7 @@ pub use image_heights::{Detail, ImageScale, MAX_VOXELS_PER_SAMPLE};
 pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]
-pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
+pub(crate) use noise_params::{NoiseFactors, NoiseParams};
 pub(crate) use page::GroundPage;
 pub use rules::MaterialRule;
 pub use source::{ColumnGrid, FunctionSource, HeightSource, ImageSource, InsetSource, NoiseSource};

@@ -17,7 +17,7 @@ pub(crate) fn table_bytes<K, V>(table: &FxHashMap<K, V>) -> usize {
 }
 
 /// Shrinks a hash table once it is less than a quarter full.
-pub(crate) fn give_back<K: Eq + Hash, V>(table: &mut FxHashMap<K, V>) {
+pub(crate) fn shrink_if_sparse<K: Eq + Hash, V>(table: &mut FxHashMap<K, V>) {
     if table.len() < table.capacity() / 4 {
         table.shrink_to_fit();
     }
@@ -34,7 +34,7 @@ mod tests {
         assert_eq!(full, 2048 * 17 + 16);
         for i in 0..1792 {
             table.remove(&[i % 7, i / 7, -i]);
-            give_back(&mut table);
+            shrink_if_sparse(&mut table);
             assert!(table_bytes(&table) <= (full * table.len() / 200).max(full / 100), "{i} are gone");
         }
     }

@@ -133,7 +133,7 @@ impl Choice {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::cut::dice;
+    use super::super::cut::hash_node;
     use super::super::cut::tests::assert_is_cut;
     use super::*;
     use crate::lattice::ChunkGrid;
@@ -143,7 +143,7 @@ mod tests {
 
     /// 16 x 16 km of mountains: errors as a surface of fractal noise has them.
     fn mountains(node: Node) -> NodeFacts {
-        let rough = 0.05 + (dice(node, 3) >> 11) as f32 / (1u64 << 53) as f32 * 0.4;
+        let rough = 0.05 + (hash_node(node, 3) >> 11) as f32 / (1u64 << 53) as f32 * 0.4;
         NodeFacts { heights: [0.0, 300.0], error: rough * node.stride() as f32, has_edits: false }
     }
 

@@ -36,7 +36,7 @@ impl Cut {
 
     /// A cut for tests and experiments, in which each node is split with a chance of `percent`; equal for equal seeds.
     pub fn random(grid: LevelGrid, seed: u64, percent: u64) -> Self {
-        Self::new(grid, |node| (dice(node, seed) >> 7) % 100 < percent)
+        Self::new(grid, |node| (hash_node(node, seed) >> 7) % 100 < percent)
     }
 
     /// Splits a node, and before it those that must be split; adds the children of each to `made`.
@@ -139,7 +139,7 @@ impl Cut {
 }
 
 /// A number that looks random, by a node and a seed.
-pub(super) fn dice(node: Node, seed: u64) -> u64 {
+pub(super) fn hash_node(node: Node, seed: u64) -> u64 {
     let words = [node.level.into(), node.x, node.z].map(|word: i32| u64::from(word.cast_unsigned()));
     let add = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
     words.into_iter().fold(seed, add)
@@ -194,7 +194,7 @@ pub(super) mod tests {
             assert_is_cut(&cut);
             // Every node that should be split is split, if it exists.
             for node in cut.nodes().filter(|node| node.level > 0) {
-                prop_assert!((dice(node, seed) >> 7) % 100 >= percent, "{node:?}");
+                prop_assert!((hash_node(node, seed) >> 7) % 100 >= percent, "{node:?}");
             }
         }
 

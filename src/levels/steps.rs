@@ -134,7 +134,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::LevelGrid;
-    use super::super::cut::dice;
+    use super::super::cut::hash_node;
     use super::super::cut::tests::{assert_is_cut, random_cut};
     use super::*;
     use crate::lattice::ChunkGrid;
@@ -149,7 +149,7 @@ mod tests {
             let [mut cut, target] = [0, 1].map(|at| random_cut(grid, seeds[at], percents[at]));
             let most_nodes = cut.nodes().count().max(target.nodes().count() + 3);
             let mut before = cut.clone();
-            while let Some(step) = cut.step_to(&target, most, |node| dice(node, 5) % 64) {
+            while let Some(step) = cut.step_to(&target, most, |node| hash_node(node, 5) % 64) {
                 assert_is_cut(&cut);
                 prop_assert!(cut.nodes().count() <= most_nodes);
                 let sorted = |nodes: &mut dyn Iterator<Item = Node>| {

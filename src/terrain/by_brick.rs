@@ -32,7 +32,7 @@ const PIECE: usize = 128;
 
 /// A brick and cells of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct OfBrick {
+pub(super) struct BrickCells {
     pub brick: BrickPos,
     /// The box around the cells that changes reach.
     pub cells: LatticeBox,
@@ -44,7 +44,7 @@ pub(super) struct OfBrick {
 #[derive(Debug, Default)]
 pub(super) struct ByBrick {
     /// In order, split between stacks.
-    slabs: Vec<Vec<OfBrick>>,
+    slabs: Vec<Vec<BrickCells>>,
 }
 
 /// Cells that a change reaches.
@@ -84,15 +84,18 @@ impl ByBrick {
 
     /// Collects what `work` makes of all stacks, in order; in parallel where there are many. `work` gets several whole
     /// stacks at a time.
-    pub fn collect<R: Clone + Send + Sync>(&self, work: impl Fn(&[OfBrick], &mut Vec<R>) + Sync) -> Vec<R> {
+    pub fn collect<R: Clone + Send + Sync>(
+        &self,
+        work: impl Fn(&[BrickCells], &mut Vec<R>) + Sync,
+    ) -> Vec<R> {
         if !ItemCost::Lookup.is_shared(self.len()) {
             let mut found = Vec::with_capacity(self.len());
             self.slabs.iter().for_each(|slab| work(slab, &mut found));
             return found;
         }
-        let pieces: Vec<&[OfBrick]> =
+        let pieces: Vec<&[BrickCells]> =
             self.slabs.iter().flat_map(|slab| pieces(slab, PIECE, is_same_stack)).collect();
-        let of_piece = |piece: &&[OfBrick]| {
+        let of_piece = |piece: &&[BrickCells]| {
             let mut found = Vec::with_capacity(piece.len());
             work(piece, &mut found);
             found
@@ -102,7 +105,7 @@ impl ByBrick {
 }
 
 /// Returns `true` if both bricks belong to the same stack.
-pub(super) fn is_same_stack(a: &OfBrick, b: &OfBrick) -> bool {
+pub(super) fn is_same_stack(a: &BrickCells, b: &BrickCells) -> bool {
     a.brick.stack() == b.brick.stack()
 }
 
@@ -125,17 +128,17 @@ impl Bits {
         self.0 |= other;
     }
 
-    fn of(self, brick: IVec3) -> OfBrick {
+    fn of(self, brick: IVec3) -> BrickCells {
         let sides = [self.0, self.0 >> 8, self.0 >> 16].map(|side| (side & 0xff) as u8);
         let first = IVec3::from_array(sides.map(|side| side.trailing_zeros() as i32));
         let last = IVec3::from_array(sides.map(|side| 7 - side.leading_zeros() as i32));
         let cells = LatticeBox { min: brick * 8 + first, max: brick * 8 + last };
-        OfBrick { brick: BrickPos(brick), cells, may_join: self.0 & Self::MAY_JOIN != 0 }
+        BrickCells { brick: BrickPos(brick), cells, may_join: self.0 & Self::MAY_JOIN != 0 }
     }
 }
 
 /// Those of the bricks that hold cells of boxes whose x lies in a range.
-fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
+fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<BrickCells> {
     let bricks_of = |cells: LatticeBox| {
         let LatticeBox { min, max } = BrickPos::range(cells);
         LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
@@ -150,7 +153,7 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
                 index.entry(BrickPos(low.with_y(y))).or_default().include(pile.bits(y));
             }
         });
-        let mut found: Vec<OfBrick> = index.into_iter().map(|(brick, bits)| bits.of(brick.0)).collect();
+        let mut found: Vec<BrickCells> = index.into_iter().map(|(brick, bits)| bits.of(brick.0)).collect();
         found.sort_unstable_by_key(|own| own.brick);
         return found;
     }
@@ -170,7 +173,7 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
 }
 
 /// Cells of bricks above each other.
-struct Pile {
+struct BrickColumn {
     /// Along x and z, as [`Bits`] have them.
     sides: u32,
     /// The lowest and the highest one.
@@ -179,7 +182,7 @@ struct Pile {
     joining: Option<[i32; 2]>,
 }
 
-impl Pile {
+impl BrickColumn {
     /// Those of the brick at this height.
     fn bits(&self, y: i32) -> u32 {
         let [low, high] = self.cells;
@@ -192,7 +195,7 @@ impl Pile {
 /// each other, and their cells.
 fn enter_all<'r>(
     changes: impl Iterator<Item = (&'r Reached, LatticeBox)>,
-    mut enter: impl FnMut(IVec3, i32, &Pile),
+    mut enter: impl FnMut(IVec3, i32, &BrickColumn),
 ) {
     for (change, LatticeBox { min, max }) in changes {
         let Some(cells) = change.cells else { continue };
@@ -203,7 +206,7 @@ fn enter_all<'r>(
                 let is_in_line = |bricks: &LatticeBox| {
                     bricks.min.x <= x && x <= bricks.max.x && bricks.min.z <= z && z <= bricks.max.z
                 };
-                let pile = Pile {
+                let pile = BrickColumn {
                     sides: Bits::side(z, cells.min.z, cells.max.z) << 16 | of_x,
                     cells: [cells.min.y, cells.max.y],
                     joining: joining.filter(is_in_line).map(|bricks| [bricks.min.y, bricks.max.y]),
@@ -223,7 +226,7 @@ mod tests {
     use super::*;
 
     /// All of them, one after the other.
-    fn by_brick(changes: &[Reached]) -> Vec<OfBrick> {
+    fn by_brick(changes: &[Reached]) -> Vec<BrickCells> {
         let found = ByBrick::new(changes, |&reached| reached);
         let all = found.slabs.concat();
         assert_eq!(found.len(), all.len());
@@ -241,14 +244,14 @@ mod tests {
     }
 
     /// A simple implementation, brick by brick.
-    fn naive(changes: &[Reached]) -> Vec<OfBrick> {
-        let mut all: BTreeMap<_, OfBrick> = BTreeMap::new();
+    fn naive(changes: &[Reached]) -> Vec<BrickCells> {
+        let mut all: BTreeMap<_, BrickCells> = BTreeMap::new();
         for (reached, cells) in changes.iter().filter_map(|reached| Some((reached, reached.cells?))) {
             for brick in BrickPos::covering(cells) {
                 let own = brick.samples().intersection(cells).expect("covered");
                 let may_join =
                     reached.joining.is_some_and(|joining| brick.samples().intersection(joining).is_some());
-                let all = all.entry(brick).or_insert(OfBrick { brick, cells: own, may_join });
+                let all = all.entry(brick).or_insert(BrickCells { brick, cells: own, may_join });
                 all.cells = all.cells.union(own);
                 all.may_join |= may_join;
             }

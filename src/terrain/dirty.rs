@@ -12,7 +12,7 @@ use crate::surface::pristine::{self, PristineStack};
 use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
 
-use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack};
+use super::by_brick::{BrickCells, ByBrick, Reached, is_same_stack};
 use super::world::World;
 use crate::volume::layers::FIRST_X;
 
@@ -71,7 +71,7 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
 fn at_sheet(
     world: &World,
     view: &WorldView,
-    stack: &[OfBrick],
+    stack: &[BrickCells],
     bricks: &mut Vec<BrickPos>,
 ) -> Option<PristineStack> {
     let word = stack[0].brick.stack();
@@ -88,7 +88,7 @@ fn at_sheet(
 /// Every block that has to be drawn again, by stacks of bricks, each from below. A word of the mask changes only where
 /// samples do, so its cells lie in stacks that have `dirty` cells.
 pub(super) fn dirty_blocks(world: &World, view: &WorldView, newer: &Mask, dirty: &ByBrick) -> Vec<Block> {
-    let blocks_of = |&OfBrick { brick, cells, .. }: &OfBrick| {
+    let blocks_of = |&BrickCells { brick, cells, .. }: &BrickCells| {
         view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk })
     };
     dirty.collect(|stacks, found| {
@@ -135,13 +135,13 @@ fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) 
 const BESIDE: [(i32, i32); 8] = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
 
 /// The cells of a stack with those of a box added.
-fn with_sheet(stack: &[OfBrick], sheet: LatticeBox) -> Vec<OfBrick> {
+fn with_sheet(stack: &[BrickCells], sheet: LatticeBox) -> Vec<BrickCells> {
     let mut all = stack.to_vec();
     for brick in BrickPos::covering(sheet) {
         let Some(cells) = brick.samples().intersection(sheet) else { continue };
         match all.binary_search_by_key(&brick.0.y, |own| own.brick.0.y) {
             Ok(at) => all[at].cells = all[at].cells.union(cells),
-            Err(at) => all.insert(at, OfBrick { brick, cells, may_join: false }),
+            Err(at) => all.insert(at, BrickCells { brick, cells, may_join: false }),
         }
     }
     all

@@ -18,7 +18,7 @@ use super::unmeshed::{self, Meshing};
 use super::world::World;
 use crate::backend::Compute;
 use crate::lattice::{
-    BrickPos, ChunkPos, Column, ItemCost, LatticeBox, TilePos, order_of_places, side_by_side,
+    BrickPos, ChunkPos, Column, ItemCost, LatticeBox, TilePos, side_by_side, sort_permutation,
 };
 use crate::surface::Mask;
 use crate::surface::block::Block;
@@ -153,7 +153,7 @@ impl ByChunk {
     /// On one thread: with rayon's help, a thread that waits for this could be given other work first.
     fn new(blocks: &[Block]) -> Self {
         let of = |number: u32| &blocks[number as usize];
-        let mut order = order_of_places(blocks, |block| block.chunk.as_ivec3().to_array());
+        let mut order = sort_permutation(blocks, |block| block.chunk.as_ivec3().to_array());
         let mut keyed = Vec::new();
         let of_chunk = |numbers: &mut [u32]| {
             let end = numbers.iter().max().map_or(0, |&last| last as usize + 1);

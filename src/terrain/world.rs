@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 
 use super::surface::ChunkSurface;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, give_back, hash, table_bytes};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash, shrink_if_sparse, table_bytes};
 use crate::surface::block;
 use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
@@ -280,20 +280,20 @@ impl World {
         self.uniform = uniform;
         if self.uniform.len() >= self.many_kinds {
             self.uniform.retain(|_, brick| Arc::strong_count(brick) > 1);
-            give_back(&mut self.uniform);
+            shrink_if_sparse(&mut self.uniform);
             self.many_kinds = FEW_KINDS.max(2 * self.uniform.len());
         }
     }
 
     /// Shrinks the tables of bricks, fields and surfaces where many entries are gone.
     pub(super) fn shrink(&mut self) {
-        give_back(&mut self.bricks);
-        give_back(&mut self.stacks);
-        give_back(&mut self.fields);
-        give_back(&mut self.surfaces);
-        give_back(&mut self.rings);
-        give_back(&mut self.unmeshed);
-        self.mask.give_back();
+        shrink_if_sparse(&mut self.bricks);
+        shrink_if_sparse(&mut self.stacks);
+        shrink_if_sparse(&mut self.fields);
+        shrink_if_sparse(&mut self.surfaces);
+        shrink_if_sparse(&mut self.rings);
+        shrink_if_sparse(&mut self.unmeshed);
+        self.mask.shrink_if_sparse();
     }
 
     /// Bytes that the world takes.

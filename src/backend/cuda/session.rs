@@ -358,8 +358,8 @@ impl Session {
 
     /// Releases the slots of uploads that were never sent.
     pub(super) fn give_up(&mut self, uploads: &Uploads) {
-        uploads.bricks.iter().for_each(|upload| self.bricks.give_back(upload.slot));
-        uploads.stacks.iter().for_each(|&(_, slot)| self.stacks.slots.give_back(slot));
+        uploads.bricks.iter().for_each(|upload| self.bricks.release_slot(upload.slot));
+        uploads.stacks.iter().for_each(|&(_, slot)| self.stacks.slots.release_slot(slot));
     }
 }
 

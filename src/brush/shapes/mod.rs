@@ -105,7 +105,7 @@ macro_rules! shapes {
 
         /// A shape's distance function.
         #[derive(Clone, Debug)]
-        pub(super) enum Form {
+        pub(super) enum ShapeSdf {
             $($name(<$name<Units> as ShapeGeometry>::Distance),)*
         }
 
@@ -198,14 +198,14 @@ macro_rules! shapes {
             }
 
             /// Its distance function.
-            pub(super) fn form(&self) -> Form {
+            pub(super) fn form(&self) -> ShapeSdf {
                 match self {
-                    $(Self::$name(shape) => Form::$name(shape.distance()),)*
+                    $(Self::$name(shape) => ShapeSdf::$name(shape.distance()),)*
                 }
             }
         }
 
-        impl Form {
+        impl ShapeSdf {
             /// Distances of a run of points along x.
             pub(super) fn run(&self, xs: &[f32], y: f32, z: f32, out: &mut [f32]) {
                 match self {
@@ -297,7 +297,7 @@ impl QuantizedShape {
 mod tests {
     use super::*;
 
-    fn depth(form: &Form, at: Vec3) -> f32 {
+    fn depth(form: &ShapeSdf, at: Vec3) -> f32 {
         let mut distance = [0.0];
         form.run(&[at.x], at.y, at.z, &mut distance);
         -distance[0]

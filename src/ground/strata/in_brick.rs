@@ -91,7 +91,7 @@ fn bounds(values: impl IntoIterator<Item = i32>) -> [i32; 2] {
 
 /// Where all numbers of a range lie that are moved by up to `by`: inside another one, outside it, or neither.
 #[inline]
-fn lies([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Option<bool> {
+fn range_relation([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Option<bool> {
     if high + by < from || low - by >= to {
         Some(false)
     } else if low - by >= from && high + by < to {
@@ -132,11 +132,15 @@ impl BrickStrata {
         let (depths, heights) = ([depth(lowest, ys[1]), depth(highest, ys[0])], ys.map(|y| y * ONE));
         let mut eighth = Eighth::default();
         for (number, record) in records.strata.iter().enumerate() {
-            let is_deep = lies(depths, record.rough, record.depth);
+            let is_deep = range_relation(depths, record.rough, record.depth);
             if is_deep == Some(false) {
                 continue;
             }
-            let known = [is_deep, lies(heights, record.rough, record.height), lies(ys, 0, record.ys)];
+            let known = [
+                is_deep,
+                range_relation(heights, record.rough, record.height),
+                range_relation(ys, 0, record.ys),
+            ];
             if known.contains(&Some(false)) {
                 continue;
             }
@@ -218,7 +222,7 @@ impl BrickStrata {
         } else {
             open = 0;
             let is_level = match (record.ys[0]..record.ys[1]).contains(&y) {
-                true => lies([y * ONE; 2], record.rough, record.height),
+                true => range_relation([y * ONE; 2], record.rough, record.height),
                 false => Some(false),
             };
             if is_level == Some(false) {
@@ -227,7 +231,7 @@ impl BrickStrata {
             let is_sure = record.body == FILL && is_level == Some(true);
             for column in ones(voxels) {
                 let depth = depth(self.heights.as_flattened()[column], y);
-                match lies([depth; 2], record.rough, record.depth) {
+                match range_relation([depth; 2], record.rough, record.depth) {
                     Some(false) => {}
                     Some(true) if is_sure => held |= 1 << column,
                     _ => open |= 1 << column,

@@ -8,7 +8,7 @@ mod rule;
 
 use rustc_hash::FxHashMap;
 
-use crate::lattice::{Column, give_back, table_bytes};
+use crate::lattice::{Column, shrink_if_sparse, table_bytes};
 
 pub use super::pristine::{cell_sheet, sheet};
 pub use borders::Borders;
@@ -69,8 +69,8 @@ impl Mask {
     }
 
     /// Shrinks the table once most of it is unused.
-    pub(crate) fn give_back(&mut self) {
-        give_back(&mut self.0);
+    pub(crate) fn shrink_if_sparse(&mut self) {
+        shrink_if_sparse(&mut self.0);
     }
 
     /// The 8x8 cells of a word, if it is stored.

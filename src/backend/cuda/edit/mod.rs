@@ -84,7 +84,7 @@ impl Session {
             self.give_up(&uploads);
         }
         if !matches!(delta, Ok(Some(_))) {
-            targets.iter().for_each(|&(slot, _)| self.bricks.give_back(slot));
+            targets.iter().for_each(|&(slot, _)| self.bricks.release_slot(slot));
         }
         delta
     }
@@ -218,7 +218,7 @@ impl Session {
 fn free_targets(slots: &mut RecordCache, results: &[EditResult], targets: &[Target]) {
     for (result, &(slot, _)) in results.iter().zip(targets) {
         if result.flags & EditResult::CHANGED == 0 || result.flags & EditResult::UNIFORM != 0 {
-            slots.give_back(slot);
+            slots.release_slot(slot);
         }
     }
 }

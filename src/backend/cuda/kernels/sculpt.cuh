@@ -227,13 +227,13 @@ __device__ inline bool sculpted(
     if (outside > 0) return false;
     i32 target = 0;
     bool has_target = false;
-    if (sculpt.stroke == FLATTEN) {
+    if (sculpt.operation == FLATTEN) {
         target = above_plane(sculpt, at);
         has_target = true;
-    } else if (sculpt.stroke == LEVEL) {
+    } else if (sculpt.operation == LEVEL) {
         target = at[1] * ONE - sculpt.amounts[0];
         has_target = true;
-    } else if (sculpt.stroke == STAMP) {
+    } else if (sculpt.operation == STAMP) {
         i32 beside;
         target = above_stamp(sculpt, images, at, beside);
         outside = largest(outside, beside);
@@ -247,15 +247,15 @@ __device__ inline bool sculpted(
         return true;
     }
     i32 by = 0;
-    if (sculpt.stroke == SHIFT) {
+    if (sculpt.operation == SHIFT) {
         by = sculpt.amounts[0];
         return shifted(own, sign_of(by) * ((magnitude(by) * weight + ONE / 2) >> 8), after);
     }
     if (!middle_of(own, middle)) return false;
-    if (sculpt.stroke == SMOOTH) {
+    if (sculpt.operation == SMOOTH) {
         by = way_to_average(own, middle) * weight / (64 * ONE);
         after = attached(own, middle + by);
-    } else if (sculpt.stroke == SHARPEN) {
+    } else if (sculpt.operation == SHARPEN) {
         by = clamped(way_to_average(own, middle) * weight / (64 * ONE), -SHARPER, SHARPER);
         i32 low = before, high = before;
 #pragma unroll

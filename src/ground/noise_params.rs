@@ -14,20 +14,20 @@ use super::world::Ground;
 use crate::lattice::{LIMIT, ONE};
 
 /// [`NoiseHeights`] over a world, checked, and all numbers derived from them.
-pub(crate) struct NoiseTerms {
+pub(crate) struct NoiseParams {
     #[cfg_attr(not(any(test, feature = "cuda")), expect(dead_code))]
     extent: Extent,
     pub kind: NoiseKind,
     /// For each octave the permutation of 0 to 255 that its gradients are drawn from.
     pub tables: Vec<[u8; 256]>,
-    pub numbers: NoiseNumbers,
+    pub numbers: NoiseFactors,
 }
 
 /// At the column (x, z) the first octave is looked up at `(x, z) / scale + origin`, times `frequency`; each further one
 /// `lacunarity` times as far out. `kernels/heights.cuh` and the crate `noise` define how their sum is used.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct NoiseNumbers {
+pub(crate) struct NoiseFactors {
     pub scale: f64,
     pub origin: [f64; 2],
     pub frequency: f64,
@@ -49,12 +49,12 @@ impl NoiseHeights {
     ///
     /// # Errors
     /// Those of [`Ground::from_noise`](super::Ground::from_noise) that show before any height is computed.
-    pub(crate) fn terms(&self, width: u32, depth: u32) -> Result<NoiseTerms, GroundError> {
+    pub(crate) fn params(&self, width: u32, depth: u32) -> Result<NoiseParams, GroundError> {
         let &Self { seed, kind, octaves, scale, amplitude, base } = self;
         let noise = Octaves::new(self)?;
         let extent = Extent::new(width, depth)?;
         let tables = seeds(seed, octaves).map(table).collect();
-        let common = |frequency, lacunarity, persistence| NoiseNumbers {
+        let common = |frequency, lacunarity, persistence| NoiseFactors {
             scale,
             origin: ORIGIN,
             frequency,
@@ -67,11 +67,11 @@ impl NoiseHeights {
             base,
         };
         let numbers = match &noise {
-            Octaves::Fractal(noise) => NoiseNumbers {
+            Octaves::Fractal(noise) => NoiseFactors {
                 factor: fractal_factor(noise),
                 ..common(noise.frequency, noise.lacunarity, noise.persistence)
             },
-            Octaves::Ridged(noise, peak) => NoiseNumbers {
+            Octaves::Ridged(noise, peak) => NoiseFactors {
                 // A power of two: multiplying gives the bits of dividing.
                 weighting: 1.0 / noise.attenuation,
                 factor: ridged_factor(noise),
@@ -79,7 +79,7 @@ impl NoiseHeights {
                 ..common(noise.frequency, noise.lacunarity, noise.persistence)
             },
         };
-        Ok(NoiseTerms { extent, kind, tables, numbers })
+        Ok(NoiseParams { extent, kind, tables, numbers })
     }
 }
 
@@ -92,7 +92,7 @@ impl NoiseHeights {
 }
 
 #[cfg(any(test, feature = "cuda"))]
-impl NoiseTerms {
+impl NoiseParams {
     /// Columns in a row, of which there are as many as it takes.
     #[cfg(feature = "cuda")]
     pub fn row_len(&self) -> usize {
@@ -146,8 +146,8 @@ mod tests {
     use crate::ground::{MAX_OCTAVES, MAX_SIZE};
     use noise::{MultiFractal, NoiseFn};
 
-    fn terms(kind: NoiseKind, octaves: u32) -> NoiseTerms {
-        NoiseHeights { kind, octaves, ..NoiseHeights::default() }.terms(3, 2).unwrap()
+    fn params(kind: NoiseKind, octaves: u32) -> NoiseParams {
+        NoiseHeights { kind, octaves, ..NoiseHeights::default() }.params(3, 2).unwrap()
     }
 
     #[test]
@@ -175,7 +175,7 @@ mod tests {
             // 2 at half the strength, and nothing more.
             let noise = Fbm::<Fixed>::new(0).set_octaves(octaves as usize).set_sources(fixed(2.0, 0.0));
             assert_eq!(
-                terms(NoiseKind::Fractal, octaves).numbers.factor,
+                params(NoiseKind::Fractal, octaves).numbers.factor,
                 noise.get([0.0; 2]),
                 "{octaves} octaves"
             );
@@ -183,7 +183,7 @@ mod tests {
             // off.
             let noise =
                 RidgedMulti::<Fixed>::new(0).set_octaves(octaves as usize).set_sources(fixed(0.0, 1.0));
-            let factor = terms(NoiseKind::Ridged, octaves).numbers.factor;
+            let factor = params(NoiseKind::Ridged, octaves).numbers.factor;
             assert_eq!(factor - 1.0, noise.get([0.0; 2]), "{octaves} octaves");
             assert!((1.0..2.0).contains(&factor));
         }
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn tables_are_permutations_and_go_on_after_the_largest_seed() {
         let tables = |seed, octaves| {
-            NoiseHeights { seed, octaves, ..NoiseHeights::default() }.terms(1, 1).unwrap().tables
+            NoiseHeights { seed, octaves, ..NoiseHeights::default() }.params(1, 1).unwrap().tables
         };
         let mut sorted = tables(7, 1)[0];
         sorted.sort_unstable();
@@ -202,23 +202,23 @@ mod tests {
 
     #[test]
     fn the_farthest_point_of_an_octave_has_a_whole_part_of_31_bits() {
-        let terms = terms(NoiseKind::Fractal, MAX_OCTAVES);
-        let farthest = (f64::from(MAX_SIZE) + 1.0) * terms.numbers.lacunarity.powi(MAX_OCTAVES as i32 - 1);
-        assert!(farthest * terms.numbers.frequency < f64::from(1 << 30) * 1.9);
+        let params = params(NoiseKind::Fractal, MAX_OCTAVES);
+        let farthest = (f64::from(MAX_SIZE) + 1.0) * params.numbers.lacunarity.powi(MAX_OCTAVES as i32 - 1);
+        assert!(farthest * params.numbers.frequency < f64::from(1 << 30) * 1.9);
     }
 
     #[test]
     fn an_octave_weighs_half_of_the_one_before_which_is_exact() {
-        assert_eq!(terms(NoiseKind::Ridged, 2).numbers.weighting, 0.5);
+        assert_eq!(params(NoiseKind::Ridged, 2).numbers.weighting, 0.5);
     }
 
     #[test]
     fn heights_that_do_not_fit_are_no_ground() {
-        let terms = terms(NoiseKind::Fractal, 1);
-        let ground = |last| terms.ground([vec![0; 11], vec![last]].concat());
+        let params = params(NoiseKind::Fractal, 1);
+        let ground = |last| params.ground([vec![0; 11], vec![last]].concat());
         assert_eq!(ground(5), Ground::from_heights(3, 2, [vec![0; 11], vec![5]].concat()).ok());
         assert!(ground(1 << 23).is_some() && ground((1 << 23) + 1).is_none() && ground(i32::MIN).is_none());
-        assert!(terms.ground(vec![0; 11]).is_none());
+        assert!(params.ground(vec![0; 11]).is_none());
     }
 
     #[test]
@@ -234,7 +234,7 @@ mod tests {
             (0, NoiseHeights { base: 1e9, ..good }),
         ] {
             let error = Ground::from_noise(width, 2, &noise).unwrap_err();
-            assert_eq!(noise.terms(width, 2).err(), Some(error));
+            assert_eq!(noise.params(width, 2).err(), Some(error));
         }
     }
 }
