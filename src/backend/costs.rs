@@ -440,7 +440,8 @@ mod tests {
             assert!(play(&mut costs, machine(before), rng, [60; 500]).regret() < 0.05);
             assert!(play(&mut costs, machine(after), rng, [60; 500]).regret() < 0.08);
         }
-        // The slower one is now twice as fast as the other, which is as it was: only timing it again can tell.
+        // The slower backend becomes twice as fast as the other, whose times do not change: only timing it again
+        // reveals that.
         for is_cuda in [false, true] {
             let (mut costs, rng) = (Costs::default(), &mut Rng::with_seed(9));
             let pick = |own: fn(f64) -> f64, other: fn(f64) -> f64| {

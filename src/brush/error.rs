@@ -1,4 +1,4 @@
-//! Why a brush was refused.
+//! Errors of brushes that are refused.
 
 use thiserror::Error;
 

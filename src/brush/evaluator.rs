@@ -13,11 +13,11 @@ use crate::lattice::{LatticeBox, ONE};
 /// Samples evaluated together.
 const RUN: usize = 32;
 
-/// Distances stop here: 16384 voxels.
+/// Distances are clamped here: 16384 voxels.
 const MAX_DISTANCE: f32 = (1 << 22) as f32;
 
-/// Coordinates stop here, in voxels from the shape. It is far beyond the horizon, so no distance shows it, and a run
-/// farther still fits into 2^24 of 1/256 voxel, which `f32` holds exactly.
+/// Coordinates are clamped here, in voxels from the shape. It is far beyond [`MAX_DISTANCE`], so no distance depends on
+/// it, and a run farther still fits into 2^24 of 1/256 voxel, which `f32` holds exactly.
 const FARTHEST: i64 = 65_000;
 
 /// An edit's signed distance function, its constants derived once.
@@ -74,7 +74,7 @@ impl Evaluator {
         let along = |start: i32, origin_voxel: i32, origin_fraction: i32| -> [f32; 8] {
             std::array::from_fn(|i| units(i64::from(start) + i as i64, origin_voxel, origin_fraction))
         };
-        // Eight steps from beyond where coordinates stop count on from there, as in longer runs.
+        // Clamped coordinates still increase within a run, as in longer runs.
         let first = voxels(origin.x.into(), self.origin_voxel.x);
         let xs = std::array::from_fn(|i| ((first + i as i32) * ONE - self.origin_fraction.x) as f32);
         let ys = along(origin.y, self.origin_voxel.y, self.origin_fraction.y);
@@ -103,7 +103,7 @@ impl Evaluator {
         let mut distance = [0.0];
         self.smooth(middle.x, middle.as_ivec3(), &mut distance);
         let distance = round(distance[0]);
-        // What rounding to f32 may have cost at this distance, generously.
+        // A generous bound on the rounding to f32 at this distance.
         let rounding = 16 + (distance >> 14);
         let amplitude = self.roughness.map_or(0, |roughness| roughness.amplitude);
         f64::from(distance - rounding) > f64::from(BAND + amplitude) + diagonal
@@ -139,9 +139,9 @@ pub(crate) struct Constants {
     /// The shape's origin in voxels, and 1/256 voxel from there.
     pub origin_voxel: IVec3,
     pub origin_fraction: IVec3,
-    /// Which of the shapes.
+    /// The kind of shape.
     pub kind: u32,
-    /// What [`ShapeSdf::constants`] says.
+    /// The result of [`ShapeSdf::constants`].
     pub shape: [f32; 12],
     /// Amplitude, scale and seed of roughness.
     pub roughness: Option<(i32, i32, u32)>,

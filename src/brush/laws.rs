@@ -379,7 +379,7 @@ fn wild_integer() -> impl Strategy<Value = i32> {
     ]
 }
 
-// Whether integers make a shape, by the room's table of limits; `None` where that takes more than a line.
+// Whether integers make a shape, by the table of limits; `None` where that takes more than a line.
 
 fn is_in_world(at: [i32; 3]) -> bool {
     at.iter().zip([262_144, 32_768, 262_144]).all(|(v, most)| v.unsigned_abs() <= most * 256)

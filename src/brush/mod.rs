@@ -1,8 +1,8 @@
-//! What a game asks for, and what the world obeys.
+//! Brushes, which a game sends, and edits, which the world applies.
 //!
-//! A [`Brush`] is a wish: a [`Shape`] in floats, an [`Operation`], perhaps some [`Roughness`]. [`Edit::quantize`] turns
-//! it into an [`Edit`], which holds integers only, or says in a [`BrushError`] why not. An [`Evaluator`] then gives the
-//! signed distance of every lattice sample, the same bits on every machine.
+//! A [`Brush`] is a request in floats: a [`Shape`], an [`Operation`], perhaps some [`Roughness`]. [`Edit::quantize`]
+//! converts it to an [`Edit`], which holds integers only, or returns a [`BrushError`]. An [`Evaluator`] then computes
+//! the signed distance of every lattice sample, with equal bits on every machine.
 //!
 //! ```text
 //! Brush (f32, voxels) --quantize--> Edit (1/256 voxel) --evaluator--> distance per sample --apply--> new sample
@@ -13,7 +13,7 @@
 //! | positions, sizes, axes, amplitude | voxels of terrain space | 1/256 voxel, `i32` |
 //! | rotation | unit quaternion | four `i16` of 1/32767, q and -q alike |
 //!
-//! Each wish has a twin in integers, which an [`Edit`] is made of; a game never meets those.
+//! Each part of a brush has an integer counterpart inside the [`Edit`]; games do not need these.
 //!
 //! | in a brush, floats | in an edit, integers | ready to be applied |
 //! | --- | --- | --- |
@@ -122,7 +122,7 @@ pub use stamp::Stamp;
 
 use crate::lattice::ONE;
 
-/// The power of a brush that takes away whatever can be taken away, as each does unless told otherwise.
+/// The default power of a brush, which removes everything that rules allow to be removed.
 pub const FULL_POWER: u8 = u8::MAX;
 
 /// How far outside its shape an edit still changes samples, in 1/256 voxel (rule 6).

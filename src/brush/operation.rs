@@ -1,4 +1,4 @@
-//! What a brush does to the samples it reaches.
+//! The operations of brushes.
 
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use super::line::is_default;
 use super::{DEPTH, Stamp};
 use crate::ground::MaterialId;
 
-/// What happens inside the shape.
+/// The operation inside the shape.
 ///
 /// Dig, add and paint look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All
 /// others *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change
@@ -33,7 +33,7 @@ pub enum Operation {
         material: MaterialId,
     },
     /// Evens out bumps and edges: each sample goes towards the average of the 26 around it. Slopes stay as they are;
-    /// hollows and towers of a radius r are gone after about r x r times, as it is with averages.
+    /// hollows and towers of radius r disappear after about r x r applications, as with any averaging.
     Smooth,
     /// Deepens bumps and edges, by at most a quarter of a voxel each time.
     Sharpen,
@@ -95,7 +95,7 @@ impl Operation {
         }
     }
 
-    /// Does it sculpt? Only then the brush's [`Blend`](super::Blend) counts.
+    /// Returns `true` if it sculpts. Only then the brush's [`Blend`](super::Blend) is used.
     pub fn is_sculpting(&self) -> bool {
         !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. })
     }

@@ -113,7 +113,7 @@ impl QuantizedOperation {
         }
     }
 
-    /// Which way it is applied.
+    /// The kind of its operation.
     pub fn kind(&self) -> Kind {
         match *self {
             Self::Dig => Kind::Dig,

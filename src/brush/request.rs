@@ -7,10 +7,11 @@ use super::line::Line;
 use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
-/// A wish to change the ground, in voxels of terrain space. One that is sent to the plugin as a message is in world
-/// space and its units, metres: each terrain takes it into its own.
+/// A request to change the ground, in voxels of terrain space. A brush sent to the plugin as a message is in world
+/// space and metres instead; each terrain transforms it into its own space.
 ///
-/// Nothing is checked here: [`Edit::quantize`](super::Edit::quantize) does, and says what is wrong.
+/// A brush is not checked when it is made: [`Edit::quantize`](super::Edit::quantize) checks it, and reports what is
+/// wrong.
 ///
 /// # Lines of JSON
 ///
@@ -37,7 +38,7 @@ pub struct Brush {
     pub operation: Operation,
     /// Bumps on the shape's surface; `None` for a smooth one.
     pub roughness: Option<Roughness>,
-    /// Any number of the game's own; the receipt carries it back.
+    /// Any number that the game chooses; the receipt returns it.
     pub tag: u64,
     /// What one undo takes back: brushes of one stroke that follow each other are one step, over however many frames
     /// they come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply). A
@@ -118,7 +119,7 @@ impl Brush {
     }
 
     /// A brush that gives the ground in its shape the relief of an image. It fades over a single voxel at the rim of
-    /// the image and of the shape, unless told otherwise.
+    /// the image and of the shape, by default.
     pub fn stamp(shape: Shape, stamp: Stamp) -> Self {
         Self::new(shape, Operation::Stamp { stamp }).with_falloff(1.0)
     }
@@ -158,13 +159,13 @@ impl Brush {
         Self { roughness: Some(roughness), ..self }
     }
 
-    /// The brush with a number of the game's own, which the receipt carries back.
+    /// The brush with a number that the game chooses; the receipt returns it.
     #[must_use]
     pub fn with_tag(self, tag: u64) -> Self {
         Self { tag, ..self }
     }
 
-    /// The brush as part of a stroke, by any number of the game's own: see [`stroke`](Self::stroke).
+    /// The brush as part of a stroke, identified by any number that the game chooses: see [`stroke`](Self::stroke).
     #[must_use]
     pub fn with_stroke(self, stroke: u64) -> Self {
         Self { stroke: Some(stroke), ..self }

@@ -1,4 +1,4 @@
-//! What operations that sculpt make of a sample: integers throughout.
+//! The new density of a sample under an operation that sculpts, in integers throughout.
 //!
 //! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], and what is stored
 //! ends at [`FARTHEST`], so exactly these numbers say "at least as far". Operations that move a surface have
@@ -68,8 +68,8 @@ pub(crate) struct Stencil {
     pub moved: u32,
 }
 
-/// Is a sample farther from the surface, by a voxel or more, than it was before anybody edited it? Then it is solid
-/// that was built or raised, or air that was dug or lowered.
+/// Returns `true` if a sample is farther from the surface, by a voxel or more, than its pristine state. It is then
+/// solid ground that was built or raised, or air that was dug or lowered.
 pub(crate) fn is_moved(density: i32, pristine: i32) -> bool {
     let by = density - pristine;
     if density < 0 { by <= -ONE } else { by >= ONE }

@@ -69,7 +69,7 @@ const SIDES: (u32, u32) = (2, 256);
 /// Most height.
 const HEIGHT: f32 = 256.0;
 
-/// What errors call the length that they tell, which is half of what a stamp has.
+/// The name that errors use for the length they report, which is half of the stamp's.
 const HALF: &str = "half the stamp size";
 
 /// The samples of an image of an allowed size.

@@ -1,4 +1,4 @@
-//! What edits did to bricks, entered brick by brick and added up later.
+//! Changes that edits made to bricks, recorded brick by brick and summed later.
 
 use std::sync::Arc;
 
@@ -9,15 +9,15 @@ use crate::ground::MaterialId;
 use crate::lattice::{ChunkPos, ItemCost, LatticeBox};
 use crate::volume::VoxelOutcome;
 
-/// What edits did to some bricks.
+/// Changes that edits made to some bricks.
 #[derive(Default)]
 pub(crate) struct EditDelta {
     pub bricks: Vec<DraftedBrick>,
     pub parts: Vec<PartEffect>,
     pub counts: Vec<Count>,
-    /// What each edit did, in order, if parts and counts have been added up already; otherwise empty.
+    /// The effect of each edit, in order, if parts and counts have been summed already; otherwise empty.
     pub effects: Vec<EditEffect>,
-    /// By how much the hash of the world's samples changes.
+    /// The change in the hash of the world's samples.
     pub hash: u64,
 }
 
@@ -67,7 +67,7 @@ impl EditDelta {
 /// How many of the latest entries a new one is compared with.
 const LATEST: usize = 8;
 
-/// What one edit changed in one chunk, in one brick or in several.
+/// Changes by one edit in one chunk, in one brick or in several.
 pub(crate) struct PartEffect {
     pub edit: usize,
     pub chunk: ChunkPos,

@@ -1,7 +1,6 @@
 //! Edits of a transaction drafted as new bricks, before anything is committed.
 //!
-//! Edits are split into batches, a [`backend`](crate::backend) applies each batch, and what they changed is added up
-//! here.
+//! Edits are split into batches, a [`backend`](crate::backend) applies each batch, and their changes are summed here.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -15,18 +14,18 @@ use crate::brush::Edit;
 use crate::lattice::{BrickPos, ChunkGrid, ItemCost, parallel_map};
 use crate::volume::{Brick, DiggingRules, SampleView, UniformBricks};
 
-/// What a list of edits makes of a world.
+/// The result of a list of edits on a world.
 #[derive(Debug, Default)]
 pub(crate) struct Draft {
     /// The bricks that changed, in order.
     pub bricks: Vec<DraftedBrick>,
-    /// What each edit changed, in order of the edits.
+    /// The effect of each edit, in order of the edits.
     pub effects: Vec<EditEffect>,
     /// Order-independent hash of every edited sample: point, density, material.
     pub hash: u64,
 }
 
-/// Applies prepared edits and hands out what they changed.
+/// Applies prepared edits and passes on their changes.
 pub(crate) type Apply<'a> = dyn Fn(&PreparedEdits, &mut dyn FnMut(&mut [EditDelta])) + 'a;
 
 /// Drafts edits over a world and over its own earlier drafts.

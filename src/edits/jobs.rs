@@ -1,4 +1,4 @@
-//! Which edits may reach which bricks.
+//! Pairs of edits and the bricks that they may reach.
 //!
 //! Where there are many, threads share the bricks in slabs, one brick thick along x, whose results stand one
 //! after the other in order. Long thin brushes come near few bricks of the box around them, so up to 8x8x8

@@ -1,4 +1,4 @@
-//! How edits change bricks: from edits in a queue to new bricks, with what each edit did.
+//! Applies edits to bricks: from queued edits to new bricks, with the effect of each edit.
 //!
 //! ```text
 //! edits --batches--> batches of independent edits --jobs--> PreparedEdits, sorted by brick

@@ -28,7 +28,7 @@ const GROUPS_PER_THREAD: usize = 8;
 
 /// A batch of edits, sorted by the bricks that they may reach.
 pub(crate) struct PreparedEdits<'a> {
-    /// What they apply to.
+    /// The samples that they apply to.
     pub base: SampleView<'a>,
     /// How the world is cut into chunks.
     pub grid: ChunkGrid,
@@ -90,7 +90,7 @@ impl<'a> PreparedEdits<'a> {
         &self.jobs
     }
 
-    /// Applies all edits on the CPU and calls `each` with what they changed, brick by brick. The result does not depend
+    /// Applies all edits on the CPU and calls `each` with their changes, brick by brick. The result does not depend
     /// on how many threads there are.
     pub fn run(&self, mut each: impl FnMut(&mut [EditDelta])) {
         let work = |jobs: &[Job]| {

@@ -1,4 +1,4 @@
-//! Samples taken out of a brick: what was a piece of ground becomes air.
+//! Removes samples from a brick: a loose piece of ground becomes air.
 
 use super::brick_editor::BrickEditor;
 use super::delta::EditDelta;

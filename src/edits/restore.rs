@@ -1,4 +1,4 @@
-//! One state of a brick in place of another, as undo and redo put them.
+//! Replaces one state of a brick by another, for undo and redo.
 
 use super::effect::EditEffect;
 use crate::ground::{Ground, MaterialId};

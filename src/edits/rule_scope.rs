@@ -1,5 +1,6 @@
-//! Where digging rules apply: to which edits of a batch, and to which samples of a brick. A world may have thousands of
-//! protected boxes: edits search them once or twice, bricks search those nearby, and samples look up a bit.
+//! The scope of digging rules: the edits of a batch and the samples of a brick that they restrict. A world may have
+//! thousands of protected boxes: edits search them once or twice, bricks search those nearby, and samples look up a
+//! bit.
 
 use glam::IVec3;
 

@@ -130,8 +130,8 @@ impl BrickEditor<'_> {
     }
 }
 
-/// The nearest ground straight below and above the samples of a brick, for edits that build without a material of their
-/// own. Each column must be asked from below upwards, so that every sample of it is looked at once.
+/// The nearest ground straight below and above the samples of a brick, for edits that build without a given material.
+/// Each column must be asked from below upwards, so that every sample of it is looked at once.
 struct NearestGround {
     below: [Option<Below>; 64],
     /// The y up to which there is only air above the last sample that looked up.

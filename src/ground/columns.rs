@@ -1,4 +1,4 @@
-//! Asking a source for columns that lie in rows and lines, but clamped to the rim of the world.
+//! Requests to a source for columns in rows and lines, clamped to the rim of the world.
 
 use std::ops::Range;
 

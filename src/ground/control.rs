@@ -1,4 +1,4 @@
-//! Material control: which column is made of what.
+//! Material control: decides the materials of columns.
 
 use super::error::GroundError;
 use super::grey_image::GreyImage;
@@ -7,7 +7,8 @@ use super::rules::MaterialRule;
 use crate::lattice::hash::hash_words;
 
 /// Decides the materials of every column. Images are stretched over the world, their first sample at column (0, 0),
-/// their last at the far corner. None of the materials may be [`MaterialId::GROUND`], which has no look of its own.
+/// their last at the far corner. None of the materials may be [`MaterialId::GROUND`], which stands for the ground's own
+/// materials.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MaterialControl {

@@ -34,11 +34,11 @@ pub(crate) struct NoiseFactors {
     pub lacunarity: f64,
     /// Amplitude of an octave relative to the previous one.
     pub persistence: f64,
-    /// What a ridged octave is multiplied with to be the weight of the next; 0 if not ridged.
+    /// Factor from a ridged octave to the weight of the next one; 0 if not ridged.
     pub weighting: f64,
-    /// What the sum is multiplied with.
+    /// Factor of the sum.
     pub factor: f64,
-    /// Where ridged noise ends, counted from -1; 1 if not ridged.
+    /// Range of ridged noise, counted from -1; 1 if not ridged.
     pub peak: f64,
     pub amplitude: f64,
     pub base: f64,
@@ -93,7 +93,7 @@ impl NoiseHeights {
 
 #[cfg(any(test, feature = "cuda"))]
 impl NoiseParams {
-    /// Columns in a row, of which there are as many as it takes.
+    /// Number of columns in a row.
     #[cfg(feature = "cuda")]
     pub fn row_len(&self) -> usize {
         self.extent.row_len()
@@ -116,7 +116,7 @@ impl NoiseParams {
     }
 }
 
-/// The permutation of a seed. The crate looks `values[values[a] ^ b]` up for (a, b), and `values[a]` for a alone.
+/// The permutation table of a seed. The crate reads `values[values[a] ^ b]` for (a, b), and `values[a]` for a alone.
 fn table(seed: u32) -> [u8; 256] {
     let permutation = PermutationTable::new(seed);
     std::array::from_fn(|at| permutation.hash(&[at as isize]) as u8)

@@ -1,5 +1,6 @@
-//! Octaves of Perlin noise over rows of columns, bit by bit those of the crate `noise`: the same operations in the same
-//! order, as in `kernels/heights.cuh`, but several columns at a time, and what a row shares only once.
+//! Octaves of Perlin noise over rows of columns, equal bit by bit to those of the crate `noise`: the same operations in
+//! the same order, as in `kernels/heights.cuh`, but for several columns at a time, and with values that a row shares
+//! computed only once. Tests compare it with the crate, and the GPU kernel with it.
 
 use std::array::from_fn;
 use std::f64::consts::SQRT_2;
@@ -28,7 +29,7 @@ fn gradient_dot(hash: u8, x: f64, z: f64) -> f64 {
     flip_sign(x, 0) + flip_sign(z, 1)
 }
 
-/// The whole number below, and what is left.
+/// The floor of a number, and its fraction.
 fn floor_fract(at: f64) -> (i64, f64) {
     let whole = at as i64;
     let whole = whole - i64::from(at < whole as f64);

@@ -52,7 +52,7 @@ impl Ground {
             Materials::OnDemand(None) | Materials::Columns(_) => 0,
         };
         let size = [self.width(), self.depth()].map(|cells| u64::from(cells.cast_unsigned()));
-        // The first word tells such grounds from those in memory, which begin with a size.
+        // The first word distinguishes such grounds from those in memory, which begin with a size.
         hash_words([u64::MAX, size[0], size[1], id, materials].into_iter().chain(self.below_hash()))
     }
 
@@ -68,7 +68,7 @@ impl Ground {
         self.read_page(column, Page::height).unwrap_or_default()
     }
 
-    /// [Height](Self::height) of a column whose neighbours nobody asks for: no page is made for it.
+    /// [Height](Self::height) of a single column: no page is made for it.
     #[cfg(feature = "plugin")]
     pub(crate) fn lone_height(&self, column: Column) -> i32 {
         let Column { x, z } = self.extent().clamp(column);
@@ -87,7 +87,7 @@ impl Ground {
     pub(super) fn rises_on_demand(&self, pages: &Pages, column: Column) -> [Rise; 2] {
         let column = self.extent().clamp(column);
         let [x, z] = pages.read(Pages::place(column), |page| page.around(column));
-        // Pages have the rim's heights beyond it, so only what lies between tells.
+        // Pages repeat the rim's heights beyond it, so only columns inside are compared.
         let run = |at: i32, last: i32| if at == 0 || at == last { 1 } else { 2 };
         let rise = |[before, after]: [i32; 2], run| Rise { rise: after - before, run };
         [rise(x, run(column.x, self.width())), rise(z, run(column.z, self.depth()))]

@@ -21,7 +21,7 @@ const AFTER: i32 = 2;
 /// Heights along a page's side.
 const SIDE: usize = (BEFORE + PAGE + AFTER) as usize;
 
-/// Bytes of pages that a ground keeps unless told otherwise.
+/// Bytes of pages that a ground keeps by default.
 pub(super) const DEFAULT_BUDGET: usize = 32 << 20;
 
 /// Most parts of the cache that are locked on their own.

@@ -1,4 +1,4 @@
-//! The ground itself: what every column of the pristine world is like.
+//! The ground itself: heights and materials of every column of the pristine world.
 
 use std::fmt;
 use std::ops::Range;
@@ -18,16 +18,16 @@ use crate::lattice::{Column, ONE};
 /// The pristine world: a height and materials for each column (x, z) with x in `0..=width` and z in `0..=depth`.
 ///
 /// Immutable. Heights are in 1/256 voxel ([`ONE`] per voxel) and at most [`LIMIT`](crate::lattice::LIMIT) voxels from
-/// zero. A column beyond the rim is like the nearest one on the rim, so every question has an answer.
+/// zero. A column beyond the rim is like the nearest one on the rim, so every query has a result.
 pub struct Ground {
     extent: Extent,
-    /// One for each column, row-major; none of a ground with a source.
+    /// One height for each column, row-major; empty for a ground with a source.
     heights: Vec<i32>,
     materials: Materials,
     below: Option<Below>,
     height_range: (i32, i32),
     hash: u64,
-    /// The source of heights, and what was computed of it.
+    /// The source of heights, and its computed pages.
     pages: Option<Box<Pages>>,
 }
 
@@ -86,7 +86,7 @@ impl Materials {
     }
 }
 
-/// What [`Ground::row`] computes; kept by the caller, so that it is allocated once for many rows.
+/// The buffer of [`Ground::row`], kept by the caller so that it is allocated once for many rows.
 #[derive(Default)]
 pub(crate) struct RowBuffer {
     pub(super) normals: Vec<Vec3>,
@@ -145,7 +145,7 @@ impl Ground {
         self.pages().map(|pages| &*pages.source)
     }
 
-    /// What was computed of the source.
+    /// The computed pages of the source.
     pub(super) fn pages(&self) -> Option<&Pages> {
         self.pages.as_deref()
     }
@@ -180,7 +180,7 @@ impl Ground {
         self
     }
 
-    /// What is below its surface, if more than its columns say.
+    /// The material below its surface, unless it follows from the columns.
     pub(super) fn below(&self) -> Option<&Below> {
         self.below.as_ref()
     }
@@ -383,7 +383,7 @@ impl Ground {
         }
     }
 
-    /// What all ground is made of, if it is the same from every surface down.
+    /// The material of all ground, if it is the same everywhere.
     pub(crate) fn single_material(&self) -> Option<MaterialId> {
         match self.materials {
             Materials::Uniform(all)
@@ -395,7 +395,7 @@ impl Ground {
         }
     }
 
-    /// What the column of a voxel gives it.
+    /// The material of a voxel from its column.
     pub(super) fn material_of_column(&self, point: IVec3) -> MaterialId {
         self.column_material(Column::of(point)).at_distance(self.distance(point))
     }
@@ -572,7 +572,7 @@ mod tests {
 
     #[test]
     fn the_hash_is_the_same_on_every_machine() {
-        // If this fails, worlds saved with hashes of the old kind are no longer recognised: say so in the change log.
+        // If this fails, worlds saved with the old hashes are no longer recognised: say so in the changelog.
         assert_eq!(bumps().hash(), 0xD52B_8BB1_2AC5_464F);
     }
 

@@ -16,7 +16,7 @@ const LEAST_STAY: f32 = 0.01;
 /// The most often they grow: by then they are so large that only nodes around an eye are split.
 const MOST_GROWTHS: u32 = 60;
 
-/// Somebody who looks at the world.
+/// A viewpoint that the level of detail is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
     /// Where, in voxels.
@@ -52,7 +52,7 @@ pub struct Choice {
     /// The greatest size of cells in nodes with edits, 4 unless set otherwise.
     pub edited_pixels: f32,
     /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing
-    /// changes back and forth while somebody moves to and fro.
+    /// changes back and forth while an eye moves to and fro.
     pub stay: f32,
     /// The choice also considers where each eye will be in this many seconds; 0.5 by default.
     pub look_ahead: f32,

@@ -138,7 +138,7 @@ impl Cut {
     }
 }
 
-/// A number that looks random, by a node and a seed.
+/// A pseudo-random hash of a node and a seed.
 pub(super) fn hash_node(node: Node, seed: u64) -> u64 {
     let words = [node.level.into(), node.x, node.z].map(|word: i32| u64::from(word.cast_unsigned()));
     let add = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);

@@ -10,9 +10,9 @@ const MOST_LEVELS: u8 = 10;
 pub struct Node {
     /// Its cells are 2^`level` voxels wide.
     pub level: u8,
-    /// Along +x, in units of its own width.
+    /// Along +x, in units of the node's width.
     pub x: i32,
-    /// Along +z, in units of its own width.
+    /// Along +z, in units of the node's width.
     pub z: i32,
 }
 

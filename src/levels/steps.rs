@@ -2,7 +2,7 @@
 
 use super::{Cut, Node};
 
-/// One step: some nodes split or merged, and what has to be drawn for it.
+/// One step: some nodes split or merged, and the meshes that change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Step {
     /// Nodes that are drawn no more.
@@ -108,7 +108,7 @@ impl Cut {
         node
     }
 
-    /// What has to be drawn after these nodes changed.
+    /// The nodes to draw again after these nodes changed.
     fn step_from(&self, before: &Self, changed: &[Node]) -> Step {
         let mut step = Step::default();
         for &node in changed {

@@ -85,7 +85,8 @@ pub struct Vertex {
 }
 
 impl Vertex {
-    /// Is it equal to the other one, bit by bit? Normals of 0.0 and -0.0 are equal, but not the same.
+    /// Returns `true` if it equals the other one bit by bit. Normals of 0.0 and -0.0 differ here, though they compare
+    /// equal.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         self == other && self.normal.to_array().map(f32::to_bits) == other.normal.to_array().map(f32::to_bits)
     }

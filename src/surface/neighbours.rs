@@ -53,8 +53,8 @@ const CORNER_STACKS: [usize; 4] = [4, 5, 7, 8];
 pub(super) struct CornerBricks<'a>(pub [[Option<&'a Brick>; 4]; 2]);
 
 impl CornerBricks<'_> {
-    /// Are all corners solid, or all air? `pristine` is the side that all corners without a brick are on, if they are
-    /// on one.
+    /// Returns `true` if all corners are solid, or all air. `pristine` is the side that all corners without a brick are
+    /// on, if they are on one.
     pub fn is_one_side(&self, pristine: Option<bool>) -> bool {
         let mut sides = self.0.iter().flatten().map(|brick| match brick {
             None => pristine,

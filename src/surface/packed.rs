@@ -31,7 +31,7 @@ impl<'a> PackedVertices<'a> {
         self.positions.len()
     }
 
-    /// Each as it is in a mesh.
+    /// Each vertex as it is in a mesh.
     pub fn iter(self) -> impl Iterator<Item = Vertex> + 'a {
         let Self { origin, positions, normals, mixes } = self;
         let mix = move |number: usize| match mixes {

@@ -209,7 +209,7 @@ impl SeamChecker {
     }
 }
 
-/// In how many separate strips or rings do a vertex's triangles lie? `fan` holds (vertex, next, last) of each.
+/// Number of separate strips or rings formed by a vertex's triangles. `fan` holds (vertex, next, last) of each.
 fn links(fan: &[(u32, u32, u32)]) -> usize {
     let mut parent: Vec<usize> = (0..fan.len()).collect();
     fn root(parent: &mut [usize], mut at: usize) -> usize {

@@ -4,8 +4,8 @@
 //! the mask's border follow after the columns. A transaction rebuilds only the list of indices: whole cells first, then
 //! the rings, of which it computes those near its edits and copies the others.
 //!
-//! On a ground with materials of its own, steep cells are drawn with the rings, wherever they are: in bands, since
-//! their corners alone do not show the beds between them (`cell_outline`).
+//! On a ground with strata or a material function, steep cells are drawn with the rings, wherever they are: in bands,
+//! since their corners alone do not show the beds between them (`cell_outline`).
 
 use std::cmp::Ordering;
 

@@ -21,7 +21,7 @@ pub trait Lattice {
     fn stored_material(&self, point: IVec3) -> MaterialId;
     /// The pristine world.
     fn ground(&self) -> &Ground;
-    /// Does marching cubes draw the sheet of a cell? `None` outside the world.
+    /// Returns `true` if marching cubes draws the sheet of a cell; `None` outside the world.
     fn is_volumetric(&self, cell: Column) -> Option<bool>;
 }
 

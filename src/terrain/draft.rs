@@ -1,4 +1,4 @@
-//! Drafts: what edits would make of a world that stays as it is.
+//! Drafts: the result of edits on a world, without changing it.
 
 use std::sync::Arc;
 

@@ -120,7 +120,7 @@ impl World {
         chunks
     }
 
-    /// The mesh of a chunk as it is kept; `None` where it draws nothing or no mesh is kept.
+    /// The stored mesh of a chunk; `None` if it draws nothing or no mesh is stored.
     pub fn chunk_surface(&self, chunk: ChunkPos) -> Option<&SurfaceMesh> {
         self.surfaces.get(&chunk).map(|surface| surface.mesh())
     }

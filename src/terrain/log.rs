@@ -145,7 +145,7 @@ impl CommitLog {
 
     /// Enters that these terms hold from now on, if others did.
     fn enter_terms(&mut self, world: &World, terms: Terms) {
-        // The next edit tells them.
+        // The next edit logs them.
         if self.has_gap && self.records.is_empty() {
             return;
         }

@@ -239,7 +239,7 @@ impl Terrain {
         self.transaction(ticket, work)
     }
 
-    /// A transaction on the world as it is.
+    /// A transaction on the present world.
     pub(super) fn transaction(&self, ticket: u64, work: Work) -> Transaction {
         Transaction {
             ticket,

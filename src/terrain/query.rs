@@ -231,7 +231,7 @@ impl World {
     }
 }
 
-/// On which side of the edge p-q does the origin lie, once it is moved by (e, e * e) for an infinitesimal e?
+/// The side of the edge p-q on which the origin lies, once it is moved by (e, e * e) for an infinitesimal e.
 fn turn(p: (i64, i64), q: (i64, i64)) -> bool {
     let cross = p.0 * q.1 - p.1 * q.0;
     let (dx, dz) = (q.0 - p.0, q.1 - p.1);

@@ -54,7 +54,8 @@ pub struct CommitRecord {
 }
 
 impl CommitRecord {
-    /// Is it a commit? Otherwise it only says which rules and settings hold from here on, and the revision stays.
+    /// Whether it is a commit. Otherwise it only holds rules and settings for later edits, and the revision does not
+    /// change.
     pub fn is_commit(&self) -> bool {
         let changes =
             |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change | LogEntry::Ground(_));
@@ -62,7 +63,7 @@ impl CommitRecord {
     }
 }
 
-/// All of a world but its ground, as it is saved: [`Terrain::restore`](super::Terrain::restore) makes a terrain of it.
+/// All of a world except its ground, for saving: [`Terrain::restore`](super::Terrain::restore) makes a terrain of it.
 #[derive(Clone, Debug, Default)]
 pub struct WorldParts {
     /// Every stored brick, and all fields.

@@ -9,7 +9,7 @@ use super::world::unique;
 use crate::brush::{Brush, Edit};
 
 impl Terrain {
-    /// Queues a brush as a step of undo of its own, unless it is part of a [stroke](Brush::stroke). An invalid brush is
+    /// Queues a brush as a separate step of undo, unless it is part of a [stroke](Brush::stroke). An invalid brush is
     /// queued too: its receipt says why it was rejected. A brush that exceeds the [limits](Self::set_work_limits) is
     /// answered [at once](Self::take_answered).
     pub fn submit(&mut self, brush: &Brush) {
@@ -77,7 +77,8 @@ impl Terrain {
         }
     }
 
-    /// Is there room for an edit? `None` stands for an invalid one, which is queued too and gets its receipt in turn.
+    /// Returns `true` if there is room for an edit. `None` stands for an invalid edit, which is queued too and gets its
+    /// receipt in turn.
     pub(crate) fn admit(&self, edit: Option<&Edit>) -> Result<(), Rejection> {
         let has_room = self.queue.has_room(self.world.grid(), edit);
         if has_room { Ok(()) } else { Err(Rejection::Overloaded) }

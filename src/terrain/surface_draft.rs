@@ -14,7 +14,7 @@ use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Indices, SurfaceMesh};
 
-/// What a tile draws: its columns stay as they are, so only its rings and indices change.
+/// The mesh data of a tile. Its columns never change, so only its rings and indices do.
 #[derive(Clone, Debug)]
 pub struct TileUpdate {
     pub(crate) tile: TilePos,
@@ -70,7 +70,7 @@ pub(crate) enum SurfaceDraft {
 }
 
 impl World {
-    /// What the surface of a tile or chunk is made from, as it is now.
+    /// The present input for the surface of a tile or chunk.
     pub(crate) fn draft(&self, drawn: Drawn) -> SurfaceDraft {
         match drawn {
             Drawn::Tile(tile) if self.grid.has_tile(tile) => {

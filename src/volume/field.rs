@@ -17,8 +17,8 @@ pub struct Field {
     pub revision: u64,
 }
 
-/// What an edit did to the fields of one chunk (paper, section Scenarios, 1 to 4). An edit that reaches over several
-/// chunks is cut, and each chunk has a scenario of its own (5).
+/// How an edit changed the fields of one chunk (paper, section Scenarios, 1 to 4). An edit that reaches over several
+/// chunks is cut, and each chunk has a separate scenario (5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Scenario {
     /// 1: no field was near; one was created to fit the edit.
@@ -34,7 +34,7 @@ pub enum Scenario {
     },
 }
 
-/// What became of the fields of a chunk.
+/// The change of a chunk's fields.
 pub(crate) struct Absorbed {
     /// The scenario that took place.
     pub scenario: Scenario,

@@ -1,4 +1,4 @@
-//! What may be dug: hardness of materials, bedrock, protected boxes.
+//! Digging rules: hardness of materials, bedrock, protected boxes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,7 +6,7 @@ use super::{MaterialCounts, VoxelOutcome};
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, ONE};
 
-/// What brushes may do to a world. Without rules, everything.
+/// Restrictions on brushes. Without rules, brushes may change everything.
 ///
 /// Equal edits under equal rules make equal worlds, bit for bit. Rules restrict every operation: it *takes
 /// away* wherever it makes a sample's density higher, whether the sample is solid or not.

@@ -117,7 +117,7 @@ impl<'a> SampleView<'a> {
         self.sample(point).distance().unwrap_or_else(|| self.ground.distance(point))
     }
 
-    /// Is the lattice point solid? Density 0 is air.
+    /// Returns `true` if the lattice point is solid. Density 0 is air.
     pub fn is_solid(&self, point: IVec3) -> bool {
         self.distance(point) < 0
     }

@@ -22,7 +22,7 @@ use crate::backend::CardChoice;
 /// The kernels as PTX, compiled in advance.
 const PTX: &str = include_str!("kernels.ptx");
 
-/// Launches with at least this many blocks are timed. For smaller ones, timing costs more than it tells.
+/// Launches with at least this many blocks are timed. For smaller ones, timing costs more than it is worth.
 const TIMED: u32 = 64;
 
 /// A GPU with the kernels loaded.

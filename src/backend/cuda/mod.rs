@@ -73,7 +73,7 @@ use surfaces::Surfaces;
 
 /// A GPU as an alternative to the CPU. It is opened on first use.
 pub(super) struct Cuda {
-    /// Use the faster of the two? Otherwise the GPU is used whenever possible.
+    /// Whether the faster of the two is used. Otherwise the GPU is used whenever possible.
     is_auto: bool,
     /// Opens the device; `None` once opening has begun.
     pending: Mutex<Option<PendingDevice>>,

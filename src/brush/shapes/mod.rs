@@ -156,7 +156,8 @@ macro_rules! shapes {
                 })
             }
 
-            /// Is the shape within every limit? Any integers may be asked about; all else relies on it.
+            /// Checks that the shape is within every limit. Accepts any integers; all other functions rely on this
+            /// check.
             pub(super) fn check(&self) -> Result<(), BrushError> {
                 match self {
                     $(Self::$name(shape) => {

@@ -30,7 +30,7 @@ impl HeightSource for NoiseSource {
             NoiseKind::Ridged => 1,
         };
         let [scale, amplitude, base] = [scale, amplitude, base].map(f64::to_bits);
-        // The first word tells kinds of sources apart.
+        // The first word distinguishes kinds of sources.
         hash_words([0x6e6f_6973, seed.into(), kind, octaves.into(), scale, amplitude, base])
     }
 

@@ -302,7 +302,7 @@ fn the_hash_is_of_the_source_and_what_it_is_made_of() {
 
 #[test]
 fn the_hashes_of_sources_are_the_same_on_every_machine() {
-    // If this fails, worlds saved with hashes of the old kind are no longer recognised: say so in the change log.
+    // If this fails, worlds saved with the old hashes are no longer recognised: say so in the changelog.
     let noise = NoiseSource::new(&NoiseHeights::default()).unwrap();
     let samples = (0..6).map(|i| i * 999).collect();
     let image = ImageSource::new(GreyImage::from_samples(3, 2, samples).unwrap(), &ImageScale::default());

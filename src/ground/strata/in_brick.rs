@@ -89,7 +89,8 @@ fn bounds(values: impl IntoIterator<Item = i32>) -> [i32; 2] {
     values.into_iter().fold([i32::MAX, i32::MIN], |[low, high], value| [low.min(value), high.max(value)])
 }
 
-/// Where all numbers of a range lie that are moved by up to `by`: inside another one, outside it, or neither.
+/// Relation of a range, widened by `by`, to another one: inside (`Some(true)`), outside (`Some(false)`), or
+/// overlapping.
 #[inline]
 fn range_relation([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Option<bool> {
     if high + by < from || low - by >= to {
@@ -101,7 +102,7 @@ fn range_relation([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Optio
     }
 }
 
-/// How deep a voxel lies, in 1/256 voxel: 0 to 255 for the highest solid one of its column, and 0 above it.
+/// Depth of a voxel, in 1/256 voxel: 0 to 255 for the highest solid one of its column, and 0 above it.
 #[inline]
 fn depth(height: i32, y: i32) -> i32 {
     (height - y * ONE - 1).max(0)

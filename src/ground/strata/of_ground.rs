@@ -197,8 +197,8 @@ impl Ground {
         self.nearest_column(point) == Column::of(point) && point.y.unsigned_abs() <= HIGHEST.unsigned_abs()
     }
 
-    /// What the undug surface shows over a column: the material of its highest solid voxel where the ground has strata,
-    /// otherwise the column's own, base and overlay blended.
+    /// The material that the undug surface shows over a column: the material of its highest solid voxel where the
+    /// ground has strata, otherwise the column's own, base and overlay blended.
     pub fn surface_material(&self, column: Column) -> ColumnMaterial {
         match self.below() {
             Some(below) => match below.tops.get(self.extent().index(column)) {

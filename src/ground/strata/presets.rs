@@ -1,4 +1,4 @@
-//! Strata to begin with.
+//! Preset strata.
 
 use glam::Vec2;
 

@@ -1,4 +1,4 @@
-//! Nodes of level 0: the tile and the chunks below it, most often as they are drawn without levels.
+//! Nodes of level 0: the tile and the chunks below it, mostly unchanged.
 //!
 //! Next to coarser nodes the mask differs from the world's: their cells are not in it, and cells that are
 //! promoted because of them are. Where that shows in a node, its tile and its blocks are made from scratch

@@ -51,17 +51,17 @@ impl<'a> LevelView<'a> {
         IVec3::new(point.x.min(last.x), point.y, point.z.min(last.z))
     }
 
-    /// Was a sample edited? Beyond the rim, that of the rim's column.
+    /// Returns `true` if a sample was edited. Beyond the rim, that of the rim's column.
     pub(super) fn is_edited(&self, point: IVec3) -> bool {
         self.world.samples.is_edited(self.drawn(point))
     }
 
-    /// Is a sample solid? Beyond the rim, that of the rim's column.
+    /// Returns `true` if a sample is solid. Beyond the rim, that of the rim's column.
     pub(super) fn is_solid(&self, point: IVec3) -> bool {
         self.world.samples.is_solid(self.drawn(point))
     }
 
-    /// Both at once: was a sample edited, and is it solid?
+    /// Whether a sample was edited, and whether it is solid.
     pub(super) fn state(&self, point: IVec3) -> (bool, bool) {
         let drawn = self.drawn(point);
         match self.world.samples.sample(drawn).distance() {

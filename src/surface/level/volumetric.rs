@@ -43,7 +43,7 @@ impl<'a> Volumetric<'a> {
         is
     }
 
-    /// Rule 2: is a sample of the cell's sheet edited?
+    /// Rule 2: returns `true` if a sample of the cell's sheet is edited.
     fn is_disturbed(&self, cell: Cell) -> bool {
         match cell.stride {
             1 => self.view.world.mask.contains(cell.low),
@@ -82,7 +82,7 @@ impl<'a> Volumetric<'a> {
         self.is_sheet_edited(&interval.columns(), interval.coarse(), interval.fine())
     }
 
-    /// Is a cell in the same node promoted? Only for a broken rule.
+    /// Returns `true` if a cell in the same node is promoted. Only for a rule broken on purpose.
     fn is_any_promoted(&self, cell: Cell) -> bool {
         let (grid, level) = (self.view.cut.grid(), cell.stride.trailing_zeros() as u8);
         let (low, high) = grid.columns(Node::over(grid.chunks().tile_of_cell(cell.low), level));

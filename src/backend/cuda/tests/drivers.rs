@@ -33,7 +33,7 @@ fn a_device_passes_the_whole_self_test() {
     assert_eq!(engine.wait(Duration::from_secs(600)), EngineState::Cuda(name));
 }
 
-/// Runs in a process of its own, started by the test below.
+/// Runs in a separate process, started by the test below.
 #[test]
 #[ignore = "looks at the machine's driver"]
 fn tell_what_the_driver_says() {
@@ -82,7 +82,7 @@ fn a_driver_without_a_device_is_no_device() {
     }
 }
 
-/// Runs in a process of its own, started by the test below.
+/// Runs in a separate process, started by the test below.
 #[test]
 #[ignore = "needs the stand-in driver with three GPUs"]
 fn open_each_of_three_cards() {
@@ -122,7 +122,7 @@ fn processor_time() -> Option<Duration> {
     stat.split(' ').next()?.parse().ok().map(Duration::from_nanos)
 }
 
-/// Runs in a process of its own, started by the test below.
+/// Runs in a separate process, started by the test below.
 #[test]
 #[ignore = "needs the stand-in driver that answers slowly"]
 fn wait_for_a_slow_card() {

@@ -43,7 +43,7 @@ fn an_engine_that_nobody_uses_opens_no_card() {
     assert_eq!(Engine::new(Backend::Cpu).state(), EngineState::Cpu);
 }
 
-/// Runs in a process of its own, where no other test starts threads.
+/// Runs in a separate process, where no other test starts threads.
 #[test]
 #[ignore = "counts the threads of its process"]
 fn count_threads_of_engines() {
