@@ -1,10 +1,10 @@
 //! Levels of detail by their figures, without drawing: `cargo bench --no-default-features --bench horizon [--
-//! KILOMETRES] [PART...]`, where parts are `views`, `cdlod`, `load`, `nodes`, `digs` and `flight`; all of them unless
-//! some are named.
+//! KILOMETRES] [PART...]`, where parts are `views`, `cdlod`, `load`, `nodes`, `edited`, `digs` and `flight`; all of them
+//! unless some are named.
 //!
 //! A world of 16 x 16 km (or so many) whose mountains are computed on demand, seen by an eye on a summit at 1440 lines
 //! and 45 degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the whole
-//! cut take; what a node costs in a task, from noise and from an image; what a flight at 100 m/s with 20 digs a second
+//! cut take; what a node costs in a task, from noise and from an image, and on edited ground; what a flight at 100 m/s with 20 digs a second
 //! needs; and the bytes that the ground and the meshes take, as a GPU gets them. `cdlod` sets triangles beside those of
 //! a published scheme.
 
@@ -12,6 +12,7 @@
 mod mountains;
 
 mod cdlod;
+mod edited;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -57,13 +58,14 @@ fn main() {
             "cdlod" => cdlod::compare(terrain().world(), summit),
             "load" => load(terrain(), summit),
             "nodes" => nodes(terrain().world(), summit),
+            "edited" => edited::nodes(),
             "digs" => digs([terrain(), terrain()], summit),
             _ => flight(terrain(), summit),
         }
     }
 }
 
-const PARTS: [&str; 6] = ["views", "cdlod", "load", "nodes", "digs", "flight"];
+const PARTS: [&str; 7] = ["views", "cdlod", "load", "nodes", "edited", "digs", "flight"];
 
 /// Digs of radius 4 near the eye, with a cut drawn and without, in turns. The first round computes the ground that both
 /// share, and shows where edits are: the cut is the one that they lead to, as in a game. It is not counted.

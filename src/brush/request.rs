@@ -201,12 +201,6 @@ mod tests {
     use crate::brush::shapes::Cone;
 
     #[test]
-    fn a_brush_can_be_a_message() {
-        fn is_message<T: Clone + Send + Sync + 'static>() {}
-        is_message::<Brush>();
-    }
-
-    #[test]
     fn transforming_moves_points_turns_axes_and_scales_sizes() {
         let turn = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
         let brush = Brush::dig(Shape::cone(Vec3::X, Vec3::X, 3.0))

@@ -213,7 +213,17 @@ mod tests {
             let rule = MaterialRule { overlay: GRASS, height: (low, high), height_fade, slope: steep, slope_fade };
             let control = MaterialControl::Rules { base: ROCK, rules: vec![rule, rule] };
             let ground = Ground::from_heights(1, 1, vec![-99, 1 << 23, 0, -(1 << 23)]).unwrap();
-            let _ = ground.with_materials(&control);
+            match ground.with_materials(&control) {
+                Ok(ground) => {
+                    for (x, z) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                        let material = ground.column_material(Column::new(x, z));
+                        prop_assert_eq!(material.base, ROCK);
+                        prop_assert!(material.blend == 0 || material.overlay == GRASS, "{:?}", material);
+                    }
+                }
+                Err(GroundError::Parameter { .. }) => {}
+                Err(error) => prop_assert!(false, "{error}"),
+            }
         }
 
         #[test]

@@ -7,7 +7,7 @@
 //! | --- | --- |
 //! | a number, a function, a list | [`Ground::flat`], [`Ground::from_fn`], [`Ground::from_heights`] |
 //! | a grey PNG or RAW image | [`GreyImage::decode_png`], [`GreyImage::decode_raw`], then [`Ground::from_image`] |
-//! | noise | [`Ground::from_noise`] |
+//! | noise | [`Ground::from_noise`], or [`Ground::from_noise_fn`] for any function of the crate [`noise`] |
 //! | anything of these and more, computed where it is needed | a [`HeightSource`], then [`Ground::from_source`] |
 //! | materials by slope, height or image | [`Ground::with_materials`] |
 //! | strata and ore below the surface | [`Ground::with_strata`], [`Ground::with_material_fn`] |
@@ -37,6 +37,9 @@ mod source;
 mod sources;
 mod strata;
 mod world;
+
+#[doc(no_inline)]
+pub use ::noise;
 
 pub use control::MaterialControl;
 pub use error::{GroundError, ImageError};

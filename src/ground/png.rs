@@ -110,6 +110,14 @@ mod tests {
         [&(data.len() as u32).to_be_bytes(), &*checked, &(!crc).to_be_bytes()].concat()
     }
 
+    /// Checks that a decoded image has all of its samples, and this size if it is given.
+    fn assert_whole(decoded: Result<GreyImage, ImageError>, size: Option<(u32, u32)>) {
+        let Ok(image) = decoded else { return };
+        let found = (image.width(), image.height());
+        assert_eq!(image.samples().len() as u64, u64::from(found.0) * u64::from(found.1));
+        assert!(found.0 > 0 && found.1 > 0 && size.is_none_or(|size| size == found), "{found:?}");
+    }
+
     type Damage = Vec<(prop::sample::Index, u8)>;
 
     fn damage() -> impl Strategy<Value = Damage> {
@@ -125,16 +133,16 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_are_an_image_or_an_error(bytes: Vec<u8>) {
-            let _ = decode(&bytes);
-            let _ = decode(&[&SIGNATURE, bytes.as_slice()].concat());
-            let _ = decode(&[header(4, 4, 8, 0), bytes].concat());
+            prop_assert!(bytes.starts_with(&SIGNATURE) || decode(&bytes).is_err());
+            assert_whole(decode(&[&SIGNATURE, bytes.as_slice()].concat()), None);
+            assert_whole(decode(&[header(4, 4, 8, 0), bytes].concat()), Some((4, 4)));
         }
 
         #[test]
         fn a_damaged_png_is_an_image_or_an_error(damage in damage()) {
             let mut file = noisy_png();
             inflict(&damage, &mut file);
-            let _ = decode(&file);
+            assert_whole(decode(&file), None);
         }
 
         #[test]
@@ -147,7 +155,8 @@ mod tests {
             let header = [0, 0, 0, width, 0, 0, 0, height, bits, 0, 0, 0, u8::from(interlaced)];
             let (header, samples) = (chunk(b"IHDR", &header), chunk(b"IDAT", &samples));
             for (name, length) in [(b"tRNS", 2), (b"gAMA", 4), (b"acTL", 8), (b"fcTL", 26), (b"iCCP", 26)] {
-                let _ = decode(&[&SIGNATURE, &*header, &chunk(name, &extra[..length]), &samples].concat());
+                let file = [&SIGNATURE, &*header, &chunk(name, &extra[..length]), &samples].concat();
+                assert_whole(decode(&file), Some((width.into(), height.into())));
             }
         }
 

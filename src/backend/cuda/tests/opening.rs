@@ -33,12 +33,17 @@ fn threads() -> Option<usize> {
 }
 
 #[test]
-fn an_engine_that_nobody_uses_opens_no_card() {
-    for backend in [Backend::Auto, Backend::Cuda] {
-        let engine = Engine::new(backend);
-        std::thread::sleep(Duration::from_millis(20));
-        assert_eq!(engine.state(), EngineState::Unopened);
+fn an_unused_engine_opens_no_gpu() {
+    // Attempts to open a device are counted; that no thread is started that could do so later is the next test.
+    for is_auto in [true, false] {
+        let (engine, opened) = counted(is_auto);
+        assert_eq!((engine.state(), opened.load(Ordering::SeqCst)), (EngineState::Unopened, 0));
         assert_eq!(engine.figures(), Default::default());
+        drop(engine);
+        assert_eq!(opened.load(Ordering::SeqCst), 0);
+    }
+    for backend in [Backend::Auto, Backend::Cuda] {
+        assert_eq!(Engine::new(backend).state(), EngineState::Unopened);
     }
     assert_eq!(Engine::new(Backend::Cpu).state(), EngineState::Cpu);
 }
@@ -54,7 +59,7 @@ fn count_threads_of_engines() {
 }
 
 #[test]
-fn an_engine_that_nobody_uses_starts_no_thread() {
+fn an_unused_engine_starts_no_thread() {
     let test = "backend::cuda::tests::opening::count_threads_of_engines";
     let own = std::env::current_exe().expect("this test");
     let said =
@@ -63,7 +68,7 @@ fn an_engine_that_nobody_uses_starts_no_thread() {
 }
 
 #[test]
-fn small_brushes_open_no_card() {
+fn small_brushes_open_no_gpu() {
     let (engine, opened) = counted(true);
     let mut terrain = terrain(&engine);
     (0..50).for_each(|_| drop(terrain.apply(dig(4.0))));
@@ -71,7 +76,7 @@ fn small_brushes_open_no_card() {
 }
 
 #[test]
-fn a_large_transaction_opens_the_card_once_and_does_not_wait_for_it() {
+fn a_large_transaction_opens_the_gpu_once_and_does_not_wait_for_it() {
     let (engine, opened) = counted(true);
     let mut terrain = terrain(&engine);
     for _ in 0..3 {
