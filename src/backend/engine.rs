@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::{Backend, CardChoice, Choice, Compute, Cpu, EngineSettings, Stage, lock};
+use super::{Backend, CardChoice, Choice, Compute, Cpu, EngineSettings, EngineState, Stage, lock};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::{Ground, GroundError, NoiseHeights};
 use crate::surface::block::Block;
@@ -45,21 +45,6 @@ impl fmt::Debug for Engine {
 
 /// Number of choices that are remembered.
 const REMEMBERED: usize = 64;
-
-/// What an engine runs on.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum EngineState {
-    /// The CPU.
-    Cpu,
-    /// The CPU; no transaction was large enough for a GPU yet.
-    Unopened,
-    /// The CPU, while a GPU is being opened.
-    Opening,
-    /// The GPU of this name, and the CPU.
-    Cuda(String),
-    /// The CPU, because the GPU can't be used, for this reason.
-    Lost(String),
-}
 
 /// Statistics of an engine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -20,11 +20,13 @@ mod cpu;
 mod cuda;
 mod engine;
 mod settings;
+mod state;
 
 pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::Cpu;
-pub use engine::{Engine, EngineFigures, EngineState};
+pub use engine::{Engine, EngineFigures};
 pub use settings::{CardChoice, EngineSettings};
+pub use state::EngineState;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

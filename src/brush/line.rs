@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use super::{Brush, FULL_POWER, Operation, Roughness, Shape};
+use super::{Brush, FULL_POWER, Operation, Roughness, Shape, is_default};
 use crate::ground::MaterialId;
 
 /// A [`Brush`] in its written form, without fields that may be left out.
@@ -48,11 +48,6 @@ fn full() -> u8 {
 
 fn is_full(power: &u8) -> bool {
     *power == FULL_POWER
-}
-
-/// Returns `true` if the value is the default, which is left out when writing.
-pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 impl TryFrom<Line> for Brush {

@@ -131,3 +131,8 @@ pub const BAND: i32 = 2 * ONE;
 /// Depth inside its shape down to which an edit distinguishes distances, in 1/256 voxel. Surface and normals
 /// need two voxels; the rest is for rough shapes, whose distances change faster than the point moves.
 pub const DEPTH: i32 = 4 * ONE;
+
+/// Returns `true` if the value is the default, which is left out when writing.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}

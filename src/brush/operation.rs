@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::line::is_default;
+use super::is_default;
 use super::{DEPTH, Stamp};
 use crate::ground::MaterialId;
 

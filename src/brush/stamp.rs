@@ -7,7 +7,7 @@ use glam::{IVec3, Quat, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::BrushError;
-use super::line::is_default;
+use super::is_default;
 use super::quantize::{
     check_point, check_size, check_turn, in_range, matrix, point, restored_point, restored_turn, size, turn,
     voxels,
