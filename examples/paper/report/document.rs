@@ -186,7 +186,7 @@ fn experiment(page: &mut String, measurements: &Measurements) -> std::fmt::Resul
     )?;
     writeln!(
         page,
-        "- **Full field, positions and normals only** (beside it): one cube of {side}^3 samples of 16 bits that holds the \
+        "- **Full field, positions and normals only** (for comparison): one cube of {side}^3 samples of 16 bits that holds the \
          same ground. An edit changes only the samples in its reach; then the whole mesh is made again by the library's \
          dense mesher into buffers that are kept: positions and gradient normals in floats, nothing else."
     )?;
@@ -211,9 +211,8 @@ fn experiment(page: &mut String, measurements: &Measurements) -> std::fmt::Resul
             "- **GPU**: every edit is applied and meshed on the GPU, the smallest too. The paper's GPU lost to its CPU in \
              every test because each call sent the whole field over and the mesh back, and waited. Here bricks and heights \
              stay on the GPU: an edit sends a list of jobs, some kilobytes, and two launches write what changed, samples, \
-             vertices and indices, straight into memory that the CPU reads. What is left of the old cost are two \
-             round trips an edit, which large edits are worth and small ones are not; the ratios below tell what that comes \
-             to. A game leaves that choice to `Backend::Auto`; here it is not made, so that the columns compare."
+             vertices and indices, straight into memory that the CPU reads. Two round trips an edit remain \
+             of the old cost, which pay for large edits but not for small ones; the ratios below show the result. A game leaves that choice to `Backend::Auto`; here it is not made, so that the columns compare."
         )?;
     }
     for (backend, reason) in &measurements.missing {
