@@ -133,7 +133,7 @@ struct Walk {
     camera: Entity,
     path: Vec<Vec3>,
     balls: Vec<Entity>,
-    /// Is the camera so far up that nothing is in sight?
+    /// Whether the camera is far above the ground, with nothing in sight.
     is_far: bool,
     /// When the next brush is due.
     next_brush: Instant,
@@ -322,7 +322,7 @@ impl Walk {
 enum Scene {
     /// The real landscape with a look.
     Landscape,
-    /// The same with a plain material.
+    /// The real landscape with a plain material.
     Plain,
     /// Mountains to the horizon with levels of detail and a plain material.
     Horizon { view_distance: f32 },

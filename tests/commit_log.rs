@@ -1,5 +1,5 @@
-//! The commit log, and terrains from what was saved: replayed records, restored parts and parts that are put in place
-//! lead to the same world. `BURROW_WORLDS` is the number of random worlds.
+//! The commit log, and terrains from what was saved: replayed records, restored parts and replaced parts lead to the
+//! same world. `BURROW_WORLDS` is the number of random worlds.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Strata: what is drawn is what a dig yields, nothing is stored for it, and solid ground is the same as without.
+//! Strata: drawn materials equal those that a dig yields, nothing is stored for them, and solid ground is unaffected.
 
 mod worlds;
 
@@ -71,7 +71,7 @@ fn ten_thousand_digs_yield_what_the_function_says() {
             let height = ground.height(Column::new(x, z)) as f32 / 256.0;
             let center = Vec3::new(x as f32 + rng.f32(), height - 12.0 * rng.f32(), z as f32 + rng.f32());
             let shape = Shape::sphere(center, 1.0 + 3.0 * rng.f32());
-            // Some of what is dug was built or painted before.
+            // Some of the dug ground was built or painted before.
             if rng.u8(..4) == 0 {
                 let stored = MaterialId([3, 77, 255][rng.usize(..3)]);
                 let shape = Shape::sphere(center + Vec3::splat(1.5), 2.5);

@@ -1,6 +1,6 @@
 //! CPU against CUDA: `cargo bench --no-default-features --features cuda --bench backends [-- SECTION...]`.
 //!
-//! The same transactions on the shipped landscape, on each backend in turn. The CPU uses all of its threads unless
+//! Runs equal transactions on the shipped landscape, on each backend in turn. The CPU uses all of its threads unless
 //! stated otherwise. Times run from the edits to the commit, with vertices in host memory.
 
 #[path = "../edits/landscape.rs"]
@@ -79,7 +79,7 @@ impl Engines {
         let is_there = |choice: &Choice| choice.is_cuda || choice.amount == 0;
         assert!(
             who != EngineKind::Cuda || choices.iter().all(is_there),
-            "the CPU did the GPU's work: {choices:?}"
+            "the CPU ran stages of the GPU: {choices:?}"
         );
         times.push(&commit.stages, &choices);
         commit

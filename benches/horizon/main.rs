@@ -2,11 +2,11 @@
 //! KILOMETRES] [PART...]`, where parts are `views`, `cdlod`, `load`, `nodes`, `edited`, `digs` and `flight`; all of them
 //! unless some are named.
 //!
-//! A world of 16 x 16 km (or so many) whose mountains are computed on demand, seen by an eye on a summit at 1440 lines
-//! and 45 degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the whole
-//! cut take; what a node costs in a task, from noise and from an image, and on edited ground; what a flight at 100 m/s with 20 digs a second
-//! needs; and the bytes that the ground and the meshes take, as a GPU gets them. `cdlod` sets triangles beside those of
-//! a published scheme.
+//! A world of 16 x 16 km (or the given size) whose mountains are computed on demand, seen by an eye on a summit at 1440
+//! lines and 45 degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the
+//! whole cut take; what a node costs in a task, from noise and from an image, and on edited ground; what a flight at
+//! 100 m/s with 20 digs a second needs; and the bytes that the ground and the meshes take, as a GPU gets them. `cdlod`
+//! compares triangles with those of a published scheme.
 
 #[path = "../../examples/shared/mountains.rs"]
 mod mountains;
@@ -127,12 +127,12 @@ const DIRECTIONS: usize = 64;
 /// Half the horizontal angle of view of a picture of 16 to 9 that is 45 degrees high.
 const HALF_ANGLE: f32 = 0.635;
 
-/// Is any part of a node within the angle of view, seen from above?
+/// Returns `true` if any part of a node is within the angle of view, seen from above.
 fn is_in_sight(cut: &Cut, node: Node, eye: Vec3, angle: f32) -> bool {
     let (low, high) = cut.grid().columns(node);
     let [low, high] = [low, high].map(|column| Vec2::new(column.x as f32, column.z as f32));
     let corners = [low, Vec2::new(low.x, high.y), high, Vec2::new(high.x, low.y)];
-    // Beside neither side of the wedge.
+    // Outside neither side of the wedge.
     let sides = [-HALF_ANGLE, HALF_ANGLE].map(|half| Vec2::from_angle(angle + half));
     let is_inside = |corner: &Vec2, side: usize| {
         let across = sides[side].perp_dot(*corner - eye.xz());

@@ -26,7 +26,7 @@ impl Runner {
         }
     }
 
-    /// The number of stages so far that a GPU left to the CPU.
+    /// Number of stages that a GPU left to the CPU.
     pub fn left_over(&self) -> u64 {
         self.engine.as_ref().map_or(0, |engine| engine.figures().cpu)
     }

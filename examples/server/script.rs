@@ -97,7 +97,7 @@ fn made_up(options: &Options) -> impl Iterator<Item = Line> + use<> {
     })
 }
 
-/// Sends brushes, so many each tick, and ends the program when none is left and all are answered.
+/// Sends some brushes each tick, and ends the program once none is left and all have receipts.
 pub fn add(app: &mut App, source: Source) {
     app.insert_resource(source).add_systems(Update, send.before(BurrowSystems::Collect));
 }

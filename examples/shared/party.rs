@@ -32,7 +32,7 @@ fn config(world: &World) -> ConnectionConfig {
     }
 }
 
-/// Listens for players, at most so many. Everything that is replicated has to be registered.
+/// Listens for a limited number of players. Everything that is replicated has to be registered.
 ///
 /// # Errors
 /// When the address is taken.

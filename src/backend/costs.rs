@@ -109,7 +109,7 @@ type Statistic = fn(&Recent) -> Option<f64>;
 #[derive(Clone, Debug, Default)]
 struct Times(Vec<Recent>);
 
-/// Which power of two an amount belongs to.
+/// The power of two that an amount belongs to.
 fn size(amount: usize) -> usize {
     amount.checked_ilog2().unwrap_or_default() as usize
 }

@@ -13,7 +13,7 @@ use crate::surface::block::{Block, Mesher, Parts};
 use crate::surface::meshed_blocks::{Group, MeshedBlocks, PartLists};
 use crate::surface::vertex::WorldView;
 
-/// How many stacks of bricks a thread takes at a time.
+/// Number of stacks of bricks that a thread takes at a time.
 const STACKS: usize = 4;
 
 /// About how many vertices a list has room for that several threads make.

@@ -2,7 +2,7 @@
 
 use super::Backend;
 
-/// Which CUDA GPU an engine opens.
+/// Selects the CUDA GPU that an engine opens.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum CardChoice {
@@ -31,7 +31,7 @@ pub enum CardChoice {
 pub struct EngineSettings {
     /// CPU, GPU, or the faster of the two.
     pub backend: Backend,
-    /// Which GPU. One that does not exist is treated like one that fails.
+    /// Selects the GPU. One that does not exist is treated like one that fails.
     pub card: CardChoice,
     /// Most bytes of GPU memory. Up to half may hold bricks and ground, which stay there between
     /// transactions. `None`: a quarter of the memory that is free when the GPU is opened, at most 2 GiB.

@@ -11,7 +11,7 @@ use crate::lattice::ONE;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blend {
-    /// How much of the change is made: 0 for nothing, 1 for all of it.
+    /// Share of the change that is made: 0 for nothing, 1 for all of it.
     pub strength: f32,
     /// Width in voxels, from the shape's surface inwards, over which the change fades in: 0 to 64. A falloff wider than
     /// the shape's depth ends in its middle. With 0 the change ends in a step at the shape's surface.
@@ -56,7 +56,7 @@ impl QuantizedBlend {
         Blend { strength: voxels(self.strength), falloff: voxels(self.falloff), material: self.material }
     }
 
-    /// How much of the change is made at a distance from the shape, in 1/256; the falloff is at most `deep` wide.
+    /// Share of the change at a distance from the shape, in 1/256; the falloff is at most `deep` wide.
     pub fn weight(self, outside: i32, deep: i32) -> i32 {
         let inside = -outside;
         let falloff = self.falloff.min(deep);

@@ -114,7 +114,7 @@ impl Edit {
         self.operation.operation()
     }
 
-    /// How the edit blends in, if it sculpts.
+    /// The blend, if the edit sculpts.
     pub fn blend(&self) -> Option<Blend> {
         self.blend.map(QuantizedBlend::blend)
     }

@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-/// Why a [`Brush`](super::Brush) cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes in cubic
-/// voxels.
+/// The error of a [`Brush`](super::Brush) that cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes
+/// in cubic voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BrushError {

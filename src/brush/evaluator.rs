@@ -154,7 +154,7 @@ impl Evaluator {
         self.roughness.is_some()
     }
 
-    /// All that distances are computed from.
+    /// All parameters of distances.
     pub(crate) fn constants(&self) -> Constants {
         let (kind, shape) = self.form.constants();
         let roughness = self.roughness.as_ref().map(QuantizedRoughness::constants);

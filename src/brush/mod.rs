@@ -54,7 +54,7 @@
 //! on a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls and
 //! ceilings too. A sample whose density stays as it is is not edited.
 //!
-//! What becomes solid is of the blend's material; without one, of the first solid voxel straight below within 64
+//! New solid samples get the blend's material; without one, of the first solid voxel straight below within 64
 //! voxels, else straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
 //!
 //! ```
@@ -125,7 +125,7 @@ use crate::lattice::ONE;
 /// The default power of a brush, which removes everything that rules allow to be removed.
 pub const FULL_POWER: u8 = u8::MAX;
 
-/// How far outside its shape an edit still changes samples, in 1/256 voxel (rule 6).
+/// Distance outside its shape within which an edit changes samples, in 1/256 voxel (rule 6).
 pub const BAND: i32 = 2 * ONE;
 
 /// Depth inside its shape down to which an edit distinguishes distances, in 1/256 voxel. Surface and normals

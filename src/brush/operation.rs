@@ -62,12 +62,12 @@ pub enum Operation {
     /// again, is higher, but nowhere lower. Once the ground is higher than nature made it, further raising
     /// fills what is missing from the sides, by a voxel each time at most.
     Raise {
-        /// How far, in voxels: 0 to 64.
+        /// Distance in voxels: 0 to 64.
         amount: f32,
     },
     /// Moves the surface inwards: the opposite of [`Raise`](Self::Raise).
     Lower {
-        /// How far, in voxels: 0 to 64.
+        /// Distance in voxels: 0 to 64.
         amount: f32,
     },
     /// Gives the surface the relief of an image.
@@ -138,7 +138,7 @@ impl Operation {
     }
 }
 
-/// Which way an edit is applied.
+/// The kind of an edit's operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Dig,

@@ -34,20 +34,20 @@ use crate::ground::MaterialId;
 pub struct Brush {
     /// Where.
     pub shape: Shape,
-    /// What to do there.
+    /// The operation.
     pub operation: Operation,
     /// Bumps on the shape's surface; `None` for a smooth one.
     pub roughness: Option<Roughness>,
     /// Any number that the game chooses; the receipt returns it.
     pub tag: u64,
-    /// What one undo takes back: brushes of one stroke that follow each other are one step, over however many frames
+    /// The steps of undo: brushes of one stroke that follow each other are one step, over however many frames
     /// they come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply). A
     /// brush of another stroke in between, a second player's say, ends a step.
     pub stroke: Option<u64>,
-    /// How operations that sculpt fade, and what they build of.
+    /// The falloff, strength and material of operations that sculpt.
     pub blend: Blend,
-    /// How hard the material may be that it takes away, where the terrain has rules for that: [`FULL_POWER`] takes away
-    /// all that can be.
+    /// The greatest hardness of material that it removes, where the terrain has rules for that: [`FULL_POWER`] takes
+    /// away all that can be.
     pub power: u8,
 }
 

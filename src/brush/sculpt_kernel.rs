@@ -30,13 +30,13 @@ use super::{quantize::measure, stamp::StampParams};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
-/// Where stored densities end, in 1/256 voxel.
+/// Greatest stored density, in 1/256 voxel.
 pub(crate) const FARTHEST: i32 = i16::MAX as i32;
 
 /// The bound on differences between neighbours, in 1/256 voxel. Densities beyond a cliff are not known better.
 const CONTRAST: i32 = 2 * ONE;
 
-/// By how much sharpening changes a sample at most, in 1/256 voxel.
+/// The most that sharpening changes a sample, in 1/256 voxel.
 const SHARPER: i32 = ONE / 4;
 
 /// The opposite neighbours of a sample, their weight in a binomial average (1 2 1 along each axis), and what the way to
@@ -190,7 +190,7 @@ impl Stencil {
 pub(crate) struct SculptKernel {
     operation: QuantizedOperation,
     blend: QuantizedBlend,
-    /// How deep the shape is in its middle.
+    /// Depth of the shape's middle.
     deep: i32,
 }
 
@@ -204,7 +204,7 @@ impl SculptKernel {
         Self { operation: operation.clone(), blend, deep }
     }
 
-    /// What new ground is made of, if the operation says so.
+    /// The material of new ground, if the operation has one.
     pub fn material(&self) -> Option<MaterialId> {
         self.blend.material
     }
@@ -280,7 +280,7 @@ pub(crate) enum SculptOp<'a> {
     /// A point of the plane, its normal, and what that measures.
     Flatten([i32; 3], [i16; 3], f64),
     Level(i32),
-    /// How much is added to densities.
+    /// The change of densities.
     Shift(i32),
     Stamp(StampParams<'a>),
     /// Step and base.
@@ -289,7 +289,7 @@ pub(crate) enum SculptOp<'a> {
 
 #[cfg(feature = "cuda")]
 impl SculptKernel {
-    /// All that densities are computed from; `None` unless the operation sculpts.
+    /// All parameters of densities; `None` unless the operation sculpts.
     pub(crate) fn constants(&self) -> Option<SculptParams<'_>> {
         let operation = match &self.operation {
             QuantizedOperation::Smooth => SculptOp::Smooth,

@@ -29,14 +29,14 @@ pub struct Stamp {
     /// The image, 2 to 256 samples a side.
     #[serde(with = "image")]
     pub image: Arc<GreyImage>,
-    /// Where the middle of the image lies.
+    /// The middle of the image.
     pub center: Vec3,
     /// From the stamp's axes to those of the terrain; of length 1. It may be left out in a line of JSON.
     #[serde(default, skip_serializing_if = "is_default")]
     pub rotation: Quat,
     /// The image's sides in voxels, along its columns and its rows. Nothing changes outside the image.
     pub size: Vec2,
-    /// How high white lies above black, in voxels; -256 to 256.
+    /// Height of white above black, in voxels; -256 to 256.
     pub height: f32,
 }
 
@@ -234,7 +234,7 @@ pub(crate) struct StampParams<'a> {
 
 #[cfg(feature = "cuda")]
 impl QuantizedStamp {
-    /// All that [`QuantizedStamp::at`] looks at.
+    /// All parameters of [`QuantizedStamp::at`].
     pub(super) fn constants(&self) -> StampParams<'_> {
         let &Self { center, rotation, half, height, .. } = self;
         let (rows, squared) = matrix(rotation);

@@ -1,4 +1,4 @@
-//! How many voxels a brush covers.
+//! Counts the voxels that a brush covers.
 
 use super::{Brush, BrushError, Edit};
 

@@ -100,7 +100,7 @@ impl Cells {
         }
     }
 
-    /// How many edges have no vertex yet.
+    /// Number of edges without a vertex yet.
     pub(super) fn pending(&self) -> usize {
         self.edges.iter().map(Stream::len).sum()
     }

@@ -13,7 +13,7 @@ impl Density for i16 {}
 pub(super) mod sealed {
     use super::f32x4;
 
-    /// What the mesher asks of a density.
+    /// The operations on a density that the mesher needs.
     pub trait Wide: Copy {
         /// Returns `true` if this sample is solid.
         fn is_solid(self) -> bool;

@@ -11,7 +11,7 @@ pub struct DenseGrid<'a, S> {
     apron: usize,
 }
 
-/// Why samples are no [`DenseGrid`].
+/// An error of making a [`DenseGrid`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DenseGridError {
     /// The number of samples is not the product of the sides.

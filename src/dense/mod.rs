@@ -70,7 +70,7 @@ pub struct DenseMesh {
     pub indices: Vec<u32>,
 }
 
-/// Which normals a mesh gets.
+/// Kind of normals of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Normals {
     /// None.

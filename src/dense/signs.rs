@@ -1,4 +1,4 @@
-//! Which samples of a layer are solid: bits, 64 samples to a word.
+//! Solid samples of a layer as bits, 64 samples to a word.
 //!
 //! A word holds 64 samples but only 63 columns, because neighbouring words share a sample:
 //!

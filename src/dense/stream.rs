@@ -34,7 +34,7 @@ impl<T: Copy + Default> Stream<T> {
         }
     }
 
-    /// How many items there is room for.
+    /// Number of items that fit.
     pub(super) fn room(&self) -> usize {
         self.slots.len() - self.len
     }

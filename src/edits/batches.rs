@@ -1,4 +1,4 @@
-//! Which edits of a transaction may be applied brick by brick.
+//! Batches: edits of a transaction that may be applied brick by brick.
 
 use std::ops::Range;
 

@@ -64,7 +64,7 @@ impl EditDelta {
     }
 }
 
-/// How many of the latest entries a new one is compared with.
+/// Number of latest entries that a new one is compared with.
 const LATEST: usize = 8;
 
 /// Changes by one edit in one chunk, in one brick or in several.

@@ -15,22 +15,22 @@ use super::rule_scope::{BatchRules, BrickRules};
 use crate::lattice::{ChunkGrid, ItemCost, pieces};
 use crate::volume::{DiggingRules, SampleView};
 
-/// How many jobs are done before their deltas are added up. With many edits deltas take more memory than bricks, and
-/// most bricks of a large cave are replaced by a shared one.
+/// Number of jobs that are done before their deltas are summed. With many edits deltas take more memory than bricks,
+/// and most bricks of a large cave are replaced by a shared one.
 const JOBS_AT_ONCE: usize = 8192;
 
 /// Least and most jobs of a delta: few, so that all threads end together, but not so few that there are many deltas to
 /// add up.
 const GROUP: [usize; 2] = [16, 64];
 
-/// How many groups there should be for each thread.
+/// Desired number of groups for each thread.
 const GROUPS_PER_THREAD: usize = 8;
 
 /// A batch of edits, sorted by the bricks that they may reach.
 pub(crate) struct PreparedEdits<'a> {
     /// The samples that they apply to.
     pub base: SampleView<'a>,
-    /// How the world is cut into chunks.
+    /// The grid of chunks and tiles.
     pub grid: ChunkGrid,
     pub edits: Vec<PreparedEdit>,
     jobs: Vec<Job>,

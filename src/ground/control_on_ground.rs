@@ -1,4 +1,4 @@
-//! What a material control gives on a ground, column by column.
+//! Evaluates a material control on a ground, column by column.
 
 use super::control::{MaterialControl, id};
 use super::error::GroundError;
@@ -9,7 +9,7 @@ use super::world::{Ground, Materials};
 use crate::lattice::{Column, ONE};
 
 impl MaterialControl {
-    /// What a column of a ground is made of.
+    /// The materials of a column.
     pub(super) fn at(&self, ground: &Ground, column: Column) -> ColumnMaterial {
         self.of_column(ground, column, || (ground.height(column), ground.slope(column)))
     }

@@ -18,7 +18,7 @@ pub enum RawFormat {
     BigEndian,
 }
 
-/// What an image may cost; checked against what the file declares, before memory is allocated for it.
+/// Limits of an image's size, checked against the file's header before memory is allocated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ImageLimits {
     /// Most bytes of the file.

@@ -37,7 +37,7 @@ pub struct NoiseHeights {
     pub octaves: u32,
     /// Size of the largest features in voxels: 1 to [`MAX_SCALE`].
     pub scale: f64,
-    /// How far heights rise above and fall below `base` at most, in voxels; may be negative.
+    /// Greatest height above and below `base`, in voxels; may be negative.
     pub amplitude: f64,
     /// Middle height in voxels.
     pub base: f64,

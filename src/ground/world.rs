@@ -101,7 +101,7 @@ pub(crate) struct RowBuffer {
 pub(super) struct Rise {
     /// Height gained, in 1/256 voxel.
     pub rise: i32,
-    /// Over how many voxels: 2, at the rim 1.
+    /// Number of voxels over which it is gained: 2, at the rim 1.
     pub run: i32,
 }
 

@@ -106,7 +106,7 @@ pub struct TilePos {
     pub z: i32,
 }
 
-/// How the world is cut into chunks and tiles.
+/// The grid of chunks and tiles.
 ///
 /// Cells of chunk `c` along an axis are `c * size .. (c + 1) * size`. Along x and z the world ends at `width` and
 /// `depth`, so the last chunk may hold fewer cells; y has no end. A sample belongs to the chunk of the cell it is the

@@ -1,10 +1,10 @@
-//! Which cut an eye needs: by the size of cells and errors on the screen.
+//! Chooses the cut for an eye by the size of cells and errors on the screen.
 
 use glam::Vec3;
 
 use super::{Cut, LevelGrid, Node};
 
-/// How much larger all limits get each time there would be too many nodes.
+/// Factor by which all limits grow each time there would be too many nodes.
 const GROWTH: f32 = 1.2;
 
 /// The least of all limits in pixels: what is less, or no number, counts as this.
@@ -28,12 +28,12 @@ pub struct Eye {
     pub pixels: f32,
 }
 
-/// What a choice must know of a node.
+/// The properties of a node that a choice depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeFacts {
     /// Its lowest and its highest point, in voxels.
     pub heights: [f32; 2],
-    /// How far it is from the finer surface, in voxels.
+    /// Greatest distance from the finer surface, in voxels.
     pub error: f32,
     /// Whether anything was dug or built there.
     pub has_edits: bool,

@@ -62,7 +62,7 @@ impl Cut {
         (!step.new.is_empty()).then_some(step)
     }
 
-    /// All that differs in another cut of the same quadtree.
+    /// All differences from another cut of the same quadtree.
     pub fn changes_to(&self, other: &Self) -> Step {
         let mut step = Step {
             gone: self.nodes().filter(|&node| !other.contains(node)).collect(),

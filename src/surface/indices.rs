@@ -44,7 +44,7 @@ impl Indices {
         }
     }
 
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         match self {
             Self::U16(list) => list.len(),

@@ -35,7 +35,7 @@ pub(crate) enum BlockVertices<'a> {
 }
 
 impl BlockVertices<'_> {
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         match self {
             Self::Made(vertices) => vertices.len(),

@@ -26,7 +26,7 @@ pub(crate) enum PackedMixes<'a> {
 }
 
 impl<'a> PackedVertices<'a> {
-    /// How many there are.
+    /// Their number.
     pub fn len(self) -> usize {
         self.positions.len()
     }

@@ -12,7 +12,7 @@ use rustc_hash::FxHashMap;
 use super::mesh::SurfaceMesh;
 use crate::lattice::{ChunkGrid, SNAP};
 
-/// What may be wrong with a drawn surface.
+/// Faults of a drawn surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum SeamFault {

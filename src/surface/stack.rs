@@ -1,5 +1,5 @@
-//! What all blocks of one stack of bricks share: heights, cells of the mask and the world's rim, normals and materials
-//! of columns.
+//! Data that all blocks of one stack of bricks share: heights, cells of the mask and the world's rim, normals and
+//! materials of columns.
 
 use std::ops::RangeInclusive;
 

@@ -11,7 +11,7 @@ use crate::ground::{Ground, MaterialId, OVERLAY_DEPTH};
 use crate::lattice::{ChunkGrid, Column, ONE, SNAP};
 use crate::volume::SampleView;
 
-/// What the vertex function reads of the world.
+/// The part of the world that the vertex function reads.
 pub trait Lattice {
     /// Density at a lattice point, 1/256 voxel. Gradients look one point beyond the world's rim.
     fn distance(&self, point: IVec3) -> i32;

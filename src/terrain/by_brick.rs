@@ -77,7 +77,7 @@ impl ByBrick {
         Self { slabs: slabs.into_par_iter().map(slab).collect() }
     }
 
-    /// How many bricks.
+    /// Number of bricks.
     pub fn len(&self) -> usize {
         self.slabs.iter().map(Vec::len).sum()
     }

@@ -1,4 +1,4 @@
-//! What a commit puts in place of what the world held.
+//! The content that a commit replaces in the world.
 
 use std::sync::Arc;
 

@@ -29,7 +29,7 @@ pub struct Commit {
     pub(super) next_field: u64,
     pub(super) receipts: Vec<Receipt>,
     pub(super) step: Option<HistoryReceipt>,
-    /// What became of parts that it puts in place.
+    /// The receipt of the parts that it replaces.
     pub(super) put: Option<Result<Restored, ChangeError>>,
     /// Its record, where a log is kept.
     pub(super) record: Option<RecordDraft>,
@@ -38,7 +38,7 @@ pub struct Commit {
     pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
     /// Chunks that change without being meshed.
     pub(super) outdated: Vec<ChunkPos>,
-    /// What is drawn then, if that changes.
+    /// The cut that is drawn afterwards, if it changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Returns `true` if it changes only what is drawn.
     pub(super) is_cut: bool,
@@ -48,7 +48,7 @@ pub struct Commit {
     pub(super) copy: Option<Arc<World>>,
     /// Meshes to be swapped together with this commit. The world keeps its own.
     pub meshes: MeshUpdates,
-    /// Where the time went.
+    /// Durations of its stages.
     pub stages: Stages,
 }
 
@@ -63,12 +63,12 @@ impl fmt::Debug for Commit {
     }
 }
 
-/// What a commit returns once it is installed.
+/// The result of installing a commit.
 pub(super) struct Installed {
     pub receipts: Vec<Receipt>,
     /// The receipt of a step through history, if the commit was one.
     pub step: Option<HistoryReceipt>,
-    /// What became of parts that it put in place.
+    /// The receipt of the parts that it replaced.
     pub put: Option<Result<Restored, ChangeError>>,
     /// What each group replaced that replaced something.
     pub replaced: Vec<UndoDelta>,
@@ -80,7 +80,7 @@ impl Commit {
         self.sample_hash
     }
 
-    /// What happens to fields when this is committed, by chunk.
+    /// Changes of fields in this commit, by chunk.
     pub fn field_news(&self) -> &[(ChunkPos, FieldNews)] {
         &self.news
     }

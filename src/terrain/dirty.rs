@@ -1,4 +1,5 @@
-//! Where changed samples show: the cells that join the mask, and the blocks that have to be drawn again.
+//! The cells and blocks where changed samples show: the cells that join the mask, and the blocks that have to be drawn
+//! again.
 //!
 //! Bricks are in order of their stacks throughout, so each step works stack by stack and threads share the stacks.
 

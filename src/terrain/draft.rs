@@ -18,7 +18,7 @@ use crate::volume::Brick;
 pub struct Draft {
     /// A receipt for each edit.
     pub receipts: Vec<Receipt>,
-    /// What would change.
+    /// The changes.
     pub change: WorldChange,
     /// The [hash](World::hash) that the world would have.
     pub hash: u64,
@@ -27,7 +27,7 @@ pub struct Draft {
 }
 
 impl Terrain {
-    /// What these edits would make of the world as last committed, under the rules and settings of edits that are
+    /// The result of these edits on the last committed world, under the rules and settings of edits that are
     /// submitted now. Nothing changes. It takes as long as their transaction on a terrain that [never
     /// meshes](Meshing::Never).
     pub fn draft(&self, edits: &[Edit]) -> Draft {

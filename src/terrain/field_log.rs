@@ -1,4 +1,4 @@
-//! What a transaction does to fields.
+//! Changes of fields in a transaction.
 
 use std::collections::{BTreeMap, BTreeSet};
 

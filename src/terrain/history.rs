@@ -23,7 +23,7 @@ pub enum HistoryStep {
     Redo,
 }
 
-/// What a terrain's history holds.
+/// Statistics of a terrain's history.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct History {
     /// Steps that can be undone.
@@ -39,12 +39,12 @@ pub struct History {
 pub struct HistoryReceipt {
     /// Undo or redo.
     pub step: HistoryStep,
-    /// What it changed, or why it changed nothing.
+    /// Its changes, or the reason why there were none.
     pub outcome: Result<Restored, HistoryRejection>,
 }
 
-/// What a step through history changed. Inventories that follow receipts must follow this too. Loose pieces count here,
-/// although a receipt's `removed` leaves them out.
+/// The changes of a step through history. Inventories that follow receipts must follow this too. Loose pieces count
+/// here, although a receipt's `removed` leaves them out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Restored {
     /// The tags of the undone or redone brushes, in order, without those that had changed nothing.
@@ -59,7 +59,7 @@ pub struct Restored {
     pub painted: MaterialCounts,
 }
 
-/// Why a step changed nothing.
+/// The reason why a step changed nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HistoryRejection {
@@ -128,8 +128,8 @@ impl UndoDelta {
     }
 }
 
-/// What a terrain no longer needs: steps, bricks, records of the log, and a copy of the world. Dropping these is slow;
-/// do it off the main thread.
+/// Data that a terrain no longer needs: steps, bricks, records of the log, and a copy of the world. Dropping these is
+/// slow; do it off the main thread.
 #[derive(Default)]
 pub(crate) struct DeferredDrop {
     steps: Vec<Arc<UndoDelta>>,

@@ -15,7 +15,7 @@ const WIDEST: i32 = 4096;
 pub struct GroundFacts {
     /// Its lowest and its highest point, in voxels.
     pub heights: [f32; 2],
-    /// How far its heightmap is from the heights at half its stride, in voxels; 0 at level 0.
+    /// Greatest distance of its heightmap from the heights at half its stride, in voxels; 0 at level 0.
     pub error: f32,
 }
 
@@ -106,7 +106,7 @@ impl World {
         checker.check(self.grid)
     }
 
-    /// What a choice must know of a node.
+    /// The properties of a node that a choice depends on.
     pub fn node_facts(&self, grid: LevelGrid, node: Node) -> NodeFacts {
         let GroundFacts { heights, error } = GroundFacts::new(&self.ground, grid, node);
         NodeFacts { heights, error, has_edits: self.has_edits(grid, node) }

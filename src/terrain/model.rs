@@ -70,7 +70,7 @@ pub struct Terrain {
     pub(super) log: Option<CommitLog>,
     pub(super) meshing: Meshing,
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
-    /// What the game committed since the plugin last showed the world; `None` while the plugin does not show it.
+    /// Commits of the game since the plugin last showed the world; `None` while the plugin does not show it.
     #[cfg(feature = "plugin")]
     pub(super) unseen: Option<Unseen>,
 }
@@ -86,11 +86,11 @@ impl fmt::Debug for Terrain {
     }
 }
 
-/// What a terrain keeps of the transaction under way.
+/// A terrain's record of the running transaction.
 pub(super) struct InFlight {
     pub ticket: u64,
     pub work: Work,
-    /// How much work that is, as the queue counts.
+    /// Its work, in the units of the queue.
     estimate: u64,
     /// Whether the plugin runs it.
     #[cfg_attr(not(feature = "plugin"), expect(dead_code))]

@@ -28,7 +28,7 @@ use crate::surface::{Mask, MaskView};
 use crate::volume::layers::{self, offset};
 use crate::volume::{Brick, Field, FieldId, UniformBricks, column_hash, pristine_layers};
 
-/// Why parts were not put in place; nothing changed then.
+/// The reason why parts were not replaced; nothing changed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChangeError {
@@ -329,7 +329,7 @@ impl Terrain {
         self.change_receipts.pop_back().unwrap_or(Err(ChangeError::Panicked))
     }
 
-    /// What became of parts that were [submitted](Self::submit_change), in order; each is returned once. If they are
+    /// Receipts of parts that were [submitted](Self::submit_change), in order; each is returned once. If they are
     /// not taken, the latest 65,536 are kept.
     pub fn take_change_receipts(&mut self) -> Vec<Result<Restored, ChangeError>> {
         std::mem::take(&mut self.change_receipts).into()

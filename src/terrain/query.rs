@@ -8,7 +8,7 @@ use super::world::World;
 use crate::ground::MaterialId;
 use crate::lattice::{Column, LIMIT, LatticeBox, REACH};
 
-/// Where a ray meets the ground.
+/// The point where a ray meets the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Voxels from the ray's origin.
@@ -197,7 +197,7 @@ impl World {
         )
     }
 
-    /// Where the vertical line through (x, z) crosses the surface, lowest first.
+    /// Heights at which the vertical line through (x, z) crosses the surface, lowest first.
     ///
     /// Exact in integers, with the line moved by an infinitesimal step off every edge, so each crossing counts once.
     fn crossings(&self, x: f64, z: f64) -> Vec<Crossing> {

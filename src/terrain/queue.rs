@@ -15,7 +15,7 @@ use crate::edits::reach;
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
 use crate::volume::DiggingRules;
 
-/// How much work a terrain takes on, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
+/// Limits of a terrain's work, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
 /// A brick takes the CPU about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose
 /// pieces are not counted, because their cost is not known before, and a step through history counts as a
@@ -34,7 +34,7 @@ pub struct WorkLimits {
 }
 
 impl WorkLimits {
-    /// All that waits goes into one transaction, and nothing is rejected: for tools and tests.
+    /// No limits: one transaction takes everything that waits, and nothing is rejected. For tools and tests.
     pub const UNBOUNDED: Self = Self { transaction: u64::MAX, waiting: u64::MAX };
 }
 
@@ -58,7 +58,7 @@ fn work_of(grid: ChunkGrid, edit: &Edit) -> u64 {
     EDIT + weight * reach(grid, edit).map_or(0, |reach| BrickPos::range(reach).volume())
 }
 
-/// What makes edits that follow each other one step of undo.
+/// The reason why consecutive edits are one step of undo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Together {
     /// They belong to one stroke.
@@ -110,7 +110,7 @@ impl Submission {
     }
 }
 
-/// What waits for its transaction.
+/// Requests that wait for their transaction.
 pub(super) enum Request {
     Edit(Submission),
     Step(HistoryStep),
@@ -269,7 +269,7 @@ impl Queue {
     }
 }
 
-/// What a transaction is made of.
+/// The work of a transaction.
 pub(super) enum Taken {
     Edits(Arc<[Submission]>),
     Step(HistoryStep),

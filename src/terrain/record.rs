@@ -23,7 +23,7 @@ pub struct WorldChange {
     pub next_field: u64,
 }
 
-/// What a commit was asked for. Those of one commit apply in order.
+/// One item of a commit. Items of one commit apply in order.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LogEntry {
@@ -47,7 +47,7 @@ pub struct CommitRecord {
     pub revision: u64,
     /// The world's [hash](super::World::hash) after it.
     pub hash: u64,
-    /// What was asked for, in order. Edits that were rejected are left out; a commit of such edits alone has no entry.
+    /// The items of the commit, in order. Rejected edits are left out; a commit of such edits alone has no entry.
     pub entries: Vec<LogEntry>,
     /// What changed.
     pub change: WorldChange,

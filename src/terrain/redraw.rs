@@ -35,7 +35,7 @@ pub struct MeshUpdates {
     /// Nodes that are drawn otherwise than before, where a [cut](super::DrawnCut) is drawn. Tiles and chunks that
     /// change are listed above, whether they are drawn or not.
     pub nodes: Vec<NodeUpdate>,
-    /// What is drawn then, if that changes.
+    /// The cut that is drawn afterwards, if it changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Chunks that change without being meshed.
     pub(super) outdated: Vec<ChunkPos>,
@@ -143,7 +143,7 @@ struct ByChunk {
 /// Blocks of a chunk.
 struct OfChunk {
     chunk: ChunkPos,
-    /// How many there are.
+    /// Their number.
     count: usize,
     /// One more than the greatest of their numbers.
     end: usize,

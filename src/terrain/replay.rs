@@ -14,7 +14,7 @@ use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, ChunkPos};
 use crate::volume::{DiggingRules, FieldId, Fields, RulesError};
 
-/// Why a terrain can't be restored.
+/// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RestoreError {
@@ -29,7 +29,7 @@ pub enum RestoreError {
     Parts(#[from] ChangeError),
 }
 
-/// Why a record can't be replayed. The terrain may hold a part of it then, and should be dropped.
+/// An error of replaying a record. The terrain may then hold a part of the record, and should be dropped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {

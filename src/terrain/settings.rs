@@ -1,6 +1,6 @@
 //! Settings that a terrain is made with, and what may be wrong with them.
 
-/// How a terrain is cut up and how large it is drawn.
+/// Settings of a terrain: chunk size and voxel size.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TerrainSettings {
@@ -29,7 +29,7 @@ impl TerrainSettings {
     }
 }
 
-/// Why a terrain can't be made.
+/// An error of making a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TerrainError {

@@ -1,10 +1,10 @@
-//! Where the time of a transaction goes.
+//! Times of the stages of a transaction.
 
 use std::time::Duration;
 
 use web_time::Instant;
 
-/// How long the stages of a transaction took. In large ones tiles and chunks are made side by side, so stages may take
+/// Durations of the stages of a transaction. In large ones tiles and chunks are made side by side, so stages may take
 /// longer than the whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stages {

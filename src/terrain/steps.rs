@@ -35,7 +35,7 @@ impl Terrain {
         }
     }
 
-    /// What can be undone and redone, and what it takes.
+    /// The steps that can be undone and redone, and their memory.
     pub fn history(&self) -> History {
         self.undo_stack.figures()
     }
@@ -102,7 +102,7 @@ impl Terrain {
         self.step_receipts.pop_back().unwrap_or_else(|| step.nothing())
     }
 
-    /// What became of steps through history that were submitted, in order; each is returned once. If they are not
+    /// Receipts of steps through history that were submitted, in order; each is returned once. If they are not
     /// taken, the latest 65,536 are kept.
     pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
         std::mem::take(&mut self.step_receipts).into()

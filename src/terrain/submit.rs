@@ -102,7 +102,7 @@ impl Terrain {
         self.queue.limits = limits;
     }
 
-    /// How much work a transaction takes, and how much may wait.
+    /// Limits of the work in a transaction and of the work that may wait.
     pub fn work_limits(&self) -> WorkLimits {
         self.queue.limits
     }

@@ -3,7 +3,7 @@
 use crate::surface::meshed_blocks::MeshedBlock;
 use crate::surface::{Indices, SurfaceMesh};
 
-/// What marching cubes draws in one chunk: one mesh, which remembers where each block's part of it is.
+/// The marching cubes surface of one chunk: one mesh, with the position of each block's part.
 #[derive(Clone, Debug, Default)]
 pub struct ChunkSurface {
     mesh: SurfaceMesh,

@@ -57,7 +57,7 @@ impl TileUpdate {
     }
 }
 
-/// All that the surface of one tile or chunk is made from, to make it on another thread. Unlike a snapshot it does not
+/// The complete input for the surface of one tile or chunk, to make it on another thread. Unlike a snapshot it does not
 /// hold the world, so the next commit has nothing to copy.
 #[derive(Clone)]
 pub(crate) enum SurfaceDraft {

@@ -58,7 +58,7 @@ impl Transaction {
         self.ticket
     }
 
-    /// How many edits it holds; steps through history and changes of the cut hold none.
+    /// Number of its edits; steps through history and changes of the cut hold none.
     pub fn len(&self) -> usize {
         match &self.work {
             Work::Edits(submissions) => submissions.len(),

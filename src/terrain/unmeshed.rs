@@ -20,17 +20,17 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{Bricks, SampleView};
 
-/// Which surfaces a terrain's transactions make.
+/// Selects the surfaces that a terrain's transactions make.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Meshing {
-    /// All that change, ready to be shown.
+    /// All changed meshes, ready to be shown.
     #[default]
     All,
     /// None: for servers and tools that show nothing. Meshes that are asked for are made at that moment.
     Never,
 }
 
-/// All that the surface of a chunk is made from.
+/// The complete input for the surface of a chunk.
 pub(crate) struct UnmeshedChunk {
     ground: Arc<Ground>,
     grid: ChunkGrid,
@@ -124,7 +124,7 @@ pub(super) fn complete(world: &World, view: &WorldView, blocks: &mut Vec<Block>)
 }
 
 impl World {
-    /// All that the surface of a chunk is made from; `None` unless it is one whose surface is not kept.
+    /// The complete input for the surface of a chunk; `None` unless it is one whose surface is not kept.
     pub(super) fn unmeshed(&self, chunk: ChunkPos) -> Option<UnmeshedChunk> {
         self.unmeshed.contains_key(&chunk).then(|| UnmeshedChunk::new(self, chunk))
     }
@@ -158,7 +158,7 @@ impl Terrain {
         self.meshing = meshing;
     }
 
-    /// Which surfaces transactions make.
+    /// The surfaces that transactions make.
     pub fn meshing(&self) -> Meshing {
         self.meshing
     }

@@ -7,7 +7,7 @@ use super::field_log::FieldNews;
 use super::world::{Drawn, Version, World};
 use crate::lattice::ChunkPos;
 
-/// What changed of a world that is shown.
+/// Changes of a world that is shown.
 pub(crate) struct Unseen {
     from: Version,
     to: Version,
@@ -41,12 +41,12 @@ impl Unseen {
         self.drawn.iter().copied()
     }
 
-    /// How many they are.
+    /// Their number.
     pub fn len(&self) -> usize {
         self.drawn.len()
     }
 
-    /// What happened to fields, in order.
+    /// Changes of fields, in order.
     pub fn fields(&self) -> &[(ChunkPos, FieldNews)] {
         &self.fields
     }

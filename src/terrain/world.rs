@@ -65,7 +65,7 @@ impl Memory {
         self.ground + self.edits() + self.undo
     }
 
-    /// What edits cost: all but the ground and history.
+    /// Memory of edits: everything except the ground and history.
     pub fn edits(&self) -> usize {
         self.samples + self.materials + self.meshes + self.parts + self.index
     }
@@ -104,7 +104,7 @@ pub struct World {
     pub(super) revision: u64,
 }
 
-/// Which world, and how many commits old.
+/// Identifies a world and its number of commits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Version {
     lineage: u64,
@@ -164,7 +164,7 @@ impl World {
         Arc::clone(&self.ground)
     }
 
-    /// How the world is cut into chunks.
+    /// The grid of chunks and tiles.
     pub fn grid(&self) -> ChunkGrid {
         self.grid
     }

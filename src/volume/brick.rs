@@ -65,7 +65,7 @@ pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     layers
 }
 
-/// Which samples of a pristine brick are solid.
+/// The solid samples of a pristine brick.
 pub(crate) fn pristine_layers(ground: &Ground, pos: BrickPos) -> Layers {
     let low = pos.origin();
     solid_layers(&ground.heights::<8>(Column::of(low)), low.y)
@@ -204,12 +204,12 @@ impl Brick {
         self.materials.as_ref().map_or(MaterialId::GROUND, |materials| materials[BrickPos::index(point)])
     }
 
-    /// Which samples are solid: below zero, or pristine and below the ground's surface.
+    /// The solid samples: below zero, or pristine and below the ground's surface.
     pub fn solid(&self) -> &Layers {
         &self.solid
     }
 
-    /// Which samples are edited.
+    /// The edited samples.
     pub fn edited(&self) -> &Layers {
         &self.edited
     }

@@ -29,7 +29,7 @@ pub enum Scenario {
     Extended,
     /// 4: the edit joined several fields into one.
     Merged {
-        /// How many fields became one, at least 2.
+        /// Number of fields that became one, at least 2.
         fields: usize,
     },
 }
@@ -62,7 +62,7 @@ impl Fields {
         self.0.iter()
     }
 
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         self.0.len()
     }

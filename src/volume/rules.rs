@@ -29,7 +29,7 @@ use crate::lattice::{LatticeBox, ONE};
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DiggingRules {
-    /// How hard materials are; others have hardness 0. A brush with at least that power digs at full speed, one with
+    /// Hardness of materials; others have hardness 0. A brush with at least that power digs at full speed, one with
     /// half of it or less takes nothing away, and in between its speed grows linearly. Painting is not restricted:
     /// ground that is painted with a softer material is softer from then on.
     pub hardness: BTreeMap<MaterialId, u8>,
@@ -115,7 +115,7 @@ impl DiggingRules {
     }
 }
 
-/// Why rules can't be set.
+/// An error of setting rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RulesError {
@@ -127,13 +127,13 @@ pub enum RulesError {
 /// Voxels that an operation would have changed but for the rules, by the material that they have, or would have got.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Refused {
-    /// Those in protected boxes: not taken away, not filled, not painted.
+    /// Voxels in protected boxes: not removed, not filled, not painted.
     pub protected: MaterialCounts,
-    /// Those of unbreakable materials, or below bedrock.
+    /// Voxels of unbreakable materials, or below bedrock.
     pub unbreakable: MaterialCounts,
-    /// Those too hard for the brush's power.
+    /// Voxels too hard for the brush's power.
     pub too_hard: MaterialCounts,
-    /// Those so hard that one pass of the brush was not enough.
+    /// Voxels that one pass of the brush only slowed down.
     pub slowed: MaterialCounts,
 }
 

@@ -39,8 +39,8 @@ const COLORS: [[u8; 3]; 14] = [
 /// border, and what a surface at a whole height lies above its highest sample.
 const FARTHER: f64 = 1.1;
 
-/// One pixel in so many may show what lies a little farther: noise moves borders, by less than half the way to the next
-/// vertex.
+/// One pixel in this many may show ground that lies a little farther: noise moves borders, by less than half the way to
+/// the next vertex.
 const SELDOM: usize = 5000;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
@@ -120,7 +120,7 @@ struct Counts {
 impl Counts {
     fn count(&mut self, picture: &RgbImage, camera: Transform, world: &terrain::World) {
         for (x, y, texel) in picture.enumerate_pixels() {
-            // On an outline, the renderer may see what is just beside the middle of the pixel.
+            // On an outline, the renderer may see ground just off the middle of the pixel.
             let beside = [[0.0, 0.0], [0.1, 0.0], [-0.1, 0.0], [0.0, 0.1], [0.0, -0.1]];
             let cast = |[dx, dy]: [f32; 2]| {
                 let direction = direction(camera, x as f32 + 0.5 + dx, y as f32 + 0.5 + dy);

@@ -59,7 +59,7 @@ pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
     (random_ground_of_size(rng, index, width, depth), chunk_size)
 }
 
-/// The same with so many cells along x and along z.
+/// Random ground with `width` cells along x and `depth` along z.
 pub fn random_ground_of_size(rng: &mut Rng, index: u64, width: u32, depth: u32) -> Ground {
     let ground = random_ground_without_strata(rng, index, width, depth);
     if index % 5 != 4 {

@@ -31,7 +31,7 @@ struct Slot {
     used: AtomicU32,
 }
 
-/// How many slots eviction examines before it checks whether enough are free.
+/// Number of slots that eviction examines before it checks whether enough are free.
 const PIECE: usize = 1 << 14;
 
 /// Initial number of slots. Growing takes half a millisecond, which the first digs should not pay.

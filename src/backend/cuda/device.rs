@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-/// Why a device cannot be used, or no longer.
+/// A fault that makes a device unusable.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {

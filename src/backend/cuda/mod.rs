@@ -92,7 +92,7 @@ struct Shared {
     session: Mutex<Option<Box<Session>>>,
     /// The outcome of opening, readable at any time.
     state: Mutex<EngineState>,
-    /// How long opening and the self-test took, once the test has passed.
+    /// Duration of opening and of the self-test, once the test has passed.
     opening: OnceLock<Duration>,
     usage: Arc<Usage>,
 }
@@ -194,7 +194,7 @@ impl Cuda {
         lock(&self.shared.state).clone()
     }
 
-    /// How long opening the device and its self-test took; zero until the test has passed.
+    /// Duration of opening the device and of its self-test; zero until the test has passed.
     pub fn opening(&self) -> Duration {
         self.shared.opening.get().copied().unwrap_or_default()
     }

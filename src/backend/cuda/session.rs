@@ -38,7 +38,7 @@ pub(super) struct Session {
     /// When memory was last trimmed, and whether anything was launched since.
     trimmed: Instant,
     is_used: bool,
-    /// How long unused memory is kept.
+    /// Time for which unused memory is kept.
     pub(super) keep: Duration,
 }
 
@@ -173,10 +173,10 @@ pub(super) fn windows<'a, T: Sync>(
 /// From this many stacks on, their records are written in parallel. Each reads 121 columns.
 const MANY_STACKS: usize = 64;
 
-/// How many bricks are sampled to estimate how many are missing.
+/// Number of bricks that are sampled to estimate how many are missing.
 const LOOKS: usize = 128;
 
-/// How long unused memory is kept. Players pause, and reallocating costs time.
+/// Time for which unused memory is kept. Players pause, and reallocating costs time.
 const KEEP: Duration = Duration::from_secs(30);
 
 /// Fraction of the budget for stacks, as a divisor.

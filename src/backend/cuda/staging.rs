@@ -210,7 +210,7 @@ impl OutputList {
         unsafe { device.download(from, &mut *self.host, 0..entries * self.entry) }
     }
 
-    /// How many entries the next kernel may write.
+    /// Number of entries that the next kernel may write.
     pub fn capacity(&self) -> u32 {
         let own = self.own.map_or(0, |(_, capacity)| capacity);
         (if self.is_own() { own } else { self.capacity }) as u32

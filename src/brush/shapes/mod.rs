@@ -67,7 +67,7 @@ pub(super) trait ShapeGeometry {
     /// Lowest and highest corner of a box around it, at most 1 too wide on each side.
     fn bounds(&self) -> (IVec3, IVec3);
 
-    /// How deep inside the shape its middle lies, rounded down.
+    /// Depth of the shape's middle, rounded down.
     fn deepest(&self) -> i32;
 
     /// Volume in cubes of 1/256 voxel.
@@ -182,7 +182,7 @@ macro_rules! shapes {
                 }
             }
 
-            /// How deep inside the shape its middle lies, rounded down: at least 1.
+            /// Depth of the shape's middle, rounded down: at least 1.
             pub(super) fn deepest(&self) -> i32 {
                 let deepest = match self {
                     $(Self::$name(shape) => shape.deepest(),)*

@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 use crate::brush::BrushError;
 use crate::brush::quantize::{self, voxels};
 
-/// What the fields of a shape hold: [`Voxels`] in a brush, [`Units`] in an edit.
+/// The type of numbers in a shape: [`Voxels`] in a brush, [`Units`] in an edit.
 pub trait Numbers: Copy + Debug + PartialEq {
     /// A place, the way to another place, or half the sides of a box.
     type Vector: Copy + Debug + PartialEq;

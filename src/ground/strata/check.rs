@@ -1,4 +1,4 @@
-//! What strata may be.
+//! Limits and checks of strata.
 
 use std::borrow::Cow;
 

@@ -46,7 +46,7 @@ pub(crate) struct StratumRecord {
     pub ys: [i32; 2],
 }
 
-/// How beds lie, as numbers.
+/// The orientation of beds as numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct BeddingRecord {

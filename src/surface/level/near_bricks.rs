@@ -1,4 +1,4 @@
-//! Where edits are, seen by levels: the bricks over a rectangle of columns, stack by stack.
+//! The places of edits, for levels of detail: the bricks over a rectangle of columns, stack by stack.
 
 use std::ops::RangeInclusive;
 

@@ -1,4 +1,4 @@
-//! What the meshes of a cut are made from.
+//! The input for the meshes of a cut.
 
 use std::ops::Range;
 

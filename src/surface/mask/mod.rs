@@ -42,7 +42,7 @@ impl Mask {
         }
     }
 
-    /// How many words there are.
+    /// Number of words.
     pub(crate) fn word_count(&self) -> usize {
         self.0.len()
     }
@@ -83,7 +83,7 @@ impl Mask {
         self.get_word(word).unwrap_or_default()
     }
 
-    /// How many cells are in the mask.
+    /// Number of cells in the mask.
     pub fn len(&self) -> usize {
         self.0.values().map(|bits| bits.count_ones() as usize).sum()
     }

@@ -38,7 +38,7 @@ pub(in super::super) struct EditOutput {
     pub totals: OutputList,
 }
 
-/// How many entries of each list the kernel needs.
+/// Number of entries of each list that the kernel needs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Totals {
     records: usize,
@@ -97,7 +97,7 @@ impl EditOutput {
         Ok(is_copied)
     }
 
-    /// How many entries of each list were written. Reading counters from the device takes longer than a small
+    /// Number of written entries of each list. Reading counters from the device takes longer than a small
     /// launch. Lists in host memory are therefore wiped before the launch, and end at the first wiped entry.
     pub(super) fn totals(&mut self, results: usize) -> Totals {
         if !self.parts.is_mapped() {

@@ -12,7 +12,7 @@ use super::output::LONG;
 use crate::edits::PreparedEdits;
 use crate::ground::GreyImage;
 
-/// How far new ground searches for its material.
+/// Distance within which new ground searches for its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Look {
     /// In adjacent bricks.
