@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn little_is_lost_beside_the_faster_backend_whichever_that_is() {
+    fn little_time_is_lost_compared_with_the_faster_backend() {
         for (seed, (name, machine)) in (0..9).flat_map(|seed| MACHINES.map(|machine| (seed, machine))) {
             let rng = &mut Rng::with_seed(seed);
             let (mut costs, first, rest) = (Costs::default(), amounts(rng, 300), amounts(rng, 20_000));
@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn small_stages_do_not_pay_for_a_card_that_is_slower() {
+    fn small_stages_do_not_pay_for_a_slower_gpu() {
         for card in [45.0, 100.0, 1000.0, 100_000.0] {
             let (mut costs, rng) = (Costs::default(), &mut Rng::with_seed(3));
             let mut times = [0.0, 0.0];
@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn large_stages_move_to_the_card_at_once() {
+    fn large_stages_move_to_the_gpu_at_once() {
         // The CPU did small stages and a large one before the GPU was open.
         let mut costs = Costs::default();
         for amount in [1, 16, 16, 90, 32_000] {
@@ -495,7 +495,7 @@ mod tests {
     }
 
     #[test]
-    fn a_card_that_can_not_do_a_stage_is_seldom_asked_again() {
+    fn a_gpu_that_fails_a_stage_is_seldom_tried_again() {
         // The time that the CPU needed in the end is charged to the GPU.
         let (mut costs, mut failed) = (Costs::default(), 0);
         for _ in 0..2000 {

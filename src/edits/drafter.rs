@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_edits_come_to_the_same_in_batches_of_any_length() {
+    fn plain_edits_have_equal_results_in_batches_of_any_length() {
         let ground = Ground::from_fn(80, 70, |x, z| 20.0 + f64::from(x * 7 % 5 + z * 3 % 4)).unwrap();
         let (grid, bricks, edits) = (ChunkGrid::new(25, 80, 70), Bricks::default(), balls(40));
         let draft = |length: usize| {

@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn few_edits_and_many_come_to_the_bricks_that_they_may_reach() {
+    fn few_and_many_edits_are_assigned_to_the_bricks_that_they_may_reach() {
         let mut rng = Rng::with_seed(8);
         for (count, size) in [(0, 0.0), (1, 3.0), (3, 9.0), (40, 30.0), (1, 150.0), (300, 2.0)] {
             let brush = |rng: &mut Rng| {

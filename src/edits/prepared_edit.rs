@@ -81,7 +81,7 @@ mod tests {
     use crate::ground::MaterialId;
 
     #[test]
-    fn edits_that_no_rule_can_restrict_are_told_apart() {
+    fn edits_that_no_rule_can_restrict_are_recognised() {
         let samples = LatticeBox::point(IVec3::ZERO).grown(4);
         let restricts = |rules: DiggingRules| may_restrict(&rules, samples, 100);
         let (none, at) = (DiggingRules::default, |x| LatticeBox::point(IVec3::new(x, 0, 0)));

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn new_ground_in_mid_air_is_what_lies_nearest_below_above_or_beside() {
+    fn new_ground_in_mid_air_has_the_nearest_material_below_above_or_next_to_it() {
         let ground = Ground::flat(24, 24, -300.0).unwrap();
         let pos = BrickPos(IVec3::new(1, 0, 1));
         let mut found = [0; 2];

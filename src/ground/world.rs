@@ -560,7 +560,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hash_tells_worlds_apart() {
+    fn the_hash_distinguishes_worlds() {
         let heights = || (0..12).collect::<Vec<i32>>();
         let hash = |width, depth, heights| Ground::from_heights(width, depth, heights).unwrap().hash();
         let mut other = heights();

@@ -190,7 +190,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn who_moves_to_and_fro_soon_sees_no_change(x in 200f32..16_000.0, z in 200f32..16_000.0, step in -8f32..8.0) {
+        fn an_eye_that_moves_to_and_fro_soon_changes_nothing(x in 200f32..16_000.0, z in 200f32..16_000.0, step in -8f32..8.0) {
             let choice = Choice { most_nodes: usize::MAX, ..Choice::default() };
             let mut cut = choice.cut(&Cut::coarsest(world()), &[eye(x, z)], mountains);
             let mut changes = 0;

@@ -295,7 +295,7 @@ mod tests {
 
     /// Only one box at each origin reaches the brick next to it; the others reach no other brick.
     #[test]
-    fn cells_beside_their_home_are_found_in_every_slab() {
+    fn cells_next_to_their_origin_brick_are_found_in_every_slab() {
         let point = |home_x: i32, x: i32, y: i32| Reached {
             home_x,
             cells: Some(LatticeBox::point(IVec3::new(x, y, 4))),

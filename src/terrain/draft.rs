@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_draft_is_what_the_edits_come_to_and_changes_nothing() {
+    fn a_draft_is_the_result_of_its_edits_and_changes_nothing() {
         let mut rng = Rng::with_seed(5);
         for round in 0..40 {
             let (mut edited, mut put) = (terrain(), terrain());

@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_smaller_budget_has_no_room_for_is_left_to_whoever_sets_it() {
+    fn the_excess_of_a_smaller_budget_is_returned_to_the_caller() {
         let mut terrain = terrain();
         assert_eq!(terrain.undo_budget(), UNDO_BUDGET);
         for x in [20.0, 40.0] {
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn history_that_is_forgotten_begins_anew_with_what_was_under_way() {
+    fn cleared_history_restarts_with_the_running_transaction() {
         let mut terrain = terrain();
         terrain.set_undo_budget(1 << 30);
         terrain.apply([dig(20.0)]);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stroke_that_goes_on_after_history_was_forgotten_is_a_step_again() {
+    fn a_stroke_continued_after_history_was_cleared_is_a_step_again() {
         let mut terrain = terrain();
         terrain.apply([dig(20.0).with_stroke(1)]);
         terrain.clear_history();

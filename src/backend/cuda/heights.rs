@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn ground_of_any_noise_is_that_of_the_processor() {
+    fn ground_of_any_noise_equals_the_cpus() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         let mut rng = Rng::with_seed(23);
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_that_of_the_processor_to_the_last_bit_of_a_double() {
+    fn noise_equals_the_cpus_to_the_last_bit_of_a_double() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         let mut rng = Rng::with_seed(29);
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_and_number_of_octaves_is_that_of_the_processor() {
+    fn every_kind_and_number_of_octaves_equals_the_cpus() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn the_far_ends_of_the_widest_worlds_are_those_of_the_processor() {
+    fn the_far_ends_of_the_widest_worlds_equal_the_cpus() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_card_makes_ground_where_that_pays_and_never_keeps_anyone_waiting() {
+    fn a_gpu_makes_ground_where_that_is_faster_and_blocks_no_caller() {
         let open = |is_auto| {
             let device = device()?;
             let cuda = Cuda::with_device(is_auto, limits(64 << 20), &[(1, 2.0)], |_| Ok(device));

@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn borders_are_beside_the_mask() {
+    fn borders_are_next_to_the_mask() {
         let mut mask = Mask::default();
         for (word, cells) in
             [((0, 0), 0x8100_0000_0012_0081), ((1, 0), 0x0180), ((0, 1), 0xf0), ((-1, 0), 0x80)]

@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn more_images_than_a_launch_takes_are_told() {
+    fn more_images_than_a_launch_takes_are_reported() {
         let all: Vec<GreyImage> = (0..257).map(|of| image(256, of)).collect();
         let mut images = Images::default();
         for image in &all[..256] {

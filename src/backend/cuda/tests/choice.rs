@@ -103,7 +103,7 @@ fn time_that_was_lost_on_a_device_is_the_devices() {
 }
 
 #[test]
-fn who_panics_over_what_was_done_panics_and_the_device_is_kept() {
+fn a_panic_over_results_is_passed_on_and_the_device_is_kept() {
     let own = open_cuda(true, 20, 10);
     let mut choice = Choice::of(Stage::Mesh, 16);
     let on_done = |_: &mut Session, ()| -> Result<u32, Fault> { panic!("as planned") };
@@ -114,7 +114,7 @@ fn who_panics_over_what_was_done_panics_and_the_device_is_kept() {
 }
 
 #[test]
-fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
+fn a_panic_while_surfaces_arrive_releases_the_device() {
     let Some(engine) = async_copies() else { return };
     let half = glam::Vec3::new(40.0, 9.0, 40.0);
     let brush = Brush::dig(Shape::cuboid(glam::Vec3::new(60.0, 28.0, 60.0), half));
@@ -140,7 +140,7 @@ fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
 }
 
 #[test]
-fn whoever_comes_while_surfaces_are_drawn_goes_on_without_the_device() {
+fn callers_continue_without_a_busy_device() {
     let own = open_cuda(true, 20, 10);
     let mut choice = Choice::of(Stage::Mesh, 16);
     let draw = |_: &mut Session, ()| {

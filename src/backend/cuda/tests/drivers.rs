@@ -85,7 +85,7 @@ fn a_driver_without_a_device_is_no_device() {
 /// Runs in a separate process, started by the test below.
 #[test]
 #[ignore = "needs the stand-in driver with three GPUs"]
-fn open_each_of_three_cards() {
+fn open_each_of_three_gpus() {
     let open = |card: &CardChoice, suggested: Option<&CardChoice>| match Card::open(card, suggested) {
         Ok(card) => Ok(card.name()),
         Err(Fault::NoDevice(why)) => Err(why),
@@ -112,8 +112,8 @@ fn open_each_of_three_cards() {
 }
 
 #[test]
-fn a_card_is_chosen_by_number_by_uuid_and_by_its_place_on_the_bus() {
-    with_driver("cards", include_str!("driver.c"), "open_each_of_three_cards");
+fn a_gpu_is_chosen_by_ordinal_by_uuid_and_by_its_bus_address() {
+    with_driver("cards", include_str!("driver.c"), "open_each_of_three_gpus");
 }
 
 /// CPU time of this thread, where the system provides it.
@@ -125,7 +125,7 @@ fn cpu_time() -> Option<Duration> {
 /// Runs in a separate process, started by the test below.
 #[test]
 #[ignore = "needs the stand-in driver that answers slowly"]
-fn wait_for_a_slow_card() {
+fn wait_for_a_slow_gpu() {
     let mut card = Card::open(&CardChoice::Default, None).expect("a card");
     // Only the waits are timed. Other load makes them longer, but this thread no busier.
     let (Some(before), start) = (cpu_time(), std::time::Instant::now()) else { return };
@@ -138,8 +138,8 @@ fn wait_for_a_slow_card() {
 }
 
 #[test]
-fn a_thread_that_waits_for_a_slow_card_sleeps() {
-    with_driver("slow", include_str!("driver.c"), "wait_for_a_slow_card");
+fn a_thread_that_waits_for_a_slow_gpu_sleeps() {
+    with_driver("slow", include_str!("driver.c"), "wait_for_a_slow_gpu");
 }
 
 #[test]

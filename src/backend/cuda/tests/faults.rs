@@ -190,7 +190,7 @@ fn a_transaction_of_several_runs_survives_a_device_that_fails_in_its_middle() {
 }
 
 #[test]
-fn surfaces_that_never_come_are_drawn_by_the_processor_with_all_others() {
+fn surfaces_that_never_arrive_are_drawn_by_the_cpu_with_all_others() {
     let half = glam::Vec3::new(40.0, 9.0, 40.0);
     let brush = Brush::dig(Shape::cuboid(glam::Vec3::new(60.0, 28.0, 60.0), half));
     let brushes = [brush.with_roughness(Roughness::new(2.0, 3.0, 5))];
@@ -217,7 +217,7 @@ fn surfaces_that_never_come_are_drawn_by_the_processor_with_all_others() {
 }
 
 #[test]
-fn ground_is_made_by_the_processor_where_a_device_fails() {
+fn ground_is_made_by_the_cpu_if_a_device_fails() {
     // Two slices, of which the second is short.
     let (width, depth, noise) = (1030, 1020, NoiseHeights { octaves: 1, ..NoiseHeights::default() });
     let expected = Ground::from_noise(width, depth, &noise);

@@ -90,7 +90,7 @@ fn a_large_transaction_opens_the_gpu_once_and_does_not_wait_for_it() {
 }
 
 #[test]
-fn an_engine_that_is_to_use_a_card_opens_it_for_its_first_transaction() {
+fn an_engine_set_to_cuda_opens_the_gpu_for_its_first_transaction() {
     let (engine, opened) = counted(false);
     let mut terrain = terrain(&engine);
     // An empty transaction does not count.
@@ -103,7 +103,7 @@ fn an_engine_that_is_to_use_a_card_opens_it_for_its_first_transaction() {
 }
 
 #[test]
-fn who_waits_for_a_card_opens_it() {
+fn waiting_for_a_gpu_opens_it() {
     for is_auto in [false, true] {
         let (engine, opened) = counted(is_auto);
         assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(Fault::NoDriver.to_string()));
@@ -112,7 +112,7 @@ fn who_waits_for_a_card_opens_it() {
 }
 
 #[test]
-fn the_card_that_a_game_suggests_is_asked_for() {
+fn the_gpu_that_a_game_suggests_is_opened() {
     let (said, heard) = std::sync::mpsc::channel();
     let device = move |card| {
         said.send(card).expect("the test listens");
