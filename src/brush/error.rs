@@ -8,7 +8,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum BrushError {
     /// A number is infinite or not a number.
-    #[error("`{what}` must be finite, but it holds {value}")]
+    #[error("`{what}` must be finite, but it is {value}")]
     NotFinite {
         /// The field.
         what: &'static str,

@@ -70,7 +70,7 @@ pub enum GroundError {
         allowed: &'static str,
     },
     /// The machine has too little memory for the world.
-    #[error("the machine has no {bytes} bytes of memory left for the world")]
+    #[error("the machine cannot allocate {bytes} bytes of memory for the world")]
     Memory {
         /// Bytes asked for; `usize::MAX` where their number does not fit.
         bytes: usize,

@@ -70,13 +70,13 @@ pub enum HistoryRejection {
     #[error("there is nothing to redo")]
     NothingToRedo,
     /// The terrain was removed before the step's turn came, or the entity never had one.
-    #[error("the terrain is gone")]
+    #[error("the terrain no longer exists")]
     TerrainGone,
     /// Too much work [waits](super::WorkLimits::waiting).
-    #[error("too much work waits already")]
+    #[error("the queue is full: try again once waiting work is done")]
     Overloaded,
     /// The step panicked. World and history are unchanged.
-    #[error("the step panicked; this is a bug of the plugin's")]
+    #[error("the step panicked: this is a bug in bevy_burrow")]
     Panicked,
 }
 

@@ -40,7 +40,7 @@ fn keep<T>(answers: &mut VecDeque<T>, answer: T) {
 /// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "this terrain does not wait for that commit; its transaction was given up, or belongs to another terrain"
+    "this terrain is not waiting for that commit: its transaction was abandoned, or belongs to another terrain"
 )]
 pub struct StaleCommit;
 

@@ -33,19 +33,19 @@ use crate::volume::{Brick, Field, FieldId, UniformBricks, column_hash, pristine_
 #[non_exhaustive]
 pub enum ChangeError {
     /// Bricks come twice or out of order.
-    #[error("the brick {0:?} comes twice or out of order")]
+    #[error("the brick {0:?} is repeated or out of order: sort bricks by position")]
     Order(BrickPos),
     /// A brick, or one of its edited samples, lies outside the world.
-    #[error("the brick {0:?} reaches out of the world")]
+    #[error("the brick {0:?} extends beyond the world")]
     OutsideWorld(BrickPos),
     /// A brick says of a pristine sample that it is solid where this ground is air, or the other way round.
-    #[error("the brick {0:?} belongs to another ground")]
+    #[error("the brick {0:?} was made on a different ground")]
     OtherGround(BrickPos),
     /// Fields of a chunk reach out of it, it comes twice, or one of its fields has the name of another.
-    #[error("fields of the chunk {0:?} reach out of it, come twice or share a name")]
+    #[error("the fields of chunk {0:?} extend beyond it, are repeated, or share a name")]
     Fields(ChunkPos),
     /// A revision or the name of a field is so great that no others could follow.
-    #[error("{0} is too great for a revision or the name of a field")]
+    #[error("{0} is too large for a revision or the name of a field")]
     Number(u64),
     /// The world would not have the hash that was expected.
     #[error("the world would have the hash {found:#018x}, not {expected:#018x}")]
@@ -56,7 +56,7 @@ pub enum ChangeError {
         expected: u64,
     },
     /// The ground has another size, in cells.
-    #[error("the ground has {found:?} cells, but that of the world has {expected:?}")]
+    #[error("the new ground has {found:?} cells, but the world has {expected:?}")]
     GroundSize {
         /// Width and depth of the new one.
         found: (i32, i32),
@@ -64,10 +64,10 @@ pub enum ChangeError {
         expected: (i32, i32),
     },
     /// Too much work [waits](super::WorkLimits::waiting).
-    #[error("too much work waits already")]
+    #[error("the queue is full: try again once waiting work is done")]
     Overloaded,
     /// It panicked.
-    #[error("putting parts in place panicked; this is a bug of the plugin's")]
+    #[error("replacing parts panicked: this is a bug in bevy_burrow")]
     Panicked,
 }
 

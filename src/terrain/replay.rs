@@ -34,7 +34,7 @@ pub enum RestoreError {
 #[non_exhaustive]
 pub enum ReplayError {
     /// The record does not follow the world's revision, or makes more than one commit.
-    #[error("the record leads to revision {found}, but the world is at {at}")]
+    #[error("the record leads to revision {found}, but the world is at revision {at}")]
     Revision {
         /// The world's.
         at: u64,
@@ -53,7 +53,7 @@ pub enum ReplayError {
         expected: u64,
     },
     /// An edit was rejected that had been applied.
-    #[error("an edit of revision {0} is rejected here, though it had been applied")]
+    #[error("an edit of revision {0} is rejected, although the record says that it was applied")]
     Rejected(u64),
     /// The rules are invalid.
     #[error(transparent)]

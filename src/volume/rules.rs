@@ -120,7 +120,9 @@ impl DiggingRules {
 #[non_exhaustive]
 pub enum RulesError {
     /// A rule is for a material that nothing has.
-    #[error("a rule is for `MaterialId::GROUND`, which nothing is made of: name the materials of the ground")]
+    #[error(
+        "a rule refers to `MaterialId::GROUND`, which is a placeholder: name the materials of the ground instead"
+    )]
     Ground,
 }
 

@@ -83,7 +83,7 @@ pub(super) struct Cuda {
     /// Measured costs of both, for [`Backend::Auto`].
     costs: Mutex<Costs>,
     /// Whether it was logged that a stage was too large for the device.
-    has_verified: AtomicBool,
+    has_warned: AtomicBool,
 }
 
 /// State shared by the thread that opens the device and those that use it.
@@ -154,7 +154,7 @@ impl Cuda {
                 usage: Arc::default(),
             }),
             costs: Mutex::default(),
-            has_verified: AtomicBool::default(),
+            has_warned: AtomicBool::default(),
         }
     }
 
@@ -288,8 +288,8 @@ impl Cuda {
     fn handle_fault(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
         if !fault.is_passing() {
             self.shared.disable(place, fault);
-        } else if !self.has_verified.swap(true, Ordering::Relaxed) {
-            log::warn!("bevy_burrow does without CUDA what is too much for the device: {fault}");
+        } else if !self.has_warned.swap(true, Ordering::Relaxed) {
+            log::warn!("bevy_burrow runs on the CPU what is too large for the CUDA device: {fault}");
         }
     }
 
