@@ -414,6 +414,7 @@ mod guide {
         Materials "docs/guide/src/materials.md"
         Physics "docs/guide/src/physics.md"
         Undo "docs/guide/src/undo.md"
+        Events "docs/guide/src/events.md"
         Saving "docs/guide/src/saving.md"
         LevelAssets "docs/guide/src/level-assets.md"
         Determinism "docs/guide/src/determinism.md"
