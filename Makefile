@@ -32,7 +32,7 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-# Where nobody looks on, a test that finds neither card, compiler nor renderer fails, and is not skipped. Only Linux can
+# Where nobody looks on, a test that finds neither GPU, compiler nor renderer fails, and is not skipped. Only Linux can
 # have all of them.
 ifeq ($(CI) $(shell uname -s),true Linux)
 export BURROW_REQUIRE ?= 1
@@ -114,7 +114,7 @@ crowd: ## 1,000 balls and 100 walkers for a minute, on ground that is dug ten ti
 	@tools/setup.sh test
 	BURROW_CROWD=1000 cargo test $(WITH_BEVY) --test physics crowd -- --nocapture
 
-paper: ## Do the paper's experiment again; overwrites docs/RESULTS.md and docs/plots, whose GPU columns go where there is no card (REPEATS=10)
+paper: ## Do the paper's experiment again; overwrites docs/RESULTS.md and docs/plots, whose GPU columns go where there is no GPU (REPEATS=10)
 	@tools/setup.sh build
 	RUSTC_VERSION="$$(rustc --version)" cargo run --release $(WITHOUT_BEVY) --example paper -- --out out/paper --results docs/RESULTS.md --repeats $(REPEATS)
 
@@ -122,15 +122,15 @@ bench: ## Time the dense mesher beside public crates (ARGS="--quick" for a short
 	@tools/setup.sh build
 	cargo bench $(WITHOUT_BEVY) --bench meshers -- $(ARGS)
 
-bench-backends: ## Time the processor beside a CUDA card (ARGS="craters sweep" for some sections only)
+bench-backends: ## Compare the CPU with a CUDA GPU (ARGS="craters sweep" for some sections only)
 	@tools/setup.sh build
 	cargo bench $(WITHOUT_BEVY) --bench backends -- $(ARGS)
 
-sanitize: ## Run the kernels' tests under compute-sanitizer on a card, or in an emulator that watches its own memory (BURROW_WORLDS=20 BURROW_RACE_WORLDS=1)
+sanitize: ## Run the kernels' tests under compute-sanitizer on a GPU, or in an emulator that watches its own memory (BURROW_WORLDS=20 BURROW_RACE_WORLDS=1)
 	@tools/setup.sh build
 	@tools/sanitize.sh
 
-ptx: ## Compile the CUDA kernels to PTX again; needs no card (ARGS=--check to compare only)
+ptx: ## Compile the CUDA kernels to PTX again; needs no GPU (ARGS=--check to compare only)
 	@tools/setup.sh ptx
 	@python3 tools/ptx.py $(ARGS)
 

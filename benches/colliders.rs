@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ] {
             let flags = TriMeshFlags::FIX_INTERNAL_EDGES;
             row(what, "own shape", &meshes, |mesh| GroundShape::new(mesh, 1.0).map(|shape| shape.bytes()));
-            row(what, "mesh, edges mended", &meshes, |mesh| Some(tri_mesh(mesh, flags)?.heap_memory_size()));
+            row(what, "mesh, edges fixed", &meshes, |mesh| Some(tri_mesh(mesh, flags)?.heap_memory_size()));
             row(what, "mesh", &meshes, |mesh| {
                 Some(tri_mesh(mesh, TriMeshFlags::empty())?.heap_memory_size())
             });

@@ -1,10 +1,11 @@
-//! A long flight without a renderer: `cargo bench --features examples --bench flight [-- MINUTES] [looking|digging] [plain]`, by default one minute.
+//! A long flight without a renderer: `cargo bench --features examples --bench flight [-- MINUTES] [looking|digging]
+//! [plain]`, by default one minute.
 //!
-//! A camera flies at 100 m/s and 60 frames a second, 60 m above a world of 16 x 16 km whose mountains are computed on demand, with
-//! 8 km of view on a picture 1440 high at 45 degrees: first without edits, then with 20 digs a second below it, each for so many
-//! minutes, or only one of both. Vertices are
-//! slim, as with a look, or with `plain` those of other materials. Printed are the plugin's time on the main thread in each frame, and every tenth of the flight what the ground and
-//! the meshes take.
+//! A camera flies at 100 m/s and 60 frames a second, 60 m above a world of 16 x 16 km whose mountains are computed on
+//! demand, with 8 km of view on a picture 1440 high at 45 degrees: first without edits, then with 20 digs a second
+//! below it, each for the given minutes, or only one of the two. Vertices are slim, as with a look, or with `plain`
+//! those of other materials. Printed are the plugin's time on the main thread in each frame, and every tenth of the
+//! flight what the ground and the meshes take.
 
 #[path = "../examples/shared/mountains.rs"]
 mod mountains;

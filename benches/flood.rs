@@ -1,4 +1,4 @@
-//! Latency under overload: ten thousand large brushes in one frame, and a player who goes on digging.
+//! Latency under overload: ten thousand large brushes in one frame, and a player who keeps digging.
 //!
 //! ```text
 //! cargo bench --features examples --bench flood

@@ -1,6 +1,6 @@
-//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT [horizon]]`;
-//! with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with levels of detail and a plain material,
-//! with views of 0.5 to 16 km, is compared with the real landscape in full detail.
+//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT
+//! [horizon]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with levels of
+//! detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full detail.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
 //! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
@@ -140,7 +140,7 @@ struct Walk {
     film: Handle<Image>,
     path: Vec<Vec3>,
     balls: Vec<Entity>,
-    /// Is the camera so far up that nothing is in sight?
+    /// Whether the camera is far above the ground, with nothing in sight.
     is_far: bool,
     /// When the next brush is due.
     next_brush: Instant,
@@ -354,7 +354,7 @@ impl Walk {
 enum Scene {
     /// The real landscape with a look.
     Landscape,
-    /// The same with a plain material.
+    /// The real landscape with a plain material.
     Plain,
     /// Mountains to the horizon with levels of detail and a plain material.
     Horizon { view_distance: f32 },

@@ -127,7 +127,7 @@ enum Digging {
     Deep,
     /// Untouched ground with strata.
     Mine,
-    /// The same, 20 voxels below the surface, where the ores are.
+    /// Untouched ground with strata, 20 voxels below the surface, where the ores are.
     DeepMine,
 }
 

@@ -75,20 +75,24 @@
 //! | a landscape | [`Ground`](ground::Ground) from an image, noise or a function; [`MaterialControl`](ground::MaterialControl) |
 //! | to put it into the world | the [`Terrain`](terrain::Terrain) component; `BurrowPlugins` |
 //! | another level | a new [`Terrain`](terrain::Terrain), inserted in place of the old one |
+//! | ground to the horizon | `LevelsOfDetail` on the terrain; [`Ground::from_source`](ground::Ground::from_source) |
+//! | to save the world | `SavedWorld` on the terrain; `WorldStore` for the game's own data (feature `store`) |
+//! | sculpted levels as assets | `BurrowLevel`, `StartLevel` (feature `store`) |
+//! | several players | `GroundServer` and `SharedTerrain` (feature `replicon`); `net` for other transports (feature `net`) |
 //! | to dig, build, paint | [`Brush`](brush::Brush) messages; [`Shape`](brush::Shape), [`Roughness`](brush::Roughness) |
 //! | to sculpt | [`Brush::smooth`](brush::Brush::smooth), `flatten`, `level`, `raise`, `stamp`, ...; [`Blend`](brush::Blend) |
 //! | ground that resists | [`Terrain::set_rules`](terrain::Terrain::set_rules) with [`DiggingRules`](volume::DiggingRules) |
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
-//! | to take it back | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
-//! | cut off ground to fall | the `LooseGround` component, `LoosePieceFound` messages, `physics::DebrisPlugin` (feature `avian`); [`LooseSettings`](terrain::LooseSettings) |
+//! | to undo it | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
+//! | ground that was cut off to fall | the `LooseGround` component, `LoosePieceFound` messages, `physics::DebrisPlugin` (feature `avian`); [`LooseSettings`](terrain::LooseSettings) |
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
-//! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
+//! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for the game's own textures |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
 //! | other cameras, no shadows | `RenderLayers`, `NotShadowCaster`, `NotShadowReceiver` on the terrain |
 //! | more from the same surfaces, in the same commit | `SurfaceProcessor`s |
-//! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
-//! | an editor's panel | `BurrowPanelPlugin`, and `BrushTool` for the brush in hand (feature `egui`) |
-//! | to see what the model holds | `BurrowDebugPlugin` and the switches of `BurrowDebug` (feature `debug`) |
+//! | a custom look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
+//! | an editor's panel | `BurrowPanelPlugin`, and `BrushTool` for the selected brush (feature `egui`) |
+//! | debug views of the model | `BurrowDebugPlugin` and the switches of `BurrowDebug` (feature `debug`) |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
 //!
 //! # The parts, a few lines each
@@ -126,7 +130,7 @@
 //! # }
 //! ```
 //!
-//! **Digging rules**, and receipts that tell what they refused.
+//! **Digging rules**, and receipts that report what they refused.
 //!
 //! ```
 //! # #[cfg(feature = "plugin")] {
@@ -157,8 +161,9 @@
 //! # }
 //! ```
 //!
-//! **Loose pieces**: what a dig cuts off falls, lies about and crumbles (feature `avian`); without that it is a message.
-//! `DebrisPlugin` wants the `PhysicsPlugins`, the `TerrainPhysicsPlugin` and a `ColliderSource` of the part below.
+//! **Loose pieces**: ground that a dig cuts off falls, comes to rest and crumbles (feature `avian`); without that
+//! feature it is reported as a message. `DebrisPlugin` needs the `PhysicsPlugins`, the `TerrainPhysicsPlugin` and a
+//! `ColliderSource`, which the next part shows.
 //!
 //! ```
 //! # #[cfg(feature = "avian")] {
@@ -188,8 +193,8 @@
 //! # }
 //! ```
 //!
-//! **A panel** (feature `egui`) with live figures, the terrain's rules and look, and the brush in hand to read; **views** of
-//! what the model holds (feature `debug`).
+//! **A panel** (feature `egui`) with live figures, the terrain's rules and look, and the selected brush, which games
+//! can read; **debug views** of the model (feature `debug`).
 //!
 //! ```
 //! # #[cfg(all(feature = "egui", feature = "debug"))] {
@@ -213,7 +218,7 @@
 //! # }
 //! ```
 //!
-//! **A look of its own**: any `Material` on the terrain, with its plugin where it is not Bevy's own.
+//! **A custom look**: any `Material` on the terrain; types other than Bevy's need their `TerrainMaterialPlugin`.
 //!
 //! ```
 //! # #[cfg(feature = "render")] {
@@ -226,36 +231,45 @@
 //! # }
 //! ```
 //!
-//! # Rooms
+//! # Modules
 //!
-//! From the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`levels`], [`ground`], [`brush`], [`volume`], `edits`, [`surface`], [`backend`], [`terrain`], `plugin`, `view`,
-//! `physics`, `panel`, `debug`. Beside them stands [`dense`], which meshes plain arrays and serves no terrain.
+//! From the ground up. A lower module never imports a higher one, which `tests/structure.rs` checks.
+//!
+//! | modules | subject |
+//! | --- | --- |
+//! | [`lattice`], [`levels`], [`ground`] | coordinates, levels of detail, the pristine world |
+//! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
+//! | [`surface`], [`dense`] | marching cubes, heightmap and their seam; a mesher of plain arrays |
+//! | [`backend`], [`terrain`] | engines on CPU and GPU; transactions, history, queries |
+//! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
+//! | `plugin`, `view`, `saves`, `together`, `physics`, `debug`, `panel` | everything that uses Bevy |
 //!
 //! # How the seam closes
 //!
-//! 1. **Sentinel samples.** Only edited samples are stored; a pristine one is computed, d = y - h(x, z), and never rounded:
-//!    [`SampleView::distance`](volume::SampleView::distance).
-//! 2. **The mask follows edits, not boxes.** A cell is drawn by marching cubes when a corner of its *sheet*, the cubes
-//!    that the pristine surface crosses over it, is edited. All samples of the sheet beside the mask are pristine then:
-//!    [`surface::mask`].
+//! 1. **Sentinel samples.** Only edited samples are stored; a pristine one is computed, d = y - h(x, z), and never
+//!    rounded: [`SampleView::distance`](volume::SampleView::distance).
+//! 2. **The mask follows edits, not boxes.** A cell is drawn by marching cubes when a corner of its *sheet*,
+//!    the cubes that the pristine surface crosses over it, is edited. All samples of the sheet outside the
+//!    mask are then pristine: [`surface::mask`].
 //! 3. **The ring is a fan** from the border polyline to the opposite heightmap vertex: [`fan`](surface::tile::fan).
-//! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers: [`vertex`](surface::vertex::vertex).
+//! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers:
+//!    [`vertex`](surface::vertex::vertex).
 //! 5. **The y-range covers every sign change** of the footprint, in as many chunks above and below as that takes:
 //!    [`sheet`](surface::mask::sheet) gives it.
 //! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes:
 //!    [`Edit::reach`](brush::Edit::reach).
 //!
-//! Three more close what lies between [levels of detail](levels): a coarse cell fans over the line of its finer neighbours, a
-//! coarse vertex of an edit is a vertex of the finest level, and what lies beyond the rim is the rim's ([`surface::level`]).
+//! Three more rules close the gaps between [levels of detail](levels): a coarse cell fans over the line of its finer
+//! neighbours, a coarse vertex of an edit is a vertex of the finest level, and columns beyond the rim equal the rim's
+//! ([`surface::level`]).
 //!
-//! What was not chosen, and why: *snapping* border vertices to the nearest point of the other surface tears on steep
-//! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep caves
-//! pay for the meadow above; *transition cells* need a second case table and still leave the heightmap out.
+//! Rejected alternatives: *snapping* border vertices to the nearest point of the other surface tears on steep
+//! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep
+//! caves pay for the meadow above; *transition cells* need a second case table and still leave the heightmap out.
 //!
 //! The method is that of P. Andersson and S. Johansson, *Rendering with Marching Cubes, looking at Hybrid Solutions*
-//! (2012): heightmap, fields in chunks, five scenarios of an edit. They ended with cuts and holes on steep ground and with
-//! an index buffer that took 15 seconds to rebuild; the six rules and the transaction are what it took to finish that.
+//! (2012): heightmap, fields in chunks, five scenarios of an edit. Their version had cuts and holes on steep ground and
+//! an index buffer that took 15 seconds to rebuild; the six rules and the transaction solve these problems.
 //!
 //! # An edit is a transaction
 //!
@@ -265,55 +279,56 @@
 //!   -> commit in one frame, all or nothing: world, meshes, entities, receipts
 //! ```
 //!
-//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the others. Rules and
-//! loose settings bind the edits that are sent after them. A [stroke](brush::Brush::stroke), or what was sent in one frame, is a
-//! step of undo. A transaction holds as many edits as its [limit](terrain::WorkLimits) of work allows, and more work than may
-//! wait is rejected when it is sent; an edit that panics is rejected, and the others are applied without it.
-//! Integers decide what is solid, and floats are only drawn, so the same edits give the same
-//! [`hash`](terrain::World::hash) on every machine.
+//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the
+//! others. Rules and loose settings bind the edits that are sent after them. A
+//! [stroke](brush::Brush::stroke), or everything sent in one frame, is a step of undo. A transaction holds as
+//! many edits as its [limit](terrain::WorkLimits) of work allows, and more work than may wait is rejected
+//! when it is sent; an edit that panics is rejected, and the others are applied without it. Integers decide
+//! solidity, and floats are only drawn, so equal edits give an equal [`hash`](terrain::World::hash) on every
+//! machine.
 //!
 //! # What an edit costs
 //!
-//! What its brush reaches, whatever the chunk size. Bricks of 8x8x8 samples are copied, changed and shared; each keeps a
-//! bit per sample for solid and for edited, so that [`block`](surface::block) finds the cubes to draw by a few operations
-//! on whole layers and looks at samples only around them. Parts of a chunk's mesh that did not change are copied from its
-//! last one, and so are rings of a tile. Nothing is allocated while meshing. Bricks, blocks and chunks of a large
-//! transaction are spread over rayon's threads; the result does not depend on how many there are.
-//! [`Commit::stages`](terrain::Commit::stages) tells where the time went.
+//! The cost depends on the region that its brush reaches, not on the chunk size. Bricks of 8x8x8 samples are copied, changed and shared; each keeps
+//! a bit per sample for solid and for edited, so that [`block`](surface::block) finds the cubes to draw by a few
+//! operations on whole layers and looks at samples only around them. Parts of a chunk's mesh that did not change are
+//! copied from its last one, and so are rings of a tile. Nothing is allocated while meshing. Bricks, blocks and chunks
+//! of a large transaction are spread over rayon's threads; the result does not depend on how many there are.
+//! [`Commit::stages`](terrain::Commit::stages) reports where the time went.
 //!
 //! # System sets
 //!
-//! `BurrowSystems`, in `Update`: `Load`, `Collect`, `Commit`, `Begin`, `Propagate`. A brush that is sent before `Collect`
-//! starts in the same frame; its receipt comes in `Commit` of the frame in which its meshes are shown.
+//! `BurrowSystems`, in `Update`: `Load`, `Collect`, `Commit`, `Begin`, `Propagate`. A brush that is sent before
+//! `Collect` starts in the same frame; its receipt comes in `Commit` of the frame in which its meshes are shown.
 //!
 //! # Features
 //!
 //! | feature | what it adds | default |
 //! | --- | --- | --- |
-//! | `cuda` | transactions on an NVIDIA card where one is found, see [`backend`]; compiles everywhere | |
+//! | `cuda` | transactions on an NVIDIA GPU where one is found, see [`backend`]; compiles everywhere | |
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
-//! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
+//! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking character; debris | |
 //! | `store` | worlds on disk: a commit journal, checkpoints, portable files | |
-//! | `net` | digging together: server and client without transport | |
-//! | `replicon` | digging together over bevy_replicon | |
+//! | `net` | multiplayer: a server and clients without a transport | |
+//! | `replicon` | multiplayer over bevy_replicon | |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
-//! Without any feature the model alone is built, with no Bevy at all. Where there are threads, transactions, loads and textures
-//! have their own, whatever features of Bevy's are on.
+//! Without any feature only the model is built, without Bevy. Where threads are available, transactions, loads and
+//! textures use their own threads, regardless of the features of Bevy.
 //!
-//! # Interval
+//! # Limits
 //!
 //! Heights stay within 32768 voxels. A world's sides have up to 16384 cells, or 262144 where its heights come from a
-//! [source](ground::HeightSource). All of it is drawn in full detail, or with `LevelsOfDetail` what is far coarsely.
-//! A terrain may be moved by whole voxels and scaled by powers of two, by
-//! [`TerrainSettings::voxel_size`](terrain::TerrainSettings::voxel_size) or by a parent: the scale of its own `Transform` is
-//! the plugin's. Rotated, stretched or moved by a part of a voxel, its seams lose their equal bits.
+//! [source](ground::HeightSource). All of it is drawn in full detail, or with `LevelsOfDetail` distant ground coarsely. A
+//! terrain may be moved by whole voxels and scaled by powers of two, by
+//! [`TerrainSettings::voxel_size`](terrain::TerrainSettings::voxel_size) or by a parent: the scale of its own
+//! `Transform` is the plugin's. Rotated, stretched or moved by a part of a voxel, its seams lose their equal bits.
 
-// Tests of the crate share worlds with those beside it.
+// Unit tests share worlds with the integration tests.
 #[cfg(test)]
 extern crate self as bevy_burrow;
 
@@ -400,6 +415,7 @@ mod guide {
         Materials "docs/guide/src/materials.md"
         Physics "docs/guide/src/physics.md"
         Undo "docs/guide/src/undo.md"
+        Events "docs/guide/src/events.md"
         Saving "docs/guide/src/saving.md"
         LevelAssets "docs/guide/src/level-assets.md"
         Determinism "docs/guide/src/determinism.md"
@@ -408,6 +424,7 @@ mod guide {
         WhoMayConnect "docs/guide/src/who-may-connect.md"
         Cuda "docs/guide/src/cuda.md"
         Performance "docs/guide/src/performance.md"
+        Heightmaps "docs/guide/src/recipes/heightmaps.md"
         Mining "docs/guide/src/recipes/mining.md"
         Explosions "docs/guide/src/recipes/explosions.md"
         Journal "docs/guide/src/recipes/journal.md"

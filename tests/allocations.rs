@@ -66,8 +66,7 @@ fn the_allocations_of_an_edit_are_bounded() {
         Terrain::new(worlds::real_ground(), &TerrainSettings::default()).expect("valid settings");
     let mut most = [0; 2];
     for i in 0..60 {
-        // The same ten holes six times, a little deeper each time: from the second time on, bricks, mask and rings
-        // exist.
+        // Ten holes six times, a little deeper each time: from the second time on, bricks, mask and rings exist.
         let (x, z) = (100 + i % 10 * 40, 200 + i % 10 * 3);
         let height = terrain.world().ground().height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
         let place = Vec3::new(x as f32, height - 0.3 * (i / 10) as f32, z as f32);

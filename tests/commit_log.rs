@@ -1,4 +1,4 @@
-//! The commit log, and terrains from what was saved: replayed records, restored parts and parts that are put in place lead to the
+//! The commit log, and terrains from what was saved: replayed records, restored parts and replaced parts lead to the
 //! same world. `BURROW_WORLDS` is the number of random worlds.
 
 use std::collections::BTreeMap;
@@ -120,7 +120,7 @@ fn a_log_replays_to_the_same_world_and_parts_restore_it() {
 }
 
 #[test]
-fn what_goes_on_after_a_restore_is_what_would_have_gone_on() {
+fn a_restored_world_continues_as_the_original() {
     for index in 0..world_count(16) {
         let mut rng = Rng::with_seed(index + 260);
         let (ground, chunk_size) = random_ground(&mut rng, index);
@@ -219,7 +219,7 @@ fn dig(x: f32) -> Brush {
 }
 
 #[test]
-fn a_log_that_nobody_takes_is_bounded_and_shows_its_gap() {
+fn a_log_that_is_never_taken_is_bounded_and_shows_its_gap() {
     let mut terrain = flat();
     terrain.keep_log(Some(100_000));
     (0..200).for_each(|number| drop(terrain.apply([dig(number as f32 / 4.0)])));
@@ -261,7 +261,7 @@ fn kinds_of(record: &CommitRecord) -> Vec<&'static str> {
 }
 
 #[test]
-fn a_record_that_does_not_fit_is_told() {
+fn a_record_that_does_not_fit_is_an_error() {
     let mut terrain = flat();
     terrain.keep_log(Some(PLENTY));
     terrain.apply([dig(20.0)]);
@@ -274,7 +274,7 @@ fn a_record_that_does_not_fit_is_told() {
 }
 
 #[test]
-fn parts_that_do_not_fit_are_told_and_change_nothing() {
+fn parts_that_do_not_fit_are_errors_and_change_nothing() {
     let mut terrain = flat();
     terrain.apply([dig(20.0)]);
     let (parts, hash) = (terrain.parts(), terrain.world().hash());

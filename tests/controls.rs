@@ -205,8 +205,8 @@ impl<'a> ReferenceMesher<'a> {
         }
     }
 
-    /// With strata: do two lattice levels or more separate the heights of two neighbouring columns of a cell, while the solid
-    /// ends of all such edges and the voxels below its corners are of several materials?
+    /// With strata: do two lattice levels or more separate the heights of two neighbouring columns of a cell, while the
+    /// solid ends of all such edges and the voxels below its corners are of several materials?
     fn is_steep(&self, cell: Column) -> bool {
         let (ground, [a, b, c, d]) = (self.view.ground(), cell.corners());
         let is_solid = |point: &IVec3| point.y * ONE < ground.height(Column::of(*point));
@@ -242,8 +242,8 @@ impl<'a> ReferenceMesher<'a> {
         vertices
     }
 
-    /// A triangle in bands, by the lines around it. Its vertices in the order of their heights, those of the longest line last
-    /// among equals: each makes a triangle with the last one of its own side and the last one of the other.
+    /// A triangle in bands, by the lines around it. Its vertices in the order of their heights, those of the longest
+    /// line last among equals: each makes a triangle with the last one of its own side and the last one of the other.
     fn bands(&mut self, lines: &[Vec<Vertex>; 3]) {
         let height = |corner: &usize| lines[*corner][0].position.y;
         let low = (0..3).min_by_key(height).expect("three");

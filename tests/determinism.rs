@@ -1,4 +1,4 @@
-//! The same edits give the same world, bit for bit, whatever the batching, threads, chunk size or serialisation.
+//! Equal edits give equal worlds, bit for bit, regardless of batching, threads, chunk size or serialisation.
 
 mod worlds;
 

@@ -36,7 +36,9 @@ fn guide() -> PathBuf {
 /// All pages for users.
 fn documents() -> Vec<PathBuf> {
     let mut pages = pages_in(&root().join("docs"));
-    pages.extend(["README.md", "CHANGELOG.md", "assets/README.md"].map(|name| root().join(name)));
+    pages.extend(
+        ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "assets/README.md"].map(|name| root().join(name)),
+    );
     pages
 }
 
@@ -172,6 +174,62 @@ fn commands_name_what_exists() {
     for page in documents() {
         assert_eq!(unknown_names(&read(&page), &makefile, &manifest), [""; 0], "{}", page.display());
     }
+}
+
+/// The names in code in the first cells of all tables of a text.
+fn names_in_tables(text: &str) -> BTreeSet<&str> {
+    let rows =
+        text.lines().map(|line| line.trim_start_matches("//!").trim()).filter(|line| line.starts_with('|'));
+    let cells = rows.filter_map(|row| row.split('|').nth(1));
+    cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect()
+}
+
+/// The features and examples of a crate that no table of a text lists.
+fn unlisted(text: &str, features: &BTreeSet<&str>, examples: &BTreeSet<String>) -> Vec<String> {
+    let listed = names_in_tables(text);
+    let features = features.iter().filter(|name| **name != "default" && !listed.contains(*name));
+    let examples = examples.iter().filter(|name| !listed.contains(name.as_str()));
+    features
+        .map(|name| format!("feature {name}"))
+        .chain(examples.map(|name| format!("example {name}")))
+        .collect()
+}
+
+/// The names of all examples.
+fn examples() -> BTreeSet<String> {
+    let folders = fs::read_dir(root().join("examples")).expect("a folder of examples").flatten();
+    let programs = folders.filter(|folder| folder.path().join("main.rs").exists());
+    programs.map(|folder| folder.file_name().to_string_lossy().into_owned()).collect()
+}
+
+#[test]
+fn every_feature_and_every_example_is_listed() {
+    let (manifest, examples) = (read(&root().join("Cargo.toml")), examples());
+    let features = features(&manifest);
+    assert!(features.len() > 8 && examples.len() > 8, "{features:?}, {examples:?}");
+    let none = BTreeSet::new();
+    assert_eq!(unlisted(&read(&root().join("README.md")), &features, &examples), [""; 0], "README.md");
+    assert_eq!(unlisted(&read(&root().join("src/lib.rs")), &features, &none), [""; 0], "src/lib.rs");
+}
+
+#[test]
+fn unlisted_features_and_examples_are_found() {
+    let text = "| `a` (default), `b` | adds `c` |\n`d` in prose\n//! | `e` | |";
+    let examples = BTreeSet::from(["e".to_owned(), "f".to_owned()]);
+    let found = unlisted(text, &BTreeSet::from(["a", "b", "c", "d", "default"]), &examples);
+    assert_eq!(found, ["feature c", "feature d", "example f"]);
+}
+
+#[test]
+fn the_documentation_online_has_every_feature_of_the_library() {
+    let manifest = read(&root().join("Cargo.toml"));
+    let online =
+        manifest.split("[package.metadata.docs.rs]").nth(1).and_then(|rest| rest.split("\n[").next());
+    let online: BTreeSet<&str> = online.expect("a section").split('"').skip(1).step_by(2).collect();
+    // `render`, and `plugin` with it, are on by default; the last two are for examples only.
+    let expected =
+        &features(&manifest) - &BTreeSet::from(["default", "render", "plugin", "examples", "gamepad"]);
+    assert_eq!(online, expected);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Parts of a world that no world has, say from a damaged save: each is told, changes nothing, and panics nowhere.
+//! Invalid parts of a world, for example from a damaged save: each is an error, changes nothing, and causes no panic.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ fn dig(x: f32) -> Brush {
     Brush::dig(Shape::sphere(Vec3::new(x, 10.0, 32.0), 4.0))
 }
 
-/// What comes of a change; if it is refused, nothing has changed, and the terrain goes on.
+/// The result of a change; if it is refused, nothing has changed, and the terrain still works.
 fn put(change: WorldChange) -> Result<(), ChangeError> {
     let mut terrain = terrain();
     let (before, next) = (terrain.parts().change, terrain.world().hash());

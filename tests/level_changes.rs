@@ -1,5 +1,5 @@
-//! Sequences of edits and changes of levels, commit by commit: after each commit, what is drawn is closed, and it is what would be
-//! drawn if all of it were made from scratch. `BURROW_WORLDS` is the number of sequences.
+//! Sequences of edits and changes of levels, commit by commit: after each commit, the drawn surface is closed, and
+//! equals one that is made from scratch. `BURROW_WORLDS` is the number of sequences.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! A log that loses records never looks whole, and one that loses none is whole: whatever is submitted, begun, given up, taken or
-//! held meanwhile. `BURROW_WORLDS` is the number of random sequences.
+//! A log that loses records never looks whole, and one that loses none is whole: whatever is submitted, begun, given
+//! up, taken or held meanwhile. `BURROW_WORLDS` is the number of random sequences.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,12 +32,12 @@ fn rules() -> DiggingRules {
     DiggingRules::default().with_unbreakable(MaterialId(0))
 }
 
-/// Does a record follow a revision, as whoever takes a log sees it?
+/// Returns `true` if a record follows a revision, as seen by a reader of the log.
 fn follows(record: &CommitRecord, at: u64) -> bool {
     record.revision == at || record.revision == at + 1
 }
 
-/// Is it a commit, and not only what rules and settings became?
+/// Returns `true` if it is a commit, and not only a change of rules and settings.
 fn is_commit(record: &CommitRecord) -> bool {
     let of_commit = |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change);
     record.entries.is_empty() || record.entries.iter().any(of_commit)

@@ -393,7 +393,7 @@ fn loose_pieces_do_not_depend_on_how_edits_are_batched() {
         let settings = LooseSettings { largest: 2000, crumbs: 10, debris: 300 };
         let (seed, mut results) = (rng.u64(..), Vec::new());
         for batch in [1, 3, 14] {
-            // The same world each time, with another chunk size.
+            // An equal world each time, with another chunk size.
             let mut rng = Rng::with_seed(seed);
             let (ground, _) = small_world(&mut rng, index);
             let brushes = brushes(&mut rng, &ground, 16);

@@ -60,7 +60,7 @@ const EXAMPLES: [Example; 5] = [
     Example { name: "custom_material", arguments: "--headless", pictures: 2, ground: 0.6, black: 0.05 },
 ];
 
-/// Longest time for all pictures of an example; about twice what two busy cores without a graphics card need.
+/// Longest time for all pictures of an example; about twice the time of two busy cores without a GPU.
 const LIMIT: Duration = Duration::from_secs(300);
 
 #[test]
@@ -68,7 +68,7 @@ const LIMIT: Duration = Duration::from_secs(300);
 fn examples_show_ground() {
     // Cargo's folder for temporary files lies in the target folder.
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("a target folder");
-    // The tests of a profile lie beside its examples.
+    // The tests of a profile lie next to its examples.
     let program = std::env::current_exe().expect("the test knows its own path");
     let examples = program.ancestors().nth(2).expect("the folder of a profile").join("examples");
     let faults: Vec<String> = EXAMPLES.iter().flat_map(|example| play(example, target, &examples)).collect();

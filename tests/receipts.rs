@@ -352,7 +352,7 @@ fn a_brush_that_finds_nothing_to_change_has_an_empty_receipt() {
     assert_eq!(terrain.world().bricks().count(), 0, "edits that change nothing store nothing");
     assert_eq!(terrain.world().fields().filter(|(_, fields)| !fields.is_empty()).count(), 0);
 
-    // The same edit again changes nothing.
+    // An equal edit again changes nothing.
     let dig = Brush::dig(Shape::sphere(Vec3::new(20.0, 10.0, 20.0), 4.0));
     let first = terrain.apply([&dig]).remove(0).outcome.expect("a valid brush");
     assert!(first.removed.total() > 100 && first.added.total() == 0);

@@ -1,4 +1,4 @@
-//! Strata: what is drawn is what a dig yields, nothing is stored for it, and solid ground is the same as without.
+//! Strata: drawn materials equal those that a dig yields, nothing is stored for them, and solid ground is unaffected.
 
 mod worlds;
 
@@ -71,7 +71,7 @@ fn ten_thousand_digs_yield_what_the_function_says() {
             let height = ground.height(Column::new(x, z)) as f32 / 256.0;
             let center = Vec3::new(x as f32 + rng.f32(), height - 12.0 * rng.f32(), z as f32 + rng.f32());
             let shape = Shape::sphere(center, 1.0 + 3.0 * rng.f32());
-            // Some of what is dug was built or painted before.
+            // Some of the dug ground was built or painted before.
             if rng.u8(..4) == 0 {
                 let stored = MaterialId([3, 77, 255][rng.usize(..3)]);
                 let shape = Shape::sphere(center + Vec3::splat(1.5), 2.5);
@@ -286,8 +286,8 @@ fn shown(triangle: &[Vertex; 3], weights: Vec3) -> MaterialId {
     MaterialId(strongest.unwrap_or_default())
 }
 
-/// How much farther from a point than the nearest solid voxel is the nearest one of this material; `None` if there is none
-/// within 2 voxels.
+/// How much farther from a point than the nearest solid voxel is the nearest one of this material; `None` if there is
+/// none within 2 voxels.
 fn error_at(world: &World, at: Vec3, shown: MaterialId) -> Option<f32> {
     let middle = at.floor().as_ivec3();
     let last = IVec3::new(world.ground().width(), middle.y + 3, world.ground().depth());
@@ -319,9 +319,9 @@ fn dug_cliffs(index: u64) -> Terrain {
     terrain
 }
 
-/// The border between two materials that are drawn is at most half a voxel off, so what is shown may be a voxel farther away
-/// than what is nearest. Where heights are whole numbers, the surface lies a voxel above the highest solid points, which adds
-/// 0.083 at most.
+/// The border between two materials that are drawn is at most half a voxel off, so what is shown may be a voxel farther
+/// away than what is nearest. Where heights are whole numbers, the surface lies a voxel above the highest solid points,
+/// which adds 0.083 at most.
 #[test]
 fn every_point_shows_what_a_dig_there_yields() {
     let (mut points, mut far, mut misses) = ([0; 2], 0, Vec::new());

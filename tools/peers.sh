@@ -1,6 +1,6 @@
 #!/bin/sh
 # Times our dense mesher beside VTK, scikit-image and PyMCubes: installs them outside the clone, builds, measures.
-# With --gpu: beside cupmb and isoext on an NVIDIA card, and scikit-image for scale.
+# With --gpu: beside cupmb and isoext on an NVIDIA GPU, and scikit-image for scale.
 #
 #   tools/peers.sh [--gpu] [--quick] [--fields sphere,caves] [--sizes 64,128] [--json FILE]
 set -eu
@@ -11,7 +11,7 @@ if [ "${1:-}" = --gpu ]; then
     shift
     name=peers_gpu
     if ! nvidia-smi -L >/dev/null 2>&1; then
-        echo "peers: --gpu needs an NVIDIA card with its driver, and nvidia-smi finds none" >&2
+        echo "peers: --gpu needs an NVIDIA GPU with its driver, and nvidia-smi finds none" >&2
         exit 1
     fi
 fi

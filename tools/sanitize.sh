@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs the tests of the CUDA kernels under a watcher of memory and races: compute-sanitizer where there is a card, else the
+# Runs the tests of the CUDA kernels under a watcher of memory and races: compute-sanitizer where there is a GPU, else the
 # sanitizers of a C++ compiler in the emulator, many times slower, which tests blocks and bricks only.
 #
 #   BURROW_WORLDS=20 BURROW_RACE_WORLDS=1 tools/sanitize.sh
@@ -16,7 +16,7 @@ check() {
 # sanitize TOOL WORLDS
 sanitize() {
     export "CARGO_TARGET_${host}_RUNNER=compute-sanitizer --tool $1 --error-exitcode 9" BURROW_WORLDS="$2"
-    # Tests of drivers look at machines without a card.
+    # Tests of drivers look at machines without a GPU.
     check backend::cuda -- --skip drivers
 }
 
@@ -25,7 +25,7 @@ if command -v compute-sanitizer >/dev/null 2>&1 && nvidia-smi -L >/dev/null 2>&1
     sanitize memcheck "${BURROW_WORLDS:-20}"
     sanitize racecheck "${BURROW_RACE_WORLDS:-1}"
 else
-    echo 'tools/sanitize.sh: no card, or no compute-sanitizer: the emulator watches its own memory instead'
+    echo 'tools/sanitize.sh: no GPU, or no compute-sanitizer: the emulator watches its own memory instead'
     export BURROW_EMULATOR_SANITIZE=1
     check backend::cuda::kernel_tests
 fi

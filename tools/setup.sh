@@ -3,7 +3,7 @@
 #
 #   tools/setup.sh build          compiler, linker, Rust
 #   tools/setup.sh run            the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
-#   tools/setup.sh test           the same as run, and a C++ compiler, with which CUDA kernels are tested without a card
+#   tools/setup.sh test           the same as run, and a C++ compiler, with which CUDA kernels are tested without a GPU
 #   tools/setup.sh drive          the same as run, and what plays the examples: Python, Xvfb, xdotool, ImageMagick
 #   tools/setup.sh lint           the same as build, and rustfmt and clippy
 #   tools/setup.sh peers          the same as build, and Python for the meshers that ours is compared with
@@ -100,7 +100,7 @@ add_component() {
 # What is told at the end of many tests, of which some had nothing to run on.
 tell_skipped() {
     if ! nvidia-smi -L >/dev/null 2>&1 && { [ "$(uname -s)" != Linux ] || ! { has "${CXX:-c++}" || has g++ || has clang++; }; }; then
-        say '*** SKIPPED: CUDA kernels were not tested: neither a card nor, on Linux, a C++ compiler (g++) for the emulator ***'
+        say '*** SKIPPED: CUDA kernels were not tested: neither a GPU nor, on Linux, a C++ compiler (g++) for the emulator ***'
     fi
     if [ "$(uname -s)" = Linux ] && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && ! has_vulkan_driver; then
         say '*** SKIPPED: no picture was compared: no Vulkan driver (mesa-vulkan-drivers) ***'

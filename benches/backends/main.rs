@@ -1,6 +1,6 @@
 //! CPU against CUDA: `cargo bench --no-default-features --features cuda --bench backends [-- SECTION...]`.
 //!
-//! The same transactions on the shipped landscape, on each backend in turn. The CPU uses all of its threads unless
+//! Runs equal transactions on the shipped landscape, on each backend in turn. The CPU uses all of its threads unless
 //! stated otherwise. Times run from the edits to the commit, with vertices in host memory.
 
 #[path = "../edits/landscape.rs"]
@@ -66,7 +66,7 @@ impl Engines {
     /// Runs one transaction on an engine.
     ///
     /// # Panics
-    /// Panics if the card left any stage to the CPU, whose time would then count as the card's.
+    /// Panics if the GPU left any stage to the CPU, whose time would then count as the GPU's.
     fn run(&self, transaction: Transaction, who: EngineKind, times: &mut Times) -> Commit {
         let engine = [&self.cpu, &self.cuda, &self.auto][who as usize];
         let commit = transaction.run_on(engine);
@@ -79,13 +79,13 @@ impl Engines {
         let is_there = |choice: &Choice| choice.is_cuda || choice.amount == 0;
         assert!(
             who != EngineKind::Cuda || choices.iter().all(is_there),
-            "the CPU did the card's work: {choices:?}"
+            "the CPU ran stages of the GPU: {choices:?}"
         );
         times.push(&commit.stages, &choices);
         commit
     }
 
-    /// Plays brushes in one transaction on a terrain that only this engine edits, so that a card keeps its copy up to
+    /// Plays brushes in one transaction on a terrain that only this engine edits, so that a GPU keeps its copy up to
     /// date; returns the time in seconds.
     fn play(
         &self,
@@ -127,7 +127,7 @@ fn main() {
             engines.cuda.figures().opening.as_secs_f64() * 1e3,
             engines.auto.figures().opening.as_secs_f64() * 1e3,
         ),
-        state => return println!("no card: {state:?}"),
+        state => return println!("no GPU: {state:?}"),
     }
     for (name, run) in SECTIONS {
         if wanted.is_empty() || wanted.iter().any(|wanted| wanted == name) {
@@ -147,7 +147,7 @@ struct Times {
     ring: Sample,
     /// The parts of edits and of meshing that a backend does.
     backend: [Sample; 2],
-    /// On the card only: edits and meshing, and their kernels.
+    /// On the GPU only: edits and meshing, and their kernels.
     device: [Sample; 2],
     kernel: [Sample; 2],
 }
@@ -198,7 +198,7 @@ fn header(what: &str) {
     // count as assembly, and as backend time too while they are waited for.
     let names = ["whole", "p99", "edits", "blocks", "edit", "meshing", "assembly", "ring"];
     let names = names.map(|name| format!("{name:>9}")).concat();
-    println!("  {what:<28}{names}   edits and blocks on the card (kernels); us, medians but for p99");
+    println!("  {what:<28}{names}   edits and blocks on the GPU (kernels); us, medians but for p99");
 }
 
 /// The order of the engines in a round. Later engines find warmer caches, depending on the engine before. In six
@@ -249,7 +249,7 @@ fn bulk(engines: &Engines, are_rough: bool) {
     println!("  {vertices} vertices");
 }
 
-/// Large transactions on a new engine: the first one opens the card, the next ones measure which backend is faster.
+/// Large transactions on a new engine: the first one opens the GPU, the next ones measure which backend is faster.
 fn moving() {
     let start = std::time::Instant::now();
     let engine = Engine::new(Backend::Auto);
@@ -262,7 +262,7 @@ fn moving() {
         let commit = terrain.begin().expect("queued brushes").run_on(&engine);
         let figures = engine.figures();
         println!(
-            "  {:>2}: {:>6.1} ms, {} of {} stages on the card; {:?}, {} MiB there, {} MiB pinned",
+            "  {:>2}: {:>6.1} ms, {} of {} stages on the GPU; {:?}, {} MiB there, {} MiB pinned",
             number + 1,
             commit.stages.whole.as_secs_f64() * 1e3,
             figures.cuda - before.cuda,
@@ -367,7 +367,7 @@ fn sweep(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
     let after = engines.auto.figures();
     println!("  worst {worst:.2}; {good} of {rows} rows within 1.15");
     println!(
-        "  of the stages, the card did {} of {}",
+        "  of the stages, the GPU did {} of {}",
         after.cuda - before.cuda,
         stages(&after) - stages(&before)
     );

@@ -41,7 +41,7 @@ impl Places {
         Self { count, first: 0 }
     }
 
-    /// The same number of other places.
+    /// An equal number of other places.
     pub fn offset(self, round: usize) -> Self {
         Self { first: round * 1009, ..self }
     }

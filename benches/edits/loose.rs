@@ -1,6 +1,6 @@
 //! The cost of searching for loose pieces, and of undo: digs of some 100 voxels, one transaction each.
 //!
-//! The same digs are done with every setting in turns, each undone before the next, so that all find the same world.
+//! Every setting does equal digs in turns, each undone before the next, so that all find equal worlds.
 //! The cost of a search is the time of a dig minus that of the same dig without a search, pair by pair.
 //!
 //! A search ends at [`LooseSettings::largest`] voxels. A body just below that bound is searched completely, found and
@@ -39,7 +39,7 @@ fn searches() -> [(&'static str, Option<LooseSettings>); 3] {
     ]
 }
 
-/// Digs of some 100 voxels, and what is built where they are done.
+/// Digs of some 100 voxels, and the ground that is built there.
 struct Scene {
     name: &'static str,
     build: fn(Vec3) -> Vec<Brush>,

@@ -65,7 +65,7 @@ fn by_radius() {
     });
 }
 
-/// The same brushes, by chunk size.
+/// Equal brushes, by chunk size.
 fn by_chunk_size() {
     stages::header("radius 4, dug ground");
     one_thread(|| {

@@ -1,10 +1,12 @@
-//! Triangles of the published scheme CDLOD (F. Strugar, "Continuous Distance-Dependent Level of Detail for Rendering Heightmaps",
-//! Journal of Graphics, GPU, and Game Tools 14(4), 2009) beside those of a cut, for the same ground, eye and limits.
+//! Triangles of the published scheme CDLOD (F. Strugar, "Continuous Distance-Dependent Level of Detail for Rendering
+//! Heightmaps", Journal of Graphics, GPU, and Game Tools 14(4), 2009) compared with those of a cut, for the same
+//! ground, eye and limits.
 //!
-//! CDLOD draws a node of its quadtree as a grid of fixed size. A level is drawn within a range around the eye that doubles from
-//! level to level; where a node reaches into the range of the next finer level, only quarters of it are drawn, with a quarter of
-//! the grid each. Ranges are the same everywhere, so they follow from the greatest error that a level has anywhere. What is
-//! farther than the view is not drawn. Its morphing costs no triangles and is left out: with it, ranges would be larger.
+//! CDLOD draws a node of its quadtree as a grid of fixed size. A level is drawn within a range around the eye that
+//! doubles from level to level; where a node reaches into the range of the next finer level, only quarters of it are
+//! drawn, with a quarter of the grid each. Ranges are the same everywhere, so they follow from the greatest error that
+//! a level has anywhere. Nodes beyond the view are not drawn. Its morphing costs no triangles and is left out:
+//! with it, ranges would be larger.
 
 use bevy_burrow::levels::{Choice, Cut, LevelGrid, Node};
 use bevy_burrow::terrain::{GroundFacts, World};
@@ -12,7 +14,7 @@ use glam::{Vec2, Vec3, Vec3Swizzles};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// Nodes of a level of which the greatest error is taken, at most: so many along each side, evenly spread.
+/// Most nodes along each side, evenly spread, from which the greatest error of a level is taken.
 const SAMPLES: i32 = 24;
 
 /// CDLOD's quadtree over a world.
@@ -28,7 +30,7 @@ struct Quadtree<'a> {
 }
 
 impl Quadtree<'_> {
-    /// Selects what is drawn of a node; false if it is farther away than its level is drawn.
+    /// Selects the grids of a node; returns `false` if it is beyond the range of its level.
     fn select(&mut self, node: Node, level: usize) -> bool {
         if !self.grid.has(node) {
             return true;
@@ -80,8 +82,8 @@ fn greatest_errors(world: &World, grid: LevelGrid) -> Vec<f32> {
     (0..=grid.top()).map(greatest).collect()
 }
 
-/// How far level 0 is drawn: where level 1 begins, its error or its cells are within the limits, and so for the levels above,
-/// each at twice the distance.
+/// How far level 0 is drawn: where level 1 begins, its error or its cells are within the limits, and so for the levels
+/// above, each at twice the distance.
 fn first_range(errors: &[f32], choice: &Choice, pixels: f32) -> f32 {
     let by_error = errors.iter().zip(0..).skip(1).map(|(error, level)| {
         let distance = error * pixels / choice.error_pixels;
@@ -91,7 +93,7 @@ fn first_range(errors: &[f32], choice: &Choice, pixels: f32) -> f32 {
     by_error.fold(0.0, f32::max).min(by_cells)
 }
 
-/// Does a node of a cut lie within the view, in part at least?
+/// Returns `true` if a node of a cut lies within the view, at least in part.
 fn is_in_view(cut: &Cut, node: Node, eye: Vec3, view: f32) -> bool {
     let (low, high) = cut.grid().columns(node);
     let [low, high] = [low, high].map(|column| Vec2::new(column.x as f32, column.z as f32));

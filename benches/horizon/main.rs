@@ -1,16 +1,18 @@
-//! Levels of detail by their figures, without drawing:
-//! `cargo bench --no-default-features --bench horizon [-- KILOMETRES] [PART...]`, where parts are `views`, `cdlod`, `load`, `nodes`,
-//! `digs` and `flight`; all of them unless some are named.
+//! Levels of detail by their figures, without drawing: `cargo bench --no-default-features --bench horizon [--
+//! KILOMETRES] [PART...]`, where parts are `views`, `cdlod`, `load`, `nodes`, `edited`, `digs` and `flight`; all of them
+//! unless some are named.
 //!
-//! A world of 16 x 16 km (or so many) whose mountains are computed on demand, seen by an eye on a summit at 1440 lines and 45
-//! degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the whole cut take;
-//! what a node costs in a task, from noise and from an image; what a flight at 100 m/s with 20 digs a second needs; and the
-//! bytes that the ground and the meshes take, as a card gets them. `cdlod` sets triangles beside those of a published scheme.
+//! A world of 16 x 16 km (or the given size) whose mountains are computed on demand, seen by an eye on a summit at 1440
+//! lines and 45 degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the
+//! whole cut take; what a node costs in a task, from noise and from an image, and on edited ground; what a flight at
+//! 100 m/s with 20 digs a second needs; and the bytes that the ground and the meshes take, as a GPU gets them. `cdlod`
+//! compares triangles with those of a published scheme.
 
 #[path = "../../examples/shared/mountains.rs"]
 mod mountains;
 
 mod cdlod;
+mod edited;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -56,16 +58,17 @@ fn main() {
             "cdlod" => cdlod::compare(terrain().world(), summit),
             "load" => load(terrain(), summit),
             "nodes" => nodes(terrain().world(), summit),
+            "edited" => edited::nodes(),
             "digs" => digs([terrain(), terrain()], summit),
             _ => flight(terrain(), summit),
         }
     }
 }
 
-const PARTS: [&str; 6] = ["views", "cdlod", "load", "nodes", "digs", "flight"];
+const PARTS: [&str; 7] = ["views", "cdlod", "load", "nodes", "edited", "digs", "flight"];
 
-/// Digs of radius 4 near the eye, with a cut drawn and without, in turns. The first round computes the ground that both share, and
-/// shows where edits are: the cut is the one that they lead to, as in a game. It is not counted.
+/// Digs of radius 4 near the eye, with a cut drawn and without, in turns. The first round computes the ground that both
+/// share, and shows where edits are: the cut is the one that they lead to, as in a game. It is not counted.
 fn digs(mut terrains: [Terrain; 2], summit: Vec3) {
     let mut times = [Vec::new(), Vec::new()];
     for (round, number) in (0..3).flat_map(|round| (0..600).map(move |number| (round, number))) {
@@ -124,12 +127,12 @@ const DIRECTIONS: usize = 64;
 /// Half the horizontal angle of view of a picture of 16 to 9 that is 45 degrees high.
 const HALF_ANGLE: f32 = 0.635;
 
-/// Is any part of a node within the angle of view, seen from above?
+/// Returns `true` if any part of a node is within the angle of view, seen from above.
 fn is_in_sight(cut: &Cut, node: Node, eye: Vec3, angle: f32) -> bool {
     let (low, high) = cut.grid().columns(node);
     let [low, high] = [low, high].map(|column| Vec2::new(column.x as f32, column.z as f32));
     let corners = [low, Vec2::new(low.x, high.y), high, Vec2::new(high.x, low.y)];
-    // Beside neither side of the wedge.
+    // Outside neither side of the wedge.
     let sides = [-HALF_ANGLE, HALF_ANGLE].map(|half| Vec2::from_angle(angle + half));
     let is_inside = |corner: &Vec2, side: usize| {
         let across = sides[side].perp_dot(*corner - eye.xz());
@@ -166,7 +169,7 @@ fn views(world: &World, summit: Vec3) {
     }
 }
 
-/// Bytes of meshes as a card gets them.
+/// Bytes of meshes as a GPU gets them.
 fn bytes(nodes: &[NodeUpdate]) -> usize {
     let of = |mesh: &bevy_burrow::surface::SurfaceMesh| {
         let index = if mesh.vertices.len() < 1 << 16 { 2 } else { 4 };

@@ -34,7 +34,7 @@ pub struct Grid {
     pub size: usize,
     /// Densities in voxels.
     pub samples: Vec<f32>,
-    /// The same densities in 1/256 voxel.
+    /// These densities in 1/256 voxel.
     pub fixed: Vec<i16>,
 }
 

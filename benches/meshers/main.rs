@@ -1,6 +1,6 @@
 //! Dense meshing compared with public crates: `cargo bench --no-default-features --bench meshers`.
 //!
-//! The same grids in one process, on one thread, in turns: see [`timing`]. Before timing, the meshes of closed grids
+//! Equal grids in one process, on one thread, in turns: see [`timing`]. Before timing, the meshes of closed grids
 //! and of the first chunks of the streams are checked: see [`check`]. Then single grids are meshed repeatedly, which
 //! keeps caches warm, and after that streams of different chunks, as in a game. Ratios are paired, round by round or
 //! chunk by chunk.

@@ -36,7 +36,7 @@ impl Contender for MarchingCubes {
             samples,
             0.0,
         );
-        self.loaded = Some(peer.expect("as many samples as the sides say"));
+        self.loaded = Some(peer.expect("the sides match the number of samples"));
     }
 
     fn mesh(&mut self, _grid: &Grid, part: Part) {

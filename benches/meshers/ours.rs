@@ -7,7 +7,7 @@ use crate::fields::Grid;
 
 /// The contender with which all others are compared.
 pub const REFERENCE: &str = "burrow dense f32";
-/// The same without normals.
+/// The reference without normals.
 pub const REFERENCE_BARE: &str = "burrow dense f32, bare";
 
 /// Ours with unit normals.
@@ -78,7 +78,7 @@ impl<S: Density> Contender for Dense<S> {
             Part::Whole => DenseGrid::new(samples, grid.sides()),
             Part::WithinApron => DenseGrid::with_apron(samples, grid.sides()),
         };
-        self.mesher.mesh(dense.expect("as many samples as the sides say"), self.normals, &mut self.mesh);
+        self.mesher.mesh(dense.expect("the sides match the number of samples"), self.normals, &mut self.mesh);
     }
 
     fn triangles(&self) -> usize {

@@ -1,5 +1,6 @@
-//! Much at once, on the processor and on a CUDA card: ground from noise, a meteor shower, a landscape cut into terraces and
-//! smoothed as a whole, hundreds of strokes that sculpt it, and a world of thousands of edits replayed as when it is loaded.
+//! Large transactions, on the CPU and on a CUDA GPU: ground from noise, a meteor shower, a landscape cut into terraces
+//! and smoothed as a whole, hundreds of strokes that sculpt it, and a world of thousands of edits replayed as when it
+//! is loaded.
 //!
 //! `cargo run --release --no-default-features --features cuda --example bulk [-- --help]`
 
@@ -14,7 +15,7 @@ use clap::Parser;
 use fastrand::Rng;
 use glam::{Quat, Vec2, Vec3};
 
-/// Times large transactions on the processor and on a CUDA card.
+/// Times large transactions on the CPU and on a CUDA GPU.
 #[derive(Parser)]
 struct Arguments {
     /// Cells along a side of the landscape.
@@ -79,8 +80,8 @@ fn terraces(ground: &Ground, _: &mut Rng) -> Vec<Brush> {
     places.map(cut).collect()
 }
 
-/// All of the ground smoothed in overlapping squares. Those of one colour, of four, lie apart, so that they need not wait
-/// for each other.
+/// All of the ground smoothed in overlapping squares. Those of one colour, of four, lie apart, so that they need not
+/// wait for each other.
 fn smooth(ground: &Ground, _: &mut Rng) -> Vec<Brush> {
     let (step, overlap) = (64, 4);
     let square = |x: i32, z: i32| {
@@ -173,14 +174,14 @@ fn compare_ground(side: u32, repeats: u16, engines: &[(Backend, Engine); 3]) {
 struct Outcome {
     commit: Commit,
     hash: u64,
-    /// The stages that went to the card, and those that did not though there was something to do.
+    /// Numbers of stages that ran on the GPU, and of those with work that did not.
     on_card: u64,
     left: usize,
-    /// What was expected of processor and card, in milliseconds: all choices together.
+    /// Expected times on CPU and GPU, in milliseconds, summed over all choices.
     expected: [f64; 2],
 }
 
-/// Runs what waits, which goes on waiting. Nobody else holds the world meanwhile: it would be copied.
+/// Runs the waiting edits, which stay queued. No other handle to the world may exist, or it would be copied.
 fn run(terrain: &mut Terrain, engine: &Engine) -> Outcome {
     let before = engine.figures();
     let commit = terrain.begin().expect("brushes wait").run_on(engine);
@@ -198,7 +199,7 @@ fn run(terrain: &mut Terrain, engine: &Engine) -> Outcome {
     Outcome { commit, hash, on_card, left, expected }
 }
 
-/// Do both draw the same?
+/// Returns `true` if both draw the same meshes.
 fn are_same(a: &Commit, b: &Commit) -> bool {
     let (a, b) = (&a.meshes, &b.meshes);
     let mut chunks = a.chunks.iter().zip(&b.chunks);
@@ -215,9 +216,9 @@ fn main() {
     let engines = [Backend::Cpu, Backend::Cuda, Backend::Auto].map(|backend| (backend, Engine::new(backend)));
     for (backend, engine) in &engines {
         match engine.wait(Duration::from_secs(30)) {
-            EngineState::Cuda(name) => println!("{backend:?}: {name} beside the processor"),
-            EngineState::Lost(why) => println!("{backend:?}: the processor; {why}"),
-            _ => println!("{backend:?}: the processor, {} threads", rayon::current_num_threads()),
+            EngineState::Cuda(name) => println!("{backend:?}: {name} and the CPU"),
+            EngineState::Lost(why) => println!("{backend:?}: the CPU; {why}"),
+            _ => println!("{backend:?}: the CPU, {} threads", rayon::current_num_threads()),
         }
     }
     let has_card = matches!(engines[1].1.state(), EngineState::Cuda(_));
@@ -241,8 +242,8 @@ fn main() {
         let mut first: Option<Commit> = None;
         // The first round warms memory and threads.
         for round in 0..=arguments.repeats {
-            // In turns: whoever comes later finds caches warm. Every other round runs backwards, so that nobody always comes
-            // after the same one.
+            // In turns: a later engine finds caches warm. Every other round runs backwards, so that no engine always
+            // follows the same one.
             for turn in 0..engines.len() {
                 let turn = if round.is_multiple_of(2) { turn } else { engines.len() - 1 - turn };
                 let i = (turn + usize::from(round) / 2) % engines.len();
@@ -253,11 +254,7 @@ fn main() {
                 // In the end, of Auto.
                 expected = if i == 2 { outcome.expected } else { expected };
                 let is_card = engines[i].0 == Backend::Cuda && has_card;
-                assert!(
-                    !is_card || outcome.left == 0,
-                    "the processor did the card's work: {:?}",
-                    engine.state()
-                );
+                assert!(!is_card || outcome.left == 0, "the CPU ran stages of the GPU: {:?}", engine.state());
                 let meshes = outcome.commit.meshes.chunks.iter();
                 vertices = meshes.map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
                 if round > 0 {
@@ -276,7 +273,7 @@ fn main() {
         println!("{:<24}{:>9}{vertices:>10}{cpu}{cuda}{auto}", scene.name, brushes.len());
         assert!(hashes.windows(2).all(|pair| pair[0] == pair[1]), "all engines make the same world");
         let [cpu, cuda] = expected;
-        println!("{:<24}stages on the card: {on_card:?}; samples {:016x} on all", "", hashes[0]);
-        println!("{:<24}Auto expected {cpu:.1} ms of the processor, {cuda:.1} of the card", "");
+        println!("{:<24}stages on the GPU: {on_card:?}; samples {:016x} on all", "", hashes[0]);
+        println!("{:<24}Auto expected {cpu:.1} ms of the CPU, {cuda:.1} of the GPU", "");
     }
 }

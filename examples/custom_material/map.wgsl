@@ -39,7 +39,7 @@ fn vertex(in: Vertex) -> Varying {
     return out;
 }
 
-// 1 on a line at each multiple of `step`, 0 beside it; `width` in pixels.
+// 1 on a line at each multiple of `step`, 0 elsewhere; `width` in pixels.
 fn line(height: f32, step: f32, width: f32) -> f32 {
     let at = height / step;
     let off = abs(fract(at - 0.5) - 0.5) / max(fwidth(at), 0.0001);

@@ -16,9 +16,9 @@
 //! {"shape":"cone","base":[20,60,20],"axis":[0,9,0],"radius":5,"op":"paint","material":3}
 //! ```
 //!
-//! `--strata` gives the ground strata: a preset, or a file with [`Strata`] as JSON. `--rules` limits what brushes remove:
-//! a file with [`DiggingRules`] as JSON. `--probe` asks what lattice points of the pristine world are made of, `[x,y,z]`
-//! a line; `probes.json` has an answer for each, `{"solid":true,"material":7}`.
+//! `--strata` gives the ground strata: a preset, or a file with [`Strata`] as JSON. `--rules` limits what brushes
+//! remove: a file with [`DiggingRules`] as JSON. `--probe` asks what lattice points of the pristine world are made of,
+//! `[x,y,z]` a line; `probes.json` has an answer for each, `{"solid":true,"material":7}`.
 //!
 //! `mesh.obj` holds every drawn triangle with exact positions: y up, one unit per voxel, one group per tile and chunk.
 //! Vertices of neighbouring parts are not welded. `report.json` has the hash, scenarios, counts, bytes, seams and
@@ -26,8 +26,8 @@
 //!
 //! With `--eye X Y Z`, in voxels, the mesh is what would be drawn from there with levels of detail, on a picture
 //! `--screen-height` pixels high with an angle of view of 45 degrees; with `--random-cut SEED` any squares that may be
-//! drawn together. Then `mesh.obj` has a group for each square, `node_X_Z_level_L`, `report.json` has nodes and triangles by
-//! level in `levels`, and `seams` is the report of what was written.
+//! drawn together. Then `mesh.obj` has a group for each square, `node_X_Z_level_L`, `report.json` has nodes and
+//! triangles by level in `levels`, and `seams` is the report of what was written.
 //!
 //! | exit code | when |
 //! | --- | --- |

@@ -13,7 +13,7 @@ use crate::ExportError;
 /// The answer for a lattice point, before any edit.
 #[derive(Debug, PartialEq, Eq, Serialize)]
 pub struct Probe {
-    /// Is it below the surface?
+    /// Whether it is below the surface.
     solid: bool,
     /// The ground's own material there; of points above the surface, the one that ground filled in there would have.
     material: u8,

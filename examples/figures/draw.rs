@@ -175,7 +175,7 @@ fn section(world: &World) -> String {
     }
     for (are_chunks, color) in [(false, BROWN), (true, BLUE)] {
         for triangle in triangles(world, are_chunks) {
-            // Beside the lattice plane, where no triangle lies within it.
+            // Slightly off the lattice plane, so that no triangle lies within it.
             if let Some(cut) = slice(triangle, Z as f32 + 0.01) {
                 canvas.line(&cut, color, 2.4);
             }
@@ -195,7 +195,7 @@ fn slice(triangle: [Vec3; 3], z: f32) -> Option<[Vec2; 2]> {
     crossings.try_into().ok()
 }
 
-/// The steepest side between a cell of the mask and one beside it, in its own plane.
+/// The steepest side between a cell of the mask and a neighbour, in the plane of that side.
 fn steep(world: &World) -> String {
     let mask = mask(world);
     let height = |x: i32, z: i32| world.ground().height(Column::new(x, z)) as f32 / ONE as f32;

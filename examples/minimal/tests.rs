@@ -13,10 +13,10 @@ use bevy_burrow::prelude::*;
 use photo::Photographer;
 use photo::pixels::Shares;
 
-/// Small: without a graphics card, a picture as large as the window takes fifteen times as long.
+/// Small: without a GPU, a picture as large as the window takes fifteen times as long.
 const SIZE: (u32, u32) = (320, 180);
 
-/// Longest time to a picture. Two cores without a graphics card take 10 seconds, and 40 while others keep them busy.
+/// Longest time to a picture. Two cores without a GPU take 10 seconds, and 40 while others keep them busy.
 const LIMIT: Duration = Duration::from_secs(120);
 
 #[test]

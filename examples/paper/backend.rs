@@ -5,7 +5,7 @@ use std::time::Duration;
 use bevy_burrow::backend::{Backend as Kind, Engine, EngineState};
 use bevy_burrow::terrain::{Commit, Transaction};
 
-/// The processor that does the work.
+/// The CPU that does the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backend {
     Cpu,
@@ -26,7 +26,7 @@ impl Runner {
         }
     }
 
-    /// The number of stages so far that a card left to the CPU.
+    /// Number of stages that a GPU left to the CPU.
     pub fn left_over(&self) -> u64 {
         self.engine.as_ref().map_or(0, |engine| engine.figures().cpu)
     }

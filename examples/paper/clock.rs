@@ -1,4 +1,4 @@
-//! Two clocks: the wall clock, as in the paper, and the processor time of this thread, which excludes other load. On
+//! Two clocks: the wall clock, as in the paper, and the CPU time of this thread, which excludes other load. On
 //! a busy machine, long edits lose more wall-clock time to other processes than short ones.
 
 use std::time::Instant;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Lap {
     /// By the wall clock.
     pub seconds: f64,
-    /// Processor time; the wall-clock time where the system does not report it.
+    /// CPU time; the wall-clock time where the system does not report it.
     pub processor: f64,
 }
 
@@ -24,10 +24,10 @@ pub fn time<T>(work: impl FnOnce() -> T) -> (Lap, T) {
     (Lap { seconds, processor }, result)
 }
 
-/// Whether processor time is available.
+/// Whether CPU time is available.
 pub const IS_KNOWN: bool = cfg!(target_os = "linux");
 
-/// Processor time of this thread in seconds.
+/// CPU time of this thread in seconds.
 #[cfg(target_os = "linux")]
 fn processor() -> Option<f64> {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);

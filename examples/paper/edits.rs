@@ -20,8 +20,8 @@ const MARGIN: f32 = 20.0;
 pub enum Run {
     /// On untouched ground: no fields exist.
     First,
-    /// The same shapes at the same places with reversed polarity, so that each edit changes something: what was dug
-    /// is filled, what was built is dug.
+    /// Equal shapes at equal places with reversed polarity, so that each edit changes something:
+    /// holes are filled, and built ground is dug.
     Second,
 }
 

@@ -23,7 +23,7 @@ pub enum PaperError {
     Grid(#[from] DenseGridError),
     #[error(transparent)]
     Backend(#[from] NoBackend),
-    #[error("{0} stages of a run on the card were done by the processor: it failed, or had no memory left")]
+    #[error("{0} stages of a run on the GPU were done by the CPU: it failed, or had no memory left")]
     LeftTheCard(u64),
     #[error(transparent)]
     Stale(#[from] StaleCommit),

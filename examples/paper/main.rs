@@ -12,11 +12,11 @@
 //! | --- | --- |
 //! | `timings.csv` | each single timing |
 //! | `summary.json` | machine, statistics, checks, ratios |
-//! | `RESULTS.md` | all tables beside the paper's figures |
+//! | `RESULTS.md` | all tables, compared with the paper's figures |
 //! | `plots/*.svg` | the plots that the page shows |
 //!
 //! It fails if a check fails: seams, equal worlds for all chunk sizes, ground and surface of the full fields against
-//! the hybrid. If all checks pass, `--results` also copies the page there, and the plots into `plots/` beside it.
+//! the hybrid. If all checks pass, `--results` also copies the page there, and the plots into `plots/` next to it.
 
 mod alone;
 mod backend;
@@ -50,13 +50,13 @@ use machine::Machine;
 use measure::{Measurements, measure};
 use setup::{Setup, Subject};
 
-/// Reproduces the paper's Tables 1 to 5 and writes them beside the paper's own figures.
+/// Reproduces the paper's Tables 1 to 5 and compares them with the paper's figures.
 #[derive(Parser)]
 struct Args {
     /// Folder for timings, summary, page and plots; created if missing
     #[arg(long, value_name = "DIR", default_value = "out/paper")]
     out: PathBuf,
-    /// Writes the page here as well, and the plots beside it
+    /// Writes the page here as well, and the plots next to it
     #[arg(long, value_name = "FILE")]
     results: Option<PathBuf>,
     /// How often each run is repeated

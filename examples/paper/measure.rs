@@ -21,14 +21,15 @@ pub struct Measured {
     pub run: Run,
     /// Seconds of each edit, by repeat.
     pub repeats: Vec<Vec<f64>>,
-    /// The same in processor time. With several threads it is not available, and these are wall-clock seconds.
+    /// CPU seconds of each edit, by repeat. With several threads they are not available, and these are wall-clock
+    /// seconds.
     pub processor: Vec<Vec<f64>>,
     /// Voxels that each edit dug or filled; `None` for a dense field.
     pub voxels: Vec<u64>,
     /// Number of edits in one repeat that changed no sample, and that changed no mesh.
     pub unchanged: usize,
     pub undrawn: usize,
-    /// The same run in processes that play a single test; empty where no process can be started.
+    /// This run in separate processes that each play a single test; empty if no process can be started.
     pub alone: Vec<AloneRun>,
     pub ending: Ending,
 }
@@ -175,7 +176,7 @@ fn keep(
     }
 }
 
-/// Seconds by both clocks. With several threads, processor time is not available, and wall-clock time replaces it.
+/// Seconds by both clocks. With several threads, CPU time is not available, and wall-clock time replaces it.
 pub fn both_clocks(laps: &[Lap], threads: usize) -> (Vec<f64>, Vec<f64>) {
     let processor = |lap: &Lap| if threads == 1 { lap.processor } else { lap.seconds };
     (laps.iter().map(|lap| lap.seconds).collect(), laps.iter().map(processor).collect())

@@ -52,7 +52,7 @@ pub fn hybrid(terrain: &mut Terrain, runner: &Runner, brushes: &[Brush]) -> Resu
         played.record(&receipts);
         played.undrawn += usize::from(meshes.chunks.is_empty() && meshes.tiles.is_empty());
     }
-    // An edit that changes nothing is not sent to the card.
+    // An edit that changes nothing is not sent to the GPU.
     match runner.left_over() - left_before {
         left if left <= played.undrawn as u64 => Ok(played),
         left => Err(PaperError::LeftTheCard(left)),

@@ -22,8 +22,8 @@ pub const PLOTS: [(&str, &str); 6] = [
     ("second_run.svg", "Second run: total time of all edits, seconds"),
     ("growth.svg", "Second run: average time over that of chunk size 25"),
     ("full.svg", "Second run: hybrid with chunk size 25 and full fields, total seconds"),
-    ("edits.svg", "Second run: processor milliseconds of each edit, in order"),
-    ("sorted.svg", "Second run: processor milliseconds of an edit, sorted"),
+    ("edits.svg", "Second run: CPU milliseconds of each edit, in order"),
+    ("sorted.svg", "Second run: CPU milliseconds of an edit, sorted"),
 ];
 
 const SIZE: (u32, u32) = (820, 460);
@@ -119,7 +119,7 @@ fn chunked_and_full(measurements: &Measurements) -> Vec<Row> {
     ]
 }
 
-/// Each edit's median over the repeats, in milliseconds of processor time.
+/// Each edit's median over the repeats, in milliseconds of CPU time.
 fn latencies(measurements: &Measurements) -> Vec<Row> {
     let second = measurements.measured.iter().filter(|measured| measured.run == Run::Second);
     let mut chunk_colors = CHUNKS.into_iter().cycle();

@@ -1,4 +1,4 @@
-//! The same without a window: pictures, and a report.
+//! Runs without a window: makes pictures and a report.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -127,7 +127,7 @@ fn build(options: &Options) -> (App, bool) {
     (app, renders)
 }
 
-/// Makes the camera draw into a picture, when told to.
+/// Makes the camera draw into a picture, on request.
 fn hire(app: &mut App, options: &Options) -> Result<Photographer> {
     let world = app.world_mut();
     let camera = world.query_filtered::<Entity, With<Camera3d>>().single(world)?;

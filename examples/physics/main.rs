@@ -12,10 +12,10 @@
 //! | right mouse button, held | looks around |
 //! | `W` `A` `S` `D`, `Q`, `E` | moves, down, up; with the left `Shift` faster |
 //! | `Space` | throws a ball |
-//! | `P` | stops the digging machine, or lets it go on |
+//! | `P` | stops or restarts the digging machine |
 //!
-//! Without a display, or with `--headless`, it plays by itself for some seconds of the game's time and leaves pictures and
-//! `report.json` in `--out`; it fails if a ball is below the ground then.
+//! Without a display, or with `--headless`, it plays automatically for some seconds of game time and leaves pictures
+//! and `report.json` in `--out`; it fails if a ball is below the ground then.
 
 #[path = "../shared/display.rs"]
 mod display;

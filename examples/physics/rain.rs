@@ -22,7 +22,7 @@ pub struct Ball;
 /// The weather.
 #[derive(Resource)]
 pub struct Rain {
-    /// Does the machine dig?
+    /// Whether the machine digs.
     pub digs: bool,
     /// How many brushes it sent.
     pub edits: usize,
@@ -33,7 +33,7 @@ pub struct Rain {
 }
 
 impl Rain {
-    /// A rain of so many balls at most.
+    /// A rain of at most `most` balls.
     pub fn new(most: usize) -> Self {
         Self { digs: true, edits: 0, most, balls: VecDeque::new(), rng: Rng::with_seed(1), looks: Vec::new() }
     }

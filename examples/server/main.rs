@@ -7,20 +7,20 @@
 //! some_game | cargo run --release --features examples --example server -- --world out/world --script -
 //! ```
 //!
-//! It runs Bevy's `MinimalPlugins` and `BurrowPlugins`, so it needs no window, no graphics and no assets. A script has a
-//! brush a line, as [`Brush`] describes it, in voxels; `{"undo":true}` and `{"redo":true}`
-//! are steps through history, and blank lines and lines that start with `#` count for nothing. `-` reads standard input
-//! as it comes in; without a script it digs at random, the same each time.
+//! It runs Bevy's `MinimalPlugins` and `BurrowPlugins`, so it needs no window, no graphics and no assets. A script has
+//! a brush a line, as [`Brush`] describes it, in voxels; `{"undo":true}` and `{"redo":true}` are steps through history,
+//! and blank lines and lines that start with `#` are ignored. `-` reads standard input as it comes in; without a
+//! script it digs at random, the same each time.
 //!
 //! For each brush a line with what became of it, then fields, memory, and the hash of the world: a client that got the
-//! same brushes in the same order has the same one. With `--per-tick` brushes go in batches, as they would from players;
-//! the hash does not depend on that, but for scripts with steps: a step undoes a batch, unless the brushes say of which
-//! `"stroke"` they are; then it undoes a stroke, however many ticks that took. From standard input each brush is a
-//! batch of its own.
+//! same brushes in the same order has the same one. With `--per-tick` brushes go in batches, as they would from
+//! players; the hash does not depend on that, but for scripts with steps: a step undoes a batch, unless the brushes say
+//! of which `"stroke"` they are; then it undoes a stroke, however many ticks that took. From standard input each brush
+//! is a batch of its own.
 //!
-//! With `--world` the world is kept in a folder: it goes on where it was. Then standard output holds JSON lines only:
-//! `{"revision":7,"hash":"0x..."}` for each commit, and `{"durable":7}` once everything up to it would survive a crash or
-//! a loss of power.
+//! With `--world` the world is saved in a folder, and continued from there. Then standard output holds JSON lines only:
+//! `{"revision":7,"hash":"0x..."}` for each commit, and `{"durable":7}` once everything up to it would survive a crash
+//! or a loss of power.
 //!
 //! | file | subject |
 //! | --- | --- |
@@ -135,7 +135,7 @@ fn terrain(options: &Options) -> Result<Terrain> {
 mod tests {
     use super::*;
 
-    /// The world after a script, with so many lines a tick.
+    /// The world after a script, with `per_tick` lines a tick.
     fn play(script: &str, per_tick: &str) -> App {
         let name = format!("bevy_burrow_server_{}_{per_tick}.jsonl", std::process::id());
         let place = std::env::temp_dir().join(name);

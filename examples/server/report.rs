@@ -12,14 +12,14 @@ use bevy_burrow::terrain::Memory;
 
 use crate::output::say;
 
-/// What happened so far.
+/// Counts of events since the start.
 #[derive(Resource)]
 pub struct Report {
     /// Brushes and steps that were answered.
     pub answered: u64,
     /// Lines that could not be read.
     pub faults: u64,
-    /// Was the summary asked for?
+    /// Whether the summary was requested.
     pub is_done: bool,
     quiet: bool,
     rejected: u64,

@@ -1,4 +1,4 @@
-//! The world on disk: each commit is told on a line, and so is what would survive a crash by now.
+//! The world on disk: prints a line for each commit, and for each revision that would survive a crash.
 
 use std::path::Path;
 
@@ -33,7 +33,7 @@ pub fn open(folder: &Path, options: &Options, untouched: Terrain) -> Result<(Sav
     Ok((Saving { store, durable: None }, terrain))
 }
 
-/// Saves what is committed, and tells of it.
+/// Saves commits, and prints a line for each.
 pub fn add(app: &mut App, saving: Saving) {
     app.insert_resource(saving)
         .add_systems(Update, save.after(BurrowSystems::Commit))
@@ -62,7 +62,7 @@ fn save(mut saving: ResMut<Saving>, mut terrains: Query<&mut Terrain>) {
     tell(&mut saving);
 }
 
-/// Says what is durable, if that changed, and what is wrong.
+/// Prints the durable revision if it changed, and any trouble.
 fn tell(saving: &mut Saving) {
     let durable = saving.store.durable();
     if saving.durable != Some(durable) {

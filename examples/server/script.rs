@@ -97,7 +97,7 @@ fn made_up(options: &Options) -> impl Iterator<Item = Line> + use<> {
     })
 }
 
-/// Sends brushes, so many each tick, and ends the program when none is left and all are answered.
+/// Sends some brushes each tick, and ends the program once none is left and all have receipts.
 pub fn add(app: &mut App, source: Source) {
     app.insert_resource(source).add_systems(Update, send.before(BurrowSystems::Collect));
 }
@@ -162,8 +162,8 @@ fn send(
 }
 
 impl Source {
-    /// Lines of one tick, at most. Of those that come as somebody says them each is one of its own: how many are there by
-    /// now is chance.
+    /// Lines of one tick, at most. Of those that come as somebody says them each is one of its own: how many are there
+    /// by now is chance.
     fn due(&self) -> u64 {
         if matches!(self.feed, Feed::Coming(_)) { 1 } else { self.per_tick }
     }
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn who_says_more_than_is_sent_has_to_wait() {
+    fn senders_over_the_limit_have_to_wait() {
         let (sender, receiver) = sync_channel(3);
         let feed = Feed::Coming(Mutex::new(receiver));
         let mut source = Source { feed, next: None, per_tick: 1, sent: 0 };
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_names_its_file_and_line_and_the_rest_goes_on() {
+    fn a_fault_names_its_file_and_line_and_later_lines_are_read() {
         let script = "{\"undo\":true}\ndig\n{\"redo\":true}\n";
         let found: Vec<Entry> = entries(script.as_bytes(), "a.jsonl".into()).collect();
         let fault = "a.jsonl: line 2: expected a JSON object in braces";

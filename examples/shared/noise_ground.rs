@@ -2,7 +2,7 @@
 
 use bevy_burrow::ground::{Ground, GroundError, NoiseHeights};
 
-/// Hills of so many cells along each side.
+/// Hills of `side` cells along each side.
 pub fn noise_ground(side: u32) -> Result<Ground, GroundError> {
     let noise =
         NoiseHeights { seed: 4, amplitude: 40.0, scale: 180.0, octaves: 5, ..NoiseHeights::default() };

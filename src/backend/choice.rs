@@ -1,8 +1,8 @@
-//! What was chosen for a stage of a transaction, and why.
+//! The backend chosen for a stage of a transaction, and the reason.
 
 use std::time::Duration;
 
-/// A stage of a transaction that a backend does.
+/// A stage of a transaction that a backend runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
     /// Edits applied to bricks.
@@ -11,41 +11,41 @@ pub enum Stage {
     Mesh,
 }
 
-/// How long a stage may take on either backend, by what such stages took lately. Where none was timed, no more is known than
-/// that it takes no less than this.
+/// Expected times of a stage on either backend, from recent stages of its kind. If none was timed, a lower
+/// bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Estimate {
-    /// On the processor.
+    /// On the CPU.
     pub cpu: Duration,
-    /// On the card, uploads included.
+    /// On the GPU, uploads included.
     pub cuda: Duration,
 }
 
-/// What was chosen for a stage, and why.
+/// The backend chosen for a stage, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choice {
-    /// Of which stage.
+    /// The stage.
     pub stage: Stage,
-    /// Bricks that edits may reach, or blocks to be meshed.
+    /// Number of bricks that edits may reach, or of blocks to be meshed.
     pub amount: usize,
-    /// Bricks and stacks of the ground that the card does not have yet, roughly; 0 where nobody looked, as it was the
-    /// processor's even if the card had them all.
+    /// Approximate number of bricks and ground stacks that the GPU does not have yet; 0 if they were not
+    /// counted because the CPU was faster in any case.
     pub missing: usize,
-    /// What was expected, for edits with the meshing that follows; `None` where nothing had to be chosen: the card is not
-    /// there, busy, could not do it, or does all.
+    /// Expected times, for edits including the meshing that follows. `None` if there was no choice: the GPU
+    /// is not available, busy, unable to do it, or does everything.
     pub estimate: Option<Estimate>,
-    /// Was it the card?
+    /// Whether the GPU ran it.
     pub is_cuda: bool,
-    /// How long it took.
+    /// Its duration.
     pub took: Duration,
-    /// On the card: how long uploads and kernels took.
+    /// Time of uploads and kernels on the GPU.
     pub device: Duration,
-    /// On the card: how long the stage's kernel took.
+    /// Time of the stage's kernel on the GPU.
     pub kernel: Duration,
 }
 
 impl Choice {
-    /// A choice that was not made yet.
+    /// An empty record for a stage.
     pub(super) fn of(stage: Stage, amount: usize) -> Self {
         Self {
             stage,

@@ -1,24 +1,24 @@
-//! Which backend does a stage: the one that took less time for such stages lately.
+//! Chooses the backend for a stage: the one that recently took less time for such stages.
 //!
-//! There is a row for each kind of stage and each power of two of its amount. A row has the last three times of each backend,
-//! and their median is what the next stage is expected to take. A backend that was never timed in a row is expected to take
-//! as little as its times in other rows allow, so it is tried once where that could pay.
+//! There is a row for each kind of stage and each power of two of its amount. A row has the last three times of each
+//! backend, and their median is what the next stage is expected to take. A backend that was never timed in a row is
+//! expected to take as little as its times in other rows allow, so it is tried once where that could pay.
 //!
-//! A backend that is slower in a row is timed again now and then: each stage done by the faster one earns [`SHARE`] of
-//! its time for the row, and as soon as that pays for the time that is expected to be lost, the slower one has a turn.
+//! The slower backend of a row is timed again occasionally: each stage done by the faster one earns [`SHARE`]
+//! of its time as credit for the row. Once the credit covers the expected loss, the slower one runs a stage.
 
 use std::time::Duration;
 
 use super::Estimate;
 use crate::edits::{Job, PreparedEdit, PreparedEdits};
 
-/// Of the time spent in a row, the part that may be lost on timing the slower backend: a fiftieth.
+/// Share of a row's time that may be spent on timing the slower backend: a fiftieth.
 const SHARE: f64 = 0.02;
 
-/// A stage that takes the processor a millisecond could be worth a card, which takes about a tenth of that to start and to answer.
+/// CPU seconds from which a stage may be worth opening a GPU, whose latency is about a tenth of that.
 const WORTH: f64 = 1e-3;
 
-/// What a stage does, as far as it matters to how long that takes.
+/// Kind of work, as far as it affects how long a stage takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Edits.
@@ -31,7 +31,7 @@ pub(super) enum Kind {
     Mesh,
 }
 
-/// What a stage has to do.
+/// The work of a stage.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Load {
     pub kind: Kind,
@@ -39,7 +39,7 @@ pub(super) struct Load {
     pub amount: usize,
     /// Blocks that will be meshed after edits, roughly: the bricks that they reach, each once.
     pub blocks: usize,
-    /// Does the card lack most of what it needs, so that this has to be uploaded first?
+    /// Whether most of the needed data has to be uploaded to the GPU first.
     pub is_cold: bool,
 }
 
@@ -49,7 +49,7 @@ impl Load {
         Self { kind: Kind::Mesh, amount: blocks, blocks, is_cold: false }
     }
 
-    /// What edits have to do.
+    /// The work of these edits.
     pub fn of_edits(work: &PreparedEdits) -> Self {
         let jobs = work.jobs();
         let kind = if work.looks_around() {
@@ -67,21 +67,22 @@ impl Load {
     }
 }
 
-/// How many jobs are looked at to see how many bricks they reach.
+/// Number of jobs that are sampled to estimate how many bricks they reach.
 const SAMPLED: usize = 1 << 10;
 
 /// The last times of one backend in one row, in seconds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Recent {
     times: [f64; 3],
-    /// How many of them are there.
+    /// Number of valid entries in `times`.
     count: usize,
-    /// Was the last stage left out, as memory was allocated in it?
+    /// Whether the last stage was left out because memory was allocated in it.
     has_skipped: bool,
 }
 
 impl Recent {
-    /// One stage that had to wait for something else does not move a median of three; of two, the shorter one counts.
+    /// The median; of two times, the shorter one. One stage that had to wait for something else does not move
+    /// a median of three.
     fn median(&self) -> Option<f64> {
         let mut times = self.times;
         let times = &mut times[..self.count];
@@ -89,7 +90,7 @@ impl Recent {
         times.get(times.len().saturating_sub(1) / 2).copied()
     }
 
-    /// One that was so short may be so again.
+    /// The shortest time, which may be reached again.
     fn shortest(&self) -> Option<f64> {
         self.times[..self.count].iter().copied().min_by(f64::total_cmp)
     }
@@ -101,21 +102,21 @@ impl Recent {
     }
 }
 
-/// What the last times of a row say of the next one.
+/// Predicts the next time of a row from its last ones.
 type Statistic = fn(&Recent) -> Option<f64>;
 
 /// The times of one backend for one kind of stage, by powers of two of the amount.
 #[derive(Clone, Debug, Default)]
 struct Times(Vec<Recent>);
 
-/// Which power of two an amount belongs to.
+/// The power of two that an amount belongs to.
 fn size(amount: usize) -> usize {
     amount.checked_ilog2().unwrap_or_default() as usize
 }
 
 impl Times {
-    /// Seconds that an amount is expected to take. Where none was timed, no less than smaller amounts take, and no less a
-    /// piece than larger ones.
+    /// Seconds that an amount is expected to take. If none was timed: at least as long as smaller amounts,
+    /// and per piece at least as long as larger ones.
     fn at(&self, amount: usize, statistic: Statistic) -> f64 {
         let own = size(amount);
         let row = |at: usize| self.0.get(at).and_then(statistic);
@@ -134,32 +135,32 @@ impl Times {
     }
 }
 
-/// What runs a stage: the processor, a card that has its data, or one that does not.
+/// Index into [`Costs::times`]: the CPU, a GPU that has its data, or a GPU that does not.
 const CPU: usize = 0;
-const CARD: usize = 1;
-const COLD_CARD: usize = 2;
+const WARM_GPU: usize = 1;
+const COLD_GPU: usize = 2;
 
-/// Which of them a card is.
-fn card(load: Load) -> usize {
-    if load.is_cold { COLD_CARD } else { CARD }
+/// The index of the GPU for this load.
+fn gpu_index(load: Load) -> usize {
+    if load.is_cold { COLD_GPU } else { WARM_GPU }
 }
 
-/// What both backends took.
+/// The recorded times of both backends.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Costs {
-    /// By kind and runner.
+    /// By kind and by backend ([`CPU`], [`WARM_GPU`], [`COLD_GPU`]).
     times: [[Times; 3]; 4],
-    /// Seconds that may be lost in each row on the slower backend; negative where more were lost than that.
+    /// Seconds that each row may lose on the slower backend; negative after a larger loss.
     credit: [Vec<f64>; 4],
 }
 
 impl Costs {
-    /// What a stage is expected to take on either backend, and whether it is the card's.
+    /// Returns the expected times of a stage, and whether the GPU runs it.
     pub fn choose(&self, load: Load) -> (Estimate, bool) {
         let [cpu, card] = self.expected(load, Recent::median);
         let is_faster = card < cpu;
         let credit = self.credit[load.kind as usize].get(size(load.amount)).copied().unwrap_or_default();
-        // Where the median is of stages that had to wait, the shortest time tells.
+        // If the median comes from stages that had to wait, the shortest time is the better estimate.
         let shortest = self.expected(load, Recent::shortest);
         let may_be_faster = shortest[usize::from(!is_faster)] < shortest[usize::from(is_faster)];
         let is_turn = may_be_faster || (card - cpu).abs() < credit;
@@ -167,35 +168,36 @@ impl Costs {
         (Estimate { cpu: time(cpu), cuda: time(card) }, is_faster != is_turn)
     }
 
-    /// Seconds on the processor and on the card. Those of edits have those of the meshing that follows: it is chosen by
-    /// itself, but what was edited on the processor has to be uploaded before a card can mesh it.
+    /// Seconds on the CPU and on the GPU. The times of edits include the meshing that follows: that stage
+    /// makes its own choice, but bricks edited on the CPU have to be uploaded before a GPU can mesh them.
     fn expected(&self, load: Load, statistic: Statistic) -> [f64; 2] {
-        let own = [CPU, card(load)].map(|who| self.times[load.kind as usize][who].at(load.amount, statistic));
+        let own =
+            [CPU, gpu_index(load)].map(|who| self.times[load.kind as usize][who].at(load.amount, statistic));
         if load.kind == Kind::Mesh {
             return own;
         }
         let mesh = |who: usize| self.times[Kind::Mesh as usize][who].at(load.blocks, Recent::median);
-        [own[0] + mesh(CPU).min(mesh(COLD_CARD)), own[1] + mesh(CPU).min(mesh(CARD))]
+        [own[0] + mesh(CPU).min(mesh(COLD_GPU)), own[1] + mesh(CPU).min(mesh(WARM_GPU))]
     }
 
-    /// Takes in how long a stage took: one that was `chosen`, or that nobody but the processor could do; and whether memory
-    /// was allocated for it, which the next one will find.
+    /// Records how long a stage took. `is_chosen` is false if only the CPU could do it. `has_grown` says
+    /// whether memory was allocated for it, which later stages will not need to do.
     pub fn learn(&mut self, load: Load, is_cuda: bool, is_chosen: bool, took: Duration, has_grown: bool) {
         if load.amount == 0 {
             return;
         }
         let (took, expected) = (took.as_secs_f64(), self.expected(load, Recent::median));
-        let own = &mut self.times[load.kind as usize][if is_cuda { card(load) } else { CPU }];
+        let own = &mut self.times[load.kind as usize][if is_cuda { gpu_index(load) } else { CPU }];
         let surprise = took - own.at(load.amount, Recent::median);
         let row = own.row(load.amount);
-        // Where each stage allocates, that is what it takes.
+        // If every stage allocates, the time for that is part of the cost.
         row.has_skipped = has_grown && !row.has_skipped;
         if row.has_skipped {
             return;
         }
         let lost = expected[usize::from(is_cuda)] - expected[usize::from(!is_cuda)];
         if lost > 0.0 && lost + surprise < 0.0 {
-            // The slower one was the faster one: that is believed at once.
+            // The backend that was expected to be slower was faster: the new time replaces the old ones.
             *row = Recent::default();
         }
         row.push(took);
@@ -212,8 +214,8 @@ impl Costs {
         }
     }
 
-    /// Could such a stage be worth opening a card?
-    pub fn could_be_worth_a_card(&self, load: Load) -> bool {
+    /// Returns `true` if such a stage may be worth opening a GPU.
+    pub fn may_be_worth_a_gpu(&self, load: Load) -> bool {
         self.times[load.kind as usize][CPU].at(load.amount, Recent::median) >= WORTH
     }
 }
@@ -232,7 +234,7 @@ mod tests {
         Duration::from_secs_f64(time * 1e-6)
     }
 
-    /// Learns that a stage of so many blocks took so many microseconds.
+    /// Records that a stage of `amount` blocks took `time` microseconds.
     fn took(costs: &mut Costs, amount: usize, is_cuda: bool, time: f64) {
         costs.learn(Load::of_blocks(amount), is_cuda, true, micros(time), false);
     }
@@ -282,12 +284,12 @@ mod tests {
         assert_eq!([grown(700.0, true), grown(600.0, true), grown(600.0, true)], [100, 100, 600]);
     }
 
-    /// A computer: microseconds that a stage of so many blocks takes on processor and card.
+    /// A simulated machine: microseconds by the number of blocks, on CPU and GPU.
     #[derive(Clone, Copy)]
     struct Machine {
         cpu: fn(f64) -> f64,
         card: fn(f64) -> f64,
-        /// Times differ by so much of themselves, either way.
+        /// Relative deviation of times, in both directions.
         noise: f64,
     }
 
@@ -300,7 +302,7 @@ mod tests {
         ("a fast card", Machine { cpu: threads, card: |blocks| 45.0 + 0.08 * blocks, noise: 0.15 }),
         ("a slow card", Machine { cpu: threads, card: |blocks| 150.0 + 0.9 * blocks, noise: 0.15 }),
         (
-            "a card that is always faster",
+            "a GPU that is always faster",
             Machine { cpu: threads, card: |blocks| 0.5 + 0.1 * blocks, noise: 0.1 },
         ),
         (
@@ -356,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn little_is_lost_beside_the_faster_backend_whichever_that_is() {
+    fn little_time_is_lost_compared_with_the_faster_backend() {
         for (seed, (name, machine)) in (0..9).flat_map(|seed| MACHINES.map(|machine| (seed, machine))) {
             let rng = &mut Rng::with_seed(seed);
             let (mut costs, first, rest) = (Costs::default(), amounts(rng, 300), amounts(rng, 20_000));
@@ -391,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn small_stages_do_not_pay_for_a_card_that_is_slower() {
+    fn small_stages_do_not_pay_for_a_slower_gpu() {
         for card in [45.0, 100.0, 1000.0, 100_000.0] {
             let (mut costs, rng) = (Costs::default(), &mut Rng::with_seed(3));
             let mut times = [0.0, 0.0];
@@ -409,15 +411,15 @@ mod tests {
     }
 
     #[test]
-    fn large_stages_move_to_the_card_at_once() {
-        // The processor did small ones and a large one before the card was there.
+    fn large_stages_move_to_the_gpu_at_once() {
+        // The CPU did small stages and a large one before the GPU was open.
         let mut costs = Costs::default();
         for amount in [1, 16, 16, 90, 32_000] {
             costs.learn(Load::of_blocks(amount), false, false, micros(threads(amount as f64)), false);
         }
-        assert!(!costs.could_be_worth_a_card(Load::of_blocks(90)));
-        assert!(costs.could_be_worth_a_card(Load::of_blocks(32_000)));
-        // The first one on the card allocates much.
+        assert!(!costs.may_be_worth_a_gpu(Load::of_blocks(90)));
+        assert!(costs.may_be_worth_a_gpu(Load::of_blocks(32_000)));
+        // The first stage on the GPU allocates much memory.
         let mut times = Vec::new();
         for stage in 0..20 {
             let load = Load::of_blocks(32_000 + 100 * stage);
@@ -438,7 +440,8 @@ mod tests {
             assert!(play(&mut costs, machine(before), rng, [60; 500]).regret() < 0.05);
             assert!(play(&mut costs, machine(after), rng, [60; 500]).regret() < 0.08);
         }
-        // The slower one is now twice as fast as the other, which is as it was: only timing it again can tell.
+        // The slower backend becomes twice as fast as the other, whose times do not change: only timing it again
+        // reveals that.
         for is_cuda in [false, true] {
             let (mut costs, rng) = (Costs::default(), &mut Rng::with_seed(9));
             let pick = |own: fn(f64) -> f64, other: fn(f64) -> f64| {
@@ -451,8 +454,8 @@ mod tests {
         }
     }
 
-    /// Plays transactions: edits of so many bricks, then as many blocks. Times are those of edits and of meshing, on the
-    /// processor, on the card, and on the card when it has to be sent all bricks that the processor edited.
+    /// Plays transactions: edits, then the meshing of as many blocks. `edit` and `mesh` hold times on the
+    /// CPU, on the GPU, and on the GPU when all bricks that the CPU edited have to be uploaded.
     fn play_transactions(costs: &mut Costs, edit: [f64; 2], mesh: [f64; 3], count: usize) -> f64 {
         let mut all = 0.0;
         for _ in 0..count {
@@ -476,7 +479,8 @@ mod tests {
     #[test]
     fn edits_are_chosen_together_with_the_meshing_that_follows() {
         for (edit, mesh, best) in [
-            // Edits are a little slower on the card, meshing is much faster, unless all has to be uploaded.
+            // Edits are a little slower on the GPU. Meshing is much faster there, unless everything has to be
+            // uploaded.
             ([300.0, 340.0], [600.0, 200.0, 580.0], 540.0),
             ([300.0, 340.0], [600.0, 200.0, 210.0], 510.0),
             ([300.0, 150.0], [200.0, 400.0, 600.0], 350.0),
@@ -491,8 +495,8 @@ mod tests {
     }
 
     #[test]
-    fn a_card_that_can_not_do_a_stage_is_seldom_asked_again() {
-        // The time counts for the card that the processor needed in the end.
+    fn a_gpu_that_fails_a_stage_is_seldom_tried_again() {
+        // The time that the CPU needed in the end is charged to the GPU.
         let (mut costs, mut failed) = (Costs::default(), 0);
         for _ in 0..2000 {
             let (_, is_cuda) = costs.choose(Load::of_blocks(60));

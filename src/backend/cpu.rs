@@ -1,4 +1,4 @@
-//! The processor, with all threads of the current rayon pool where there is enough to do.
+//! The CPU backend. It uses all threads of the current rayon pool for larger stages.
 
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,14 +13,14 @@ use crate::surface::block::{Block, Mesher, Parts};
 use crate::surface::meshed_blocks::{Group, MeshedBlocks, PartLists};
 use crate::surface::vertex::WorldView;
 
-/// How many stacks of bricks a thread takes at a time.
+/// Number of stacks of bricks that a thread takes at a time.
 const STACKS: usize = 4;
 
 /// About how many vertices a list has room for that several threads make.
 const LIST: usize = 1 << 13;
 
-/// Most lists whose memory is kept for the next large transaction, for each thread; and for how many threads at least and at
-/// most. A list takes some 400 KB, and none that is kept takes more than 1.2 MB.
+/// Most lists whose memory is kept for the next large transaction, for each thread; and for how many threads at least
+/// and at most. A list takes some 400 KB, and none that is kept takes more than 1.2 MB.
 const KEPT_LISTS: usize = 8;
 const FEW_THREADS: usize = 4;
 const MANY_THREADS: usize = 8;
@@ -33,7 +33,7 @@ thread_local! {
 /// Memory for parts that several threads make.
 static KEPT: Mutex<Vec<Parts>> = Mutex::new(Vec::new());
 
-/// The processor.
+/// The CPU.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cpu;
 
@@ -46,14 +46,14 @@ impl Compute for Cpu {
         &self,
         view: &WorldView,
         blocks: &[Block],
-        meanwhile: &(dyn Fn() + Sync),
-        then: &mut dyn FnMut(&dyn MeshedBlocks),
+        overlap: &(dyn Fn() + Sync),
+        on_done: &mut dyn FnMut(&dyn MeshedBlocks),
     ) {
-        meanwhile();
+        overlap();
         if !ItemCost::Brick.is_shared(blocks.len()) {
             let mut parts = MESHER.with_borrow_mut(|(_, kept)| std::mem::take(kept));
             mesh(view, blocks, &mut parts);
-            then(&parts);
+            on_done(&parts);
             parts.clear();
             MESHER.with_borrow_mut(|(_, kept)| *kept = parts);
             return;
@@ -68,7 +68,7 @@ impl Compute for Cpu {
         };
         let groups: Vec<Group> = groups(blocks).par_iter().with_max_len(1).map(group).collect();
         let lists = lists.all();
-        then(&PartLists::new(&lists, &groups));
+        on_done(&PartLists::new(&lists, &groups));
         keep(lists);
     }
 }

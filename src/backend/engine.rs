@@ -1,4 +1,4 @@
-//! What a terrain runs its transactions on.
+//! The engine that runs a terrain's transactions.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::{Backend, CardChoice, Choice, Compute, Cpu, EngineSettings, Stage, lock};
+use super::{Backend, CardChoice, Choice, Compute, Cpu, EngineSettings, EngineState, Stage, lock};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::{Ground, GroundError, NoiseHeights};
 use crate::surface::block::Block;
@@ -19,20 +19,21 @@ use super::cuda::Cuda;
 #[cfg(feature = "cuda")]
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What transactions run on; clones share it, and so may any number of terrains.
+/// Runs transactions. Clones share one engine, and any number of terrains may share it too.
 ///
-/// A new engine costs nothing. A card is opened when a transaction comes that it could be worth, in the background, and
-/// compared with the processor bit by bit before it is used, which takes some tenths of a second. One that fails, then or
-/// later, is given up with one warning, and the processor goes on; no edit is lost.
+/// A new engine costs nothing. It opens a GPU in the background, once a transaction is large enough to
+/// benefit, and compares its results with the CPU's bit by bit before using it; this takes some tenths of a
+/// second. If the GPU fails, then or later, the engine logs one warning and continues on the CPU; no edit is
+/// lost.
 #[derive(Clone)]
 pub struct Engine(Arc<Shared>);
 
 struct Shared {
     #[cfg(feature = "cuda")]
     cuda: Option<Cuda>,
-    /// Whether it was logged that a ground's own function keeps a world from the card.
+    /// Whether the warning was logged that a ground with a material function can't use the GPU.
     #[cfg(feature = "cuda")]
-    has_told: AtomicBool,
+    has_warned: AtomicBool,
     figures: Mutex<EngineFigures>,
 }
 
@@ -42,51 +43,36 @@ impl fmt::Debug for Engine {
     }
 }
 
-/// Choices that are remembered.
+/// Number of choices that are remembered.
 const REMEMBERED: usize = 64;
 
-/// What an engine has to run on.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum EngineState {
-    /// The processor.
-    Cpu,
-    /// The processor, as no transaction came yet that wants a card.
-    Unopened,
-    /// The processor, while a card is being opened.
-    Opening,
-    /// A card of this name, beside the processor.
-    Cuda(String),
-    /// The processor, because a card could not be used, or can't be used any longer.
-    Lost(String),
-}
-
-/// What an engine did.
+/// Statistics of an engine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EngineFigures {
-    /// How long it took to open a card and to compare it with the processor bit by bit, in the background before it was used.
-    /// Zero until it has passed, and where there is no card that did.
+    /// Time to open the GPU and to compare it with the CPU bit by bit, in the background. Zero until the
+    /// comparison has succeeded.
     pub opening: Duration,
-    /// Bytes that are allocated on the card now.
+    /// Bytes of GPU memory that are allocated now.
     pub device_memory: usize,
-    /// Bytes of pinned memory of the host, which the card copies from and to.
+    /// Bytes of pinned host memory, which the GPU copies from and to.
     pub pinned_memory: usize,
-    /// Stages of transactions done on the processor.
+    /// Number of stages run on the CPU.
     pub cpu: u64,
-    /// Stages of transactions done on a card.
+    /// Number of stages run on the GPU.
     pub cuda: u64,
-    /// The latest ones, newest last.
+    /// The latest choices, newest last.
     pub choices: VecDeque<Choice>,
 }
 
 impl Default for Engine {
-    /// The processor.
+    /// The CPU.
     fn default() -> Self {
         Self::new(Backend::Cpu)
     }
 }
 
 impl Engine {
-    /// An engine. Without the feature `cuda` all of them run on the processor.
+    /// An engine with default settings. Without the feature `cuda` every engine runs on the CPU.
     pub fn new(backend: Backend) -> Self {
         Self::with_settings(&EngineSettings { backend, ..EngineSettings::default() })
     }
@@ -99,13 +85,13 @@ impl Engine {
             #[cfg(feature = "cuda")]
             cuda: (settings.backend != Backend::Cpu).then(|| Cuda::new(settings)),
             #[cfg(feature = "cuda")]
-            has_told: AtomicBool::default(),
+            has_warned: AtomicBool::default(),
             figures: Mutex::default(),
         }))
     }
 
-    /// Says which card to open where the settings leave it open ([`CardChoice::Default`]) and none is open yet: for games,
-    /// the renderer's own. If CUDA has no such card, the first one is opened.
+    /// Suggests a GPU, such as the one that renders. It is used if the settings do not choose one
+    /// ([`CardChoice::Default`]) and none is open yet. If CUDA does not list it, the first GPU is opened.
     pub fn suggest_card(&self, card: CardChoice) {
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.0.cuda {
@@ -119,12 +105,12 @@ impl Engine {
     pub(super) fn from_cuda(cuda: Cuda) -> Self {
         Self(Arc::new(Shared {
             cuda: Some(cuda),
-            has_told: AtomicBool::default(),
+            has_warned: AtomicBool::default(),
             figures: Mutex::default(),
         }))
     }
 
-    /// What it has to run on now.
+    /// What it runs on now.
     pub fn state(&self) -> EngineState {
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.0.cuda {
@@ -133,8 +119,8 @@ impl Engine {
         EngineState::Cpu
     }
 
-    /// Opens the card now, and waits until it is known whether it can be used, but no longer than that. Tools and benchmarks
-    /// want this.
+    /// Opens the GPU now, and waits at most `longest` until it is known whether the GPU can be used. For
+    /// tools and benchmarks.
     pub fn wait(&self, longest: Duration) -> EngineState {
         let start = Instant::now();
         #[cfg(feature = "cuda")]
@@ -147,7 +133,7 @@ impl Engine {
         self.state()
     }
 
-    /// What it did so far.
+    /// Statistics since the engine was made.
     pub fn figures(&self) -> EngineFigures {
         let figures = lock(&self.0.figures).clone();
         #[cfg(feature = "cuda")]
@@ -158,9 +144,9 @@ impl Engine {
         figures
     }
 
-    /// Frees memory of the card, and pinned memory, that was not needed in the last half minute; does nothing while the card is
-    /// in use. Every transaction does the same, so this is for games in which there may be none for long. May take some
-    /// milliseconds, so not on the main thread.
+    /// Frees GPU memory and pinned memory that was not needed in the last half minute; does nothing while the
+    /// GPU is in use. Every transaction does this too, so call it only in games that may have no transactions
+    /// for long. May take some milliseconds, so do not call it on the main thread.
     pub fn trim(&self) {
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.0.cuda {
@@ -168,11 +154,11 @@ impl Engine {
         }
     }
 
-    /// Ground of `width` x `depth` cells from noise: the same, bit by bit, as [`Ground::from_noise`] makes.
+    /// Makes ground of `width` x `depth` cells from noise, equal bit by bit to [`Ground::from_noise`].
     ///
-    /// The card makes it if it is open and free; with [`Backend::Auto`] only from 2^18 columns on, as small worlds are made
-    /// faster than a card gets ready for them. In all other cases, and where the card fails, the processor makes it. To have
-    /// the card make the first world, [`wait`](Self::wait) until it is open.
+    /// The GPU computes it if it is open and idle; with [`Backend::Auto`] only from 2^18 columns on, because
+    /// the CPU is faster for small worlds. In all other cases, and if the GPU fails, the CPU computes it. To
+    /// compute the first world on the GPU, [`wait`](Self::wait) until it is open.
     ///
     /// # Errors
     /// Those of [`Ground::from_noise`].
@@ -205,16 +191,16 @@ impl Engine {
 }
 
 impl Shared {
-    /// The card, if it can give the same materials as the processor.
+    /// The GPU, unless the ground's materials can only be computed on the CPU.
     #[cfg(feature = "cuda")]
     fn cuda_for(&self, ground: &Ground) -> Option<&Cuda> {
         let cuda = self.cuda.as_ref()?;
         if !ground.has_material_fn() {
             return Some(cuda);
         }
-        if !self.has_told.swap(true, Ordering::Relaxed) {
+        if !self.has_warned.swap(true, Ordering::Relaxed) {
             log::warn!(
-                "bevy_burrow does without CUDA where the ground's materials are a function of the game's own"
+                "bevy_burrow does not use CUDA for grounds whose materials are a function of the game"
             );
         }
         None
@@ -257,26 +243,26 @@ impl Compute for Shared {
         &self,
         view: &WorldView,
         blocks: &[Block],
-        meanwhile: &(dyn Fn() + Sync),
-        then: &mut dyn FnMut(&dyn MeshedBlocks),
+        overlap: &(dyn Fn() + Sync),
+        on_done: &mut dyn FnMut(&dyn MeshedBlocks),
     ) {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Mesh, blocks.len()));
         let mut took = Duration::ZERO;
-        let mut then = |parts: &dyn MeshedBlocks| {
+        let mut on_done = |parts: &dyn MeshedBlocks| {
             took = start.elapsed();
-            then(parts);
+            on_done(parts);
         };
         #[cfg(feature = "cuda")]
         if let Some(cuda) = self.cuda_for(view.samples.ground()) {
-            let attempt = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
+            let attempt = cuda.mesh(view, blocks, &mut choice, overlap, &mut on_done);
             if attempt.done.is_none() {
-                Cpu.mesh(view, blocks, meanwhile, &mut then);
+                Cpu.mesh(view, blocks, overlap, &mut on_done);
             }
             choice.took = took + attempt.done.unwrap_or_default();
             cuda.learn(&choice, &attempt);
             return self.remember(choice);
         }
-        Cpu.mesh(view, blocks, meanwhile, &mut then);
+        Cpu.mesh(view, blocks, overlap, &mut on_done);
         choice.took = took;
         self.remember(choice);
     }

@@ -1,6 +1,7 @@
-//! The backends that apply edits to bricks and mesh blocks: the processor, or a CUDA card.
+//! The backends that apply edits to bricks and mesh blocks: the CPU, or a CUDA GPU.
 //!
-//! A [`Terrain`](crate::terrain::Terrain) has an [`Engine`], and whatever that runs on, the world is the same bit by bit.
+//! A [`Terrain`](crate::terrain::Terrain) has an [`Engine`]. The world is the same, bit by bit, on every
+//! backend.
 //!
 //! ```
 //! use bevy_burrow::backend::{Backend, Engine};
@@ -19,11 +20,13 @@ mod cpu;
 mod cuda;
 mod engine;
 mod settings;
+mod state;
 
 pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::Cpu;
-pub use engine::{Engine, EngineFigures, EngineState};
+pub use engine::{Engine, EngineFigures};
 pub use settings::{CardChoice, EngineSettings};
+pub use state::EngineState;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -35,33 +38,34 @@ use crate::surface::vertex::WorldView;
 /// What an [`Engine`] may run on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Backend {
-    /// Whichever was faster lately for such a stage of a transaction; occasionally the other one, to time it again. The card is
-    /// opened when transactions come that it could be worth; until then, and where there is none, the processor.
+    /// The backend that was recently faster for such a stage of a transaction; occasionally the other one, to
+    /// time it again. The GPU is opened once transactions are large enough to benefit; until then, and
+    /// without a GPU, the CPU.
     #[default]
     Auto,
-    /// The processor.
+    /// The CPU.
     Cpu,
-    /// A CUDA card for all transactions, small ones too, unless another terrain uses it. The first transaction opens it; until
-    /// it is open, and where there is none, the processor.
+    /// A CUDA GPU for all transactions, even small ones, unless another terrain is using it. The first
+    /// transaction opens it; until it is open, and without a GPU, the CPU.
     Cuda,
 }
 
-/// The heavy work of a transaction. All backends give the same bits.
+/// The heavy work of a transaction. All backends give equal bits.
 pub(crate) trait Compute: Send + Sync {
-    /// Applies edits; `each` gets what they changed, brick by brick in order of their positions, as one delta or as
-    /// several, once or more often; it may take out of them what it wants.
+    /// Applies edits. `each` receives the changes by brick, in order of their positions, as one or several
+    /// deltas, in one or several calls; it may move data out of them.
     fn edit(&self, work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta]));
 
-    /// Meshes blocks. `meanwhile` is called when there is time for other things, maybe more than once; it should only set them
-    /// going. `then` gets the surfaces, by the numbers of the blocks, some of which may still be on their way; their memory is
-    /// used again afterwards. Where some never came it is called once more, with all of them, and what it made before is to
-    /// be forgotten.
+    /// Meshes blocks. `overlap` is called while the backend waits, possibly more than once; it should only
+    /// start other work. `on_done` receives the surfaces, by block number; some may still be in transfer, and
+    /// their memory is reused afterwards. If some transfer fails, it is called again with all surfaces, and
+    /// must discard its earlier result.
     fn mesh(
         &self,
         view: &WorldView,
         blocks: &[Block],
-        meanwhile: &(dyn Fn() + Sync),
-        then: &mut dyn FnMut(&dyn MeshedBlocks),
+        overlap: &(dyn Fn() + Sync),
+        on_done: &mut dyn FnMut(&dyn MeshedBlocks),
     );
 }
 

@@ -2,20 +2,20 @@
 
 use super::Backend;
 
-/// Which CUDA card an engine opens.
+/// Selects the CUDA GPU that an engine opens.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum CardChoice {
-    /// The one that was [suggested](super::Engine::suggest_card), such as the renderer's own, where CUDA knows it; else the
-    /// first.
+    /// The [suggested](super::Engine::suggest_card) GPU, such as the renderer's, if CUDA lists it; otherwise
+    /// the first.
     #[default]
     Default,
-    /// By its number, as CUDA counts cards: from 0, and only those that `CUDA_VISIBLE_DEVICES` lets through.
+    /// By CUDA's device ordinal, from 0; `CUDA_VISIBLE_DEVICES` applies.
     Ordinal(u32),
     /// By its UUID, as `nvidia-smi -L` lists them, or as Vulkan has it in `VkPhysicalDeviceIDProperties::deviceUUID`.
     Uuid([u8; 16]),
-    /// By its place on the PCI bus, `domain:bus:device.function` in hexadecimal, such as `0000:01:00.0`; wgpu has it in
-    /// `AdapterInfo::device_pci_bus_id`, on Vulkan and DirectX 12.
+    /// By its address on the PCI bus, `domain:bus:device.function` in hexadecimal, such as `0000:01:00.0`;
+    /// wgpu has it in `AdapterInfo::device_pci_bus_id`, on Vulkan and DirectX 12.
     PciBusId(String),
 }
 
@@ -29,15 +29,15 @@ pub enum CardChoice {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct EngineSettings {
-    /// Processor, card, or the faster of both.
+    /// CPU, GPU, or the faster of the two.
     pub backend: Backend,
-    /// Which card; a card that is not there is given up like one that fails.
+    /// Selects the GPU. One that does not exist is treated like one that fails.
     pub card: CardChoice,
-    /// Most bytes of the card's memory. Half of it may be bricks and ground, which stay there from one transaction to the
-    /// next. `None` is a quarter of what is free when the card is opened, and 2 GiB at most.
+    /// Most bytes of GPU memory. Up to half may hold bricks and ground, which stay there between
+    /// transactions. `None`: a quarter of the memory that is free when the GPU is opened, at most 2 GiB.
     pub device_memory: Option<usize>,
-    /// Most bytes of pinned memory of the host, through which all goes to the card and back. A transaction that needs more,
-    /// of either, is the processor's. 1 GiB by default.
+    /// Most bytes of pinned host memory, through which all data passes to the GPU and back. A transaction
+    /// that needs more of either runs on the CPU. 1 GiB by default.
     pub pinned_memory: usize,
 }
 

@@ -1,4 +1,4 @@
-//! How a sculpting brush fades towards the rim of its shape.
+//! The blend of a sculpting brush towards the rim of its shape.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,17 +7,17 @@ use super::quantize::{in_range, voxels};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
-/// How an operation that sculpts blends in. Dig, add and paint have no use for it.
+/// How an operation that sculpts blends in. Dig, add and paint ignore it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blend {
-    /// How much of the change is made: 0 for nothing, 1 for all of it.
+    /// Share of the change that is made: 0 for nothing, 1 for all of it.
     pub strength: f32,
-    /// Over how many voxels from the shape's surface inwards the change fades in: 0 to 64. One that is wider than the
-    /// shape is deep ends in its middle. With 0 the change ends in a step at the shape's surface.
+    /// Width in voxels, from the shape's surface inwards, over which the change fades in: 0 to 64. A falloff wider than
+    /// the shape's depth ends in its middle. With 0 the change ends in a step at the shape's surface.
     pub falloff: f32,
-    /// What new ground is made of; `None`: the first ground straight below it, else straight above,
-    /// within 64 voxels, else beside it.
+    /// The material of new ground. `None`: that of the first ground straight below it, else straight above,
+    /// within 64 voxels, else next to it.
     pub material: Option<MaterialId>,
 }
 
@@ -56,7 +56,7 @@ impl QuantizedBlend {
         Blend { strength: voxels(self.strength), falloff: voxels(self.falloff), material: self.material }
     }
 
-    /// How much of the change is made at a distance from the shape, in 1/256; the falloff is at most `deep` wide.
+    /// Share of the change at a distance from the shape, in 1/256; the falloff is at most `deep` wide.
     pub fn weight(self, outside: i32, deep: i32) -> i32 {
         let inside = -outside;
         let falloff = self.falloff.min(deep);

@@ -1,4 +1,4 @@
-//! The edit: a brush in integers, which the world obeys.
+//! The edit: a brush in integers, which the world applies.
 
 use std::sync::Arc;
 
@@ -16,9 +16,9 @@ use crate::lattice::{LatticeBox, ONE};
 
 /// A brush in integers: the same edit changes the same samples to the same bits on every machine.
 ///
-/// An edit is always within the limits of [the room's table](super): [`quantize`](Self::quantize) checks, and so does
-/// deserialising, which fails with the message of the [`BrushError`]. Both drop roughness of amplitude 0, which has
-/// no bumps.
+/// An edit is always within the limits of [the module's table](super): [`quantize`](Self::quantize) checks them, and so
+/// does deserialising, which fails with the message of the [`BrushError`]. Both drop roughness of amplitude 0, which
+/// has no bumps.
 ///
 /// # Format
 ///
@@ -69,7 +69,7 @@ impl Edit {
     ///
     /// # Errors
     ///
-    /// A [`BrushError`] where a number is not finite or beyond the limits of [the room's table](super).
+    /// A [`BrushError`] where a number is not finite or beyond the limits of [the module's table](super).
     pub fn quantize(brush: &Brush) -> Result<Self, BrushError> {
         let roughness = brush.roughness.as_ref().map(QuantizedRoughness::quantize).transpose()?;
         let sculpts = brush.operation.is_sculpting();
@@ -99,42 +99,42 @@ impl Edit {
         self.roughness.map_or(Ok(()), |roughness| roughness.check())
     }
 
-    /// Where, in the brush's own numbers.
+    /// The shape, in floats as in a brush.
     pub fn shape(&self) -> Shape {
         self.shape.shape()
     }
 
-    /// Bumps on the shape's surface, in the brush's own numbers.
+    /// Bumps on the shape's surface, in floats as in a brush.
     pub fn roughness(&self) -> Option<Roughness> {
         self.roughness.map(|roughness| roughness.roughness())
     }
 
-    /// What the edit does, in the brush's own numbers.
+    /// The operation, in floats as in a brush.
     pub fn operation(&self) -> Operation {
         self.operation.operation()
     }
 
-    /// How the edit blends in, if it sculpts.
+    /// The blend, if the edit sculpts.
     pub fn blend(&self) -> Option<Blend> {
         self.blend.map(QuantizedBlend::blend)
     }
 
-    /// How hard the material may be that it takes away.
+    /// The greatest hardness of material that it removes at full speed.
     pub fn power(&self) -> u8 {
         self.power
     }
 
-    /// Which way it is applied.
+    /// The kind of its operation.
     pub(crate) fn kind(&self) -> Kind {
         self.operation.kind()
     }
 
-    /// What it makes of samples, if it sculpts.
+    /// The kernel that computes new samples, if it sculpts.
     pub(crate) fn sculptor(&self) -> Option<SculptKernel> {
         self.blend.map(|blend| SculptKernel::new(&self.operation, blend, &self.shape))
     }
 
-    /// The number that the brush carried.
+    /// The brush's tag.
     pub fn tag(&self) -> u64 {
         self.tag
     }
@@ -150,7 +150,7 @@ impl Edit {
         Self { tag, stroke, ..self }
     }
 
-    /// The image that it presses onto the ground, if it is a stamp.
+    /// The image of the stamp, if it is one.
     pub fn stamp_image(&self) -> Option<&Arc<GreyImage>> {
         self.operation.stamp_image()
     }
@@ -180,8 +180,8 @@ impl Edit {
     }
 }
 
-/// A brush that asks for the edit: quantised, it is the same again. Only how a box is turned and which way a slope faces may
-/// be rounded once more.
+/// A brush for this edit: quantising it gives the edit again, except that the rotation of a box and the normal of a
+/// plane may be rounded once more.
 impl From<&Edit> for Brush {
     fn from(edit: &Edit) -> Self {
         Self {

@@ -1,13 +1,14 @@
-//! Why a brush was refused.
+//! Errors of brushes that are refused.
 
 use thiserror::Error;
 
-/// Why a [`Brush`](super::Brush) cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes in cubic voxels.
+/// The error of a [`Brush`](super::Brush) that cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes
+/// in cubic voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BrushError {
     /// A number is infinite or not a number.
-    #[error("`{what}` must be finite, but it holds {value}")]
+    #[error("`{what}` must be finite, but it is {value}")]
     NotFinite {
         /// The field.
         what: &'static str,
@@ -41,7 +42,8 @@ pub enum BrushError {
         what: &'static str,
         /// The coordinate.
         value: f32,
-        /// The largest coordinate along that axis: [`LIMIT`](crate::lattice::LIMIT), or [`REACH`](crate::lattice::REACH).
+        /// The largest coordinate along that axis: [`LIMIT`](crate::lattice::LIMIT), or
+        /// [`REACH`](crate::lattice::REACH).
         most: f32,
     },
     /// The axis of a cylinder or cone is too short to have a direction.

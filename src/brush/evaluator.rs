@@ -7,17 +7,17 @@ use wide::{i16x8, i32x8};
 
 use super::BAND;
 use super::roughness::QuantizedRoughness;
-use super::shapes::{Form, QuantizedShape, larger, smaller};
+use super::shapes::{QuantizedShape, ShapeSdf, larger, smaller};
 use crate::lattice::{LatticeBox, ONE};
 
 /// Samples evaluated together.
 const RUN: usize = 32;
 
-/// Distances stop here: 16384 voxels.
-const HORIZON: f32 = (1 << 22) as f32;
+/// Distances are clamped here: 16384 voxels.
+const MAX_DISTANCE: f32 = (1 << 22) as f32;
 
-/// Coordinates stop here, in voxels from the shape. It is far beyond the horizon, so no distance shows it, and a run
-/// farther still fits into 2^24 of 1/256 voxel, which `f32` holds exactly.
+/// Coordinates are clamped here, in voxels from the shape. It is far beyond [`MAX_DISTANCE`], so no distance depends on
+/// it, and a run farther still fits into 2^24 of 1/256 voxel, which `f32` holds exactly.
 const FARTHEST: i64 = 65_000;
 
 /// An edit's signed distance function, its constants derived once.
@@ -25,10 +25,10 @@ const FARTHEST: i64 = 65_000;
 /// Equal edits give equal distances, bit for bit, on every machine.
 #[derive(Clone, Debug)]
 pub struct Evaluator {
-    /// The shape's origin is at `home` voxels and `rest` (0..256) of 1/256 voxel.
-    home: IVec3,
-    rest: IVec3,
-    form: Form,
+    /// The shape's origin is at `origin_voxel` voxels and `origin_fraction` (0..256) of 1/256 voxel.
+    origin_voxel: IVec3,
+    origin_fraction: IVec3,
+    form: ShapeSdf,
     roughness: Option<QuantizedRoughness>,
 }
 
@@ -36,7 +36,7 @@ impl Evaluator {
     /// The evaluator of a checked edit.
     pub(super) fn new(shape: &QuantizedShape, roughness: Option<QuantizedRoughness>) -> Self {
         let origin = shape.origin();
-        Self { home: origin >> 8, rest: origin & 0xff, form: shape.form(), roughness }
+        Self { origin_voxel: origin >> 8, origin_fraction: origin & 0xff, form: shape.form(), roughness }
     }
 
     /// Signed distance from a lattice point to the edit's shape in 1/256 voxel: negative inside, roughness included,
@@ -49,7 +49,8 @@ impl Evaluator {
         distance[0]
     }
 
-    /// The same as [`distance`](Self::distance), bit for bit, for the samples `start`, `start + (1, 0, 0)` and so on.
+    /// Like [`distance`](Self::distance), bit for bit, for the samples `start`, `start + (1, 0, 0)` and so
+    /// on.
     pub fn row(&self, start: IVec3, out: &mut [i32]) {
         let mut x = i64::from(start.x);
         for run in out.chunks_mut(RUN) {
@@ -66,18 +67,18 @@ impl Evaluator {
         }
     }
 
-    /// The same for the rows of 8 samples along x from `origin` on, cut off at what 16 bits hold, far beyond where edits
-    /// tell distances apart: those with `y` and `z` in these ranges, counted from `origin`, go to `out[y * 8 + z]`;
-    /// other rows stay as they are.
+    /// Distances of rows of 8 samples along x from `origin` on, clamped to 16 bits, far beyond the distances that edits
+    /// distinguish. Rows with `y` and `z` in these ranges, counted from `origin`, go to `out[y * 8 + z]`; other rows
+    /// stay as they are.
     pub(crate) fn rows(&self, origin: IVec3, y: Range<i32>, z: Range<i32>, out: &mut [i16x8; 64]) {
-        let along = |start: i32, home: i32, rest: i32| -> [f32; 8] {
-            std::array::from_fn(|i| units(i64::from(start) + i as i64, home, rest))
+        let along = |start: i32, origin_voxel: i32, origin_fraction: i32| -> [f32; 8] {
+            std::array::from_fn(|i| units(i64::from(start) + i as i64, origin_voxel, origin_fraction))
         };
-        // Eight steps from beyond where coordinates stop count on from there, as in longer runs.
-        let first = voxels(origin.x.into(), self.home.x);
-        let xs = std::array::from_fn(|i| ((first + i as i32) * ONE - self.rest.x) as f32);
-        let ys = along(origin.y, self.home.y, self.rest.y);
-        let zs = along(origin.z, self.home.z, self.rest.z);
+        // Clamped coordinates still increase within a run, as in longer runs.
+        let first = voxels(origin.x.into(), self.origin_voxel.x);
+        let xs = std::array::from_fn(|i| ((first + i as i32) * ONE - self.origin_fraction.x) as f32);
+        let ys = along(origin.y, self.origin_voxel.y, self.origin_fraction.y);
+        let zs = along(origin.z, self.origin_voxel.z, self.origin_fraction.z);
         let range = |range: Range<i32>| range.start as usize..range.end as usize;
         self.form.rows(&[xs, ys, zs], range(y), range(z), |y, z, mut distances| {
             if let Some(roughness) = &self.roughness {
@@ -88,7 +89,8 @@ impl Evaluator {
         });
     }
 
-    /// Is every sample of the box farther than [`BAND`] outside, so that the edit changes none of them (rule 6)?
+    /// Returns `true` if every sample of the box lies farther than [`BAND`] outside, so that the edit changes
+    /// none of them (rule 6).
     ///
     /// Cheap and conservative: `false` may also mean "not sure". It takes one distance, at the middle of the box, of
     /// which no corner can be nearer by more than half the diagonal.
@@ -101,43 +103,45 @@ impl Evaluator {
         let mut distance = [0.0];
         self.smooth(middle.x, middle.as_ivec3(), &mut distance);
         let distance = round(distance[0]);
-        // What rounding to f32 may have cost at this distance, generously.
+        // A generous bound on the rounding to f32 at this distance.
         let rounding = 16 + (distance >> 14);
         let amplitude = self.roughness.map_or(0, |roughness| roughness.amplitude);
         f64::from(distance - rounding) > f64::from(BAND + amplitude) + diagonal
     }
 
-    /// Distances without roughness, not rounded, for a run of at most [`RUN`] from (`x`, `start.y`, `start.z`) along +x.
+    /// Distances without roughness, not rounded, for a run of at most [`RUN`] from (`x`, `start.y`, `start.z`) along
+    /// +x.
     fn smooth(&self, x: i64, start: IVec3, out: &mut [f32]) {
-        let first = voxels(x, self.home.x);
-        let xs: [f32; RUN] = std::array::from_fn(|i| ((first + i as i32) * ONE - self.rest.x) as f32);
-        let y = units(start.y.into(), self.home.y, self.rest.y);
-        let z = units(start.z.into(), self.home.z, self.rest.z);
+        let first = voxels(x, self.origin_voxel.x);
+        let xs: [f32; RUN] =
+            std::array::from_fn(|i| ((first + i as i32) * ONE - self.origin_fraction.x) as f32);
+        let y = units(start.y.into(), self.origin_voxel.y, self.origin_fraction.y);
+        let z = units(start.z.into(), self.origin_voxel.z, self.origin_fraction.z);
         self.form.run(&xs[..out.len().min(RUN)], y, z, out);
     }
 }
 
 /// From a shape's home to a coordinate, in voxels.
 #[inline(always)]
-fn voxels(at: i64, home: i32) -> i32 {
-    (at - i64::from(home)).clamp(-FARTHEST, FARTHEST) as i32
+fn voxels(at: i64, origin_voxel: i32) -> i32 {
+    (at - i64::from(origin_voxel)).clamp(-FARTHEST, FARTHEST) as i32
 }
 
 /// From a shape's origin to a coordinate, in 1/256 voxel.
 #[inline(always)]
-fn units(at: i64, home: i32, rest: i32) -> f32 {
-    (voxels(at, home) * ONE - rest) as f32
+fn units(at: i64, origin_voxel: i32, origin_fraction: i32) -> f32 {
+    (voxels(at, origin_voxel) * ONE - origin_fraction) as f32
 }
 
-/// An evaluator as plain numbers, for the card.
+/// An evaluator as plain numbers, for the GPU.
 #[cfg(feature = "cuda")]
 pub(crate) struct Constants {
     /// The shape's origin in voxels, and 1/256 voxel from there.
-    pub home: IVec3,
-    pub rest: IVec3,
-    /// Which of the shapes.
+    pub origin_voxel: IVec3,
+    pub origin_fraction: IVec3,
+    /// The kind of shape.
     pub kind: u32,
-    /// What [`Form::constants`] says.
+    /// The result of [`ShapeSdf::constants`].
     pub shape: [f32; 12],
     /// Amplitude, scale and seed of roughness.
     pub roughness: Option<(i32, i32, u32)>,
@@ -145,16 +149,22 @@ pub(crate) struct Constants {
 
 #[cfg(feature = "cuda")]
 impl Evaluator {
-    /// Is the shape rough?
+    /// Returns `true` if the shape is rough.
     pub(crate) fn is_rough(&self) -> bool {
         self.roughness.is_some()
     }
 
-    /// All that distances are computed from.
+    /// All parameters of distances.
     pub(crate) fn constants(&self) -> Constants {
         let (kind, shape) = self.form.constants();
         let roughness = self.roughness.as_ref().map(QuantizedRoughness::constants);
-        Constants { home: self.home, rest: self.rest, kind, shape, roughness }
+        Constants {
+            origin_voxel: self.origin_voxel,
+            origin_fraction: self.origin_fraction,
+            kind,
+            shape,
+            roughness,
+        }
     }
 }
 
@@ -162,7 +172,7 @@ impl Evaluator {
 #[inline(always)]
 fn round(distance: f32) -> i32 {
     const SHIFT: f32 = 12_582_912.0;
-    let near = smaller(larger(distance, -HORIZON), HORIZON);
+    let near = smaller(larger(distance, -MAX_DISTANCE), MAX_DISTANCE);
     (near + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32
 }
 
@@ -243,7 +253,7 @@ mod tests {
                 for start in [IVec3::new(x, 3, 0), IVec3::new(x, i32::MAX, i32::MIN)] {
                     let mut row = [0; 80];
                     evaluator.row(start, &mut row);
-                    assert_eq!(row, [HORIZON as i32; 80], "{start}");
+                    assert_eq!(row, [MAX_DISTANCE as i32; 80], "{start}");
                 }
             }
         }
@@ -255,7 +265,7 @@ mod tests {
         let mut row = [0; 33_000];
         evaluator.row(IVec3::new(-16_500, 0, 0), &mut row);
         for (x, distance) in (-16_500i32..).zip(row) {
-            assert_eq!(distance, ((x.abs() - 1) * ONE).min(HORIZON as i32));
+            assert_eq!(distance, ((x.abs() - 1) * ONE).min(MAX_DISTANCE as i32));
         }
     }
 }

@@ -319,7 +319,7 @@ proptest! {
             }
         }
         let _ = Edit::quantize(&brush.transformed(Quat::from_xyzw(0.6, 0.0, 0.0, 0.8), Vec3::ONE, 0.5));
-        // What is written of it is the same wish, or just as bad a one.
+        // A round trip through JSON gives an equal brush, or an equally invalid one.
         let read = Brush::try_from(line::Line::from(brush.clone())).unwrap();
         match (Edit::quantize(&read), Edit::quantize(&brush)) {
             (Ok(read), Ok(edit)) => prop_assert_eq!(read, edit),
@@ -379,7 +379,7 @@ fn wild_integer() -> impl Strategy<Value = i32> {
     ]
 }
 
-// Whether integers make a shape, by the room's table of limits; `None` where that takes more than a line.
+// Whether integers make a shape, by the table of limits; `None` where that takes more than a line.
 
 fn is_in_world(at: [i32; 3]) -> bool {
     at.iter().zip([262_144, 32_768, 262_144]).all(|(v, most)| v.unsigned_abs() <= most * 256)

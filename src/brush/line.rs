@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use super::{Brush, FULL_POWER, Operation, Roughness, Shape};
+use super::{Brush, FULL_POWER, Operation, Roughness, Shape, is_default};
 use crate::ground::MaterialId;
 
-/// A [`Brush`] as it is written. What may be left out is not written.
+/// A [`Brush`] in its written form, without fields that may be left out.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Brush")]
 pub(super) struct Line {
@@ -35,7 +35,7 @@ pub(super) struct Line {
     fields: BTreeMap<String, IgnoredAny>,
 }
 
-/// The material of an operation that sculpts, under the name which that of an add has.
+/// The material of an operation that sculpts, under the same name as that of an add.
 #[derive(Serialize, Deserialize)]
 struct NewGround {
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -48,11 +48,6 @@ fn full() -> u8 {
 
 fn is_full(power: &u8) -> bool {
     *power == FULL_POWER
-}
-
-/// Is it what is read where nothing is written?
-pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 impl TryFrom<Line> for Brush {
@@ -91,7 +86,7 @@ impl TryFrom<Line> for Brush {
 impl From<Brush> for Line {
     fn from(brush: Brush) -> Self {
         let Brush { shape, operation, roughness, tag, stroke, blend, power } = brush;
-        // Only what differs from the blend that such a brush comes with.
+        // Only what differs from the default blend of such a brush.
         let like = Brush::plain(shape, operation.clone()).blend;
         let is_sculpting = operation.is_sculpting();
         Self {

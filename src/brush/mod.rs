@@ -1,8 +1,8 @@
-//! What a game asks for, and what the world obeys.
+//! Brushes, which a game sends, and edits, which the world applies.
 //!
-//! A [`Brush`] is a wish: a [`Shape`] in floats, an [`Operation`], perhaps some [`Roughness`]. [`Edit::quantize`] turns
-//! it into an [`Edit`], which holds integers only, or says in a [`BrushError`] why not. An [`Evaluator`] then gives the
-//! signed distance of every lattice sample, the same bits on every machine.
+//! A [`Brush`] is a request in floats: a [`Shape`], an [`Operation`], perhaps some [`Roughness`]. [`Edit::quantize`]
+//! converts it to an [`Edit`], which holds integers only, or returns a [`BrushError`]. An [`Evaluator`] then computes
+//! the signed distance of every lattice sample, with equal bits on every machine.
 //!
 //! ```text
 //! Brush (f32, voxels) --quantize--> Edit (1/256 voxel) --evaluator--> distance per sample --apply--> new sample
@@ -13,11 +13,11 @@
 //! | positions, sizes, axes, amplitude | voxels of terrain space | 1/256 voxel, `i32` |
 //! | rotation | unit quaternion | four `i16` of 1/32767, q and -q alike |
 //!
-//! Each wish has a twin in integers, which an [`Edit`] is made of; a game never meets those.
+//! Each part of a brush has an integer counterpart inside the [`Edit`]; games do not need these.
 //!
 //! | in a brush, floats | in an edit, integers | ready to be applied |
 //! | --- | --- | --- |
-//! | [`Shape`] | `QuantizedShape` | `Form`, in the [`Evaluator`] |
+//! | [`Shape`] | `QuantizedShape` | `ShapeSdf`, in the [`Evaluator`] |
 //! | [`Roughness`] | `QuantizedRoughness` | the same, in the [`Evaluator`] |
 //! | [`Operation`] | `QuantizedOperation` | `Kind`, and a `SculptKernel` for those that sculpt |
 //! | [`Blend`] | `QuantizedBlend` | the same, in the `SculptKernel` |
@@ -45,16 +45,17 @@
 //!
 //! # Sculpting
 //!
-//! Dig and add know their shape's distance and nothing else. [`Operation::Smooth`], [`Sharpen`](Operation::Sharpen),
-//! [`Flatten`](Operation::Flatten), [`Level`](Operation::Level), [`Raise`](Operation::Raise), [`Lower`](Operation::Lower),
-//! [`Stamp`](Operation::Stamp) and [`Terrace`](Operation::Terrace) *sculpt*: they change the densities that are there,
-//! with a weight that rises from 0 at the shape's surface to the [`Blend`]'s strength over its falloff, so that nothing
-//! jumps at the rim. On pristine ground a density is the height above the surface, and so all of them do what
-//! the same tool does to a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls
-//! and ceilings too. A sample whose density stays as it is is not edited.
+//! Dig and add know their shape's distance and nothing else. [`Operation::Smooth`],
+//! [`Sharpen`](Operation::Sharpen), [`Flatten`](Operation::Flatten), [`Level`](Operation::Level),
+//! [`Raise`](Operation::Raise), [`Lower`](Operation::Lower), [`Stamp`](Operation::Stamp) and
+//! [`Terrace`](Operation::Terrace) *sculpt*: they change the densities that are there, with a weight that
+//! rises from 0 at the shape's surface to the [`Blend`]'s strength over its falloff, so that nothing jumps at
+//! the rim. On pristine ground a density is the height above the surface, and so they act like the same tools
+//! on a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls and
+//! ceilings too. A sample whose density stays as it is is not edited.
 //!
-//! What becomes solid is of the blend's material; without one, of the first solid voxel straight below within 64 voxels,
-//! else straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
+//! New solid samples get the blend's material; without one, of the first solid voxel straight below within 64
+//! voxels, else straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
 //!
 //! ```
 //! use bevy_burrow::prelude::*;
@@ -112,7 +113,7 @@ pub use operation::Operation;
 pub use request::Brush;
 pub use roughness::Roughness;
 #[cfg(feature = "cuda")]
-pub(crate) use sculpt_kernel::Stroke;
+pub(crate) use sculpt_kernel::SculptOp;
 pub(crate) use sculpt_kernel::{FARTHEST, SculptKernel, Stencil, is_moved};
 #[cfg(feature = "plugin")]
 pub(crate) use shapes::Extent;
@@ -121,12 +122,17 @@ pub use stamp::Stamp;
 
 use crate::lattice::ONE;
 
-/// The power of a brush that takes away whatever can be taken away, as each does unless told otherwise.
+/// The default power of a brush, which removes everything that rules allow to be removed.
 pub const FULL_POWER: u8 = u8::MAX;
 
-/// How far outside its shape an edit still changes samples, in 1/256 voxel (rule 6).
+/// Distance outside its shape within which an edit changes samples, in 1/256 voxel (rule 6).
 pub const BAND: i32 = 2 * ONE;
 
-/// How deep inside its shape an edit's distances are told apart, in 1/256 voxel. Two voxels are what surface and normals
-/// look at; the rest is for rough shapes, whose distances change faster than the point moves.
+/// Depth inside its shape down to which an edit distinguishes distances, in 1/256 voxel. Surface and normals
+/// need two voxels; the rest is for rough shapes, whose distances change faster than the point moves.
 pub const DEPTH: i32 = 4 * ONE;
+
+/// Returns `true` if the value is the default, which is left out when writing.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}

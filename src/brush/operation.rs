@@ -1,17 +1,17 @@
-//! What a brush does to the samples it reaches.
+//! The operations of brushes.
 
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::line::is_default;
+use super::is_default;
 use super::{DEPTH, Stamp};
 use crate::ground::MaterialId;
 
-/// What happens inside the shape.
+/// The operation inside the shape.
 ///
-/// Dig, add and paint look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All others
-/// *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change nothing outside. Beyond the
-/// world's rim they take all to go on as it is at the rim.
+/// Dig, add and paint look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All
+/// others *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change
+/// nothing outside. Beyond the world's rim they assume that everything continues as at the rim.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -33,7 +33,7 @@ pub enum Operation {
         material: MaterialId,
     },
     /// Evens out bumps and edges: each sample goes towards the average of the 26 around it. Slopes stay as they are;
-    /// hollows and towers of a radius r are gone after about r x r times, as it is with averages.
+    /// hollows and towers of radius r disappear after about r x r applications, as with any averaging.
     Smooth,
     /// Deepens bumps and edges, by at most a quarter of a voxel each time.
     Sharpen,
@@ -52,22 +52,22 @@ pub enum Operation {
     /// Moves the surface outwards, which is up on pristine ground. Where a dig or an add was, distances are known
     /// to [`DEPTH`] only, and one application moves the surface by about that at most.
     ///
-    /// It gives back what a [`Lower`](Self::Lower) of the same brush took, and the other way round. Samples are the same
-    /// again, or 1/256 voxel off for each time that one would have come to lie exactly 4 voxels from the surface. Those
-    /// that a dig or an add cut off are on the same side again.
+    /// It reverses a [`Lower`](Self::Lower) of the same brush, and vice versa. Each sample returns to its
+    /// value, or to 1/256 voxel off for each time that it would have been exactly 4 voxels from the surface.
+    /// Samples cut off by a dig or an add return to their side of the surface.
     ///
-    /// Densities end 127.996 voxels from the surface, and what was moved beyond is forgotten: raise and lower leave it as it
-    /// is. So at most some 128 voxels come back. Natural ground that was lowered by more, and raised again, is lower than
-    /// before, but nowhere higher; ground that was raised by more, and lowered again, is higher, but nowhere lower. Once
-    /// the ground is higher than nature made it, further raising fills what is missing from the sides, by a voxel each
-    /// time at most.
+    /// Densities end 127.996 voxels from the surface, and anything moved beyond is lost: raise and lower
+    /// leave it unchanged. So at most about 128 voxels return. Natural ground that was lowered by more, and
+    /// raised again, is lower than before, but nowhere higher; ground that was raised by more, and lowered
+    /// again, is higher, but nowhere lower. Once the ground is higher than nature made it, further raising
+    /// fills what is missing from the sides, by a voxel each time at most.
     Raise {
-        /// How far, in voxels: 0 to 64.
+        /// Distance in voxels: 0 to 64.
         amount: f32,
     },
     /// Moves the surface inwards: the opposite of [`Raise`](Self::Raise).
     Lower {
-        /// How far, in voxels: 0 to 64.
+        /// Distance in voxels: 0 to 64.
         amount: f32,
     },
     /// Gives the surface the relief of an image.
@@ -95,12 +95,12 @@ impl Operation {
         }
     }
 
-    /// Does it sculpt? Only then the brush's [`Blend`](super::Blend) counts.
+    /// Returns `true` if it sculpts. Only then the brush's [`Blend`](super::Blend) is used.
     pub fn is_sculpting(&self) -> bool {
         !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. })
     }
 
-    /// The names of its fields in a line of JSON, beside those of the blend.
+    /// The names of its fields in a line of JSON, in addition to those of the blend.
     pub(super) fn fields(&self) -> &'static [&'static str] {
         match self {
             Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Smooth | Self::Sharpen => &[],
@@ -138,7 +138,7 @@ impl Operation {
     }
 }
 
-/// Which way an edit is applied.
+/// The kind of an edit's operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Dig,
@@ -149,8 +149,8 @@ pub(crate) enum Kind {
 
 impl Kind {
     /// The density of a sample after a dig, an add or a paint, from its density `before` and its signed distance to the
-    /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt look
-    /// at more than that: for them, it gives `before`.
+    /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt
+    /// look at more than that: for them, it gives `before`.
     ///
     /// A shape counts as [`DEPTH`] deep at most: beyond, no surface shows the difference, and the middle of a large
     /// cave or hill is all one number. Applying an operation twice is the same as once, and neither a dig ever adds

@@ -53,7 +53,7 @@ pub(super) fn voxels(units: i32) -> f32 {
     units as f32 / ONE as f32
 }
 
-/// Is a shape with this box around it, and of this volume in cubic voxels, small enough?
+/// Checks that a shape with this bounding box, and of this volume in cubic voxels, is small enough.
 pub(super) fn check_extent((low, high): (IVec3, IVec3), volume: f64) -> Result<(), BrushError> {
     let side = (high - low).max_element();
     if side > LONGEST {
@@ -187,7 +187,8 @@ pub(super) fn restored_turn(rotation: [i16; 4]) -> Quat {
     Quat::from_array(rotation.map(f32::from)).normalize()
 }
 
-/// Is the first non-zero component of w, x, y, z positive? Of q and -q, which mean one rotation, one is.
+/// Returns `true` if the first non-zero component of w, x, y, z is positive. This selects one of q and -q, which mean
+/// the same rotation.
 fn is_positive([x, y, z, w]: [i16; 4]) -> bool {
     [w, x, y, z].into_iter().find(|&v| v != 0).is_some_and(|v| v > 0)
 }

@@ -60,7 +60,7 @@ impl QuantizedOperation {
         })
     }
 
-    /// Is it within every limit?
+    /// Checks every limit.
     pub fn check(&self) -> Result<(), BrushError> {
         match self {
             Self::Flatten { point, normal } => {
@@ -113,7 +113,7 @@ impl QuantizedOperation {
         }
     }
 
-    /// Which way it is applied.
+    /// The kind of its operation.
     pub fn kind(&self) -> Kind {
         match *self {
             Self::Dig => Kind::Dig,
@@ -128,7 +128,8 @@ fn amount(by: f32) -> Result<i32, BrushError> {
     in_range("amount", by, 0.0, AMOUNT)
 }
 
-/// How far a lattice point lies from a plane, on the side of its normal, in 1/256 voxel. Needs a normal that is not zero.
+/// Distance of a lattice point from a plane, positive on the side of its normal, in 1/256 voxel. Needs a normal that is
+/// not zero.
 pub(super) fn above_plane(at: IVec3, point: [i32; 3], normal: [i16; 3]) -> i32 {
     let from = at.as_i64vec3() * i64::from(ONE) - IVec3::from_array(point).as_i64vec3();
     let along: i64 = from.to_array().iter().zip(normal).map(|(&from, n)| from * i64::from(n)).sum();

@@ -7,10 +7,11 @@ use super::line::Line;
 use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
-/// A wish to change the ground, in voxels of terrain space. One that is sent to the plugin as a message is in world space
-/// and its units, metres: each terrain takes it into its own.
+/// A request to change the ground, in voxels of terrain space. A brush sent to the plugin as a message is in world
+/// space and metres instead; each terrain transforms it into its own space.
 ///
-/// Nothing is checked here: [`Edit::quantize`](super::Edit::quantize) does, and says what is wrong.
+/// A brush is not checked when it is made: [`Edit::quantize`](super::Edit::quantize) checks it, and reports what is
+/// wrong.
 ///
 /// # Lines of JSON
 ///
@@ -25,28 +26,28 @@ use crate::ground::MaterialId;
 /// {"shape":"sphere","center":[8,0,8],"radius":6,"op":"smooth","strength":0.5}
 /// ```
 ///
-/// The fields are those of its [`Shape`] (a cuboid is a `box`), those of its [`Operation`] (the base of a terrace is its
-/// `height`), and for operations that sculpt those of the [`Blend`]. Fields of the blend, `rotation`, `roughness`, `power`, `tag` and
-/// `stroke` may be left out; other fields are refused.
+/// The fields are those of its [`Shape`] (a cuboid is a `box`), those of its [`Operation`] (the base of a terrace is
+/// its `height`), and for operations that sculpt those of the [`Blend`]. Fields of the blend, `rotation`, `roughness`,
+/// `power`, `tag` and `stroke` may be left out; other fields are refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Line", into = "Line")]
 pub struct Brush {
     /// Where.
     pub shape: Shape,
-    /// What to do there.
+    /// The operation.
     pub operation: Operation,
     /// Bumps on the shape's surface; `None` for a smooth one.
     pub roughness: Option<Roughness>,
-    /// Any number of the game's own; the receipt carries it back.
+    /// Any number that the game chooses; the receipt returns it.
     pub tag: u64,
-    /// What one undo takes back: brushes of one stroke that follow each other are one step, over however many frames they
-    /// come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply). A brush of another
-    /// stroke in between, a second player's say, ends a step.
+    /// The steps of undo: brushes of one stroke that follow each other are one step, over however many frames
+    /// they come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply). A
+    /// brush of another stroke in between, a second player's say, ends a step.
     pub stroke: Option<u64>,
-    /// How operations that sculpt fade, and what they build of.
+    /// The falloff, strength and material of operations that sculpt.
     pub blend: Blend,
-    /// How hard the material may be that it takes away, where the terrain has rules for that: [`FULL_POWER`] takes away
-    /// all that can be.
+    /// The greatest hardness of material that it removes, where the terrain has rules for that: [`FULL_POWER`] takes
+    /// away all that can be.
     pub power: u8,
 }
 
@@ -107,18 +108,18 @@ impl Brush {
         Self::new(shape, Operation::Level { height })
     }
 
-    /// A brush that raises the ground by so many voxels.
+    /// A brush that raises the ground by `amount` voxels.
     pub fn raise(shape: Shape, amount: f32) -> Self {
         Self::new(shape, Operation::Raise { amount })
     }
 
-    /// A brush that lowers the ground by so many voxels.
+    /// A brush that lowers the ground by `amount` voxels.
     pub fn lower(shape: Shape, amount: f32) -> Self {
         Self::new(shape, Operation::Lower { amount })
     }
 
-    /// A brush that gives the ground in its shape the relief of an image. It fades over a single voxel at the rim of the
-    /// image and of the shape, unless told otherwise.
+    /// A brush that gives the ground in its shape the relief of an image. It fades over a single voxel at the rim of
+    /// the image and of the shape, by default.
     pub fn stamp(shape: Shape, stamp: Stamp) -> Self {
         Self::new(shape, Operation::Stamp { stamp }).with_falloff(1.0)
     }
@@ -134,7 +135,7 @@ impl Brush {
         Self { blend: Blend { strength, ..self.blend }, ..self }
     }
 
-    /// The brush with another falloff, if it sculpts: over so many voxels its change fades in.
+    /// The brush with another falloff, if it sculpts: its change fades in over this many voxels.
     #[must_use]
     pub fn with_falloff(self, falloff: f32) -> Self {
         Self { blend: Blend { falloff, ..self.blend }, ..self }
@@ -158,21 +159,21 @@ impl Brush {
         Self { roughness: Some(roughness), ..self }
     }
 
-    /// The brush with a number of the game's own, which the receipt carries back.
+    /// The brush with a number that the game chooses; the receipt returns it.
     #[must_use]
     pub fn with_tag(self, tag: u64) -> Self {
         Self { tag, ..self }
     }
 
-    /// The brush as part of a stroke, by any number of the game's own: see [`stroke`](Self::stroke).
+    /// The brush as part of a stroke, identified by any number that the game chooses: see [`stroke`](Self::stroke).
     #[must_use]
     pub fn with_stroke(self, stroke: u64) -> Self {
         Self { stroke: Some(stroke), ..self }
     }
 
-    /// The brush after every point p moved to `rotation * (p * scale) + translation`: from world space to terrain
-    /// space, say. Sizes and roughness grow with `scale`, which should be positive; the roughness pattern itself stays
-    /// tied to the lattice.
+    /// The brush after every point p moved to `rotation * (p * scale) + translation`: for example from world
+    /// space to terrain space. Sizes and roughness grow with `scale`, which should be positive; the roughness
+    /// pattern itself stays tied to the lattice.
     ///
     /// `rotation` should have length 1. Other numbers give a brush that [`Edit::quantize`](super::Edit::quantize)
     /// refuses or that is deformed.
@@ -198,12 +199,6 @@ impl Brush {
 mod tests {
     use super::*;
     use crate::brush::shapes::Cone;
-
-    #[test]
-    fn a_brush_can_be_a_message() {
-        fn is_message<T: Clone + Send + Sync + 'static>() {}
-        is_message::<Brush>();
-    }
 
     #[test]
     fn transforming_moves_points_turns_axes_and_scales_sizes() {

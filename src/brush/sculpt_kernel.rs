@@ -1,20 +1,22 @@
-//! What operations that sculpt make of a sample: integers throughout.
+//! The new density of a sample under an operation that sculpts, in integers throughout.
 //!
-//! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], and what is stored ends at
-//! [`FARTHEST`], so exactly these numbers say "at least as far". Operations that move a surface have to know how far away
-//! it is, or the whole middle of a cave would turn solid at once. So a sample that was *cut off* at `DEPTH` counts as one
-//! voxel farther than its nearest face neighbour, and is left alone while all of those were cut off too. One that was cut off
-//! at `FARTHEST` is left alone unless it lies beside the surface, one voxel from which it counts as then. Beyond the world's
-//! rim all goes on as it is at the rim.
+//! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], and what is stored
+//! ends at [`FARTHEST`], so exactly these numbers say "at least as far". Operations that move a surface have
+//! to know how far away it is, or the whole middle of a cave would turn solid at once. So a sample that was
+//! *cut off* at `DEPTH` counts as one voxel farther than its nearest face neighbour, and is left alone while
+//! all of those were cut off too. One that was cut off at `FARTHEST` is left alone unless it lies next to the
+//! surface; it then counts as one voxel from the surface. Beyond the world's rim everything continues as at
+//! the rim.
 //!
-//! Raise and lower have to give back what the other one took, and they change neighbours by different amounts where they
-//! fade. Any guess may leave crumbs and holes there, so they ask for more:
+//! Raise and lower have to reverse each other, and they change neighbours by different amounts where they
+//! fade. Any guess may leave crumbs and holes there, so they have further conditions:
 //!
-//! - What was cut off at `DEPTH` is left alone if its neighbours lie deeper. They were moved away, and it was not.
-//! - Samples at `FARTHEST`, and pristine ones beyond it, are left alone even beside the surface, unless that surface is
-//!   known to be beyond what nature made: of ground that was built or raised, for a raise; of air that was dug or lowered, for
-//!   a lower. So natural ground that was lowered and raised again is never higher than before, however often; and raising on
-//!   fills the pit that is left of it.
+//! - A sample cut off at `DEPTH` is left alone if its neighbours lie deeper. They were moved away, and it was
+//!   not.
+//! - Samples at `FARTHEST`, and pristine ones beyond it, are left alone even next to the surface, unless that
+//!   surface is known to be artificial: of ground that was built or raised, for a raise; of air
+//!   that was dug or lowered, for a lower. So natural ground that was lowered and raised again is never
+//!   higher than before, however often; and raising on fills the pit that is left of it.
 //! - Neither makes a sample `DEPTH` that was not cut off.
 
 use glam::IVec3;
@@ -28,13 +30,13 @@ use super::{quantize::measure, stamp::StampParams};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
-/// Where stored densities end, in 1/256 voxel.
+/// Greatest stored density, in 1/256 voxel.
 pub(crate) const FARTHEST: i32 = i16::MAX as i32;
 
 /// The bound on differences between neighbours, in 1/256 voxel. Densities beyond a cliff are not known better.
 const CONTRAST: i32 = 2 * ONE;
 
-/// By how much sharpening changes a sample at most, in 1/256 voxel.
+/// The most that sharpening changes a sample, in 1/256 voxel.
 const SHARPER: i32 = ONE / 4;
 
 /// The opposite neighbours of a sample, their weight in a binomial average (1 2 1 along each axis), and what the way to
@@ -66,8 +68,8 @@ pub(crate) struct Stencil {
     pub moved: u32,
 }
 
-/// Is a sample farther from the surface, by a voxel or more, than it was before anybody edited it? Then it is solid that was
-/// built or raised, or air that was dug or lowered.
+/// Returns `true` if a sample is farther from the surface, by a voxel or more, than its pristine state. It is then
+/// solid ground that was built or raised, or air that was dug or lowered.
 pub(crate) fn is_moved(density: i32, pristine: i32) -> bool {
     let by = density - pristine;
     if density < 0 { by <= -ONE } else { by >= ONE }
@@ -105,7 +107,7 @@ impl Stencil {
         [4, 10, 12, 14, 16, 22].map(|index| (self.densities[index], index)).into_iter()
     }
 
-    /// Do any of the neighbours that these say lie on the other side of the surface?
+    /// Returns `true` if any of the neighbours selected by `which` lies on the other side of the surface.
     fn is_beside(&self, which: impl Fn(usize) -> bool) -> bool {
         self.faces().any(|(other, index)| (other < 0) != (self.own() < 0) && which(index))
     }
@@ -132,8 +134,8 @@ impl Stencil {
         Some(own.signum() * (nearest.max(0) + ONE))
     }
 
-    /// The density in the middle with a part of `by` added, which an opposite shift takes away again: to the bit, or to 1/256
-    /// voxel where one of both would end at exactly [`DEPTH`].
+    /// The density in the middle with a part of `by` added, which an opposite shift takes away again: to the bit, or to
+    /// 1/256 voxel where one of both would end at exactly [`DEPTH`].
     fn shifted(&self, by: i32, weight: i32) -> Option<i32> {
         let by = by.signum() * ((by.abs() * weight + ONE / 2) >> 8);
         if by == 0 {
@@ -152,7 +154,7 @@ impl Stencil {
             own
         };
         let after = middle + by;
-        // It must not come to say that it is cut off: the opposite shift would not know it again.
+        // The result must not look like a cut-off sample, or the opposite shift would not recognise it.
         Some(if after.abs() == DEPTH { after + by.signum() } else { after })
     }
 
@@ -172,8 +174,8 @@ impl Stencil {
         PAIRS.iter().filter_map(pair).sum()
     }
 
-    /// The density after a change that may make the sample solid only beside a solid one, and air only beside air: no
-    /// crumb comes from nowhere.
+    /// The density after a change that may make the sample solid only next to a solid one, and air only next
+    /// to air, so that no crumb appears in isolation.
     fn attached(&self, after: i32) -> i32 {
         let was_solid = self.densities[Self::MIDDLE] < 0;
         if (after < 0) == was_solid || self.faces().any(|(other, _)| (other < 0) == (after < 0)) {
@@ -188,7 +190,7 @@ impl Stencil {
 pub(crate) struct SculptKernel {
     operation: QuantizedOperation,
     blend: QuantizedBlend,
-    /// How deep the shape is in its middle.
+    /// Depth of the shape's middle.
     deep: i32,
 }
 
@@ -202,13 +204,13 @@ impl SculptKernel {
         Self { operation: operation.clone(), blend, deep }
     }
 
-    /// What new ground is made of, if the operation says so.
+    /// The material of new ground, if the operation has one.
     pub fn material(&self) -> Option<MaterialId> {
         self.blend.material
     }
 
-    /// The density at a lattice point after the operation, from its distance to the shape and from what is around; `None`
-    /// where it stays as it is.
+    /// The density at a lattice point after the operation, from its distance to the shape and from what is around;
+    /// `None` where it stays as it is.
     pub fn density(&self, at: IVec3, outside: i32, around: impl FnOnce() -> Stencil) -> Option<i32> {
         if outside > 0 {
             return None;
@@ -260,25 +262,25 @@ impl SculptKernel {
     }
 }
 
-/// A sculptor as plain numbers, for other machines.
+/// A sculpting operation as plain numbers, for the GPU.
 #[cfg(feature = "cuda")]
 pub(crate) struct SculptParams<'a> {
     pub strength: i32,
     /// Not wider than the shape is deep.
     pub falloff: i32,
     pub material: Option<MaterialId>,
-    pub stroke: Stroke<'a>,
+    pub operation: SculptOp<'a>,
 }
 
-/// What a sculptor does to a surface.
+/// A sculpting operation with its parameters.
 #[cfg(feature = "cuda")]
-pub(crate) enum Stroke<'a> {
+pub(crate) enum SculptOp<'a> {
     Smooth,
     Sharpen,
     /// A point of the plane, its normal, and what that measures.
     Flatten([i32; 3], [i16; 3], f64),
     Level(i32),
-    /// How much is added to densities.
+    /// The change of densities.
     Shift(i32),
     Stamp(StampParams<'a>),
     /// Step and base.
@@ -287,25 +289,25 @@ pub(crate) enum Stroke<'a> {
 
 #[cfg(feature = "cuda")]
 impl SculptKernel {
-    /// All that densities are computed from; `None` for what is no sculptor's deed.
+    /// All parameters of densities; `None` unless the operation sculpts.
     pub(crate) fn constants(&self) -> Option<SculptParams<'_>> {
-        let stroke = match &self.operation {
-            QuantizedOperation::Smooth => Stroke::Smooth,
-            QuantizedOperation::Sharpen => Stroke::Sharpen,
+        let operation = match &self.operation {
+            QuantizedOperation::Smooth => SculptOp::Smooth,
+            QuantizedOperation::Sharpen => SculptOp::Sharpen,
             QuantizedOperation::Flatten { point, normal } => {
-                Stroke::Flatten(*point, *normal, measure(normal.map(i32::from)))
+                SculptOp::Flatten(*point, *normal, measure(normal.map(i32::from)))
             }
-            QuantizedOperation::Level { height } => Stroke::Level(*height),
-            QuantizedOperation::Raise { amount } => Stroke::Shift(-amount),
-            QuantizedOperation::Lower { amount } => Stroke::Shift(*amount),
-            QuantizedOperation::Stamp { stamp } => Stroke::Stamp(stamp.constants()),
-            QuantizedOperation::Terrace { step, base } => Stroke::Terrace(*step, *base),
+            QuantizedOperation::Level { height } => SculptOp::Level(*height),
+            QuantizedOperation::Raise { amount } => SculptOp::Shift(-amount),
+            QuantizedOperation::Lower { amount } => SculptOp::Shift(*amount),
+            QuantizedOperation::Stamp { stamp } => SculptOp::Stamp(stamp.constants()),
+            QuantizedOperation::Terrace { step, base } => SculptOp::Terrace(*step, *base),
             QuantizedOperation::Dig | QuantizedOperation::Add { .. } | QuantizedOperation::Paint { .. } => {
                 return None;
             }
         };
         let QuantizedBlend { strength, falloff, material } = self.blend;
-        Some(SculptParams { strength, falloff: falloff.min(self.deep), material, stroke })
+        Some(SculptParams { strength, falloff: falloff.min(self.deep), material, operation })
     }
 }
 
@@ -422,7 +424,7 @@ mod tests {
             for end in [FARTHEST, FARTHEST + 5000] {
                 let is_moved = 1 << below;
                 assert_eq!(far(end, FARTHEST - 9, is_moved).shifted(nearer, 256), None, "as far as it says");
-                assert_eq!(far(end, -40, 0).shifted(nearer, 256), None, "beside natural ground");
+                assert_eq!(far(end, -40, 0).shifted(nearer, 256), None, "next to natural ground");
                 assert_eq!(far(end, -40, is_moved).shifted(away, 256), None, "farther is as far");
                 assert_eq!(far(end, -40, is_moved).shifted(nearer, 256), Some(side * ONE + nearer));
             }

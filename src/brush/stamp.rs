@@ -7,7 +7,7 @@ use glam::{IVec3, Quat, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::BrushError;
-use super::line::is_default;
+use super::is_default;
 use super::quantize::{
     check_point, check_size, check_turn, in_range, matrix, point, restored_point, restored_turn, size, turn,
     voxels,
@@ -17,25 +17,26 @@ use crate::lattice::ONE;
 
 /// An image that gives the surface its relief: black lies on the stamp's plane, white `height` above it.
 ///
-/// The stamp's own axes are the image's columns (x), up (y) and the image's rows (z); without a rotation, they are those of
-/// the terrain, and the image lies as a [`Ground`](crate::ground::Ground) made of it would.
+/// The stamp's own axes are the image's columns (x), up (y) and the image's rows (z); without a rotation, they are
+/// those of the terrain, and the image lies as a [`Ground`](crate::ground::Ground) made of it would.
 ///
 /// The surface is the image, interpolated linearly between its samples, to within 1/8 voxel in each lattice column that
-/// the brush covers with full weight: heights are rounded to 1/256 voxel, and the rest is marching cubes between voxels.
+/// the brush covers with full weight: heights are rounded to 1/256 voxel, and the rest is marching cubes between
+/// voxels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stamp {
     /// The image, 2 to 256 samples a side.
     #[serde(with = "image")]
     pub image: Arc<GreyImage>,
-    /// Where the middle of the image lies.
+    /// The middle of the image.
     pub center: Vec3,
     /// From the stamp's axes to those of the terrain; of length 1. It may be left out in a line of JSON.
     #[serde(default, skip_serializing_if = "is_default")]
     pub rotation: Quat,
-    /// The image's sides in voxels, along its columns and its rows. Nothing changes beside the image.
+    /// The image's sides in voxels, along its columns and its rows. Nothing changes outside the image.
     pub size: Vec2,
-    /// How high white lies above black, in voxels; -256 to 256.
+    /// Height of white above black, in voxels; -256 to 256.
     pub height: f32,
 }
 
@@ -51,7 +52,8 @@ impl Stamp {
         Self { rotation, ..self }
     }
 
-    /// The stamp on a plane: its up becomes `normal`, by the shortest turn. A normal of no direction leaves it as it is.
+    /// The stamp on a plane: its up becomes `normal`, by the shortest turn. A normal of no direction leaves it as it
+    /// is.
     #[must_use]
     pub fn onto(self, normal: Vec3) -> Self {
         match normal.try_normalize() {
@@ -67,7 +69,7 @@ const SIDES: (u32, u32) = (2, 256);
 /// Most height.
 const HEIGHT: f32 = 256.0;
 
-/// What errors call the length that they tell, which is half of what a stamp has.
+/// The name that errors use for the length they report, which is half of the stamp's.
 const HALF: &str = "half the stamp size";
 
 /// The samples of an image of an allowed size.
@@ -197,7 +199,8 @@ impl QuantizedStamp {
         self.half[0].min(self.half[1])
     }
 
-    /// How far a lattice point lies beside the image, negative inside, and how far above its relief; in 1/256 voxel.
+    /// Distance of a lattice point outside the image, negative inside, and its height above the relief; in
+    /// 1/256 voxel.
     pub fn at(&self, at: IVec3) -> (i32, i32) {
         let (rows, squared) = matrix(self.rotation);
         let from = at.as_i64vec3() * i64::from(ONE) - IVec3::from_array(self.center).as_i64vec3();
@@ -217,7 +220,7 @@ impl QuantizedStamp {
     }
 }
 
-/// A stamp as plain numbers, for the card.
+/// A stamp as plain numbers, for the GPU.
 #[cfg(feature = "cuda")]
 pub(crate) struct StampParams<'a> {
     pub center: [i32; 3],
@@ -231,7 +234,7 @@ pub(crate) struct StampParams<'a> {
 
 #[cfg(feature = "cuda")]
 impl QuantizedStamp {
-    /// All that [`QuantizedStamp::at`] looks at.
+    /// All parameters of [`QuantizedStamp::at`].
     pub(super) fn constants(&self) -> StampParams<'_> {
         let &Self { center, rotation, half, height, .. } = self;
         let (rows, squared) = matrix(rotation);

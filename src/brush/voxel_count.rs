@@ -1,13 +1,14 @@
-//! How many voxels a brush covers.
+//! Counts the voxels that a brush covers.
 
 use super::{Brush, BrushError, Edit};
 
 impl Brush {
-    /// Counts the voxels within the brush's shape, roughness included: the most that it digs, adds or paints. A game that
-    /// charges for building checks this before it sends the brush; the receipt says what the brush really changed.
+    /// Counts the voxels within the brush's shape, roughness included: the most that it digs, adds or paints. A game
+    /// that charges for building checks this before it sends the brush; the receipt says what the brush really changed.
     ///
-    /// The brush must be in voxels of the terrain. A brush in world space is that if the terrain has a voxel size of 1 and was
-    /// not moved; otherwise [transform](Brush::transformed) it first. Every lattice point of the shape is visited.
+    /// The brush must be in voxels of the terrain. A brush in world space is that if the terrain has a voxel size of 1
+    /// and was not moved; otherwise [transform](Brush::transformed) it first. Every lattice point of the shape is
+    /// visited.
     ///
     /// ```
     /// use bevy_burrow::prelude::*;

@@ -22,8 +22,8 @@ pub(super) const fn point([x, y, z]: [usize; 3]) -> Point {
     x as u64 | (y as u64) << 16 | (z as u64) << 32
 }
 
-/// Edges that are listed before they get their vertices. Few enough to stay in the first cache, and their samples in the
-/// second; enough that the lists' ends do not matter.
+/// Edges that are listed before they get their vertices. Few enough to stay in the first cache, and their samples in
+/// the second; enough that the lists' ends do not matter.
 const BATCH: usize = 2048;
 
 /// Where the vertices of a layer's edges begin: in the lists first, in the mesh once those are numbered.
@@ -100,18 +100,18 @@ impl Cells {
         }
     }
 
-    /// How many edges have no vertex yet.
+    /// Number of edges without a vertex yet.
     pub(super) fn pending(&self) -> usize {
         self.edges.iter().map(Stream::len).sum()
     }
 
-    /// Must the edges get their vertices before the next layer is added?
+    /// Returns `true` if the edges must get their vertices before the next layer is added.
     pub(super) fn is_full(&self) -> bool {
         self.pending() >= BATCH
     }
 
-    /// Adds layer `z`: the cells between `low`, its signs, and `high`, those of the next layer. Behind the last layer, which
-    /// starts no cells, both are the same.
+    /// Adds layer `z`: the cells between `low`, its signs, and `high`, those of the next layer. Behind the last layer,
+    /// which starts no cells, both are the same.
     pub(super) fn add_layer<S: Density>(&mut self, grid: &DenseGrid<S>, z: usize, low: &Signs, high: &Signs) {
         let [width, height, depth] = grid.meshed();
         let mut start = LayerStart::default();
@@ -148,8 +148,8 @@ impl Cells {
         self.layers.push(start);
     }
 
-    /// Appends the crossed cells of some words of layer `z`: first the words that hold any, without a branch, as most hold
-    /// none; then their cells.
+    /// Appends the crossed cells of some words of layer `z`: first the words that hold any, without a branch, as most
+    /// hold none; then their cells.
     fn add_cells(&mut self, z: usize, signs: Corners, words: Range<usize>) {
         // Slices of one length: a single check covers all of them.
         let [a, b, c, d] = signs.0.map(|signs| &signs[words.clone()]);

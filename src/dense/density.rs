@@ -13,9 +13,9 @@ impl Density for i16 {}
 pub(super) mod sealed {
     use super::f32x4;
 
-    /// What the mesher asks of a density.
+    /// The operations on a density that the mesher needs.
     pub trait Wide: Copy {
-        /// Is this sample solid?
+        /// Returns `true` if this sample is solid.
         fn is_solid(self) -> bool;
         /// Bit `i` is set when sample `i` is solid.
         fn signs(samples: &[Self; 16]) -> u64;

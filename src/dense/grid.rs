@@ -11,7 +11,7 @@ pub struct DenseGrid<'a, S> {
     apron: usize,
 }
 
-/// Why samples are no [`DenseGrid`].
+/// An error of making a [`DenseGrid`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DenseGridError {
     /// The number of samples is not the product of the sides.
@@ -110,8 +110,8 @@ impl<'a, S: Density> DenseGrid<'a, S> {
         self.size.map(|side| side - 2 * self.apron)
     }
 
-    /// The rows of layer `z`, counted from the first meshed one. Each begins with its first meshed sample, and ends where
-    /// the grid's next row begins.
+    /// The rows of layer `z`, counted from the first meshed one. Each begins with its first meshed sample, and ends
+    /// where the grid's next row begins.
     pub(super) fn rows(&self, z: usize) -> impl Iterator<Item = &'a [S]> {
         let [width, height, _] = self.size;
         let start = width * (self.apron + height * (self.apron + z));

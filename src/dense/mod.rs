@@ -1,6 +1,7 @@
 //! Marching cubes over a plain dense grid: shared vertices, and unit normals if they are wanted.
 //!
-//! For fields that are stored as one array: imported volumes, simulations, chunks of a game that keeps its own samples. The terrain's own blocks are meshed by [`block`](crate::surface::block), which follows edits, materials and seams.
+//! For fields that are stored as one array: imported volumes, simulations, chunks of a game that keeps its own samples.
+//! The terrain's own blocks are meshed by [`block`](crate::surface::block), which follows edits, materials and seams.
 //!
 //! Samples below zero are solid. Triangles are counter-clockwise seen from the air, and the case table is the one in
 //! [`cases`](crate::surface::cases): a surface that stays away from the grid's border is closed.
@@ -60,8 +61,8 @@ use stream::Stream;
 /// A triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DenseMesh {
-    /// Vertices, in voxels from sample (0, 0, 0), the apron included. One for each lattice edge that the surface crosses, in
-    /// its middle where the difference between its two samples is no finite number.
+    /// Vertices, in voxels from sample (0, 0, 0), the apron included. One for each lattice edge that the surface
+    /// crosses, in its middle where the difference between its two samples is no finite number.
     pub positions: Vec<[f32; 3]>,
     /// Unit normals towards the air, one for each vertex; empty with [`Normals::None`].
     pub normals: Vec<[f32; 3]>,
@@ -69,22 +70,22 @@ pub struct DenseMesh {
     pub indices: Vec<u32>,
 }
 
-/// Which normals a mesh gets.
+/// Kind of normals of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Normals {
     /// None.
     None,
-    /// The gradient of the densities, by central differences, linear between the two samples of an edge, of length 1. It
-    /// points up where the densities have no finite gradient.
+    /// The gradient of the densities, by central differences, linear between the two samples of an edge, of length 1.
+    /// It points up where the densities have no finite gradient.
     #[default]
     Gradient,
 }
 
 /// Meshes dense grids, and keeps its memory from one to the next.
 ///
-/// The first grids make it allocate. Nothing is allocated for a grid with no longer sides, no more crossed cells and no more
-/// vertices and triangles than one before, if the mesh is reused as well. It takes some 34 bytes for each cell of a layer in
-/// z, crossed or not: of a flat grid, a long side should lie along z.
+/// The first grids make it allocate. Nothing is allocated for a grid with no longer sides, no more crossed cells and no
+/// more vertices and triangles than one before, if the mesh is reused as well. It takes some 34 bytes for each cell of
+/// a layer in z, crossed or not: of a flat grid, a long side should lie along z.
 #[derive(Debug, Default)]
 pub struct DenseMesher {
     low: Signs,
@@ -100,7 +101,7 @@ impl DenseMesher {
 
     /// Meshes a grid. What `out` held is replaced, its memory is used again.
     ///
-    /// The same samples give the same bits on every machine.
+    /// Equal samples give equal bits on every machine.
     pub fn mesh<S: Density>(&mut self, grid: DenseGrid<S>, normals: Normals, out: &mut DenseMesh) {
         let depth = grid.meshed()[2];
         self.cells.start(&grid);
@@ -133,8 +134,8 @@ impl DenseMesher {
         triangles::mesh(&self.cells, &mut out.indices);
     }
 
-    /// Appends the vertex of every listed edge to the `vertices` that exist, and stores in the layers from `first_layer` on
-    /// where their vertices begin.
+    /// Appends the vertex of every listed edge to the `vertices` that exist, and stores in the layers from
+    /// `first_layer` on where their vertices begin.
     fn add_vertices<S: Density, const NORMALS: bool>(
         &mut self,
         grid: &DenseGrid<S>,

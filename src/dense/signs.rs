@@ -1,4 +1,4 @@
-//! Which samples of a layer are solid: bits, 64 samples to a word.
+//! Solid samples of a layer as bits, 64 samples to a word.
 //!
 //! A word holds 64 samples but only 63 columns, because neighbouring words share a sample:
 //!
@@ -7,8 +7,9 @@
 //! word 1: samples 63 ..= 126   columns 63 ..= 125
 //! ```
 //!
-//! So both samples of a cell's edge along x always lie in one word, and no bit is ever carried. The last sample of a row is
-//! repeated: the column that it starts is no cell, and no edge along x is crossed there. The last row is repeated as well.
+//! So both samples of a cell's edge along x always lie in one word, and no bit is ever carried. The last sample of a
+//! row is repeated: the column that it starts is no cell, and no edge along x is crossed there. The last row is
+//! repeated as well.
 
 use super::density::Density;
 use super::grid::DenseGrid;
@@ -97,7 +98,7 @@ impl Signs {
         &self.words
     }
 
-    /// Is the layer one with `other`: both all air, or both all solid?
+    /// Returns `true` if the layer and `other` are both all air, or both all solid.
     pub(super) fn is_uniform_with(&self, other: &Self) -> bool {
         self.content != Content::Mixed && self.content == other.content
     }

@@ -1,4 +1,4 @@
-//! The same mesh, cell by cell, as plainly as it can be said: what the fast mesher is tested against.
+//! A simple reference mesher, cell by cell, which the fast mesher is tested against.
 
 use glam::IVec3;
 

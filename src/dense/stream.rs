@@ -1,7 +1,7 @@
 //! Growing lists that may be written beyond their end.
 
-/// A list with writable slots behind its end. An item that is appended under a condition is always written there, and the
-/// condition moves the end: this needs no branch.
+/// A list with writable slots behind its end. An item that is appended under a condition is always written there, and
+/// the condition moves the end: this needs no branch.
 #[derive(Debug, Default)]
 pub(super) struct Stream<T> {
     slots: Vec<T>,
@@ -34,7 +34,7 @@ impl<T: Copy + Default> Stream<T> {
         }
     }
 
-    /// How many items there is room for.
+    /// Number of items that fit.
     pub(super) fn room(&self) -> usize {
         self.slots.len() - self.len
     }

@@ -1,7 +1,7 @@
 //! Triangles from the stream of cases alone.
 //!
-//! Vertices are numbered in the order of the edges in their lists, which is the order of the stream. So no cell looks up
-//! the numbers of its twelve edges: ten counters, one for each row of edges around the cell, hold them.
+//! Vertices are numbered in the order of the edges in their lists, which is the order of the stream. So no cell looks
+//! up the numbers of its twelve edges: ten counters, one for each row of edges around the cell, hold them.
 
 use std::sync::LazyLock;
 
@@ -30,8 +30,8 @@ struct Step {
 /// | y | of the row (y, z), the same plus one, of the row (y, z + 1), the same plus one |
 /// | z | of the row (y, z), the same plus one, of the row (y + 1, z), the same plus one |
 ///
-/// An edge along y or z on the cell's far side is the first of its row behind the cell's near side: where the near edge is
-/// crossed, it has the number plus one.
+/// An edge along y or z on the cell's far side is the first of its row behind the cell's near side: where the near edge
+/// is crossed, it has the number plus one.
 type Counters = [u32x4; 3];
 
 fn counters(low: &LayerStart, high: &LayerStart) -> Counters {

@@ -1,7 +1,8 @@
 //! Vertices from the lists of crossed edges, four at a time.
 //!
-//! All edges of a list run along the same axis, so all four take the same steps: read the samples around both ends, then
-//! calculate with four numbers at once. Only + - * / and square roots in a fixed order, so all machines agree on every bit.
+//! All edges of a list run along the same axis, so all four take the same steps: read the samples around both ends,
+//! then calculate with four numbers at once. Only + - * / and square roots in a fixed order, so all machines agree on
+//! every bit.
 
 use wide::{f32x4, i32x4};
 
@@ -21,8 +22,8 @@ pub(super) const SLACK: usize = LANES + 1;
 /// Three numbers for each of four edges.
 type Vectors = [f32x4; 3];
 
-/// Writes the vertices of the edges along `AXIS` that start at `points`, whose number is a multiple of [`LANES`]. The slot
-/// behind them is overwritten too. Without `NORMALS` no normal is written.
+/// Writes the vertices of the edges along `AXIS` that start at `points`, whose number is a multiple of [`LANES`]. The
+/// slot behind them is overwritten too. Without `NORMALS` no normal is written.
 pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
     grid: &DenseGrid<S>,
     points: &[Point],
@@ -93,7 +94,7 @@ impl Lattice {
         [index(a), index(b), index(c), index(d)]
     }
 
-    /// Do all neighbours of both ends of these edges lie in the grid?
+    /// Returns `true` if all neighbours of both ends of these edges lie in the grid.
     #[inline(always)]
     fn are_inside(&self, points: &[Point; LANES]) -> bool {
         let inside = |all, point| all & ((point | TOP) - self.first) & (self.last - point);
@@ -127,14 +128,15 @@ fn coordinates(&[a, b, c, d]: &[Point; LANES]) -> Vectors {
     [f32x4::from_i32x4(xy & i32x4::splat(0xffff)), f32x4::from_i32x4(xy >> 16), f32x4::from_i32x4(z)]
 }
 
-/// The samples around edges along one axis, each as a slice of its own that begins at the first edge's sample. All are of
-/// the same length, so that a single check covers the twelve samples of an edge.
+/// The samples around edges along one axis, each as a slice of its own that begins at the first edge's
+/// sample. All have equal length, so that a single check covers the twelve samples of an edge.
 struct Taps<'a, S, const AXIS: usize> {
     /// How far the slices begin behind the grid's first sample.
     first: usize,
     /// From one before the start of the edge to one behind its end.
     along: [&'a [S]; 4],
-    /// Beside the start and beside the end, along the next axis, then along the one after that: before and behind.
+    /// Neighbours of the start and of the end, along the next axis, then along the one after that: before and
+    /// behind.
     across: [[&'a [S]; 4]; 2],
 }
 
@@ -182,8 +184,8 @@ impl<'a, S: Density, const AXIS: usize> Taps<'a, S, AXIS> {
     }
 }
 
-/// The gradients at both ends of edges that may lie in the grid's border. Where a neighbour is missing, the difference to
-/// the other one counts twice.
+/// The gradients at both ends of edges that may lie in the grid's border. Where a neighbour is missing, the difference
+/// to the other one counts twice.
 #[inline(never)]
 fn border_gradients<S: Density, const AXIS: usize>(
     grid: &DenseGrid<S>,

@@ -1,4 +1,4 @@
-//! Which edits of a transaction may be applied brick by brick.
+//! Batches: edits of a transaction that may be applied brick by brick.
 
 use std::ops::Range;
 
@@ -11,10 +11,10 @@ const LONGEST: usize = 1 << 12;
 /// Most bricks around all edits of a batch, unless it is a single edit: their jobs take 16 MiB.
 pub(super) const MOST_BRICKS: u64 = 1 << 20;
 
-/// Splits edits into batches, in order, in which no edit reads what an earlier edit of the batch may write, except for the
-/// samples that it changes itself. Digs, adds and paint read nothing else; edits that sculpt, and edits that rules restrict,
-/// read what is [around](PreparedEdit::reads) them. A batch also ends before there would be more than `most` bricks around
-/// its edits.
+/// Splits edits into batches, in order, in which no edit reads what an earlier edit of the batch may write, except for
+/// the samples that it changes itself. Digs, adds and paint read nothing else; edits that sculpt, and edits that rules
+/// restrict, read what is [around](PreparedEdit::reads) them. A batch also ends before there would be more than `most`
+/// bricks around its edits.
 pub(super) fn batches(edits: &[PreparedEdit], most: u64) -> Vec<Range<usize>> {
     let mut batches = Vec::new();
     let (mut first, mut bricks) = (0, 0);
@@ -71,7 +71,7 @@ mod tests {
         assert_eq!(of(&[smooth(20.0), dig(60.0), smooth(100.0), dig(20.0), dig(100.0)]), [0]);
         assert_eq!(of(&[dig(20.0), smooth(25.0), dig(25.0), smooth(90.0), smooth(20.0)]), [0, 1, 4]);
         assert_eq!(of(&[smooth(20.0), smooth(20.0), smooth(20.0)]), [0, 1, 2]);
-        // New ground looks for its material 64 voxels down and up, unless it is told one.
+        // Without a material, new ground searches 64 voxels down and up for one.
         let above = Shape::sphere(Vec3::new(20.0, 60.0, 50.0), 4.0);
         assert_eq!(of(&[dig(20.0), Brush::raise(above, 1.0)]), [0, 1]);
         assert_eq!(of(&[dig(20.0), Brush::raise(above, 1.0).with_material(MaterialId(1))]), [0]);
@@ -87,7 +87,7 @@ mod tests {
         assert_eq!(begins(&eight, 7 * 8), [0]);
         assert_eq!(begins(&eight, 3 * 8), [0, 3, 7]);
         assert_eq!(begins(&eight, 3 * 8 - 1), [0, 2, 5, 7]);
-        // One that is too large by itself.
+        // A single edit that exceeds the limit.
         assert_eq!(begins(&eight, 0), [0, 1, 2, 3, 5, 6, 7]);
         assert_eq!(begins(&[dig(-90.0), dig(16.0), dig(16.0)], 8), [0, 2]);
         // Large balls, some at a time.

@@ -1,4 +1,4 @@
-//! A brick under edit: its samples before and after, and what changed.
+//! A brick that is being edited: its samples before and after, and the changes.
 
 use std::sync::Arc;
 
@@ -13,9 +13,9 @@ use crate::volume::{Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_ha
 pub(super) struct BrickEditor<'a> {
     pub view: SampleView<'a>,
     pub pos: BrickPos,
-    /// What it was before.
+    /// Its earlier state.
     base: Option<&'a Brick>,
-    /// What it is now; `None` until its first sample changes.
+    /// Its present state; `None` until its first sample changes.
     brick: Option<Brick>,
     /// Heights of its columns.
     pub heights: [[i32; 8]; 8],
@@ -34,23 +34,23 @@ pub(super) struct Changed {
 }
 
 impl<'a> BrickEditor<'a> {
-    /// A brick as it is.
+    /// An editor for this brick.
     pub fn new(view: SampleView<'a>, pos: BrickPos) -> Self {
         let heights = view.ground().heights::<8>(Column::of(pos.origin()));
         Self { view, pos, base: view.brick(pos), brick: None, heights, changed: layers::NONE }
     }
 
-    /// The brick as it is now; `None` while all samples are pristine.
+    /// The present brick; `None` while all samples are pristine.
     pub fn current(&self) -> Option<&Brick> {
         self.brick.as_ref().or(self.base)
     }
 
-    /// The samples as they are now.
+    /// The present samples.
     pub fn samples(&self) -> &[Sample; 512] {
         self.current().map_or(&PRISTINE, Brick::samples)
     }
 
-    /// The brick, to be changed.
+    /// The present brick, for changes.
     #[inline]
     pub fn brick(&mut self) -> &mut Brick {
         let (base, heights, y) = (self.base, &self.heights, self.pos.origin().y);
@@ -139,14 +139,14 @@ impl<'a> BrickEditor<'a> {
         }
     }
 
-    /// By how much the brick changes the hash of the world's samples.
+    /// The change in the hash of the world's samples.
     fn hash_change(&self, brick: &Brick) -> u64 {
         let low = self.pos.origin();
         let mut columns = [0; 64];
         for bit in ones(layers::columns(&self.changed)) {
             columns[bit] = column_hash(Column::of(low + offset(bit)));
         }
-        // Samples that were pristine counted nothing.
+        // Pristine samples contribute nothing to the hash.
         let before = self.base.map_or(0, |base| {
             let stored = layers::and(&self.changed, base.edited());
             base.hash(low.y, &stored, &columns)

@@ -1,4 +1,4 @@
-//! What edits did to bricks, entered brick by brick and added up later.
+//! Changes that edits made to bricks, recorded brick by brick and summed later.
 
 use std::sync::Arc;
 
@@ -9,20 +9,20 @@ use crate::ground::MaterialId;
 use crate::lattice::{ChunkPos, ItemCost, LatticeBox};
 use crate::volume::VoxelOutcome;
 
-/// What edits did to some bricks.
+/// Changes that edits made to some bricks.
 #[derive(Default)]
 pub(crate) struct EditDelta {
     pub bricks: Vec<DraftedBrick>,
     pub parts: Vec<PartEffect>,
     pub counts: Vec<Count>,
-    /// What each edit did, in order, if parts and counts have been added up already; otherwise empty.
+    /// The effect of each edit, in order, if parts and counts have been summed already; otherwise empty.
     pub effects: Vec<EditEffect>,
-    /// By how much the hash of the world's samples changes.
+    /// The change in the hash of the world's samples.
     pub hash: u64,
 }
 
 impl EditDelta {
-    /// An empty delta with room for so many bricks.
+    /// An empty delta with room for `bricks` bricks.
     pub fn with_room(bricks: usize) -> Self {
         Self {
             bricks: Vec::with_capacity(bricks),
@@ -33,8 +33,8 @@ impl EditDelta {
         }
     }
 
-    /// Enters a brick. Neighbouring uniform bricks are mostly equal and share memory at once, so fewer of them have to be
-    /// freed when deltas are added up.
+    /// Enters a brick. Neighbouring uniform bricks are mostly equal and share memory at once, so fewer of them have to
+    /// be freed when deltas are added up.
     pub fn change(&mut self, mut drafted: DraftedBrick) {
         // Materials may be stored though all of them are the ground's own.
         let key = |of: &DraftedBrick| (of.kind, of.brick.bytes());
@@ -56,18 +56,18 @@ impl EditDelta {
         }
     }
 
-    /// Where an edit counts voxels. All entries of the edit at the end of the list are searched, so one brick never gets two
-    /// entries for the same outcome and material.
+    /// Where an edit counts voxels. All entries of the edit at the end of the list are searched, so one brick never
+    /// gets two entries for the same outcome and material.
     pub fn counts(&mut self, edit: usize) -> Counts<'_> {
         let own = self.counts.iter().rev().take_while(|count| count.edit == edit).count();
         Counts { edit, first: self.counts.len() - own, list: &mut self.counts }
     }
 }
 
-/// How many of the latest entries a new one is compared with.
+/// Number of latest entries that a new one is compared with.
 const LATEST: usize = 8;
 
-/// What one edit changed in one chunk, in one brick or in several.
+/// Changes by one edit in one chunk, in one brick or in several.
 pub(crate) struct PartEffect {
     pub edit: usize,
     pub chunk: ChunkPos,

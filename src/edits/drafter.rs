@@ -1,6 +1,6 @@
 //! Edits of a transaction drafted as new bricks, before anything is committed.
 //!
-//! Edits are split into batches, a [`backend`](crate::backend) applies each batch, and what they changed is added up here.
+//! Edits are split into batches, a [`backend`](crate::backend) applies each batch, and their changes are summed here.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -14,26 +14,26 @@ use crate::brush::Edit;
 use crate::lattice::{BrickPos, ChunkGrid, ItemCost, parallel_map};
 use crate::volume::{Brick, DiggingRules, SampleView, UniformBricks};
 
-/// What a list of edits makes of a world.
+/// The result of a list of edits on a world.
 #[derive(Debug, Default)]
 pub(crate) struct Draft {
     /// The bricks that changed, in order.
     pub bricks: Vec<DraftedBrick>,
-    /// What each edit changed, in order of the edits.
+    /// The effect of each edit, in order of the edits.
     pub effects: Vec<EditEffect>,
     /// Order-independent hash of every edited sample: point, density, material.
     pub hash: u64,
 }
 
-/// Applies prepared edits and hands out what they changed.
+/// Applies prepared edits and passes on their changes.
 pub(crate) type Apply<'a> = dyn Fn(&PreparedEdits, &mut dyn FnMut(&mut [EditDelta])) + 'a;
 
-/// Drafts edits over a world and over what it has drafted so far.
+/// Drafts edits over a world and over its own earlier drafts.
 pub(crate) struct Drafter<'a> {
     world: SampleView<'a>,
     grid: ChunkGrid,
     apply: &'a Apply<'a>,
-    /// Bricks drafted so far.
+    /// All bricks drafted up to now.
     pub overlay: Overlay,
     /// Hash of all samples.
     pub hash: u64,
@@ -53,12 +53,13 @@ impl<'a> Drafter<'a> {
         Self { world, grid, apply, overlay: Overlay::default(), hash, uniform: Cow::Borrowed(uniform) }
     }
 
-    /// The samples as they are so far.
+    /// The samples with all drafts up to now.
     pub fn samples(&self) -> SampleView<'_> {
         self.overlay.over(self.world)
     }
 
-    /// What edits make of the samples so far. [Lay](Overlay::lay) its bricks over these before the next draft.
+    /// Applies edits to the current samples. [Lay](Overlay::lay) the draft's bricks over these before the
+    /// next draft.
     pub fn draft(&mut self, edits: &[&Edit], rules: Option<&DiggingRules>) -> Draft {
         let edits: Vec<PreparedEdit> =
             edits.iter().map(|edit| PreparedEdit::new(self.grid, edit, rules)).collect();
@@ -66,7 +67,7 @@ impl<'a> Drafter<'a> {
         self.draft_batches(edits, &lengths, rules)
     }
 
-    /// The same with edits in batches of these lengths.
+    /// Like [`Self::draft`], with edits in batches of these lengths.
     fn draft_batches(
         &mut self,
         edits: Vec<PreparedEdit>,
@@ -95,7 +96,7 @@ impl<'a> Drafter<'a> {
         draft
     }
 
-    /// Adds to a draft what its edits did besides, and lays that over the samples so far.
+    /// Adds further changes of a draft's edits to the draft, and lays them over the current samples.
     pub fn extend(&mut self, draft: &mut Draft, delta: EditDelta) {
         let (edits, before) = (draft.effects.len(), draft.bricks.len());
         add(draft, 0, edits, &mut [delta], &mut self.hash, &mut self.uniform);
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_edits_come_to_the_same_in_batches_of_any_length() {
+    fn plain_edits_have_equal_results_in_batches_of_any_length() {
         let ground = Ground::from_fn(80, 70, |x, z| 20.0 + f64::from(x * 7 % 5 + z * 3 % 4)).unwrap();
         let (grid, bricks, edits) = (ChunkGrid::new(25, 80, 70), Bricks::default(), balls(40));
         let draft = |length: usize| {

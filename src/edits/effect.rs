@@ -1,4 +1,4 @@
-//! What edits change: the samples of bricks, and for each edit the chunks it reaches and the voxels it counts.
+//! Effects of edits: the changed samples of bricks, and for each edit the chunks it reaches and the voxels it counts.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,15 +8,15 @@ use rustc_hash::FxHashMap;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::volume::{Brick, Bricks, MaterialCounts, Refused, SampleView, UniformKind, VoxelOutcome};
 
-/// What one edit changed in one chunk.
+/// The part of an edit's changes that lies in one chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ChunkEffect {
     pub chunk: ChunkPos,
-    /// Box around the samples that changed, all of them the chunk's own.
+    /// Box around the samples that changed, all of them inside the chunk.
     pub bounds: LatticeBox,
 }
 
-/// What one edit changed.
+/// The effect of one edit.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct EditEffect {
     /// Each chunk whose samples changed, in order.
@@ -58,13 +58,13 @@ impl EditEffect {
 #[derive(Clone, Debug)]
 pub(crate) struct DraftedBrick {
     pub pos: BrickPos,
-    /// What it holds now.
+    /// Its new content.
     pub brick: Arc<Brick>,
     /// Box around the samples that changed.
     pub changed: LatticeBox,
-    /// Is a sample among them that had never been edited?
+    /// Whether any of them had never been edited before.
     pub is_extended: bool,
-    /// What all samples were edited to, if that is the same for all.
+    /// The common sample, if all samples were edited to the same.
     pub kind: Option<UniformKind>,
 }
 
@@ -98,7 +98,7 @@ impl MergedBricks {
     }
 }
 
-/// Drafted bricks over those of a world: what later edits of a transaction read.
+/// Drafted bricks over those of a world, as later edits of a transaction read them.
 #[derive(Default)]
 pub(crate) struct Overlay {
     bricks: Bricks,

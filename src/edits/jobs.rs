@@ -1,8 +1,8 @@
-//! Which edits may reach which bricks.
+//! Pairs of edits and the bricks that they may reach.
 //!
-//! Where there are many, threads share the bricks in slabs, one brick thick along x, whose results stand one after the other
-//! in order. Long thin brushes come near few bricks of the box around them, so up to 8x8x8 bricks are tested together before
-//! each is tested by itself.
+//! Where there are many, threads share the bricks in slabs, one brick thick along x, whose results stand one
+//! after the other in order. Long thin brushes come near few bricks of the box around them, so up to 8x8x8
+//! bricks are tested together before each is tested alone.
 
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ impl Job {
         self.pos
     }
 
-    /// Are both about the same brick?
+    /// Returns `true` if both concern the same brick.
     pub fn is_same_brick(a: &Self, b: &Self) -> bool {
         a.pos == b.pos
     }
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn few_edits_and_many_come_to_the_bricks_that_they_may_reach() {
+    fn few_and_many_edits_are_assigned_to_the_bricks_that_they_may_reach() {
         let mut rng = Rng::with_seed(8);
         for (count, size) in [(0, 0.0), (1, 3.0), (3, 9.0), (40, 30.0), (1, 150.0), (300, 2.0)] {
             let brush = |rng: &mut Rng| {

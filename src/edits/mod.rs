@@ -1,12 +1,13 @@
-//! How edits change bricks: from edits in a queue to new bricks, with what each edit did.
+//! Applies edits to bricks: from queued edits to new bricks, with the effect of each edit.
 //!
 //! ```text
 //! edits --batches--> batches of independent edits --jobs--> PreparedEdits, sorted by brick
 //!   --brick_editor, per brick--> EditDelta --drafter--> new bricks, effects, hash
 //! ```
 //!
-//! Edits that read samples around those they change, such as sculpting or those that [rules](crate::volume::DiggingRules)
-//! restrict, take the slower path of `stencil_edit`; all others are applied row by row by `plain_edit`.
+//! Edits that read samples around those they change, such as sculpting or those that
+//! [rules](crate::volume::DiggingRules) restrict, take the slower path of `stencil_edit`; all others are applied row by
+//! row by `plain_edit`.
 
 mod batches;
 mod brick_editor;

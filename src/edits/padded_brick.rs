@@ -112,7 +112,7 @@ impl PaddedBrick {
     }
 }
 
-/// Which of the padded samples along an axis lie in a world of so many cells; at least one, even where none does.
+/// The padded samples along an axis that lie in a world of `cells` cells; at least one, even where none does.
 fn inside(low: i32, cells: i32) -> RangeInclusive<usize> {
     let local = |at: i32| (at.saturating_sub(low)).clamp(0, SIDE as i32 - 1) as usize;
     local(0)..=local(cells)

@@ -38,7 +38,8 @@ impl BrickEditor<'_> {
 
     /// Digs or adds in rows of a layer; returns the samples that changed.
     ///
-    /// Densities saturate at 16 bits. That changes no sample: the operation compares them with depths of a few voxels only.
+    /// Densities saturate at 16 bits. That changes no sample: the operation compares them with depths of a few voxels
+    /// only.
     fn carve<'d>(
         &mut self,
         y: usize,

@@ -1,7 +1,7 @@
 //! Edits, sorted by the bricks that they may reach: the work that a [`backend`](crate::backend) does.
 //!
-//! Each brick takes its edits in order and by itself: bricks share no samples, so threads share no work, and what an edit
-//! changed is added up afterwards.
+//! Each brick applies its edits in order, independently of other bricks: bricks share no samples, so threads
+//! share no work. The changes of each edit are summed afterwards.
 
 use rayon::prelude::*;
 use wide::i16x8;
@@ -15,21 +15,22 @@ use super::rule_scope::{BatchRules, BrickRules};
 use crate::lattice::{ChunkGrid, ItemCost, pieces};
 use crate::volume::{DiggingRules, SampleView};
 
-/// How many jobs are done before their deltas are added up. With many edits deltas take more memory than bricks, and most
-/// bricks of a large cave are replaced by a shared one.
+/// Number of jobs that are done before their deltas are summed. With many edits deltas take more memory than bricks,
+/// and most bricks of a large cave are replaced by a shared one.
 const JOBS_AT_ONCE: usize = 8192;
 
-/// Least and most jobs of a delta: few, so that all threads end together, but not so few that there are many deltas to add up.
+/// Least and most jobs of a delta: few, so that all threads end together, but not so few that there are many deltas to
+/// add up.
 const GROUP: [usize; 2] = [16, 64];
 
-/// How many groups there should be for each thread.
+/// Desired number of groups for each thread.
 const GROUPS_PER_THREAD: usize = 8;
 
 /// A batch of edits, sorted by the bricks that they may reach.
 pub(crate) struct PreparedEdits<'a> {
-    /// What they apply to.
+    /// The samples that they apply to.
     pub base: SampleView<'a>,
-    /// How the world is cut into chunks.
+    /// The grid of chunks and tiles.
     pub grid: ChunkGrid,
     pub edits: Vec<PreparedEdit>,
     jobs: Vec<Job>,
@@ -55,14 +56,14 @@ impl<'a> PreparedEdits<'a> {
         Self::of(base, grid, edits, None)
     }
 
-    /// The same edits under rules.
+    /// These edits, restricted by rules.
     #[cfg(feature = "cuda")]
     pub fn under(mut self, rules: Option<&'a DiggingRules>) -> Self {
         self.edits.iter_mut().for_each(|edit| edit.set_rules(rules));
         Self::of(self.base, self.grid, self.edits, rules)
     }
 
-    /// Does any edit read other samples than those that it changes?
+    /// Returns `true` if any edit reads other samples than those that it changes.
     #[cfg(feature = "cuda")]
     pub fn looks_around(&self) -> bool {
         self.edits.iter().any(PreparedEdit::looks_around)
@@ -89,8 +90,8 @@ impl<'a> PreparedEdits<'a> {
         &self.jobs
     }
 
-    /// Applies all edits on the CPU and calls `each` with what they changed, brick by brick. The result does not depend on how
-    /// many threads there are.
+    /// Applies all edits on the CPU and calls `each` with their changes, brick by brick. The result does not depend
+    /// on how many threads there are.
     pub fn run(&self, mut each: impl FnMut(&mut [EditDelta])) {
         let work = |jobs: &[Job]| {
             let mut delta = EditDelta::with_room(jobs.len().min(GROUP[1]));

@@ -1,4 +1,4 @@
-//! An edit with what is derived from it once.
+//! An edit with derived data that is computed once.
 
 use glam::IVec3;
 
@@ -6,10 +6,10 @@ use crate::brush::{Edit, Evaluator, Kind, SculptKernel};
 use crate::lattice::{ChunkGrid, LatticeBox};
 use crate::volume::DiggingRules;
 
-/// How far below and above itself new ground looks for its material, in voxels.
+/// Distance in voxels, down and up, within which new ground searches for its material.
 pub(super) const LOOK: i32 = 64;
 
-/// An edit with what is derived from it once.
+/// An edit with derived data that is computed once.
 pub(crate) struct PreparedEdit {
     /// The part of the edit's reach that lies in the world.
     pub reach: Option<LatticeBox>,
@@ -17,7 +17,7 @@ pub(crate) struct PreparedEdit {
     pub evaluator: Evaluator,
     pub sculptor: Option<SculptKernel>,
     pub power: u8,
-    /// May a digging rule restrict it? If not, it does what it would do without any rule.
+    /// Whether a digging rule may restrict it. If not, it acts as without any rule.
     pub is_ruled: bool,
 }
 
@@ -41,7 +41,7 @@ impl PreparedEdit {
             rules.zip(self.reach).is_some_and(|(rules, own)| may_restrict(rules, own, self.power));
     }
 
-    /// Does the edit read other samples than those that it changes?
+    /// Returns `true` if the edit reads other samples than those that it changes.
     pub fn looks_around(&self) -> bool {
         self.sculptor.is_some() || self.is_ruled
     }
@@ -54,7 +54,7 @@ impl PreparedEdit {
         Some(LatticeBox { min: all.min - look, max: all.max + look })
     }
 
-    /// May the edit change some of these samples? If not, it certainly changes none.
+    /// Returns `true` if the edit may change some of these samples; `false` if it certainly changes none.
     pub(super) fn reaches(&self, samples: LatticeBox) -> bool {
         let reached = self.reach.and_then(|reach| reach.intersection(samples));
         reached.is_some_and(|samples| !self.evaluator.is_out_of_reach(samples))
@@ -66,7 +66,7 @@ pub(crate) fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
     edit.reach().intersection(grid.edit_bounds())
 }
 
-/// May some rule restrict an edit of this power that changes these samples?
+/// Returns `true` if some rule may restrict an edit of this power that changes these samples.
 fn may_restrict(rules: &DiggingRules, samples: LatticeBox, power: u8) -> bool {
     let around = samples.grown(1);
     !rules.unbreakable.is_empty()
@@ -81,14 +81,14 @@ mod tests {
     use crate::ground::MaterialId;
 
     #[test]
-    fn edits_that_no_rule_can_restrict_are_told_apart() {
+    fn edits_that_no_rule_can_restrict_are_recognised() {
         let samples = LatticeBox::point(IVec3::ZERO).grown(4);
         let restricts = |rules: DiggingRules| may_restrict(&rules, samples, 100);
         let (none, at) = (DiggingRules::default, |x| LatticeBox::point(IVec3::new(x, 0, 0)));
         assert!(!restricts(none()) && !restricts(none().with_hardness(MaterialId(1), 100)));
         assert!(restricts(none().with_hardness(MaterialId(1), 101)));
         assert!(restricts(none().with_unbreakable(MaterialId(1))));
-        // A neighbour that stays holds the surface.
+        // A neighbour that does not change also defines the surface.
         assert!(restricts(none().with_bedrock(-4)) && !restricts(none().with_bedrock(-5)));
         assert!(restricts(none().with_protected(at(5))) && !restricts(none().with_protected(at(6))));
         let inverted = LatticeBox { min: IVec3::splat(i32::MAX), max: IVec3::splat(-i32::MAX) };

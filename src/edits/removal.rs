@@ -1,4 +1,4 @@
-//! Samples taken out of a brick: what was a piece of ground becomes air.
+//! Removes samples from a brick: a loose piece of ground becomes air.
 
 use super::brick_editor::BrickEditor;
 use super::delta::EditDelta;
@@ -7,8 +7,9 @@ use crate::lattice::{BrickPos, ChunkGrid};
 use crate::volume::layers::{self, Layers, offset, ones};
 use crate::volume::{SampleView, row};
 
-/// Turns samples of a brick to the air that the middle of a large dig is, and enters that into `delta` as changes of the edit
-/// with number `edit`. None of them may lie outside the world's columns. Samples that are such air already stay as they are.
+/// Turns samples of a brick to the air that the middle of a large dig is, and enters that into `delta` as changes of
+/// the edit with number `edit`. None of them may lie outside the world's columns. Samples that are such air already
+/// stay as they are.
 pub(crate) fn take_out(
     view: SampleView,
     grid: ChunkGrid,

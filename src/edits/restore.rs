@@ -1,4 +1,4 @@
-//! One state of a brick in place of another, as undo and redo put them.
+//! Replaces one state of a brick by another, for undo and redo.
 
 use super::effect::EditEffect;
 use crate::ground::{Ground, MaterialId};
@@ -6,8 +6,8 @@ use crate::lattice::{BrickPos, LatticeBox};
 use crate::volume::layers::{self, Layers, offset};
 use crate::volume::{Brick, MaterialCounts, pristine_layers, resolve};
 
-/// Counts the voxels that change when a brick is put in place of another; `None` stands for a pristine one. Returns the box
-/// around samples that differ.
+/// Counts the voxels that change when a brick is put in place of another; `None` stands for a pristine one. Returns the
+/// box around samples that differ.
 pub(crate) fn count_replaced(
     ground: &Ground,
     pos: BrickPos,

@@ -1,5 +1,6 @@
-//! Where digging rules apply: to which edits of a batch, and to which samples of a brick. A world may have thousands of
-//! protected boxes: edits search them once or twice, bricks search those nearby, and samples look up a bit.
+//! The scope of digging rules: the edits of a batch and the samples of a brick that they restrict. A world may have
+//! thousands of protected boxes: edits search them once or twice, bricks search those nearby, and samples look up a
+//! bit.
 
 use glam::IVec3;
 
@@ -32,7 +33,7 @@ const SIDE: usize = BRICK as usize + 2;
 /// The rules as they apply to one brick.
 pub(super) struct BrickRules<'a> {
     pub rules: &'a DiggingRules,
-    /// The lowest sample beside the brick.
+    /// The lowest sample of the layer around the brick.
     low: IVec3,
     /// Which samples of the brick, and of one more on all sides, are protected: a bit for each x, by y and z.
     protected: [[u16; SIDE]; SIDE],
@@ -52,13 +53,14 @@ impl<'a> BrickRules<'a> {
         own
     }
 
-    /// Does no operation change this sample, which must lie in the brick or beside it?
+    /// Returns `true` if no operation changes this sample, which must lie in the brick or next to it.
     pub fn is_protected(&self, at: IVec3) -> bool {
         let at = (at - self.low).as_usizevec3();
         self.protected[at.y][at.z] >> at.x & 1 == 1
     }
 
-    /// The density that rules allow a sample of the brick in place of the proposed one, and why, where it is another one.
+    /// The density that rules allow a sample of the brick in place of the proposed one, and why, where it is another
+    /// one.
     pub fn judge(
         &self,
         view: &SampleView,
@@ -83,7 +85,7 @@ impl<'a> BrickRules<'a> {
         let (part, outcome) = if before < 0 {
             pace(at)
         } else {
-            // Air beside what is solid holds its surface.
+            // Air next to solid samples also defines the surface.
             solid_faces().map(holds).min_by_key(|(part, _)| *part).unwrap_or((ONE, None))
         };
         let change = (i64::from(proposed) - i64::from(before)) * i64::from(part);

@@ -130,7 +130,7 @@ impl BrickEditor<'_> {
     }
 }
 
-/// The nearest ground straight below and above the samples of a brick, for edits that build without a material of their own.
+/// The nearest ground straight below and above the samples of a brick, for edits that build without a given material.
 /// Each column must be asked from below upwards, so that every sample of it is looked at once.
 struct NearestGround {
     below: [Option<Below>; 64],
@@ -152,7 +152,8 @@ struct Below {
 }
 
 impl NearestGround {
-    /// The material for a point that becomes solid: of the ground straight below, else straight above, else beside it.
+    /// The material for a point that becomes solid: of the ground straight below, else straight above, else
+    /// next to it.
     fn material(&mut self, view: &SampleView, point: IVec3, around: &Stencil) -> MaterialId {
         let column = ((point.z & 7) * 8 + (point.x & 7)) as usize;
         let known = &mut self.below[column];
@@ -205,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn new_ground_in_mid_air_is_what_lies_nearest_below_above_or_beside() {
+    fn new_ground_in_mid_air_has_the_nearest_material_below_above_or_next_to_it() {
         let ground = Ground::flat(24, 24, -300.0).unwrap();
         let pos = BrickPos(IVec3::new(1, 0, 1));
         let mut found = [0; 2];

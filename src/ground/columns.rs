@@ -1,11 +1,12 @@
-//! Asking a source for columns that lie in rows and lines, but clamped to the rim of the world.
+//! Requests to a source for columns in rows and lines, clamped to the rim of the world.
 
 use std::ops::Range;
 
 use super::source::ColumnGrid;
 use crate::lattice::Column;
 
-/// Coordinates that a source can be asked for at once: so many from `low` on, or one that all places of the range share.
+/// Coordinates that a source can be asked for at once: a range from `low` on, or one coordinate that all
+/// places share.
 #[derive(Debug, PartialEq)]
 struct Run {
     low: i32,

@@ -1,4 +1,4 @@
-//! Material control: which column is made of what.
+//! Material control: decides the materials of columns.
 
 use super::error::GroundError;
 use super::grey_image::GreyImage;
@@ -7,11 +7,12 @@ use super::rules::MaterialRule;
 use crate::lattice::hash::hash_words;
 
 /// Decides the materials of every column. Images are stretched over the world, their first sample at column (0, 0),
-/// their last at the far corner. None of the materials may be [`MaterialId::GROUND`], which has no look of its own.
+/// their last at the far corner. None of the materials may be [`MaterialId::GROUND`], which stands for the ground's own
+/// materials.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MaterialControl {
-    /// The same for every column.
+    /// One material for every column.
     Uniform(ColumnMaterial),
     /// By height and slope: `base` everywhere, and over it the rules like coats of paint, the first on top. A column
     /// shows as overlay the rule that covers most of it, blended by how much all rules together cover.
@@ -48,7 +49,7 @@ impl Default for MaterialControl {
 }
 
 impl MaterialControl {
-    /// Can ground be made of these materials?
+    /// Checks that ground can be made of these materials.
     pub(super) fn check(&self) -> Result<(), GroundError> {
         let check_base = |base: &MaterialId| base.check("the base material");
         match self {

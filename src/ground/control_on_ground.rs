@@ -1,4 +1,4 @@
-//! What a material control gives on a ground, column by column.
+//! Evaluates a material control on a ground, column by column.
 
 use super::control::{MaterialControl, id};
 use super::error::GroundError;
@@ -9,12 +9,12 @@ use super::world::{Ground, Materials};
 use crate::lattice::{Column, ONE};
 
 impl MaterialControl {
-    /// What a column of a ground is made of.
+    /// The materials of a column.
     pub(super) fn at(&self, ground: &Ground, column: Column) -> ColumnMaterial {
         self.of_column(ground, column, || (ground.height(column), ground.slope(column)))
     }
 
-    /// The same, where height and slope may be asked for.
+    /// The material of a column, with access to its height and slope.
     pub(super) fn of_column(
         &self,
         ground: &Ground,
@@ -41,7 +41,7 @@ impl MaterialControl {
 }
 
 impl Ground {
-    /// The same heights, with materials as `control` decides.
+    /// This ground, with materials as `control` decides.
     ///
     /// # Errors
     /// [`GroundError::Parameter`] for a rule with a parameter out of its range, and if a material is
@@ -213,7 +213,17 @@ mod tests {
             let rule = MaterialRule { overlay: GRASS, height: (low, high), height_fade, slope: steep, slope_fade };
             let control = MaterialControl::Rules { base: ROCK, rules: vec![rule, rule] };
             let ground = Ground::from_heights(1, 1, vec![-99, 1 << 23, 0, -(1 << 23)]).unwrap();
-            let _ = ground.with_materials(&control);
+            match ground.with_materials(&control) {
+                Ok(ground) => {
+                    for (x, z) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                        let material = ground.column_material(Column::new(x, z));
+                        prop_assert_eq!(material.base, ROCK);
+                        prop_assert!(material.blend == 0 || material.overlay == GRASS, "{:?}", material);
+                    }
+                }
+                Err(GroundError::Parameter { .. }) => {}
+                Err(error) => prop_assert!(false, "{error}"),
+            }
         }
 
         #[test]

@@ -1,4 +1,4 @@
-//! Why ground cannot be made, and why an image cannot be read.
+//! Errors of grounds and images.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::{MAX_SIZE, MAX_SOURCE_SIZE};
 use crate::lattice::LIMIT;
 
-/// Why ground cannot be made from what was given.
+/// An error of making ground.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GroundError {
@@ -70,7 +70,7 @@ pub enum GroundError {
         allowed: &'static str,
     },
     /// The machine has too little memory for the world.
-    #[error("the machine has no {bytes} bytes of memory left for the world")]
+    #[error("the machine cannot allocate {bytes} bytes of memory for the world")]
     Memory {
         /// Bytes asked for; `usize::MAX` where their number does not fit.
         bytes: usize,
@@ -80,7 +80,7 @@ pub enum GroundError {
     Image(#[from] ImageError),
 }
 
-/// Why a [`GreyImage`](super::GreyImage) cannot be read.
+/// An error of reading a [`GreyImage`](super::GreyImage).
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -139,11 +139,11 @@ pub enum ImageError {
         width: u32,
         /// Rows.
         height: u32,
-        /// What is counted: `"bytes"` or `"samples"`.
+        /// The unit that is counted: `"bytes"` or `"samples"`.
         unit: &'static str,
         /// How many the dimensions ask for.
         expected: u64,
-        /// How many there are.
+        /// Their number.
         actual: u64,
     },
     /// The file is no PNG, is damaged, or uses something that the decoder does not know.

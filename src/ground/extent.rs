@@ -19,7 +19,7 @@ impl Extent {
         Self::within(MAX_SIZE, width, depth).ok_or(GroundError::Size { width, depth })
     }
 
-    /// The same with a source: each 1 to [`MAX_SOURCE_SIZE`].
+    /// The extent of ground with a source: each side 1 to [`MAX_SOURCE_SIZE`].
     pub(super) fn of_source(width: u32, depth: u32) -> Result<Self, GroundError> {
         Self::within(MAX_SOURCE_SIZE, width, depth).ok_or(GroundError::SourceSize { width, depth })
     }
@@ -60,7 +60,7 @@ impl Extent {
         self.inner_index(self.clamp(column))
     }
 
-    /// The same of a column that lies in the world; of any other, some number.
+    /// The index of a column inside the world; an arbitrary number for any other column.
     pub(super) fn inner_index(self, Column { x, z }: Column) -> usize {
         (z as usize).wrapping_mul(self.row_len()).wrapping_add(x as usize)
     }

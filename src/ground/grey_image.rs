@@ -18,7 +18,7 @@ pub enum RawFormat {
     BigEndian,
 }
 
-/// What an image may cost; checked against what the file declares, before memory is allocated for it.
+/// Limits of an image's size, checked against the file's header before memory is allocated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ImageLimits {
     /// Most bytes of the file.
@@ -166,7 +166,7 @@ impl LinePosition {
         Self { sample: parts / parts_per_sample, fraction }
     }
 
-    /// The same for many parts, as long as the sample's number fits.
+    /// A position by a large number of parts, as long as the sample's number fits.
     pub fn of_long(parts: u64, parts_per_sample: u32) -> Self {
         let per_sample = u64::from(parts_per_sample);
         let fraction = f64::from((parts % per_sample) as u32) / f64::from(parts_per_sample);

@@ -10,7 +10,8 @@ use super::world::Ground;
 /// Most voxels from one sample of an image to the next.
 pub const MAX_VOXELS_PER_SAMPLE: u32 = 64;
 
-/// How an image becomes heights. Its columns run along +x, its rows along +z; its first sample lies at column (0, 0).
+/// The scale of an image of heights. Its columns run along +x, its rows along +z; its first sample lies at column (0,
+/// 0).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImageScale {
@@ -40,7 +41,7 @@ impl Default for ImageScale {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Detail {
-    /// How far heights rise and fall at most, in voxels; may be negative.
+    /// Greatest height above and below the middle, in voxels; may be negative.
     pub amplitude: f64,
     /// Size of the largest features in voxels: 1 to [`MAX_SCALE`](super::MAX_SCALE). About `voxels_per_sample` fits.
     pub scale: f64,

@@ -1,4 +1,4 @@
-//! What the ground is made of.
+//! Materials of the ground.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::error::GroundError;
 use crate::lattice::ONE;
 
-/// How deep the overlay reaches below the surface: 1.5 voxels, in 1/256 voxel.
+/// Depth of the overlay below the surface: 1.5 voxels, in 1/256 voxel.
 pub const OVERLAY_DEPTH: i32 = ONE + ONE / 2;
 
 /// Identifies a material; the renderer decides what it looks like.
@@ -16,8 +16,8 @@ pub const OVERLAY_DEPTH: i32 = ONE + ONE / 2;
 pub struct MaterialId(pub u8);
 
 impl MaterialId {
-    /// The ground's own material at that place, computed and never stored: that of samples that were never built or painted.
-    /// Painting with it restores the ground's own look. No ground can be made of it.
+    /// The ground's own material at that place, computed and never stored: that of samples that were never built or
+    /// painted. Painting with it restores the ground's own look. No ground can be made of it.
     pub const GROUND: Self = Self(u8::MAX);
 
     /// Checks a parameter of this name: ground cannot be made of [`Self::GROUND`].
@@ -37,7 +37,7 @@ pub struct ColumnMaterial {
     pub base: MaterialId,
     /// The skin, [`OVERLAY_DEPTH`] thick.
     pub overlay: MaterialId,
-    /// How much the overlay covers: 0 shows the base only, 255 the overlay only.
+    /// Share of the surface that the overlay covers: 0 shows the base only, 255 the overlay only.
     pub blend: u8,
 }
 

@@ -7,12 +7,12 @@
 //! | --- | --- |
 //! | a number, a function, a list | [`Ground::flat`], [`Ground::from_fn`], [`Ground::from_heights`] |
 //! | a grey PNG or RAW image | [`GreyImage::decode_png`], [`GreyImage::decode_raw`], then [`Ground::from_image`] |
-//! | noise | [`Ground::from_noise`] |
+//! | noise | [`Ground::from_noise`], or [`Ground::from_noise_fn`] for any function of the crate [`noise`] |
 //! | anything of these and more, computed where it is needed | a [`HeightSource`], then [`Ground::from_source`] |
 //! | materials by slope, height or image | [`Ground::with_materials`] |
 //! | strata and ore below the surface | [`Ground::with_strata`], [`Ground::with_material_fn`] |
 //!
-//! The same input gives the same bits on every machine: heights and materials are computed with additions,
+//! Equal input gives equal bits on every machine: heights and materials are computed with additions,
 //! multiplications, divisions and square roots in a fixed order, then rounded to integers. [`Ground::hash`] sums it up.
 //! All input is checked, and invalid input is refused with an error that names the value.
 
@@ -25,8 +25,8 @@ mod grey_image;
 mod image_heights;
 mod material;
 mod noise_heights;
+mod noise_params;
 mod noise_rows;
-mod noise_terms;
 mod on_demand;
 mod page;
 mod pages;
@@ -38,6 +38,9 @@ mod sources;
 mod strata;
 mod world;
 
+#[doc(no_inline)]
+pub use ::noise;
+
 pub use control::MaterialControl;
 pub use error::{GroundError, ImageError};
 pub use grey_image::{GreyImage, ImageLimits, RawFormat};
@@ -45,7 +48,7 @@ pub use image_heights::{Detail, ImageScale, MAX_VOXELS_PER_SAMPLE};
 pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]
-pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
+pub(crate) use noise_params::{NoiseFactors, NoiseParams};
 pub(crate) use page::GroundPage;
 pub use rules::MaterialRule;
 pub use source::{ColumnGrid, FunctionSource, HeightSource, ImageSource, InsetSource, NoiseSource};
@@ -65,7 +68,8 @@ pub const MAX_SIZE: u32 = 16_384;
 /// Most cells along one side of a world with a [`HeightSource`]: the same as brushes [reach](crate::lattice::REACH).
 ///
 /// Positions in 1/4096 voxel, counted from the world's origin, would fit 32 bits up to 524,287 voxels. But a
-/// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536 voxels from the origin,
-/// and to 1/64 voxel at the far end of such a world. Meshes lie beside their own origins and lose nothing; a camera that goes
-/// that far needs an origin that follows it, as in any game with `f32` transforms.
+/// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536
+/// voxels from the origin, and to 1/64 voxel at the far end of such a world. Meshes are stored relative to
+/// their own origins and lose nothing; a camera that goes that far needs an origin that follows it, as in any
+/// game with `f32` transforms.
 pub const MAX_SOURCE_SIZE: u32 = crate::lattice::REACH.cast_unsigned();

@@ -12,8 +12,8 @@ pub const MAX_OCTAVES: u32 = 16;
 /// Largest size of a noise's features, in voxels; the smallest is 1.
 pub const MAX_SCALE: f64 = 1_048_576.0;
 
-/// The kind of landscape that the noise makes. Both use Perlin's gradient noise, which needs no function whose last bits differ
-/// from machine to machine.
+/// The kind of landscape that the noise makes. Both use Perlin's gradient noise, which needs no function whose last
+/// bits differ from machine to machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -37,7 +37,7 @@ pub struct NoiseHeights {
     pub octaves: u32,
     /// Size of the largest features in voxels: 1 to [`MAX_SCALE`].
     pub scale: f64,
-    /// How far heights rise above and fall below `base` at most, in voxels; may be negative.
+    /// Greatest height above and below `base`, in voxels; may be negative.
     pub amplitude: f64,
     /// Middle height in voxels.
     pub base: f64,
@@ -63,6 +63,35 @@ impl Ground {
         let noise = noise.generator()?;
         Self::from_fn(width, depth, |x, z| base + amplitude * noise(x, z))
     }
+
+    /// Ground of `width` x `depth` cells from any function of the crate [`noise`](super::noise): the height in voxels
+    /// over the column (x, z) is `noise.get([x, z])`, rounded to 1/256. Scale it with the crate's `ScalePoint` and
+    /// `ScaleBias`. Rows are evaluated in parallel.
+    ///
+    /// The crate's gradient, value and cellular noise give the same bits on every machine. Functions that call sines
+    /// or cosines, such as `RotatePoint`, may not.
+    ///
+    /// ```
+    /// use bevy_burrow::ground::noise::{Billow, Perlin, ScaleBias, ScalePoint};
+    /// use bevy_burrow::prelude::*;
+    ///
+    /// // Features 200 voxels wide, heights around 20 voxels.
+    /// let dunes = ScalePoint::new(Billow::<Perlin>::new(7)).set_scale(1.0 / 200.0);
+    /// let dunes = ScaleBias::new(dunes).set_scale(12.0).set_bias(20.0);
+    /// let ground = Ground::from_noise_fn(256, 256, &dunes)?;
+    /// # assert_ne!(ground.height_range().0, ground.height_range().1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`Self::from_fn`].
+    pub fn from_noise_fn(
+        width: u32,
+        depth: u32,
+        noise: &(impl NoiseFn<f64, 2> + Sync),
+    ) -> Result<Self, GroundError> {
+        Self::from_fn(width, depth, |x, z| noise.get([x.into(), z.into()]))
+    }
 }
 
 /// Noise within -1 to 1 over the column (x, z), from checked parameters.
@@ -75,8 +104,8 @@ pub(super) const ORIGIN: [f64; 2] = [0.37, 0.71];
 /// A sum of octaves of Perlin's gradient noise, of checked parameters.
 pub(super) enum Octaves {
     Fractal(Fbm<Perlin>),
-    /// It starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that every ridged noise has
-    /// at its own origin, counted from -1.
+    /// It starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that every ridged noise
+    /// has at its own origin, counted from -1.
     Ridged(RidgedMulti<Perlin>, f64),
 }
 
@@ -160,7 +189,31 @@ mod tests {
             base in prop_oneof![3 => -99.0..99.0, 1 => any::<f64>()],
         ) {
             let kind = KINDS[usize::from(ridged)];
-            let _ = Ground::from_noise(3, 3, &NoiseHeights { seed, kind, octaves, scale, amplitude, base });
+            match Ground::from_noise(3, 3, &NoiseHeights { seed, kind, octaves, scale, amplitude, base }) {
+                Ok(ground) => {
+                    let (low, high) = ground.height_range();
+                    prop_assert!(low >= -LIMIT * 256 && high <= LIMIT * 256);
+                    prop_assert!((1..=MAX_OCTAVES).contains(&octaves) && (1.0..=MAX_SCALE).contains(&scale));
+                    prop_assert!(base.is_finite() && amplitude.is_finite());
+                }
+                Err(GroundError::Parameter { .. } | GroundError::Height { .. }) => {}
+                Err(error) => prop_assert!(false, "{error}"),
+            }
+        }
+
+        /// The noise of [`NoiseHeights`] is the crate's own, sampled at scaled points.
+        #[test]
+        fn any_noise_function_makes_ground(seed: u32, scale in 1.0..999.0, bias in -99.0..99.0) {
+            let points = |x: f64, z: f64| [x * (1.0 / scale), z * (1.0 / scale)];
+            let noise = noise::ScalePoint::new(Perlin::new(seed)).set_scale(1.0 / scale);
+            let noise = noise::ScaleBias::new(noise).set_scale(20.0).set_bias(bias);
+            let ground = Ground::from_noise_fn(9, 7, &noise).unwrap();
+            let perlin = Perlin::new(seed);
+            for (x, z) in [(0, 0), (9, 0), (0, 7), (5, 3)] {
+                let height = perlin.get(points(x.into(), z.into())) * 20.0 + bias;
+                let found = ground.height(crate::lattice::Column::new(x, z));
+                prop_assert_eq!(found, (height * 256.0).round() as i32);
+            }
         }
 
         #[test]
@@ -173,6 +226,16 @@ mod tests {
             let reach = (f64::abs(amplitude) * 256.0).ceil() as i32;
             prop_assert!(low >= 7 * 256 - reach && high <= 7 * 256 + reach);
         }
+    }
+
+    #[test]
+    fn a_noise_function_without_a_height_is_refused() {
+        let noise = noise::Constant::new(f64::NAN);
+        assert!(matches!(Ground::from_noise_fn(2, 2, &noise), Err(GroundError::Height { x: 0, z: 0, .. })));
+        assert!(matches!(
+            Ground::from_noise_fn(0, 2, &noise::Constant::new(1.0)),
+            Err(GroundError::Size { .. })
+        ));
     }
 
     #[test]

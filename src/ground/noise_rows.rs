@@ -1,11 +1,12 @@
-//! Octaves of Perlin noise over rows of columns, bit by bit those of the crate `noise`: the same operations in the same order,
-//! as in `kernels/heights.cuh`, but several columns at a time, and what a row shares only once.
+//! Octaves of Perlin noise over rows of columns, equal bit by bit to those of the crate `noise`: the same operations in
+//! the same order, as in `kernels/heights.cuh`, but for several columns at a time, and with values that a row shares
+//! computed only once. Tests compare it with the crate, and the GPU kernel with it.
 
 use std::array::from_fn;
 use std::f64::consts::SQRT_2;
 
 use super::noise_heights::NoiseKind;
-use super::noise_terms::NoiseTerms;
+use super::noise_params::NoiseParams;
 
 /// Columns at a time.
 const LANES: usize = 8;
@@ -14,22 +15,22 @@ const LANES: usize = 8;
 type Lanes = [f64; LANES];
 
 /// Quintic fade curve: first and second derivatives are zero at both ends.
-fn eased(t: f64) -> f64 {
+fn fade(t: f64) -> f64 {
     t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
 }
 
-fn blended(a: f64, b: f64, t: f64) -> f64 {
+fn lerp(a: f64, b: f64, t: f64) -> f64 {
     b * t + a * (1.0 - t)
 }
 
 /// Dot product of one of four diagonal gradients with the offset from its corner.
-fn sloped(hash: u8, x: f64, z: f64) -> f64 {
-    let turned = |at: f64, bit: u32| f64::from_bits(at.to_bits() ^ u64::from(hash >> bit & 1) << 63);
-    turned(x, 0) + turned(z, 1)
+fn gradient_dot(hash: u8, x: f64, z: f64) -> f64 {
+    let flip_sign = |at: f64, bit: u32| f64::from_bits(at.to_bits() ^ u64::from(hash >> bit & 1) << 63);
+    flip_sign(x, 0) + flip_sign(z, 1)
 }
 
-/// The whole number below, and what is left.
-fn parts(at: f64) -> (i64, f64) {
+/// The floor of a number, and its fraction.
+fn floor_fract(at: f64) -> (i64, f64) {
     let whole = at as i64;
     let whole = whole - i64::from(at < whole as f64);
     (whole, at - whole as f64)
@@ -37,20 +38,20 @@ fn parts(at: f64) -> (i64, f64) {
 
 /// Gradient noise at points of a row.
 fn perlin(table: &[u8; 256], xs: &Lanes, z: f64) -> Lanes {
-    let (row, v) = parts(z);
-    let (north, south, bend) = (row as u8, (row + 1) as u8, eased(v));
+    let (row, v) = floor_fract(z);
+    let (north, south, bend) = (row as u8, (row + 1) as u8, fade(v));
     let hash = |own: u8| table[usize::from(own)];
     from_fn(|lane| {
-        let (column, u) = parts(xs[lane]);
+        let (column, u) = floor_fract(xs[lane]);
         let (west, east) = (hash(column as u8), hash((column + 1) as u8));
         let side = |own: u8, u: f64| {
-            blended(sloped(hash(own ^ north), u, v), sloped(hash(own ^ south), u, v - 1.0), bend)
+            lerp(gradient_dot(hash(own ^ north), u, v), gradient_dot(hash(own ^ south), u, v - 1.0), bend)
         };
-        (blended(side(west, u), side(east, u - 1.0), eased(u)) * (2.0 / SQRT_2)).clamp(-1.0, 1.0)
+        (lerp(side(west, u), side(east, u - 1.0), fade(u)) * (2.0 / SQRT_2)).clamp(-1.0, 1.0)
     })
 }
 
-impl NoiseTerms {
+impl NoiseParams {
     /// Heights in voxels of a row of columns, the first at `x` and each `stride` farther along x; not rounded.
     pub fn row(&self, x: i32, z: i32, stride: i32, heights: &mut [f64]) {
         let numbers = &self.numbers;
@@ -118,7 +119,7 @@ mod tests {
             let heights = NoiseHeights { seed, kind, octaves, scale, amplitude, base: 3.0 };
             let noise = heights.generator().unwrap();
             let mut row = vec![0.0; count];
-            heights.terms(1, 1).unwrap().row(x, z, stride, &mut row);
+            heights.params(1, 1).unwrap().row(x, z, stride, &mut row);
             for (at, own) in (0..).zip(row) {
                 let expected = 3.0 + amplitude * noise(x + at * stride, z);
                 prop_assert_eq!(own.to_bits(), expected.to_bits(), "column {} of the row", at);

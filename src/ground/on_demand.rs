@@ -14,11 +14,12 @@ use crate::lattice::Column;
 use crate::lattice::hash::hash_words;
 
 impl Ground {
-    /// Ground of `width` x `depth` cells whose heights, and materials if it has any, a source gives when they are needed.
+    /// Ground of `width` x `depth` cells whose heights, and materials if any, come from a source on demand.
     ///
-    /// Memory follows what is looked at: 64 x 64 columns at a time are computed, some 18 kB for their heights and up to 4 bytes
-    /// more a column for materials and strata, and kept [within a budget](Self::with_page_budget). All else is as if the same
-    /// heights were in memory, but for [`Self::hash`] and [`Self::height_range`], which say what the source promised.
+    /// Memory depends on the columns in use: pages of 64 x 64 columns are computed, with about 18 kB for
+    /// their heights and up to 4 bytes a column for materials and strata, and kept [within a
+    /// budget](Self::with_page_budget). All else is as if the same heights were in memory, but for
+    /// [`Self::hash`] and [`Self::height_range`], which say what the source promised.
     ///
     /// # Errors
     /// [`GroundError::SourceSize`] unless width and depth are 1 to [`MAX_SOURCE_SIZE`](super::MAX_SOURCE_SIZE).
@@ -27,14 +28,14 @@ impl Ground {
         Ok(Self::of_pages(extent, Pages::new(Box::new(source), extent)))
     }
 
-    /// The same ground, which keeps at most so many bytes of computed pages; 32 MiB unless told otherwise. Each thread keeps up to
-    /// four pages beyond that. A small budget costs time, and changes nothing else. Does nothing without a
+    /// This ground with another budget for computed pages, in bytes; 32 MiB by default. Each thread keeps up
+    /// to four pages beyond that. A small budget costs time, and changes nothing else. Does nothing without a
     /// [source](Self::from_source).
     pub fn with_page_budget(self, bytes: usize) -> Self {
         self.with_empty_pages(Some(bytes))
     }
 
-    /// Bytes that a page has for each column, beside its height.
+    /// Bytes that a page has for each column, in addition to its height.
     pub(super) fn on_demand_column_bytes(&self) -> usize {
         let has_materials = matches!(self.materials(), Materials::OnDemand(_));
         // Tops, and a bit for a steep cell.
@@ -51,7 +52,7 @@ impl Ground {
             Materials::OnDemand(None) | Materials::Columns(_) => 0,
         };
         let size = [self.width(), self.depth()].map(|cells| u64::from(cells.cast_unsigned()));
-        // The first word tells such grounds from those in memory, which begin with a size.
+        // The first word distinguishes such grounds from those in memory, which begin with a size.
         hash_words([u64::MAX, size[0], size[1], id, materials].into_iter().chain(self.below_hash()))
     }
 
@@ -67,7 +68,7 @@ impl Ground {
         self.read_page(column, Page::height).unwrap_or_default()
     }
 
-    /// [Height](Self::height) of a column whose neighbours nobody asks for: no page is made for it.
+    /// [Height](Self::height) of a single column: no page is made for it.
     #[cfg(feature = "plugin")]
     pub(crate) fn lone_height(&self, column: Column) -> i32 {
         let Column { x, z } = self.extent().clamp(column);
@@ -86,7 +87,7 @@ impl Ground {
     pub(super) fn rises_on_demand(&self, pages: &Pages, column: Column) -> [Rise; 2] {
         let column = self.extent().clamp(column);
         let [x, z] = pages.read(Pages::place(column), |page| page.around(column));
-        // Pages have the rim's heights beyond it, so only what lies between tells.
+        // Pages repeat the rim's heights beyond it, so only columns inside are compared.
         let run = |at: i32, last: i32| if at == 0 || at == last { 1 } else { 2 };
         let rise = |[before, after]: [i32; 2], run| Rise { rise: after - before, run };
         [rise(x, run(column.x, self.width())), rise(z, run(column.z, self.depth()))]

@@ -56,8 +56,9 @@ impl Coordinates {
 }
 
 impl Ground {
-    /// Heights, normals and surface materials of columns a stride apart, from `low` on, so many along x and z. Columns beyond
-    /// the rim are like the nearest ones on it. With a source, coarse strides ask only for these columns and their neighbours.
+    /// Heights, normals and surface materials of a grid of columns a stride apart, from `low` on. Columns
+    /// beyond the rim are like the nearest ones on it. With a source, coarse strides ask only for these
+    /// columns and their neighbours.
     pub(crate) fn page(&self, low: Column, stride: i32, count: [usize; 2]) -> GroundPage {
         let columns = Coordinates::new(self, low, stride, count);
         match self.pages().filter(|_| stride > FINE) {

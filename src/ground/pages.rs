@@ -21,7 +21,7 @@ const AFTER: i32 = 2;
 /// Heights along a page's side.
 const SIDE: usize = (BEFORE + PAGE + AFTER) as usize;
 
-/// Bytes of pages that a ground keeps unless told otherwise.
+/// Bytes of pages that a ground keeps by default.
 pub(super) const DEFAULT_BUDGET: usize = 32 << 20;
 
 /// Most parts of the cache that are locked on their own.
@@ -35,8 +35,9 @@ pub(super) struct Page {
     place: Place,
     /// Row by row, from `BEFORE` columns before the page's first one on. Columns beyond the rim are like those on it.
     heights: Box<[i32]>,
-    /// Of the page's own columns: what they are made of, and the material of the highest solid voxel, where these differ from
-    /// column to column; and which cells are steep, a word for 8x8 of them. Each is computed when it is first needed.
+    /// Of the page's own columns: what they are made of, and the material of the highest solid voxel, where these
+    /// differ from column to column; and which cells are steep, a word for 8x8 of them. Each is computed when it is
+    /// first needed.
     pub materials: OnceLock<Box<[ColumnMaterial]>>,
     pub tops: OnceLock<Box<[MaterialId]>>,
     pub steep: OnceLock<Box<[u64]>>,
@@ -142,7 +143,8 @@ impl Pages {
         empty.emptied(0, DEFAULT_BUDGET)
     }
 
-    /// The same without pages; from now on a page has so many bytes for each column beside its height.
+    /// This cache without its pages, which from now on have `column_bytes` bytes for each column in addition
+    /// to its height.
     pub fn emptied(self, column_bytes: usize, budget: usize) -> Self {
         static LAST: AtomicU64 = AtomicU64::new(0);
         let number = LAST.fetch_add(1, Ordering::Relaxed) + 1;
@@ -203,7 +205,7 @@ impl Pages {
         (place.0 & 1 | (place.1 & 1) << 1) as usize
     }
 
-    /// The same for what a page may not know yet: `make` lets it know.
+    /// Reads data that a page may not hold yet; `make` computes it.
     pub fn read_or_make<R>(
         &self,
         place: Place,
@@ -248,7 +250,7 @@ impl Pages {
         heights
     }
 
-    /// The same for the source's materials.
+    /// The source's materials at single points.
     pub fn point_materials(&self, columns: [&[i32]; 2], stride: i32) -> Vec<ColumnMaterial> {
         let mut materials = vec![ColumnMaterial::default(); columns[0].len() * columns[1].len()];
         fill_columns(columns, stride, &mut materials, |grid, own| self.source.fill_materials(grid, own));

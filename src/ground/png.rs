@@ -44,8 +44,8 @@ impl GreyImage {
     }
 }
 
-/// Width, height and bits per channel that a PNG declares in its header; `None` where there is none, which the decoder then
-/// reports. They are read here because the decoder reserves memory for them at once.
+/// Width, height and bits per channel that a PNG declares in its header; `None` where there is none, which the decoder
+/// then reports. They are read here because the decoder reserves memory for them at once.
 fn declared(bytes: &[u8]) -> Option<(u32, u32, u8)> {
     let is_png = image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Png);
     let (&width, rest) = bytes.get(16..).filter(|_| is_png)?.split_first_chunk()?;
@@ -77,7 +77,7 @@ mod tests {
         file
     }
 
-    /// A PNG of 5 x 4 samples of 16 bits and so many noisy bytes that it cannot be compressed to nothing.
+    /// A PNG of 5 x 4 samples of 16 bits, noisy enough not to be compressed to nothing.
     fn noisy_png() -> Vec<u8> {
         let samples: Vec<u8> =
             (0..20_u32).flat_map(|i| (i * i * 40_503).to_ne_bytes()[..2].to_vec()).collect();
@@ -110,6 +110,14 @@ mod tests {
         [&(data.len() as u32).to_be_bytes(), &*checked, &(!crc).to_be_bytes()].concat()
     }
 
+    /// Checks that a decoded image has all of its samples, and this size if it is given.
+    fn assert_whole(decoded: Result<GreyImage, ImageError>, size: Option<(u32, u32)>) {
+        let Ok(image) = decoded else { return };
+        let found = (image.width(), image.height());
+        assert_eq!(image.samples().len() as u64, u64::from(found.0) * u64::from(found.1));
+        assert!(found.0 > 0 && found.1 > 0 && size.is_none_or(|size| size == found), "{found:?}");
+    }
+
     type Damage = Vec<(prop::sample::Index, u8)>;
 
     fn damage() -> impl Strategy<Value = Damage> {
@@ -125,16 +133,16 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_are_an_image_or_an_error(bytes: Vec<u8>) {
-            let _ = decode(&bytes);
-            let _ = decode(&[&SIGNATURE, bytes.as_slice()].concat());
-            let _ = decode(&[header(4, 4, 8, 0), bytes].concat());
+            prop_assert!(bytes.starts_with(&SIGNATURE) || decode(&bytes).is_err());
+            assert_whole(decode(&[&SIGNATURE, bytes.as_slice()].concat()), None);
+            assert_whole(decode(&[header(4, 4, 8, 0), bytes].concat()), Some((4, 4)));
         }
 
         #[test]
         fn a_damaged_png_is_an_image_or_an_error(damage in damage()) {
             let mut file = noisy_png();
             inflict(&damage, &mut file);
-            let _ = decode(&file);
+            assert_whole(decode(&file), None);
         }
 
         #[test]
@@ -147,7 +155,8 @@ mod tests {
             let header = [0, 0, 0, width, 0, 0, 0, height, bits, 0, 0, 0, u8::from(interlaced)];
             let (header, samples) = (chunk(b"IHDR", &header), chunk(b"IDAT", &samples));
             for (name, length) in [(b"tRNS", 2), (b"gAMA", 4), (b"acTL", 8), (b"fcTL", 26), (b"iCCP", 26)] {
-                let _ = decode(&[&SIGNATURE, &*header, &chunk(name, &extra[..length]), &samples].concat());
+                let file = [&SIGNATURE, &*header, &chunk(name, &extra[..length]), &samples].concat();
+                assert_whole(decode(&file), Some((width.into(), height.into())));
             }
         }
 
@@ -173,7 +182,7 @@ mod tests {
     fn a_png_cut_off_anywhere_is_truncated() {
         let file = noisy_png();
         assert!(decode(&file).is_ok());
-        // The last 16 bytes, a checksum and the end chunk, say nothing about the samples.
+        // The last 16 bytes, a checksum and the end chunk, do not affect the samples.
         for length in 1..file.len() - 16 {
             assert_eq!(decode(&file[..length]), Err(ImageError::Truncated { bytes: length as u64 }));
         }

@@ -1,12 +1,12 @@
-//! The ground by columns of regions, so that a save tells where the ground below it has changed.
+//! Hashes of the ground by region, so that a save detects where the ground below it has changed.
 
 use super::Ground;
 use crate::lattice::hash::hash_words;
 use crate::lattice::{Column, RegionPos};
 
 impl Ground {
-    /// Hash of the heights over one column of [regions](RegionPos), as (x, z): the same number on every machine. Materials and
-    /// strata do not count, since what is stored of edits does not depend on them.
+    /// Hash of the heights over one column of [regions](RegionPos), as (x, z): the same number on every machine.
+    /// Materials and strata do not count, since what is stored of edits does not depend on them.
     pub fn region_hash(&self, (x, z): (i32, i32)) -> u64 {
         let side = RegionPos::VOXELS;
         let low = |at: i32| at.saturating_mul(side);

@@ -9,7 +9,7 @@ use super::material::{ColumnMaterial, MaterialId};
 /// outside than the fade, and in between by a straight line; height's and slope's parts are multiplied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaterialRule {
-    /// What the rule lays over the base; not [`MaterialId::GROUND`].
+    /// The overlay of the rule; not [`MaterialId::GROUND`].
     pub overlay: MaterialId,
     /// Lowest and highest height in voxels; infinite ends are open.
     pub height: (f64, f64),
@@ -54,7 +54,7 @@ impl MaterialRule {
         Ok(())
     }
 
-    /// How much of a column the rule covers, 0 to 1.
+    /// Share of a column that the rule covers, 0 to 1.
     fn cover(&self, height: f64, slope: f64) -> f64 {
         fade(height, self.height, self.height_fade) * fade(slope, self.slope, self.slope_fade)
     }

@@ -1,4 +1,4 @@
-//! The ground itself: what every column of the pristine world is like.
+//! The ground itself: heights and materials of every column of the pristine world.
 
 use std::fmt;
 use std::ops::Range;
@@ -18,16 +18,16 @@ use crate::lattice::{Column, ONE};
 /// The pristine world: a height and materials for each column (x, z) with x in `0..=width` and z in `0..=depth`.
 ///
 /// Immutable. Heights are in 1/256 voxel ([`ONE`] per voxel) and at most [`LIMIT`](crate::lattice::LIMIT) voxels from
-/// zero. A column beyond the rim is like the nearest one on the rim, so every question has an answer.
+/// zero. A column beyond the rim is like the nearest one on the rim, so every query has a result.
 pub struct Ground {
     extent: Extent,
-    /// One for each column, row-major; none of a ground with a source.
+    /// One height for each column, row-major; empty for a ground with a source.
     heights: Vec<i32>,
     materials: Materials,
     below: Option<Below>,
     height_range: (i32, i32),
     hash: u64,
-    /// The source of heights, and what was computed of it.
+    /// The source of heights, and its computed pages.
     pages: Option<Box<Pages>>,
 }
 
@@ -86,7 +86,7 @@ impl Materials {
     }
 }
 
-/// What [`Ground::row`] computes; kept by the caller, so that it is allocated once for many rows.
+/// The buffer of [`Ground::row`], kept by the caller so that it is allocated once for many rows.
 #[derive(Default)]
 pub(crate) struct RowBuffer {
     pub(super) normals: Vec<Vec3>,
@@ -101,7 +101,7 @@ pub(crate) struct RowBuffer {
 pub(super) struct Rise {
     /// Height gained, in 1/256 voxel.
     pub rise: i32,
-    /// Over how many voxels: 2, at the rim 1.
+    /// Number of voxels over which it is gained: 2, at the rim 1.
     pub run: i32,
 }
 
@@ -145,12 +145,12 @@ impl Ground {
         self.pages().map(|pages| &*pages.source)
     }
 
-    /// What was computed of the source.
+    /// The computed pages of the source.
     pub(super) fn pages(&self) -> Option<&Pages> {
         self.pages.as_deref()
     }
 
-    /// The same ground, none of whose pages are computed, and which keeps so many bytes of them.
+    /// This ground without computed pages, and with another budget for them.
     pub(super) fn with_empty_pages(mut self, budget: Option<usize>) -> Self {
         let column_bytes = self.on_demand_column_bytes();
         self.pages = self.pages.map(|pages| {
@@ -164,23 +164,23 @@ impl Ground {
         &self.materials
     }
 
-    /// The same heights with other materials; `Columns` hold one for each column.
+    /// This ground with other materials; `Columns` hold one for each column.
     pub(super) fn replace_materials(self, materials: Materials) -> Self {
         Self { materials, ..self }.hashed()
     }
 
-    /// The same ground with something else below its surface.
+    /// This ground with something else below its surface.
     pub(super) fn replace_below(self, below: Below) -> Self {
         Self { below: Some(below), ..self }.hashed()
     }
 
-    /// The same ground with what is below its surface stored otherwise.
+    /// This ground with another representation of what is below its surface.
     pub(super) fn map_below(mut self, map: impl FnOnce(Below) -> Below) -> Self {
         self.below = self.below.map(map);
         self
     }
 
-    /// What is below its surface, if more than its columns say.
+    /// The material below its surface, unless it follows from the columns.
     pub(super) fn below(&self) -> Option<&Below> {
         self.below.as_ref()
     }
@@ -270,7 +270,8 @@ impl Ground {
         Self::normal_of(self.rises(column))
     }
 
-    /// The same as [`Self::normal`], by the heights of the columns before and after along x and z; `None` at the rim.
+    /// Like [`Self::normal`], from the heights of the columns before and after along x and z; `None` at the
+    /// rim.
     pub(crate) fn inner_normal(&self, column: Column, x: [i32; 2], z: [i32; 2]) -> Option<Vec3> {
         let is_inner = (1..self.width()).contains(&column.x) && (1..self.depth()).contains(&column.z);
         let rise = |[before, after]: [i32; 2]| Rise { rise: after - before, run: 2 };
@@ -284,10 +285,9 @@ impl Ground {
         Vec3::new(-x / length, 1.0 / length, -z / length)
     }
 
-    /// Columns of a row that all lie in the world, from one on: their heights, normals and materials, which are what
-    /// [`Self::height`], [`Self::normal`] and [`Self::surface_material`] give for each. What is computed goes into a buffer of
-    /// the caller's.
-    /// Of columns beyond the rim, none.
+    /// Columns of a row that all lie in the world, from one on: their heights, normals and materials, equal
+    /// to [`Self::height`], [`Self::normal`] and [`Self::surface_material`] of each. Computed values go into
+    /// the caller's buffer. Of columns beyond the rim, none.
     pub(crate) fn row<'a>(
         &'a self,
         low: Column,
@@ -383,7 +383,7 @@ impl Ground {
         }
     }
 
-    /// What all ground is made of, if it is the same from every surface down.
+    /// The material of all ground, if it is the same everywhere.
     pub(crate) fn single_material(&self) -> Option<MaterialId> {
         match self.materials {
             Materials::Uniform(all)
@@ -395,7 +395,7 @@ impl Ground {
         }
     }
 
-    /// What the column of a voxel gives it.
+    /// The material of a voxel from its column.
     pub(super) fn material_of_column(&self, point: IVec3) -> MaterialId {
         self.column_material(Column::of(point)).at_distance(self.distance(point))
     }
@@ -426,9 +426,9 @@ impl Ground {
         self.height_range
     }
 
-    /// Hash of the dimensions, heights and materials: equal for equal worlds, on every machine. The heights and materials of a
-    /// [source](Self::from_source) are hashed by its [id](HeightSource::id), so it differs from the hash of the same heights in
-    /// memory.
+    /// Hash of the dimensions, heights and materials: equal for equal worlds, on every machine. The heights and
+    /// materials of a [source](Self::from_source) are hashed by its [id](HeightSource::id), so it differs from the hash
+    /// of the same heights in memory.
     pub fn hash(&self) -> u64 {
         self.hash
     }
@@ -560,7 +560,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hash_tells_worlds_apart() {
+    fn the_hash_distinguishes_worlds() {
         let heights = || (0..12).collect::<Vec<i32>>();
         let hash = |width, depth, heights| Ground::from_heights(width, depth, heights).unwrap().hash();
         let mut other = heights();
@@ -572,7 +572,7 @@ mod tests {
 
     #[test]
     fn the_hash_is_the_same_on_every_machine() {
-        // If this fails, worlds saved with hashes of the old kind are no longer recognised: say so in the change log.
+        // If this fails, worlds saved with the old hashes are no longer recognised: say so in the changelog.
         assert_eq!(bumps().hash(), 0xD52B_8BB1_2AC5_464F);
     }
 

@@ -23,12 +23,12 @@ impl LatticeBox {
         Self { min: point, max: point }
     }
 
-    /// Is the point in the box?
+    /// Returns `true` if the point is in the box.
     pub fn contains(self, point: IVec3) -> bool {
         self.min.cmple(point).all() && point.cmple(self.max).all()
     }
 
-    /// Is all of `other` in the box?
+    /// Returns `true` if all of `other` is in the box.
     pub fn encloses(self, other: Self) -> bool {
         self.contains(other.min) && self.contains(other.max)
     }
@@ -54,7 +54,7 @@ impl LatticeBox {
         Self { min: self.min.saturating_sub(by), max: self.max.saturating_add(by) }
     }
 
-    /// Do the boxes share a point, or lie one step apart, so that a lattice cell touches both?
+    /// Returns `true` if the boxes share a point, or lie one step apart, so that a lattice cell touches both.
     pub fn meets(self, other: Self) -> bool {
         self.grown(1).intersection(other).is_some()
     }

@@ -106,7 +106,7 @@ pub struct TilePos {
     pub z: i32,
 }
 
-/// How the world is cut into chunks and tiles.
+/// The grid of chunks and tiles.
 ///
 /// Cells of chunk `c` along an axis are `c * size .. (c + 1) * size`. Along x and z the world ends at `width` and
 /// `depth`, so the last chunk may hold fewer cells; y has no end. A sample belongs to the chunk of the cell it is the
@@ -157,13 +157,13 @@ impl ChunkGrid {
         (0..nz).flat_map(move |z| (0..nx).map(move |x| TilePos { x, z }))
     }
 
-    /// Does the world have this tile?
+    /// Returns `true` if the world has this tile.
     pub fn has_tile(self, tile: TilePos) -> bool {
         let (nx, nz) = self.tile_counts();
         (0..nx).contains(&tile.x) && (0..nz).contains(&tile.z)
     }
 
-    /// Is the cell inside the world?
+    /// Returns `true` if the cell is inside the world.
     pub fn has_cell(self, cell: Column) -> bool {
         (0..self.width).contains(&cell.x) && (0..self.depth).contains(&cell.z)
     }

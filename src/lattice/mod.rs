@@ -23,9 +23,9 @@ mod tables;
 pub use boxes::LatticeBox;
 pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
 pub(crate) use parallel::{ItemCost, parallel_map, parallel_map_into, pieces, side_by_side};
-pub(crate) use places::{order_of_places, sort_by_place};
+pub(crate) use places::{sort_by_place, sort_permutation};
 pub use region::RegionPos;
-pub(crate) use tables::{give_back, table_bytes};
+pub(crate) use tables::{shrink_if_sparse, table_bytes};
 
 use glam::IVec3;
 

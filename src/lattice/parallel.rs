@@ -26,7 +26,7 @@ impl ItemCost {
         }
     }
 
-    /// The most items that a thread takes at once. Surfaces differ in cost, so each is taken by itself.
+    /// The most items that a thread takes at once. Surfaces differ in cost, so they are taken one at a time.
     const fn most_at_once(self) -> usize {
         match self {
             Self::Surface => 1,
@@ -53,7 +53,7 @@ pub(crate) fn parallel_map<'a, T: Sync, R: Send>(
     }
 }
 
-/// The same for a list that is consumed. The result's capacity is its length.
+/// Like [`parallel_map`], for a list that is consumed. The result's capacity is its length.
 pub(crate) fn parallel_map_into<T: Send, R: Send>(
     list: Vec<T>,
     cost: ItemCost,

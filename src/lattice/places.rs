@@ -6,12 +6,12 @@ const PLACES: u64 = 16;
 /// Sorts items by their positions, compared number by number; the sort is stable.
 pub(crate) fn sort_by_place<T: Copy>(items: &mut Vec<T>, place: impl Fn(&T) -> [i32; 3]) {
     if !items.is_sorted_by_key(&place) {
-        *items = order_of_places(items, place).into_iter().map(|item| items[item as usize]).collect();
+        *items = sort_permutation(items, place).into_iter().map(|item| items[item as usize]).collect();
     }
 }
 
 /// The numbers of items as [`sort_by_place`] would sort them.
-pub(crate) fn order_of_places<T>(items: &[T], place: impl Fn(&T) -> [i32; 3]) -> Vec<u32> {
+pub(crate) fn sort_permutation<T>(items: &[T], place: impl Fn(&T) -> [i32; 3]) -> Vec<u32> {
     let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
     for at in items.iter().map(&place) {
         (0..3).for_each(|i| (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i])));

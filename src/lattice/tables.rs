@@ -6,8 +6,8 @@ use rustc_hash::FxHashMap;
 
 /// Bytes of a hash table: its buckets, and one byte for each to find them by.
 pub(crate) fn table_bytes<K, V>(table: &FxHashMap<K, V>) -> usize {
-    // One bucket of eight stays free, in small tables a single one, and the first group of control bytes is repeated at the
-    // end. Removed entries may still occupy buckets until the table grows. The number of buckets is a power of two.
+    // One bucket of eight stays free, in small tables a single one, and the first group of control bytes is repeated at
+    // the end. Removed entries may still occupy buckets until the table grows. The number of buckets is a power of two.
     let least = match table.capacity() {
         0 => return 0,
         few @ 1..8 => few + 1,
@@ -17,7 +17,7 @@ pub(crate) fn table_bytes<K, V>(table: &FxHashMap<K, V>) -> usize {
 }
 
 /// Shrinks a hash table once it is less than a quarter full.
-pub(crate) fn give_back<K: Eq + Hash, V>(table: &mut FxHashMap<K, V>) {
+pub(crate) fn shrink_if_sparse<K: Eq + Hash, V>(table: &mut FxHashMap<K, V>) {
     if table.len() < table.capacity() / 4 {
         table.shrink_to_fit();
     }
@@ -34,7 +34,7 @@ mod tests {
         assert_eq!(full, 2048 * 17 + 16);
         for i in 0..1792 {
             table.remove(&[i % 7, i / 7, -i]);
-            give_back(&mut table);
+            shrink_if_sparse(&mut table);
             assert!(table_bytes(&table) <= (full * table.len() / 200).max(full / 100), "{i} are gone");
         }
     }

@@ -1,10 +1,10 @@
-//! Which cut an eye needs: by the size of cells and errors on the screen.
+//! Chooses the cut for an eye by the size of cells and errors on the screen.
 
 use glam::Vec3;
 
 use super::{Cut, LevelGrid, Node};
 
-/// How much larger all limits get each time there would be too many nodes.
+/// Factor by which all limits grow each time there would be too many nodes.
 const GROWTH: f32 = 1.2;
 
 /// The least of all limits in pixels: what is less, or no number, counts as this.
@@ -16,32 +16,33 @@ const LEAST_STAY: f32 = 0.01;
 /// The most often they grow: by then they are so large that only nodes around an eye are split.
 const MOST_GROWTHS: u32 = 60;
 
-/// Somebody who looks at the world.
+/// A viewpoint that the level of detail is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
     /// Where, in voxels.
     pub position: Vec3,
     /// Voxels a second.
     pub velocity: Vec3,
-    /// Pixels that one voxel covers one voxel away: the height of the picture over twice the tangent of half the angle of view.
+    /// Pixels that one voxel covers one voxel away: the height of the picture over twice the tangent of half the angle
+    /// of view.
     pub pixels: f32,
 }
 
-/// What a choice must know of a node.
+/// The properties of a node that a choice depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeFacts {
     /// Its lowest and its highest point, in voxels.
     pub heights: [f32; 2],
-    /// How far it is from the finer surface, in voxels.
+    /// Greatest distance from the finer surface, in voxels.
     pub error: f32,
-    /// Was anything dug or built there?
+    /// Whether anything was dug or built there.
     pub has_edits: bool,
 }
 
 /// Limits by which nodes are split. Each is a size on the screen in pixels.
 ///
-/// A node is split if its cells are larger than `cell_pixels` and its error larger than `error_pixels`; or if it has edits and its
-/// cells are larger than `edited_pixels`.
+/// A node is split if its cells are larger than `cell_pixels` and its error larger than `error_pixels`; or if it has
+/// edits and its cells are larger than `edited_pixels`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     /// The least size of cells, 12 unless set otherwise.
@@ -50,12 +51,12 @@ pub struct Choice {
     pub error_pixels: f32,
     /// The greatest size of cells in nodes with edits, 4 unless set otherwise.
     pub edited_pixels: f32,
-    /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing changes
-    /// back and forth while somebody moves to and fro.
+    /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing
+    /// changes back and forth while an eye moves to and fro.
     pub stay: f32,
-    /// Eyes are also thought to be where they will be in so many seconds; 0.5 unless set otherwise.
+    /// The choice also considers where each eye will be in this many seconds; 0.5 by default.
     pub look_ahead: f32,
-    /// Voxels; what is farther from all eyes is not split. 8,192 unless set otherwise.
+    /// Nodes farther from all eyes than this many voxels are not split; 8,192 by default.
     pub view_distance: f32,
     /// The most nodes, about 2,400 unless set otherwise: beyond them, all limits grow.
     pub most_nodes: usize,
@@ -76,8 +77,8 @@ impl Default for Choice {
 }
 
 impl Choice {
-    /// The cut that these eyes need, all together, wherever they look: turning changes nothing. `before` is the one that they
-    /// had. Eyes whose numbers are not finite see nothing.
+    /// The cut that these eyes need, all together, wherever they look: turning changes nothing. `before` is the one
+    /// that they had. Eyes whose numbers are not finite see nothing.
     pub fn cut(&self, before: &Cut, eyes: &[Eye], facts: impl Fn(Node) -> NodeFacts) -> Cut {
         let grid = before.grid();
         let is_somewhere = |eye: &&Eye| eye.position.is_finite() && eye.pixels.is_finite();
@@ -98,8 +99,8 @@ impl Choice {
         cut
     }
 
-    /// Is a node so near and so large on the screen that it should be split? Limits are taken for this share of them, times their
-    /// growth.
+    /// Returns `true` if a node is near and large enough on the screen to be split. The limits are scaled by
+    /// `share`, times their growth.
     fn is_split(
         &self,
         grid: LevelGrid,
@@ -132,7 +133,7 @@ impl Choice {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::cut::dice;
+    use super::super::cut::hash_node;
     use super::super::cut::tests::assert_is_cut;
     use super::*;
     use crate::lattice::ChunkGrid;
@@ -142,7 +143,7 @@ mod tests {
 
     /// 16 x 16 km of mountains: errors as a surface of fractal noise has them.
     fn mountains(node: Node) -> NodeFacts {
-        let rough = 0.05 + (dice(node, 3) >> 11) as f32 / (1u64 << 53) as f32 * 0.4;
+        let rough = 0.05 + (hash_node(node, 3) >> 11) as f32 / (1u64 << 53) as f32 * 0.4;
         NodeFacts { heights: [0.0, 300.0], error: rough * node.stride() as f32, has_edits: false }
     }
 
@@ -189,7 +190,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn who_moves_to_and_fro_soon_sees_no_change(x in 200f32..16_000.0, z in 200f32..16_000.0, step in -8f32..8.0) {
+        fn an_eye_that_moves_to_and_fro_soon_changes_nothing(x in 200f32..16_000.0, z in 200f32..16_000.0, step in -8f32..8.0) {
             let choice = Choice { most_nodes: usize::MAX, ..Choice::default() };
             let mut cut = choice.cut(&Cut::coarsest(world()), &[eye(x, z)], mountains);
             let mut changes = 0;

@@ -5,8 +5,8 @@ use rustc_hash::FxHashSet;
 use super::{LevelGrid, Node};
 use crate::lattice::TilePos;
 
-/// Nodes that together cover the world once. Those that share an edge differ by at most one level; across a corner they may
-/// differ by more.
+/// Nodes that together cover the world once. Those that share an edge differ by at most one level; across a corner they
+/// may differ by more.
 ///
 /// It is kept as the set of nodes that are split. A node of the cut is one that is not split, of a parent that is.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,8 +21,8 @@ impl Cut {
         Self { grid, split: FxHashSet::default() }
     }
 
-    /// The coarsest cut in which every node is split that ought to be. Nodes are asked about from above; the children of one that
-    /// neither ought to be split nor has to be, for the sake of its neighbours, are not.
+    /// The coarsest cut in which every node is split that ought to be. Nodes are asked about from above; the children
+    /// of one that neither ought to be split nor has to be, for the sake of its neighbours, are not.
     pub fn new(grid: LevelGrid, mut is_split: impl FnMut(Node) -> bool) -> Self {
         let mut cut = Self::coarsest(grid);
         let mut asked: Vec<Node> = grid.roots().collect();
@@ -36,7 +36,7 @@ impl Cut {
 
     /// A cut for tests and experiments, in which each node is split with a chance of `percent`; equal for equal seeds.
     pub fn random(grid: LevelGrid, seed: u64, percent: u64) -> Self {
-        Self::new(grid, |node| (dice(node, seed) >> 7) % 100 < percent)
+        Self::new(grid, |node| (hash_node(node, seed) >> 7) % 100 < percent)
     }
 
     /// Splits a node, and before it those that must be split; adds the children of each to `made`.
@@ -64,12 +64,12 @@ impl Cut {
         self.grid
     }
 
-    /// Is a node split, so that finer ones are drawn in its place?
+    /// Returns `true` if a node is split, so that finer ones are drawn in its place.
     pub fn is_split(&self, node: Node) -> bool {
         self.split.contains(&node)
     }
 
-    /// Is a node drawn?
+    /// Returns `true` if a node is drawn.
     pub fn contains(&self, node: Node) -> bool {
         self.grid.has(node)
             && !self.is_split(node)
@@ -81,7 +81,7 @@ impl Cut {
         if !self.grid.chunks().has_tile(tile) {
             return None;
         }
-        // From below: whoever is split has parents that are, and fine nodes are asked for most often.
+        // From below: the parents of a split node are split too, and fine nodes are asked for most often.
         let nodes = (0..=self.grid.top()).map(|level| Node::over(tile, level));
         nodes.into_iter().find(|node| node.level == self.grid.top() || self.is_split(node.parent()))
     }
@@ -92,7 +92,8 @@ impl Cut {
         self.grid.roots().chain(children).filter(|&node| self.grid.has(node) && !self.is_split(node))
     }
 
-    /// The nodes that are drawn and touch a node, over an edge or at a corner: those whose meshes may change with its level.
+    /// The nodes that are drawn and touch a node, over an edge or at a corner: those whose meshes may change with its
+    /// level.
     pub fn touching(&self, node: Node) -> Vec<Node> {
         let (TilePos { x, z }, size) = (node.tile(), node.stride());
         let beside = (-1..=size).flat_map(|at| [(at, -1), (at, size), (-1, at), (size, at)]);
@@ -137,8 +138,8 @@ impl Cut {
     }
 }
 
-/// A number that looks random, by a node and a seed.
-pub(super) fn dice(node: Node, seed: u64) -> u64 {
+/// A pseudo-random hash of a node and a seed.
+pub(super) fn hash_node(node: Node, seed: u64) -> u64 {
     let words = [node.level.into(), node.x, node.z].map(|word: i32| u64::from(word.cast_unsigned()));
     let add = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
     words.into_iter().fold(seed, add)
@@ -191,9 +192,9 @@ pub(super) mod tests {
             let grid = LevelGrid::new(ChunkGrid::new(size, width, depth), top);
             let cut = random_cut(grid, seed, percent);
             assert_is_cut(&cut);
-            // Whoever wants to be split is, if it exists at all.
+            // Every node that should be split is split, if it exists.
             for node in cut.nodes().filter(|node| node.level > 0) {
-                prop_assert!((dice(node, seed) >> 7) % 100 >= percent, "{node:?}");
+                prop_assert!((hash_node(node, seed) >> 7) % 100 >= percent, "{node:?}");
             }
         }
 

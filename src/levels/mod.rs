@@ -1,11 +1,11 @@
-//! Levels of detail: which squares of the world are drawn how coarsely.
+//! Levels of detail: chooses how coarsely each square of the world is drawn.
 //!
-//! A world is a quadtree of [`Node`]s. A node of level 0 is a tile; one of level L covers as many cells, each 2^L voxels wide.
-//! A [`Cut`] is what is drawn: nodes that cover the world once, where those that share an edge differ by at most one level.
-//! [`Choice`] says which cut an eye needs, and [`Cut::step_to`] leads from one cut to another without ever leaving
-//! that rule.
+//! A world is a quadtree of [`Node`]s. A node of level 0 is a tile; one of level L covers as many cells, each 2^L
+//! voxels wide. A [`Cut`] is the set of drawn nodes: they cover the world once, and nodes that share an edge differ by
+//! at most one level. [`Choice`] computes the cut for some eyes, and [`Cut::step_to`] leads from one cut to another
+//! without violating that rule.
 //!
-//! Nothing here knows heights or meshes: how rough a node is, it is told.
+//! Nothing here knows heights or meshes: the roughness of nodes is an input.
 
 mod choice;
 mod cut;

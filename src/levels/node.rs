@@ -10,9 +10,9 @@ const MOST_LEVELS: u8 = 10;
 pub struct Node {
     /// Its cells are 2^`level` voxels wide.
     pub level: u8,
-    /// Along +x, in units of its own width.
+    /// Along +x, in units of the node's width.
     pub x: i32,
-    /// Along +z, in units of its own width.
+    /// Along +z, in units of the node's width.
     pub z: i32,
 }
 
@@ -55,7 +55,7 @@ impl Node {
         Self::BESIDE.map(|(x, z)| Self { x: self.x + x, z: self.z + z, ..self })
     }
 
-    /// Does it cover the other node, or is it the same?
+    /// Returns `true` if it covers the other node or equals it.
     pub const fn covers(self, other: Self) -> bool {
         if other.level > self.level {
             return false;
@@ -64,7 +64,7 @@ impl Node {
         other.x >> up == self.x && other.z >> up == self.z
     }
 
-    /// Do two nodes share an edge or a corner, and no cell?
+    /// Returns `true` if two nodes share an edge or a corner, and no cell.
     pub fn touches(self, other: Self) -> bool {
         // Both in tiles: the first, and the one after the last.
         let span = |node: Self| {
@@ -101,7 +101,7 @@ impl LevelGrid {
         self.top
     }
 
-    /// Is any cell of the node inside the world?
+    /// Returns `true` if any cell of the node is inside the world.
     pub fn has(self, node: Node) -> bool {
         node.level <= self.top && self.grid.has_tile(node.tile())
     }

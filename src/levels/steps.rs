@@ -2,7 +2,7 @@
 
 use super::{Cut, Node};
 
-/// One step: some nodes split or merged, and what has to be drawn for it.
+/// One step: some nodes split or merged, and the meshes that change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Step {
     /// Nodes that are drawn no more.
@@ -31,9 +31,9 @@ impl Step {
 impl Cut {
     /// Takes one step towards another cut of the same quadtree; `None` once they are equal.
     ///
-    /// It makes `most_meshes` meshes at most, or more if a single split or merge does. Nodes with a small `rank` are split first and
-    /// merged last. Nodes are merged first while there are more of them than the other cut has, so that on the way there
-    /// are at most three more than at one of its ends.
+    /// It makes `most_meshes` meshes at most, or more if a single split or merge does. Nodes with a small `rank` are
+    /// split first and merged last. Nodes are merged first while there are more of them than the other cut has, so that
+    /// on the way there are at most three more than at one of its ends.
     pub fn step_to(&mut self, other: &Self, most_meshes: usize, rank: impl Fn(Node) -> u64) -> Option<Step> {
         // Most steps lead all the way.
         let all = self.changes_to(other);
@@ -62,7 +62,7 @@ impl Cut {
         (!step.new.is_empty()).then_some(step)
     }
 
-    /// All that differs in another cut of the same quadtree.
+    /// All differences from another cut of the same quadtree.
     pub fn changes_to(&self, other: &Self) -> Step {
         let mut step = Step {
             gone: self.nodes().filter(|&node| !other.contains(node)).collect(),
@@ -108,7 +108,7 @@ impl Cut {
         node
     }
 
-    /// What has to be drawn after these nodes changed.
+    /// The nodes to draw again after these nodes changed.
     fn step_from(&self, before: &Self, changed: &[Node]) -> Step {
         let mut step = Step::default();
         for &node in changed {
@@ -134,7 +134,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::LevelGrid;
-    use super::super::cut::dice;
+    use super::super::cut::hash_node;
     use super::super::cut::tests::{assert_is_cut, random_cut};
     use super::*;
     use crate::lattice::ChunkGrid;
@@ -149,7 +149,7 @@ mod tests {
             let [mut cut, target] = [0, 1].map(|at| random_cut(grid, seeds[at], percents[at]));
             let most_nodes = cut.nodes().count().max(target.nodes().count() + 3);
             let mut before = cut.clone();
-            while let Some(step) = cut.step_to(&target, most, |node| dice(node, 5) % 64) {
+            while let Some(step) = cut.step_to(&target, most, |node| hash_node(node, 5) % 64) {
                 assert_is_cut(&cut);
                 prop_assert!(cut.nodes().count() <= most_nodes);
                 let sorted = |nodes: &mut dyn Iterator<Item = Node>| {

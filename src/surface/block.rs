@@ -201,7 +201,8 @@ impl Mesher {
                 let base = y * 81 + cell;
                 let (slots, count) = (&table[case], usize::from(table[case][MOST]));
                 let Some(room) = out[end..].first_chunk_mut::<MOST>() else { return };
-                // Most cubes have two triangles at most. Those two are always written; the next cube overwrites the surplus.
+                // Most cubes have two triangles at most. Those two are always written; the next cube overwrites the
+                // surplus.
                 let (usual, others) = slots.split_at(6);
                 let (first, rest) = room.split_at_mut(6);
                 let number = |slot: &u16| self.numbers.at(base + usize::from(*slot));
@@ -215,8 +216,8 @@ impl Mesher {
     }
 }
 
-/// The solid ends of all lattice edges that vertices of drawn cubes lie on: those corners of the cubes that are one edge away
-/// from another corner, of air.
+/// The solid ends of all lattice edges that vertices of drawn cubes lie on: those corners of the cubes that are one
+/// edge away from another corner, of air.
 fn solid_ends(solid: &[LayerBits; 9], drawn: &[LayerBits; 8]) -> [LayerBits; 9] {
     let mut ends = [0; 9];
     for (y, &drawn) in drawn.iter().enumerate().filter(|(_, drawn)| **drawn != 0) {
@@ -271,8 +272,8 @@ impl Numbers {
     }
 }
 
-/// For each case the places in [`Numbers`] of its triangles' edges, counted from the cube's lowest corner, three for a triangle;
-/// the last number is how many they are.
+/// For each case the places in [`Numbers`] of its triangles' edges, counted from the cube's lowest corner, three for a
+/// triangle; the last number is how many they are.
 pub(crate) static SLOTS: LazyLock<[[u16; MOST + 1]; 256]> = LazyLock::new(|| {
     let slot = |edge| {
         let (corner, axis) = cases::edge_corners(edge);

@@ -1,9 +1,10 @@
 //! The marching-cubes case table, derived instead of copied.
 //!
-//! Corner `i` of a cube lies at `(i & 1, i >> 1 & 1, i >> 2 & 1)`; bit `i` of a case is set when corner `i` is solid.
-//! The rule, for every face of the cube: where the face is ambiguous (two solid corners across a diagonal), each solid
-//! corner is cut off on its own. Two cubes that share a face so draw the same segments there, whatever else they hold,
-//! and the union of all cubes is closed. Triangles are counter-clockwise seen from the air.
+//! Corner `i` of a cube lies at `(i & 1, i >> 1 & 1, i >> 2 & 1)`; bit `i` of a case is set when corner `i`
+//! is solid. The rule, for every face of the cube: where the face is ambiguous (two solid corners across a
+//! diagonal), each solid corner is cut off separately. Two cubes that share a face so draw the same segments
+//! there, whatever else they hold, and the union of all cubes is closed. Triangles are counter-clockwise seen
+//! from the air.
 //!
 //! Tables that treat a case like its complement, and tests that look at values on a face, break that rule and leave
 //! holes.
@@ -129,7 +130,7 @@ fn triangulations(polygon: &[Edge]) -> Vec<Vec<[Edge; 3]>> {
     all
 }
 
-/// Do the two edges lie in a common face of the cube?
+/// Returns `true` if the two edges lie in a common face of the cube.
 fn share_face(a: Edge, b: Edge) -> bool {
     let ends = |edge| {
         let (low, axis) = edge_corners(edge);
@@ -151,8 +152,8 @@ fn flat_diagonals(triangles: &[[Edge; 3]], polygon: &[Edge]) -> usize {
 }
 
 /// How little a triangulation is like a tile's, which splits its cells along (x, z)-(x + 1, z + 1): first without that
-/// diagonal, then by triangles that touch none of its ends. Where the ground is gentle, cubes so draw the very triangles
-/// of the tile.
+/// diagonal, then by triangles that touch none of its ends. Where the ground is gentle, cubes so draw the very
+/// triangles of the tile.
 fn unlike_tile(triangles: &[[Edge; 3]]) -> (bool, usize) {
     const OVER_LOW_COLUMN: Edge = 4;
     const OVER_HIGH_COLUMN: Edge = 7;

@@ -1,8 +1,8 @@
 //! The triangles that a tile draws for a cell, by the lines around it.
 //!
-//! A cell is two triangles, a-b-c and c-d-a. Sides that border on the mask or on a steep cell are lines of several vertices,
-//! over which rule 3 fans. All lines of a steep cell are, its diagonal too, and its triangles are cut into bands, one for each
-//! lattice level, so a cliff shows the beds between the tops of its columns:
+//! A cell is two triangles, a-b-c and c-d-a. Sides that border on the mask or on a steep cell are lines of several
+//! vertices, over which rule 3 fans. All lines of a steep cell are, its diagonal too, and its triangles are cut into
+//! bands, one for each lattice level, so a cliff shows the beds between the tops of its columns:
 //!
 //! ```text
 //!        high          The long side goes from the lowest corner to the highest, the other
@@ -38,8 +38,8 @@ impl<T: Copy> CellOutline<T> {
         Self { lines, is_steep: false, around: Vec::new() }
     }
 
-    /// Makes it that of a cell, given its [flags](super::mask::Borders), the vertices at its corners, by column and height, and
-    /// those of crossed lattice edges, as lower end and axis.
+    /// Makes it that of a cell, given its [flags](super::mask::Borders), the vertices at its corners, by column and
+    /// height, and those of crossed lattice edges, as lower end and axis.
     pub fn trace(
         &mut self,
         ground: &Ground,
@@ -110,7 +110,8 @@ fn bands<T: Copy, H: PartialOrd>(
     let mut at = [0, 0];
     while at != most {
         let next = [ahead(at[0] + 1), back(at[1] + 1)];
-        // At the same height, the long side comes last: its vertex lies beside that of the others, never below a corner.
+        // At equal height, the long side comes last: its vertex lies next to that of the others, never below
+        // a corner.
         let goes_ahead = match (at[0] < most[0], at[1] < most[1]) {
             (true, true) if is_long_ahead => height(next[0]) < height(next[1]),
             (true, true) => height(next[0]) <= height(next[1]),
@@ -130,9 +131,9 @@ fn bands<T: Copy, H: PartialOrd>(
     }
 }
 
-/// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, given by column and height, in
-/// order: one for each lattice y that separates their heights, as lower end and axis. Also between the ends of a cell's
-/// diagonal.
+/// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, given by column and
+/// height, in order: one for each lattice y that separates their heights, as lower end and axis. Also between the ends
+/// of a cell's diagonal.
 fn chain([(from, h_from), (to, h_to)]: [(Column, i32); 2]) -> impl Iterator<Item = (IVec3, usize)> {
     let axis = match (from.x != to.x, from.z != to.z) {
         (true, true) => DIAGONAL,

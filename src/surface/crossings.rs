@@ -1,8 +1,8 @@
 //! Vertices of a block, made from lists of lattice edges: the vertex function (rule 4) for many edges at once.
 //!
-//! What it computes, and in which order of operations, is what [`vertex`](super::vertex::vertex) says; the results have
-//! the same bits. Here the edges of one axis are taken four at a time (lists are short): their samples are gathered into
-//! vectors, one for each place around an edge, and every step is done for all four.
+//! It computes what [`vertex`](super::vertex::vertex) computes, in the same order of operations; the results
+//! have equal bits. Here the edges of one axis are taken four at a time (lists are short): their samples are
+//! gathered into vectors, one for each place around an edge, and every step is done for all four.
 
 use glam::{IVec3, Vec3};
 use wide::{f32x4, i32x4};
@@ -38,8 +38,8 @@ pub(super) struct Crossings {
 }
 
 impl Crossings {
-    /// Adds the vertex of each listed edge of the brick whose lowest sample is `low`, relative to `origin`: all along x,
-    /// then along y, then along z.
+    /// Adds the vertex of each listed edge of the brick whose lowest sample is `low`, relative to `origin`: all along
+    /// x, then along y, then along z.
     pub fn make(
         &self,
         samples: &PaddedSamples,
@@ -65,8 +65,8 @@ impl Crossings {
     }
 }
 
-/// The ground's own materials at the solid ends of edges of a block. Several edges end at the same voxel, and neighbours are asked
-/// together.
+/// The ground's own materials at the solid ends of edges of a block. Several edges end at the same voxel, and
+/// neighbours are asked together.
 fn solid_materials(ends: &[LayerBits; 9], ground: &Ground, low: IVec3) -> SolidMaterials {
     let mut materials = [[[MaterialId::GROUND; 64]; 4]; 9];
     let brick = BrickPos::of(low).0;
@@ -98,7 +98,7 @@ struct Site<'a, 'b> {
     own: Option<&'a SolidMaterials>,
     /// The brick's lowest sample.
     low: IVec3,
-    /// The same, from where positions count.
+    /// The brick's lowest sample, relative to the origin of positions.
     base: IVec3,
 }
 
@@ -182,9 +182,9 @@ struct Batch {
     steps: [i32; LANES],
     /// Unit gradients at the crossings: x, y, z.
     normals: [[f32; LANES]; 3],
-    /// Is an end edited?
+    /// Whether an end is edited.
     edited: u32,
-    /// Is any sample edited that the gradients at both ends look at?
+    /// Whether any sample that the gradients at both ends read is edited.
     stencil_edited: u32,
     lower_solid: u32,
 }
@@ -274,7 +274,7 @@ fn solid_end<const AXIS: usize>(edge: Edge, is_lower: bool) -> (usize, usize) {
 /// The stored materials around a block's corners.
 struct StoredMaterials<'a> {
     bricks: CornerBricks<'a>,
-    /// Does any brick store materials at all?
+    /// Whether any brick stores materials at all.
     is_any: bool,
 }
 
@@ -301,8 +301,8 @@ mod tests {
     use super::super::vertex::linear;
     use super::*;
 
-    /// The steps from air of one density to ground of another one, and the other way round, which are those of the vertex
-    /// function.
+    /// The steps from air of one density to ground of another one, and the other way round, which are those of the
+    /// vertex function.
     fn steps(air: i32, ground: i32) -> [i32; 2] {
         let [there, back] = [[air, -ground], [-ground, air]];
         let lanes = |end: usize| i32x4::new([there[end], back[end], there[end], back[end]]);
@@ -323,7 +323,7 @@ mod tests {
 
         #[test]
         fn halves_are_rounded_up(step in 0..SNAP, part in 1i32..4096) {
-            // So many steps and a half, of all that there are: (2 step + 1) / 8192.
+            // `step` and a half of all steps: (2 step + 1) / 8192.
             let (from, to) = ((2 * step + 1) * part, (2 * (SNAP - step) - 1) * part);
             let most = SNAP - 1;
             prop_assert_eq!(steps(from, to), [step + 1, SNAP - step].map(|step| step.clamp(1, most)));

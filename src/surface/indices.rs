@@ -4,8 +4,8 @@ use std::ops::Range;
 
 /// The indices of a triangle mesh, three for each triangle.
 ///
-/// They have 16 bits in a mesh of up to [`Indices::MOST_SHORT`] vertices, 32 in a larger one: half the memory to keep, to
-/// copy at each edit and to send to a graphics card. The same mesh always has the same ones.
+/// They have 16 bits in a mesh of up to [`Indices::MOST_SHORT`] vertices, 32 in a larger one: half the memory to keep,
+/// to copy at each edit and to upload to a GPU. Equal meshes have equal indices.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Indices {
     /// 16 bits each, for up to [`Indices::MOST_SHORT`] vertices.
@@ -21,10 +21,12 @@ impl Default for Indices {
 }
 
 impl Indices {
-    /// Vertices of a mesh that has indices of 16 bits at most. The largest index is left free, as it restarts triangle strips.
+    /// Vertices of a mesh that has indices of 16 bits at most. The largest index is left free, as it restarts triangle
+    /// strips.
     pub const MOST_SHORT: usize = u16::MAX as usize;
 
-    /// These indices, for a mesh of `vertices` vertices. Indices that do not fit 16 bits are kept in 32, even if they are invalid.
+    /// These indices, for a mesh of `vertices` vertices. Indices that do not fit 16 bits are kept in 32, even if they
+    /// are invalid.
     pub fn new(vertices: usize, list: Vec<u32>) -> Self {
         let short = || list.iter().map(|&index| u16::try_from(index).ok()).collect();
         match (vertices <= Self::MOST_SHORT).then(short).flatten() {
@@ -42,7 +44,7 @@ impl Indices {
         }
     }
 
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         match self {
             Self::U16(list) => list.len(),
@@ -50,7 +52,7 @@ impl Indices {
         }
     }
 
-    /// Are there none?
+    /// Returns `true` if there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -119,7 +121,7 @@ impl Indices {
         }
     }
 
-    /// Does this range equal a part whose indices count from vertex `base`?
+    /// Returns `true` if this range equals a part whose indices count from vertex `base`.
     pub(crate) fn is_part(&self, range: Range<usize>, part: &[u16], base: usize) -> bool {
         match self {
             Self::U16(list) => {

@@ -36,8 +36,8 @@ impl MaterialMix {
         }
     }
 
-    /// The mix at `step` of [`SNAP`] steps from `a` to `b`, in integers. Equal ends give themselves; where nothing has any
-    /// weight, it is `a`.
+    /// The mix at `step` of [`SNAP`] steps from `a` to `b`, in integers. Equal ends give themselves; where nothing has
+    /// any weight, it is `a`.
     pub fn lerp(a: Self, b: Self, step: i32) -> Self {
         if a == b {
             return a;
@@ -85,7 +85,8 @@ pub struct Vertex {
 }
 
 impl Vertex {
-    /// Is it equal to the other one, bit by bit? Normals of 0.0 and -0.0 are equal, but not the same.
+    /// Returns `true` if it equals the other one bit by bit. Normals of 0.0 and -0.0 differ here, though they compare
+    /// equal.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         self == other && self.normal.to_array().map(f32::to_bits) == other.normal.to_array().map(f32::to_bits)
     }
@@ -141,7 +142,7 @@ impl TryFrom<Unchecked> for SurfaceMesh {
 }
 
 impl SurfaceMesh {
-    /// Is there nothing to draw?
+    /// Returns `true` if there is nothing to draw.
     pub fn is_empty(&self) -> bool {
         self.indices.is_empty()
     }

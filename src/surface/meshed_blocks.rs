@@ -1,4 +1,4 @@
-//! The surfaces of the blocks that a transaction has meshed: in [`Parts`], or packed as a graphics card writes them. They are
+//! The surfaces of the blocks that a transaction has meshed: in [`Parts`], or packed as a GPU writes them. They are
 //! unpacked when they are copied into a chunk's mesh.
 
 use super::block::Parts;
@@ -8,8 +8,8 @@ pub(crate) use super::packed::{PackedMixes, PackedVertices};
 
 /// The surfaces of blocks, by the blocks' numbers.
 pub(crate) trait MeshedBlocks: Sync {
-    /// Waits until the surfaces of the first `blocks` blocks are ready; returns how many of them are. If these are fewer, the
-    /// others will never be ready, and what was made of any surface must be dropped.
+    /// Waits until the surfaces of the first `blocks` blocks are ready; returns how many of them are. If these are
+    /// fewer, the others will never be ready, and what was made of any surface must be dropped.
     fn wait_for(&self, _blocks: usize) -> usize {
         usize::MAX
     }
@@ -35,7 +35,7 @@ pub(crate) enum BlockVertices<'a> {
 }
 
 impl BlockVertices<'_> {
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         match self {
             Self::Made(vertices) => vertices.len(),
@@ -44,7 +44,7 @@ impl BlockVertices<'_> {
         }
     }
 
-    /// Are they equal to these, bit by bit?
+    /// Returns `true` if they equal these, bit by bit.
     pub fn are_same(&self, others: &[Vertex]) -> bool {
         self.len() == others.len()
             && match self {

@@ -1,4 +1,4 @@
-//! What is drawn: marching cubes where edits are, heightmap elsewhere, and the ring where they meet.
+//! The drawn surface: marching cubes at edits, heightmap elsewhere, and the ring where they meet.
 //!
 //! - [`cases`]: the marching-cubes case table, derived from one rule about cube faces.
 //! - [`mask`]: which cells marching cubes draws (rule 2), as bits.

@@ -48,12 +48,13 @@ impl<'a> Neighbours<'a> {
 /// Of nine stacks, those that hold corners of the middle one's cells: itself, beyond x, beyond z, beyond both.
 const CORNER_STACKS: [usize; 4] = [4, 5, 7, 8];
 
-/// The bricks that hold corners of a brick's cells, at its own height and at the next: the own one, those beyond x, beyond z
-/// and beyond both.
+/// The bricks that hold corners of a brick's cells, at its own height and at the next: the own one, those beyond x,
+/// beyond z and beyond both.
 pub(super) struct CornerBricks<'a>(pub [[Option<&'a Brick>; 4]; 2]);
 
 impl CornerBricks<'_> {
-    /// Are all corners solid, or all air? `pristine` is the side that all corners without a brick are on, if they are on one.
+    /// Returns `true` if all corners are solid, or all air. `pristine` is the side that all corners without a brick are
+    /// on, if they are on one.
     pub fn is_one_side(&self, pristine: Option<bool>) -> bool {
         let mut sides = self.0.iter().flatten().map(|brick| match brick {
             None => pristine,

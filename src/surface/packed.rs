@@ -1,10 +1,10 @@
-//! Vertices as a graphics card writes them: smaller than those of a mesh, so that less is sent.
+//! Vertices as a GPU writes them: smaller than those of a mesh, so that less is sent.
 
 use glam::IVec3;
 
 use super::mesh::{MaterialMix, Vertex};
 
-/// Vertices as a graphics card writes them.
+/// Vertices as a GPU writes them.
 #[derive(Clone, Copy)]
 pub(crate) struct PackedVertices<'a> {
     /// Where positions count from.
@@ -26,12 +26,12 @@ pub(crate) enum PackedMixes<'a> {
 }
 
 impl<'a> PackedVertices<'a> {
-    /// How many there are.
+    /// Their number.
     pub fn len(self) -> usize {
         self.positions.len()
     }
 
-    /// Each as it is in a mesh.
+    /// Each vertex as it is in a mesh.
     pub fn iter(self) -> impl Iterator<Item = Vertex> + 'a {
         let Self { origin, positions, normals, mixes } = self;
         let mix = move |number: usize| match mixes {

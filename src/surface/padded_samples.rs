@@ -56,8 +56,8 @@ impl PaddedSamples {
         }
     }
 
-    /// Extrapolates densities by one sample beyond the world's rim, which is as far as gradients look. The rows and layers are
-    /// those that were filled, `columns` those of the world, along x and z.
+    /// Extrapolates densities by one sample beyond the world's rim, which is as far as gradients look. The rows and
+    /// layers are those that were filled, `columns` those of the world, along x and z.
     pub fn extrapolate_beyond(
         &mut self,
         [xs, zs]: &[RangeInclusive<usize>; 2],
@@ -91,8 +91,8 @@ fn extrapolated(rim: Marked, inner: Marked) -> Marked {
     ((rim >> 1) * 2 - (inner >> 1)) << 1
 }
 
-/// One row: a sample of the brick before, eight of the middle one, two of the one after. `at` is where the row begins in
-/// the bricks.
+/// One row: a sample of the brick before, eight of the middle one, two of the one after. `at` is where the row begins
+/// in the bricks.
 #[inline(always)]
 fn fill_row(
     row: &mut [Marked],

@@ -27,7 +27,8 @@ impl<V> CubeMesh<V> {
         Self { vertices: Vec::new(), indices: Vec::new(), numbers: FxHashMap::default() }
     }
 
-    /// Adds the triangles of the cube at `low`; `vertex` makes the vertex of an edge that is crossed for the first time.
+    /// Adds the triangles of the cube at `low`; `vertex` makes the vertex of an edge that is crossed for the first
+    /// time.
     pub fn add(&mut self, low: IVec3, case: usize, mut vertex: impl FnMut(IVec3, usize) -> V) {
         for edge in cases::table()[case].triangles().flatten() {
             let (start, axis) = cases::lattice_edge(low, edge);

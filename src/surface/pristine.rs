@@ -21,7 +21,8 @@ pub fn cell_sheet(ground: &Ground, cell: Column) -> Range<i32> {
     sheet(cell.corners().map(|column| ground.height(column)))
 }
 
-/// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on, given as bits `z * 8 + x`.
+/// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on, given as bits
+/// `z * 8 + x`.
 pub(crate) fn sheet_rows(ground: &Ground, low: Column, cells: u64) -> Range<i32> {
     let heights = ground.heights::<9>(low);
     let cells = layer_bits::spread(cells);
@@ -60,7 +61,8 @@ impl PristineStack {
         sheet([self.range.0, self.range.1])
     }
 
-    /// Are the samples of the nine layers from `y` on all solid (`Some(true)`), or all air (`Some(false)`)?
+    /// Returns `Some(true)` if the samples of the nine layers from `y` on are all solid, `Some(false)` if all
+    /// are air, and `None` otherwise.
     pub fn side(&self, y: i32) -> Option<bool> {
         match self.filled(y) {
             [_, 0] => Some(false),

@@ -12,7 +12,7 @@ use rustc_hash::FxHashMap;
 use super::mesh::SurfaceMesh;
 use crate::lattice::{ChunkGrid, SNAP};
 
-/// What may be wrong with a drawn surface.
+/// Faults of a drawn surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum SeamFault {
@@ -58,7 +58,7 @@ pub struct SeamReport {
 }
 
 impl SeamReport {
-    /// Is every edge off the rim closed and balanced, and is there a surface at all?
+    /// Returns `true` if every edge off the rim is closed and balanced, and there is a surface at all.
     pub fn is_closed(&self) -> bool {
         self.triangles > 0 && self.open == 0 && self.unbalanced == 0
     }
@@ -146,7 +146,7 @@ impl SeamChecker {
         number
     }
 
-    /// Checks everything added so far. The rim of the world, where x or z is at its end, may be open.
+    /// Checks everything that was added. The rim of the world, where x or z is at its end, may be open.
     pub fn check(&self, grid: ChunkGrid) -> SeamReport {
         let mut report = SeamReport {
             triangles: self.triangles.len(),
@@ -209,7 +209,7 @@ impl SeamChecker {
     }
 }
 
-/// In how many separate strips or rings do a vertex's triangles lie? `fan` holds (vertex, next, last) of each.
+/// Number of separate strips or rings formed by a vertex's triangles. `fan` holds (vertex, next, last) of each.
 fn links(fan: &[(u32, u32, u32)]) -> usize {
     let mut parent: Vec<usize> = (0..fan.len()).collect();
     fn root(parent: &mut [usize], mut at: usize) -> usize {

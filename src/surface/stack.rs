@@ -1,5 +1,5 @@
-//! What all blocks of one stack of bricks share: heights, cells of the mask and the world's rim, normals and materials of
-//! columns.
+//! Data that all blocks of one stack of bricks share: heights, cells of the mask and the world's rim, normals and
+//! materials of columns.
 
 use std::ops::RangeInclusive;
 
@@ -62,7 +62,8 @@ impl<'a> Stack<'a> {
         (columns != [all.clone(), all]).then_some(columns)
     }
 
-    /// Does the lattice edge from a corner along an axis lie between a volumetric cell and one that stays heightmap?
+    /// Returns `true` if the lattice edge from a corner along an axis lies between a volumetric cell and one
+    /// that stays heightmap.
     pub fn is_border(&mut self, corner: usize, axis: usize) -> bool {
         let place = &PLACES[corner];
         let stack = self.pristine.stack;
@@ -85,7 +86,7 @@ impl<'a> Stack<'a> {
         self.single
     }
 
-    /// Does the ground's material differ from voxel to voxel?
+    /// Returns `true` if the ground's material differs from voxel to voxel.
     pub fn has_own_materials(&self) -> bool {
         self.ground.has_own_materials()
     }

@@ -1,11 +1,11 @@
 //! Tiles: the heightmap's triangles outside the mask, with rings along its border (rule 3).
 //!
-//! A tile's vertices are its columns, in rows along x; digging never moves them. The few vertices that rings need on the
-//! mask's border follow after the columns. A transaction rebuilds only the list of indices: whole cells first, then the
-//! rings, of which it computes those near its edits and copies the others.
+//! A tile's vertices are its columns, in rows along x; digging never moves them. The few vertices that rings need on
+//! the mask's border follow after the columns. A transaction rebuilds only the list of indices: whole cells first, then
+//! the rings, of which it computes those near its edits and copies the others.
 //!
-//! On a ground with materials of its own, steep cells are drawn with the rings, wherever they are: in bands, since their
-//! corners alone do not show the beds between them (`cell_outline`).
+//! On a ground with strata or a material function, steep cells are drawn with the rings, wherever they are: in bands,
+//! since their corners alone do not show the beds between them (`cell_outline`).
 
 use std::cmp::Ordering;
 
@@ -21,8 +21,8 @@ use crate::lattice::{ChunkGrid, Column, ONE, SNAP, TilePos};
 
 pub use super::cell_outline::fan;
 
-/// The whole mesh of a tile, relative to its lowest column at y = 0. Empty where the mask covers all of it, and where the
-/// world has no such tile.
+/// The whole mesh of a tile, relative to its lowest column at y = 0. Empty where the mask covers all of it, and where
+/// the world has no such tile.
 pub fn mesh(world: &WorldView, tile: TilePos) -> SurfaceMesh {
     if !world.grid.has_tile(tile) {
         return SurfaceMesh::default();
@@ -87,8 +87,8 @@ pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings)
     indices
 }
 
-/// The rings of one tile: triangles of steep cells and of those that border on them or on the mask, and the vertices they
-/// have there.
+/// The rings of one tile: triangles of steep cells and of those that border on them or on the mask, and the vertices
+/// they have there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rings {
     vertices: Vec<Vertex>,
@@ -126,7 +126,8 @@ impl Rings {
         drawing.finish()
     }
 
-    /// The same rings, but with those of some patches of 8x8 cells made again: `(z, x)` in units of 8 cells, ascending.
+    /// These rings, with those of some patches of 8x8 cells made again: `(z, x)` in units of 8 cells,
+    /// ascending.
     pub(crate) fn updated(
         &self,
         world: &WorldView,
@@ -156,7 +157,7 @@ impl Rings {
         }
     }
 
-    /// Does no cell of the tile border on the mask, and is none steep?
+    /// Returns `true` if no cell of the tile borders on the mask, and none is steep.
     pub fn is_empty(&self) -> bool {
         self.patches.is_empty()
     }
@@ -191,9 +192,9 @@ struct Drawing<'a> {
     rings: Rings,
     /// The lines of the cell under work.
     outline: CellOutline<Numbered>,
-    /// Sides of a patch's cells that have vertices: 81 along x and as many along z. Those with numbers below the patch's first
-    /// were of an earlier one. Empty where no cell is steep: there, only the mask's border has vertices, and each side of it but
-    /// once.
+    /// Sides of a patch's cells that have vertices: 81 along x and as many along z. Those with numbers below the
+    /// patch's first were of an earlier one. Empty where no cell is steep: there, only the mask's border has vertices,
+    /// and each side of it but once.
     sides: Vec<Side>,
     /// The number that the patch's first vertex has, or would have.
     first: u32,

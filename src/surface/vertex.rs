@@ -11,17 +11,17 @@ use crate::ground::{Ground, MaterialId, OVERLAY_DEPTH};
 use crate::lattice::{ChunkGrid, Column, ONE, SNAP};
 use crate::volume::SampleView;
 
-/// What the vertex function reads of the world.
+/// The part of the world that the vertex function reads.
 pub trait Lattice {
     /// Density at a lattice point, 1/256 voxel. Gradients look one point beyond the world's rim.
     fn distance(&self, point: IVec3) -> i32;
-    /// Was the sample at a lattice point edited?
+    /// Returns `true` if the sample at a lattice point was edited.
     fn is_edited(&self, point: IVec3) -> bool;
     /// The material stored there; [`MaterialId::GROUND`] where it was never changed.
     fn stored_material(&self, point: IVec3) -> MaterialId;
     /// The pristine world.
     fn ground(&self) -> &Ground;
-    /// Does marching cubes draw the sheet of a cell? `None` outside the world.
+    /// Returns `true` if marching cubes draws the sheet of a cell; `None` outside the world.
     fn is_volumetric(&self, cell: Column) -> Option<bool>;
 }
 
@@ -54,8 +54,8 @@ impl Lattice for WorldView<'_> {
     }
 }
 
-/// Density at a point, from those of the world's own points. Points beyond the rim are never edited; there densities are
-/// extrapolated linearly, so that ground dug at the rim isn't shaded as a wall.
+/// Density at a point, from those of the world's own points. Points beyond the rim are never edited; there densities
+/// are extrapolated linearly, so that ground dug at the rim isn't shaded as a wall.
 fn extrapolated(grid: ChunkGrid, point: IVec3, own: impl Fn(IVec3) -> i32) -> i32 {
     let last = IVec3::new(grid.width(), point.y, grid.depth());
     let rim = point.clamp(IVec3::Y * point.y, last);
@@ -70,8 +70,8 @@ const UNIT: [IVec3; 4] = [IVec3::X, IVec3::Y, IVec3::Z, IVec3::new(1, 0, 1)];
 
 /// Where the surface crosses the lattice edge from `p` along `axis`, in steps of 1/4096 voxel from `p`.
 ///
-/// A pristine vertical edge is crossed exactly at h, its upper end included. Any other crossing is linear, rounded to the
-/// nearest step, and at least one step away from both ends. `d = 0` is air.
+/// A pristine vertical edge is crossed exactly at h, its upper end included. Any other crossing is linear, rounded to
+/// the nearest step, and at least one step away from both ends. `d = 0` is air.
 pub fn crossing(lattice: &impl Lattice, p: IVec3, axis: usize) -> i32 {
     let q = p + UNIT[axis];
     if axis == 1 && !lattice.is_edited(p) && !lattice.is_edited(q) {
@@ -85,7 +85,7 @@ pub(super) fn linear(dp: i32, dq: i32) -> i32 {
     linear_over(dp, dq, 1)
 }
 
-/// The same between points that are `length` voxels apart.
+/// The step of a linear crossing between points that are `length` voxels apart.
 #[inline(always)]
 pub(super) fn linear_over(dp: i32, dq: i32, length: i32) -> i32 {
     let (dp, dq) = (i64::from(dp).abs(), i64::from(dq).abs());
@@ -151,7 +151,8 @@ fn is_stencil_pristine(lattice: &impl Lattice, p: IVec3, q: IVec3) -> bool {
     })
 }
 
-/// Does the edge lie in the border of the mask: between a volumetric cell and one that stays heightmap?
+/// Returns `true` if the edge lies in the border of the mask: between a volumetric cell and one that stays
+/// heightmap.
 fn is_on_mask_border(lattice: &impl Lattice, column: Column, axis: usize) -> bool {
     let Column { x, z } = column;
     let cells: &[Column] = match axis {
@@ -179,7 +180,7 @@ pub(super) fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
     lerp_normal_over(a, b, step, 1)
 }
 
-/// The same between points that are `length` voxels apart.
+/// The unit normal between points that are `length` voxels apart.
 #[inline(always)]
 pub(super) fn lerp_normal_over(a: Vec3, b: Vec3, step: i32, length: i32) -> Vec3 {
     let t = step as f32 / (SNAP * length) as f32;
@@ -194,8 +195,8 @@ pub(super) fn between(low: i32, high: i32, step: i32) -> i32 {
 }
 
 /// Materials at a crossing where the ground shows its own. With strata, that of the solid end: what a dig there yields.
-/// Otherwise those of both columns, blended as the tile does: the overlay within its depth below the pristine surface, the
-/// base below.
+/// Otherwise those of both columns, blended as the tile does: the overlay within its depth below the pristine surface,
+/// the base below.
 pub(super) fn own_materials(ground: &Ground, [p, q]: [IVec3; 2], step: i32, solid: IVec3) -> MaterialMix {
     if ground.has_own_materials() {
         return MaterialMix::pure(ground.material(solid));

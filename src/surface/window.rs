@@ -39,7 +39,7 @@ impl<'a> Window<'a> {
         window
     }
 
-    /// The same memory without bricks, to be kept for later.
+    /// An empty window that keeps the memory of this one.
     pub fn emptied<'b>(self) -> Window<'b> {
         Window { bricks: emptied(self.bricks), ..Window::default() }
     }

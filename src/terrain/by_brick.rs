@@ -1,8 +1,8 @@
 //! Boxes of cells, sorted into the bricks that hold them.
 //!
-//! A change in a brick also shows in cells of the bricks next to it. Where there are many boxes, each thread takes a slab of
-//! bricks, one brick thick along x: all cells in it belong to boxes whose home is that slab or one next to it. The bricks that
-//! are found are split into pieces again, so that many threads share a few long slabs as well.
+//! A change in a brick also shows in cells of the bricks next to it. Where there are many boxes, each thread takes a
+//! slab of bricks, one brick thick along x: all cells in it belong to boxes whose home is that slab or one next to it.
+//! The bricks that are found are split into pieces again, so that many threads share a few long slabs as well.
 //!
 //! ```text
 //! home_x           3         4         5         6
@@ -32,11 +32,11 @@ const PIECE: usize = 128;
 
 /// A brick and cells of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct OfBrick {
+pub(super) struct BrickCells {
     pub brick: BrickPos,
     /// The box around the cells that changes reach.
     pub cells: LatticeBox,
-    /// May any cell of the brick join the mask?
+    /// Whether any cell of the brick may join the mask.
     pub may_join: bool,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct OfBrick {
 #[derive(Debug, Default)]
 pub(super) struct ByBrick {
     /// In order, split between stacks.
-    slabs: Vec<Vec<OfBrick>>,
+    slabs: Vec<Vec<BrickCells>>,
 }
 
 /// Cells that a change reaches.
@@ -59,8 +59,8 @@ pub(super) struct Reached {
 }
 
 impl ByBrick {
-    /// The bricks that hold cells which changes reach, each with the box around its own of them. Changes must be sorted by
-    /// where they are at home.
+    /// The bricks that hold cells which changes reach, each with the box around its own of them. Changes must be sorted
+    /// by where they are at home.
     pub fn new<T: Sync>(changes: &[T], reached: impl Fn(&T) -> Reached + Sync) -> Self {
         let (Some(first), Some(last)) = (changes.first(), changes.last()) else { return Self::default() };
         let home_x = |change: &T| reached(change).home_x;
@@ -77,22 +77,25 @@ impl ByBrick {
         Self { slabs: slabs.into_par_iter().map(slab).collect() }
     }
 
-    /// How many bricks.
+    /// Number of bricks.
     pub fn len(&self) -> usize {
         self.slabs.iter().map(Vec::len).sum()
     }
 
-    /// Collects what `work` makes of all stacks, in order; in parallel where there are many. `work` gets several whole stacks at
-    /// a time.
-    pub fn collect<R: Clone + Send + Sync>(&self, work: impl Fn(&[OfBrick], &mut Vec<R>) + Sync) -> Vec<R> {
+    /// Collects what `work` makes of all stacks, in order; in parallel where there are many. `work` gets several whole
+    /// stacks at a time.
+    pub fn collect<R: Clone + Send + Sync>(
+        &self,
+        work: impl Fn(&[BrickCells], &mut Vec<R>) + Sync,
+    ) -> Vec<R> {
         if !ItemCost::Lookup.is_shared(self.len()) {
             let mut found = Vec::with_capacity(self.len());
             self.slabs.iter().for_each(|slab| work(slab, &mut found));
             return found;
         }
-        let pieces: Vec<&[OfBrick]> =
+        let pieces: Vec<&[BrickCells]> =
             self.slabs.iter().flat_map(|slab| pieces(slab, PIECE, is_same_stack)).collect();
-        let of_piece = |piece: &&[OfBrick]| {
+        let of_piece = |piece: &&[BrickCells]| {
             let mut found = Vec::with_capacity(piece.len());
             work(piece, &mut found);
             found
@@ -101,13 +104,14 @@ impl ByBrick {
     }
 }
 
-/// Do both bricks belong to the same stack?
-pub(super) fn is_same_stack(a: &OfBrick, b: &OfBrick) -> bool {
+/// Returns `true` if both bricks belong to the same stack.
+pub(super) fn is_same_stack(a: &BrickCells, b: &BrickCells) -> bool {
     a.brick.stack() == b.brick.stack()
 }
 
-/// The box around some cells of a brick, as the sides of it that lie in the brick: bits 0 to 7 those along x, 8 to 15 along y,
-/// 16 to 23 along z. What is around two boxes is the one or the other. And may any of them join the mask?
+/// The box around some cells of a brick, as the sides of it that lie in the brick: bits 0 to 7 those along x,
+/// 8 to 15 along y, 16 to 23 along z. The box around two boxes is the bitwise or. Also whether any of the
+/// cells may join the mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Bits(u32);
 
@@ -124,17 +128,17 @@ impl Bits {
         self.0 |= other;
     }
 
-    fn of(self, brick: IVec3) -> OfBrick {
+    fn of(self, brick: IVec3) -> BrickCells {
         let sides = [self.0, self.0 >> 8, self.0 >> 16].map(|side| (side & 0xff) as u8);
         let first = IVec3::from_array(sides.map(|side| side.trailing_zeros() as i32));
         let last = IVec3::from_array(sides.map(|side| 7 - side.leading_zeros() as i32));
         let cells = LatticeBox { min: brick * 8 + first, max: brick * 8 + last };
-        OfBrick { brick: BrickPos(brick), cells, may_join: self.0 & Self::MAY_JOIN != 0 }
+        BrickCells { brick: BrickPos(brick), cells, may_join: self.0 & Self::MAY_JOIN != 0 }
     }
 }
 
 /// Those of the bricks that hold cells of boxes whose x lies in a range.
-fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
+fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<BrickCells> {
     let bricks_of = |cells: LatticeBox| {
         let LatticeBox { min, max } = BrickPos::range(cells);
         LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
@@ -149,7 +153,7 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
                 index.entry(BrickPos(low.with_y(y))).or_default().include(pile.bits(y));
             }
         });
-        let mut found: Vec<OfBrick> = index.into_iter().map(|(brick, bits)| bits.of(brick.0)).collect();
+        let mut found: Vec<BrickCells> = index.into_iter().map(|(brick, bits)| bits.of(brick.0)).collect();
         found.sort_unstable_by_key(|own| own.brick);
         return found;
     }
@@ -169,16 +173,16 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
 }
 
 /// Cells of bricks above each other.
-struct Pile {
+struct BrickColumn {
     /// Along x and z, as [`Bits`] have them.
     sides: u32,
     /// The lowest and the highest one.
     cells: [i32; 2],
-    /// The same in bricks, of those that may join the mask.
+    /// The lowest and the highest cell, in bricks, that may join the mask.
     joining: Option<[i32; 2]>,
 }
 
-impl Pile {
+impl BrickColumn {
     /// Those of the brick at this height.
     fn bits(&self, y: i32) -> u32 {
         let [low, high] = self.cells;
@@ -187,11 +191,11 @@ impl Pile {
     }
 }
 
-/// Enters the cells of changes into some bricks of each: `enter` gets the lowest and the highest one of bricks above each other,
-/// and their cells.
+/// Enters the cells of changes into some bricks of each: `enter` gets the lowest and the highest one of bricks above
+/// each other, and their cells.
 fn enter_all<'r>(
     changes: impl Iterator<Item = (&'r Reached, LatticeBox)>,
-    mut enter: impl FnMut(IVec3, i32, &Pile),
+    mut enter: impl FnMut(IVec3, i32, &BrickColumn),
 ) {
     for (change, LatticeBox { min, max }) in changes {
         let Some(cells) = change.cells else { continue };
@@ -202,7 +206,7 @@ fn enter_all<'r>(
                 let is_in_line = |bricks: &LatticeBox| {
                     bricks.min.x <= x && x <= bricks.max.x && bricks.min.z <= z && z <= bricks.max.z
                 };
-                let pile = Pile {
+                let pile = BrickColumn {
                     sides: Bits::side(z, cells.min.z, cells.max.z) << 16 | of_x,
                     cells: [cells.min.y, cells.max.y],
                     joining: joining.filter(is_in_line).map(|bricks| [bricks.min.y, bricks.max.y]),
@@ -222,7 +226,7 @@ mod tests {
     use super::*;
 
     /// All of them, one after the other.
-    fn by_brick(changes: &[Reached]) -> Vec<OfBrick> {
+    fn by_brick(changes: &[Reached]) -> Vec<BrickCells> {
         let found = ByBrick::new(changes, |&reached| reached);
         let all = found.slabs.concat();
         assert_eq!(found.len(), all.len());
@@ -239,15 +243,15 @@ mod tests {
         all
     }
 
-    /// The same, brick by brick.
-    fn naive(changes: &[Reached]) -> Vec<OfBrick> {
-        let mut all: BTreeMap<_, OfBrick> = BTreeMap::new();
+    /// A simple implementation, brick by brick.
+    fn naive(changes: &[Reached]) -> Vec<BrickCells> {
+        let mut all: BTreeMap<_, BrickCells> = BTreeMap::new();
         for (reached, cells) in changes.iter().filter_map(|reached| Some((reached, reached.cells?))) {
             for brick in BrickPos::covering(cells) {
                 let own = brick.samples().intersection(cells).expect("covered");
                 let may_join =
                     reached.joining.is_some_and(|joining| brick.samples().intersection(joining).is_some());
-                let all = all.entry(brick).or_insert(OfBrick { brick, cells: own, may_join });
+                let all = all.entry(brick).or_insert(BrickCells { brick, cells: own, may_join });
                 all.cells = all.cells.union(own);
                 all.may_join |= may_join;
             }
@@ -289,9 +293,9 @@ mod tests {
         }
     }
 
-    /// One box at each home alone reaches beside it; all others are in the way of nobody.
+    /// Only one box at each origin reaches the brick next to it; the others reach no other brick.
     #[test]
-    fn cells_beside_their_home_are_found_in_every_slab() {
+    fn cells_next_to_their_origin_brick_are_found_in_every_slab() {
         let point = |home_x: i32, x: i32, y: i32| Reached {
             home_x,
             cells: Some(LatticeBox::point(IVec3::new(x, y, 4))),

@@ -1,4 +1,4 @@
-//! What a commit puts in place of what the world held.
+//! The content that a commit replaces in the world.
 
 use std::sync::Arc;
 
@@ -9,7 +9,8 @@ use crate::volume::{Brick, Fields};
 /// A brick by its position; `None` is a pristine one.
 pub(super) type ChangedBrick = (BrickPos, Option<Arc<Brick>>);
 
-/// Parts of a world at one revision: bricks, fields, words of the mask. Everything else is unchanged or made from these.
+/// Parts of a world at one revision: bricks, fields, words of the mask. Everything else is unchanged or made from
+/// these.
 #[derive(Clone, Default)]
 pub(super) struct Change {
     /// In order; `None` is a pristine brick.
@@ -57,8 +58,8 @@ impl Change {
         std::mem::swap(&mut self.sample_hash, &mut world.sample_hash);
     }
 
-    /// Adds what a later change replaced first, so that swapping restores the state before both. Returns the bytes of the
-    /// bricks that are added, and the bricks that are not.
+    /// Adds what a later change replaced first, so that swapping restores the state before both. Returns the bytes of
+    /// the bricks that are added, and the bricks that are not.
     pub fn absorb(&mut self, later: Self) -> (usize, Vec<ChangedBrick>) {
         let bytes = |brick: &Option<Arc<Brick>>| brick.iter().map(|brick| brick_bytes(brick)).sum();
         let (bytes, left) = fill_in(&mut self.bricks, later.bricks, bytes);
@@ -78,8 +79,8 @@ impl Change {
     }
 }
 
-/// Adds to a sorted list what another one has at other places. Returns the sum of the `bytes` of what it adds, and what it
-/// does not add.
+/// Adds to a sorted list what another one has at other places. Returns the sum of the `bytes` of what it adds, and what
+/// it does not add.
 fn fill_in<K: Copy + Ord, V>(
     list: &mut Vec<(K, V)>,
     other: Vec<(K, V)>,
@@ -96,8 +97,8 @@ fn fill_in<K: Copy + Ord, V>(
     (added, left)
 }
 
-/// Bytes of the brick that a world holds there, if it holds one. Uniform bricks count nothing: the world keeps the one of
-/// their kind for as long as history has it.
+/// Bytes of the brick that a world holds there, if it holds one. Uniform bricks count nothing: the world keeps the one
+/// of their kind for as long as history has it.
 pub(super) fn replaced_bytes(world: &World, pos: BrickPos) -> usize {
     world.bricks.get(&pos).map_or(0, |brick| brick_bytes(brick))
 }

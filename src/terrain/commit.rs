@@ -29,7 +29,7 @@ pub struct Commit {
     pub(super) next_field: u64,
     pub(super) receipts: Vec<Receipt>,
     pub(super) step: Option<HistoryReceipt>,
-    /// What became of parts that it puts in place.
+    /// The receipt of the parts that it replaces.
     pub(super) put: Option<Result<Restored, ChangeError>>,
     /// Its record, where a log is kept.
     pub(super) record: Option<RecordDraft>,
@@ -38,9 +38,9 @@ pub struct Commit {
     pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
     /// Chunks that change without being meshed.
     pub(super) outdated: Vec<ChunkPos>,
-    /// What is drawn then, if that changes.
+    /// The cut that is drawn afterwards, if it changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
-    /// Does it change only what is drawn?
+    /// Returns `true` if it changes only what is drawn.
     pub(super) is_cut: bool,
     /// The world that takes the place of the one that was there, if all of it changes.
     pub(super) whole: Option<Arc<World>>,
@@ -48,7 +48,7 @@ pub struct Commit {
     pub(super) copy: Option<Arc<World>>,
     /// Meshes to be swapped together with this commit. The world keeps its own.
     pub meshes: MeshUpdates,
-    /// Where the time went.
+    /// Durations of its stages.
     pub stages: Stages,
 }
 
@@ -63,12 +63,12 @@ impl fmt::Debug for Commit {
     }
 }
 
-/// What a commit returns once it is installed.
+/// The result of installing a commit.
 pub(super) struct Installed {
     pub receipts: Vec<Receipt>,
     /// The receipt of a step through history, if the commit was one.
     pub step: Option<HistoryReceipt>,
-    /// What became of parts that it put in place.
+    /// The receipt of the parts that it replaced.
     pub put: Option<Result<Restored, ChangeError>>,
     /// What each group replaced that replaced something.
     pub replaced: Vec<UndoDelta>,
@@ -80,22 +80,22 @@ impl Commit {
         self.sample_hash
     }
 
-    /// What happens to fields when this is committed, by chunk.
+    /// Changes of fields in this commit, by chunk.
     pub fn field_news(&self) -> &[(ChunkPos, FieldNews)] {
         &self.news
     }
 
-    /// What is drawn once this is committed, if a cut is drawn.
+    /// The cut that is drawn after this commit, if any.
     pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
         self.drawn_cut.as_ref()
     }
 
-    /// Does it change only what is drawn?
+    /// Returns `true` if it changes only what is drawn.
     pub fn is_cut(&self) -> bool {
         self.is_cut
     }
 
-    /// Does another world take the place of this one, so that all of it has to be drawn anew?
+    /// Returns `true` if another world replaces this one, so that all meshes are made again.
     pub fn is_whole(&self) -> bool {
         self.whole.is_some()
     }
@@ -166,7 +166,7 @@ mod tests {
         Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 30.0), 5.0))
     }
 
-    /// What digging once more comes to, and whether the task's copy became the world.
+    /// Digs once more; returns whether the task's copy became the world, and the dropped world.
     fn dig_on(terrain: &mut Terrain, meanwhile: impl FnOnce(&mut Terrain)) -> (bool, Option<Arc<World>>) {
         terrain.submit(&dig(40.0));
         let commit = terrain.begin().expect("something waits").run();

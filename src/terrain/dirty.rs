@@ -1,4 +1,5 @@
-//! Where changed samples show: the cells that join the mask, and the blocks that have to be drawn again.
+//! The cells and blocks where changed samples show: the cells that join the mask, and the blocks that have to be drawn
+//! again.
 //!
 //! Bricks are in order of their stacks throughout, so each step works stack by stack and threads share the stacks.
 
@@ -12,12 +13,12 @@ use crate::surface::pristine::{self, PristineStack};
 use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
 
-use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack};
+use super::by_brick::{BrickCells, ByBrick, Reached, is_same_stack};
 use super::world::World;
 use crate::volume::layers::FIRST_X;
 
-/// The cells that changed samples show in. `changed` gives the brick of each change, the box around its samples, and whether
-/// one of them is edited for the first time: only then may cells join the mask.
+/// The cells that changed samples show in. `changed` gives the brick of each change, the box around its samples, and
+/// whether one of them is edited for the first time: only then may cells join the mask.
 pub(super) fn dirty_cells<T: Sync>(
     grid: ChunkGrid,
     changes: &[T],
@@ -32,8 +33,8 @@ pub(super) fn dirty_cells<T: Sync>(
     })
 }
 
-/// Rule 2 for the sheet over some cells: the words of the mask that change. Edited samples stay edited, so cells only ever
-/// join it.
+/// Rule 2 for the sheet over some cells: the words of the mask that change. Edited samples stay edited, so cells only
+/// ever join it.
 pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> Mask {
     let words = dirty.collect(|stacks, found| {
         let mut bricks = Vec::with_capacity(stacks.len());
@@ -66,12 +67,12 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
     mask
 }
 
-/// Adds to `bricks` those of a stack that the pristine surface crosses and that may have cells that join the mask. Returns that
-/// surface, or `None` where there are no such bricks.
+/// Adds to `bricks` those of a stack that the pristine surface crosses and that may have cells that join the mask.
+/// Returns that surface, or `None` where there are no such bricks.
 fn at_sheet(
     world: &World,
     view: &WorldView,
-    stack: &[OfBrick],
+    stack: &[BrickCells],
     bricks: &mut Vec<BrickPos>,
 ) -> Option<PristineStack> {
     let word = stack[0].brick.stack();
@@ -85,10 +86,10 @@ fn at_sheet(
     (bricks.len() > before).then_some(sheet)
 }
 
-/// Every block that has to be drawn again, by stacks of bricks, each from below. A word of the mask changes only where samples
-/// do, so its cells lie in stacks that have `dirty` cells.
+/// Every block that has to be drawn again, by stacks of bricks, each from below. A word of the mask changes only where
+/// samples do, so its cells lie in stacks that have `dirty` cells.
 pub(super) fn dirty_blocks(world: &World, view: &WorldView, newer: &Mask, dirty: &ByBrick) -> Vec<Block> {
-    let blocks_of = |&OfBrick { brick, cells, .. }: &OfBrick| {
+    let blocks_of = |&BrickCells { brick, cells, .. }: &BrickCells| {
         view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk })
     };
     dirty.collect(|stacks, found| {
@@ -107,8 +108,8 @@ fn in_world(grid: ChunkGrid, low: IVec3, high: IVec3) -> Option<LatticeBox> {
     LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last))
 }
 
-/// The box in a stack of bricks around the sheets of cells that join or leave the mask, and of the cells next to them, whose
-/// vertices may come to lie on the mask's border or leave it.
+/// The box in a stack of bricks around the sheets of cells that join or leave the mask, and of the cells next to them,
+/// whose vertices may move onto the mask's border or off it.
 fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) -> Option<LatticeBox> {
     if newer.is_empty() {
         return None;
@@ -135,13 +136,13 @@ fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) 
 const BESIDE: [(i32, i32); 8] = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
 
 /// The cells of a stack with those of a box added.
-fn with_sheet(stack: &[OfBrick], sheet: LatticeBox) -> Vec<OfBrick> {
+fn with_sheet(stack: &[BrickCells], sheet: LatticeBox) -> Vec<BrickCells> {
     let mut all = stack.to_vec();
     for brick in BrickPos::covering(sheet) {
         let Some(cells) = brick.samples().intersection(sheet) else { continue };
         match all.binary_search_by_key(&brick.0.y, |own| own.brick.0.y) {
             Ok(at) => all[at].cells = all[at].cells.union(cells),
-            Err(at) => all.insert(at, OfBrick { brick, cells, may_join: false }),
+            Err(at) => all.insert(at, BrickCells { brick, cells, may_join: false }),
         }
     }
     all

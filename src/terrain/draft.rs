@@ -1,4 +1,4 @@
-//! Drafts: what edits would make of a world that stays as it is.
+//! Drafts: the result of edits on a world, without changing it.
 
 use std::sync::Arc;
 
@@ -14,12 +14,12 @@ use crate::brush::Edit;
 use crate::lattice::BrickPos;
 use crate::volume::Brick;
 
-/// What edits would come to.
+/// The changes that edits would make.
 #[derive(Clone, Debug, Default)]
 pub struct Draft {
     /// A receipt for each edit.
     pub receipts: Vec<Receipt>,
-    /// What would change.
+    /// The changes.
     pub change: WorldChange,
     /// The [hash](World::hash) that the world would have.
     pub hash: u64,
@@ -28,8 +28,9 @@ pub struct Draft {
 }
 
 impl Terrain {
-    /// What these edits would make of the world as last committed, under the rules and settings of edits that are submitted now.
-    /// Nothing changes. It takes as long as their transaction on a terrain that [never meshes](Meshing::Never).
+    /// The result of these edits on the last committed world, under the rules and settings of edits that are
+    /// submitted now. Nothing changes. It takes as long as their transaction on a terrain that [never
+    /// meshes](Meshing::Never).
     pub fn draft(&self, edits: &[Edit]) -> Draft {
         let mut queue = Queue::default();
         queue.limits = WorkLimits::UNBOUNDED;
@@ -117,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_draft_is_what_the_edits_come_to_and_changes_nothing() {
+    fn a_draft_is_the_result_of_its_edits_and_changes_nothing() {
         let mut rng = Rng::with_seed(5);
         for round in 0..40 {
             let (mut edited, mut put) = (terrain(), terrain());

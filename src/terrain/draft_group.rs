@@ -20,7 +20,7 @@ pub(super) struct Found {
 /// What the searches found, by the number of the edit before them. Those that found nothing are left out.
 pub(super) type LoosePieces = BTreeMap<usize, Found>;
 
-/// What a group of edits makes of the samples so far.
+/// Drafts a group of edits over the current samples.
 pub(super) fn draft_group(
     world: &World,
     drafter: &mut Drafter,
@@ -35,12 +35,12 @@ pub(super) fn draft_group(
     }
 }
 
-/// Can the operation turn solid samples into air?
+/// Returns `true` if the operation can turn solid samples into air.
 fn can_remove(edit: &Edit) -> bool {
     !matches!(edit.operation(), Operation::Add { .. } | Operation::Paint { .. })
 }
 
-/// Drafts each edit that can remove ground by itself; what it cuts off falls before the next edit.
+/// Drafts one at a time each edit that can remove ground; pieces that it cuts off fall before the next edit.
 fn one_by_one(
     world: &World,
     drafter: &mut Drafter,

@@ -1,4 +1,4 @@
-//! What a transaction does to fields.
+//! Changes of fields in a transaction.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -36,7 +36,7 @@ pub(super) struct FieldLog<'a> {
     /// Fields that were merged, in order, and the fields that they went into.
     merged: Vec<(ChunkPos, FieldId)>,
     merged_into: BTreeMap<FieldId, FieldId>,
-    /// The greatest name of a field so far.
+    /// The greatest name that any field has had.
     pub next_field: u64,
 }
 

@@ -1,5 +1,5 @@
-//! Another ground under a world's edits, say a heightmap that was loaded again: edited samples stay as they are, pristine ones
-//! are those of the new ground.
+//! Replaces the ground below a world's edits, for example after a heightmap was loaded again. Edited samples
+//! stay as they are; pristine ones come from the new ground.
 
 use std::sync::Arc;
 
@@ -18,13 +18,15 @@ use crate::lattice::BrickPos;
 use crate::volume::{Brick, pristine_layers};
 
 impl Terrain {
-    /// Queues another ground of the same size, after everything that was submitted before. Edited samples, fields and names stay;
-    /// pristine samples are those of the new ground, and all is as if the world had been [restored](Self::restore) on it. The
-    /// world is built in the transaction, and drawn anew as a whole. History begins anew.
-    /// [What came of it](Self::take_change_receipts) is told in order; its counts are 0.
+    /// Queues another ground of the same size, after everything that was submitted before. Edited samples,
+    /// fields and names stay; pristine samples are those of the new ground, and all is as if the world had
+    /// been [restored](Self::restore) on it. The world is built in the transaction and meshed from scratch.
+    /// The undo history is cleared. The [receipts](Self::take_change_receipts) arrive in order; their counts
+    /// are 0.
     ///
     /// # Errors
-    /// [`ChangeError::GroundSize`] where the size is another one, and [`ChangeError::Overloaded`] where too much work waits.
+    /// [`ChangeError::GroundSize`] where the size is another one, and [`ChangeError::Overloaded`] where too much work
+    /// waits.
     pub fn submit_ground(&mut self, ground: impl Into<Arc<Ground>>) -> Result<(), ChangeError> {
         let put = self.ground_put(ground.into())?;
         if !self.queue.has_room_for_step() {
@@ -34,8 +36,8 @@ impl Terrain {
         Ok(())
     }
 
-    /// Sets another ground of the same size at once, after everything that waits; like [`submit_ground`](Self::submit_ground)
-    /// otherwise. A transaction that is under way elsewhere is given up first.
+    /// Sets another ground of the same size at once, after everything that waits; like
+    /// [`submit_ground`](Self::submit_ground) otherwise. A transaction that is under way elsewhere is given up first.
     ///
     /// # Errors
     /// [`ChangeError::GroundSize`] where the size is another one; nothing changed then.

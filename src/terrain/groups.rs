@@ -1,6 +1,7 @@
-//! The edits of a transaction, group by group: each group is one step of undo, and has its own rules and loose settings.
+//! The edits of a transaction, group by group: each group is one step of undo, and has its own rules and loose
+//! settings.
 //!
-//! Only what history and receipts need is made for each group. What is drawn is made once for all of them.
+//! Only history and receipts are made group by group. Meshes are made once for all groups.
 
 use std::borrow::Cow;
 
@@ -49,7 +50,7 @@ struct Entered {
     groups: Vec<EnteredGroup>,
 }
 
-/// The same of one group.
+/// The results of one group, once entered.
 struct EnteredGroup {
     /// All fields of each chunk that a field changed in.
     fields: Vec<(ChunkPos, Fields)>,
@@ -113,7 +114,7 @@ pub(super) fn edit(transaction: &Transaction, submissions: &[Submission], backen
         groups.push(Group { submissions: own, bricks: draft.bricks, mask, sample_hash: draft.hash });
     }
 
-    // The last group, which most often is the only one, and with it everything that is drawn anew.
+    // The last group, which most often is the only one, together with all meshing.
     let (draft, pieces) = Stages::time(&mut stages.edit, || draft_group(world, &mut drafter, last));
     effects.push((draft.effects, pieces));
     let bricks = merged(&groups, &draft.bricks);

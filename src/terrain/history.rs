@@ -1,9 +1,9 @@
 //! Undo and redo: what edits replaced, kept as far back as a budget of bytes allows.
 //!
 //! A step holds the bricks, fields and words of the mask that one group of edits replaced: a stroke, or edits that were
-//! submitted together. Groups are independent of transactions: one transaction may hold many groups, and a stroke may take
-//! many transactions. Bricks are shared, so a step costs only the bytes of bricks that are held by it alone. Undo swaps the old
-//! parts with the new ones, which redo then needs.
+//! submitted together. Groups are independent of transactions: one transaction may hold many groups, and a stroke may
+//! take many transactions. Bricks are shared, so a step costs only the bytes of bricks that are held by it alone. Undo
+//! swaps the old parts with the new ones, which redo then needs.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -20,11 +20,11 @@ use crate::volume::MaterialCounts;
 pub enum HistoryStep {
     /// Back to before the last group of edits: a stroke, or what was submitted together.
     Undo,
-    /// What was undone last is done again.
+    /// Repeats the step that was undone last.
     Redo,
 }
 
-/// What a terrain's history holds.
+/// Statistics of a terrain's history.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct History {
     /// Steps that can be undone.
@@ -40,7 +40,7 @@ pub struct History {
 pub struct HistoryReceipt {
     /// Undo or redo.
     pub step: HistoryStep,
-    /// What it changed, or why it changed nothing.
+    /// Its changes, or the reason why there were none.
     pub outcome: Result<Restored, HistoryRejection>,
 }
 
@@ -67,7 +67,7 @@ pub struct Restored {
     pub loose: Vec<(u64, LoosePiece)>,
 }
 
-/// Why a step changed nothing.
+/// The reason why a step changed nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HistoryRejection {
@@ -78,16 +78,16 @@ pub enum HistoryRejection {
     #[error("there is nothing to redo")]
     NothingToRedo,
     /// The terrain was removed before the step's turn came, or the entity never had one.
-    #[error("the terrain is gone")]
+    #[error("the terrain no longer exists")]
     TerrainGone,
     /// Too much work [waits](super::WorkLimits::waiting).
-    #[error("too much work waits already")]
+    #[error("the queue is full: try again once waiting work is done")]
     Overloaded,
     /// The terrain is shared, and its server does not do the step.
     #[error("the server refuses the step")]
     Refused,
     /// The step panicked. World and history are unchanged.
-    #[error("the step panicked; this is a bug of the plugin's")]
+    #[error("the step panicked: this is a bug in bevy_burrow")]
     Panicked,
 }
 
@@ -149,7 +149,8 @@ impl UndoDelta {
     }
 }
 
-/// What a terrain no longer needs: steps, bricks, records of the log, and a copy of the world. Dropping these is slow; do it off the main thread.
+/// Data that a terrain no longer needs: steps, bricks, records of the log, and a copy of the world. Dropping these is
+/// slow; do it off the main thread.
 #[derive(Default)]
 pub(crate) struct DeferredDrop {
     steps: Vec<Arc<UndoDelta>>,
@@ -159,7 +160,7 @@ pub(crate) struct DeferredDrop {
 }
 
 impl DeferredDrop {
-    /// Is there nothing to drop?
+    /// Returns `true` if there is nothing to drop.
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
         let Self { steps, bricks, records, copy } = self;
@@ -215,7 +216,7 @@ impl UndoStack {
         self.step_bytes + (self.undo.capacity() + self.redo.capacity()) * size_of::<Arc<UndoDelta>>()
     }
 
-    /// Does some step reach these samples?
+    /// Returns `true` if some step reaches these samples.
     pub fn reaches(&self, samples: LatticeBox) -> bool {
         let meets =
             |step: &Arc<UndoDelta>| step.bounds.is_some_and(|own| own.intersection(samples).is_some());
@@ -241,8 +242,8 @@ impl UndoStack {
         (self.undo, self.redo, self.step_bytes) = Default::default();
     }
 
-    /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can be
-    /// redone.
+    /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can
+    /// be redone.
     pub fn record(&mut self, replaced: UndoDelta, dropped: &mut DeferredDrop) {
         let first = dropped.steps.len();
         dropped.steps.extend(self.redo.drain(..));
@@ -299,8 +300,8 @@ impl UndoStack {
         }
     }
 
-    /// Shrinks the lists. Their capacity depends only on how many steps there are; otherwise what is trimmed would depend on how
-    /// many there were before.
+    /// Shrinks the lists. Their capacity depends only on how many steps there are; otherwise what is trimmed would
+    /// depend on how many there were before.
     fn shrink(&mut self) {
         for list in [&mut self.undo, &mut self.redo] {
             let room = if list.is_empty() { 0 } else { list.len().next_power_of_two().max(4) };

@@ -103,8 +103,8 @@ impl World {
         })
     }
 
-    /// The stacks of bricks in a box of height one: all positions of the box, or those with bricks where the world has fewer
-    /// stacks than the box has positions.
+    /// The stacks of bricks in a box of height one: all positions of the box, or those with bricks where the world has
+    /// fewer stacks than the box has positions.
     fn stacks_in(&self, columns: LatticeBox) -> Box<dyn Iterator<Item = (i32, i32)> + '_> {
         if columns.volume() <= self.stacks.len() as u64 {
             return Box::new(columns.points().map(|column| (column.x, column.z)));
@@ -120,14 +120,14 @@ impl World {
         chunks
     }
 
-    /// The mesh of a chunk as it is kept; `None` where it draws nothing or no mesh is kept.
+    /// The stored mesh of a chunk; `None` if it draws nothing or no mesh is stored.
     pub fn chunk_surface(&self, chunk: ChunkPos) -> Option<&SurfaceMesh> {
         self.surfaces.get(&chunk).map(|surface| surface.mesh())
     }
 }
 
-/// The chunks of a table whose positions lie in a box, in no order. Looks up each position of the box, or goes through the
-/// table where that is shorter.
+/// The chunks of a table whose positions lie in a box, in no order. Looks up each position of the box, or goes through
+/// the table where that is shorter.
 fn found_in<T>(table: &FxHashMap<ChunkPos, T>, places: LatticeBox) -> Vec<ChunkPos> {
     if places.volume() <= table.len() as u64 {
         places.points().map(ChunkPos::from_ivec3).filter(|chunk| table.contains_key(chunk)).collect()

@@ -1,5 +1,5 @@
-//! Laws of levels that look inside: of vertices and nesting, of running transactions; and negative controls, each of which
-//! breaks one rule and must be noticed.
+//! Laws of levels that look inside: of vertices and nesting, of running transactions; and negative controls, each of
+//! which breaks one rule and must be noticed.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -268,7 +268,7 @@ fn overlay(world: &World, commit: &Commit) -> (Vec<(BrickPos, Arc<Brick>)>, Mask
     (bricks.into_iter().collect(), mask)
 }
 
-/// Runs what was submitted, and compares what the running transaction draws with what is drawn once it is committed.
+/// Runs the submitted edits, and compares the meshes of the running transaction with those after its commit.
 fn check_transaction(terrain: &mut Terrain, cut: &Cut, what: &str) -> [usize; 2] {
     let before = draw(&terrain.world().level_view(cut));
     let commit = terrain.begin().expect("something waits").run();

@@ -7,7 +7,7 @@ use crate::levels::{Cut, LevelGrid, Node, NodeFacts};
 use crate::surface::level::{self, LevelView, Stacks};
 use crate::surface::{SeamChecker, SeamReport, SurfaceMesh};
 
-/// Nodes are this many voxels wide at most: so far, 1/4096 of a voxel is exact in `f32`.
+/// Greatest width of a node in voxels: up to this width, 1/4096 of a voxel is exact in `f32`.
 const WIDEST: i32 = 4096;
 
 /// What of a node's [`NodeFacts`] depends on the ground alone.
@@ -15,7 +15,7 @@ const WIDEST: i32 = 4096;
 pub struct GroundFacts {
     /// Its lowest and its highest point, in voxels.
     pub heights: [f32; 2],
-    /// How far its heightmap is from the heights at half its stride, in voxels; 0 at level 0.
+    /// Greatest distance of its heightmap from the heights at half its stride, in voxels; 0 at level 0.
     pub error: f32,
 }
 
@@ -53,8 +53,8 @@ impl GroundFacts {
 }
 
 impl World {
-    /// The quadtree over the world's tiles, with levels up to `top`; fewer where one node would cover the world or be wider than
-    /// 4,096 voxels.
+    /// The quadtree over the world's tiles, with levels up to `top`; fewer where one node would cover the world or be
+    /// wider than 4,096 voxels.
     pub fn level_grid(&self, top: u8) -> LevelGrid {
         let widest = (0..=top).take_while(|&level| i64::from(self.grid.size()) << level <= i64::from(WIDEST));
         LevelGrid::new(self.grid, widest.last().unwrap_or_default())
@@ -70,18 +70,19 @@ impl World {
         LevelView::new(self.view(), cut, self.edited_stacks())
     }
 
-    /// Is the cut one of this world's tiles?
+    /// Returns `true` if the cut was made for a world of this size.
     pub(super) fn has_cut(&self, cut: &Cut) -> bool {
         cut.grid().chunks() == self.grid
     }
 
-    /// The mesh of a node of a cut, relative to its lowest column at y = 0. What it draws depends on the nodes of the cut that
-    /// touch it. Empty where the world has no such node, or if the cut is of a world of another size.
+    /// The mesh of a node of a cut, relative to its lowest column at y = 0. What it draws depends on the nodes of the
+    /// cut that touch it. Empty where the world has no such node, or if the cut is of a world of another size.
     pub fn node_mesh(&self, cut: &Cut, node: Node) -> SurfaceMesh {
         if self.has_cut(cut) { level::node_mesh(&self.level_view(cut), node) } else { SurfaceMesh::default() }
     }
 
-    /// Is a node of level 0 drawn by [its tile](Self::tile_mesh) and [the chunks](Self::chunk_mesh) below it as they are?
+    /// Returns `true` if a node of level 0 is drawn by [its tile](Self::tile_mesh) and [the
+    /// chunks](Self::chunk_mesh) below it, unchanged.
     pub fn is_plain(&self, cut: &Cut, node: Node) -> bool {
         self.has_cut(cut) && level::is_plain(&self.level_view(cut), node)
     }
@@ -95,8 +96,8 @@ impl World {
 
     /// Checks that everything that a cut draws is one closed surface. Visits each triangle of the cut.
     ///
-    /// Where four nodes meet whose levels go fine, coarse, fine, coarse, an edge may serve four triangles. Triangles without area
-    /// may lie in the planes between levels.
+    /// Where four nodes meet whose levels go fine, coarse, fine, coarse, an edge may serve four triangles. Triangles
+    /// without area may lie in the planes between levels.
     pub fn check_seams_in(&self, cut: &Cut) -> SeamReport {
         let mut checker = SeamChecker::default();
         for (node, mesh) in self.drawn_in(cut) {
@@ -105,13 +106,13 @@ impl World {
         checker.check(self.grid)
     }
 
-    /// What a choice must know of a node.
+    /// The properties of a node that a choice depends on.
     pub fn node_facts(&self, grid: LevelGrid, node: Node) -> NodeFacts {
         let GroundFacts { heights, error } = GroundFacts::new(&self.ground, grid, node);
         NodeFacts { heights, error, has_edits: self.has_edits(grid, node) }
     }
 
-    /// Was anything dug or built in a node?
+    /// Returns `true` if a node contains edits.
     pub fn has_edits(&self, grid: LevelGrid, node: Node) -> bool {
         let (low, high) = grid.columns(node);
         grid.has(node) && self.edited_stacks().has_any(low, high)

@@ -88,7 +88,8 @@ impl Commit {
     }
 }
 
-/// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main thread.
+/// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main
+/// thread.
 fn bytes_of(entries: &[LogEntry], change: &WorldChange) -> usize {
     let rules = entries.iter().map(rule_bytes);
     let bricks = change.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));
@@ -100,7 +101,7 @@ fn bytes_of(entries: &[LogEntry], change: &WorldChange) -> usize {
         + rules.chain(bricks).chain(fields).sum::<usize>()
 }
 
-/// Bytes of the rules that an entry tells of.
+/// Bytes of the rules that an entry holds.
 fn rule_bytes(entry: &LogEntry) -> usize {
     match entry {
         LogEntry::Rules(Some(rules)) => rules.bytes(),
@@ -118,8 +119,8 @@ pub(super) struct CommitLog {
     limit: usize,
     /// The terms that hold after the last record; `None` if nothing is known of them.
     terms: Option<Terms>,
-    /// Was a commit dropped after the last record that was taken? The first record that waits is a commit then: any other has
-    /// the same revision as the one that was dropped, and would hide the gap.
+    /// Whether a commit was dropped after the last record that was taken. The first waiting record is a
+    /// commit then: any other kind has the same revision as the dropped one, and would hide the gap.
     has_gap: bool,
 }
 
@@ -129,7 +130,7 @@ impl CommitLog {
         Self { records, sizes, bytes: 0, limit, terms: None, has_gap: false }
     }
 
-    /// Enters the commit that led to this world. What has to be dropped for it is added to `dropped`.
+    /// Enters the commit that led to this world. Records that do not fit any longer are moved to `dropped`.
     pub fn enter(&mut self, world: &World, draft: RecordDraft, dropped: &mut Vec<CommitRecord>) {
         let RecordDraft { terms, mut entries, mut change, mut bytes } = draft;
         change.next_field = world.next_field;
@@ -144,7 +145,7 @@ impl CommitLog {
 
     /// Enters that these terms hold from now on, if others did.
     fn enter_terms(&mut self, world: &World, terms: Terms) {
-        // The next edit tells them.
+        // The next edit logs them.
         if self.has_gap && self.records.is_empty() {
             return;
         }
@@ -178,18 +179,20 @@ impl CommitLog {
             self.bytes -= self.sizes.pop_front().unwrap_or_default();
             dropped.extend(self.records.pop_front());
         }
-        // Those that the dropped ones told of are told again.
+        // The dropped records may have held the current terms, so these are logged again.
         self.terms = None;
     }
 }
 
 impl Terrain {
-    /// From now on a record of each commit is kept until it is [taken](Self::take_log); `None` keeps none and drops those that
-    /// wait. Once they hold more than so many bytes, images of stamps not counted, the oldest are dropped: whoever finds a gap
-    /// between [revisions](CommitRecord::revision), or another revision after the last of them than the
-    /// [world's](super::World::revision), has to read [all of the world](Self::parts).
+    /// From now on a record of each commit is kept until it is [taken](Self::take_log); `None` keeps none and
+    /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps, the
+    /// oldest are dropped. A reader that finds a gap between [revisions](CommitRecord::revision), or whose
+    /// last record does not have the [world's revision](super::World::revision), has to read [all of the
+    /// world](Self::parts).
     ///
-    /// Rules and settings of loose pieces are told with the first edit that obeys them, or once nothing waits.
+    /// Rules and settings of loose pieces are logged with the first edit that obeys them, or once nothing
+    /// waits.
     pub fn keep_log(&mut self, bytes: Option<usize>) {
         match (&mut self.log, bytes) {
             (_, None) => self.log = None,
@@ -209,14 +212,14 @@ impl Terrain {
     /// The records of the commits since the last call, in order; each is returned once.
     pub fn take_log(&mut self) -> Vec<CommitRecord> {
         let Some(log) = &mut self.log else { return Vec::new() };
-        // Whoever takes them sees the gap.
+        // The caller sees the gap in the revisions.
         log.has_gap &= log.records.is_empty();
         log.sizes.clear();
         log.bytes = 0;
         std::mem::take(&mut log.records).into()
     }
 
-    /// Is there any record to [take](Self::take_log)?
+    /// Returns `true` if there is a record to [take](Self::take_log).
     pub fn has_log(&self) -> bool {
         self.log.as_ref().is_some_and(|log| !log.records.is_empty())
     }

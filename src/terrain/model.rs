@@ -40,17 +40,18 @@ fn keep<T>(answers: &mut VecDeque<T>, answer: T) {
 /// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "this terrain does not wait for that commit; its transaction was given up, or belongs to another terrain"
+    "this terrain is not waiting for that commit: its transaction was abandoned, or belongs to another terrain"
 )]
 pub struct StaleCommit;
 
 /// A world, the edits that wait for it, and the one transaction that may be under way.
 ///
-/// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
-/// to it. A game may also commit by itself, for example with [`apply`](Self::apply); the change is shown some frames later.
+/// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or
+/// [`submit`](Self::submit) to it. A game may also commit directly, for example with [`apply`](Self::apply);
+/// the change is shown some frames later.
 ///
-/// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and overwrites
-/// any other; a parent may scale it further.
+/// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and
+/// overwrites any other; a parent may scale it further.
 ///
 /// To change levels, insert a new one on the same entity, with its own `SavedWorld` if it is saved. A terrain that is assigned
 /// through `&mut Terrain` is shown too, but edits that waited in the old one get no receipts, and its debris stays.
@@ -69,7 +70,7 @@ pub struct Terrain {
     pub(super) log: Option<CommitLog>,
     pub(super) meshing: Meshing,
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
-    /// What the game committed since the plugin last showed the world; `None` while the plugin does not show it.
+    /// Commits of the game since the plugin last showed the world; `None` while the plugin does not show it.
     #[cfg(feature = "plugin")]
     pub(super) unseen: Option<Unseen>,
 }
@@ -85,13 +86,13 @@ impl fmt::Debug for Terrain {
     }
 }
 
-/// What a terrain keeps of the transaction under way.
+/// A terrain's record of the running transaction.
 pub(super) struct InFlight {
     pub ticket: u64,
     pub work: Work,
-    /// How much work that is, as the queue counts.
+    /// Its work, in the units of the queue.
     estimate: u64,
-    /// Does the plugin run it?
+    /// Whether the plugin runs it.
     #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
     pub is_plugins: bool,
 }
@@ -124,18 +125,18 @@ impl Terrain {
         })
     }
 
-    /// Sets the engine that runs later transactions. The result is the same on every engine. By default it is the plugin's, or
-    /// without the plugin the processor.
+    /// Sets the engine that runs later transactions. The result is the same on every engine. The default is
+    /// the plugin's engine, or the CPU without the plugin.
     pub fn set_engine(&mut self, engine: Engine) {
         self.engine = Some(engine);
     }
 
-    /// Sets the rules for edits that are submitted later. Edits that wait or are under way keep theirs. A journal is replayed
-    /// exactly only if rules change at the same edits.
+    /// Sets the rules for edits that are submitted later. Edits that wait or are under way keep theirs. A journal is
+    /// replayed exactly only if rules change at the same edits.
     ///
     /// # Errors
-    /// When the rules name [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND), which no ground has; nothing is changed
-    /// then.
+    /// When the rules name [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND), which no ground has; nothing is
+    /// changed then.
     pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
         rules.check()?;
         self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
@@ -163,14 +164,14 @@ impl Terrain {
         &self.world
     }
 
-    /// The world as last committed, to be read elsewhere. Drop it soon: while a snapshot is held, the next transaction has to
-    /// copy the world's index, or its commit does, if the snapshot was taken in between.
+    /// The world as last committed, to be read elsewhere. Drop it soon: while a snapshot is held, the next transaction
+    /// has to copy the world's index, or its commit does, if the snapshot was taken in between.
     pub fn snapshot(&self) -> Arc<World> {
         Arc::clone(&self.world)
     }
 
-    /// Lets edits that are submitted later search for pieces of ground that they cut off, which receipts then list. `None`, the
-    /// default, turns that off. Terrains that must have equal worlds need equal settings.
+    /// Lets edits that are submitted later search for pieces of ground that they cut off, which receipts then list.
+    /// `None`, the default, turns that off. Terrains that must have equal worlds need equal settings.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
         self.loose = settings;
         self.log_terms();
@@ -186,7 +187,7 @@ impl Terrain {
         self.queue.len()
     }
 
-    /// Is a transaction under way?
+    /// Returns `true` while a transaction is running.
     pub fn is_busy(&self) -> bool {
         self.in_flight.is_some()
     }
@@ -238,7 +239,7 @@ impl Terrain {
         self.transaction(ticket, work)
     }
 
-    /// A transaction on the world as it is.
+    /// A transaction on the present world.
     pub(super) fn transaction(&self, ticket: u64, work: Work) -> Transaction {
         Transaction {
             ticket,
@@ -266,7 +267,7 @@ impl Terrain {
         Ok(receipts)
     }
 
-    /// The same without a note for the plugin; the caller may drop what is no longer needed elsewhere.
+    /// Commits without notifying the plugin; the caller may drop the replaced data on another thread.
     pub(super) fn install(
         &mut self,
         mut commit: Commit,
@@ -301,7 +302,7 @@ impl Terrain {
         }
         self.log_terms();
         dropped.copy = copy;
-        // Steps of before hold parts that are gone.
+        // Undo steps recorded before the replacement refer to parts that no longer exist.
         if let (Work::Put(put), Some(Ok(_))) = (&done.work, &installed.put)
             && !put.is_empty()
         {
@@ -330,7 +331,8 @@ impl Terrain {
         keep(&mut self.step_receipts, receipt);
     }
 
-    /// Gives up the transaction that is under way, say because its task was lost. Its work is queued again, in front.
+    /// Abandons the running transaction, for example because its task was lost. Its work is queued again, in
+    /// front.
     pub fn abandon(&mut self) {
         let Some(lost) = self.in_flight.take() else { return };
         match lost.work {
@@ -342,8 +344,8 @@ impl Terrain {
         }
     }
 
-    /// Whether no queued or running edit changes these samples. A queued step counts as reaching everything in the history.
-    /// Loose pieces are not predicted: a piece may reach farther than the edit that cuts it off.
+    /// Whether no queued or running edit changes these samples. A queued step counts as reaching everything in the
+    /// history. Loose pieces are not predicted: a piece may reach farther than the edit that cuts it off.
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
         let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
             Work::Edits(submissions) => submissions.iter().all(|submission| submission.misses(bounds)),
@@ -360,20 +362,22 @@ impl Terrain {
             })
     }
 
-    /// What is drawn; `None` if all of the world is drawn in full.
+    /// The cut that is drawn; `None` if all of the world is drawn in full detail.
     pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
         self.drawn_cut.as_ref()
     }
 
-    /// Draws the nodes of a cut from now on, or with `None`, or a cut of a world of another size, all of the world in full. Everything has to be drawn anew:
-    /// [`World::draw_cut`] makes the meshes. A transaction under way is given up, and its work queued again.
+    /// Draws the nodes of a cut from now on. With `None`, or with a cut for a world of another size, draws
+    /// all of the world in full detail. All meshes have to be made again, with [`World::draw_cut`]. A running
+    /// transaction is abandoned, and its work queued again.
     pub fn set_drawn_cut(&mut self, drawn: Option<Arc<DrawnCut>>) {
         self.abandon();
         self.drawn_cut = drawn.filter(|drawn| self.world.has_cut(drawn.cut()));
     }
 
-    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](super::MeshUpdates::nodes) are what has to
-    /// be drawn. `None` while another transaction is under way, and where all of the world is drawn in full.
+    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](super::MeshUpdates::nodes)
+    /// are what has to be drawn. `None` while another transaction is under way, and where all of the world is drawn in
+    /// full.
     #[must_use = "the terrain waits for the commit of its transaction"]
     pub fn begin_cut(&mut self, choose: Arc<ChooseCut>) -> Option<Transaction> {
         self.begin_cut_for(choose, false)

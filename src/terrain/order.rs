@@ -1,8 +1,8 @@
-//! The law of order: the result depends only on the order of submissions, and not on frames, threads, or when transactions
-//! begin, are abandoned or are split.
+//! The law of order: the result depends only on the order of submissions, and not on frames, threads, or when
+//! transactions begin, are abandoned or are split.
 //!
-//! A random script is played twice with irregular transactions, and once by a simple model that applies one edit after the
-//! other, undoes single edits, and groups them itself. `BURROW_WORLDS` is the number of scripts.
+//! A random script is played twice with irregular transactions, and once by a simple model that applies one edit after
+//! the other, undoes single edits, and groups them itself. `BURROW_WORLDS` is the number of scripts.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -170,8 +170,8 @@ fn check_log(terrain: &mut Terrain) {
     assert_eq!(now(&replayed), now(terrain));
 }
 
-/// Plays a script with the simple model: one edit after the other, each a step by itself. A group is a list of edits that changed
-/// something.
+/// Plays a script with the simple model: one edit after the other, each its own step. A group is a list of
+/// edits that changed something.
 fn by_the_book(mut terrain: Terrain, script: &[Ask]) -> (BTreeMap<u64, Receipt>, Vec<Option<Vec<u64>>>, u64) {
     #[derive(PartialEq, Clone, Copy)]
     enum Key {
@@ -191,7 +191,7 @@ fn by_the_book(mut terrain: Terrain, script: &[Ask]) -> (BTreeMap<u64, Receipt>,
                 let receipt = if brush.tag & PANICS != 0 && Edit::quantize(brush).is_ok() {
                     Receipt { tag: brush.tag, outcome: Err(Rejection::Panicked) }
                 } else {
-                    // Each is a step by itself.
+                    // Each edit is its own step.
                     terrain.apply([Brush { stroke: None, ..brush.clone() }]).remove(0)
                 };
                 let is_changed = receipt.outcome.as_ref().is_ok_and(|applied| applied.bounds.is_some());

@@ -28,24 +28,24 @@ use crate::surface::{Mask, MaskView};
 use crate::volume::layers::{self, offset};
 use crate::volume::{Brick, Field, FieldId, UniformBricks, column_hash, pristine_layers};
 
-/// Why parts were not put in place; nothing changed then.
+/// The reason why parts were not replaced; nothing changed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChangeError {
     /// Bricks come twice or out of order.
-    #[error("the brick {0:?} comes twice or out of order")]
+    #[error("the brick {0:?} is repeated or out of order: sort bricks by position")]
     Order(BrickPos),
     /// A brick, or one of its edited samples, lies outside the world.
-    #[error("the brick {0:?} reaches out of the world")]
+    #[error("the brick {0:?} extends beyond the world")]
     OutsideWorld(BrickPos),
     /// A brick says of a pristine sample that it is solid where this ground is air, or the other way round.
-    #[error("the brick {0:?} belongs to another ground")]
+    #[error("the brick {0:?} was made on a different ground")]
     OtherGround(BrickPos),
     /// Fields of a chunk reach out of it, it comes twice, or one of its fields has the name of another.
-    #[error("fields of the chunk {0:?} reach out of it, come twice or share a name")]
+    #[error("the fields of chunk {0:?} extend beyond it, are repeated, or share a name")]
     Fields(ChunkPos),
     /// A revision or the name of a field is so great that no others could follow.
-    #[error("{0} is too great for a revision or the name of a field")]
+    #[error("{0} is too large for a revision or the name of a field")]
     Number(u64),
     /// The world would not have the hash that was expected.
     #[error("the world would have the hash {found:#018x}, not {expected:#018x}")]
@@ -56,7 +56,7 @@ pub enum ChangeError {
         expected: u64,
     },
     /// The ground has another size, in cells.
-    #[error("the ground has {found:?} cells, but that of the world has {expected:?}")]
+    #[error("the new ground has {found:?} cells, but the world has {expected:?}")]
     GroundSize {
         /// Width and depth of the new one.
         found: (i32, i32),
@@ -64,10 +64,10 @@ pub enum ChangeError {
         expected: (i32, i32),
     },
     /// Too much work [waits](super::WorkLimits::waiting).
-    #[error("too much work waits already")]
+    #[error("the queue is full: try again once waiting work is done")]
     Overloaded,
     /// It panicked.
-    #[error("putting parts in place panicked; this is a bug of the plugin's")]
+    #[error("replacing parts panicked: this is a bug in bevy_burrow")]
     Panicked,
 }
 
@@ -77,19 +77,19 @@ pub(super) struct Put {
     pub change: WorldChange,
     /// The hash that the world must have afterwards.
     pub hash: Option<u64>,
-    /// Does its receipt count voxels?
+    /// Whether its receipt counts voxels.
     pub counts: bool,
     /// Another ground below all edits; nothing else changes then.
     pub ground: Option<Arc<Ground>>,
 }
 
 impl Put {
-    /// Does it certainly change nothing?
+    /// Returns `true` if it certainly changes nothing.
     pub fn is_empty(&self) -> bool {
         self.change.bricks.is_empty() && self.change.fields.is_empty() && self.ground.is_none()
     }
 
-    /// Does it certainly change none of these samples?
+    /// Returns `true` if it certainly changes none of these samples.
     pub fn misses(&self, samples: LatticeBox) -> bool {
         let misses = |pos: &BrickPos| pos.samples().intersection(samples).is_none();
         self.ground.is_none() && self.change.bricks.iter().all(|(pos, _)| misses(pos))
@@ -262,7 +262,8 @@ fn share_uniform(world: &World, new: &mut [NewBrick]) -> Option<UniformBricks> {
     grown
 }
 
-/// Rule 2 anew for the cells near changed bricks, as samples may have become pristine again: the words of the mask that change.
+/// Evaluates rule 2 again near changed bricks, as samples may have become pristine again. Returns the mask
+/// words that change.
 fn words_of(
     world: &World,
     bricks: &[(BrickPos, Arc<Brick>)],
@@ -296,10 +297,10 @@ fn words_of(
 }
 
 impl Terrain {
-    /// Queues parts that take the place of what the world holds, after everything that was submitted before: say a region of
-    /// another machine's world. They are checked in the transaction, where `hash` is given against the hash that the world must
-    /// have afterwards too. History begins anew then, as its steps hold parts of before.
-    /// [What came of it](Self::take_change_receipts) is told in order.
+    /// Queues parts that replace parts of the world, after everything that was submitted before; for example
+    /// a region of another machine's world. The transaction checks them, and if `hash` is given, also that
+    /// the world has this hash afterwards. The undo history is cleared, because its steps refer to the
+    /// replaced parts. The [receipts](Self::take_change_receipts) arrive in order.
     ///
     /// # Errors
     /// [`ChangeError::Overloaded`] where too much work waits.
@@ -328,8 +329,8 @@ impl Terrain {
         self.change_receipts.pop_back().unwrap_or(Err(ChangeError::Panicked))
     }
 
-    /// What became of parts that were [submitted](Self::submit_change), in order; each is returned once. If they are not taken,
-    /// the latest 65,536 are kept.
+    /// Receipts of parts that were [submitted](Self::submit_change), in order; each is returned once. If they are
+    /// not taken, the latest 65,536 are kept.
     pub fn take_change_receipts(&mut self) -> Vec<Result<Restored, ChangeError>> {
         std::mem::take(&mut self.change_receipts).into()
     }

@@ -8,7 +8,7 @@ use super::world::World;
 use crate::ground::MaterialId;
 use crate::lattice::{Column, LIMIT, LatticeBox, REACH};
 
-/// Where a ray meets the ground.
+/// The point where a ray meets the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Voxels from the ray's origin.
@@ -141,7 +141,8 @@ impl World {
     /// The stretches of air over (x, z), lowest first; empty outside the world. Coordinates are taken to the nearest
     /// 2^-20 voxel.
     pub fn spans(&self, x: f64, z: f64) -> Vec<Span> {
-        // The deep is solid and the surface closed: floors and ceilings take turns, whatever rounding does to equal heights.
+        // The deep is solid and the surface closed: floors and ceilings take turns, whatever rounding does to equal
+        // heights.
         let crossings = self.crossings(x, z);
         let span =
             |pair: &[Crossing]| Span { floor: pair[0].y, ceiling: pair.get(1).map(|ceiling| ceiling.y) };
@@ -160,8 +161,8 @@ impl World {
         !place.y.is_nan() && !spans.is_empty() && !spans.iter().any(is_open)
     }
 
-    /// Whether all samples around the place are solid. Faster than [`is_solid`](Self::is_solid), which is also true nearer to
-    /// the surface.
+    /// Whether all samples around the place are solid. Faster than [`is_solid`](Self::is_solid), which is also true
+    /// nearer to the surface.
     pub fn is_buried(&self, place: DVec3) -> bool {
         let limit = DVec3::splat(f64::from(LIMIT)).with_x(f64::from(REACH)).with_z(f64::from(REACH));
         let cell = place.clamp(-limit, limit).floor().as_ivec3();
@@ -196,7 +197,7 @@ impl World {
         )
     }
 
-    /// Where the vertical line through (x, z) crosses the surface, lowest first.
+    /// Heights at which the vertical line through (x, z) crosses the surface, lowest first.
     ///
     /// Exact in integers, with the line moved by an infinitesimal step off every edge, so each crossing counts once.
     fn crossings(&self, x: f64, z: f64) -> Vec<Crossing> {
@@ -230,7 +231,7 @@ impl World {
     }
 }
 
-/// On which side of the edge p-q does the origin lie, once it is moved by (e, e * e) for an infinitesimal e?
+/// The side of the edge p-q on which the origin lies, once it is moved by (e, e * e) for an infinitesimal e.
 fn turn(p: (i64, i64), q: (i64, i64)) -> bool {
     let cross = p.0 * q.1 - p.1 * q.0;
     let (dx, dz) = (q.0 - p.0, q.1 - p.1);

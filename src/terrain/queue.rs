@@ -15,7 +15,7 @@ use crate::edits::reach;
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
 use crate::volume::DiggingRules;
 
-/// How much work a terrain takes on, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
+/// Limits of a terrain's work, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
 /// A brick takes the processor about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose pieces are
 /// not counted: each has a [budget](super::LooseSettings) that follows from its edit. A step through history counts as a fixed
@@ -34,7 +34,7 @@ pub struct WorkLimits {
 }
 
 impl WorkLimits {
-    /// All that waits goes into one transaction, and nothing is rejected: for tools and tests.
+    /// No limits: one transaction takes everything that waits, and nothing is rejected. For tools and tests.
     pub const UNBOUNDED: Self = Self { transaction: u64::MAX, waiting: u64::MAX };
 }
 
@@ -58,7 +58,7 @@ fn work_of(grid: ChunkGrid, edit: &Edit) -> u64 {
     EDIT + weight * reach(grid, edit).map_or(0, |reach| BrickPos::range(reach).volume())
 }
 
-/// What makes edits that follow each other one step of undo.
+/// The reason why consecutive edits are one step of undo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Together {
     /// They belong to one stroke.
@@ -67,7 +67,7 @@ pub(crate) enum Together {
     Batch(u64),
 }
 
-/// What is fixed for an edit when it is submitted.
+/// Everything about an edit that is fixed when it is submitted.
 #[derive(Clone, Debug)]
 pub(super) struct Terms {
     /// Edits with the same number are one step of undo; later ones have greater numbers.
@@ -99,18 +99,18 @@ pub(crate) struct Submission {
 }
 
 impl Submission {
-    /// Does it belong to the same group, under the same rules and loose settings?
+    /// Returns `true` if it belongs to the same group, under the same rules and loose settings.
     pub(super) fn goes_with(&self, other: &Self) -> bool {
         self.terms.is_same(&other.terms)
     }
 
-    /// Does it certainly change none of these samples?
+    /// Returns `true` if it certainly changes none of these samples.
     pub(super) fn misses(&self, samples: LatticeBox) -> bool {
         self.edit.as_ref().map_or(true, |edit| edit.reach().intersection(samples).is_none())
     }
 }
 
-/// What waits for its transaction.
+/// Requests that wait for their transaction.
 pub(super) enum Request {
     Edit(Submission),
     Step(HistoryStep),
@@ -180,12 +180,12 @@ impl Queue {
         self.open = None;
     }
 
-    /// Is there room for an edit, valid or not?
+    /// Returns `true` if there is room for an edit, valid or not.
     pub fn has_room(&self, grid: ChunkGrid, edit: Option<&Edit>) -> bool {
         self.fits(edit.map_or(EDIT, |edit| work_of(grid, edit)))
     }
 
-    /// Is there room for a step?
+    /// Returns `true` if there is room for a step.
     pub fn has_room_for_step(&self) -> bool {
         self.fits(STEP)
     }
@@ -291,7 +291,7 @@ impl Queue {
     }
 }
 
-/// What a transaction is made of.
+/// The work of a transaction.
 pub(super) enum Taken {
     Edits(Arc<[Submission]>),
     Step(HistoryStep),

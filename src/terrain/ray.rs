@@ -8,8 +8,9 @@ pub(super) const NEAR: f64 = 1e-6;
 /// A drawn triangle, in voxels.
 pub(super) type Triangle = [DVec3; 3];
 
-/// A ray prepared for watertight intersection tests, by *Watertight Ray/Triangle Intersection* (Woop, Benthin and Wald 2013). Triangles that share an edge compute the
-/// same number for it, and a distance is always a mean of those of the corners.
+/// A ray prepared for watertight intersection tests, by *Watertight Ray/Triangle Intersection* (Woop, Benthin and Wald
+/// 2013). Triangles that share an edge compute the same number for it, and a distance is always a mean of those of the
+/// corners.
 pub(super) struct Ray {
     origin: DVec3,
     axes: [usize; 3],

@@ -8,8 +8,8 @@ use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos};
 use crate::volume::{Brick, DiggingRules, Fields};
 
-/// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was written
-/// under another number can't be replayed.
+/// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was
+/// written under another number can't be replayed.
 pub const SIMULATION: u32 = 1;
 
 /// Parts of a world that take the place of others.
@@ -19,11 +19,11 @@ pub struct WorldChange {
     pub bricks: Vec<(BrickPos, Option<Arc<Brick>>)>,
     /// All fields of each chunk whose fields change, by chunk.
     pub fields: Vec<(ChunkPos, Fields)>,
-    /// The greatest name that a field has had so far.
+    /// The greatest name that any field has had.
     pub next_field: u64,
 }
 
-/// What a commit was asked for. Those of one commit apply in order.
+/// One item of a commit. Items of one commit apply in order.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LogEntry {
@@ -42,19 +42,20 @@ pub enum LogEntry {
 /// A commit: what was asked for, and what came of it.
 #[derive(Clone, Debug)]
 pub struct CommitRecord {
-    /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same where only
-    /// rules or settings changed.
+    /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same
+    /// where only rules or settings changed.
     pub revision: u64,
     /// The world's [hash](super::World::hash) after it.
     pub hash: u64,
-    /// What was asked for, in order. Edits that were rejected are left out; a commit of such edits alone has no entry.
+    /// The items of the commit, in order. Rejected edits are left out; a commit of such edits alone has no entry.
     pub entries: Vec<LogEntry>,
     /// What changed.
     pub change: WorldChange,
 }
 
 impl CommitRecord {
-    /// Is it a commit? Otherwise it only says which rules and settings hold from here on, and the revision stays.
+    /// Whether it is a commit. Otherwise it only holds rules and settings for later edits, and the revision does not
+    /// change.
     pub fn is_commit(&self) -> bool {
         let changes =
             |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change | LogEntry::Ground(_));
@@ -62,7 +63,7 @@ impl CommitRecord {
     }
 }
 
-/// All of a world but its ground, as it is saved: [`Terrain::restore`](super::Terrain::restore) makes a terrain of it.
+/// All of a world except its ground, for saving: [`Terrain::restore`](super::Terrain::restore) makes a terrain of it.
 #[derive(Clone, Debug, Default)]
 pub struct WorldParts {
     /// Every stored brick, and all fields.

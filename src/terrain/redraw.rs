@@ -1,4 +1,4 @@
-//! What a transaction draws anew: chunks with dirty blocks, touched tiles.
+//! The meshes that a transaction makes again: chunks with dirty blocks, touched tiles.
 
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
@@ -18,7 +18,7 @@ use super::unmeshed::{self, Meshing};
 use super::world::World;
 use crate::backend::Compute;
 use crate::lattice::{
-    BrickPos, ChunkPos, Column, ItemCost, LatticeBox, TilePos, order_of_places, side_by_side,
+    BrickPos, ChunkPos, Column, ItemCost, LatticeBox, TilePos, side_by_side, sort_permutation,
 };
 use crate::surface::Mask;
 use crate::surface::block::Block;
@@ -32,10 +32,10 @@ pub struct MeshUpdates {
     pub tiles: Vec<(TilePos, TileUpdate)>,
     /// Chunks whose surface changed.
     pub chunks: Vec<(ChunkPos, Arc<ChunkSurface>)>,
-    /// Nodes that are drawn otherwise than before, where a [cut](super::DrawnCut) is drawn. Tiles and chunks that change are
-    /// listed above, whether they are drawn or not.
+    /// Nodes that are drawn otherwise than before, where a [cut](super::DrawnCut) is drawn. Tiles and chunks that
+    /// change are listed above, whether they are drawn or not.
     pub nodes: Vec<NodeUpdate>,
-    /// What is drawn then, if that changes.
+    /// The cut that is drawn afterwards, if it changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Chunks that change without being meshed.
     pub(super) outdated: Vec<ChunkPos>,
@@ -61,13 +61,13 @@ pub(super) fn updates(
         return MeshUpdates { outdated, ..MeshUpdates::default() };
     }
     let tiles = TileWork::new(world, view, newer);
-    let mut chunks = |meanwhile: &(dyn Fn() + Sync)| {
+    let mut chunks = |overlap: &(dyn Fn() + Sync)| {
         let blocks = Stages::time(meshing, || {
             let mut blocks = dirty_blocks(world, view, newer, dirty);
             unmeshed::complete(world, view, &mut blocks);
             blocks
         });
-        mesh_blocks(world, view, backend, &blocks, meanwhile, meshing, assembly)
+        mesh_blocks(world, view, backend, &blocks, overlap, meshing, assembly)
     };
     // Tiles and chunks do not depend on each other: each is made while the other leaves threads idle.
     let chunks = if !ItemCost::Brick.is_shared(dirty.len()) {
@@ -102,13 +102,14 @@ fn areas(dirty: &ByBrick) -> Vec<(Column, Column)> {
     })
 }
 
-/// Has blocks meshed and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
+/// Has blocks meshed and puts their parts among those of their chunks that stay; leaves out chunks where nothing
+/// changed.
 fn mesh_blocks(
     world: &World,
     view: &WorldView,
     backend: &dyn Compute,
     blocks: &[Block],
-    meanwhile: &(dyn Fn() + Sync),
+    overlap: &(dyn Fn() + Sync),
     meshing: &mut Duration,
     assembly: &mut Duration,
 ) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
@@ -117,7 +118,7 @@ fn mesh_blocks(
     let order = OnceLock::new();
     let order = || order.get_or_init(|| ByChunk::new(blocks));
     let meshed = || {
-        backend.mesh(view, blocks, meanwhile, &mut |parts| {
+        backend.mesh(view, blocks, overlap, &mut |parts| {
             chunks = Stages::time(&mut own, || assemble(world, blocks, order(), parts));
         });
     };
@@ -142,7 +143,7 @@ struct ByChunk {
 /// Blocks of a chunk.
 struct OfChunk {
     chunk: ChunkPos,
-    /// How many there are.
+    /// Their number.
     count: usize,
     /// One more than the greatest of their numbers.
     end: usize,
@@ -152,7 +153,7 @@ impl ByChunk {
     /// On one thread: with rayon's help, a thread that waits for this could be given other work first.
     fn new(blocks: &[Block]) -> Self {
         let of = |number: u32| &blocks[number as usize];
-        let mut order = order_of_places(blocks, |block| block.chunk.as_ivec3().to_array());
+        let mut order = sort_permutation(blocks, |block| block.chunk.as_ivec3().to_array());
         let mut keyed = Vec::new();
         let of_chunk = |numbers: &mut [u32]| {
             let end = numbers.iter().max().map_or(0, |&last| last as usize + 1);
@@ -187,8 +188,8 @@ fn as_number(key: Key, number: u32) -> u128 {
 /// A chunk, and its surface.
 type Updated = (ChunkPos, Arc<ChunkSurface>);
 
-/// The surfaces of chunks with the parts of these blocks, in order, in place of old ones. Threads begin with those whose parts
-/// are here.
+/// The surfaces of chunks with the parts of these blocks, in order, in place of old ones. Threads begin with those
+/// whose parts are here.
 fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn MeshedBlocks) -> Vec<Updated> {
     let fresh = |&number: &u32| {
         let number = number as usize;

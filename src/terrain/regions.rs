@@ -34,18 +34,19 @@ impl World {
         self.bricks.get(&pos)
     }
 
-    /// The greatest name that a field has had so far.
+    /// The greatest name that any field has had.
     pub fn next_field(&self) -> u64 {
         self.next_field
     }
 
-    /// The sum of the [hashes of all regions](Self::region_hash), which wraps around; it is kept, so this takes no time.
+    /// The sum of the [hashes of all regions](Self::region_hash), which wraps around; it is kept, so this takes no
+    /// time.
     pub fn regions_hash(&self) -> u64 {
         self.sample_hash
     }
 
-    /// Hash of the edited samples of a region; 0 where nothing was edited. The sum of all, which wraps around, is that of the
-    /// world: see [`hash_of`](Self::hash_of).
+    /// Hash of the edited samples of a region; 0 where nothing was edited. The sum of all, which wraps around, is that
+    /// of the world: see [`hash_of`](Self::hash_of).
     pub fn region_hash(&self, region: RegionPos) -> u64 {
         let hash = |(pos, brick): (BrickPos, &Arc<Brick>)| {
             brick.hash(pos.origin().y, brick.edited(), &columns_of(pos))

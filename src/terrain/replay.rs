@@ -14,7 +14,7 @@ use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, ChunkPos};
 use crate::volume::{DiggingRules, FieldId, Fields, RulesError};
 
-/// Why a terrain can't be restored.
+/// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RestoreError {
@@ -29,20 +29,20 @@ pub enum RestoreError {
     Parts(#[from] ChangeError),
 }
 
-/// Why a record can't be replayed. The terrain may hold a part of it then, and should be dropped.
+/// An error of replaying a record. The terrain may then hold a part of the record, and should be dropped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
     /// The record does not follow the world's revision, or makes more than one commit.
-    #[error("the record leads to revision {found}, but the world is at {at}")]
+    #[error("the record leads to revision {found}, but the world is at revision {at}")]
     Revision {
         /// The world's.
         at: u64,
         /// The record's.
         found: u64,
     },
-    /// The world has another hash than the record says: it is another world, or the record was written by a version of the
-    /// crate with another [`SIMULATION`](super::SIMULATION).
+    /// The world has another hash than the record says: it is another world, or the record was written by a version of
+    /// the crate with another [`SIMULATION`](super::SIMULATION).
     #[error("revision {revision} has the hash {found:#018x} here, but {expected:#018x} in the record")]
     Hash {
         /// The record's revision.
@@ -53,7 +53,7 @@ pub enum ReplayError {
         expected: u64,
     },
     /// An edit was rejected that had been applied.
-    #[error("an edit of revision {0} is rejected here, though it had been applied")]
+    #[error("an edit of revision {0} is rejected, although the record says that it was applied")]
     Rejected(u64),
     /// The rules are invalid.
     #[error(transparent)]
@@ -64,8 +64,8 @@ pub enum ReplayError {
 }
 
 impl Terrain {
-    /// All of the world but its ground, as [`restore`](Self::restore) takes it. Bricks are shared, not copied. History and what
-    /// waits are not part of it.
+    /// All of the world but its ground, as [`restore`](Self::restore) takes it. Bricks are shared, not copied. History
+    /// and what waits are not part of it.
     pub fn parts(&self) -> WorldParts {
         let world = &self.world;
         WorldParts {
@@ -77,11 +77,11 @@ impl Terrain {
         }
     }
 
-    /// A terrain from the parts of a world over this ground. Nothing is meshed: surfaces are made when they are asked for. There
-    /// is no history.
+    /// A terrain from the parts of a world over this ground. Nothing is meshed: surfaces are made when they are asked
+    /// for. There is no history.
     ///
-    /// Samples and hash do not depend on the chunk size. Fields do: for another size than they were saved with, there is one
-    /// for each connected group of boxes around the samples of a brick.
+    /// Samples and hash do not depend on the chunk size. Fields do: for another size than they were saved with, there
+    /// is one for each connected group of boxes around the samples of a brick.
     ///
     /// # Errors
     /// When settings or rules are out of range, or when parts do not fit this ground.
@@ -106,13 +106,15 @@ impl Terrain {
         Ok(terrain)
     }
 
-    /// Applies a record of a [log](Self::take_log) at once, after everything that waits, and compares the world with it: its
-    /// revision, and its hash. Returns the receipts of its edits. A log that this terrain keeps
-    /// tells of it too.
+    /// Applies a record of a [log](Self::take_log) at once, after everything that waits, and compares the
+    /// world with it: its revision, and its hash. Returns the receipts of its edits. A log that this terrain
+    /// keeps records it too.
     ///
-    /// Fields of steps and of parts belong to the chunk size of the terrain that they were logged by, which this one needs too.
+    /// Fields of steps and of parts belong to the chunk size of the terrain that they were logged by, which this one
+    /// needs too.
     ///
-    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as [stale](super::StaleCommit).
+    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as
+    /// [stale](super::StaleCommit).
     ///
     /// # Errors
     /// When the record does not follow, or does not lead to the world that it says.
@@ -165,8 +167,8 @@ impl Terrain {
 }
 
 impl WorldChange {
-    /// Lets fields take in the edited samples of all bricks that none of them holds; new ones get names that none has had. Returns
-    /// whether there were any.
+    /// Lets fields take in the edited samples of all bricks that none of them holds; new ones get names that none has
+    /// had. Returns whether there were any.
     pub(crate) fn cover(&mut self, grid: ChunkGrid) -> bool {
         let mut fields: BTreeMap<ChunkPos, Fields> = std::mem::take(&mut self.fields).into_iter().collect();
         let (mut next, mut has_grown) = (self.next_field, false);

@@ -1,5 +1,5 @@
-//! Bricks, fields and mask of another time, put in place of those of now: a step through history, and what that shares with
-//! parts from a save.
+//! Bricks, fields and mask of another time, put in place of those of now: a step through history, and what that shares
+//! with parts from a save.
 
 use std::sync::Arc;
 
@@ -21,13 +21,14 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{Brick, Fields, pristine_layers};
 
-/// What is drawn otherwise, and what happens to fields, when parts are put in place.
+/// How meshes and fields change when parts are replaced.
 pub(super) struct Placed {
     pub meshes: MeshUpdates,
     pub news: Vec<(ChunkPos, FieldNews)>,
 }
 
-/// Draws the world with a change; `bricks` are those of the change with pristine ones made, `changed` says where samples differ.
+/// Draws the world with a change; `bricks` are those of the change with pristine ones made, `changed` says where
+/// samples differ.
 pub(super) fn place(
     transaction: &Transaction,
     change: &Change,

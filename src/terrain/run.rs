@@ -29,8 +29,8 @@ use crate::backend::{Compute, Cpu, Engine};
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ItemCost};
 
-/// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for more
-/// would take too long.
+/// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for
+/// more would take too long.
 const MOST_FAULTS: usize = 16;
 
 /// A transaction panicked.
@@ -79,7 +79,7 @@ impl Transaction {
         Commit { copy, record, stages, ..commit }
     }
 
-    /// May it reach so many bricks that several threads will work on them?
+    /// Returns `true` if it may reach enough bricks for several threads.
     fn is_large(&self) -> bool {
         match &self.work {
             Work::Edits(submissions) => {
@@ -110,8 +110,8 @@ impl Transaction {
         self.commit(Vec::new(), self.world.sample_hash, meshes)
     }
 
-    /// Computes the commit of a transaction that panicked. Runs it once more, because the panic may not have come from an edit,
-    /// and then finds each edit that is to blame by bisection.
+    /// Computes the commit of a transaction that panicked. Runs it once more, because the panic may not have come from
+    /// an edit, and then finds each edit that is to blame by bisection.
     fn run_without_faults(mut self) -> Commit {
         if let Ok(commit) = self.attempt() {
             return commit;
@@ -137,7 +137,8 @@ impl Transaction {
         self.rejected()
     }
 
-    /// The last edit of the shortest list of first edits that panics; the first `fine` are known not to panic, all of them do.
+    /// The last edit of the shortest list of first edits that panics; the first `fine` are known not to panic, all of
+    /// them do.
     fn first_fault(&self, submissions: &[Submission], mut fine: usize) -> usize {
         let mut faulty = submissions.len();
         while faulty > fine + 1 {

@@ -1,13 +1,13 @@
 //! Settings that a terrain is made with, and what may be wrong with them.
 
-/// How a terrain is cut up and how large it is drawn.
+/// Settings of a terrain: chunk size and voxel size.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TerrainSettings {
     /// Cells along a chunk's side, 8..=128. Small chunks redraw faster, large ones need fewer draws.
     pub chunk_size: u32,
-    /// Metres along a voxel's side: a power of two from 1/8 to 8, so that scaling loses no bits. The model itself counts
-    /// in voxels.
+    /// Metres along a voxel's side: a power of two from 1/8 to 8, so that scaling loses no bits. The model itself
+    /// counts in voxels.
     pub voxel_size: f32,
 }
 
@@ -29,7 +29,7 @@ impl TerrainSettings {
     }
 }
 
-/// Why a terrain can't be made.
+/// An error of making a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TerrainError {

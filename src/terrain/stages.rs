@@ -1,10 +1,10 @@
-//! Where the time of a transaction goes.
+//! Times of the stages of a transaction.
 
 use std::time::Duration;
 
 use web_time::Instant;
 
-/// How long the stages of a transaction took. In large ones tiles and chunks are made side by side, so stages may take
+/// Durations of the stages of a transaction. In large ones tiles and chunks are made side by side, so stages may take
 /// longer than the whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stages {
@@ -12,11 +12,13 @@ pub struct Stages {
     pub edit: Duration,
     /// Marching cubes over dirty blocks, and finding these.
     pub meshing: Duration,
-    /// Assembling chunk meshes from new and old parts, the first ones while others are still being copied from a card.
+    /// Assembling chunk meshes from new and old parts, the first ones while others are still being copied
+    /// from the GPU.
     pub assembly: Duration,
     /// The mask, rings and index lists.
     pub ring: Duration,
-    /// The whole transaction: the above, fields and receipts, and a copy of the world's index where others hold the world.
+    /// The whole transaction: the above, fields and receipts, and a copy of the world's index where others hold the
+    /// world.
     pub whole: Duration,
 }
 

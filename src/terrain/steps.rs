@@ -5,17 +5,18 @@ use super::model::Terrain;
 use super::world::Memory;
 
 impl Terrain {
-    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last group of edits
-    /// that changed the world. Its [`HistoryReceipt`] says what came of it. Where there is [no room](Self::set_work_limits)
-    /// for it, it is answered at once.
+    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last group of
+    /// edits that changed the world. Its [`HistoryReceipt`] says what came of it. Where there is [no
+    /// room](Self::set_work_limits) for it, it is answered at once.
     ///
     /// Groups are decided when edits are submitted, not when their transactions begin: brushes of one
     /// [stroke](crate::brush::Brush::stroke) that follow each other, those that one call of [`apply`](Self::apply) or
     /// [`submit_all`](Self::submit_all) was given, or a single brush. One that changed nothing is no step.
     ///
-    /// Afterwards all is as it was before that group, bit by bit: [`World::hash`](super::World::hash), samples, materials, fields with
-    /// their names, boxes and revisions, mask, meshes and rings. Other than before are [`World::revision`](super::World::revision), which counts
-    /// this as one more commit, and the names that fields will get from then on: none is ever used for two.
+    /// Afterwards all is as it was before that group, bit by bit: [`World::hash`](super::World::hash), samples,
+    /// materials, fields with their names, boxes and revisions, mask, meshes and rings. Other than before are
+    /// [`World::revision`](super::World::revision), which counts this as one more commit, and the names that fields
+    /// will get from then on: none is ever used for two.
     pub fn submit_undo(&mut self) {
         self.submit_step(HistoryStep::Undo);
     }
@@ -34,19 +35,19 @@ impl Terrain {
         }
     }
 
-    /// What can be undone and redone, and what it takes.
+    /// The steps that can be undone and redone, and their memory.
     pub fn history(&self) -> History {
         self.undo_stack.figures()
     }
 
-    /// From now on, history takes at most so many bytes; 64 MiB unless set, and with 0 there is none. Where they do not
-    /// suffice, the oldest steps go first. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the surface of
-    /// some thousand digs of radius 8. What exceeds the budget is dropped before this returns.
+    /// Limits the history to `bytes` bytes; 64 MiB by default, and 0 turns history off. If it grows beyond
+    /// that, the oldest steps are dropped. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the
+    /// surface of some thousand digs of radius 8. What exceeds the budget is dropped before this returns.
     pub fn set_undo_budget(&mut self, bytes: usize) {
         drop(self.rebudget_undo(bytes));
     }
 
-    /// The same; the caller may drop what exceeds the budget elsewhere.
+    /// Like [`Self::set_undo_budget`]; the caller may drop the excess on another thread.
     pub(crate) fn rebudget_undo(&mut self, bytes: usize) -> DeferredDrop {
         self.undo_stack.set_budget(bytes)
     }
@@ -56,8 +57,8 @@ impl Terrain {
         self.undo_stack.budget()
     }
 
-    /// Clears what can be undone and redone; the budget stays. Edits that wait or are under way enter history once they are
-    /// committed, and steps that wait find nothing.
+    /// Clears what can be undone and redone; the budget stays. Edits that wait or are under way enter history once they
+    /// are committed, and steps that wait find nothing.
     ///
     /// ```
     /// # use bevy_burrow::prelude::*;
@@ -73,7 +74,7 @@ impl Terrain {
     /// ```
     pub fn clear_history(&mut self) {
         self.undo_stack.clear(&mut DeferredDrop::default());
-        // A stroke that goes on begins anew.
+        // An unfinished stroke starts a new group.
         self.queue.close_group();
     }
 
@@ -101,13 +102,13 @@ impl Terrain {
         self.step_receipts.pop_back().unwrap_or_else(|| step.nothing())
     }
 
-    /// What became of steps through history that were submitted, in order; each is returned once. If they are not taken,
-    /// the latest 65,536 are kept.
+    /// Receipts of steps through history that were submitted, in order; each is returned once. If they are not
+    /// taken, the latest 65,536 are kept.
     pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
         std::mem::take(&mut self.step_receipts).into()
     }
 
-    /// Is there any to [take](Self::take_history_receipts)?
+    /// Returns `true` if there is a receipt to [take](Self::take_history_receipts).
     pub fn has_history_receipts(&self) -> bool {
         !self.step_receipts.is_empty()
     }
@@ -133,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_smaller_budget_has_no_room_for_is_left_to_whoever_sets_it() {
+    fn the_excess_of_a_smaller_budget_is_returned_to_the_caller() {
         let mut terrain = terrain();
         assert_eq!(terrain.undo_budget(), UNDO_BUDGET);
         for x in [20.0, 40.0] {
@@ -160,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn history_that_is_forgotten_begins_anew_with_what_was_under_way() {
+    fn cleared_history_restarts_with_the_running_transaction() {
         let mut terrain = terrain();
         terrain.set_undo_budget(1 << 30);
         terrain.apply([dig(20.0)]);
@@ -177,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stroke_that_goes_on_after_history_was_forgotten_is_a_step_again() {
+    fn a_stroke_continued_after_history_was_cleared_is_a_step_again() {
         let mut terrain = terrain();
         terrain.apply([dig(20.0).with_stroke(1)]);
         terrain.clear_history();

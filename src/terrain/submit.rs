@@ -9,9 +9,9 @@ use super::world::unique;
 use crate::brush::{Brush, Edit};
 
 impl Terrain {
-    /// Queues a brush as a step of undo of its own, unless it is part of a [stroke](Brush::stroke). An invalid brush is queued
-    /// too: its receipt says why it was rejected. A brush that exceeds the [limits](Self::set_work_limits) is answered
-    /// [at once](Self::take_answered).
+    /// Queues a brush as a separate step of undo, unless it is part of a [stroke](Brush::stroke). An invalid brush is
+    /// queued too: its receipt says why it was rejected. A brush that exceeds the [limits](Self::set_work_limits) is
+    /// answered [at once](Self::take_answered).
     pub fn submit(&mut self, brush: &Brush) {
         self.submit_all([brush]);
     }
@@ -48,7 +48,8 @@ impl Terrain {
         }
     }
 
-    /// Queues an edit, say from a file or the network. It is checked like a brush, and a step of undo as one would be.
+    /// Queues an edit, for example from a file or the network. It is checked like a brush, and becomes a step
+    /// of undo as a brush does.
     pub fn submit_edit(&mut self, edit: &Edit) {
         self.submit_edits([edit]);
     }
@@ -76,7 +77,8 @@ impl Terrain {
         }
     }
 
-    /// Is there room for an edit? `None` stands for an invalid one, which is queued too and gets its receipt in turn.
+    /// Returns `true` if there is room for an edit. `None` stands for an invalid edit, which is queued too and gets its
+    /// receipt in turn.
     pub(crate) fn admit(&self, edit: Option<&Edit>) -> Result<(), Rejection> {
         let has_room = self.queue.has_room(self.world.grid(), edit);
         if has_room { Ok(()) } else { Err(Rejection::Overloaded) }
@@ -100,7 +102,7 @@ impl Terrain {
         self.queue.limits = limits;
     }
 
-    /// How much work a transaction takes, and how much may wait.
+    /// Limits of the work in a transaction and of the work that may wait.
     pub fn work_limits(&self) -> WorkLimits {
         self.queue.limits
     }
@@ -110,14 +112,15 @@ impl Terrain {
         self.queue.work()
     }
 
-    /// Applies brushes at once, after everything that waits: queue, transactions and commits in one call, on this thread.
-    /// Returns the receipts of these brushes; those of brushes that waited are kept for
+    /// Applies brushes at once, after everything that waits: queue, transactions and commits in one call, on this
+    /// thread. Returns the receipts of these brushes; those of brushes that waited are kept for
     /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
     ///
     /// All of them are one step of undo, except for strokes among them; a game that replays a journal may want to
     /// [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.
     ///
-    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as [stale](super::StaleCommit).
+    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as
+    /// [stale](super::StaleCommit).
     pub fn apply<B: Borrow<Brush>>(&mut self, brushes: impl IntoIterator<Item = B>) -> Vec<Receipt> {
         self.abandon();
         let waiting = self.queue.edits().count();
@@ -141,13 +144,13 @@ impl Terrain {
         receipts
     }
 
-    /// Receipts of brushes that waited when [`apply`](Self::apply) was called, and of those that there was no room for, in
-    /// order; each is returned once. If they are not taken, the latest 65,536 are kept.
+    /// Receipts of brushes that waited when [`apply`](Self::apply) was called, and of those that there was no room for,
+    /// in order; each is returned once. If they are not taken, the latest 65,536 are kept.
     pub fn take_answered(&mut self) -> Vec<Receipt> {
         std::mem::take(&mut self.answered).into()
     }
 
-    /// Is there any receipt to [take](Self::take_answered)?
+    /// Returns `true` if there is a receipt to [take](Self::take_answered).
     pub fn has_answered(&self) -> bool {
         !self.answered.is_empty()
     }

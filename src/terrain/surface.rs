@@ -3,7 +3,7 @@
 use crate::surface::meshed_blocks::MeshedBlock;
 use crate::surface::{Indices, SurfaceMesh};
 
-/// What marching cubes draws in one chunk: one mesh, which remembers where each block's part of it is.
+/// The marching cubes surface of one chunk: one mesh, with the position of each block's part.
 #[derive(Clone, Debug, Default)]
 pub struct ChunkSurface {
     mesh: SurfaceMesh,
@@ -24,7 +24,7 @@ struct Part {
 /// A brick's position in [layer order](crate::lattice::BrickPos::layer_order): the order of parts.
 pub(super) type Key = [i32; 3];
 
-/// A part that was meshed anew. Without indices it is no part.
+/// A part that was meshed again. Without indices, the part is removed.
 #[derive(Clone, Copy)]
 pub(super) struct Fresh<'a> {
     pub key: Key,
@@ -40,7 +40,7 @@ impl ChunkSurface {
         &self.mesh
     }
 
-    /// Does the chunk draw nothing?
+    /// Returns `true` if the chunk draws nothing.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
@@ -54,7 +54,8 @@ impl ChunkSurface {
         self.parts.binary_search_by(|part| part.key.cmp(&key)).ok()
     }
 
-    /// The surface with these parts, in order, in place of old ones; others are copied. `None` where that changes nothing.
+    /// The surface with these parts, in order, in place of old ones; others are copied. `None` where that changes
+    /// nothing.
     pub(super) fn updated<'a>(&self, fresh: impl Iterator<Item = Fresh<'a>>) -> Option<Self> {
         let changes: Vec<Fresh> = fresh.filter(|part| self.differs(part)).collect();
         if changes.is_empty() {
@@ -89,7 +90,7 @@ impl ChunkSurface {
         Some(new)
     }
 
-    /// Is a part other than the one with its key, or without it?
+    /// Returns `true` if a part differs from the one with its key, or if there is none with it.
     fn differs(&self, fresh: &Fresh) -> bool {
         let Some(at) = self.find(fresh.key) else {
             return !fresh.part.indices.is_empty();

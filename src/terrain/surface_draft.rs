@@ -14,7 +14,7 @@ use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Indices, SurfaceMesh};
 
-/// What a tile draws: its columns stay as they are, so only its rings and indices change.
+/// The mesh data of a tile. Its columns never change, so only its rings and indices do.
 #[derive(Clone, Debug)]
 pub struct TileUpdate {
     pub(crate) tile: TilePos,
@@ -57,8 +57,8 @@ impl TileUpdate {
     }
 }
 
-/// All that the surface of one tile or chunk is made from, to make it on another thread. Unlike a snapshot it does not hold
-/// the world, so the next commit has nothing to copy.
+/// The complete input for the surface of one tile or chunk, to make it on another thread. Unlike a snapshot it does not
+/// hold the world, so the next commit has nothing to copy.
 #[derive(Clone)]
 pub(crate) enum SurfaceDraft {
     Nothing,
@@ -70,7 +70,7 @@ pub(crate) enum SurfaceDraft {
 }
 
 impl World {
-    /// What the surface of a tile or chunk is made from, as it is now.
+    /// The present input for the surface of a tile or chunk.
     pub(crate) fn draft(&self, drawn: Drawn) -> SurfaceDraft {
         match drawn {
             Drawn::Tile(tile) if self.grid.has_tile(tile) => {
@@ -88,7 +88,7 @@ impl World {
 }
 
 impl SurfaceDraft {
-    /// Is nothing drawn?
+    /// Returns `true` if nothing is drawn.
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
         match self {

@@ -23,8 +23,8 @@ const FOUND: u8 = 1;
 /// Set when the caller allows drawing to start.
 const ALLOWED: u8 = 2;
 
-/// The tiles that a transaction draws. The touched ones can be found early; drawing starts once they are known and the caller
-/// allows it.
+/// The tiles that a transaction draws. The touched ones can be found early; drawing starts once they are known and the
+/// caller allows it.
 pub(super) struct TileWork<'a> {
     world: &'a World,
     view: &'a WorldView<'a>,
@@ -100,18 +100,18 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
 /// A tile, and 8x8 cells of it as (z, x), in units of 8 cells.
 type Patch = (TilePos, (i32, i32));
 
-/// The patch itself and those beside it, in units of patches.
+/// The patch itself and its neighbours, in units of patches.
 const BESIDE: [(i32, i32); 5] = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)];
 
 /// Patches that lose a cell to the mask or get one back, or border on one that does, by the tiles that draw them.
 fn touched_patches(world: &World, grid: ChunkGrid, newer: &Mask) -> Vec<Patch> {
     let turned = |word| newer.get_word(word).map_or(0, |cells| cells ^ world.mask.word(word));
-    // Does a word turn cells of the patch that is one of these steps further, or beside it?
+    // Whether a word changes cells of the patch that is one of these steps away, or of its neighbours.
     let touches = |(x, z): (i32, i32), step: usize| {
         let (dx, dz) = BESIDE[step];
         grown_into(turned((x - dx, z - dz)), dx, dz) != 0
     };
-    // Of several words that touch a patch, the one of the first step tells of it.
+    // Of several words that touch a patch, the one of the first step reports it.
     let is_first = |patch, step| touches(patch, step) && !(0..step).any(|other| touches(patch, other));
     let touched_by = |&((x, z), _): &((i32, i32), u64)| {
         let patches = (0..).zip(BESIDE).map(move |(step, (dx, dz))| ((x + dx, z + dz), step));

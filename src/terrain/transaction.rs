@@ -26,19 +26,19 @@ pub(super) enum Work {
     Cut(Arc<ChooseCut>),
 }
 
-/// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
-/// terrain takes one of them.
+/// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit;
+/// a terrain takes one of them.
 #[derive(Clone)]
 pub struct Transaction {
     pub(super) ticket: u64,
     pub(super) world: Arc<World>,
     pub(super) work: Work,
-    /// Without one, the processor.
+    /// `None` runs on the CPU.
     pub(super) engine: Option<Engine>,
-    /// What is drawn; `None` where all of the world is drawn in full.
+    /// The cut that is drawn; `None` if all of the world is drawn in full detail.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     pub(super) meshing: Meshing,
-    /// Does the terrain keep a log?
+    /// Whether the terrain keeps a log.
     pub(super) is_logged: bool,
 }
 
@@ -58,7 +58,7 @@ impl Transaction {
         self.ticket
     }
 
-    /// How many edits it holds; steps through history and changes of the cut hold none.
+    /// Number of its edits; steps through history and changes of the cut hold none.
     pub fn len(&self) -> usize {
         match &self.work {
             Work::Edits(submissions) => submissions.len(),
@@ -66,7 +66,7 @@ impl Transaction {
         }
     }
 
-    /// Does it hold no edit?
+    /// Returns `true` if it holds no edit.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

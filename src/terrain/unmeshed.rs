@@ -1,4 +1,4 @@
-//! Chunks whose surface is not kept: it is made when it is asked for, say once a player comes near.
+//! Chunks whose surface is not kept: it is made on demand, for example when a player comes near.
 //!
 //! A terrain that is [restored](super::Terrain::restore) from a save has meshed nothing, and one that [never
 //! meshes](Meshing::Never) keeps no surface. Everything else about them is the same.
@@ -20,17 +20,17 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{Bricks, SampleView};
 
-/// Which surfaces a terrain's transactions make.
+/// Selects the surfaces that a terrain's transactions make.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Meshing {
-    /// All that change, ready to be shown.
+    /// All changed meshes, ready to be shown.
     #[default]
     All,
-    /// None: for servers and tools that show nothing. Whoever asks for a mesh gets it nevertheless, made at that moment.
+    /// None: for servers and tools that show nothing. Meshes that are asked for are made at that moment.
     Never,
 }
 
-/// All that the surface of a chunk is made from.
+/// The complete input for the surface of a chunk.
 pub(crate) struct UnmeshedChunk {
     ground: Arc<Ground>,
     grid: ChunkGrid,
@@ -89,8 +89,8 @@ fn columns(low: IVec3, high: IVec3) -> impl Iterator<Item = (i32, i32)> {
     (low.x..=high.x).flat_map(move |x| (low.z..=high.z).map(move |z| (x, z)))
 }
 
-/// The blocks of a chunk that may draw something of a world with this mask, by stacks, each from below: those of stored bricks
-/// and next to them, and those of the mask's sheet.
+/// The blocks of a chunk that may draw something of a world with this mask, by stacks, each from below: those of stored
+/// bricks and next to them, and those of the mask's sheet.
 fn blocks_of(world: &World, mask: MaskView, chunk: ChunkPos) -> Vec<Block> {
     let own = BrickPos::range(world.grid.chunk_cells(chunk));
     let mut blocks = Vec::new();
@@ -124,7 +124,7 @@ pub(super) fn complete(world: &World, view: &WorldView, blocks: &mut Vec<Block>)
 }
 
 impl World {
-    /// All that the surface of a chunk is made from; `None` unless it is one whose surface is not kept.
+    /// The complete input for the surface of a chunk; `None` unless it is one whose surface is not kept.
     pub(super) fn unmeshed(&self, chunk: ChunkPos) -> Option<UnmeshedChunk> {
         self.unmeshed.contains_key(&chunk).then(|| UnmeshedChunk::new(self, chunk))
     }
@@ -134,7 +134,7 @@ impl World {
         self.surfaces.keys().chain(self.unmeshed.keys()).copied()
     }
 
-    /// Does the chunk draw something, or may it?
+    /// Returns `true` if the chunk draws something, or may do so.
     pub(crate) fn may_draw(&self, chunk: ChunkPos) -> bool {
         self.surfaces.contains_key(&chunk) || self.unmeshed.contains_key(&chunk)
     }
@@ -147,8 +147,9 @@ impl World {
 }
 
 impl Terrain {
-    /// Says which surfaces transactions make from now on. With [`Meshing::Never`] those that are kept are dropped: for terrains
-    /// that nobody looks at. A plugin that shows the terrain is not told of changes then.
+    /// Says which surfaces transactions make from now on. With [`Meshing::Never`] those that are kept are
+    /// dropped: for terrains that are never shown. A plugin that shows the terrain does not learn of changes
+    /// then.
     pub fn set_meshing(&mut self, meshing: Meshing) {
         if meshing == Meshing::Never && self.meshing != meshing {
             self.abandon();
@@ -157,7 +158,7 @@ impl Terrain {
         self.meshing = meshing;
     }
 
-    /// Which surfaces transactions make.
+    /// The surfaces that transactions make.
     pub fn meshing(&self) -> Meshing {
         self.meshing
     }

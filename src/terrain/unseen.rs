@@ -1,4 +1,4 @@
-//! What a game committed by itself to a terrain, until the plugin shows it.
+//! Changes that a game committed to a terrain directly, until the plugin shows them.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use super::field_log::FieldNews;
 use super::world::{Drawn, Version, World};
 use crate::lattice::ChunkPos;
 
-/// What changed of a world that is shown.
+/// Changes of a world that is shown.
 pub(crate) struct Unseen {
     from: Version,
     to: Version,
@@ -26,12 +26,12 @@ impl Unseen {
         self.to
     }
 
-    /// Is it of this world, whatever was committed to that since?
+    /// Returns `true` if it belongs to this world, regardless of later commits.
     pub fn is_of(&self, world: &World) -> bool {
         self.to.is_same_world(world.version())
     }
 
-    /// Is this the version before all of it?
+    /// Returns `true` if this is the version before all of it.
     pub fn follows(&self, shown: Version) -> bool {
         self.from == shown
     }
@@ -41,17 +41,18 @@ impl Unseen {
         self.drawn.iter().copied()
     }
 
-    /// How many they are.
+    /// Their number.
     pub fn len(&self) -> usize {
         self.drawn.len()
     }
 
-    /// What happened to fields, in order.
+    /// Changes of fields, in order.
     pub fn fields(&self) -> &[(ChunkPos, FieldNews)] {
         &self.fields
     }
 
-    /// What a commit will change of the world at this version. Read from its own lists: the game may have taken its meshes.
+    /// What a commit will change of the world at this version. Read from its own lists: the game may have taken its
+    /// meshes.
     pub(super) fn of(commit: &Commit, before: Version) -> Self {
         let tiles = commit.rings.iter().map(|(tile, _)| Drawn::Tile(*tile));
         let chunks = commit.surfaces.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));

@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 
 use super::surface::ChunkSurface;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, give_back, hash, table_bytes};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash, shrink_if_sparse, table_bytes};
 use crate::surface::block;
 use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
@@ -65,7 +65,7 @@ impl Memory {
         self.ground + self.edits() + self.undo
     }
 
-    /// What edits cost: all but the ground and history.
+    /// Memory of edits: everything except the ground and history.
     pub fn edits(&self) -> usize {
         self.samples + self.materials + self.meshes + self.parts + self.index
     }
@@ -88,10 +88,11 @@ pub struct World {
     pub(super) fields: FxHashMap<ChunkPos, Fields>,
     pub(super) mask: Mask,
     pub(super) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
-    /// Chunks that may draw something and whose surface is not kept: a table without values, counted and shrunk like the others.
+    /// Chunks that may draw something and whose surface is not kept: a table without values, counted and shrunk like
+    /// the others.
     pub(super) unmeshed: FxHashMap<ChunkPos, ()>,
-    /// Of tiles that bordered on the mask when they were last drawn; some may have none. Those of a tile that is not among them
-    /// are made when they are needed.
+    /// Of tiles that bordered on the mask when they were last drawn; some may have none. Those of a tile that is not
+    /// among them are made when they are needed.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
     /// With this many kinds, unused ones are removed from the pool.
@@ -103,7 +104,7 @@ pub struct World {
     pub(super) revision: u64,
 }
 
-/// Which world, and how many commits old.
+/// Identifies a world and its number of commits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Version {
     lineage: u64,
@@ -157,13 +158,13 @@ impl World {
         &self.ground
     }
 
-    /// The same, shared.
+    /// A shared handle to [`Self::ground`].
     #[cfg(any(feature = "plugin", feature = "store"))]
     pub(crate) fn shared_ground(&self) -> Arc<Ground> {
         Arc::clone(&self.ground)
     }
 
-    /// How the world is cut into chunks.
+    /// The grid of chunks and tiles.
     pub fn grid(&self) -> ChunkGrid {
         self.grid
     }
@@ -193,14 +194,14 @@ impl World {
         WorldView { samples: self.samples(), mask: MaskView::new(&self.mask), grid: self.grid }
     }
 
-    /// Hash of the ground and of every edited sample. It does not depend on chunk size, on how edits were batched, nor on
-    /// the machine.
+    /// Hash of the ground and of every edited sample. It does not depend on chunk size, on how edits were batched, nor
+    /// on the machine.
     pub fn hash(&self) -> u64 {
         Self::hash_of(self.ground.hash(), self.sample_hash)
     }
 
-    /// The hash of a world over a ground with this [hash](Ground::hash), whose [regions](Self::region_hash) have hashes with this
-    /// sum, which wraps around.
+    /// The hash of a world over a ground with this [hash](Ground::hash), whose [regions](Self::region_hash) have hashes
+    /// with this sum, which wraps around.
     pub fn hash_of(ground: u64, regions: u64) -> u64 {
         hash::mix(ground ^ hash::mix(regions))
     }
@@ -220,8 +221,8 @@ impl World {
         self.bricks.iter().map(|(&pos, brick)| (pos, brick.as_ref()))
     }
 
-    /// The chunks that draw something, in no order. Of a world that was [restored](super::Terrain::restore), or whose terrain
-    /// [never meshes](super::Meshing::Never), some may turn out to draw nothing.
+    /// The chunks that draw something, in no order. Of a world that was [restored](super::Terrain::restore), or whose
+    /// terrain [never meshes](super::Meshing::Never), some may turn out to draw nothing.
     pub fn drawn_chunks(&self) -> impl Iterator<Item = ChunkPos> {
         self.maybe_drawn()
     }
@@ -273,26 +274,26 @@ impl World {
         checker.check(self.grid)
     }
 
-    /// Sets the pool of uniform bricks. Once it holds twice as many kinds as were left the last time, those are dropped that
-    /// nobody else holds: neither a brick of this world, nor its history, nor another world.
+    /// Sets the pool of uniform bricks. Once it holds twice as many kinds as were left the last time, those
+    /// are dropped that nothing else refers to: no brick of this world, no history, no other world.
     pub(super) fn set_uniform(&mut self, uniform: UniformBricks) {
         self.uniform = uniform;
         if self.uniform.len() >= self.many_kinds {
             self.uniform.retain(|_, brick| Arc::strong_count(brick) > 1);
-            give_back(&mut self.uniform);
+            shrink_if_sparse(&mut self.uniform);
             self.many_kinds = FEW_KINDS.max(2 * self.uniform.len());
         }
     }
 
     /// Shrinks the tables of bricks, fields and surfaces where many entries are gone.
     pub(super) fn shrink(&mut self) {
-        give_back(&mut self.bricks);
-        give_back(&mut self.stacks);
-        give_back(&mut self.fields);
-        give_back(&mut self.surfaces);
-        give_back(&mut self.rings);
-        give_back(&mut self.unmeshed);
-        self.mask.give_back();
+        shrink_if_sparse(&mut self.bricks);
+        shrink_if_sparse(&mut self.stacks);
+        shrink_if_sparse(&mut self.fields);
+        shrink_if_sparse(&mut self.surfaces);
+        shrink_if_sparse(&mut self.rings);
+        shrink_if_sparse(&mut self.unmeshed);
+        self.mask.shrink_if_sparse();
     }
 
     /// Bytes that the world takes.
@@ -329,7 +330,7 @@ mod tests {
     use crate::ground::MaterialId;
     use crate::terrain::{Terrain, TerrainSettings};
 
-    /// One of the brick from (8, 24, 8) to (15, 31, 15), so many voxels larger on all sides.
+    /// A box around the brick from (8, 24, 8) to (15, 31, 15), `more` voxels larger on all sides.
     fn cube(more: f32) -> Shape {
         Shape::cuboid(Vec3::new(11.5, 27.5, 11.5), Vec3::splat(4.0 + more))
     }

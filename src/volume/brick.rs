@@ -65,7 +65,7 @@ pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     layers
 }
 
-/// Which samples of a pristine brick are solid.
+/// The solid samples of a pristine brick.
 pub(crate) fn pristine_layers(ground: &Ground, pos: BrickPos) -> Layers {
     let low = pos.origin();
     solid_layers(&ground.heights::<8>(Column::of(low)), low.y)
@@ -96,8 +96,8 @@ impl Tag {
 
 /// 8x8x8 samples with their materials.
 ///
-/// The brick also stores two bits per sample, so that whole rows are tested at once: is it solid (pristine samples
-/// included), and is it edited?
+/// The brick also stores two bits per sample, so that whole rows are tested at once: whether it is solid (pristine
+/// samples included), and whether it is edited.
 #[derive(Clone, Debug)]
 pub struct Brick {
     samples: [Sample; LEN],
@@ -130,11 +130,11 @@ impl Brick {
         brick
     }
 
-    /// A brick of a world over this ground, from its edited samples and their materials, both in order. Which samples are solid
-    /// is computed anew.
+    /// A brick of a world over this ground, from its edited samples and their materials, both in order. Which
+    /// samples are solid is computed again.
     ///
-    /// `None` where there are not as many of them as `edited` has bits, where a density is [`i16::MIN`], or where a sample of air
-    /// has a material.
+    /// `None` where there are not as many of them as `edited` has bits, where a density is [`i16::MIN`], or where a
+    /// sample of air has a material.
     pub fn restored(
         ground: &Ground,
         pos: BrickPos,
@@ -164,7 +164,7 @@ impl Brick {
         Some(brick)
     }
 
-    /// The same edited samples, where these pristine ones are solid.
+    /// A brick with these edited samples over other pristine ones, which are solid where `solid` says so.
     pub(crate) fn on_pristine(&self, solid: &Layers) -> Self {
         let mut brick = self.clone();
         for (y, edited) in self.edited.iter().enumerate() {
@@ -204,12 +204,12 @@ impl Brick {
         self.materials.as_ref().map_or(MaterialId::GROUND, |materials| materials[BrickPos::index(point)])
     }
 
-    /// Which samples are solid: below zero, or pristine and below the ground's surface.
+    /// The solid samples: below zero, or pristine and below the ground's surface.
     pub fn solid(&self) -> &Layers {
         &self.solid
     }
 
-    /// Which samples are edited.
+    /// The edited samples.
     pub fn edited(&self) -> &Layers {
         &self.edited
     }
@@ -238,7 +238,7 @@ impl Brick {
         self.samples[index] = sample;
     }
 
-    /// Enters which samples of a layer are edited now, beside those that are already, and which of them are solid.
+    /// Marks further samples of a layer as edited, and which of them are solid.
     #[inline]
     pub(crate) fn set_bits(&mut self, y: usize, edited: u64, solid: u64) {
         self.edited[y] |= edited;
@@ -283,12 +283,12 @@ impl Brick {
         Self::BYTES + self.material_bytes()
     }
 
-    /// Bytes that materials take beside the brick itself.
+    /// Bytes that materials take in addition to the brick.
     pub fn material_bytes(&self) -> usize {
         self.materials.as_deref().map_or(0, size_of_val)
     }
 
-    /// What every sample of the brick was edited to, if it is the same for all.
+    /// The sample that the whole brick was edited to, if all samples are equal.
     pub(crate) fn uniform(&self) -> Option<UniformKind> {
         let (sample, material) = (self.samples[0], self.material_at(0));
         let is_uniform = self.edited == [u64::MAX; 8]
@@ -297,8 +297,8 @@ impl Brick {
         is_uniform.then_some(UniformKind { sample, material })
     }
 
-    /// What some edited samples add to the world's hash, where `y` is the height of the brick's lowest sample and `columns` are
-    /// the [hashes](column_hash) of its columns.
+    /// The contribution of some edited samples to the world's hash, where `y` is the height of the brick's lowest
+    /// sample and `columns` are the [hashes](column_hash) of its columns.
     pub(crate) fn hash(&self, y: i32, samples: &Layers, columns: &[u64; 64]) -> u64 {
         let of_layer = |(layer, &samples): (usize, &u64)| {
             let height = y + layer as i32;
@@ -311,7 +311,7 @@ impl Brick {
         samples.iter().enumerate().map(of_layer).fold(0, u64::wrapping_add)
     }
 
-    /// Do two bricks hold the same? `None` stands for a pristine one.
+    /// Returns `true` if two bricks hold equal samples. `None` stands for a pristine one.
     pub(crate) fn is_same(a: Option<&Arc<Self>>, b: Option<&Arc<Self>>) -> bool {
         match (a, b) {
             (Some(a), Some(b)) if Arc::ptr_eq(a, b) => true,
@@ -342,11 +342,11 @@ impl Brick {
     }
 }
 
-/// The pool of uniform bricks, all of whose samples are alike, one of each kind: the middle of every large cave is the same
-/// brick.
+/// The pool of uniform bricks, all of whose samples are alike, one of each kind: the middle of every large cave is the
+/// same brick.
 pub(crate) type UniformBricks = FxHashMap<UniformKind, Arc<Brick>>;
 
-/// What all samples of a uniform brick were edited to.
+/// The common sample of a uniform brick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct UniformKind {
     pub sample: Sample,
@@ -358,7 +358,7 @@ pub(crate) fn column_hash(column: Column) -> u64 {
     hash::mix(column.x as u32 as u64 | (column.z as u32 as u64) << 32)
 }
 
-/// What a sample adds to the world's hash; a pristine one adds nothing.
+/// The contribution of a sample to the world's hash; a pristine one adds nothing.
 fn sample_hash(column: u64, y: i32, sample: Sample, material: MaterialId) -> u64 {
     let Some(distance) = sample.distance() else { return 0 };
     hash::mix(column ^ (y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0))

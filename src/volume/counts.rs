@@ -1,4 +1,4 @@
-//! Voxels per material, and what an edit can do to one.
+//! Voxels per material, and the outcomes of an edit for a voxel.
 
 use crate::ground::MaterialId;
 
@@ -82,7 +82,7 @@ pub(crate) fn for_runs(
     each(last, voxels);
 }
 
-/// What an edit did to a voxel.
+/// Outcome of an edit for a voxel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum VoxelOutcome {
     Removed,

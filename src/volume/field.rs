@@ -17,8 +17,8 @@ pub struct Field {
     pub revision: u64,
 }
 
-/// What an edit did to the fields of one chunk (paper, section Scenarios, 1 to 4). An edit that reaches over several
-/// chunks is cut, and each chunk has a scenario of its own (5).
+/// How an edit changed the fields of one chunk (paper, section Scenarios, 1 to 4). An edit that reaches over several
+/// chunks is cut, and each chunk has a separate scenario (5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Scenario {
     /// 1: no field was near; one was created to fit the edit.
@@ -29,12 +29,12 @@ pub enum Scenario {
     Extended,
     /// 4: the edit joined several fields into one.
     Merged {
-        /// How many fields became one, at least 2.
+        /// Number of fields that became one, at least 2.
         fields: usize,
     },
 }
 
-/// What became of the fields of a chunk.
+/// The change of a chunk's fields.
 pub(crate) struct Absorbed {
     /// The scenario that took place.
     pub scenario: Scenario,
@@ -62,12 +62,12 @@ impl Fields {
         self.0.iter()
     }
 
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Is there no field?
+    /// Returns `true` if there is no field.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -82,7 +82,8 @@ impl Fields {
         self.0.capacity() * size_of::<Field>()
     }
 
-    /// Takes in the box of an edit's changed samples. Of fields that merge the oldest goes on; `fresh` names a new one.
+    /// Takes in the box of an edit's changed samples. Of merged fields the oldest survives; `fresh` names a
+    /// new one.
     pub(crate) fn absorb(&mut self, edit: LatticeBox, fresh: impl FnOnce() -> FieldId) -> Absorbed {
         if let Some(field) = self.0.iter_mut().find(|field| field.bounds.encloses(edit)) {
             field.revision = field.revision.saturating_add(1);

@@ -32,7 +32,7 @@ pub(crate) fn count(layers: &Layers) -> u64 {
     layers.iter().map(|layer| u64::from(layer.count_ones())).sum()
 }
 
-/// Is the sample with this index in the set?
+/// Returns `true` if the sample with this index is in the set.
 pub(crate) fn contains(layers: &Layers, index: usize) -> bool {
     layers[index >> 6] >> (index & 63) & 1 == 1
 }

@@ -1,9 +1,9 @@
-//! What is stored of a world beside its ground: samples in bricks, fields in chunks, rules.
+//! A world's stored data in addition to its ground: samples in bricks, fields in chunks, rules.
 //!
-//! Only edited samples are stored (rule 1); the rest of the world is computed from the [`Ground`](crate::ground::Ground)
-//! whenever it is asked for. Bricks lie on the world's own grid and hold each sample once, so chunks that share a face
-//! read the same numbers there, and the samples of a world do not depend on its chunk size. How edits change bricks is the
-//! subject of `edits`, the room above.
+//! Only edited samples are stored (rule 1); the rest of the world is computed from the
+//! [`Ground`](crate::ground::Ground) whenever it is asked for. Bricks lie on the world's own grid and hold each sample
+//! once, so chunks that share a face read the same numbers there, and the samples of a world do not depend on its chunk
+//! size. The module `edits`, above this one, changes bricks.
 
 mod brick;
 mod counts;

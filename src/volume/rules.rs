@@ -1,4 +1,4 @@
-//! What may be dug: hardness of materials, bedrock, protected boxes.
+//! Digging rules: hardness of materials, bedrock, protected boxes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,10 +6,10 @@ use super::{MaterialCounts, VoxelOutcome};
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, ONE};
 
-/// What brushes may do to a world. Without rules, everything.
+/// Restrictions on brushes. Without rules, brushes may change everything.
 ///
-/// The same edits under the same rules make the same world, bit for bit. Rules restrict every operation: it *takes away*
-/// wherever it makes a sample's density higher, whether the sample is solid or not.
+/// Equal edits under equal rules make equal worlds, bit for bit. Rules restrict every operation: it *takes
+/// away* wherever it makes a sample's density higher, whether the sample is solid or not.
 ///
 /// ```
 /// use bevy_burrow::prelude::*;
@@ -29,16 +29,16 @@ use crate::lattice::{LatticeBox, ONE};
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DiggingRules {
-    /// How hard materials are; others have hardness 0. A brush with at least that power digs at full speed, one with half of
-    /// it or less takes nothing away, and in between its speed grows linearly. Painting is not restricted: ground that is
-    /// painted with a softer material is softer from then on.
+    /// Hardness of materials; others have hardness 0. A brush with at least that power digs at full speed, one with
+    /// half of it or less takes nothing away, and in between its speed grows linearly. Painting is not restricted:
+    /// ground that is painted with a softer material is softer from then on.
     pub hardness: BTreeMap<MaterialId, u8>,
     /// Materials that no brush takes away, nor paints over.
     pub unbreakable: BTreeSet<MaterialId>,
     /// Nothing solid below this height, in voxels, is taken away.
     pub bedrock: Option<i32>,
-    /// Samples that no operation changes at all, paint included. Each edit searches all boxes, each brick only those near
-    /// the edits of its batch.
+    /// Samples that no operation changes at all, paint included. Each edit searches all boxes, each brick only those
+    /// near the edits of its batch.
     pub protected: Vec<LatticeBox>,
 }
 
@@ -82,7 +82,7 @@ impl DiggingRules {
         Ok(())
     }
 
-    /// Is there no rule?
+    /// Returns `true` if there is no rule.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
@@ -98,7 +98,8 @@ impl DiggingRules {
         self.unbreakable.contains(&material)
     }
 
-    /// Which part of a change that takes away solid ground a brush of this power makes, in 1/256, and why not all of it.
+    /// Which part of a change that takes away solid ground a brush of this power makes, in 1/256, and why not all of
+    /// it.
     pub(crate) fn pace(&self, material: MaterialId, y: i32, power: u8) -> (i32, Option<VoxelOutcome>) {
         if self.bedrock.is_some_and(|bedrock| y < bedrock) || self.is_unbreakable(material) {
             return (0, Some(VoxelOutcome::Unbreakable));
@@ -114,30 +115,32 @@ impl DiggingRules {
     }
 }
 
-/// Why rules can't be set.
+/// An error of setting rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RulesError {
     /// A rule is for a material that nothing has.
-    #[error("a rule is for `MaterialId::GROUND`, which nothing is made of: name the materials of the ground")]
+    #[error(
+        "a rule refers to `MaterialId::GROUND`, which is a placeholder: name the materials of the ground instead"
+    )]
     Ground,
 }
 
 /// Voxels that an operation would have changed but for the rules, by the material that they have, or would have got.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Refused {
-    /// Those in protected boxes: not taken away, not filled, not painted.
+    /// Voxels in protected boxes: not removed, not filled, not painted.
     pub protected: MaterialCounts,
-    /// Those of unbreakable materials, or below bedrock.
+    /// Voxels of unbreakable materials, or below bedrock.
     pub unbreakable: MaterialCounts,
-    /// Those too hard for the brush's power.
+    /// Voxels too hard for the brush's power.
     pub too_hard: MaterialCounts,
-    /// Those so hard that one pass of the brush was not enough.
+    /// Voxels that one pass of the brush only slowed down.
     pub slowed: MaterialCounts,
 }
 
 impl Refused {
-    /// Was nothing refused?
+    /// Returns `true` if nothing was refused.
     pub fn is_empty(&self) -> bool {
         self.total() == 0
     }

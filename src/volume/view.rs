@@ -42,12 +42,12 @@ impl<'a> SampleView<'a> {
         Self { ground, bricks, newer: None, latest: &[] }
     }
 
-    /// The same view with newer bricks in place of older ones.
+    /// This view with newer bricks in place of older ones.
     pub fn over(self, newer: &'a Bricks) -> Self {
         Self { newer: Some(newer), ..self }
     }
 
-    /// The same view with bricks of a list in place of all others.
+    /// This view with bricks of a list in place of all others.
     pub(crate) fn under(self, latest: &'a BrickList<'a>) -> Self {
         debug_assert!(latest.is_sorted_by(|a, b| a.0 < b.0));
         Self { latest, ..self }
@@ -58,7 +58,8 @@ impl<'a> SampleView<'a> {
         self.ground
     }
 
-    /// Calls `each` with the bricks at all positions of a box. Where several lie over each other, the topmost comes last.
+    /// Calls `each` with the bricks at all positions of a box. Where several lie over each other, the topmost comes
+    /// last.
     pub(crate) fn for_bricks(&self, places: LatticeBox, mut each: impl FnMut(BrickPos, &'a Brick)) {
         for table in std::iter::once(self.bricks).chain(self.newer) {
             if (table.len() as u64) < places.volume() {
@@ -106,7 +107,7 @@ impl<'a> SampleView<'a> {
         self.brick(BrickPos::of(point)).map_or(Sample::PRISTINE, |brick| brick.sample(point))
     }
 
-    /// Was the sample edited?
+    /// Returns `true` if the sample was edited.
     pub fn is_edited(&self, point: IVec3) -> bool {
         self.sample(point) != Sample::PRISTINE
     }
@@ -116,7 +117,7 @@ impl<'a> SampleView<'a> {
         self.sample(point).distance().unwrap_or_else(|| self.ground.distance(point))
     }
 
-    /// Is the lattice point solid? Density 0 is air.
+    /// Returns `true` if the lattice point is solid. Density 0 is air.
     pub fn is_solid(&self, point: IVec3) -> bool {
         self.distance(point) < 0
     }

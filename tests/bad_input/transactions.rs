@@ -32,7 +32,7 @@ fn a_stale_commit_is_refused_and_loses_nothing() {
 }
 
 #[test]
-fn a_cancelled_transaction_is_not_committed_beside_its_successor() {
+fn a_cancelled_transaction_is_not_committed_with_its_successor() {
     let dig = |x: f32, tag: u64| Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 6.0), 2.0)).with_tag(tag);
     let mut terrain = small_terrain();
     terrain.submit(&dig(3.0, 1));

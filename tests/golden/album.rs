@@ -7,7 +7,7 @@ use image::RgbImage;
 
 /// Mean FLIP above which a picture counts as different.
 ///
-/// The same machine draws an identical picture (0). A spot of another material, 4 m wide in a picture of about 20 m,
+/// On one machine, pictures are identical (0). A spot of another material, 4 m wide in a picture of about 20 m,
 /// gives 0.018; a camera that moves by a quarter of a pixel gives 0.022. `sameness.rs` measures both.
 const THRESHOLD: f32 = 0.01;
 

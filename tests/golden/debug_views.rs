@@ -41,7 +41,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         let name = format!("debug_{view:?}").to_lowercase();
         album.compare(&name, &picture);
         let (apart, _) = flip(&without, &picture);
-        println!("{name}: FLIP {apart:.5} beside the ground without it");
+        println!("{name}: FLIP {apart:.5} against the ground without it");
         album.check(apart > 0.003, || format!("{name} is hardly visible: FLIP {apart:.5}"));
     }
     let (apart, _) = flip(&without, &dirty);

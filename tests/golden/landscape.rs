@@ -46,7 +46,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let eye = place(studio, EYE.x, EYE.z, EYE.y);
     studio.look(eye, pit + AT);
     album.compare("landscape", &studio.picture());
-    // The same with the low quality settings.
+    // The landscape with the low quality settings.
     studio.one::<GroundLook>().quality = GroundQuality::Low;
     album.compare("landscape_low", &studio.picture());
 }

@@ -43,7 +43,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     photograph(studio, album, "panel_settings", &SETTINGS);
 }
 
-/// Takes a picture and compares each widget on its own, so that small ones count as well.
+/// Takes a picture and compares each widget separately, so that differences in small ones are noticed as well.
 fn photograph(studio: &mut Studio, album: &mut Album, name: &str, widgets: &[&str]) {
     let mut picture = studio.picture();
     let places = studio.app.world().resource::<PanelPlaces>().clone();

@@ -92,7 +92,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.sun(Vec3::new(1.0, 0.9, 0.4));
 }
 
-/// The same limit for slopes steeper than 2:1. There the two surfaces split cells differently, and the visible
+/// The limit for slopes steeper than 2:1. There the two surfaces split cells differently, and the visible
 /// difference is about that of a camera shift by a quarter of a pixel.
 const NOISE_ON_CLIFFS: f32 = 0.03;
 

@@ -1,8 +1,8 @@
 //! The ground is what it looks like: each pixel shows what a dig there yields.
 //!
-//! A cliff, a cave and a trench through beds and ores are drawn by the look with one flat colour for each material, without
-//! light. What every pixel shows is compared with the solid voxels next to the point that it is a picture of. Borders may
-//! stray by half a voxel: then what shows is up to a voxel farther away than what is nearest.
+//! A cliff, a cave and a trench through beds and ores are drawn by the look with one flat colour for each material,
+//! without light. What every pixel shows is compared with the solid voxels next to the point that it is a picture of.
+//! Borders may stray by half a voxel: then what shows is up to a voxel farther away than what is nearest.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::core_pipeline::tonemapping::Tonemapping;
@@ -35,11 +35,12 @@ const COLORS: [[u8; 3]; 14] = [
     [188, 0, 255],
 ];
 
-/// How much farther than the nearest solid voxel one may be whose material shows: half a voxel on either side of a border,
-/// and what a surface at a whole height lies above its highest sample.
+/// How much farther than the nearest solid voxel one may be whose material shows: half a voxel on either side of a
+/// border, and what a surface at a whole height lies above its highest sample.
 const FARTHER: f64 = 1.1;
 
-/// One pixel in so many may show what lies a little farther: noise moves borders, by less than half the way to the next vertex.
+/// One pixel in this many may show ground that lies a little farther: noise moves borders, by less than half the way to
+/// the next vertex.
 const SELDOM: usize = 5000;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
@@ -119,7 +120,7 @@ struct Counts {
 impl Counts {
     fn count(&mut self, picture: &RgbImage, camera: Transform, world: &terrain::World) {
         for (x, y, texel) in picture.enumerate_pixels() {
-            // On an outline, the renderer may see what is just beside the middle of the pixel.
+            // On an outline, the renderer may see ground just off the middle of the pixel.
             let beside = [[0.0, 0.0], [0.1, 0.0], [-0.1, 0.0], [0.0, 0.1], [0.0, -0.1]];
             let cast = |[dx, dy]: [f32; 2]| {
                 let direction = direction(camera, x as f32 + 0.5 + dx, y as f32 + 0.5 + dy);

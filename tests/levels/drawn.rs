@@ -18,7 +18,7 @@ pub fn draw(world: &World, cut: &Cut) -> Drawings {
     world.drawn_in(cut).collect()
 }
 
-/// What was drawn, and what is wrong with it.
+/// Counts of drawn triangles and of faults.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     pub worlds: usize,
@@ -36,7 +36,7 @@ pub struct Counts {
     pub stray: usize,
     /// Vertices at one place with different normals.
     pub normal_jumps: usize,
-    /// The same with different materials.
+    /// Vertices at one place with different materials.
     pub material_jumps: usize,
 }
 
@@ -111,7 +111,7 @@ pub fn check(world: &World, cut: &Cut, drawings: &Drawings) -> Counts {
     counts
 }
 
-/// Do the corners lie in one plane between nodes of different levels?
+/// Returns `true` if the corners lie in one plane between nodes of different levels.
 fn is_between_levels(cut: &Cut, corners: [IVec3; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| [corner.x, corner.z]);
     let middle = |axis: usize| a[axis].min(b[axis]).min(c[axis]).midpoint(a[axis].max(b[axis]).max(c[axis]));
@@ -125,7 +125,7 @@ fn is_between_levels(cut: &Cut, corners: [IVec3; 3]) -> bool {
     })
 }
 
-/// Do four nodes meet here whose levels go fine, coarse, fine, coarse?
+/// Returns `true` if four nodes meet here whose levels go fine, coarse, fine, coarse.
 fn is_alternating(cut: &Cut, place: IVec3) -> bool {
     let [a, b, c, d] = levels_around(cut, place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
     (place.x | place.z) % SNAP == 0 && a == d && b == c && a != b && a.is_some() && b.is_some()

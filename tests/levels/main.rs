@@ -9,4 +9,3 @@ mod drawn;
 mod random;
 mod same;
 mod seams;
-mod times;

@@ -89,7 +89,7 @@ pub fn sorted(nodes: impl Iterator<Item = Node>) -> Vec<Node> {
     nodes
 }
 
-/// The same cut with one more node split, an edited one where there is one, and that node; `None` where none can be.
+/// The cut with one more node split, an edited one if there is one, and that node; `None` if none can be split.
 pub fn split_once(rng: &mut Rng, terrain: &Terrain, cut: &Cut) -> Option<(Cut, Node)> {
     let mut nodes = sorted(cut.nodes().filter(|node| node.level > 0));
     rng.shuffle(&mut nodes);

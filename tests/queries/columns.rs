@@ -78,7 +78,7 @@ fn columns_cross_what_is_drawn() {
                 .collect();
             assert!(
                 beside.iter().any(|expected| agrees(expected)),
-                "{what}: {answer:?}, but brute force {expected:?}, and beside the column {beside:?}"
+                "{what}: {answer:?}, but brute force {expected:?}, and next to the column {beside:?}"
             );
         }
     }

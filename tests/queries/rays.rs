@@ -88,7 +88,7 @@ fn check_ray(
             between
                 || answers.iter().any(|&t| agree(t))
                 || answer.is_some_and(|hit| (is_early(hit) || is_unsure) && touches(hit)),
-            "{}: {answer:?}, but brute force {expected:?}, and beside the ray {answers:?}",
+            "{}: {answer:?}, but brute force {expected:?}, and next to the ray {answers:?}",
             what()
         );
         return;
@@ -146,7 +146,7 @@ fn random_ray(rng: &mut Rng, world: &World, triangles: &Triangles) -> (DVec3, DV
             let above = DVec3::new(rng.f64() * width, target.y + 5.0 + rng.f64() * 60.0, rng.f64() * depth);
             (above, if rng.bool() { DVec3::NEG_Y } else { target + free - above })
         }
-        // From beside the world.
+        // From outside the world.
         1 => {
             let angle = rng.f64() * 6.3;
             let away = DVec3::new(angle.cos(), rng.f64() - 0.3, angle.sin()) * (width + depth);

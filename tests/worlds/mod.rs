@@ -45,8 +45,8 @@ pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) ->
     Ground::from_fn(width, depth, |i, k| grey(x + i, z + k) * relief).expect("finite heights")
 }
 
-/// A random ground, from flat to steep, and the chunk size of its world. In every third one, materials vary by column; every
-/// fifth one has strata.
+/// A random ground, from flat to steep, and the chunk size of its world. In every third one, materials vary by column;
+/// every fifth one has strata.
 pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let chunk_size = CHUNK_SIZES[(index % 4) as usize];
     // Sizes that are no multiples of the chunk size: the last chunks are cut at the rim.
@@ -59,7 +59,7 @@ pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
     (random_ground_of_size(rng, index, width, depth), chunk_size)
 }
 
-/// The same with so many cells along x and along z.
+/// Random ground with `width` cells along x and `depth` along z.
 pub fn random_ground_of_size(rng: &mut Rng, index: u64, width: u32, depth: u32) -> Ground {
     let ground = random_ground_without_strata(rng, index, width, depth);
     if index % 5 != 4 {

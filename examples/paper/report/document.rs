@@ -45,11 +45,11 @@ fn write(page: &mut String, measurements: &Measurements, machine: &Machine) -> s
          repeats, as the paper does, and medians of edits from each edit's median; {} The paper states the first ratio as 3138 %. Its first run costs more than its second \
          because fields are allocated; how much more depends on the chunk size.\n",
         if clock::IS_KNOWN && measurements.setup.threads == 1 {
-            "\"processor time\" is the same by what the processor spent on each edit, the median of its repeats. On a busy \
+            "\"CPU time\" is the same by what the CPU spent on each edit, the median of its repeats. On a busy \
              machine a long edit waits for others more often than a short one, so the passing time flatters the hybrid; \
-             targets are judged by processor time."
+             targets are judged by CPU time."
         } else {
-            "\"processor time\" is not known here: it is the passing time of each edit, the median of its repeats."
+            "\"CPU time\" is not known here: it is the passing time of each edit, the median of its repeats."
         }
     )?;
     gains(page, measurements)?;
@@ -93,7 +93,7 @@ fn gains(page: &mut String, measurements: &Measurements) -> std::fmt::Result {
         let median = stats::median(stats::by_edit(&full.processor));
         writeln!(
             page,
-            "- Full field, {}: an edit takes {:.1} ms of the processor in the median, so that {FASTER:.0} times faster means {:.0} us.",
+            "- Full field, {}: an edit takes {:.1} ms of the CPU in the median, so that {FASTER:.0} times faster means {:.0} us.",
             output.title(),
             median * 1e3,
             median * 1e6 / FASTER
@@ -137,7 +137,7 @@ fn machines(page: &mut String, measurements: &Measurements, machine: &Machine) -
         1 => "1 thread".to_owned(),
         threads => format!("{threads} threads"),
     };
-    writeln!(page, "| | processor | edits run on | system | compiler |\n| --- | --- | --- | --- | --- |")?;
+    writeln!(page, "| | CPU | edits run on | system | compiler |\n| --- | --- | --- | --- | --- |")?;
     writeln!(page, "| paper | {} | not told | Windows 7 | not told |", published::MACHINE)?;
     writeln!(page, "| here | {cpu}, {threads} threads | {used} | {system} | {rustc} |\n")
 }
@@ -186,7 +186,7 @@ fn experiment(page: &mut String, measurements: &Measurements) -> std::fmt::Resul
     )?;
     writeln!(
         page,
-        "- **Full field, positions and normals only** (beside it): one cube of {side}^3 samples of 16 bits that holds the \
+        "- **Full field, positions and normals only** (for comparison): one cube of {side}^3 samples of 16 bits that holds the \
          same ground. An edit changes only the samples in its reach; then the whole mesh is made again by the library's \
          dense mesher into buffers that are kept: positions and gradient normals in floats, nothing else."
     )?;
@@ -208,12 +208,11 @@ fn experiment(page: &mut String, measurements: &Measurements) -> std::fmt::Resul
     if measurements.missing.iter().all(|(backend, _)| *backend != Backend::Cuda) {
         writeln!(
             page,
-            "- **GPU**: every edit is applied and meshed on the card, the smallest too. The paper's GPU lost to its CPU in \
+            "- **GPU**: every edit is applied and meshed on the GPU, the smallest too. The paper's GPU lost to its CPU in \
              every test because each call sent the whole field over and the mesh back, and waited. Here bricks and heights \
-             stay on the card: an edit sends a list of jobs, some kilobytes, and two launches write what changed, samples, \
-             vertices and indices, straight into memory that the processor reads. What is left of the old cost are two \
-             round trips an edit, which large edits are worth and small ones are not; the ratios below tell what that comes \
-             to. A game leaves that choice to `Backend::Auto`; here it is not made, so that the columns compare."
+             stay on the GPU: an edit sends a list of jobs, some kilobytes, and two launches write what changed, samples, \
+             vertices and indices, straight into memory that the CPU reads. Two round trips an edit remain \
+             of the old cost, which pay for large edits but not for small ones; the ratios below show the result. A game leaves that choice to `Backend::Auto`; here it is not made, so that the columns compare."
         )?;
     }
     for (backend, reason) in &measurements.missing {

@@ -28,13 +28,13 @@ pub struct Ratio {
     pub paper: Option<f64>,
     /// From totals and averages, as in the paper.
     pub here: Option<f64>,
-    /// From processor time: the median of each edit's repeats.
+    /// From CPU time: the median of each edit's repeats.
     pub by_processor: Option<f64>,
     pub target: Option<Target>,
 }
 
 impl Ratio {
-    /// Whether the target is reached, by processor time if available. `None` without a target or a figure.
+    /// Whether the target is reached, by CPU time if available. `None` without a target or a figure.
     pub fn is_met(&self) -> Option<bool> {
         let here = self.by_processor.or(self.here)?;
         Some(match self.target? {
@@ -44,7 +44,7 @@ impl Ratio {
     }
 }
 
-/// The average time of an edit in two ways: over all timings, and over each edit's median processor time.
+/// The average time of an edit in two ways: over all timings, and over each edit's median CPU time.
 #[derive(Clone, Copy)]
 struct Averages {
     plain: f64,
@@ -60,7 +60,7 @@ impl Averages {
     }
 }
 
-/// Timings from the separate processes: seconds of each edit by repeat, and the same in processor time.
+/// Timings from the separate processes: seconds of each edit by repeat, and the same in CPU time.
 pub fn alone(measured: &Measured, threads: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     measured.alone.iter().map(|alone| both_clocks(&alone.laps, threads)).unzip()
 }
@@ -164,7 +164,7 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
     ratios
 }
 
-/// For each edit of the second run, the ratio of its median times in two tests: by wall clock and by processor time.
+/// For each edit of the second run, the ratio of its median times in two tests: by wall clock and by CPU time.
 pub fn by_edit(measurements: &Measurements, above: Subject, below: Subject) -> Option<[Vec<f64>; 2]> {
     let (above, below) = (measurements.get(above, Run::Second)?, measurements.get(below, Run::Second)?);
     let divide = |of: fn(&Measured) -> &[Vec<f64>]| {
@@ -176,7 +176,7 @@ pub fn by_edit(measurements: &Measurements, above: Subject, below: Subject) -> O
 
 /// The ratios as a table.
 pub fn table(ratios: &[Ratio]) -> Table {
-    let header = ["ratio", "paper", "here", "here, processor time", "target", "reached"];
+    let header = ["ratio", "paper", "here", "here, CPU time", "target", "reached"];
     let mut table = Table::new("Paper and reproduction", header);
     for ratio in ratios {
         let figure = |value: Option<f64>| value.map_or("-".into(), significant);

@@ -13,7 +13,7 @@ use crate::stats;
 /// The number of parts into which the edits are divided, from small to large.
 const PARTS: usize = 5;
 
-/// Medians of the edits in each part, by processor time; `None` if one of the tests was not played.
+/// Medians of the edits in each part, by CPU time; `None` if one of the tests was not played.
 pub fn by_size(measurements: &Measurements) -> Option<Table> {
     let chunk_size = CHUNK_SIZES[0];
     let hybrid = Subject::Hybrid { backend: Backend::Cpu, chunk_size };
@@ -38,7 +38,7 @@ pub fn by_size(measurements: &Measurements) -> Option<Table> {
         let name = [format!("{least} to {most}"), format!("{:.1}", of(&times) * 1e6)];
         table.row(name.into_iter().chain(ratios));
     }
-    table.note = "Medians of a fifth of all edits each, by processor time.".into();
+    table.note = "Medians of a fifth of all edits each, by CPU time.".into();
     Some(table)
 }
 

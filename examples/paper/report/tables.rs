@@ -130,7 +130,7 @@ pub fn medians(measurements: &Measurements) -> Table {
         "median",
         "99th percentile",
         "longest",
-        "processor, median",
+        "CPU, median",
         "average of medians",
         "longest of medians",
     ];
@@ -153,7 +153,7 @@ pub fn medians(measurements: &Measurements) -> Table {
             row(measured, ", alone", &seconds, &processor);
         }
     }
-    table.note = "The last three columns are processor time, which leaves out what else the machine did meanwhile; the last \
+    table.note = "The last three columns are CPU time, which leaves out what else the machine did meanwhile; the last \
                   two take each edit with its median over the repeats. \"Alone\": in processes that play one test each, one \
                   for each repeat, where nothing was allocated before; n/a where none could be started."
         .into();

@@ -31,7 +31,7 @@ struct Slot {
     used: AtomicU32,
 }
 
-/// How many slots eviction examines before it checks whether enough are free.
+/// Number of slots that eviction examines before it checks whether enough are free.
 const PIECE: usize = 1 << 14;
 
 /// Initial number of slots. Growing takes half a millisecond, which the first digs should not pay.
@@ -168,7 +168,7 @@ impl RecordCache {
     }
 
     /// Gives a slot back.
-    pub fn give_back(&mut self, slot: u32) {
+    pub fn release_slot(&mut self, slot: u32) {
         *self.slots[slot as usize].stamp.get_mut() = 0;
         self.free.push(slot);
     }
@@ -273,7 +273,7 @@ mod tests {
             assert!(taken.iter().map(|&(slot, _)| slot).eq(0..count as u32));
             assert!(taken.iter().all(|&(slot, tag)| slots.find(tag) == Some(slot)));
             assert!(slots.take(&mut *device).is_err(), "all are in use in this round");
-            slots.give_back(taken[7].0);
+            slots.release_slot(taken[7].0);
             assert_eq!((slots.find(taken[7].1), slots.find(taken[8].1)), (None, Some(taken[8].0)));
             let (again, tag) = slots.take(&mut *device).expect("room for one");
             assert_eq!((again, slots.find(tag), slots.find(taken[7].1)), (taken[7].0, Some(again), None));

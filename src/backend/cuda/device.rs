@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-/// Why a device cannot be used, or no longer.
+/// A fault that makes a device unusable.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
@@ -24,13 +24,13 @@ pub enum Fault {
     #[error("the device failed its self-test")]
     SelfTest,
     /// Memory ran out.
-    #[error("the device has no {0} bytes of memory left")]
+    #[error("the device cannot allocate {0} bytes of memory")]
     Memory(usize),
     /// A transaction needs more memory than the device may use.
-    #[error("a transaction needs more than the {0} bytes that the device may use")]
+    #[error("a transaction needs more than the allowed {0} bytes of device memory")]
     Budget(usize),
     /// A transaction is larger than one launch can be.
-    #[error("a transaction of {0} jobs is more than one launch can do")]
+    #[error("a transaction of {0} jobs is too large for one launch")]
     TooLarge(usize),
     /// A driver call failed.
     #[error("the device failed: {0}")]

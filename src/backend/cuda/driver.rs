@@ -22,7 +22,7 @@ use crate::backend::CardChoice;
 /// The kernels as PTX, compiled in advance.
 const PTX: &str = include_str!("kernels.ptx");
 
-/// Launches with at least this many blocks are timed. For smaller ones, timing costs more than it tells.
+/// Launches with at least this many blocks are timed. For smaller ones, timing costs more than it is worth.
 const TIMED: u32 = 64;
 
 /// A GPU with the kernels loaded.
@@ -69,7 +69,7 @@ fn no_device(error: DriverError) -> Fault {
     }
 }
 
-/// The device ordinal of a card, or `None` if CUDA has no such card. Call only when the driver is known to be
+/// The device ordinal of a GPU, or `None` if CUDA does not list it. Call only when the driver is known to be
 /// loaded.
 fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
     // Report missing devices before anything else.
@@ -107,12 +107,12 @@ fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
 }
 
 impl Card {
-    /// Opens a card: the suggested one if the settings leave the choice open and CUDA has it.
+    /// Opens a GPU: the suggested one if the settings leave the choice open and CUDA has it.
     pub fn open(card: &CardChoice, suggested: Option<&CardChoice>) -> Result<Self, Fault> {
         Self::open_with(card, suggested, PTX)
     }
 
-    /// Opens a card with other kernels.
+    /// Opens a GPU with other kernels.
     pub fn open_with(card: &CardChoice, suggested: Option<&CardChoice>, ptx: &str) -> Result<Self, Fault> {
         // SAFETY: only loads the driver's library, as every later call does.
         if !unsafe { sys::is_culib_present() } {
@@ -206,15 +206,15 @@ impl Pinned {
 
 impl HostMemory for Pinned {
     fn bytes(&self) -> &[u8] {
-        // SAFETY: `start` has `len` initialised bytes. The device does not write to them now: whoever started a
-        // copy waits for it before reading.
+        // SAFETY: `start` has `len` initialised bytes. The device does not write to them now: the caller that
+        // started a copy waits for it before reading.
         unsafe { std::slice::from_raw_parts(self.start, self.len) }
     }
 
     fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
         let start = self.within(&range)?;
-        // SAFETY: `start` has this many initialised bytes, and whoever started a copy to them has waited for it.
-        // Copies to other ranges may be in flight.
+        // SAFETY: `start` has this many initialised bytes, and the caller that started a copy to them has
+        // waited for it. Copies to other ranges may be in flight.
         Some(unsafe { std::slice::from_raw_parts(start, range.len()) })
     }
 

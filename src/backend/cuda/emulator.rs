@@ -52,7 +52,7 @@ impl HostMemory for Plain {
 }
 
 /// Prints what is not tested and why. If `BURROW_REQUIRE` is set in the environment, the test fails instead, since
-/// nobody reads the output of tests that pass.
+/// the output of passing tests is not read.
 pub(super) fn skip(why: &str) {
     let is_required = std::env::var_os("BURROW_REQUIRE").is_some_and(|value| !value.is_empty());
     assert!(!is_required, "BURROW_REQUIRE is set, but {why}");

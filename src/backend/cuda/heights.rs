@@ -7,7 +7,7 @@ use super::layout::{COLUMNS, HeightsParams};
 use super::session::Session;
 use super::staging::StagingLayout;
 use super::{Cuda, guarded, try_lock};
-use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
+use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseParams};
 
 /// From this many columns on, the device is assumed to be faster: 16 threads take 3.3 ms for them, an H200 0.7 to 2
 /// ms. For a fourth of them the times are 1.0 and 0.6 ms, and a slower GPU may lose.
@@ -24,8 +24,8 @@ impl Cuda {
     /// Ground from noise if the device is available, chosen and succeeds; otherwise the CPU has to compute it. That
     /// includes invalid parameters.
     pub fn ground(&self, width: u32, depth: u32, noise: &NoiseHeights) -> Option<Ground> {
-        let terms = noise.terms(width, depth).ok()?;
-        if self.is_auto && terms.columns() < LEAST {
+        let params = noise.params(width, depth).ok()?;
+        if self.is_auto && params.columns() < LEAST {
             return None;
         }
         if !self.is_auto {
@@ -35,16 +35,16 @@ impl Cuda {
             let mut place = try_lock(&self.shared.session)?;
             let session = place.as_mut()?;
             // The memory is first touched by the threads that fill it.
-            let mut heights = bytemuck::allocation::try_zeroed_vec(terms.columns()).ok()?;
+            let mut heights = bytemuck::allocation::try_zeroed_vec(params.columns()).ok()?;
             // As for transactions, a panic counts as a fault.
-            let done = guarded(|| session.heights(&terms, &mut heights));
+            let done = guarded(|| session.heights(&params, &mut heights));
             if let Err(fault) = done {
                 self.handle_fault(&mut place, &fault);
                 return None;
             }
             heights
         };
-        terms.ground(heights)
+        params.ground(heights)
     }
 }
 
@@ -63,24 +63,25 @@ impl Buffers {
 
 impl Session {
     /// Computes the heights of a world in 1/256 voxel, `i32::MIN` where one exceeds the lattice's limit.
-    pub(super) fn heights(&mut self, terms: &NoiseTerms, heights: &mut [i32]) -> Result<(), Fault> {
-        self.heights_in_slices(terms, heights, SLICE)
+    pub(super) fn heights(&mut self, params: &NoiseParams, heights: &mut [i32]) -> Result<(), Fault> {
+        self.heights_in_slices(params, heights, SLICE)
     }
 
-    /// The same in slices of `slice` columns.
+    /// Computes heights in slices of `slice` columns.
     pub(super) fn heights_in_slices(
         &mut self,
-        terms: &NoiseTerms,
+        params: &NoiseParams,
         heights: &mut [i32],
         slice: usize,
     ) -> Result<(), Fault> {
         let mut plan = StagingLayout::default();
-        let tables = plan.section::<[u8; 256]>(terms.tables.len());
+        let tables = plan.section::<[u8; 256]>(params.tables.len());
         self.input.open(&mut *self.device, &plan)?;
         // Allocation failures must show before any work is in flight.
         let mut buffers = Buffers::new(&mut *self.device, heights.len().min(slice) * size_of::<i32>())?;
-        self.input.put(tables, &terms.tables);
-        let params = HeightsParams { heights: buffers.own, ..params(terms, self.input.address(tables)) };
+        self.input.put(tables, &params.tables);
+        let params =
+            HeightsParams { heights: buffers.own, ..kernel_params(params, self.input.address(tables)) };
         let sent = self.input.send(&mut *self.device, &plan);
         let filled = sent.and_then(|()| fill(&mut *self.device, params, &mut buffers, heights, slice));
         // Work in flight uses buffers that are freed next.
@@ -103,7 +104,7 @@ fn fill(
     for part in heights.chunks_mut(slice) {
         params.count = part.len() as u32;
         let blocks = part.len().div_ceil(COLUMNS) as u32;
-        // SAFETY: the buffers in the parameters are as long as the terms say, and stay allocated until the wait.
+        // SAFETY: the buffers in the parameters are as long as the parameters say, and stay allocated until the wait.
         unsafe { device.launch(Launch::new(blocks, &params)) }?;
         // SAFETY: the kernel writes this many heights, and they are read after the wait.
         unsafe { device.download(params.heights, &mut **next, 0..size_of_val(part)) }?;
@@ -128,16 +129,16 @@ fn copy(from: &dyn HostMemory, to: &mut [i32]) {
 }
 
 /// Parameters of the first slice, without the address of the heights.
-fn params(terms: &NoiseTerms, tables: u64) -> HeightsParams {
+fn kernel_params(params: &NoiseParams, tables: u64) -> HeightsParams {
     HeightsParams {
         tables,
         heights: 0,
-        noise: terms.numbers,
+        noise: params.numbers,
         first: 0,
         count: 0,
-        row_len: terms.row_len() as u32,
-        octaves: terms.tables.len() as u32,
-        is_ridged: (terms.kind == NoiseKind::Ridged).into(),
+        row_len: params.row_len() as u32,
+        octaves: params.tables.len() as u32,
+        is_ridged: (params.kind == NoiseKind::Ridged).into(),
         pad: 0,
     }
 }
@@ -158,10 +159,10 @@ mod tests {
         noise: &NoiseHeights,
         slice: usize,
     ) -> bool {
-        let terms = noise.terms(width, depth).expect("parameters in range");
-        let mut heights = vec![77; terms.columns()];
-        session.heights_in_slices(&terms, &mut heights, slice).expect("the device is fine");
-        let (found, expected) = (terms.ground(heights), Ground::from_noise(width, depth, noise).ok());
+        let params = noise.params(width, depth).expect("parameters in range");
+        let mut heights = vec![77; params.columns()];
+        session.heights_in_slices(&params, &mut heights, slice).expect("the device is fine");
+        let (found, expected) = (params.ground(heights), Ground::from_noise(width, depth, noise).ok());
         assert!(found == expected, "{width} x {depth}, {noise:?}: {found:?}, not {expected:?}");
         found.is_some()
     }
@@ -191,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn ground_of_any_noise_is_that_of_the_processor() {
+    fn ground_of_any_noise_equals_the_cpus() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         let mut rng = Rng::with_seed(23);
@@ -208,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_that_of_the_processor_to_the_last_bit_of_a_double() {
+    fn noise_equals_the_cpus_to_the_last_bit_of_a_double() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         let mut rng = Rng::with_seed(29);
@@ -219,17 +220,17 @@ mod tests {
             let (width, depth) = (rng.u32(1..40), rng.u32(1..20));
             let (x, z) = (rng.u32(0..=width), rng.u32(0..=depth));
             let expected = noise.by_column()(x as i32, z as i32);
-            let mut terms = noise.terms(width, depth).expect("parameters in range");
-            (terms.numbers.amplitude, terms.numbers.base) = (amplitude, -amplitude * expected);
-            let mut heights = vec![77; terms.columns()];
-            session.heights(&terms, &mut heights).expect("the device is fine");
-            let found = heights[z as usize * terms.row_len() + x as usize];
+            let mut params = noise.params(width, depth).expect("parameters in range");
+            (params.numbers.amplitude, params.numbers.base) = (amplitude, -amplitude * expected);
+            let mut heights = vec![77; params.columns()];
+            session.heights(&params, &mut heights).expect("the device is fine");
+            let found = heights[z as usize * params.row_len() + x as usize];
             assert_eq!(found, 0, "({x}, {z}) of {noise:?}");
         }
     }
 
     #[test]
-    fn every_kind_and_number_of_octaves_is_that_of_the_processor() {
+    fn every_kind_and_number_of_octaves_equals_the_cpus() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
@@ -241,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn the_far_ends_of_the_widest_worlds_are_those_of_the_processor() {
+    fn the_far_ends_of_the_widest_worlds_equal_the_cpus() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
@@ -252,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_card_makes_ground_where_that_pays_and_never_keeps_anyone_waiting() {
+    fn a_gpu_makes_ground_where_that_is_faster_and_blocks_no_caller() {
         let open = |is_auto| {
             let device = device()?;
             let cuda = Cuda::with_device(is_auto, limits(64 << 20), &[(1, 2.0)], |_| Ok(device));

@@ -56,7 +56,7 @@ impl Usage {
         [&self.device, &self.host].map(|bytes| bytes.load(Ordering::Relaxed))
     }
 
-    /// How many times host memory was allocated. An allocation of a few megabytes takes about a millisecond.
+    /// Number of allocations of host memory. An allocation of a few megabytes takes about a millisecond.
     pub fn host_allocations(&self) -> u64 {
         self.host_allocations.load(Ordering::Relaxed)
     }

@@ -73,7 +73,7 @@ use surfaces::Surfaces;
 
 /// A GPU as an alternative to the CPU. It is opened on first use.
 pub(super) struct Cuda {
-    /// Use the faster of the two? Otherwise the GPU is used whenever possible.
+    /// Whether the faster of the two is used. Otherwise the GPU is used whenever possible.
     is_auto: bool,
     /// Opens the device; `None` once opening has begun.
     pending: Mutex<Option<PendingDevice>>,
@@ -83,7 +83,7 @@ pub(super) struct Cuda {
     /// Measured costs of both, for [`Backend::Auto`].
     costs: Mutex<Costs>,
     /// Whether it was logged that a stage was too large for the device.
-    has_passed: AtomicBool,
+    has_warned: AtomicBool,
 }
 
 /// State shared by the thread that opens the device and those that use it.
@@ -92,7 +92,7 @@ struct Shared {
     session: Mutex<Option<Box<Session>>>,
     /// The outcome of opening, readable at any time.
     state: Mutex<EngineState>,
-    /// How long opening and the self-test took, once the test has passed.
+    /// Duration of opening and of the self-test, once the test has passed.
     opening: OnceLock<Duration>,
     usage: Arc<Usage>,
 }
@@ -154,7 +154,7 @@ impl Cuda {
                 usage: Arc::default(),
             }),
             costs: Mutex::default(),
-            has_passed: AtomicBool::default(),
+            has_warned: AtomicBool::default(),
         }
     }
 
@@ -194,7 +194,7 @@ impl Cuda {
         lock(&self.shared.state).clone()
     }
 
-    /// How long opening the device and its self-test took; zero until the test has passed.
+    /// Duration of opening the device and of its self-test; zero until the test has passed.
     pub fn opening(&self) -> Duration {
         self.shared.opening.get().copied().unwrap_or_default()
     }
@@ -214,19 +214,19 @@ impl Cuda {
         }
     }
 
-    /// Runs a stage on the device if it is open, free and chosen; otherwise the CPU has to do it. `then` uses the
+    /// Runs a stage on the device if it is open, free and chosen; otherwise the CPU has to do it. `on_done` uses the
     /// result while it is still in the session's memory. If the result does not arrive completely, the output of
-    /// `then` is discarded.
+    /// `on_done` is discarded.
     ///
-    /// The lock is held until `then` returns. Meanwhile `then` may run other tasks of its thread pool, even on this
-    /// thread. That cannot deadlock: others only try the lock, and go on without the device.
+    /// The lock is held until `on_done` returns. Meanwhile `on_done` may run other tasks of its thread pool, even on
+    /// this thread. That cannot deadlock: other callers only try the lock, and continue without the device.
     fn attempt_stage<T, R>(
         &self,
         choice: &mut Choice,
         load: Load,
         missing: impl FnOnce(&Session) -> usize,
         work: impl FnOnce(&mut Session) -> Result<T, Fault>,
-        then: impl FnOnce(&mut Session, T) -> Result<R, Fault>,
+        on_done: impl FnOnce(&mut Session, T) -> Result<R, Fault>,
     ) -> Attempt<R> {
         let mut attempt = Attempt { done: None, load, was_tried: false, has_grown: false };
         if load.amount == 0 {
@@ -258,8 +258,8 @@ impl Cuda {
         let done = guarded(|| work(session));
         attempt.has_grown = self.shared.usage.host_allocations() != allocated;
         let times = session.times();
-        // A panic in `then` is the caller's and no fault of the device.
-        match done.and_then(|done| then(session, done)) {
+        // A panic in `on_done` is the caller's and no fault of the device.
+        match done.and_then(|done| on_done(session, done)) {
             Ok(made) => {
                 choice.is_cuda = true;
                 [choice.device, choice.kernel] = times;
@@ -288,8 +288,8 @@ impl Cuda {
     fn handle_fault(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
         if !fault.is_passing() {
             self.shared.disable(place, fault);
-        } else if !self.has_passed.swap(true, Ordering::Relaxed) {
-            log::warn!("bevy_burrow does without CUDA what is too much for the device: {fault}");
+        } else if !self.has_warned.swap(true, Ordering::Relaxed) {
+            log::warn!("bevy_burrow runs on the CPU what is too large for the CUDA device: {fault}");
         }
     }
 
@@ -303,7 +303,7 @@ impl Cuda {
         // After a failed attempt, all of the time counts as the device's.
         let is_chosen = choice.estimate.is_some() || was_tried;
         costs.learn(load, was_tried, is_chosen, choice.took, has_grown && choice.is_cuda);
-        let is_wanted = !was_tried && costs.could_be_worth_a_card(load);
+        let is_wanted = !was_tried && costs.may_be_worth_a_gpu(load);
         drop(costs);
         if is_wanted {
             self.open();
@@ -317,25 +317,25 @@ impl Cuda {
         self.attempt_stage(choice, load, missing, |session| session.edit(work), |_, delta| Ok(delta))
     }
 
-    /// Meshes blocks on the device, if it is chosen. `then` gets the surfaces; the result is how long it waited for
-    /// them. Without a result the CPU has to mesh the blocks, and anything that `then` made of surfaces is to be
+    /// Meshes blocks on the device, if it is chosen. `on_done` gets the surfaces; the result is how long it waited for
+    /// them. Without a result the CPU has to mesh the blocks, and anything that `on_done` made of surfaces is to be
     /// discarded.
     pub fn mesh(
         &self,
         view: &WorldView,
         blocks: &[Block],
         choice: &mut Choice,
-        meanwhile: &(dyn Fn() + Sync),
-        then: &mut dyn FnMut(&dyn MeshedBlocks),
+        overlap: &(dyn Fn() + Sync),
+        on_done: &mut dyn FnMut(&dyn MeshedBlocks),
     ) -> Attempt<Duration> {
         let load = Load::of_blocks(blocks.len());
         let missing = |session: &Session| session.missing_blocks(view, blocks);
-        let work = |session: &mut Session| session.mesh(view, blocks, meanwhile);
+        let work = |session: &mut Session| session.mesh(view, blocks, overlap);
         self.attempt_stage(choice, load, missing, work, |session, meshed| {
             let Session { meshes, device, .. } = session;
             let surfaces = Surfaces::new(meshes, view, blocks, meshed);
-            let drawn = catch_unwind(AssertUnwindSafe(|| then(&surfaces)));
-            // `then` may not have waited for all surfaces. Even after a panic the session must stay usable.
+            let drawn = catch_unwind(AssertUnwindSafe(|| on_done(&surfaces)));
+            // `on_done` may not have waited for all surfaces. Even after a panic the session must stay usable.
             let is_over = surfaces.arrival.is_over();
             let waited = surfaces.arrival.end();
             let ended = if is_over { Ok(()) } else { guarded(|| device.wait()) };
@@ -368,6 +368,6 @@ impl Shared {
     fn disable(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
         *place = None;
         *lock(&self.state) = EngineState::Lost(fault.to_string());
-        log::warn!("bevy_burrow goes on without CUDA: {fault}");
+        log::warn!("bevy_burrow continues without CUDA: {fault}");
     }
 }

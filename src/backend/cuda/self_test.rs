@@ -73,10 +73,10 @@ fn compare_heights(session: &mut Session) -> Result<(), Fault> {
     for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
         let noise = NoiseHeights { kind, seed: 3, scale: 21.5, ..NoiseHeights::default() };
         let refused = |error: GroundError| Fault::Failed(error.to_string());
-        let terms = noise.terms(70, 40).map_err(refused)?;
-        let mut heights = vec![0; terms.columns()];
-        session.heights(&terms, &mut heights)?;
-        if terms.ground(heights) != Some(Ground::from_noise(70, 40, &noise).map_err(refused)?) {
+        let params = noise.params(70, 40).map_err(refused)?;
+        let mut heights = vec![0; params.columns()];
+        session.heights(&params, &mut heights)?;
+        if params.ground(heights) != Some(Ground::from_noise(70, 40, &noise).map_err(refused)?) {
             return Err(Fault::SelfTest);
         }
     }

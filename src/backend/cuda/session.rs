@@ -38,7 +38,7 @@ pub(super) struct Session {
     /// When memory was last trimmed, and whether anything was launched since.
     trimmed: Instant,
     is_used: bool,
-    /// How long unused memory is kept.
+    /// Time for which unused memory is kept.
     pub(super) keep: Duration,
 }
 
@@ -173,10 +173,10 @@ pub(super) fn windows<'a, T: Sync>(
 /// From this many stacks on, their records are written in parallel. Each reads 121 columns.
 const MANY_STACKS: usize = 64;
 
-/// How many bricks are sampled to estimate how many are missing.
+/// Number of bricks that are sampled to estimate how many are missing.
 const LOOKS: usize = 128;
 
-/// How long unused memory is kept. Players pause, and reallocating costs time.
+/// Time for which unused memory is kept. Players pause, and reallocating costs time.
 const KEEP: Duration = Duration::from_secs(30);
 
 /// Fraction of the budget for stacks, as a divisor.
@@ -223,8 +223,8 @@ impl Session {
         self.stacks.pages.clear();
     }
 
-    /// Frees memory that was not needed for some time: lists shrink to what was used, and the caches are released
-    /// if nothing was launched.
+    /// Frees memory that was unused for some time: lists shrink to the size last used, and the caches are
+    /// released if nothing was launched.
     pub fn trim(&mut self, now: Instant) -> Result<(), Fault> {
         if now.saturating_duration_since(self.trimmed) < self.keep {
             return Ok(());
@@ -356,10 +356,10 @@ impl Session {
         }
     }
 
-    /// Gives back the slots of uploads that were never sent.
+    /// Releases the slots of uploads that were never sent.
     pub(super) fn give_up(&mut self, uploads: &Uploads) {
-        uploads.bricks.iter().for_each(|upload| self.bricks.give_back(upload.slot));
-        uploads.stacks.iter().for_each(|&(_, slot)| self.stacks.slots.give_back(slot));
+        uploads.bricks.iter().for_each(|upload| self.bricks.release_slot(upload.slot));
+        uploads.stacks.iter().for_each(|&(_, slot)| self.stacks.slots.release_slot(slot));
     }
 }
 
@@ -389,7 +389,7 @@ mod tests {
     #[test]
     fn what_is_uploaded_is_in_its_slot() {
         let ground = Ground::from_fn(200, 200, |x, z| f64::from(x * z % 31)).expect("finite heights");
-        // A count for one thread, and one for several.
+        // One number that a single thread handles, and one that needs several.
         for count in [3, 2 * GROUP as i32 + 5] {
             let Some(device) = device() else { return };
             let mut session = Session::new(device, 8 << 20).expect("a session");

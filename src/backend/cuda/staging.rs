@@ -210,7 +210,7 @@ impl OutputList {
         unsafe { device.download(from, &mut *self.host, 0..entries * self.entry) }
     }
 
-    /// How many entries the next kernel may write.
+    /// Number of entries that the next kernel may write.
     pub fn capacity(&self) -> u32 {
         let own = self.own.map_or(0, |(_, capacity)| capacity);
         (if self.is_own() { own } else { self.capacity }) as u32
@@ -273,7 +273,8 @@ impl OutputList {
         Ok(is_short)
     }
 
-    /// Allocates device memory. If it does not fit beside the present allocation, frees that one first.
+    /// Allocates device memory. If it does not fit in addition to the present allocation, frees that one
+    /// first.
     fn alloc_own(&mut self, device: &mut dyn Device, room: usize) -> Result<u64, Fault> {
         match device.alloc(room * self.entry) {
             Err(Fault::Memory(_) | Fault::Budget(_)) if self.own.is_some() => {
@@ -298,7 +299,7 @@ impl OutputList {
         self.fetch_part(device, 0..entries)
     }
 
-    /// The same for a range of entries.
+    /// Fetches a range of entries.
     pub fn fetch_part(&mut self, device: &mut dyn Device, entries: Range<usize>) -> Result<bool, Fault> {
         match self.own {
             Some((address, _)) if !entries.is_empty() && self.is_own() => {

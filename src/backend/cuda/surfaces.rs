@@ -48,7 +48,7 @@ impl<'a> Surfaces<'a> {
 pub(super) struct Arrival {
     /// One mark per copy; empty if nothing had to be copied.
     marks: Vec<Box<dyn Mark>>,
-    /// How many copies have arrived.
+    /// Number of copies that have arrived.
     here: AtomicUsize,
     fault: OnceLock<Fault>,
     /// Nanoseconds spent waiting.

@@ -75,7 +75,7 @@ impl KeptSlabs {
         lists
     }
 
-    /// Gives back the memory of windows.
+    /// Returns the memory of windows for reuse.
     pub fn put(&mut self, windows: Windows) {
         let lists = windows.slabs.into_iter().map(|slab| slab.lists);
         let is_small = |lists: &SlabLists| lists.refs.capacity() <= KEPT_ENTRIES;

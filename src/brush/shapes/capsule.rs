@@ -11,7 +11,7 @@ use super::{Convert, Extent, Kind, Numbers, Outline, Shape, ShapeGeometry, Units
 use crate::brush::BrushError;
 use crate::brush::quantize::{difference, measure};
 
-/// All that is nearer to a line segment than the radius; a ball where the ends coincide.
+/// All points nearer to a line segment than the radius; a ball if the ends coincide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Capsule<N: Numbers = Voxels> {
     /// One end of the segment.

@@ -1,8 +1,8 @@
 //! Signed Euclidean distances in `f32`, in one written order of exactly rounded operations.
 //!
-//! Distances take a point relative to the shape's origin, in 1/256 voxel, and are in 1/256 voxel, negative inside. All are exact
-//! distances to the shape's surface up to rounding, so none changes faster than the point moves. Sums are written
-//! `x + (y + z)`, so that along a row of samples the bracket is computed once.
+//! Distances take a point relative to the shape's origin, in 1/256 voxel, and are in 1/256 voxel, negative inside. All
+//! are exact distances to the shape's surface up to rounding, so none changes faster than the point moves. Sums are
+//! written `x + (y + z)`, so that along a row of samples the bracket is computed once.
 
 use std::ops::Range;
 
@@ -23,7 +23,8 @@ pub trait Distance {
         }
     }
 
-    /// Hands out the rows of eight points along x at `ys[y]` and `zs[z]`. Compiled for each shape, so that rows are vectorised.
+    /// Hands out the rows of eight points along x at `ys[y]` and `zs[z]`. Compiled for each shape, so that rows are
+    /// vectorised.
     #[inline(never)]
     fn rows(
         &self,

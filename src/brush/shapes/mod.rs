@@ -1,7 +1,7 @@
 //! The shapes that a brush can have: a file for each, and here what they have in common.
 //!
-//! A shape is a struct over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). To add one,
-//! write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
+//! A shape is a struct over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). To
+//! add one, write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
 //! `kernels/shapes.cuh`.
 
 /// Converts a shape field by field, as in `convert!(Sphere { center: point, radius: length })`.
@@ -59,7 +59,7 @@ pub(super) trait ShapeGeometry {
     /// The point that distances are computed relative to.
     fn origin(&self) -> [i32; 3];
 
-    /// Is it within limits that no number has by itself?
+    /// Checks limits that concern several numbers together.
     fn check(&self) -> Result<(), BrushError> {
         Ok(())
     }
@@ -67,7 +67,7 @@ pub(super) trait ShapeGeometry {
     /// Lowest and highest corner of a box around it, at most 1 too wide on each side.
     fn bounds(&self) -> (IVec3, IVec3);
 
-    /// How deep inside the shape its middle lies, rounded down.
+    /// Depth of the shape's middle, rounded down.
     fn deepest(&self) -> i32;
 
     /// Volume in cubes of 1/256 voxel.
@@ -77,7 +77,7 @@ pub(super) trait ShapeGeometry {
     fn distance(&self) -> Self::Distance;
 }
 
-/// Where a shape lies, roughly: between two points, and so far around them.
+/// Approximate bounds of a shape: a segment between two points, and a radius around it.
 #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
 pub(crate) struct Extent {
     pub ends: [Vec3; 2],
@@ -86,8 +86,8 @@ pub(crate) struct Extent {
 
 macro_rules! shapes {
     ($($(#[$attribute:meta])* $name:ident,)*) => {
-        /// The shape of a brush, in voxels of terrain space; in a [`Brush`](super::Brush) that is a message of the plugin's, in
-        /// units of world space.
+        /// The shape of a brush, in voxels of terrain space; in a [`Brush`](super::Brush) that is a message of the
+        /// plugin's, in units of world space.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "shape", rename_all = "snake_case")]
         #[non_exhaustive]
@@ -105,7 +105,7 @@ macro_rules! shapes {
 
         /// A shape's distance function.
         #[derive(Clone, Debug)]
-        pub(super) enum Form {
+        pub(super) enum ShapeSdf {
             $($name(<$name<Units> as ShapeGeometry>::Distance),)*
         }
 
@@ -156,7 +156,8 @@ macro_rules! shapes {
                 })
             }
 
-            /// Is the shape within every limit? Any integers may be asked about; all else relies on it.
+            /// Checks that the shape is within every limit. Accepts any integers; all other functions rely on this
+            /// check.
             pub(super) fn check(&self) -> Result<(), BrushError> {
                 match self {
                     $(Self::$name(shape) => {
@@ -181,7 +182,7 @@ macro_rules! shapes {
                 }
             }
 
-            /// How deep inside the shape its middle lies, rounded down: at least 1.
+            /// Depth of the shape's middle, rounded down: at least 1.
             pub(super) fn deepest(&self) -> i32 {
                 let deepest = match self {
                     $(Self::$name(shape) => shape.deepest(),)*
@@ -198,14 +199,14 @@ macro_rules! shapes {
             }
 
             /// Its distance function.
-            pub(super) fn form(&self) -> Form {
+            pub(super) fn form(&self) -> ShapeSdf {
                 match self {
-                    $(Self::$name(shape) => Form::$name(shape.distance()),)*
+                    $(Self::$name(shape) => ShapeSdf::$name(shape.distance()),)*
                 }
             }
         }
 
-        impl Form {
+        impl ShapeSdf {
             /// Distances of a run of points along x.
             pub(super) fn run(&self, xs: &[f32], y: f32, z: f32, out: &mut [f32]) {
                 match self {
@@ -297,7 +298,7 @@ impl QuantizedShape {
 mod tests {
     use super::*;
 
-    fn depth(form: &Form, at: Vec3) -> f32 {
+    fn depth(form: &ShapeSdf, at: Vec3) -> f32 {
         let mut distance = [0.0];
         form.run(&[at.x], at.y, at.z, &mut distance);
         -distance[0]

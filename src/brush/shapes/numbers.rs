@@ -1,4 +1,4 @@
-//! The numbers that shapes are told in, and how one kind becomes another.
+//! The number types in which shapes are written, and conversions between them.
 
 use std::fmt::Debug;
 
@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 use crate::brush::BrushError;
 use crate::brush::quantize::{self, voxels};
 
-/// What the fields of a shape hold: [`Voxels`] in a brush, [`Units`] in an edit.
+/// The type of numbers in a shape: [`Voxels`] in a brush, [`Units`] in an edit.
 pub trait Numbers: Copy + Debug + PartialEq {
     /// A place, the way to another place, or half the sides of a box.
     type Vector: Copy + Debug + PartialEq;
@@ -21,7 +21,7 @@ pub trait Numbers: Copy + Debug + PartialEq {
     /// The rotation that turns nothing.
     fn unturned() -> Self::Turn;
 
-    /// May a rotation be left out where shapes are written?
+    /// Returns `true` if a rotation may be left out when a shape is written.
     fn may_leave_out(_: &Self::Turn) -> bool {
         false
     }
@@ -72,8 +72,8 @@ pub enum Kind {
     Sides,
 }
 
-/// Makes other numbers of those of a shape, which hands over one after the other with the name of its field. So what
-/// happens to all points, say, is written once, and not once for each shape.
+/// Converts the numbers of a shape, one after the other, each with the name of its field. A conversion of all
+/// points, for example, is then written once and not once for each shape.
 pub trait Convert {
     /// What the fields hold.
     type From: Numbers;

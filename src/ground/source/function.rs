@@ -2,7 +2,8 @@
 
 use super::{ColumnGrid, HeightSource, checked_bounds, rounded};
 
-/// Heights from a function of the column, in voxels: the same as [`Ground::from_fn`](crate::ground::Ground::from_fn) gives.
+/// Heights from a function of the column, in voxels: the same as [`Ground::from_fn`](crate::ground::Ground::from_fn)
+/// gives.
 pub struct FunctionSource<F> {
     id: u64,
     bounds: (i32, i32),
@@ -10,8 +11,8 @@ pub struct FunctionSource<F> {
 }
 
 impl<F: Fn(i32, i32) -> f64 + Send + Sync + 'static> FunctionSource<F> {
-    /// The height over the column (x, z) is `height(x, z)` voxels, rounded to 1/256 voxel, between `low` and `high` voxels.
-    /// Heights outside are clamped to these; NaN counts as 0.
+    /// The height over the column (x, z) is `height(x, z)` voxels, rounded to 1/256 voxel, between `low` and `high`
+    /// voxels. Heights outside are clamped to these; NaN counts as 0.
     ///
     /// `id` stands for the function: give another one to every function.
     pub fn new(id: u64, low: f64, high: f64, height: F) -> Self {

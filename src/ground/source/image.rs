@@ -6,9 +6,9 @@ use crate::ground::{GreyImage, GroundError, ImageScale};
 use crate::lattice::Column;
 use crate::lattice::hash::hash_words;
 
-/// Heights from a grey image: the same as [`Ground::from_image`](crate::ground::Ground::from_image) gives. Keeps the image's
-/// samples, two bytes each, and interpolates them when it is asked. A column beyond the image is like the nearest one on its
-/// rim.
+/// Heights from a grey image: the same as [`Ground::from_image`](crate::ground::Ground::from_image) gives. Keeps the
+/// image's samples, two bytes each, and interpolates them when it is asked. A column beyond the image is like the
+/// nearest one on its rim.
 pub struct ImageSource {
     image: GreyImage,
     scale: ImageScale,

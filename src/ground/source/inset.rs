@@ -10,8 +10,8 @@ const SHARE_BITS: u32 = 12;
 
 /// A source inside a rectangle, and another one around it: a surveyed landscape with noise to the horizon.
 ///
-/// Along the rectangle's rim heights are blended, smoothly and in integers, over a margin that lies inside it. The inner source is
-/// asked for columns counted from the rectangle's lowest one.
+/// Along the rectangle's rim heights are blended, smoothly and in integers, over a margin that lies inside it. The
+/// inner source is asked for columns counted from the rectangle's lowest one.
 pub struct InsetSource<Inner, Outer> {
     inner: Inner,
     outer: Outer,
@@ -21,8 +21,9 @@ pub struct InsetSource<Inner, Outer> {
 }
 
 impl<Inner: HeightSource, Outer: HeightSource> InsetSource<Inner, Outer> {
-    /// `inner` over the columns from `low` to `low + size`, both included, and `outer` around. From the rectangle's rim, where
-    /// all is `outer`, it takes `margin` voxels until all is `inner`; 0 is a sharp edge. Negative sizes and margins count as 0.
+    /// `inner` over the columns from `low` to `low + size`, both included, and `outer` around. From the rectangle's
+    /// rim, where all is `outer`, it takes `margin` voxels until all is `inner`; 0 is a sharp edge. Negative sizes and
+    /// margins count as 0.
     pub fn new(inner: Inner, outer: Outer, low: Column, size: [i32; 2], margin: i32) -> Self {
         Self { inner, outer, low, size: size.map(|cells| cells.max(0)), margin: margin.max(0) }
     }
@@ -46,7 +47,8 @@ impl<Inner: HeightSource, Outer: HeightSource> InsetSource<Inner, Outer> {
         }
     }
 
-    /// The part of a grid that lies in the rectangle, as the inner source counts its columns; and where it begins in the grid.
+    /// The part of a grid that lies in the rectangle, as the inner source counts its columns; and where it begins in
+    /// the grid.
     fn inside(&self, grid: ColumnGrid) -> Option<(ColumnGrid, [usize; 2])> {
         let range = |count: usize, low: i32, size: i32, from: i32| {
             let (stride, ahead) = (i64::from(grid.stride.max(1)), i64::from(low) - i64::from(from));

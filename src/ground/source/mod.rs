@@ -17,7 +17,8 @@ pub use noise::NoiseSource;
 use super::material::ColumnMaterial;
 use crate::lattice::{Column, LIMIT, ONE};
 
-/// Columns at equal distances: `low`, `low + stride` and so on, `width` of them along x in each of `depth` rows along z.
+/// Columns at equal distances: `low`, `low + stride` and so on, `width` of them along x in each of `depth` rows along
+/// z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ColumnGrid {
     /// The column with the lowest coordinates.
@@ -56,11 +57,12 @@ impl ColumnGrid {
     }
 }
 
-/// Heights and materials as a function of the column, for a [`Ground`](super::Ground) that computes them where they are needed.
+/// Heights and materials as a function of the column, for a [`Ground`](super::Ground) that computes them where they are
+/// needed.
 ///
-/// It must always give the same for the same column, whatever else is asked for with it: worlds, edits and meshes depend on it.
-/// It is asked from several threads at once, and only for columns of the world (an [`InsetSource`] asks the source inside
-/// only within its rectangle).
+/// It must always give the same for the same column, whatever else is asked for with it: worlds, edits and meshes
+/// depend on it. It is asked from several threads at once, and only for columns of the world (an [`InsetSource`] asks
+/// the source inside only within its rectangle).
 ///
 /// ```
 /// use bevy_burrow::ground::{ColumnGrid, HeightSource};
@@ -89,8 +91,8 @@ impl ColumnGrid {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait HeightSource: Send + Sync + 'static {
-    /// A number that stands for all that the source gives, in [`Ground::hash`](super::Ground::hash) and where grounds are
-    /// compared: sources with equal ids must give equal heights and materials, in every run of every program.
+    /// A number that stands for all that the source gives, in [`Ground::hash`](super::Ground::hash) and where grounds
+    /// are compared: sources with equal ids must give equal heights and materials, in every run of every program.
     fn id(&self) -> u64;
 
     /// The lowest and the highest height that it gives, in 1/256 voxel. Heights outside are clamped to them, as to the
@@ -98,16 +100,16 @@ pub trait HeightSource: Send + Sync + 'static {
     /// [`Ground::height_range`](super::Ground::height_range) says.
     fn bounds(&self) -> (i32, i32);
 
-    /// Writes the heights of the columns of a grid, in 1/256 voxel and in the order of [`ColumnGrid::columns`], to `heights`,
-    /// which is as long as the grid.
+    /// Writes the heights of the columns of a grid, in 1/256 voxel and in the order of [`ColumnGrid::columns`], to
+    /// `heights`, which is as long as the grid.
     fn fill_heights(&self, grid: ColumnGrid, heights: &mut [i32]);
 
-    /// Does it give materials too?
+    /// Returns `true` if it provides materials too.
     fn has_materials(&self) -> bool {
         false
     }
 
-    /// The same for materials, if [`Self::has_materials`] says that it gives any: every place then holds material 0.
+    /// Fills in materials, if [`Self::has_materials`] returns `true`. On entry every place holds material 0.
     /// [`MaterialId::GROUND`](super::MaterialId::GROUND) is no material, and becomes 0.
     fn fill_materials(&self, _grid: ColumnGrid, _materials: &mut [ColumnMaterial]) {}
 

@@ -3,13 +3,13 @@
 use super::{ColumnGrid, HeightSource, rounded};
 use crate::ground::GroundError;
 use crate::ground::noise_heights::{NoiseHeights, NoiseKind};
-use crate::ground::noise_terms::NoiseTerms;
+use crate::ground::noise_params::NoiseParams;
 use crate::lattice::hash::hash_words;
 
 /// Heights from fractal noise: the same as [`Ground::from_noise`](crate::ground::Ground::from_noise) gives.
 pub struct NoiseSource {
     heights: NoiseHeights,
-    terms: NoiseTerms,
+    params: NoiseParams,
 }
 
 impl NoiseSource {
@@ -18,7 +18,7 @@ impl NoiseSource {
     /// # Errors
     /// [`GroundError::Parameter`] for a parameter out of its range.
     pub fn new(heights: &NoiseHeights) -> Result<Self, GroundError> {
-        Ok(Self { heights: *heights, terms: heights.terms(1, 1)? })
+        Ok(Self { heights: *heights, params: heights.params(1, 1)? })
     }
 }
 
@@ -30,7 +30,7 @@ impl HeightSource for NoiseSource {
             NoiseKind::Ridged => 1,
         };
         let [scale, amplitude, base] = [scale, amplitude, base].map(f64::to_bits);
-        // The first word tells kinds of sources apart.
+        // The first word distinguishes kinds of sources.
         hash_words([0x6e6f_6973, seed.into(), kind, octaves.into(), scale, amplitude, base])
     }
 
@@ -42,7 +42,7 @@ impl HeightSource for NoiseSource {
     fn fill_heights(&self, grid: ColumnGrid, heights: &mut [i32]) {
         let mut voxels = vec![0.0; grid.width];
         for (row, z) in heights.chunks_exact_mut(grid.width.max(1)).zip(0..grid.depth) {
-            self.terms.row(grid.low.x, grid.column(0, z).z, grid.stride, &mut voxels);
+            self.params.row(grid.low.x, grid.column(0, z).z, grid.stride, &mut voxels);
             row.iter_mut().zip(&voxels).for_each(|(height, &voxels)| *height = rounded(voxels));
         }
     }

@@ -51,7 +51,7 @@ impl HeightSource for Striped {
     }
 }
 
-/// The same ground with heights in memory.
+/// An equal ground with its heights in memory.
 fn resident(ground: &Ground) -> Ground {
     let (width, depth) = (ground.width(), ground.depth());
     let columns = (0..=depth).flat_map(|z| (0..=width).map(move |x| Column::new(x, z)));
@@ -302,7 +302,7 @@ fn the_hash_is_of_the_source_and_what_it_is_made_of() {
 
 #[test]
 fn the_hashes_of_sources_are_the_same_on_every_machine() {
-    // If this fails, worlds saved with hashes of the old kind are no longer recognised: say so in the change log.
+    // If this fails, worlds saved with the old hashes are no longer recognised: say so in the changelog.
     let noise = NoiseSource::new(&NoiseHeights::default()).unwrap();
     let samples = (0..6).map(|i| i * 999).collect();
     let image = ImageSource::new(GreyImage::from_samples(3, 2, samples).unwrap(), &ImageScale::default());
@@ -329,55 +329,4 @@ fn sizes_are_checked() {
         assert_eq!(page.heights[0], whole.height(column));
     }
     assert!(whole.bytes() < 3 << 20);
-}
-
-/// Microseconds that nodes of levels of detail wait for their columns:
-/// `cargo test --no-default-features --lib -- --ignored --nocapture times_of_pages`.
-#[test]
-#[ignore = "asserts nothing: prints times"]
-fn times_of_pages() {
-    let noise = NoiseHeights { octaves: 6, scale: 900.0, amplitude: 200.0, ..NoiseHeights::default() };
-    let samples = (0..1 << 20).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 16) as u16).collect();
-    let image = GreyImage::from_samples(1 << 10, 1 << 10, samples).unwrap();
-    let scale = ImageScale { voxels_per_sample: 4, ..ImageScale::default() };
-    let size = [4092; 2];
-    let of = |source: Box<dyn HeightSource>| Ground::from_source(100_000, 100_000, source).unwrap();
-    let plain = of(Box::new(NoiseSource::new(&noise).unwrap()));
-    let mountains = Ground::from_noise(4096, 4096, &noise).unwrap();
-    let image = || ImageSource::new(image.clone(), &scale).unwrap();
-    let inset = InsetSource::new(image(), NoiseSource::new(&noise).unwrap(), Column::new(0, 0), size, 64);
-    for (name, ground) in [
-        ("in memory", mountains),
-        ("noise, 6 octaves", plain),
-        ("image, 4 voxels a sample", of(Box::new(image()))),
-        ("image in noise", of(Box::new(inset))),
-        (
-            "noise with strata",
-            of(Box::new(NoiseSource::new(&noise).unwrap())).with_strata(&Strata::alpine()).unwrap(),
-        ),
-    ] {
-        for stride in [1, 2, 4, 16, 64] {
-            // A column of nodes, so that no page of the ground is computed for another one.
-            let nodes = 3968 / (32 * stride);
-            let node = |at: i32| Column::new(at % 8 * 32 * stride, at / 8 * 32 * stride);
-            let time = |what: &dyn Fn(Column)| {
-                let start = std::time::Instant::now();
-                let count = (nodes * 8).min(64);
-                (0..count).for_each(|at| what(node(at)));
-                start.elapsed().as_secs_f64() * 1e6 / f64::from(count)
-            };
-            let fresh = time(&|low| drop(ground.page(low, stride, [33, 33])));
-            let again = time(&|low| drop(ground.page(low, stride, [33, 33])));
-            let heights = time(&|low| drop(ground.page_heights(low, stride, [33, 33])));
-            println!(
-                "{name}, stride {stride}: {fresh:.0} us, again {again:.0} us, heights alone {heights:.0} us"
-            );
-        }
-        let start = std::time::Instant::now();
-        let mut sum = 0i64;
-        for (x, z) in (0..500).flat_map(|z| (0..500).map(move |x| (x, z))) {
-            sum += i64::from(ground.height(Column::new(x, z)));
-        }
-        println!("{name}: {:.1} ns a height ({sum})", start.elapsed().as_secs_f64() * 1e9 / 250_000.0);
-    }
 }

@@ -1,4 +1,4 @@
-//! What strata may be.
+//! Limits and checks of strata.
 
 use std::borrow::Cow;
 
@@ -54,7 +54,7 @@ impl Strata {
 }
 
 impl Stratum {
-    /// Does it ask anything of a column?
+    /// Returns `true` if it has a condition on columns.
     pub(super) fn has_column_condition(&self) -> bool {
         self.slope != Interval::ALL || self.bounds != StratumBounds::World
     }

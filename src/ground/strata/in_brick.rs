@@ -1,8 +1,9 @@
 //! The strata in one brick, and the bricks that a thread asked for last.
 //!
-//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks. Most strata are ruled out
-//! for 4x4x4 voxels at a time, an eighth of a brick: by their ranges when the first voxel of the eighth is asked for, and by
-//! bounds of their noise when one comes that the ranges leave open. The corners of the noise are hashed once for a brick.
+//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks. Most strata are
+//! ruled out for 4x4x4 voxels at a time, an eighth of a brick: by their ranges when the first voxel of the eighth is
+//! asked for, and by bounds of their noise when one comes that the ranges leave open. The corners of the noise are
+//! hashed once for a brick.
 
 use std::cell::RefCell;
 
@@ -88,9 +89,10 @@ fn bounds(values: impl IntoIterator<Item = i32>) -> [i32; 2] {
     values.into_iter().fold([i32::MAX, i32::MIN], |[low, high], value| [low.min(value), high.max(value)])
 }
 
-/// Where all numbers of a range lie that are moved by up to `by`: inside another one, outside it, or neither.
+/// Relation of a range, widened by `by`, to another one: inside (`Some(true)`), outside (`Some(false)`), or
+/// overlapping.
 #[inline]
-fn lies([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Option<bool> {
+fn range_relation([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Option<bool> {
     if high + by < from || low - by >= to {
         Some(false)
     } else if low - by >= from && high + by < to {
@@ -100,14 +102,14 @@ fn lies([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Option<bool> {
     }
 }
 
-/// How deep a voxel lies, in 1/256 voxel: 0 to 255 for the highest solid one of its column, and 0 above it.
+/// Depth of a voxel, in 1/256 voxel: 0 to 255 for the highest solid one of its column, and 0 above it.
 #[inline]
 fn depth(height: i32, y: i32) -> i32 {
     (height - y * ONE - 1).max(0)
 }
 
 impl BrickStrata {
-    /// Begins anew, with another brick.
+    /// Starts over with another brick.
     fn fill(&mut self, ground: &Ground, records: &StrataRecords, pos: BrickPos) {
         self.key = (records.id, pos.0);
         self.heights = ground.heights(Column::of(pos.origin()));
@@ -131,11 +133,15 @@ impl BrickStrata {
         let (depths, heights) = ([depth(lowest, ys[1]), depth(highest, ys[0])], ys.map(|y| y * ONE));
         let mut eighth = Eighth::default();
         for (number, record) in records.strata.iter().enumerate() {
-            let is_deep = lies(depths, record.rough, record.depth);
+            let is_deep = range_relation(depths, record.rough, record.depth);
             if is_deep == Some(false) {
                 continue;
             }
-            let known = [is_deep, lies(heights, record.rough, record.height), lies(ys, 0, record.ys)];
+            let known = [
+                is_deep,
+                range_relation(heights, record.rough, record.height),
+                range_relation(ys, 0, record.ys),
+            ];
             if known.contains(&Some(false)) {
                 continue;
             }
@@ -152,7 +158,8 @@ impl BrickStrata {
         self.eighths[number] = eighth;
     }
 
-    /// The voxels of a set that are the highest solid ones of their columns. Sets are bits `z * 8 + x` of the layer at a y.
+    /// The voxels of a set that are the highest solid ones of their columns. Sets are bits `z * 8 + x` of the layer at
+    /// a y.
     #[inline]
     pub fn tops(&self, y: i32, voxels: u64) -> u64 {
         let heights = self.heights.as_flattened();
@@ -160,8 +167,8 @@ impl BrickStrata {
         ones(voxels).filter(is_top).fold(0, |tops, column| tops | 1 << column)
     }
 
-    /// Calls `each` with the materials of a set of voxels, and which of them each holds; [`MaterialId::GROUND`] for those
-    /// that no stratum holds. Sets are bits `z * 8 + x` of the layer at a y.
+    /// Calls `each` with the materials of a set of voxels, and which of them each holds; [`MaterialId::GROUND`] for
+    /// those that no stratum holds. Sets are bits `z * 8 + x` of the layer at a y.
     #[inline]
     pub fn for_materials(
         &mut self,
@@ -216,7 +223,7 @@ impl BrickStrata {
         } else {
             open = 0;
             let is_level = match (record.ys[0]..record.ys[1]).contains(&y) {
-                true => lies([y * ONE; 2], record.rough, record.height),
+                true => range_relation([y * ONE; 2], record.rough, record.height),
                 false => Some(false),
             };
             if is_level == Some(false) {
@@ -225,7 +232,7 @@ impl BrickStrata {
             let is_sure = record.body == FILL && is_level == Some(true);
             for column in ones(voxels) {
                 let depth = depth(self.heights.as_flattened()[column], y);
-                match lies([depth; 2], record.rough, record.depth) {
+                match range_relation([depth; 2], record.rough, record.depth) {
                     Some(false) => {}
                     Some(true) if is_sure => held |= 1 << column,
                     _ => open |= 1 << column,
@@ -293,7 +300,7 @@ impl BrickStrata {
         ones(voxels).filter(is_held).fold(0, |held, column| held | 1 << column)
     }
 
-    /// May the body of a stratum be in an eighth?
+    /// Returns `true` if the body of a stratum may be in an eighth.
     fn may_hold(&mut self, records: &StrataRecords, number: usize, eighth: usize) -> bool {
         let record = &records.strata[number];
         let Noises { body, .. } = self.noises(records, number);
@@ -333,7 +340,7 @@ impl BrickStrata {
     }
 }
 
-/// May a bed be in a box of a brick, where the bedding's noise has these corners?
+/// Returns `true` if a bed may be in a box of a brick, where the bedding's noise has these corner values.
 fn may_hold_bed(
     records: &StrataRecords,
     record: &StratumRecord,

@@ -1,11 +1,11 @@
 //! Strata: what every voxel of the pristine ground is made of, computed and never stored.
 //!
-//! [`Strata`] is a list of bodies of material, [`Stratum`], each with conditions for where it lies. A voxel is made of the
-//! first one that holds it; where none does, of what its column has ([`ColumnMaterial`](super::ColumnMaterial)). All of
-//! the model asks the same function: receipts, rules, queries, loose pieces, and the vertices that are drawn.
+//! [`Strata`] is a list of bodies of material, [`Stratum`], each with conditions for where it lies. A voxel is made of
+//! the first one that holds it; where none does, of what its column has ([`ColumnMaterial`](super::ColumnMaterial)).
+//! All of the model asks the same function: receipts, rules, queries, loose pieces, and the vertices that are drawn.
 //!
-//! The function is computed with integers (`records`), for a brick at a time (`in_brick`), and gives the same on every
-//! machine and on the graphics card.
+//! The function is computed with integers (`records`), for a brick at a time (`in_brick`), and has equal
+//! results on every machine and on the GPU.
 
 mod check;
 mod in_brick;
@@ -68,7 +68,7 @@ pub const MAX_COLUMN_CONDITIONS: usize = 16;
 pub struct Strata {
     /// The seed of all noise.
     pub seed: u32,
-    /// How beds lie.
+    /// The orientation of beds.
     pub bedding: Bedding,
     /// The bodies, topmost first: at most [`MAX_STRATA`], and [`MAX_COLUMN_CONDITIONS`] with a slope or bounds.
     pub strata: Vec<Stratum>,
@@ -86,7 +86,7 @@ impl Strata {
     }
 }
 
-/// How beds lie in space: level, tilted, folded.
+/// The orientation of beds: level, tilted, folded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bedding {
@@ -94,7 +94,7 @@ pub struct Bedding {
     pub dip: Vec2,
     /// Voxels by which folds lift and lower beds, 0 to 127.
     pub fold: f32,
-    /// How wide folds are in voxels: a power of two from 8 to 1024.
+    /// Width of folds in voxels: a power of two from 8 to 1024.
     pub scale: u32,
 }
 
@@ -109,12 +109,12 @@ impl Default for Bedding {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Stratum {
-    /// What it is made of; not [`MaterialId::GROUND`].
+    /// Its material; not [`MaterialId::GROUND`].
     pub material: MaterialId,
     /// Its shape.
     pub body: StratumBody,
-    /// The depth below the pristine surface, in voxels: from 0 on and below 1 for the highest solid voxel of a column, below 2
-    /// for the next. Voxels above the surface are at depth 0.
+    /// The depth below the pristine surface, in voxels: from 0 on and below 1 for the highest solid voxel of a column,
+    /// below 2 for the next. Voxels above the surface are at depth 0.
     pub depth: Interval,
     /// The height, in voxels.
     pub height: Interval,
@@ -122,11 +122,11 @@ pub struct Stratum {
     pub slope: Interval,
     /// Voxels by which noise moves the ends of depth, height and bed up and down, 0 to 127.
     pub rough: f32,
-    /// How wide that noise is in voxels: a power of two from 8 to 1024.
+    /// Width of that noise in voxels: a power of two from 8 to 1024.
     pub rough_scale: u32,
     /// Distinguishes strata of the same material and shape, which otherwise lie in the same places.
     pub seed: u32,
-    /// Where in the world it may be.
+    /// Its bounds in the world.
     pub bounds: StratumBounds,
 }
 
@@ -148,7 +148,7 @@ impl Default for Stratum {
 }
 
 impl Stratum {
-    /// All that its conditions admit.
+    /// Everything that its conditions admit.
     pub fn fill(material: MaterialId) -> Self {
         Self { material, ..Self::default() }
     }
@@ -178,7 +178,7 @@ impl Stratum {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum StratumBody {
-    /// All that its conditions admit.
+    /// Everything that its conditions admit.
     #[default]
     Fill,
     /// A sheet that lies as the [`Bedding`] has it.
@@ -192,7 +192,7 @@ pub enum StratumBody {
     },
     /// Threads that wind through the ground.
     Vein {
-        /// How far apart bends are in voxels: a power of two from 8 to 1024.
+        /// Distance between bends in voxels: a power of two from 8 to 1024.
         scale: u32,
         /// The share of all voxels that it holds where its conditions admit it, more than 0 and up to 1.
         share: f32,
@@ -206,7 +206,7 @@ pub enum StratumBody {
     },
 }
 
-/// Where in the world a stratum may be.
+/// Bounds of a stratum in the world.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum StratumBounds {
@@ -262,8 +262,8 @@ impl From<Interval> for (Option<f32>, Option<f32>) {
     }
 }
 
-/// A game's own function in place of [`Strata`]: the material at a lattice point that lies so deep, in 1/256 voxel; `None` for
-/// what the column has.
+/// A game's own function in place of [`Strata`]: the material at a lattice point that lies so deep, in 1/256 voxel;
+/// `None` for what the column has.
 pub(crate) type MaterialFn = dyn Fn(IVec3, i32) -> Option<MaterialId> + Send + Sync;
 
 /// What a ground has instead of its columns' materials.

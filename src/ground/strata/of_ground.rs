@@ -15,7 +15,7 @@ use crate::ground::{ColumnMaterial, GroundError};
 use crate::lattice::hash::hash_words;
 use crate::lattice::{BrickPos, Column, LIMIT, ONE, ceil};
 
-/// What a ground has beside the materials of its columns.
+/// What a ground has in addition to the materials of its columns.
 #[derive(Clone, PartialEq)]
 pub(crate) struct Below {
     own: OwnMaterials,
@@ -36,28 +36,29 @@ impl Below {
 }
 
 impl Ground {
-    /// The same ground with strata. Voxels that no stratum holds keep what [`Self::with_materials`] gave them, before or
-    /// after.
+    /// This ground with strata. Voxels outside every stratum keep their material from
+    /// [`Self::with_materials`], whether that is called before or after.
     ///
     /// Nothing is stored for a voxel, one byte for a column, and one bit for a cell if any is steep; with a
-    /// [source](Self::from_source), only for columns and cells of the pages it keeps. Counts for [`Self::hash`].
+    /// [source](Self::from_source), only for columns and cells of the pages it keeps. Strata are included in
+    /// [`Self::hash`].
     ///
     /// # Errors
-    /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the machine
-    /// has too little.
+    /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the
+    /// machine has too little.
     pub fn with_strata(self, strata: &Strata) -> Result<Self, GroundError> {
         strata.check()?;
         let records = Arc::new(StrataRecords::new(strata));
         self.with_below(OwnMaterials::Strata { given: Arc::new(strata.clone()), records })
     }
 
-    /// The same ground with a function of the game's own in place of [`Strata`]: given a lattice point and its depth in
-    /// 1/256 voxel, as [`Stratum::depth`](super::Stratum::depth) counts it, it returns the material there, or `None`
-    /// (or [`MaterialId::GROUND`]) for what the column has. For a point beyond the rim it is asked at the nearest column.
+    /// This ground with a material function in place of [`Strata`]: given a lattice point and its depth in 1/256 voxel,
+    /// as [`Stratum::depth`](super::Stratum::depth) counts it, it returns the material there, or `None` (or
+    /// [`MaterialId::GROUND`]) for what the column has. For a point beyond the rim it is asked at the nearest column.
     ///
-    /// It must always give the same for the same point, or worlds would depend on timing. `id` stands for it in
-    /// [`Self::hash`]: give another one to every function. The graphics card can't run it, so such worlds are edited and
-    /// meshed on the CPU.
+    /// It must always return the same material for a point, or worlds would depend on timing. `id` represents
+    /// it in [`Self::hash`]: use a different one for every function. The GPU can't run it, so such worlds are
+    /// edited and meshed on the CPU.
     ///
     /// # Errors
     /// [`GroundError::Memory`] if the machine has too little.
@@ -86,12 +87,12 @@ impl Ground {
         }
     }
 
-    /// Do materials differ from voxel to voxel, as strata or a function have it?
+    /// Returns `true` if materials differ from voxel to voxel, because of strata or a function.
     pub(crate) fn has_own_materials(&self) -> bool {
         self.below().is_some()
     }
 
-    /// Is its material a function that only the CPU can ask?
+    /// Returns `true` if its material is a function that only the CPU can call.
     pub fn has_material_fn(&self) -> bool {
         self.below().is_some_and(|below| matches!(below.own, OwnMaterials::Function { .. }))
     }
@@ -100,7 +101,7 @@ impl Ground {
         self.replace_below(Below { own, tops: Box::default(), steep: None }).with_new_tops()
     }
 
-    /// The same ground, with its surface as its materials are now.
+    /// This ground with its surface materials updated to its present materials.
     pub(in crate::ground) fn with_new_tops(self) -> Result<Self, GroundError> {
         if self.below().is_none() {
             return Ok(self);
@@ -133,8 +134,8 @@ impl Ground {
     }
 
     /// Material of a pristine voxel: of the first stratum that holds it; else, down to
-    /// [`OVERLAY_DEPTH`](crate::ground::OVERLAY_DEPTH) below the surface, the column's overlay if it covers at least half
-    /// (`blend >= 128`); else the column's base.
+    /// [`OVERLAY_DEPTH`](crate::ground::OVERLAY_DEPTH) below the surface, the column's overlay if it covers at least
+    /// half (`blend >= 128`); else the column's base.
     pub fn material(&self, point: IVec3) -> MaterialId {
         let Some(below) = self.below() else { return self.material_of_column(point) };
         let (column, y) = (self.nearest_column(point), point.y.clamp(-HIGHEST, HIGHEST));
@@ -159,8 +160,8 @@ impl Ground {
         found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| self.material_of_column(point))
     }
 
-    /// Calls `each` with the materials of pristine voxels, and which are of each, in one call or several. Voxels are bits
-    /// `z * 8 + x` of layer `y` of a brick.
+    /// Calls `each` with the materials of pristine voxels, and which are of each, in one call or several. Voxels are
+    /// bits `z * 8 + x` of layer `y` of a brick.
     pub(crate) fn for_materials(
         &self,
         pos: BrickPos,
@@ -191,13 +192,13 @@ impl Ground {
         for_runs(rest, |bit| self.material(point(bit)), each);
     }
 
-    /// Does a point lie in a column of the world, and no farther up or down than questions reach?
+    /// Returns `true` if a point lies in a column of the world, within the vertical range of queries.
     fn is_inside(&self, point: IVec3) -> bool {
         self.nearest_column(point) == Column::of(point) && point.y.unsigned_abs() <= HIGHEST.unsigned_abs()
     }
 
-    /// What the undug surface shows over a column: the material of its highest solid voxel where the ground has strata,
-    /// otherwise the column's own, base and overlay blended.
+    /// The material that the undug surface shows over a column: the material of its highest solid voxel where the
+    /// ground has strata, otherwise the column's own, base and overlay blended.
     pub fn surface_material(&self, column: Column) -> ColumnMaterial {
         match self.below() {
             Some(below) => match below.tops.get(self.extent().index(column)) {
@@ -213,12 +214,12 @@ impl Ground {
         self.below().filter(|below| !below.tops.is_empty()).map(|below| &below.tops[columns])
     }
 
-    /// The material of the highest solid voxel of a column of the world, computed anew.
+    /// Computes the material of the highest solid voxel of a column of the world.
     pub(in crate::ground) fn computed_top(&self, column: Column) -> MaterialId {
         self.material(column.at(ceil(self.height(column)) - 1))
     }
 
-    /// The same of a column whose height and slope are known, without asking for any other.
+    /// The surface material of a column with known height and slope, without reading any other column.
     pub(in crate::ground) fn lone_top(
         &self,
         (column, height, squared_slope): (Column, i32, u64),
@@ -240,8 +241,8 @@ impl Ground {
         found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| of_column.at_distance(-depth - 1))
     }
 
-    /// The cells whose tops do not show all materials of their face; `None` if there are none, as on any ground whose materials
-    /// are those of its columns.
+    /// The cells whose tops do not show all materials of their face; `None` if there are none, as on any ground whose
+    /// materials are those of its columns.
     pub(crate) fn steep_cells(&self) -> Option<Steep<'_>> {
         match &self.below()?.steep {
             Some(cells) => Some(Steep::Resident(cells)),

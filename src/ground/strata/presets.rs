@@ -1,4 +1,4 @@
-//! Strata to begin with.
+//! Preset strata.
 
 use glam::Vec2;
 
@@ -29,12 +29,12 @@ impl Strata {
         Self::PRESETS.iter().find(|(own, _)| *own == name).map(|(_, preset)| preset())
     }
 
-    /// Mountains: turf over soil and clay on gentle slopes, gravel on steeper ones, snow on the heights; below, folded beds
-    /// of rock, sandstone and shale with a seam of coal and veins of gold. Materials are those of the default
+    /// Mountains: turf over soil and clay on gentle slopes, gravel on steeper ones, snow on the heights; below, folded
+    /// beds of rock, sandstone and shale with a seam of coal and veins of gold. Materials are those of the default
     /// `GroundLook`.
     ///
-    /// Turf is 2 voxels thick; snow, gravel and the crust of rock faces are 3, so that slopes up to 60 degrees do not show what
-    /// lies below in stripes. Rock faces show their beds between patches of crust.
+    /// Turf is 2 voxels thick; snow, gravel and the crust of rock faces are 3, so that slopes up to 60 degrees do not
+    /// show what lies below in stripes. Rock faces show their beds between patches of crust.
     pub fn alpine() -> Self {
         let gentle = Interval::below(0.95);
         let skin =
@@ -100,11 +100,11 @@ impl Strata {
         }
     }
 
-    /// A mine: turf, soil and clay over rock with seams and pockets of coal, pockets of iron and copper, and gold in veins
-    /// and, deeper down, in pockets. There is ore from 3 to 160 voxels below the surface.
+    /// A mine: turf, soil and clay over rock with seams and pockets of coal, pockets of iron and copper, and gold in
+    /// veins and, deeper down, in pockets. There is ore from 3 to 160 voxels below the surface.
     ///
-    /// Turf is 2 voxels thick and soil reaches down to 3 or more, so that slopes up to 60 degrees do not show what lies below in
-    /// stripes.
+    /// Turf is 2 voxels thick and soil reaches down to 3 or more, so that slopes up to 60 degrees do not show what lies
+    /// below in stripes.
     pub fn mine() -> Self {
         let deep = |from| Interval::between(from, 160.0);
         Self {

@@ -17,7 +17,7 @@ pub(crate) const BED: u32 = 1;
 pub(crate) const VEIN: u32 = 2;
 pub(crate) const POCKET: u32 = 3;
 
-/// What the seeds of further noises differ by.
+/// Difference between the seeds of successive noises.
 const SECOND: u32 = 0x9E37_79B9;
 const ROUGH: u32 = 0x7F4A_7C15;
 
@@ -34,7 +34,7 @@ pub(crate) struct StratumRecord {
     pub scale: u32,
     /// Of veins, how far both noises may be from 0; of pockets, what the noise must exceed.
     pub limit: i32,
-    /// By how much noise moves ends.
+    /// Amplitude of the noise that moves ends.
     pub rough: i32,
     /// The width of that noise in voxels, as a power of two.
     pub rough_scale: u32,
@@ -46,7 +46,7 @@ pub(crate) struct StratumRecord {
     pub ys: [i32; 2],
 }
 
-/// How beds lie, as numbers.
+/// The orientation of beds as numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct BeddingRecord {
@@ -59,7 +59,7 @@ pub(crate) struct BeddingRecord {
     pub seed: u32,
 }
 
-/// What a stratum asks of a column.
+/// A stratum's conditions on a column.
 #[derive(Clone, Debug)]
 pub(super) struct ColumnCondition {
     /// Squares of the slope, as [`Ground::squared_slope`] gives it.
@@ -74,7 +74,7 @@ pub(crate) struct StrataRecords {
     pub id: u64,
     pub strata: Vec<StratumRecord>,
     pub bedding: BeddingRecord,
-    /// What strata ask of columns, by the bits of [`StratumRecord::condition`].
+    /// The conditions of strata on columns, by the bits of [`StratumRecord::condition`].
     conditions: Vec<ColumnCondition>,
     /// Hash of all of it.
     pub hash: u64,
@@ -140,12 +140,12 @@ impl StratumRecord {
         ValueNoise { seed: self.seed ^ ROUGH, scale: self.rough_scale }
     }
 
-    /// By how much ends are moved where that noise is this, in 1/256 voxel.
+    /// Displacement of ends for this noise value, in 1/256 voxel.
     pub(super) fn moved(&self, noise: i32) -> i32 {
         (self.rough * noise) >> 15
     }
 
-    /// Is a height, in 1/256 voxel as the bedding has it, in a bed?
+    /// Returns `true` if a height, in 1/256 voxel along the bedding, is in a bed.
     pub(super) fn is_in_bed(&self, height: i64) -> bool {
         let [from, thickness, every] = self.bed.map(i64::from);
         let above = height - from;
@@ -159,13 +159,13 @@ impl BeddingRecord {
         ValueNoise { seed: self.seed, scale: self.scale }
     }
 
-    /// By how much the tilt lifts a column in the bedding, in 1/256 voxel.
+    /// Displacement of a column along the bedding by the tilt, in 1/256 voxel.
     pub(super) fn dip_at(&self, column: Column) -> i64 {
         let [x, z] = self.dip.map(i64::from);
         (x * i64::from(column.x) + z * i64::from(column.z)) >> 8
     }
 
-    /// The same by folds, where the noise is this.
+    /// The displacement by folds for this noise value.
     pub(super) fn fold_at(&self, noise: i32) -> i32 {
         (self.fold * noise) >> 15
     }
@@ -183,13 +183,13 @@ impl ColumnCondition {
         stratum.has_column_condition().then(|| Self { slope, bounds: stratum.bounds.clone() })
     }
 
-    /// May the stratum be in this column of the world?
+    /// Returns `true` if the stratum may be in this column of the world.
     #[inline]
     pub(super) fn admits(&self, ground: &Ground, column: Column) -> bool {
         self.admits_slope(ground, column, || ground.squared_slope(column))
     }
 
-    /// The same, given the square of its slope.
+    /// Like [`Self::admits`], given the square of the column's slope.
     fn admits_slope(&self, ground: &Ground, column: Column, squared_slope: impl FnOnce() -> u64) -> bool {
         let is_inside = match &self.bounds {
             StratumBounds::World => true,
@@ -250,7 +250,7 @@ impl StrataRecords {
         Self { id, strata, bedding, conditions, hash }
     }
 
-    /// Does a column of the world fulfil a condition, given by its bit?
+    /// Returns `true` if a column of the world fulfils the condition with this bit.
     #[inline]
     pub fn meets(&self, ground: &Ground, column: Column, condition: u32) -> bool {
         let own = self.conditions.get(condition.trailing_zeros() as usize);
@@ -270,7 +270,7 @@ impl StrataRecords {
         size_of::<Self>() + self.strata.capacity() * size_of::<StratumRecord>() + conditions
     }
 
-    /// Does a stratum hold the voxel? By definition, without what is known of a brick: `in_brick` gives the same.
+    /// Returns `true` if a stratum holds the voxel, by definition and without data on its brick; `in_brick` must agree.
     pub fn holds(&self, record: &StratumRecord, ground: &Ground, voxel: LoneVoxel) -> bool {
         let LoneVoxel { column, y, depth, squared_slope } = voxel;
         let (place, at) = (IVec2::new(column.x, column.z), column.at(y));
@@ -301,7 +301,7 @@ impl StrataRecords {
     }
 }
 
-/// A voxel in a column of the world, with all that strata ask of its place.
+/// A voxel in a column of the world, with everything that strata depend on.
 #[derive(Clone, Copy)]
 pub(crate) struct LoneVoxel {
     pub column: Column,

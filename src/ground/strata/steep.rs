@@ -8,8 +8,8 @@ use crate::lattice::{Column, ceil};
 
 /// The steep cells of a ground, one bit each.
 ///
-/// A cell is steep if two lattice levels or more separate the ends of one of its sides or of its diagonal, and not all voxels
-/// along these lines, its columns' tops included, are of the same material.
+/// A cell is steep if two lattice levels or more separate the ends of one of its sides or of its diagonal, and not all
+/// voxels along these lines, its columns' tops included, are of the same material.
 #[derive(Clone, PartialEq)]
 pub(crate) struct SteepCells {
     /// Words along x.
@@ -67,7 +67,7 @@ impl Steep<'_> {
         }
     }
 
-    /// Is this cell steep?
+    /// Returns `true` if this cell is steep.
     pub fn contains(self, cell: Column) -> bool {
         self.word((cell.x >> 3, cell.z >> 3)) >> ((cell.z & 7) << 3 | cell.x & 7) & 1 == 1
     }
@@ -109,7 +109,7 @@ mod tests {
     use crate::ground::{ColumnMaterial, MaterialControl, MaterialId, Strata, Stratum, StratumBounds};
     use crate::lattice::{LatticeBox, ONE};
 
-    /// A step of so many 1/256 voxels between x = 9 and x = 10.
+    /// A step of `rise` 1/256 voxels between x = 9 and x = 10.
     fn step(rise: i32) -> Ground {
         let heights = (0..=12).flat_map(|_| (0..=20).map(|x| if x < 10 { 0 } else { rise })).collect();
         Ground::from_heights(20, 12, heights).expect("valid heights")

@@ -1,8 +1,8 @@
 //! Value noise in integers: random numbers at the points of a coarse lattice, blended smoothly between them.
 //!
-//! All arithmetic is on 32-bit integers, so that `kernels/strata.cuh` computes the same bits. Cells of the lattice are a
-//! power of two of voxels wide, 8 at least, so a brick lies in one cell of every noise: whoever asks for many places of
-//! a brick hashes the cell's corners once.
+//! All arithmetic is on 32-bit integers, so that `kernels/strata.cuh` computes the same bits. Cells of the
+//! lattice are a power of two of voxels wide, 8 at least, so a brick lies in one cell of every noise: the
+//! cell's corners are hashed once for many places of a brick.
 //!
 //! From one corner to the next, noise is `from + (to - from) * part / 1024`, rounded down. That is
 //! `(from * (1024 - part) + to * part) / 1024`, rounded down, a sum of two products of 16 bits: several of them are one
@@ -26,8 +26,8 @@ pub(super) struct ValueNoise {
 /// The noise at the corners of a cell: x fastest, then z, then y. In the plane, the last four are 0.
 pub(super) type Corners = i16x8;
 
-/// Along each axis noise is linear in the weight, so the least and the greatest of a box are at its corners, but for this much
-/// of rounding.
+/// Along each axis noise is linear in the weight, so the least and the greatest of a box are at its corners, but for
+/// this much of rounding.
 const ROUNDING: i32 = 4;
 
 impl ValueNoise {

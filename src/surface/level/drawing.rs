@@ -1,5 +1,5 @@
-//! A node of level 1 or above: its cells as two triangles each, as fans where they meet finer or volumetric ones (rules 3 and 7),
-//! or as cubes.
+//! A node of level 1 or above: its cells as two triangles each, as fans where they meet finer or volumetric ones (rules
+//! 3 and 7), or as cubes.
 
 use glam::IVec3;
 use rustc_hash::FxHashMap;
@@ -33,7 +33,7 @@ pub(super) struct Drawing<'a> {
     high: Column,
     /// The strides of the nodes across its sides, `None` at the rim.
     beside: [Option<i32>; 4],
-    /// Is there any brick over its columns?
+    /// Whether there is a brick over its columns.
     has_bricks: bool,
     /// The edited samples of its lattice by their columns, those in its cells' corners only.
     edited: FxHashMap<Column, Vec<i32>>,
@@ -190,7 +190,7 @@ impl<'a> Drawing<'a> {
         self.close_sides();
     }
 
-    /// Does a cell end inside the world?
+    /// Returns `true` if a cell ends inside the world.
     fn is_whole(&self, Cell { low, stride }: Cell) -> bool {
         let last = self.view.last();
         low.x + stride <= last.x && low.z + stride <= last.z
@@ -230,8 +230,8 @@ impl<'a> Drawing<'a> {
             .collect()
     }
 
-    /// The lattice y of the cubes that marching cubes draws over a cell: those that touch an edited sample, and all of a volumetric
-    /// cell's sheet; of another cell's sheet none.
+    /// The lattice y of the cubes that marching cubes draws over a cell: those that touch an edited sample, and all of
+    /// a volumetric cell's sheet; of another cell's sheet none.
     fn cube_rows(&self, cell: Cell, is_volumetric: bool, rows: &mut Vec<i32>) {
         rows.clear();
         let corners = cell.corners();
@@ -290,7 +290,7 @@ impl<'a> Drawing<'a> {
         number
     }
 
-    /// Are there nodes of different levels beside an edge?
+    /// Returns `true` if nodes of different levels meet at an edge.
     fn is_between_levels(&self, edge: Edge) -> bool {
         let drawn = edge.drawn(&self.view);
         let is_inside = |low: i32, high: i32, at: i32| low < at && at < high;
@@ -299,7 +299,7 @@ impl<'a> Drawing<'a> {
         !is_inner && self.view.is_between_levels(drawn.p, edge.axis)
     }
 
-    /// Does an edge of this level lie between a volumetric cell and one that stays heightmap?
+    /// Returns `true` if an edge of this level lies between a volumetric cell and one that stays heightmap.
     fn is_on_border(&mut self, edge: Edge) -> bool {
         if edge.length != self.stride {
             return false;
@@ -370,7 +370,7 @@ impl<'a> Drawing<'a> {
         let steep = self.view.ground().steep_cells().filter(|_| stride == 1);
         for at in (interval.start..interval.start + interval.coarse()).step_by(stride as usize) {
             let cell = interval.cell(at, is_above);
-            // Steep cells bend the sides of those beside them, also from where they are not drawn themselves.
+            // Steep cells bend the sides of their neighbours, even where they are not drawn themselves.
             let is_steep = steep.is_some_and(|steep| {
                 let Column { x, z } = interval.column(at);
                 let across = if interval.axis == 0 { Column::new(x - 1, z) } else { Column::new(x, z - 1) };

@@ -1,7 +1,8 @@
 //! The vertex of a lattice edge of any length (rules 8 and 9).
 //!
-//! A vertex depends on heights, edits and its edge alone, so no change of levels moves one. Where nodes of different levels
-//! meet, vertices of edges of different lengths may lie at the same place; there, all of them are the vertex of the shortest.
+//! A vertex depends on heights, edits and its edge alone, so no change of levels moves one. Where nodes of different
+//! levels meet, vertices of edges of different lengths may lie at the same place; there, all of them are the vertex of
+//! the shortest.
 
 use glam::IVec3;
 
@@ -108,8 +109,8 @@ impl Edge {
         Self { p, length: (q - p)[self.axis], ..self }
     }
 
-    /// The vertex of an edge with a crossing, relative to `origin`. `is_between_levels` says if there are nodes of different levels
-    /// beside it, `is_on_border` if it lies on the border of the mask of its level.
+    /// The vertex of an edge with a crossing, relative to `origin`. `is_between_levels` says whether nodes of
+    /// different levels meet at it, `is_on_border` whether it lies on the border of the mask of its level.
     pub fn vertex(
         self,
         view: &LevelView,
@@ -188,7 +189,8 @@ impl Edge {
         drawn.p * SNAP + AXES[self.axis] * step
     }
 
-    /// Where levels meet: the vertex of a pristine edge, or that of the shortest of its parts which have one at the same place.
+    /// Where levels meet: the vertex of a pristine edge, or that of the shortest of its parts which have one at the
+    /// same place.
     fn shortest(mut self, view: &LevelView, origin: IVec3) -> Vertex {
         if view.has(Fault::OwnVertices) {
             return self.drawn(view).sheet_vertex(view.ground(), origin);
@@ -223,8 +225,8 @@ impl Edge {
     }
 }
 
-/// The heightmap's vertex over a column where levels meet. Where edits left the surface at the same height, finer nodes may have
-/// the vertex of an edge of one voxel there, so it is that one.
+/// The heightmap's vertex over a column where levels meet. Where edits left the surface at the same height, finer nodes
+/// may have the vertex of an edge of one voxel there, so it is that one.
 pub(super) fn shared_height_vertex(view: &LevelView, column: Column, origin: IVec3) -> Vertex {
     let height = view.ground().height(column);
     let edge = Edge { p: column.at(crate::lattice::ceil(height) - 1), axis: 1, length: 1 };

@@ -1,7 +1,8 @@
-//! Nodes of level 0: the tile and the chunks below it, most often as they are drawn without levels.
+//! Nodes of level 0: the tile and the chunks below it, mostly unchanged.
 //!
-//! Beside coarser nodes the mask differs from the world's: their cells are not in it, and cells that are promoted for their sake
-//! are. Where that shows in a node, its tile and its blocks are made from scratch with that *drawn mask*.
+//! Next to coarser nodes the mask differs from the world's: their cells are not in it, and cells that are
+//! promoted because of them are. Where that shows in a node, its tile and its blocks are made from scratch
+//! with that *drawn mask*.
 
 use glam::IVec3;
 use rustc_hash::FxHashSet;
@@ -17,7 +18,8 @@ use crate::surface::mask::cell_sheet;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Indices, Mask, MaskView, SurfaceMesh, Vertex, tile};
 
-/// The mask by which a node of level 0 is drawn, right for its cells and those around them; `None` if it is the world's.
+/// The mask by which a node of level 0 is drawn, right for its cells and those around them; `None` if it is the
+/// world's.
 pub(super) fn drawn_mask(view: &LevelView, node: Node) -> Option<Mask> {
     if view.cut.touching(node).iter().all(|other| other.level == 0) {
         return None;

@@ -1,16 +1,16 @@
 //! Nodes of a quadtree cut, drawn so that everything drawn together is closed.
 //!
-//! Rules 1 to 6 hold at each level, on a lattice of its own; three more close what lies between levels:
+//! Rules 1 to 6 hold at each level, on that level's lattice; three more rules close the gaps between levels:
 //!
-//! 7. **Fan.** At an undisturbed interval, where the side of a coarse cell meets two finer ones, the coarse cell fans over the line
-//!    of its finer neighbours (`drawing`). Where it is volumetric, a zipper joins both lines. A disturbed interval makes the
-//!    cells along it volumetric, on both sides (`volumetric`), and is closed by walls (`walls`).
-//! 8. **Descent.** The vertex of a lattice edge with an edited end is that of its half whose ends differ in sign, down to an edge
-//!    of one voxel or one without an edited end (`edge`).
+//! 7. **Fan.** At an undisturbed interval, where the side of a coarse cell meets two finer ones, the coarse cell fans
+//!    over the line of its finer neighbours (`drawing`). Where it is volumetric, a zipper joins both lines. A disturbed
+//!    interval makes the cells along it volumetric, on both sides (`volumetric`), and is closed by walls (`walls`).
+//! 8. **Descent.** The vertex of a lattice edge with an edited end is that of its half whose ends differ in sign, down
+//!    to an edge of one voxel or one without an edited end (`edge`).
 //! 9. **Rim.** A column beyond the rim is the rim's, heights and edits, and is drawn there.
 //!
-//! What a node draws depends on its own level and on those of the nodes that touch it. A node of level 0 is drawn by its tile and
-//! chunks as they are, unless a coarser node changes its mask (`ground_level`).
+//! The mesh of a node depends on its own level and on the levels of the nodes that touch it. A node of level
+//! 0 is drawn by its tile and chunks as they are, unless a coarser node changes its mask (`ground_level`).
 
 mod builder;
 mod drawing;
@@ -67,7 +67,7 @@ pub fn node_mesh(view: &LevelView, node: Node) -> SurfaceMesh {
     }
 }
 
-/// Is a node drawn by its tile and the chunks below it as they are without levels?
+/// Returns `true` if a node is drawn by its tile and the chunks below it, unchanged.
 pub fn is_plain(view: &LevelView, node: Node) -> bool {
     node.level == 0 && view.cut.grid().has(node) && ground_level::drawn_mask(view, node).is_none()
 }
@@ -77,7 +77,8 @@ pub(crate) fn nodes_near(cut: &Cut, low: Column, high: Column) -> Vec<Node> {
     let (mut found, mut asked) = (Vec::new(), cut.grid().roots().collect::<Vec<Node>>());
     while let Some(node) = asked.pop() {
         let (first, end) = cut.grid().columns(node);
-        // The cells beside it may be promoted by an interval twice their width; gradients look one column further.
+        // Neighbouring cells may be promoted by an interval twice their width; gradients reach one column
+        // further.
         let by = 2 * node.stride() + 2;
         let is_near = |low: i32, high: i32, first: i32, end: i32| low <= end + by && first - by <= high;
         if !is_near(low.x, high.x, first.x, end.x) || !is_near(low.z, high.z, first.z, end.z) {

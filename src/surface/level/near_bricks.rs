@@ -1,4 +1,4 @@
-//! Where edits are, seen by levels: the bricks over a rectangle of columns, stack by stack.
+//! The places of edits, for levels of detail: the bricks over a rectangle of columns, stack by stack.
 
 use std::ops::RangeInclusive;
 
@@ -22,14 +22,14 @@ impl<'a> Stacks<'a> {
         Self { committed, newer: &[] }
     }
 
-    /// The same with the bricks that a running transaction changes, in order.
+    /// These bricks together with those that a running transaction changes, in order.
     pub fn over(self, newer: &'a [BrickPos]) -> Self {
         debug_assert!(newer.is_sorted());
         Self { newer, ..self }
     }
 
-    /// Calls `each` with every stack of a rectangle, both ends included, and the heights of bricks in it; some twice, and in no
-    /// order. Looks at the rectangle's places or at all stacks, whichever are fewer.
+    /// Calls `each` with every stack of a rectangle, both ends included, and the heights of bricks in it; some twice,
+    /// and in no order. Looks at the rectangle's places or at all stacks, whichever are fewer.
     fn for_stacks(&self, low: (i32, i32), high: (i32, i32), mut each: impl FnMut((i32, i32), &[i32])) {
         let along = |low: i32, high: i32| (i64::from(high) - i64::from(low) + 1).max(0);
         let is_inside = |(x, z): (i32, i32)| (low.0..=high.0).contains(&x) && (low.1..=high.1).contains(&z);
@@ -49,7 +49,7 @@ impl<'a> Stacks<'a> {
         inside.for_each(|brick| each(brick.stack(), &[brick.0.y]));
     }
 
-    /// Is there a brick over some of these columns, both ends included?
+    /// Returns `true` if there is a brick over some of these columns, both ends included.
     pub fn has_any(&self, low: Column, high: Column) -> bool {
         let mut has_any = false;
         self.for_stacks((low.x >> 3, low.z >> 3), (high.x >> 3, high.z >> 3), |_, _| has_any = true);
@@ -67,8 +67,8 @@ pub(super) struct NearBricks<'a> {
 }
 
 impl<'a> NearBricks<'a> {
-    /// The bricks over the columns from `low` to `high` with samples of a lattice of this step. Columns that lie beyond the rim,
-    /// whose last column is `last`, are the rim's.
+    /// The bricks over the columns from `low` to `high` with samples of a lattice of this step. Columns that lie beyond
+    /// the rim, whose last column is `last`, are the rim's.
     pub fn new(
         samples: &SampleView<'a>,
         stacks: &Stacks,
@@ -95,7 +95,7 @@ impl<'a> NearBricks<'a> {
         Self { stacks: heights.into_iter().filter_map(with_bricks).collect(), last: (last.x, last.z) }
     }
 
-    /// Is nothing edited?
+    /// Returns `true` if nothing is edited.
     pub fn is_empty(&self) -> bool {
         self.stacks.is_empty()
     }
@@ -106,7 +106,8 @@ impl<'a> NearBricks<'a> {
         (self.stacks.get(&(x >> 3, z >> 3)).map_or(&[], Vec::as_slice), bit)
     }
 
-    /// Is a sample of a column edited, of those in `rows` that are `step` apart, beginning at the first?
+    /// Returns `true` if any sample of a column is edited, of every `step`-th one in `rows`, beginning at the
+    /// first.
     pub fn is_any_edited(&self, column: Column, rows: RangeInclusive<i32>, step: i32) -> bool {
         if self.is_empty() {
             return false;
@@ -136,7 +137,8 @@ impl<'a> NearBricks<'a> {
         self.stacks.iter().flat_map(move |(&stack, bricks)| bricks.iter().map(move |(y, _)| at(stack, *y)))
     }
 
-    /// The lattice columns of a step under which samples may be edited, in no order. Those beyond the rim are there, too.
+    /// The lattice columns of a step under which samples may be edited, in no order. Those beyond the rim are there,
+    /// too.
     pub fn columns(&self, step: i32) -> impl Iterator<Item = Column> {
         let (last_x, last_z) = self.last;
         self.stacks.keys().flat_map(move |&(x, z)| {
@@ -152,7 +154,8 @@ fn multiples(low: i32, end: i32, step: i32) -> impl Iterator<Item = i32> {
     (first..=end).step_by(step as usize)
 }
 
-/// The coordinates of a lattice of this step in the bricks at `at`, where `last` is the rim: beyond it, the next one is the rim's.
+/// The coordinates of a lattice of this step in the bricks at `at`, where `last` is the rim: beyond it, the next one is
+/// the rim's.
 fn lattice_in(at: i32, step: i32, last: i32) -> impl Iterator<Item = i32> {
     let (low, high) = (at * BRICK, at * BRICK + BRICK - 1);
     let beyond = (last + step - 1).div_euclid(step) * step;

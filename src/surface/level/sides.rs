@@ -11,7 +11,7 @@ pub(super) struct Cell {
     pub stride: i32,
 }
 
-/// Steps to the cells beside one, in the order of its sides a-b, b-c, c-d, d-a.
+/// Steps to the neighbours of a cell, in the order of its sides a-b, b-c, c-d, d-a.
 pub(super) const SIDES: [(i32, i32); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 
 impl Cell {
@@ -70,7 +70,7 @@ impl Interval {
         self.strides[usize::from(is_above)]
     }
 
-    /// Are the finer cells those above the plane?
+    /// Returns `true` if the finer cells are those above the plane.
     pub fn is_fine_above(self) -> bool {
         self.strides[1] < self.strides[0]
     }

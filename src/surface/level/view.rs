@@ -1,4 +1,4 @@
-//! What the meshes of a cut are made from.
+//! The input for the meshes of a cut.
 
 use std::ops::Range;
 
@@ -51,17 +51,17 @@ impl<'a> LevelView<'a> {
         IVec3::new(point.x.min(last.x), point.y, point.z.min(last.z))
     }
 
-    /// Was a sample edited? Beyond the rim, that of the rim's column.
+    /// Returns `true` if a sample was edited. Beyond the rim, that of the rim's column.
     pub(super) fn is_edited(&self, point: IVec3) -> bool {
         self.world.samples.is_edited(self.drawn(point))
     }
 
-    /// Is a sample solid? Beyond the rim, that of the rim's column.
+    /// Returns `true` if a sample is solid. Beyond the rim, that of the rim's column.
     pub(super) fn is_solid(&self, point: IVec3) -> bool {
         self.world.samples.is_solid(self.drawn(point))
     }
 
-    /// Both at once: was a sample edited, and is it solid?
+    /// Whether a sample was edited, and whether it is solid.
     pub(super) fn state(&self, point: IVec3) -> (bool, bool) {
         let drawn = self.drawn(point);
         match self.world.samples.sample(drawn).distance() {
@@ -79,8 +79,8 @@ impl<'a> LevelView<'a> {
             .map(|node| node.level)
     }
 
-    /// Lattice y of the lowest points of the cubes of this stride that the pristine surface crosses over some columns; they end
-    /// at the end of the range. A height on a lattice point counts below it.
+    /// Lattice y of the lowest points of the cubes of this stride that the pristine surface crosses over some columns;
+    /// they end at the end of the range. A height on a lattice point counts below it.
     pub(super) fn sheet(&self, columns: &[Column], stride: i32) -> Range<i32> {
         let heights = columns.iter().map(|&column| self.ground().height(column));
         let (low, high) = heights.fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));
@@ -88,7 +88,8 @@ impl<'a> LevelView<'a> {
         (ceil(low) - 1) * stride..ceil(high) * stride
     }
 
-    /// Are nodes of different levels on both sides of the lattice edge from `p` along `axis`, or around it if it is upright?
+    /// Returns `true` if nodes of different levels lie on both sides of the lattice edge from `p` along
+    /// `axis`, or around it if it is upright.
     pub(super) fn is_between_levels(&self, p: IVec3, axis: usize) -> bool {
         let at = |dx: i32, dz: i32| self.level_at(Column::new(p.x + dx, p.z + dz));
         let levels = match axis {
@@ -101,7 +102,7 @@ impl<'a> LevelView<'a> {
         levels.any(|level| Some(level) != first)
     }
 
-    /// Is this rule broken on purpose?
+    /// Returns `true` if this rule is broken on purpose.
     #[cfg(test)]
     pub(super) fn has(&self, fault: super::Fault) -> bool {
         self.fault == Some(fault)

@@ -1,5 +1,5 @@
-//! Which cells of which level marching cubes draws (rule 2): those over whose sheet something is edited, and those that are
-//! promoted because something is edited at an interval between two levels.
+//! Which cells of which level marching cubes draws (rule 2): those over whose sheet something is edited, and those that
+//! are promoted because something is edited at an interval between two levels.
 
 use rustc_hash::FxHashMap;
 
@@ -18,11 +18,11 @@ pub(super) struct Volumetric<'a> {
 }
 
 impl<'a> Volumetric<'a> {
-    /// Those in a node, and so far around it as its mesh depends on them.
+    /// The volumetric cells in a node, and around it as far as its mesh depends on them.
     pub fn new(view: &LevelView<'a>, node: Node) -> Self {
         let (low, high) = view.cut.grid().columns(node);
         let (stride, last) = (node.stride(), view.last());
-        // A cell beside the node may be promoted by an interval twice its width.
+        // A neighbouring cell may be promoted by an interval twice its width.
         let by = 2 * stride;
         let clamp = |column: Column| Column::new(column.x.clamp(0, last.x), column.z.clamp(0, last.z));
         let around = [clamp(low.offset(-by, -by)), clamp(high.offset(by, by))];
@@ -30,7 +30,7 @@ impl<'a> Volumetric<'a> {
         Self { view: *view, near, known: FxHashMap::default() }
     }
 
-    /// Does marching cubes draw the sheet of this cell, which must lie in a node of its level?
+    /// Returns `true` if marching cubes draws the sheet of this cell, which must lie in a node of its level.
     pub fn contains(&mut self, cell: Cell) -> bool {
         if self.near.is_empty() {
             return false;
@@ -43,7 +43,7 @@ impl<'a> Volumetric<'a> {
         is
     }
 
-    /// Rule 2: is a sample of the cell's sheet edited?
+    /// Rule 2: returns `true` if a sample of the cell's sheet is edited.
     fn is_disturbed(&self, cell: Cell) -> bool {
         match cell.stride {
             1 => self.view.world.mask.contains(cell.low),
@@ -82,7 +82,7 @@ impl<'a> Volumetric<'a> {
         self.is_sheet_edited(&interval.columns(), interval.coarse(), interval.fine())
     }
 
-    /// Is a cell in the same node promoted? Only for a broken rule.
+    /// Returns `true` if a cell in the same node is promoted. Only for a rule broken on purpose.
     fn is_any_promoted(&self, cell: Cell) -> bool {
         let (grid, level) = (self.view.cut.grid(), cell.stride.trailing_zeros() as u8);
         let (low, high) = grid.columns(Node::over(grid.chunks().tile_of_cell(cell.low), level));

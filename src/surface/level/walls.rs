@@ -1,7 +1,7 @@
 //! Walls: triangles in the plane between a coarse cell and finer ones, where edits keep a fan from closing it.
 //!
-//! An undisturbed interval needs one where its coarse cell is volumetric: a zipper between the lines of both sides. A disturbed
-//! one, and whatever edits made off the sheet, is closed square by square.
+//! An undisturbed interval needs one where its coarse cell is volumetric: a zipper between the lines of both sides. A
+//! disturbed one, and whatever edits made off the sheet, is closed square by square.
 
 use glam::IVec3;
 
@@ -59,7 +59,8 @@ impl Drawing<'_> {
         }
     }
 
-    /// Where edits show: what the cubes below the plane draw, less what those above it draw, closed by links, bounds loops to fill.
+    /// Where edits show: what the cubes below the plane draw, less what those above it draw, closed by links, bounds
+    /// loops to fill.
     fn wall_square(&mut self, interval: Interval, y: i32) {
         let mut segments = self.outline(interval, y, interval.stride(false));
         let high = self.outline(interval, y, interval.stride(true));
@@ -98,7 +99,7 @@ impl Drawing<'_> {
         segments
     }
 
-    /// The rule of the case table for a face: where it is ambiguous, a solid corner is cut off on its own.
+    /// The rule of the case table for a face: where it is ambiguous, a solid corner is cut off separately.
     fn square(&mut self, corners: [IVec3; 4], segments: &mut Vec<Segment>) {
         let solid = corners.map(|corner| self.view.is_solid(corner));
         let count = solid.iter().filter(|&&is| is).count();
@@ -121,7 +122,8 @@ impl Drawing<'_> {
         self.edge_number(edge)
     }
 
-    /// On an edge of a square, alike from both squares that have it: the last fine crossing joins the coarse one, others pair up.
+    /// On an edge of a square, alike from both squares that have it: the last fine crossing joins the coarse one,
+    /// others pair up.
     fn link(&mut self, [low, middle, high]: [IVec3; 3], links: &mut Vec<Segment>) {
         let mut crossings = |line: &[IVec3]| -> Vec<Number> {
             let crossed =

@@ -1,4 +1,4 @@
-//! The border of the mask and of steep cells: which cells beside them stay heightmap.
+//! The border of the mask and of steep cells: neighbouring cells that stay heightmap.
 
 use std::ops::Range;
 
@@ -9,8 +9,8 @@ use crate::lattice::{ChunkGrid, Column};
 pub(crate) const WINDOW: i32 = 10;
 
 impl MaskView<'_> {
-    /// Looks at every cell from `low` up to and without `high`, and at those beside them. `steep` has the steep ones of 8x8
-    /// cells, (x, z) in units of 8 cells, as bits `z * 8 + x`.
+    /// Examines every cell from `low` up to and excluding `high`, and their neighbours. `steep` has the steep
+    /// ones of 8x8 cells, (x, z) in units of 8 cells, as bits `z * 8 + x`.
     pub fn borders(&self, low: Column, high: Column, steep: impl Fn((i32, i32)) -> u64) -> Borders {
         let (first, last) = ((low.x >> 3, low.z >> 3), ((high.x - 1) >> 3, (high.z - 1) >> 3));
         // With those around them, each looked up once.
@@ -29,7 +29,8 @@ impl MaskView<'_> {
     /// Lattice edges along x, y and z between a cell of the mask and one that stays heightmap, in and around the word
     /// (x, z): bit `(z + 1) * 10 + x + 1`.
     pub(crate) fn border_edges(&self, grid: ChunkGrid, (x, z): (i32, i32)) -> [u128; 3] {
-        // Rows of a word are bytes. A window row is one bit of the word before, eight of the own, one of the word after.
+        // Rows of a word are bytes. A window row is one bit of the word before, eight of the own, one of the word
+        // after.
         let row = |words: [u64; 3], z: i32| {
             let [before, own, after] = words.map(|word| u128::from(word >> (z * 8) & 0xff));
             before >> 7 | own << 1 | (after & 1) << 9
@@ -58,7 +59,8 @@ impl MaskView<'_> {
     }
 }
 
-/// For each cell of a rectangle: is it in the mask, is it steep, and which of its sides border on a cell that is either?
+/// For each cell of a rectangle: is it in the mask, is it steep, and which of its sides border on a cell that is
+/// either?
 #[derive(Clone, Debug)]
 pub struct Borders {
     low: Column,
@@ -130,8 +132,9 @@ impl Borders {
         self.patches.get(z * self.across + x)
     }
 
-    /// The cells of 8x8 that lie in the rectangle, are not in the mask, and border on it or on a steep cell or are steep: row
-    /// by row, each with a bit for every side where it borders, or with [`Self::STEEP`]. `(z, x)` in units of 8 cells.
+    /// The cells of 8x8 that lie in the rectangle, are not in the mask, and border on it or on a steep cell or are
+    /// steep: row by row, each with a bit for every side where it borders, or with [`Self::STEEP`]. `(z, x)` in units
+    /// of 8 cells.
     pub fn bordering(&self, (z, x): (i32, i32)) -> impl Iterator<Item = (Column, u8)> {
         let patch = self.patch((x, z)).copied().unwrap_or_default();
         self.cells(patch.touched & !patch.own, (z, x)).map(move |(bit, cell)| {
@@ -153,7 +156,7 @@ impl Borders {
         std::iter::from_fn(next).filter(move |&(_, cell)| is_inside(cell))
     }
 
-    /// Does any cell border on the mask?
+    /// Returns `true` if any cell borders on the mask.
     pub fn has_bordering(&self) -> bool {
         let places = (self.first.1..).flat_map(|z| (self.first.0..).take(self.across).map(move |x| (z, x)));
         self.patches.iter().zip(places).any(|(patch, at)| self.cells(patch.at_mask, at).next().is_some())
@@ -190,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn borders_are_beside_the_mask() {
+    fn borders_are_next_to_the_mask() {
         let mut mask = Mask::default();
         for (word, cells) in
             [((0, 0), 0x8100_0000_0012_0081), ((1, 0), 0x0180), ((0, 1), 0xf0), ((-1, 0), 0x80)]

@@ -1,14 +1,14 @@
 //! The volumetric mask: cells whose sheet marching cubes draws.
 //!
-//! Rule 2: a cell is in the mask when a corner of its [sheet](cell_sheet), the cubes that the pristine surface crosses over it,
-//! is edited. `rule::joined_cells` finds these cells.
+//! Rule 2: a cell is in the mask when a corner of its [sheet](cell_sheet), the cubes that the pristine surface crosses
+//! over it, is edited. `rule::joined_cells` finds these cells.
 
 mod borders;
 mod rule;
 
 use rustc_hash::FxHashMap;
 
-use crate::lattice::{Column, give_back, table_bytes};
+use crate::lattice::{Column, shrink_if_sparse, table_bytes};
 
 pub use super::pristine::{cell_sheet, sheet};
 pub use borders::Borders;
@@ -24,7 +24,7 @@ impl Mask {
         ((cell.x >> 3, cell.z >> 3), 1 << ((cell.z & 7) << 3 | (cell.x & 7)))
     }
 
-    /// Does marching cubes draw the sheet of this cell?
+    /// Returns `true` if marching cubes draws the sheet of this cell.
     pub fn contains(&self, cell: Column) -> bool {
         let (word, bit) = Self::place(cell);
         self.0.get(&word).is_some_and(|bits| bits & bit != 0)
@@ -42,7 +42,7 @@ impl Mask {
         }
     }
 
-    /// How many words there are.
+    /// Number of words.
     pub(crate) fn word_count(&self) -> usize {
         self.0.len()
     }
@@ -69,8 +69,8 @@ impl Mask {
     }
 
     /// Shrinks the table once most of it is unused.
-    pub(crate) fn give_back(&mut self) {
-        give_back(&mut self.0);
+    pub(crate) fn shrink_if_sparse(&mut self) {
+        shrink_if_sparse(&mut self.0);
     }
 
     /// The 8x8 cells of a word, if it is stored.
@@ -83,12 +83,12 @@ impl Mask {
         self.get_word(word).unwrap_or_default()
     }
 
-    /// How many cells are in the mask.
+    /// Number of cells in the mask.
     pub fn len(&self) -> usize {
         self.0.values().map(|bits| bits.count_ones() as usize).sum()
     }
 
-    /// Is the whole world heightmap?
+    /// Returns `true` if the whole world is heightmap.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -121,12 +121,12 @@ impl<'a> MaskView<'a> {
         Self { committed, newer: None }
     }
 
-    /// The same mask with newer words in place of its own.
+    /// This mask with newer words in place of its own.
     pub(crate) fn over(self, newer: &'a Mask) -> Self {
         Self { newer: Some(newer), ..self }
     }
 
-    /// Does marching cubes draw the sheet of this cell?
+    /// Returns `true` if marching cubes draws the sheet of this cell.
     pub fn contains(&self, cell: Column) -> bool {
         let (word, bit) = Mask::place(cell);
         self.word(word) & bit != 0

@@ -1,5 +1,5 @@
-//! Rule 2: a cell belongs to the mask when a corner of its sheet is edited. The sheet is the stack of cubes that the pristine
-//! surface crosses over the cell.
+//! Rule 2: a cell belongs to the mask when a corner of its sheet is edited. The sheet is the stack of cubes that the
+//! pristine surface crosses over the cell.
 
 use crate::lattice::{BrickPos, ChunkGrid, Column};
 use crate::surface::layer_bits::{self, CELLS, LayerBits};
@@ -7,9 +7,9 @@ use crate::surface::neighbours::Neighbours;
 use crate::surface::pristine::PristineStack;
 use crate::surface::window::Window;
 
-/// The cells of a stack of bricks that belong to the mask by rule 2: those `before`, and those over which a corner of a cube of
-/// the sheet is edited. Only these bricks, and those that hold corners of their cells, are looked at. Cells are given as bits
-/// `z * 8 + x`; the window must reach one brick further than the bricks.
+/// The cells of a stack of bricks that belong to the mask by rule 2: those `before`, and those over which a corner of a
+/// cube of the sheet is edited. Only these bricks, and those that hold corners of their cells, are looked at. Cells are
+/// given as bits `z * 8 + x`; the window must reach one brick further than the bricks.
 pub(crate) fn joined_cells(
     grid: ChunkGrid,
     window: &Window,

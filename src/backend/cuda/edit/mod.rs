@@ -29,7 +29,8 @@ const MANY: usize = 128;
 /// memory.
 const COPIED: usize = 256;
 
-/// The same by jobs: many edits of few bricks write long lists too, whose length only the device knows.
+/// The same limit in jobs: many edits of few bricks also write long lists, whose length only the device
+/// knows.
 const COPIED_JOBS: usize = 1 << 12;
 
 /// Larger job lists are not kept for the next transaction.
@@ -54,7 +55,7 @@ impl Session {
         delta
     }
 
-    /// The same, with memory for the jobs.
+    /// Applies edits, with reusable memory for the jobs.
     fn edit_bricks(&mut self, work: &PreparedEdits, jobs: &mut Vec<EditJob>) -> Result<EditDelta, Fault> {
         if !work.looks_around() {
             return self.try_edits(work, jobs, None).map(Option::unwrap_or_default);
@@ -68,7 +69,7 @@ impl Session {
         Err(Fault::Failed("new ground looked too far".into()))
     }
 
-    /// The same, with a limited search for material; `None` if an edit had to search farther.
+    /// Applies edits with a limited search for material; returns `None` if an edit had to search farther.
     fn try_edits(
         &mut self,
         work: &PreparedEdits,
@@ -83,7 +84,7 @@ impl Session {
             self.give_up(&uploads);
         }
         if !matches!(delta, Ok(Some(_))) {
-            targets.iter().for_each(|&(slot, _)| self.bricks.give_back(slot));
+            targets.iter().for_each(|&(slot, _)| self.bricks.release_slot(slot));
         }
         delta
     }
@@ -213,11 +214,11 @@ impl Session {
     }
 }
 
-/// Gives back the slots of bricks that did not change or are uniform, and so need none.
+/// Releases the slots of bricks that did not change or are uniform, and so need none.
 fn free_targets(slots: &mut RecordCache, results: &[EditResult], targets: &[Target]) {
     for (result, &(slot, _)) in results.iter().zip(targets) {
         if result.flags & EditResult::CHANGED == 0 || result.flags & EditResult::UNIFORM != 0 {
-            slots.give_back(slot);
+            slots.release_slot(slot);
         }
     }
 }

@@ -38,7 +38,7 @@ pub(in super::super) struct EditOutput {
     pub totals: OutputList,
 }
 
-/// How many entries of each list the kernel needs.
+/// Number of entries of each list that the kernel needs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Totals {
     records: usize,
@@ -97,7 +97,7 @@ impl EditOutput {
         Ok(is_copied)
     }
 
-    /// How many entries of each list were written. Reading counters from the device takes longer than a small
+    /// Number of written entries of each list. Reading counters from the device takes longer than a small
     /// launch. Lists in host memory are therefore wiped before the launch, and end at the first wiped entry.
     pub(super) fn totals(&mut self, results: usize) -> Totals {
         if !self.parts.is_mapped() {
@@ -293,7 +293,7 @@ mod tests {
     use crate::lattice::LatticeBox;
 
     #[test]
-    fn parts_beside_each_other_come_to_one_and_nothing_is_left_out() {
+    fn adjacent_parts_are_merged_and_nothing_is_left_out() {
         let (mut rng, grid) = (Rng::with_seed(4), ChunkGrid::new(20, 300, 300));
         let job = |x: i32| EditJob { brick: [x, x % 3, 2], ..EditJob::default() };
         let jobs: Vec<EditJob> = (0..30).map(job).collect();
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_beside_each_other_come_to_one_and_no_voxel_is_left_out() {
+    fn adjacent_counts_are_merged_and_no_voxel_is_left_out() {
         let (mut rng, mut delta, mut expected) = (Rng::with_seed(5), EditDelta::default(), BTreeMap::new());
         for number in 0..900 {
             let (edit, outcome, voxels) = (number / 300, rng.u32(0..7) | rng.u32(0..2) << 8, rng.u32(1..500));

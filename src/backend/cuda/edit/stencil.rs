@@ -12,7 +12,7 @@ use super::output::LONG;
 use crate::edits::PreparedEdits;
 use crate::ground::GreyImage;
 
-/// How far new ground searches for its material.
+/// Distance within which new ground searches for its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Look {
     /// In adjacent bricks.
@@ -82,7 +82,7 @@ impl<'a> StencilInput<'a> {
         self.rule_list = plan.section::<u8>(self.rules.len());
     }
 
-    /// Writes the input, and gives back the memory of the windows.
+    /// Writes the input, and returns the memory of the windows for reuse.
     pub fn put(&mut self, input: &mut InputBuffer, kept: &mut KeptSlabs) {
         self.windows.write(input.entries(self.ref_list));
         kept.put(std::mem::take(&mut self.windows));
@@ -115,7 +115,8 @@ struct Images<'a> {
     samples: Vec<u16>,
     /// Index of the first sample, by content.
     first: FxHashMap<&'a [u16], u32>,
-    /// The same by identity: most edits of a stroke share an image, which then need not be compared.
+    /// Index of the first sample, by identity: most edits of a stroke share an image, which then need not be
+    /// compared.
     known: FxHashMap<*const GreyImage, u32>,
     /// Whether there were too many samples.
     is_full: bool,
@@ -181,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn more_images_than_a_launch_takes_are_told() {
+    fn more_images_than_a_launch_takes_are_reported() {
         let all: Vec<GreyImage> = (0..257).map(|of| image(256, of)).collect();
         let mut images = Images::default();
         for image in &all[..256] {

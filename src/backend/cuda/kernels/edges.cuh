@@ -53,7 +53,7 @@ struct Crossing {
 // Central difference.
 __device__ inline i32 rise(Marked before, Marked after) { return (after >> 1) - (before >> 1); }
 
-// The same at a sample that may lie on the world's border; `last` is the last coordinate. Densities are
+// The gradient at a sample that may lie on the world's border; `last` is the last coordinate. Densities are
 // extrapolated linearly beyond it.
 __device__ inline i32 rise_at(Marked before, Marked own, Marked after, i32 at, i32 last) {
     i32 inner = rise(at == 0 ? own : before, at == last ? own : after);

@@ -116,7 +116,7 @@ enum Operation { DIG, ADD, PAINT };
 struct EditRecord {
     u32 kind, operation, material, is_rough;
     // The shape's origin: whole voxels, and the remainder in 1/256 voxel.
-    i32 home[3], rest[3];
+    i32 origin_voxel[3], origin_fraction[3];
     // Inclusive bounds of the lattice points within the shape's reach.
     i32 min[3], max[3];
     float constants[12];
@@ -130,7 +130,7 @@ enum Stroke { PLAIN, SMOOTH, SHARPEN, FLATTEN, LEVEL, SHIFT, STAMP, TERRACE };
 // What a stencil edit needs in addition to its EditRecord.
 struct SculptParams {
     // `material` is the material of new ground, or `NONE` to derive it from the surroundings.
-    u32 stroke, material;
+    u32 operation, material;
     // Strength in 1/256, falloff in 1/256 voxel.
     i32 strength, falloff;
     // Level: the height. Shift: the amount added to densities. Terrace: step and base.

@@ -92,8 +92,8 @@ struct PaddedBrick {
         return levels;
     }
 
-    // The material of a sample that becomes solid: that of the nearest solid sample below, else above, else beside
-    // it.
+    // The material of a sample that becomes solid: that of the nearest solid sample below, else above, else
+    // next to it.
     __device__ u32 new_material(const OwnColumn& column, i32 y) {
         for (i32 down = 0; down <= LOOK; down++) {
             if (down > params.look) {

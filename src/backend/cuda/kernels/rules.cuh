@@ -100,15 +100,15 @@ struct RuleChecker : PaddedBrick {
         if (before < 0) {
             least = pace(column, column.x, y, column.z, power, outcome);
         } else {
-            // Air samples beside solid ground also define its surface, so the neighbour's pace limits them. The
-            // voxel stays air, so no outcome is reported.
+            // Air samples next to solid ground also define its surface, so the neighbour's pace limits them.
+            // The voxel stays air, so no outcome is reported.
             for (i32 i = 0; i < 6; i++) {
                 if (is_inside(i, at) && density_beside(i, column, y) < 0) least = smallest(least, pace_beside(i, column, at, y, power));
             }
         }
         i32 allowed = before + (i32)((((i64)proposed - before) * least + ONE - 1) >> 8);
         if (before >= 0 || allowed < 0) return allowed;
-        // A sample that turns to air beside unbreakable ground exposes it but must not move its surface.
+        // A sample that turns to air next to unbreakable ground exposes it but must not move its surface.
         for (i32 i = 0; i < 6; i++) {
             i32 beside = density_beside(i, column, y);
             if (beside >= 0 || !is_inside(i, at) || pace_beside(i, column, at, y, power) != 0) continue;

@@ -21,7 +21,7 @@ constexpr i32 SHARPER = ONE / 4;
 // Distances to planes and stamps are clamped here.
 constexpr i64 FARTHEST_PLANE = 1 << 25;
 
-// Index in the padded brick of one of the brick's samples, or of a sample beside it.
+// Index in the padded brick of one of the brick's samples, or of a neighbouring sample.
 __device__ inline i32 around_at(i32 x, i32 y, i32 z) { return ((y + 1) * AROUND + z + 1) * AROUND + x + 1; }
 
 __device__ inline i32 density(Marked sample) { return sample >> 2; }
@@ -109,7 +109,7 @@ __device__ inline bool middle_of(const Marked* own, i32& middle) {
 __device__ inline bool shifted(const Marked* own, i32 by, i32& after) {
     i32 middle = density(*own), sign = sign_of(middle);
     if (by == 0) return false;
-    // Unedited densities go on beyond this limit, but a shift of them could not be stored.
+    // Unedited densities continue beyond this limit, but a shift of them could not be stored.
     if (magnitude(middle) >= FARTHEST) {
         if (sign_of(by) == sign || !is_beside(own, true)) return false;
         middle = sign * ONE;
@@ -146,7 +146,7 @@ __device__ inline i32 way_to_average(const Marked* own, i32 middle) {
     return sum;
 }
 
-// Lets a sample turn solid only beside a solid one, and turn to air only beside air.
+// Lets a sample turn solid only next to a solid one, and turn to air only next to air.
 __device__ inline i32 attached(const Marked* own, i32 after) {
     bool was_solid = *own < 0, is_solid = after < 0, has_like = was_solid == is_solid;
 #pragma unroll
@@ -193,7 +193,8 @@ __device__ inline i64 grey_at(const SculptParams& sculpt, const u16* images, i64
     return above * (ONE - down) + below * down;
 }
 
-// Height of a point above a stamp's relief. `beside` is the distance outside its image, negative inside.
+// Height of a point above a stamp's relief. The last argument receives the distance outside its image,
+// negative inside.
 __device__ inline i32 above_stamp(const SculptParams& sculpt, const u16* images, const i32* at, i32& beside) {
     const i64 WHITE = 65535ll << 16;
     i64 turned[3];
@@ -226,13 +227,13 @@ __device__ inline bool sculpted(
     if (outside > 0) return false;
     i32 target = 0;
     bool has_target = false;
-    if (sculpt.stroke == FLATTEN) {
+    if (sculpt.operation == FLATTEN) {
         target = above_plane(sculpt, at);
         has_target = true;
-    } else if (sculpt.stroke == LEVEL) {
+    } else if (sculpt.operation == LEVEL) {
         target = at[1] * ONE - sculpt.amounts[0];
         has_target = true;
-    } else if (sculpt.stroke == STAMP) {
+    } else if (sculpt.operation == STAMP) {
         i32 beside;
         target = above_stamp(sculpt, images, at, beside);
         outside = largest(outside, beside);
@@ -246,15 +247,15 @@ __device__ inline bool sculpted(
         return true;
     }
     i32 by = 0;
-    if (sculpt.stroke == SHIFT) {
+    if (sculpt.operation == SHIFT) {
         by = sculpt.amounts[0];
         return shifted(own, sign_of(by) * ((magnitude(by) * weight + ONE / 2) >> 8), after);
     }
     if (!middle_of(own, middle)) return false;
-    if (sculpt.stroke == SMOOTH) {
+    if (sculpt.operation == SMOOTH) {
         by = way_to_average(own, middle) * weight / (64 * ONE);
         after = attached(own, middle + by);
-    } else if (sculpt.stroke == SHARPEN) {
+    } else if (sculpt.operation == SHARPEN) {
         by = clamped(way_to_average(own, middle) * weight / (64 * ONE), -SHARPER, SHARPER);
         i32 low = before, high = before;
 #pragma unroll

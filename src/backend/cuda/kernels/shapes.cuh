@@ -186,18 +186,18 @@ __device__ inline i32 round_distance(float distance) {
 
 // Voxels from a shape's origin, clamped where the distance no longer matters. Both arguments are below 2^24, as the
 // sample is within the shape's reach.
-__device__ inline i32 voxels_from(i32 voxel, i32 home) {
+__device__ inline i32 voxels_from(i32 voxel, i32 origin) {
     const i32 FARTHEST = 65000;
-    return smallest(largest(voxel - home, -FARTHEST), FARTHEST);
+    return smallest(largest(voxel - origin, -FARTHEST), FARTHEST);
 }
 
 // Vector from the shape's origin to the sample at `offset` from the brick's minimum corner `low`. In a row along x
 // only the coordinate of `low` is clamped, as on the CPU.
 __device__ inline Vector from_origin(const EditRecord& record, const i32* low, const i32* offset) {
     return {
-        (float)((voxels_from(low[0], record.home[0]) + offset[0]) * ONE - record.rest[0]),
-        (float)(voxels_from(low[1] + offset[1], record.home[1]) * ONE - record.rest[1]),
-        (float)(voxels_from(low[2] + offset[2], record.home[2]) * ONE - record.rest[2]),
+        (float)((voxels_from(low[0], record.origin_voxel[0]) + offset[0]) * ONE - record.origin_fraction[0]),
+        (float)(voxels_from(low[1] + offset[1], record.origin_voxel[1]) * ONE - record.origin_fraction[1]),
+        (float)(voxels_from(low[2] + offset[2], record.origin_voxel[2]) * ONE - record.origin_fraction[2]),
     };
 }
 

@@ -50,7 +50,7 @@ struct MeshMemory {
     u16 edges[MOST_VERTICES], numbers[LEVELS * CORNERS];
     // Cubes to draw, in order: id of the lowest corner | case << PLACE_BITS | number of indices << CUBE_BITS.
     u32 cubes[LEN];
-    // Signs found among the corners in the brick, and among those beside it: 1 solid, 2 air.
+    // Signs found among the corners in the brick, and among those just outside: 1 solid, 2 air.
     u32 signs[2];
     // Bit mask of the layers with a cube to draw.
     u32 layers;

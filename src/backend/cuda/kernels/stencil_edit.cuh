@@ -12,7 +12,7 @@ struct StencilEditor : RuleChecker {
     // Whether this is a stencil edit. If so, loads the padded brick, and the block must synchronise.
     __device__ bool begin(const EditJob& job, const Stack& stack, u32 edit) {
         const SculptParams& sculpt = params.sculpt_params[edit];
-        if (sculpt.stroke == PLAIN && sculpt.power < 0) return false;
+        if (sculpt.operation == PLAIN && sculpt.power < 0) return false;
         if (has_looked) return true;
         has_boxes = __syncthreads_or(is_box_near(job.brick));
         look(job, stack);
@@ -52,7 +52,7 @@ struct StencilEditor : RuleChecker {
         const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample, i32& after
     ) {
         const Marked* own = shared.around + around_at(column.x, sample.y, column.z);
-        if (sculpt.stroke != PLAIN) return sculpted(sculpt, params.images, sample.at, sample.outside, own, after);
+        if (sculpt.operation != PLAIN) return sculpted(sculpt, params.images, sample.at, sample.outside, own, after);
         i32 depth = largest(sample.outside, -DEPTH);
         after = record.operation == DIG ? largest(sample.before, -depth) : smallest(sample.before, depth);
         return sample.outside <= BAND;
@@ -69,7 +69,7 @@ struct StencilEditor : RuleChecker {
         if (sculpt.power >= 0) after = judged(column, sample.at, sample.y, sculpt.power, after, outcome);
         bool is_solid = after < 0, is_refused = outcome != FATES && would_be_solid != was_solid && is_solid == was_solid;
         if (!was_solid && (is_solid || is_refused)) {
-            if (sculpt.stroke == PLAIN) {
+            if (sculpt.operation == PLAIN) {
                 material = record.operation == ADD ? record.material : GROUND;
             } else {
                 material = sculpt.material == NONE ? new_material(column, sample.y) : sculpt.material;
@@ -118,7 +118,7 @@ struct StencilEditor : RuleChecker {
                     round_distance(distance),
                     density(shared.around[around_at(column.x, y, column.z)]),
                 };
-                is_changed = sculpt.stroke == PLAIN && record.operation == PAINT
+                is_changed = sculpt.operation == PLAIN && record.operation == PAINT
                     ? paint(record, sculpt.power >= 0, column, sample, work.brick, counted)
                     : change(record, sculpt, column, sample, work.brick, counted);
                 has_materials |= work.brick.materials[index] != GROUND;

@@ -143,8 +143,8 @@ fn every_field_is_where_the_kernels_expect_it() {
         ScatterJob is ScatterJob: to, from, bytes, pad;
         ScatterParams is ScatterParams: jobs;
         EditJob is EditJob: brick, base, target, stack, first, count, cuts, window, strides, pad;
-        EditRecord is EditRecord: kind, operation, material, is_rough, home, rest, min, max, constants, amplitude, scale, seed, pad;
-        SculptParams is SculptParams: stroke, material, strength, falloff, amounts, point, half, height, image, columns, rows, power,
+        EditRecord is EditRecord: kind, operation, material, is_rough, origin_voxel, origin_fraction, min, max, constants, amplitude, scale, seed, pad;
+        SculptParams is SculptParams: operation, material, strength, falloff, amounts, point, half, height, image, columns, rows, power,
             matrix, squared, length;
         EditResult is EditResult: hash, flags, record, material, bounds, uniform, pad;
         EditPart is EditPart: job, edit, part, bounds;

@@ -58,8 +58,8 @@ pub(crate) struct EditRecord {
     pub material: u32,
     pub is_rough: u32,
     /// The shape's origin: whole voxels, and the remainder in 1/256 voxel.
-    pub home: [i32; 3],
-    pub rest: [i32; 3],
+    pub origin_voxel: [i32; 3],
+    pub origin_fraction: [i32; 3],
     /// Inclusive bounds of the lattice points of the world within its reach.
     pub min: [i32; 3],
     pub max: [i32; 3],
@@ -179,8 +179,8 @@ pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Eva
         },
         material: operation.material().map_or(0, |material| material.0.into()),
         is_rough: of.roughness.is_some().into(),
-        home: of.home.to_array(),
-        rest: of.rest.to_array(),
+        origin_voxel: of.origin_voxel.to_array(),
+        origin_fraction: of.origin_fraction.to_array(),
         min: min.to_array(),
         max: max.to_array(),
         constants: of.shape,

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{Address, THREADS};
 use crate::backend::cuda::device::{Kernel, KernelParams};
-use crate::ground::NoiseNumbers;
+use crate::ground::NoiseFactors;
 
 /// Columns per block of `heights`.
 pub(crate) const COLUMNS: usize = 8 * THREADS as usize;
@@ -17,7 +17,7 @@ pub(crate) struct HeightsParams {
     pub tables: Address,
     /// Output: an `i32` per column in 1/256 voxel; `i32::MIN` if it exceeds the lattice's limit.
     pub heights: Address,
-    pub noise: NoiseNumbers,
+    pub noise: NoiseFactors,
     /// Columns of the world, row by row: the first one, and their number.
     pub first: u32,
     pub count: u32,

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{Address, EditParams, NONE};
 use crate::backend::cuda::device::{Kernel, KernelParams};
-use crate::brush::{SculptKernel, Stroke};
+use crate::brush::{SculptKernel, SculptOp};
 use crate::edits::BatchRules;
 use crate::ground::GreyImage;
 use crate::lattice::LatticeBox;
@@ -14,7 +14,7 @@ use crate::lattice::LatticeBox;
 #[repr(C)]
 pub(crate) struct SculptParams {
     /// 0 plain, 1 smooth, 2 sharpen, 3 flatten, 4 level, 5 shift, 6 stamp, 7 terrace.
-    pub stroke: u32,
+    pub operation: u32,
     /// Material of new ground, or [`NONE`] to derive it from the surroundings.
     pub material: u32,
     pub strength: i32,
@@ -85,35 +85,35 @@ pub(crate) fn sculpt<'a>(
     let Some(of) = record.sculptor.as_ref().and_then(SculptKernel::constants) else {
         return SculptParams { power, ..SculptParams::default() };
     };
-    let sculpt = |stroke| SculptParams {
+    let sculpt = |operation| SculptParams {
         power,
-        stroke,
+        operation,
         material: of.material.map_or(NONE, |material| material.0.into()),
         strength: of.strength,
         falloff: of.falloff,
         ..SculptParams::default()
     };
-    match &of.stroke {
-        Stroke::Smooth => sculpt(1),
-        Stroke::Sharpen => sculpt(2),
-        &Stroke::Flatten(point, normal, length) => {
+    match &of.operation {
+        SculptOp::Smooth => sculpt(1),
+        SculptOp::Sharpen => sculpt(2),
+        &SculptOp::Flatten(point, normal, length) => {
             let matrix = [normal.map(i64::from), [0; 3], [0; 3]];
             SculptParams { point, matrix, length, ..sculpt(3) }
         }
-        &Stroke::Level(height) => SculptParams { amounts: [height, 0], ..sculpt(4) },
-        &Stroke::Shift(by) => SculptParams { amounts: [by, 0], ..sculpt(5) },
-        Stroke::Stamp(press) => SculptParams {
-            point: press.center,
-            half: press.half,
-            height: press.height,
-            image: image(press.image),
-            columns: press.image.width(),
-            rows: press.image.height(),
-            matrix: press.rows,
-            squared: press.squared,
+        &SculptOp::Level(height) => SculptParams { amounts: [height, 0], ..sculpt(4) },
+        &SculptOp::Shift(by) => SculptParams { amounts: [by, 0], ..sculpt(5) },
+        SculptOp::Stamp(stamp) => SculptParams {
+            point: stamp.center,
+            half: stamp.half,
+            height: stamp.height,
+            image: image(stamp.image),
+            columns: stamp.image.width(),
+            rows: stamp.image.height(),
+            matrix: stamp.rows,
+            squared: stamp.squared,
             ..sculpt(6)
         },
-        &Stroke::Terrace(step, base) => SculptParams { amounts: [step, base], ..sculpt(7) },
+        &SculptOp::Terrace(step, base) => SculptParams { amounts: [step, base], ..sculpt(7) },
     }
 }
 

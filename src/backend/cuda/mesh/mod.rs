@@ -38,16 +38,16 @@ const COPIED: usize = 512;
 
 impl Session {
     /// Meshes blocks. Their surfaces are in this session's memory until the next launch; copies may still be in
-    /// flight. `meanwhile` is called while the device works.
+    /// flight. `overlap` is called while the device works.
     pub fn mesh(
         &mut self,
         view: &WorldView,
         blocks: &[Block],
-        meanwhile: &(dyn Fn() + Sync),
+        overlap: &(dyn Fn() + Sync),
     ) -> Result<Meshed, Fault> {
         self.begin();
         let mut uploads = Uploads::new(view.samples.ground());
-        let meshed = self.run_mesh(view, blocks, &mut uploads, meanwhile);
+        let meshed = self.run_mesh(view, blocks, &mut uploads, overlap);
         if meshed.is_err() {
             self.give_up(&uploads);
         }
@@ -61,7 +61,7 @@ impl Session {
         view: &WorldView<'a>,
         blocks: &[Block],
         uploads: &mut Uploads<'a>,
-        meanwhile: &(dyn Fn() + Sync),
+        overlap: &(dyn Fn() + Sync),
     ) -> Result<Meshed, Fault> {
         let is_long = blocks.len() >= COPIED;
         if blocks.len() > MOST_JOBS {
@@ -125,7 +125,7 @@ impl Session {
             // of them is accessed before the wait below.
             unsafe { self.device.launch(Launch::new(blocks.len() as u32, &params)) }?;
             self.meshes.results.fetch(&mut *self.device, blocks.len())?;
-            meanwhile();
+            overlap();
             self.device.wait()?;
             self.times = self.device.times();
             let extents = self.meshes.extents(blocks.len());

@@ -42,7 +42,7 @@ fn auto_takes_the_device_where_it_is_faster_and_nowhere_else() {
         let (is_taken, choice) = attempt(&auto, 16, 0);
         let estimate = choice.estimate.expect("both could do it");
         assert_eq!([estimate.cpu, estimate.cuda], [cpu, device].map(Duration::from_micros));
-        assert_eq!(is_taken, is_device, "{cpu} beside {device}");
+        assert_eq!(is_taken, is_device, "CPU {cpu}, device {device}");
     }
     // A device that was requested explicitly does every stage that has any work.
     let asked = open_cuda(false, 1, 100);
@@ -103,18 +103,18 @@ fn time_that_was_lost_on_a_device_is_the_devices() {
 }
 
 #[test]
-fn who_panics_over_what_was_done_panics_and_the_device_is_kept() {
+fn a_panic_over_results_is_passed_on_and_the_device_is_kept() {
     let own = open_cuda(true, 20, 10);
     let mut choice = Choice::of(Stage::Mesh, 16);
-    let then = |_: &mut Session, ()| -> Result<u32, Fault> { panic!("as planned") };
-    let attempt_stage = || own.attempt_stage(&mut choice, Load::of_blocks(16), |_| 0, |_| Ok(()), then);
+    let on_done = |_: &mut Session, ()| -> Result<u32, Fault> { panic!("as planned") };
+    let attempt_stage = || own.attempt_stage(&mut choice, Load::of_blocks(16), |_| 0, |_| Ok(()), on_done);
     assert!(catch_unwind(AssertUnwindSafe(attempt_stage)).is_err());
     assert!(matches!(own.state(), EngineState::Cuda(_)));
     assert!(attempt(&own, 16, 0).0);
 }
 
 #[test]
-fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
+fn a_panic_while_surfaces_arrive_releases_the_device() {
     let Some(engine) = async_copies() else { return };
     let half = glam::Vec3::new(40.0, 9.0, 40.0);
     let brush = Brush::dig(Shape::cuboid(glam::Vec3::new(60.0, 28.0, 60.0), half));
@@ -127,7 +127,8 @@ fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
     bricks.sort_unstable_by_key(|brick| (brick.0.x, brick.0.z, brick.0.y));
     let block = |&brick: &BrickPos| Block { brick, chunk: view.grid.chunk_of(brick.origin()) };
     let blocks: Vec<Block> = bricks.iter().map(block).collect();
-    let mesh = |then: &mut dyn FnMut(&dyn MeshedBlocks)| engine.compute().mesh(&view, &blocks, &|| {}, then);
+    let mesh =
+        |on_done: &mut dyn FnMut(&dyn MeshedBlocks)| engine.compute().mesh(&view, &blocks, &|| {}, on_done);
     let drawn = catch_unwind(AssertUnwindSafe(|| mesh(&mut |_| panic!("as planned"))));
     assert!(drawn.is_err());
     let mut found = Parts::default();
@@ -139,7 +140,7 @@ fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
 }
 
 #[test]
-fn whoever_comes_while_surfaces_are_drawn_goes_on_without_the_device() {
+fn callers_continue_without_a_busy_device() {
     let own = open_cuda(true, 20, 10);
     let mut choice = Choice::of(Stage::Mesh, 16);
     let draw = |_: &mut Session, ()| {

@@ -24,7 +24,7 @@ fn a_device_that_can_not_be_opened_is_no_device() {
 }
 
 #[test]
-#[ignore = "every engine does the same when it opens a card; the emulator takes 16 s"]
+#[ignore = "every engine runs this test when it opens a GPU; the emulator takes 16 s"]
 fn a_device_passes_the_whole_self_test() {
     let Some(device) = device() else { return };
     let name = device.name();
@@ -33,7 +33,7 @@ fn a_device_passes_the_whole_self_test() {
     assert_eq!(engine.wait(Duration::from_secs(600)), EngineState::Cuda(name));
 }
 
-/// Runs in a process of its own, started by the test below.
+/// Runs in a separate process, started by the test below.
 #[test]
 #[ignore = "looks at the machine's driver"]
 fn tell_what_the_driver_says() {
@@ -82,10 +82,10 @@ fn a_driver_without_a_device_is_no_device() {
     }
 }
 
-/// Runs in a process of its own, started by the test below.
+/// Runs in a separate process, started by the test below.
 #[test]
-#[ignore = "needs a driver with three cards"]
-fn open_each_of_three_cards() {
+#[ignore = "needs the stand-in driver with three GPUs"]
+fn open_each_of_three_gpus() {
     let open = |card: &CardChoice, suggested: Option<&CardChoice>| match Card::open(card, suggested) {
         Ok(card) => Ok(card.name()),
         Err(Fault::NoDevice(why)) => Err(why),
@@ -98,7 +98,7 @@ fn open_each_of_three_cards() {
         let all = [CardChoice::Ordinal(number), CardChoice::Uuid([70 + number as u8; 16])];
         for card in all.into_iter().chain([bus(&format!("0000:0{}:00.0", number + 1))]) {
             assert_eq!(open(&card, None), name);
-            // The suggestion counts only if no card was chosen.
+            // The suggestion is used only if no GPU was chosen.
             assert_eq!(open(&card, Some(&CardChoice::Ordinal(1))), name);
             assert_eq!(open(&default, Some(&card)), name);
         }
@@ -112,34 +112,34 @@ fn open_each_of_three_cards() {
 }
 
 #[test]
-fn a_card_is_chosen_by_number_by_uuid_and_by_its_place_on_the_bus() {
-    with_driver("cards", include_str!("driver.c"), "open_each_of_three_cards");
+fn a_gpu_is_chosen_by_ordinal_by_uuid_and_by_its_bus_address() {
+    with_driver("cards", include_str!("driver.c"), "open_each_of_three_gpus");
 }
 
 /// CPU time of this thread, where the system provides it.
-fn processor_time() -> Option<Duration> {
+fn cpu_time() -> Option<Duration> {
     let stat = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     stat.split(' ').next()?.parse().ok().map(Duration::from_nanos)
 }
 
-/// Runs in a process of its own, started by the test below.
+/// Runs in a separate process, started by the test below.
 #[test]
-#[ignore = "needs a driver that takes its time"]
-fn wait_for_a_slow_card() {
-    let Some(before) = processor_time() else { return };
-    let (start, mut card) =
-        (std::time::Instant::now(), Card::open(&CardChoice::Default, None).expect("a card"));
-    card.wait().expect("the card works");
+#[ignore = "needs the stand-in driver that answers slowly"]
+fn wait_for_a_slow_gpu() {
+    let mut card = Card::open(&CardChoice::Default, None).expect("a card");
+    // Only the waits are timed. Other load makes them longer, but this thread no busier.
+    let (Some(before), start) = (cpu_time(), std::time::Instant::now()) else { return };
+    card.wait().expect("the GPU works");
     let mark = card.mark().expect("a mark");
-    mark.wait().expect("the card works");
-    let (took, busy) = (start.elapsed(), processor_time().expect("as before") - before);
+    mark.wait().expect("the GPU works");
+    let (took, busy) = (start.elapsed(), cpu_time().expect("available above") - before);
     // A spinning thread would be busy all the time.
     assert!(took > Duration::from_millis(120) && busy < took / 4, "{busy:?} busy of {took:?}");
 }
 
 #[test]
-fn a_thread_that_waits_for_a_slow_card_sleeps() {
-    with_driver("slow", include_str!("driver.c"), "wait_for_a_slow_card");
+fn a_thread_that_waits_for_a_slow_gpu_sleeps() {
+    with_driver("slow", include_str!("driver.c"), "wait_for_a_slow_gpu");
 }
 
 #[test]

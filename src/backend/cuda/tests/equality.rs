@@ -7,7 +7,7 @@ use super::*;
 use crate::lattice::LatticeBox;
 
 #[test]
-fn worlds_of_a_device_are_those_of_the_processor() {
+fn worlds_of_a_device_equal_the_cpus() {
     let Some(device) = device() else { return };
     let (name, engine) = (device.name(), engine(device, 64 << 20));
     assert_eq!(engine.state(), EngineState::Cuda(name));
@@ -22,7 +22,7 @@ fn worlds_of_a_device_are_those_of_the_processor() {
 }
 
 #[test]
-fn history_and_loose_pieces_of_a_device_are_those_of_the_processor() {
+fn history_and_loose_pieces_of_a_device_equal_the_cpus() {
     let Some(device) = device() else { return };
     let engine = engine(device, 64 << 20);
     for index in 0..worlds::world_count(12) {
@@ -82,7 +82,7 @@ fn kernels_that_reach_the_hosts_memory_make_the_same_worlds() {
 }
 
 #[test]
-fn a_brick_all_of_whose_materials_are_gone_is_the_processors() {
+fn a_brick_without_materials_any_more_equals_the_cpus() {
     let Some(device) = device() else { return };
     let engine = engine(device, 64 << 20);
     let sphere = |radius| Shape::sphere(glam::Vec3::new(48.0, 80.0, 48.0), radius);
@@ -145,7 +145,7 @@ fn engines_take_turns_with_the_same_bricks() {
 }
 
 #[test]
-fn a_high_cliff_at_the_end_of_the_lattice_is_the_processors() {
+fn a_high_cliff_at_the_end_of_the_lattice_equals_the_cpus() {
     let Some(device) = device() else { return };
     let engine = engine(device, 64 << 20);
     let top = f64::from(crate::lattice::LIMIT);
@@ -161,7 +161,7 @@ fn a_high_cliff_at_the_end_of_the_lattice_is_the_processors() {
 }
 
 #[test]
-fn sculpting_of_any_kind_is_that_of_the_processor() {
+fn sculpting_of_any_kind_equals_the_cpus() {
     let Some(first) = zero_copy() else { return };
     let Some(second) = device() else { return };
     let second = engine(second, 64 << 20);
@@ -188,7 +188,7 @@ fn sculpting_of_any_kind_is_that_of_the_processor() {
 }
 
 #[test]
-fn ground_lowered_and_raised_far_is_that_of_the_processor() {
+fn ground_lowered_and_raised_far_equals_the_cpus() {
     let Some(first) = zero_copy() else { return };
     let Some(second) = device() else { return };
     let second = engine(second, 64 << 20);
@@ -260,7 +260,7 @@ fn new_ground_far_from_all_other_finds_its_material() {
 }
 
 #[test]
-fn what_is_under_rules_is_that_of_the_processor() {
+fn edits_under_rules_equal_the_cpus() {
     let Some(engine) = zero_copy() else { return };
     let mut rng = Rng::with_seed(32);
     for index in 0..worlds::world_count(40).div_ceil(4) {

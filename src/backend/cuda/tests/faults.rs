@@ -7,8 +7,8 @@ use super::super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark
 use super::*;
 use crate::backend::Stage;
 
-/// Number of calls until a device fails, and the fault. Only allocations count for [`Fault::Memory`]; only waits
-/// for marks count for [`refused`].
+/// Number of calls until a device fails, and the fault. [`Fault::Memory`] counts only allocations;
+/// [`refused`] counts only waits for marks.
 struct FaultPlan(Arc<Mutex<Option<(u32, Fault)>>>);
 
 /// A device that fails as planned.
@@ -120,11 +120,11 @@ impl log::Log for Log {
 
 static LOG: Log = Log(Mutex::new(Vec::new()));
 
-/// How many messages so far contain this text. Messages are collected from the first call on.
+/// Number of logged messages that contain this text. Messages are collected from the first call on.
 pub(super) fn logged(what: &str) -> usize {
     static KEPT: Once = Once::new();
     KEPT.call_once(|| {
-        log::set_logger(&LOG).expect("nobody else logs");
+        log::set_logger(&LOG).expect("no other logger is set");
         log::set_max_level(log::LevelFilter::Warn);
     });
     lock(&LOG.0).iter().filter(|line| line.contains(what)).count()
@@ -190,7 +190,7 @@ fn a_transaction_of_several_runs_survives_a_device_that_fails_in_its_middle() {
 }
 
 #[test]
-fn surfaces_that_never_come_are_drawn_by_the_processor_with_all_others() {
+fn surfaces_that_never_arrive_are_drawn_by_the_cpu_with_all_others() {
     let half = glam::Vec3::new(40.0, 9.0, 40.0);
     let brush = Brush::dig(Shape::cuboid(glam::Vec3::new(60.0, 28.0, 60.0), half));
     let brushes = [brush.with_roughness(Roughness::new(2.0, 3.0, 5))];
@@ -217,7 +217,7 @@ fn surfaces_that_never_come_are_drawn_by_the_processor_with_all_others() {
 }
 
 #[test]
-fn ground_is_made_by_the_processor_where_a_device_fails() {
+fn ground_is_made_by_the_cpu_if_a_device_fails() {
     // Two slices, of which the second is short.
     let (width, depth, noise) = (1030, 1020, NoiseHeights { octaves: 1, ..NoiseHeights::default() });
     let expected = Ground::from_noise(width, depth, &noise);

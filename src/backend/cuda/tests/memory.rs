@@ -16,7 +16,7 @@ fn small(number: usize) -> Brush {
     Brush::dig(Shape::sphere(glam::Vec3::new(20.0 + 6.0 * number as f32, 22.0, 70.0), 4.0))
 }
 
-/// The same world on the CPU and on an engine.
+/// Two equal worlds, one edited on the CPU and one on an engine.
 struct Pair {
     expected: Terrain,
     found: Terrain,

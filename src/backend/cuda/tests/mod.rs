@@ -33,7 +33,7 @@ pub(super) fn device() -> Option<Box<dyn Device>> {
     match Card::open(&CardChoice::Default, None) {
         Ok(card) => Some(Box::new(card)),
         Err(Fault::NoDriver | Fault::NoDevice(_)) => Some(Box::new(Emulator::start()?)),
-        Err(fault) => panic!("the card can't be tested: {fault}"),
+        Err(fault) => panic!("the GPU can't be tested: {fault}"),
     }
 }
 
@@ -117,7 +117,7 @@ fn compare_on(ground: Ground, chunk_size: u32, engines: &[&Engine], transactions
     compare_under(DiggingRules::default(), ground, chunk_size, engines, transactions);
 }
 
-/// The same under rules.
+/// Compares both engines under rules.
 fn compare_under(
     rules: DiggingRules,
     ground: Ground,

@@ -33,17 +33,22 @@ fn threads() -> Option<usize> {
 }
 
 #[test]
-fn an_engine_that_nobody_uses_opens_no_card() {
-    for backend in [Backend::Auto, Backend::Cuda] {
-        let engine = Engine::new(backend);
-        std::thread::sleep(Duration::from_millis(20));
-        assert_eq!(engine.state(), EngineState::Unopened);
+fn an_unused_engine_opens_no_gpu() {
+    // Attempts to open a device are counted; that no thread is started that could do so later is the next test.
+    for is_auto in [true, false] {
+        let (engine, opened) = counted(is_auto);
+        assert_eq!((engine.state(), opened.load(Ordering::SeqCst)), (EngineState::Unopened, 0));
         assert_eq!(engine.figures(), Default::default());
+        drop(engine);
+        assert_eq!(opened.load(Ordering::SeqCst), 0);
+    }
+    for backend in [Backend::Auto, Backend::Cuda] {
+        assert_eq!(Engine::new(backend).state(), EngineState::Unopened);
     }
     assert_eq!(Engine::new(Backend::Cpu).state(), EngineState::Cpu);
 }
 
-/// Runs in a process of its own, where no other test starts threads.
+/// Runs in a separate process, where no other test starts threads.
 #[test]
 #[ignore = "counts the threads of its process"]
 fn count_threads_of_engines() {
@@ -54,7 +59,7 @@ fn count_threads_of_engines() {
 }
 
 #[test]
-fn an_engine_that_nobody_uses_starts_no_thread() {
+fn an_unused_engine_starts_no_thread() {
     let test = "backend::cuda::tests::opening::count_threads_of_engines";
     let own = std::env::current_exe().expect("this test");
     let said =
@@ -63,7 +68,7 @@ fn an_engine_that_nobody_uses_starts_no_thread() {
 }
 
 #[test]
-fn small_brushes_open_no_card() {
+fn small_brushes_open_no_gpu() {
     let (engine, opened) = counted(true);
     let mut terrain = terrain(&engine);
     (0..50).for_each(|_| drop(terrain.apply(dig(4.0))));
@@ -71,7 +76,7 @@ fn small_brushes_open_no_card() {
 }
 
 #[test]
-fn a_large_transaction_opens_the_card_once_and_does_not_wait_for_it() {
+fn a_large_transaction_opens_the_gpu_once_and_does_not_wait_for_it() {
     let (engine, opened) = counted(true);
     let mut terrain = terrain(&engine);
     for _ in 0..3 {
@@ -85,7 +90,7 @@ fn a_large_transaction_opens_the_card_once_and_does_not_wait_for_it() {
 }
 
 #[test]
-fn an_engine_that_is_to_use_a_card_opens_it_for_its_first_transaction() {
+fn an_engine_set_to_cuda_opens_the_gpu_for_its_first_transaction() {
     let (engine, opened) = counted(false);
     let mut terrain = terrain(&engine);
     // An empty transaction does not count.
@@ -98,7 +103,7 @@ fn an_engine_that_is_to_use_a_card_opens_it_for_its_first_transaction() {
 }
 
 #[test]
-fn who_waits_for_a_card_opens_it() {
+fn waiting_for_a_gpu_opens_it() {
     for is_auto in [false, true] {
         let (engine, opened) = counted(is_auto);
         assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(Fault::NoDriver.to_string()));
@@ -107,7 +112,7 @@ fn who_waits_for_a_card_opens_it() {
 }
 
 #[test]
-fn the_card_that_a_game_suggests_is_asked_for() {
+fn the_gpu_that_a_game_suggests_is_opened() {
     let (said, heard) = std::sync::mpsc::channel();
     let device = move |card| {
         said.send(card).expect("the test listens");

@@ -106,7 +106,7 @@ fn compare_edits(
     };
     let short = EditRun::new(device, &work, rng, room, FAR);
     short.check_bricks(&delta, false);
-    assert_eq!(short.counters, run.counters, "counters go on past the room");
+    assert_eq!(short.counters, run.counters, "counters exceed the room");
     // Small windows either suffice, or the kernel reports that they do not.
     let near = EditRun::new(device, &work, rng, most, 1);
     if near.results.iter().all(|result| result.flags & EditResult::TOO_FAR == 0) {

@@ -1,4 +1,5 @@
-//! The parameters of noise as numbers, for computing the same heights, bit by bit, row by row or on a graphics card.
+//! The parameters of noise as plain numbers, from which rows and the GPU compute heights that are equal bit
+//! by bit.
 
 use bytemuck::{Pod, Zeroable};
 use noise::permutationtable::{NoiseHasher, PermutationTable};
@@ -13,31 +14,31 @@ use super::world::Ground;
 use crate::lattice::{LIMIT, ONE};
 
 /// [`NoiseHeights`] over a world, checked, and all numbers derived from them.
-pub(crate) struct NoiseTerms {
+pub(crate) struct NoiseParams {
     #[cfg_attr(not(any(test, feature = "cuda")), expect(dead_code))]
     extent: Extent,
     pub kind: NoiseKind,
     /// For each octave the permutation of 0 to 255 that its gradients are drawn from.
     pub tables: Vec<[u8; 256]>,
-    pub numbers: NoiseNumbers,
+    pub numbers: NoiseFactors,
 }
 
 /// At the column (x, z) the first octave is looked up at `(x, z) / scale + origin`, times `frequency`; each further one
-/// `lacunarity` times as far out. What is made of their sum is in `kernels/heights.cuh`, and in the crate `noise`.
+/// `lacunarity` times as far out. `kernels/heights.cuh` and the crate `noise` define how their sum is used.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct NoiseNumbers {
+pub(crate) struct NoiseFactors {
     pub scale: f64,
     pub origin: [f64; 2],
     pub frequency: f64,
     pub lacunarity: f64,
-    /// How strong an octave is beside the one before.
+    /// Amplitude of an octave relative to the previous one.
     pub persistence: f64,
-    /// What a ridged octave is multiplied with to be the weight of the next; 0 if not ridged.
+    /// Factor from a ridged octave to the weight of the next one; 0 if not ridged.
     pub weighting: f64,
-    /// What the sum is multiplied with.
+    /// Factor of the sum.
     pub factor: f64,
-    /// Where ridged noise ends, counted from -1; 1 if not ridged.
+    /// Range of ridged noise, counted from -1; 1 if not ridged.
     pub peak: f64,
     pub amplitude: f64,
     pub base: f64,
@@ -48,12 +49,12 @@ impl NoiseHeights {
     ///
     /// # Errors
     /// Those of [`Ground::from_noise`](super::Ground::from_noise) that show before any height is computed.
-    pub(crate) fn terms(&self, width: u32, depth: u32) -> Result<NoiseTerms, GroundError> {
+    pub(crate) fn params(&self, width: u32, depth: u32) -> Result<NoiseParams, GroundError> {
         let &Self { seed, kind, octaves, scale, amplitude, base } = self;
         let noise = Octaves::new(self)?;
         let extent = Extent::new(width, depth)?;
         let tables = seeds(seed, octaves).map(table).collect();
-        let common = |frequency, lacunarity, persistence| NoiseNumbers {
+        let common = |frequency, lacunarity, persistence| NoiseFactors {
             scale,
             origin: ORIGIN,
             frequency,
@@ -66,11 +67,11 @@ impl NoiseHeights {
             base,
         };
         let numbers = match &noise {
-            Octaves::Fractal(noise) => NoiseNumbers {
+            Octaves::Fractal(noise) => NoiseFactors {
                 factor: fractal_factor(noise),
                 ..common(noise.frequency, noise.lacunarity, noise.persistence)
             },
-            Octaves::Ridged(noise, peak) => NoiseNumbers {
+            Octaves::Ridged(noise, peak) => NoiseFactors {
                 // A power of two: multiplying gives the bits of dividing.
                 weighting: 1.0 / noise.attenuation,
                 factor: ridged_factor(noise),
@@ -78,21 +79,21 @@ impl NoiseHeights {
                 ..common(noise.frequency, noise.lacunarity, noise.persistence)
             },
         };
-        Ok(NoiseTerms { extent, kind, tables, numbers })
+        Ok(NoiseParams { extent, kind, tables, numbers })
     }
 }
 
 #[cfg(all(test, feature = "cuda"))]
 impl NoiseHeights {
-    /// The processor's noise over columns, before it becomes heights.
+    /// The CPU's noise over columns, before it becomes heights.
     pub(crate) fn by_column(&self) -> impl Fn(i32, i32) -> f64 {
         self.generator().expect("parameters in range")
     }
 }
 
 #[cfg(any(test, feature = "cuda"))]
-impl NoiseTerms {
-    /// Columns in a row, of which there are as many as it takes.
+impl NoiseParams {
+    /// Number of columns in a row.
     #[cfg(feature = "cuda")]
     pub fn row_len(&self) -> usize {
         self.extent.row_len()
@@ -115,7 +116,7 @@ impl NoiseTerms {
     }
 }
 
-/// The permutation of a seed. The crate looks `values[values[a] ^ b]` up for (a, b), and `values[a]` for a alone.
+/// The permutation table of a seed. The crate reads `values[values[a] ^ b]` for (a, b), and `values[a]` for a alone.
 fn table(seed: u32) -> [u8; 256] {
     let permutation = PermutationTable::new(seed);
     std::array::from_fn(|at| permutation.hash(&[at as isize]) as u8)
@@ -127,8 +128,8 @@ fn fractal_factor(noise: &Fbm<Perlin>) -> f64 {
     1.0 / strengths.fold(0.0, |sum, strength| sum + strength)
 }
 
-/// The same for ridges: two by the sum of what octaves come to that are 1 before they are weighted. The crate counts one
-/// octave more than there is, and its first one last.
+/// The factor for ridges: 2 divided by the sum of the weighted octaves if every octave is 1. The crate counts
+/// one octave too many, and its first one last.
 fn ridged_factor(noise: &RidgedMulti<Perlin>) -> f64 {
     let (mut strength, mut last, mut sum) = (1.0, 1.0, 0.0);
     for octave in 1..=noise.octaves {
@@ -145,8 +146,8 @@ mod tests {
     use crate::ground::{MAX_OCTAVES, MAX_SIZE};
     use noise::{MultiFractal, NoiseFn};
 
-    fn terms(kind: NoiseKind, octaves: u32) -> NoiseTerms {
-        NoiseHeights { kind, octaves, ..NoiseHeights::default() }.terms(3, 2).unwrap()
+    fn params(kind: NoiseKind, octaves: u32) -> NoiseParams {
+        NoiseHeights { kind, octaves, ..NoiseHeights::default() }.params(3, 2).unwrap()
     }
 
     #[test]
@@ -174,14 +175,15 @@ mod tests {
             // 2 at half the strength, and nothing more.
             let noise = Fbm::<Fixed>::new(0).set_octaves(octaves as usize).set_sources(fixed(2.0, 0.0));
             assert_eq!(
-                terms(NoiseKind::Fractal, octaves).numbers.factor,
+                params(NoiseKind::Fractal, octaves).numbers.factor,
                 noise.get([0.0; 2]),
                 "{octaves} octaves"
             );
-            // A ridge where the first octave is 0, none where another is 1. The last bit is safe from the 1 that comes off.
+            // A ridge where the first octave is 0, none where another is 1. The last bit is safe from the 1 that comes
+            // off.
             let noise =
                 RidgedMulti::<Fixed>::new(0).set_octaves(octaves as usize).set_sources(fixed(0.0, 1.0));
-            let factor = terms(NoiseKind::Ridged, octaves).numbers.factor;
+            let factor = params(NoiseKind::Ridged, octaves).numbers.factor;
             assert_eq!(factor - 1.0, noise.get([0.0; 2]), "{octaves} octaves");
             assert!((1.0..2.0).contains(&factor));
         }
@@ -190,7 +192,7 @@ mod tests {
     #[test]
     fn tables_are_permutations_and_go_on_after_the_largest_seed() {
         let tables = |seed, octaves| {
-            NoiseHeights { seed, octaves, ..NoiseHeights::default() }.terms(1, 1).unwrap().tables
+            NoiseHeights { seed, octaves, ..NoiseHeights::default() }.params(1, 1).unwrap().tables
         };
         let mut sorted = tables(7, 1)[0];
         sorted.sort_unstable();
@@ -200,23 +202,23 @@ mod tests {
 
     #[test]
     fn the_farthest_point_of_an_octave_has_a_whole_part_of_31_bits() {
-        let terms = terms(NoiseKind::Fractal, MAX_OCTAVES);
-        let farthest = (f64::from(MAX_SIZE) + 1.0) * terms.numbers.lacunarity.powi(MAX_OCTAVES as i32 - 1);
-        assert!(farthest * terms.numbers.frequency < f64::from(1 << 30) * 1.9);
+        let params = params(NoiseKind::Fractal, MAX_OCTAVES);
+        let farthest = (f64::from(MAX_SIZE) + 1.0) * params.numbers.lacunarity.powi(MAX_OCTAVES as i32 - 1);
+        assert!(farthest * params.numbers.frequency < f64::from(1 << 30) * 1.9);
     }
 
     #[test]
     fn an_octave_weighs_half_of_the_one_before_which_is_exact() {
-        assert_eq!(terms(NoiseKind::Ridged, 2).numbers.weighting, 0.5);
+        assert_eq!(params(NoiseKind::Ridged, 2).numbers.weighting, 0.5);
     }
 
     #[test]
     fn heights_that_do_not_fit_are_no_ground() {
-        let terms = terms(NoiseKind::Fractal, 1);
-        let ground = |last| terms.ground([vec![0; 11], vec![last]].concat());
+        let params = params(NoiseKind::Fractal, 1);
+        let ground = |last| params.ground([vec![0; 11], vec![last]].concat());
         assert_eq!(ground(5), Ground::from_heights(3, 2, [vec![0; 11], vec![5]].concat()).ok());
         assert!(ground(1 << 23).is_some() && ground((1 << 23) + 1).is_none() && ground(i32::MIN).is_none());
-        assert!(terms.ground(vec![0; 11]).is_none());
+        assert!(params.ground(vec![0; 11]).is_none());
     }
 
     #[test]
@@ -232,7 +234,7 @@ mod tests {
             (0, NoiseHeights { base: 1e9, ..good }),
         ] {
             let error = Ground::from_noise(width, 2, &noise).unwrap_err();
-            assert_eq!(noise.terms(width, 2).err(), Some(error));
+            assert_eq!(noise.params(width, 2).err(), Some(error));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! How long meshes of nodes take.
+//! Times of node meshes by level, without edits and with few and many of them.
 
 use std::time::Instant;
 
@@ -8,7 +8,7 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
 use glam::Vec3;
 
-/// Microseconds of a call, the least of several means, and the triangles of the mesh.
+/// Microseconds to mesh a node, the least of several means, and its triangles.
 fn time(world: &World, cut: &Cut, node: Node) -> (f64, usize) {
     let mean = || {
         let start = Instant::now();
@@ -19,13 +19,13 @@ fn time(world: &World, cut: &Cut, node: Node) -> (f64, usize) {
     (least, world.node_mesh(cut, node).indices.len() / 3)
 }
 
-#[test]
-#[ignore = "measures; to be run alone, in release"]
-fn nodes_are_timed() {
+/// Prints microseconds and triangles of a mesh for nodes of levels 0 to 3.
+pub fn nodes() {
+    println!();
     let noise = NoiseHeights { seed: 3, scale: 200.0, amplitude: 60.0, ..Default::default() };
     let ground = Ground::from_noise(1024, 1024, &noise).expect("valid hills");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
-    // A node of level 1 beside finer and coarser ones.
+    // A node of level 1 between finer and coarser ones.
     let one = Node { level: 1, x: 5, z: 4 };
     let split = Node { level: 1, x: 4, z: 4 };
     let cut = Cut::new(terrain.world().level_grid(3), |node| node.covers(split));

@@ -1,0 +1,492 @@
+//! The structure of the source: modules import only lower modules, and files import each other in no circle.
+//!
+//! Imports are read from the source text: `use` declarations and paths, without comments, strings, and code that is
+//! compiled for tests only. Re-exports are followed to the file that defines the item. Known violations are listed in
+//! [`UPWARD`] and [`CIRCLES`]; a test fails if one of them no longer exists, so these lists can only shrink.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+/// The modules of the crate, from the ground up. Each imports only those before it.
+const MODULES: &[&str] = &[
+    "lattice", "levels", "ground", "brush", "volume", "edits", "surface", "dense", "backend", "terrain",
+    "store", "net", "plugin", "view", "saves", "together", "physics", "debug", "panel",
+];
+
+/// Imports of a higher module that still exist: the file, and the module that it imports.
+const UPWARD: &[(&str, &str)] = &[("plugin/mod.rs", "saves"), ("plugin/mod.rs", "view")];
+
+/// Circles of files that still exist: all files of each, in alphabetical order.
+const CIRCLES: &[&[&str]] = &[
+    &["brush/line.rs", "brush/request.rs"],
+    &[
+        "ground/strata/in_brick.rs",
+        "ground/strata/of_ground.rs",
+        "ground/strata/records.rs",
+        "ground/strata/steep.rs",
+        "ground/world.rs",
+    ],
+    &["panel/operations.rs", "panel/tool.rs"],
+    &["physics/hold.rs", "physics/sources.rs"],
+    &["plugin/mod.rs", "plugin/propagate.rs", "saves/mod.rs", "view/ground/mod.rs", "view/material.rs"],
+    &["saves/level.rs", "saves/opening.rs"],
+    &["store/format/bytes.rs", "store/format/error.rs", "store/format/frame.rs"],
+    &[
+        "terrain/commit.rs",
+        "terrain/drawn_cut.rs",
+        "terrain/ground.rs",
+        "terrain/levels.rs",
+        "terrain/log.rs",
+        "terrain/model.rs",
+        "terrain/put.rs",
+        "terrain/queue.rs",
+        "terrain/redraw.rs",
+        "terrain/replay.rs",
+        "terrain/restore.rs",
+        "terrain/surface_draft.rs",
+        "terrain/tiles.rs",
+        "terrain/transaction.rs",
+        "terrain/unmeshed.rs",
+        "terrain/unseen.rs",
+    ],
+];
+
+/// The text of a crate's files, by path below `src`.
+type Sources = BTreeMap<String, String>;
+
+/// A path in the source, such as `["crate", "lattice", "ONE"]`.
+type Segments = Vec<String>;
+
+/// Blanks comments and the content of string and character literals.
+fn without_comments(text: &str) -> String {
+    let chars: Vec<char> = text.chars().collect();
+    let at = |index: usize| chars.get(index).copied().unwrap_or('\0');
+    let (mut code, mut index) = (String::new(), 0);
+    while index < chars.len() {
+        let is_word = index > 0 && (at(index - 1).is_alphanumeric() || at(index - 1) == '_');
+        match at(index) {
+            '/' if at(index + 1) == '/' => {
+                while index < chars.len() && at(index) != '\n' {
+                    index += 1;
+                }
+            }
+            '/' if at(index + 1) == '*' => {
+                let mut depth = 0;
+                loop {
+                    let pair = (at(index), at(index + 1));
+                    depth += i32::from(pair == ('/', '*')) - i32::from(pair == ('*', '/'));
+                    index += if matches!(pair, ('/', '*') | ('*', '/')) { 2 } else { 1 };
+                    if depth == 0 || index >= chars.len() {
+                        break;
+                    }
+                }
+            }
+            'r' if !is_word && matches!(at(index + 1), '"' | '#') => {
+                let hashes = (index + 1..).take_while(|&i| at(i) == '#').count();
+                if at(index + 1 + hashes) != '"' {
+                    code.push('r');
+                    index += 1;
+                    continue;
+                }
+                index += 2 + hashes;
+                let closes = |i: usize| at(i) == '"' && (1..=hashes).all(|hash| at(i + hash) == '#');
+                while index < chars.len() && !closes(index) {
+                    index += 1;
+                }
+                index += 1 + hashes;
+                code.push_str("\"\"");
+            }
+            '"' => {
+                index += 1;
+                while index < chars.len() && at(index) != '"' {
+                    index += if at(index) == '\\' { 2 } else { 1 };
+                }
+                index += 1;
+                code.push_str("\"\"");
+            }
+            // A character, unless it is a lifetime.
+            '\'' if at(index + 1) == '\\' || at(index + 2) == '\'' => {
+                index += if at(index + 1) == '\\' { 3 } else { 2 };
+                while index < chars.len() && at(index) != '\'' {
+                    index += 1;
+                }
+                index += 1;
+                code.push_str("' '");
+            }
+            other => {
+                code.push(other);
+                index += 1;
+            }
+        }
+    }
+    code
+}
+
+/// The end of the item, field or arm that begins at `start`, its attributes included.
+fn end_of_item(code: &str, start: usize) -> usize {
+    let mut depth = 0;
+    let mut has_comma_inside = false;
+    let mut word = String::new();
+    for (offset, c) in code[start..].char_indices() {
+        if c.is_alphanumeric() || c == '_' {
+            word.push(c);
+        } else if !word.is_empty() {
+            let is_item = ["fn", "impl", "mod", "use", "struct", "enum", "const", "static", "type", "trait"];
+            has_comma_inside |= depth == 0 && is_item.contains(&word.as_str());
+            word.clear();
+        }
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            // The end of the block that the field or arm is in.
+            ')' | ']' | '}' if depth == 0 => return start + offset,
+            '}' if depth == 1 => return start + offset + 1,
+            ')' | ']' | '}' => depth -= 1,
+            ';' if depth == 0 => return start + offset + 1,
+            ',' if depth == 0 && !has_comma_inside => return start + offset + 1,
+            _ => {}
+        }
+    }
+    code.len()
+}
+
+/// The code without items for tests only, and the names of modules in other files that are for tests only.
+fn without_tests(code: &str) -> (String, BTreeSet<String>) {
+    let (mut kept, mut modules, mut rest) = (String::new(), BTreeSet::new(), code);
+    while let Some(start) = ["#[cfg(test)]", "#[cfg(all(test"].iter().filter_map(|mark| rest.find(mark)).min()
+    {
+        kept.push_str(&rest[..start]);
+        let end = end_of_item(rest, start);
+        let item = &rest[start..end];
+        if let Some((_, name)) = item.split_once("mod ").filter(|_| item.ends_with(';')) {
+            modules.insert(name.trim_end_matches(';').trim().to_owned());
+        }
+        rest = &rest[end..];
+    }
+    kept.push_str(rest);
+    (kept, modules)
+}
+
+/// Words and punctuation.
+fn tokens(code: &str) -> Vec<String> {
+    let mut tokens: Vec<String> = Vec::new();
+    let mut is_word = false;
+    for c in code.chars() {
+        let continues = c.is_alphanumeric() || c == '_';
+        match tokens.last_mut() {
+            Some(last) if continues && is_word => last.push(c),
+            Some(last) if c == ':' && last == ":" => last.push(c),
+            _ if !c.is_whitespace() => tokens.push(c.into()),
+            _ => {}
+        }
+        is_word = continues;
+    }
+    tokens
+}
+
+/// Reads a use tree from `tokens[*at]` on, and adds each path with the name that it introduces.
+fn read_tree(tokens: &[String], at: &mut usize, prefix: &[String], found: &mut Vec<(Segments, String)>) {
+    let mut path = prefix.to_vec();
+    while let Some(token) = tokens.get(*at) {
+        match token.as_str() {
+            "{" => {
+                *at += 1;
+                while tokens.get(*at).is_some_and(|token| token != "}" && token != ";") {
+                    read_tree(tokens, at, &path, found);
+                    *at += usize::from(tokens.get(*at).is_some_and(|token| token == ","));
+                }
+                *at += 1;
+                return;
+            }
+            "," | "}" | ";" => break,
+            "as" => {
+                let name = tokens.get(*at + 1).cloned().unwrap_or_default();
+                *at += 2;
+                found.push((path, name));
+                return;
+            }
+            "::" => *at += 1,
+            _ => {
+                path.push(token.clone());
+                *at += 1;
+            }
+        }
+    }
+    if path.last().is_some_and(|last| last == "self") {
+        path.pop();
+    }
+    let name = path.last().cloned().unwrap_or_default();
+    found.push((path, name));
+}
+
+/// A file: its module, the names that its `use` declarations introduce, and the paths that it mentions.
+#[derive(Default)]
+struct File {
+    module: Segments,
+    names: Vec<(Segments, String)>,
+    paths: Vec<Segments>,
+}
+
+/// The module of a file, by its path below `src`.
+fn module_of(path: &str) -> Segments {
+    let mut module: Segments = path.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
+    if module.last().is_some_and(|last| last == "mod") {
+        module.pop();
+    }
+    module
+}
+
+/// A crate: its files by path, and their paths by module.
+struct Crate {
+    files: BTreeMap<String, File>,
+    by_module: BTreeMap<Segments, String>,
+}
+
+impl Crate {
+    fn new(sources: &Sources) -> Self {
+        let (mut files, mut for_tests) = (BTreeMap::new(), Vec::new());
+        for (path, text) in sources {
+            let (code, tests) = without_tests(&without_comments(text));
+            let module = if path == "lib.rs" { Segments::new() } else { module_of(path) };
+            for_tests.extend(tests.into_iter().map(|name| [module.clone(), vec![name]].concat()));
+            files.insert(path.clone(), Self::read(module, &tokens(&code)));
+        }
+        files.retain(|path, file| {
+            path != "lib.rs" && !for_tests.iter().any(|test| file.module.starts_with(test))
+        });
+        let by_module = files.iter().map(|(path, file)| (file.module.clone(), path.clone())).collect();
+        Self { files, by_module }
+    }
+
+    fn read(module: Segments, tokens: &[String]) -> File {
+        let mut file = File { module, ..File::default() };
+        let mut at = 0;
+        while at < tokens.len() {
+            let is_start = at == 0 || tokens[at - 1] != "::";
+            // Not the `use<..>` of captured lifetimes.
+            let is_use = tokens[at] == "use" && tokens.get(at + 1).is_some_and(|next| next != "<");
+            if is_use && is_start {
+                let is_public = at > 0 && (tokens[at - 1] == "pub" || tokens[at - 1] == ")");
+                at += 1;
+                let first = file.names.len();
+                read_tree(tokens, &mut at, &[], &mut file.names);
+                // A module that re-exports what is below it does not depend on it.
+                let is_own = |path: &Segments| !matches!(path[0].as_str(), "crate" | "super" | "std");
+                let read = file.names[first..].iter().map(|(path, _)| path);
+                file.paths
+                    .extend(read.filter(|path| !path.is_empty() && !(is_public && is_own(path))).cloned());
+            } else if is_start && tokens.get(at + 1).is_some_and(|next| next == "::") {
+                let mut path = vec![tokens[at].clone()];
+                while tokens.get(at + 1).is_some_and(|next| next == "::") && at + 2 < tokens.len() {
+                    path.push(tokens[at + 2].clone());
+                    at += 2;
+                }
+                file.paths.push(path);
+                at += 1;
+            } else {
+                at += 1;
+            }
+        }
+        file
+    }
+
+    /// The file that defines what a path in `module` names, if it is in this crate.
+    fn resolve(&self, module: &[String], path: &[String], depth: usize) -> Option<&str> {
+        let mut base = match path.first()?.as_str() {
+            "crate" => Segments::new(),
+            "self" | "super" => module.to_vec(),
+            name if self.by_module.contains_key(&[module, &[name.to_owned()]].concat()) => module.to_vec(),
+            _ => return None,
+        };
+        let mut rest = path;
+        while let Some(first) = rest.first() {
+            match first.as_str() {
+                "crate" | "self" => {}
+                "super" => drop(base.pop()),
+                _ => break,
+            }
+            rest = &rest[1..];
+        }
+        while let Some(first) = rest.first() {
+            let next = [&base[..], std::slice::from_ref(first)].concat();
+            if !self.by_module.contains_key(&next) {
+                break;
+            }
+            (base, rest) = (next, &rest[1..]);
+        }
+        let own = self.by_module.get(&base)?;
+        let Some(item) = rest.first() else { return Some(own) };
+        let imported =
+            self.files[own].names.iter().find(|(path, name)| name == item && *path != [item.clone()]);
+        let imported = imported.filter(|_| depth < 9);
+        imported.map_or(Some(own), |(path, _)| self.resolve(&base, path, depth + 1).or(Some(own)))
+    }
+
+    /// The files that each file imports.
+    fn imports(&self) -> BTreeMap<&str, BTreeSet<&str>> {
+        let of = |(path, file): (&'_ String, &'_ File)| -> BTreeSet<&str> {
+            let found = file.paths.iter().filter_map(|import| self.resolve(&file.module, import, 0));
+            // A `mod.rs` and the files below it are one module, which may use its parts as they use it.
+            let folder = path.strip_suffix("mod.rs");
+            found.filter(|found| found != path && folder.is_none_or(|own| !found.starts_with(own))).collect()
+        };
+        self.files.iter().map(|(path, file)| (path.as_str(), of((path, file)))).collect()
+    }
+}
+
+/// The top-level module of a file.
+fn top(path: &str) -> &str {
+    path.split('/').next().unwrap_or_default().trim_end_matches(".rs")
+}
+
+/// Imports of higher modules: the file, and the module that it imports. Modules without a place in the order are
+/// reported as importing themselves.
+fn upward_imports(sources: &Sources, order: &[&str]) -> BTreeSet<(String, String)> {
+    let read = Crate::new(sources);
+    let rank = |path: &str| order.iter().position(|module| *module == top(path));
+    let mut found = BTreeSet::new();
+    for (path, imports) in read.imports() {
+        if rank(path).is_none() {
+            found.insert((path.to_owned(), top(path).to_owned()));
+        }
+        for import in imports.into_iter().filter(|import| rank(import) > rank(path)) {
+            found.insert((path.to_owned(), top(import).to_owned()));
+        }
+    }
+    found
+}
+
+/// Circles of imports: the files of each, where every file imports every other one directly or through others.
+fn circles(sources: &Sources) -> BTreeSet<Vec<String>> {
+    let read = Crate::new(sources);
+    let imports = read.imports();
+    let reached_from = |start| {
+        let (mut reached, mut open) = (BTreeSet::new(), vec![start]);
+        while let Some(path) = open.pop() {
+            open.extend(imports[path].iter().copied().filter(|next| reached.insert(*next)));
+        }
+        reached
+    };
+    let reached: BTreeMap<&str, BTreeSet<&str>> =
+        imports.keys().map(|path| (*path, reached_from(*path))).collect();
+    let mutual =
+        |path: &str, other: &&&str| reached[path].contains(**other) && reached[**other].contains(path);
+    let circle = |path: &&str| {
+        imports.keys().filter(|other| mutual(path, other)).map(|&path| path.to_owned()).collect()
+    };
+    imports.keys().map(circle).filter(|circle: &Vec<String>| circle.len() > 1).collect()
+}
+
+/// All Rust files below a folder.
+fn read_sources(folder: &Path, prefix: &str, sources: &mut Sources) {
+    for entry in fs::read_dir(folder).expect("a folder of sources").flatten() {
+        let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+        if path.is_dir() {
+            read_sources(&path, &format!("{prefix}{name}/"), sources);
+        } else if name.ends_with(".rs") {
+            sources.insert(format!("{prefix}{name}"), fs::read_to_string(&path).expect("a source file"));
+        }
+    }
+}
+
+fn library() -> Sources {
+    let mut sources = Sources::new();
+    read_sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), "", &mut sources);
+    sources
+}
+
+fn crate_of(files: &[(&str, &str)]) -> Sources {
+    files.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned())).collect()
+}
+
+#[test]
+fn modules_import_only_lower_ones() {
+    let found = upward_imports(&library(), MODULES);
+    let known: BTreeSet<(String, String)> =
+        UPWARD.iter().map(|&(file, to)| (file.into(), to.into())).collect();
+    let new: Vec<_> = found.difference(&known).collect();
+    assert!(new.is_empty(), "these files import a higher module: {new:#?}");
+    let gone: Vec<_> = known.difference(&found).collect();
+    assert!(gone.is_empty(), "these imports are gone: remove them from UPWARD: {gone:#?}");
+}
+
+#[test]
+fn files_import_each_other_in_no_circle() {
+    let found = circles(&library());
+    let known: BTreeSet<Vec<String>> =
+        CIRCLES.iter().map(|files| files.iter().map(|&file| file.to_owned()).collect()).collect();
+    let is_part =
+        |circle: &&Vec<String>| known.iter().any(|all| circle.iter().all(|file| all.contains(file)));
+    let new: Vec<_> = found.iter().filter(|circle| !is_part(circle)).collect();
+    assert!(new.is_empty(), "these files import each other in circles: {new:#?}");
+    let gone: Vec<_> = known.difference(&found).collect();
+    assert!(
+        gone.is_empty(),
+        "these circles are gone or smaller: shorten CIRCLES: {gone:#?}, found {found:#?}"
+    );
+}
+
+#[test]
+fn imports_are_read_however_they_are_written() {
+    let sources = crate_of(&[
+        ("lib.rs", "mod low; mod high;"),
+        (
+            "low/mod.rs",
+            "mod item; mod plain;\n#[cfg(test)]\nmod laws;\npub use item::{Item, other as Renamed};",
+        ),
+        ("low/item.rs", "pub struct Item; // use crate::high::Thing;\npub fn other() {}"),
+        (
+            "low/plain.rs",
+            "fn f<'a>(c: char) -> &'a str { if c == '\"' { \"crate::high::Thing\" } else { r#\"super::item\"# } }",
+        ),
+        ("low/laws.rs", "use crate::high::Thing;"),
+        (
+            "high/mod.rs",
+            "mod by_use;\nmod by_path;\npub struct Thing;\n#[cfg(test)]\nmod tests { use super::by_use::Unused; }",
+        ),
+        (
+            "high/by_use.rs",
+            "use crate::{low::{Item as It, Renamed}, high::Thing};\n#[cfg(test)] use super::by_path::g;",
+        ),
+        ("high/by_path.rs", "pub fn g() { let _ = (crate::low::Item, super::by_use::Other::new()); }"),
+    ]);
+    let read = Crate::new(&sources);
+    let imports = read.imports();
+    let of = |path: &str| imports[path].iter().copied().collect::<Vec<_>>();
+    assert!(!imports.contains_key("low/laws.rs"));
+    assert_eq!(of("low/mod.rs"), [""; 0]);
+    assert_eq!(of("low/item.rs"), [""; 0]);
+    assert_eq!(of("low/plain.rs"), [""; 0]);
+    assert_eq!(of("high/mod.rs"), [""; 0]);
+    assert_eq!(of("high/by_use.rs"), ["high/mod.rs", "low/item.rs"]);
+    assert_eq!(of("high/by_path.rs"), ["high/by_use.rs", "low/item.rs"]);
+    assert!(circles(&sources).is_empty() && upward_imports(&sources, &["low", "high"]).is_empty());
+}
+
+#[test]
+fn upward_imports_and_circles_are_found() {
+    // In a small crate.
+    let sources = crate_of(&[
+        ("low/mod.rs", "pub mod a; pub mod b; pub mod c;"),
+        ("low/a.rs", "use super::b::B; pub struct A;"),
+        ("low/b.rs", "use super::c::C; pub struct B;"),
+        ("low/c.rs", "pub struct C; fn f() -> crate::low::a::A { crate::high::thing() }"),
+        ("high.rs", "use crate::low::a::A; pub fn thing() {}"),
+    ]);
+    let all = ["high.rs", "low/a.rs", "low/b.rs", "low/c.rs"].map(str::to_owned).to_vec();
+    assert_eq!(circles(&sources), BTreeSet::from([all]));
+    assert_eq!(
+        upward_imports(&sources, &["low", "high"]),
+        BTreeSet::from([("low/c.rs".into(), "high".into())])
+    );
+    assert_eq!(upward_imports(&sources, &["low"]).len(), 2, "a module that is not in the order is reported");
+
+    // In this one, with one more line in a file of its lowest module.
+    let mut sources = library();
+    let before = upward_imports(&sources, MODULES).len();
+    let text = sources.get_mut("lattice/grid.rs").expect("a file");
+    text.push_str("\nuse crate::volume::{Brick, DiggingRules};\n");
+    assert_eq!(upward_imports(&sources, MODULES).len(), before + 1);
+    let has = |circle: &Vec<String>, file: &str| circle.iter().any(|own| own == file);
+    assert!(circles(&sources).iter().any(|all| has(all, "lattice/grid.rs") && has(all, "volume/brick.rs")));
+}
