@@ -360,9 +360,9 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
-        Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
-        MaterialColors, Redo, ShownLevels, SlimVertices, TargetedBrush, TerrainHit, TerrainReady, Terrains,
-        Tile, Undo,
+        DetailSource, Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround,
+        LoosePieceFound, MaterialColors, Redo, Redraw, ShownLevels, SlimVertices, TargetedBrush, TerrainHit,
+        TerrainPropagatePlugin, TerrainReady, Terrains, Tile, Undo,
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{
@@ -413,5 +413,6 @@ mod guide {
         Water "docs/guide/src/recipes/water.md"
         Navigation "docs/guide/src/recipes/navigation.md"
         Cameras "docs/guide/src/recipes/cameras.md"
+        FloatingOrigin "docs/guide/src/recipes/floating-origin.md"
     }
 }

@@ -7,7 +7,7 @@ use super::debris_collider;
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, SNAP};
 use crate::plugin::{
-    BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, ThreadTask, Threads,
+    BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, Places, ThreadTask, Threads,
     trigger_if_alive,
 };
 use crate::surface::SurfaceMesh;
@@ -116,7 +116,7 @@ fn break_off(
     settings: Res<DebrisSettings>,
     mut found: MessageReader<LoosePieceFound>,
     terrains: Query<(&Terrain, Option<&MaterialColors>)>,
-    places: TransformHelper,
+    places: Places,
     pieces: Query<(), With<DebrisOf>>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
 ) {
@@ -169,7 +169,7 @@ fn describe(found: &LoosePieceFound, half: Vec3, stay: f32) -> Debris {
 fn despawn_in_restored_ground(
     mut commands: Commands,
     mut steps: MessageReader<HistoryMoved>,
-    places: TransformHelper,
+    places: Places,
     terrains: Query<&TerrainDebris>,
     pieces: Query<(Entity, AnyOf<(&Debris, &PendingDebris)>, &Transform)>,
 ) {

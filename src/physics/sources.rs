@@ -9,7 +9,7 @@ use super::colliders::GroundColliders;
 use super::near::{Neighbourhood, ahead, stops, voxel_size};
 use super::solids::{Extent, Solids};
 use super::{HeldByGround, PhysicsFigures};
-use crate::plugin::{LevelsOfDetail, WantedTiles};
+use crate::plugin::{LevelsOfDetail, Places, WantedTiles};
 use crate::terrain::Terrain;
 
 /// How far ahead of a moving source colliders are made, in seconds.
@@ -42,7 +42,7 @@ impl Default for ColliderSource {
 /// Finds where sources want colliders.
 pub(super) fn find_near(
     colliders: Res<GroundColliders>,
-    places: TransformHelper,
+    places: Places,
     terrains: Query<(Entity, &Terrain, Has<LevelsOfDetail>)>,
     sources: Query<(Entity, &ColliderSource, Option<&LinearVelocity>, Option<&HeldByGround>, Extent)>,
     solids: Solids,

@@ -91,6 +91,7 @@ pub struct Run {
 /// game's, not the terrain's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Plain", into = "Plain")]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct LoosePiece {
     /// What happened to it.
     pub fate: PieceFate,
