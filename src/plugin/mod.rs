@@ -14,6 +14,7 @@
 //! or removed. An entity that is spawned with its own, of the same type, keeps it until the terrain's changes.
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
+//! [`Terrain`]: crate::terrain::Terrain
 //!
 //! A [`SurfaceProcessor`] builds extra data for each surface off-thread, and swaps it in with the mesh. Figures are in
 //! [`BurrowFigures`], and in Bevy's [`diagnostics`]; transactions, edits, meshes, commits and loads have tracing spans.
@@ -91,7 +92,6 @@ use bevy::ecs::reflect::ReflectMessage;
 use bevy::prelude::*;
 
 use crate::brush::Brush;
-use crate::terrain::Terrain;
 
 /// Everything a game needs. Parts can be disabled, as in any plugin group.
 ///

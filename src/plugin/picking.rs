@@ -35,7 +35,7 @@ pub struct TerrainPickingPlugin;
 
 impl Plugin for TerrainPickingPlugin {
     fn build(&self, app: &mut App) {
-        let has_picking = resource_exists::<RayMap>.and(resource_exists::<Messages<PointerHits>>);
+        let has_picking = resource_exists::<RayMap>.and_then(resource_exists::<Messages<PointerHits>>);
         app.add_systems(PreUpdate, hit_terrains.in_set(PickingSystems::Backend).run_if(has_picking));
     }
 }

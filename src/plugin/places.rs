@@ -17,11 +17,11 @@ use crate::terrain::Terrain;
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TerrainPlace {
     /// The global transform that the plugin wrote last.
-    written: GlobalTransform,
+    pub(super) written: GlobalTransform,
     /// The scale that the plugin wrote last.
     pub(super) scale: f32,
     /// Whether something else maintains the `GlobalTransform` of this terrain, so that its `Transform` does not lead to it.
-    is_external: bool,
+    pub(super) is_external: bool,
 }
 
 /// The `Transform`s of entities and of their ancestors.
@@ -126,9 +126,13 @@ pub(super) fn find_external_places(
     mut terrains: Query<(Entity, &GlobalTransform, &mut TerrainPlace), With<Terrain>>,
 ) {
     for (entity, global, mut place) in &mut terrains {
-        let is_external = places
-            .of(entity)
-            .is_none_or(|now| !is_same_place(&now, global) && !is_same_place(&place.written, global));
+        let is_elsewhere = |now: GlobalTransform| {
+            // A place that is no place is nobody's.
+            global.affine().is_finite()
+                && !is_same_place(&now, global)
+                && !is_same_place(&place.written, global)
+        };
+        let is_external = places.of(entity).is_none_or(is_elsewhere);
         place.set_if_neq(TerrainPlace { is_external, ..*place });
     }
 }
