@@ -224,14 +224,20 @@ impl Plugin for TerrainPlugin {
                     (levels::begin_level_changes, commit::begin_transactions)
                         .chain()
                         .in_set(BurrowSystems::Begin),
-                    diagnostics::measure_frame.after(BurrowSystems::Begin),
                 ),
             );
-        // In every frame, whatever the game gates.
-        app.add_systems(Last, (inbox::keep_requests, places::find_external_places))
-            .add_systems(Update, engine::trim_engines.after(BurrowSystems::Propagate))
-            // Terrains that were spawned before the plugin was added.
-            .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
+        // In every frame, whatever the game gates; and after all that changes terrains, which needs no order then.
+        app.add_systems(
+            Last,
+            (
+                inbox::keep_requests,
+                places::find_external_places,
+                diagnostics::measure_frame,
+                engine::trim_engines,
+            ),
+        )
+        // Terrains that were spawned before the plugin was added.
+        .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
         diagnostics::register(app);
         propagate::add(app);
     }

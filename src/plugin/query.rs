@@ -160,7 +160,9 @@ impl Terrains<'_, '_> {
         let far = Vec3::splat(1.0e9);
         let (min, max) = (min.clamp(-far, far), max.clamp(-far, far));
         self.terrains.iter().all(|(_, terrain, place, entities)| {
-            let loaded = entities.is_some_and(|entities| entities.show(terrain.world()));
+            let is_shown =
+                |entities: &TerrainEntities| entities.show(terrain.world()) && !entities.is_outdated;
+            let loaded = entities.is_some_and(is_shown);
             let inverse = place.affine().inverse();
             let corners = (0..8).map(|corner| {
                 let is_high = BVec3::new(corner & 1 > 0, corner & 2 > 0, corner & 4 > 0);

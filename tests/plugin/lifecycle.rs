@@ -509,7 +509,9 @@ impl Life {
                 let old = world.get::<ChildOf>(terrain).map(ChildOf::parent);
                 let root = world.spawn(root).id();
                 world.entity_mut(terrain).insert(ChildOf(root));
-                old.into_iter().for_each(|old| drop(world.despawn(old)));
+                for old in old {
+                    world.despawn(old);
+                }
             }
             Event::Redraw => self.stage.app.world_mut().trigger(Redraw { terrain: Some(terrain) }),
             Event::CameraOff => {

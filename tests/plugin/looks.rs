@@ -19,7 +19,11 @@ fn count_touched(mut events: MessageReader<AssetEvent<GroundMaterial>>, mut touc
 }
 
 fn stage() -> Stage {
-    let mut stage = Stage::windowless();
+    stage_with(())
+}
+
+fn stage_with<M>(plugins: impl bevy::app::Plugins<M>) -> Stage {
+    let mut stage = Stage::windowless_with(plugins);
     stage
         .app
         .insert_resource(GroundTextures::Baked { side: 16, anisotropy: 1 })
@@ -118,8 +122,8 @@ impl Material for Toon {}
 
 #[test]
 fn no_tile_has_two_materials_whatever_is_put_on_its_terrain() {
-    let mut stage = stage();
-    stage.app.init_asset::<Toon>().add_plugins(TerrainMaterialPlugin::<Toon>::default());
+    let mut stage = stage_with(TerrainMaterialPlugin::<Toon>::default());
+    stage.app.init_asset::<Toon>();
     type Own = MeshMaterial3d<Toon>;
     let world = stage.app.world_mut();
     let plain =
@@ -255,8 +259,7 @@ fn everything_is_drawn_again_when_asked_and_no_frame_is_without_ground() {
 fn any_component_goes_to_tiles_chunks_and_pieces() {
     #[derive(Component, Clone, Debug, PartialEq)]
     struct Minimap(u32);
-    let mut stage = stage();
-    stage.app.add_plugins((
+    let mut stage = stage_with((
         TerrainPropagatePlugin::<Minimap>::default(),
         TerrainPropagatePlugin::<Wireframe>::default(),
     ));

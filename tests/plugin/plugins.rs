@@ -4,7 +4,6 @@ use std::collections::HashMap;
 
 use bevy::app::ScheduleRunnerPlugin;
 use bevy::ecs::schedule::{ScheduleLabel, SystemKey};
-use bevy::ecs::system::System;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -26,9 +25,9 @@ fn a_terrain_may_be_there_before_the_plugin() {
     app.add_plugins(BurrowPlugins);
     app.finish();
     app.cleanup();
-    app.update();
-    assert_eq!(app.world().resource::<Found>().0, Some(4.0));
     let mut stage = Stage::of(app);
+    stage.frame();
+    assert_eq!(stage.app.world().resource::<Found>().0, Some(4.0));
     stage.settle();
     assert_eq!(stage.count::<Tile>(), 16);
     assert!(stage.app.world().entity(terrain).contains::<MaterialColors>());

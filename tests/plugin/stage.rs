@@ -77,6 +77,12 @@ impl Stage {
     /// Bevy's own plugins, without a window and without a renderer: materials are assets, and nothing is drawn.
     #[cfg(feature = "examples")]
     pub fn windowless() -> Self {
+        Self::windowless_with(())
+    }
+
+    /// The same with more plugins.
+    #[cfg(feature = "examples")]
+    pub fn windowless_with<M>(after: impl bevy::app::Plugins<M>) -> Self {
         use bevy::app::PluginsState;
         use bevy::log::LogPlugin;
         use bevy::render::RenderPlugin;
@@ -93,7 +99,7 @@ impl Stage {
             .disable::<WinitPlugin>()
             .disable::<PipelinedRenderingPlugin>();
         let mut app = App::new();
-        app.add_plugins(plugins).add_plugins(BurrowPlugins);
+        app.add_plugins(plugins).add_plugins(BurrowPlugins).add_plugins(after);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();
         }
