@@ -509,7 +509,7 @@ impl Life {
                 let old = world.get::<ChildOf>(terrain).map(ChildOf::parent);
                 let root = world.spawn(root).id();
                 world.entity_mut(terrain).insert(ChildOf(root));
-                for old in old {
+                if let Some(old) = old {
                     world.despawn(old);
                 }
             }
