@@ -226,18 +226,12 @@ impl Plugin for TerrainPlugin {
                         .in_set(BurrowSystems::Begin),
                 ),
             );
-        // In every frame, whatever the game gates; and after all that changes terrains, which needs no order then.
-        app.add_systems(
-            Last,
-            (
-                inbox::keep_requests,
-                places::find_external_places,
-                diagnostics::measure_frame,
-                engine::trim_engines,
-            ),
-        )
-        // Terrains that were spawned before the plugin was added.
-        .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
+        // In every frame, whatever the game gates.
+        app.add_systems(Last, (inbox::keep_requests, places::find_external_places))
+            // They read terrains, which systems in `Update` and `Last` change.
+            .add_systems(PostUpdate, (diagnostics::measure_frame, engine::trim_engines))
+            // Terrains that were spawned before the plugin was added.
+            .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
         diagnostics::register(app);
         propagate::add(app);
     }
