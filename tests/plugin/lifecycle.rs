@@ -194,6 +194,8 @@ struct Life {
     steps_heard: usize,
     /// Whether something was sent that no frame has collected yet.
     is_uncollected: bool,
+    /// Whether a step is among that.
+    has_step: bool,
     is_slow: Arc<AtomicBool>,
     /// Entities before there was a terrain.
     before: usize,
@@ -257,6 +259,7 @@ impl Life {
             steps_sent: 0,
             steps_heard: 0,
             is_uncollected: false,
+            has_step: false,
             is_slow,
             before,
             #[cfg(feature = "store")]
@@ -332,6 +335,8 @@ impl Life {
 
     /// Sends a brush in voxels of the terrain to the terrain, wherever that is.
     fn dig(&mut self) {
+        // Brushes of a frame are read before its steps.
+        self.collect_steps();
         let brush = self.brush();
         self.sent.push(brush.tag);
         self.is_uncollected = true;
@@ -359,8 +364,11 @@ impl Life {
         if !self.is_alive() {
             return;
         }
+        // And undos before redos.
+        self.collect_steps();
         self.steps_sent += 1;
         self.is_uncollected = true;
+        self.has_step = true;
         self.expected.requests.push(Request::Step(step));
         let terrain = Some(self.terrain);
         match step {
@@ -386,9 +394,16 @@ impl Life {
         }
     }
 
+    fn collect_steps(&mut self) {
+        if self.has_step {
+            self.run(1);
+        }
+    }
+
     fn run(&mut self, frames: usize) {
         self.stage.frames(frames);
         self.is_uncollected &= frames == 0;
+        self.has_step &= frames == 0;
     }
 
     /// Brings the terrain into a phase.
@@ -475,6 +490,7 @@ impl Life {
                 self.stage.app.world_mut().entity_mut(terrain).remove::<Disabled>();
             }
             Event::Gate => {
+                self.collect();
                 self.stage.app.world_mut().resource_mut::<Runs>().0 = false;
                 self.stage.frames(3);
                 self.dig();
