@@ -375,9 +375,9 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
-        Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
-        LoosePieceReturned, MaterialColors, Redo, ShownLevels, SlimVertices, TargetedBrush, TerrainHit,
-        TerrainReady, Terrains, Tile, Undo,
+        DetailSource, Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround,
+        LoosePieceFound, LoosePieceReturned, MaterialColors, Redo, Redraw, ShownLevels, SlimVertices,
+        TargetedBrush, TerrainHit, TerrainPropagatePlugin, TerrainReady, Terrains, Tile, Undo,
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{
@@ -432,5 +432,6 @@ mod guide {
         Water "docs/guide/src/recipes/water.md"
         Navigation "docs/guide/src/recipes/navigation.md"
         Cameras "docs/guide/src/recipes/cameras.md"
+        FloatingOrigin "docs/guide/src/recipes/floating-origin.md"
     }
 }

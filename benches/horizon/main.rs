@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bevy_burrow::ground::{GreyImage, Ground, ImageScale, ImageSource, NoiseSource};
-use bevy_burrow::levels::{Choice, Cut, Eye, Node};
+use bevy_burrow::levels::{Choice, Cut, Eye, Node, View};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{ChooseCut, GroundFacts, KnownNodes, NodeUpdate, World};
 use glam::{Vec2, Vec3, Vec3Swizzles};
@@ -118,7 +118,7 @@ fn summit(world: &World, middle: f32) -> Vec3 {
 }
 
 fn eye(position: Vec3) -> Eye {
-    Eye { position, velocity: Vec3::ZERO, pixels: PIXELS }
+    Eye { position, velocity: Vec3::ZERO, pixels: PIXELS, view: View::Perspective }
 }
 
 /// Directions in which an eye looks.
@@ -273,7 +273,7 @@ fn flight(mut terrain: Terrain, summit: Vec3) {
             continue;
         }
         let known = Arc::clone(&known);
-        let eyes = [Eye { position: at, velocity, pixels: PIXELS }];
+        let eyes = [Eye { position: at, velocity, pixels: PIXELS, view: View::Perspective }];
         let choose: Arc<ChooseCut> =
             Arc::new(move |world, cut| known.next_cut(world, cut, &Choice::default(), &eyes, 16));
         let start = Instant::now();

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use bevy_burrow::levels::{Choice, Cut, Eye, Node, NodeFacts};
+use bevy_burrow::levels::{Choice, Cut, Eye, Node, NodeFacts, View};
 use bevy_burrow::surface::{SeamChecker, SeamReport, SurfaceMesh};
 use bevy_burrow::terrain::World;
 use glam::Vec3;
@@ -40,7 +40,12 @@ impl Levels {
         let cut = match (&args.eye[..], args.random_cut) {
             (&[x, y, z], _) => {
                 let pixels = args.screen_height as f32 / (2.0 * (ANGLE / 2.0).to_radians().tan());
-                let eye = Eye { position: Vec3::new(x, y, z), velocity: Vec3::ZERO, pixels };
+                let eye = Eye {
+                    position: Vec3::new(x, y, z),
+                    velocity: Vec3::ZERO,
+                    pixels,
+                    view: View::Perspective,
+                };
                 // Asked more than once where limits grow.
                 let known: RefCell<HashMap<Node, NodeFacts>> = RefCell::default();
                 let facts =

@@ -1,5 +1,7 @@
 //! The brush: what a game asks for.
 
+#[cfg(feature = "plugin")]
+use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -29,8 +31,15 @@ use crate::ground::MaterialId;
 /// The fields are those of its [`Shape`] (a cuboid is a `box`), those of its [`Operation`] (the base of a terrace is
 /// its `height`), and for operations that sculpt those of the [`Blend`]. Fields of the blend, `rotation`, `roughness`,
 /// `power`, `tag` and `stroke` may be left out; other fields are refused.
+///
+/// With the feature `plugin` it is reflected as such a line, and so can be sent by Bevy's remote protocol.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Line", into = "Line")]
+#[cfg_attr(
+    feature = "plugin",
+    derive(bevy::reflect::Reflect),
+    reflect(opaque, Clone, Debug, PartialEq, Serialize, Deserialize)
+)]
 pub struct Brush {
     /// Where.
     pub shape: Shape,

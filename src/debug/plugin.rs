@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy::asset::AssetEventSystems;
-use bevy::camera::visibility::RenderLayers;
+use bevy::camera::visibility::{RenderLayers, VisibilitySystems};
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
@@ -12,7 +12,7 @@ use super::lines::{Layer, LineBuffer};
 use super::views::{self, Dirty, Place};
 use super::{BurrowDebug, DebugView};
 use crate::lattice::BrickPos;
-use crate::plugin::{BrushApplied, BurrowSystems, HistoryMoved};
+use crate::plugin::{BrushApplied, HistoryMoved};
 use crate::terrain::{DrawnCut, Terrain, Version};
 
 /// The shortest time between two drawings of a view while the world changes.
@@ -32,10 +32,11 @@ impl Plugin for BurrowDebugPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<BurrowDebug>()
             .init_resource::<DirtyBricks>()
-            .add_systems(Update, note_dirty.after(BurrowSystems::Commit))
+            .add_systems(PostUpdate, note_dirty.before(draw))
             .add_systems(
                 PostUpdate,
                 draw.after(TransformSystems::Propagate)
+                    .after(VisibilitySystems::VisibilityPropagate)
                     .before(AssetEventSystems)
                     .run_if(resource_exists::<Assets<GizmoAsset>>),
             );
@@ -57,14 +58,14 @@ struct DirtyBricks(HashMap<(Entity, BrickPos), Duration>);
 
 /// Records the stored bricks in the bounds of new receipts, and forgets old ones.
 fn note_dirty(
-    time: Res<Time>,
+    time: Option<Res<Time>>,
     debug: Res<BurrowDebug>,
     mut receipts: MessageReader<BrushApplied>,
     mut moves: MessageReader<HistoryMoved>,
     terrains: Query<&Terrain>,
     mut dirty: ResMut<DirtyBricks>,
 ) {
-    let now = time.elapsed();
+    let now = time.map_or(Duration::ZERO, |time| time.elapsed());
     let fade = Duration::try_from_secs_f32(debug.fade).unwrap_or(Duration::ZERO);
     if !dirty.0.is_empty() {
         dirty.0.retain(|_, since| now.saturating_sub(*since) < fade);
@@ -120,7 +121,7 @@ struct Drawing {
 /// Draws views that are outdated, and removes those that are switched off.
 fn draw(
     mut commands: Commands,
-    time: Res<Time>,
+    time: Option<Res<Time>>,
     debug: Res<BurrowDebug>,
     dirty: Res<DirtyBricks>,
     terrains: Query<(Entity, &Terrain, &GlobalTransform, Option<&RenderLayers>, &InheritedVisibility)>,
@@ -144,7 +145,9 @@ fn draw(
     // One more time after the last one is forgotten.
     *frames += u64::from(!dirty.0.is_empty() || *faded);
     *faded = !dirty.0.is_empty();
-    let now = time.elapsed();
+    // Without a clock, views are drawn as soon as they are outdated.
+    let period = if time.is_some() { PERIOD } else { Duration::ZERO };
+    let now = time.map_or(Duration::ZERO, |time| time.elapsed());
     for (entity, terrain, own_place, render_layers, _) in terrains.iter().filter(|(.., seen)| seen.get()) {
         let Some(focus) = focus(&debug, terrain, own_place, &cameras) else { continue };
         let scale = own_place.scale().x.abs().max(f32::MIN_POSITIVE);
@@ -169,7 +172,7 @@ fn draw(
                 let is_urgent = old.settings != key.settings
                     || old.fading != key.fading
                     || old.render_layers != key.render_layers;
-                let is_as_it_was = *old == key || !is_urgent && now.saturating_sub(*since) < PERIOD;
+                let is_as_it_was = *old == key || !is_urgent && now.saturating_sub(*since) < period;
                 if is_as_it_was && own.len() == *layers {
                     continue;
                 }

@@ -10,6 +10,9 @@ const GROWTH: f32 = 1.2;
 /// The least of all limits in pixels: what is less, or no number, counts as this.
 const LEAST_PIXELS: f32 = 0.01;
 
+/// Steps of the search for the place on an axis that is nearest to a box: it ends within 1/3,000 of the axis.
+const AXIS_STEPS: usize = 20;
+
 /// The least share of limits at which a node stays split: with none, nothing would ever be merged.
 const LEAST_STAY: f32 = 0.01;
 
@@ -23,9 +26,74 @@ pub struct Eye {
     pub position: Vec3,
     /// Voxels a second.
     pub velocity: Vec3,
-    /// Pixels that one voxel covers one voxel away: the height of the picture over twice the tangent of half the angle
-    /// of view.
+    /// Pixels that one voxel covers. In perspective, one voxel away: the height of the picture over twice the tangent of half
+    /// the angle of view.
     pub pixels: f32,
+    /// How sizes change with distance.
+    pub view: View,
+}
+
+/// How sizes on the screen change with distance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum View {
+    /// What is twice as far away is half as large.
+    #[default]
+    Perspective,
+    /// Everything in view has the same size, as in an orthographic projection. What is out of view counts as smaller, by how
+    /// many radii it is away from the axis.
+    Parallel {
+        /// From the eye to the far end of the view, in voxels.
+        axis: Vec3,
+        /// The greatest distance of what is in view from the axis, in voxels.
+        radius: f32,
+    },
+}
+
+impl Eye {
+    /// The distance of a box from the eye, or, in a parallel view, from its axis.
+    pub fn distance(&self, low: Vec3, high: Vec3) -> f32 {
+        self.distance_from(self.position, low, high)
+    }
+
+    /// The distance if the eye were at this place.
+    fn distance_from(&self, place: Vec3, low: Vec3, high: Vec3) -> f32 {
+        let high = high.max(low);
+        let to_box = |place: Vec3| place.distance(place.clamp(low, high));
+        match self.view {
+            View::Perspective => to_box(place),
+            View::Parallel { axis, .. } => {
+                // The distance is a convex function of the place on the axis.
+                let [mut from, mut to] = [0.0, 1.0];
+                for _ in 0..AXIS_STEPS {
+                    let [a, b] = [from + (to - from) / 3.0, to - (to - from) / 3.0];
+                    if to_box(place + axis * a) <= to_box(place + axis * b) {
+                        to = b;
+                    } else {
+                        from = a;
+                    }
+                }
+                to_box(place + axis * ((from + to) / 2.0))
+            }
+        }
+    }
+
+    /// How many times smaller than `pixels` a voxel is at this distance.
+    fn reduction(&self, distance: f32) -> f32 {
+        match self.view {
+            // One voxel away it is large enough in any case.
+            View::Perspective => distance.max(1.0),
+            View::Parallel { radius, .. } => (distance / radius.max(1.0)).max(1.0),
+        }
+    }
+
+    /// Whether all numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let is_view_finite = match self.view {
+            View::Perspective => true,
+            View::Parallel { axis, radius } => axis.is_finite() && radius.is_finite(),
+        };
+        self.position.is_finite() && self.pixels.is_finite() && is_view_finite
+    }
 }
 
 /// The properties of a node that a choice depends on.
@@ -81,8 +149,7 @@ impl Choice {
     /// that they had. Eyes whose numbers are not finite see nothing.
     pub fn cut(&self, before: &Cut, eyes: &[Eye], facts: impl Fn(Node) -> NodeFacts) -> Cut {
         let grid = before.grid();
-        let is_somewhere = |eye: &&Eye| eye.position.is_finite() && eye.pixels.is_finite();
-        let eyes: Vec<Eye> = eyes.iter().filter(is_somewhere).copied().collect();
+        let eyes: Vec<Eye> = eyes.iter().filter(|eye| eye.is_finite()).copied().collect();
         let with_limits = |growth: f32| {
             Cut::new(grid, |node| {
                 let share = if before.is_split(node) { self.stay.clamp(LEAST_STAY, 1.0) } else { 1.0 };
@@ -117,10 +184,9 @@ impl Choice {
         let has_edits = facts.has_edits;
         eyes.iter().any(|eye| {
             let places = [eye.position, eye.position + eye.velocity * self.look_ahead];
-            let distance = |place: Vec3| place.distance(place.clamp(low, high.max(low)));
+            let distance = |place: Vec3| eye.distance_from(place, low, high);
             let distance = places.map(distance).into_iter().fold(f32::INFINITY, f32::min);
-            // One voxel away it is large enough in any case.
-            let pixels = eye.pixels / distance.max(1.0);
+            let pixels = eye.pixels / eye.reduction(distance);
             let is_rough =
                 stride * pixels > limit(self.cell_pixels) && facts.error * pixels > limit(self.error_pixels);
             let is_edited = has_edits && stride * pixels > limit(self.edited_pixels);
@@ -148,7 +214,8 @@ mod tests {
     }
 
     fn eye(x: f32, z: f32) -> Eye {
-        Eye { position: Vec3::new(x, 302.0, z), velocity: Vec3::ZERO, pixels: PIXELS }
+        let (position, velocity) = (Vec3::new(x, 302.0, z), Vec3::ZERO);
+        Eye { position, velocity, pixels: PIXELS, view: View::Perspective }
     }
 
     fn world() -> LevelGrid {
@@ -186,6 +253,52 @@ mod tests {
         assert_is_cut(&cut);
         let tile = world().chunks().tile_of_cell(crate::lattice::Column::new(5000, 9000));
         assert_eq!(cut.node_at(tile).map(|node| node.level), Some(0));
+    }
+
+    /// A parallel view straight down, of a picture of this many voxels' height and 1,080 pixels.
+    fn view_from_above(x: f32, z: f32, height: f32) -> Eye {
+        let view = View::Parallel { axis: Vec3::NEG_Y * 2000.0, radius: height };
+        let position = Vec3::new(x, 1500.0, z);
+        Eye { position, velocity: Vec3::ZERO, pixels: 1080.0 / height, view }
+    }
+
+    #[test]
+    fn a_parallel_view_is_as_fine_as_its_picture_needs_and_coarse_elsewhere() {
+        let choice = Choice { cell_pixels: 12.0, error_pixels: 0.01, ..Choice::default() };
+        let mut before = None;
+        for height in [40.0, 400.0, 4000.0] {
+            let cut =
+                choice.cut(&Cut::coarsest(world()), &[view_from_above(8000.0, 8000.0, height)], mountains);
+            let level = |x, z| {
+                let tile = world().chunks().tile_of_cell(crate::lattice::Column::new(x, z));
+                cut.node_at(tile).map(|node| node.level).expect("inside the world")
+            };
+            let below = level(8000, 8000);
+            // The coarsest cells that are smaller than the limit, and no finer.
+            let cell = 1080.0 / height * f32::from(1u16 << below);
+            assert!(below == 0 || cell / 2.0 <= 12.0 && cell > 5.9, "{height}: level {below}");
+            assert!(before.is_none_or(|before| before <= below), "farther views are no finer");
+            assert!(level(200, 200) >= below, "{height}");
+            before = Some(below);
+        }
+        // A view of all of the world from above needs few nodes, one of a house from above few around it.
+        let few = choice.cut(&Cut::coarsest(world()), &[view_from_above(8000.0, 8000.0, 40.0)], mountains);
+        assert!(few.nodes().count() < 1500, "{}", few.nodes().count());
+    }
+
+    #[test]
+    fn the_distance_from_an_axis_is_that_of_its_nearest_place() {
+        let mut rng = fastrand::Rng::with_seed(3);
+        for _ in 0..200 {
+            let mut place = |size: f32| Vec3::new(rng.f32(), rng.f32(), rng.f32()) * size - size / 2.0;
+            let (position, axis, low) = (place(100.0), place(200.0), place(100.0));
+            let high = low + place(30.0).abs();
+            let view = View::Parallel { axis, radius: 1.0 };
+            let eye = Eye { position, velocity: Vec3::ZERO, pixels: 1.0, view };
+            let along = (0..=4000).map(|step| position + axis * (step as f32 / 4000.0));
+            let expected = along.map(|at| at.distance(at.clamp(low, high))).fold(f32::INFINITY, f32::min);
+            assert!((eye.distance(low, high) - expected).abs() < 0.2, "{eye:?} {low} {high}");
+        }
     }
 
     proptest! {

@@ -12,7 +12,7 @@ mod cut;
 mod node;
 mod steps;
 
-pub use choice::{Choice, Eye, NodeFacts};
+pub use choice::{Choice, Eye, NodeFacts, View};
 pub use cut::Cut;
 pub use node::{LevelGrid, Node};
 pub use steps::Step;

@@ -9,6 +9,7 @@ use bevy::prelude::*;
 use super::HeldByGround;
 use super::character::{Character, CharacterMotion, CharacterSteering};
 use super::walking::Walk;
+use crate::plugin;
 
 /// Moves characters, by default in `FixedUpdate`.
 pub struct CharacterPlugin {
@@ -87,7 +88,7 @@ fn resize(
 #[derive(SystemParam)]
 struct Places<'w, 's> {
     parents: Query<'w, 's, &'static ChildOf>,
-    transforms: ParamSet<'w, 's, (TransformHelper<'w, 's>, Query<'w, 's, &'static mut Transform>)>,
+    transforms: ParamSet<'w, 's, (plugin::Places<'w, 's>, Query<'w, 's, &'static mut Transform>)>,
 }
 
 impl Places<'_, '_> {

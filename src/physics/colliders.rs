@@ -14,7 +14,7 @@ use super::ground::{GroundBody, GroundCollider, GroundContact};
 use super::near::Neighbourhood;
 use super::shape::GroundShape;
 use super::wake::{GroundChange, GroundChanges};
-use crate::plugin::{CommitAction, Part, ShownSurface, SurfaceProcessor};
+use crate::plugin::{CommitAction, Part, Places, ShownSurface, SurfaceProcessor};
 use crate::surface::SurfaceMesh;
 use crate::terrain::Drawn;
 
@@ -243,7 +243,7 @@ pub(super) fn follow(
         (Entity, &Children),
         (With<GroundCollider>, Or<(Changed<GlobalTransform>, Changed<GroundCollider>)>),
     >,
-    places: TransformHelper,
+    places: Places,
     mut bodies: Query<(&GroundBody, &Collider, Ref<ColliderAabb>, &mut Position, &mut Rotation)>,
     mut changes: ResMut<GroundChanges>,
     mut figures: ResMut<PhysicsFigures>,

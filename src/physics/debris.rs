@@ -9,8 +9,8 @@ use super::debris_collider;
 use crate::ground::MaterialId;
 use crate::lattice::SNAP;
 use crate::plugin::{
-    BurrowSystems, GroundPiece, LoosePieceFound, LoosePieceReturned, MaterialColors, ThreadTask, Threads,
-    panic_message, trigger_if_alive,
+    BurrowSystems, GroundPiece, LoosePieceFound, LoosePieceReturned, MaterialColors, Places, ThreadTask,
+    Threads, panic_message, trigger_if_alive,
 };
 use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, PieceId, Terrain};
@@ -133,7 +133,7 @@ fn break_off(
     settings: Res<DebrisSettings>,
     mut found: MessageReader<LoosePieceFound>,
     terrains: Query<(&Terrain, Option<&MaterialColors>)>,
-    places: TransformHelper,
+    places: Places,
     pieces: Query<(), With<DebrisOf>>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
     mut number: Local<u64>,

@@ -12,7 +12,7 @@ use super::frame::{AHEAD, TerrainFrame};
 use super::solids::{Extent, FARTHEST, Reach, Solids};
 use super::{ColliderSource, PhysicsFigures, TerrainPhysicsDisabled};
 use crate::lattice::ChunkGrid;
-use crate::plugin::TerrainEntities;
+use crate::plugin::{Places, TerrainEntities};
 use crate::terrain::Terrain;
 
 /// Marks a body that is held still until the ground below it has colliders, because the terrain is loading or the body is
@@ -188,7 +188,7 @@ struct HoldCheck<'a, 'w, 's> {
     columns: &'a Columns,
     /// Columns whose colliders changed since the last frame.
     changed: Vec<ColumnKey>,
-    places: &'a TransformHelper<'w, 's>,
+    places: &'a Places<'w, 's>,
     /// Whether physics takes positions from transforms.
     follows_transform: bool,
 }
@@ -247,7 +247,7 @@ impl HoldCheck<'_, '_, '_> {
 pub(super) fn hold_bodies(
     mut commands: Commands,
     mut bodies: Query<Body, Without<super::GroundBody>>,
-    places: TransformHelper,
+    places: Places,
     config: Option<Res<PhysicsTransformConfig>>,
     terrains: Query<(Entity, &Terrain, Option<&TerrainEntities>), Without<TerrainPhysicsDisabled>>,
     sources: Query<(), With<ColliderSource>>,

@@ -11,7 +11,7 @@ use super::near::{Neighbourhood, ahead, stops, voxel_size};
 use super::solids::{Extent, Solids};
 use super::{HeldByGround, PhysicsFigures, TerrainPhysicsDisabled};
 use crate::lattice::ChunkGrid;
-use crate::plugin::{LevelsOfDetail, WantedTiles};
+use crate::plugin::{LevelsOfDetail, Places, WantedTiles};
 use crate::terrain::Terrain;
 
 /// How far ahead of a moving source colliders are made, in seconds.
@@ -65,7 +65,7 @@ fn warn_of_radius(source: Entity, terrain: Entity, bytes: f32) {
 /// Finds where sources want colliders.
 pub(super) fn find_near(
     colliders: Res<GroundColliders>,
-    places: TransformHelper,
+    places: Places,
     terrains: Query<(Entity, &Terrain, Has<LevelsOfDetail>), Without<TerrainPhysicsDisabled>>,
     sources: Query<(Entity, &ColliderSource, Option<&LinearVelocity>, Option<&HeldByGround>, Extent)>,
     solids: Solids,

@@ -1,10 +1,15 @@
 //! Moves messages into the queues of terrains: brushes, undo, redo.
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
+use super::figures::MainThread;
+use super::inbox::Requests;
+use super::places::{Places, is_usable};
 use super::reach::reaches;
+use super::reports::{Report, Reports};
 use super::{
     BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LooseGround, LoosePieceFound, LoosePieceReturned,
     Redo, TargetedBrush, Undo, free_later,
@@ -19,15 +24,16 @@ use crate::terrain::{
 /// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected at
 /// once, and so is a brush that reaches no terrain. Edits of a terrain with an [`EditOutbox`] are put there instead.
 pub(super) fn collect_brushes(
-    mut brushes: MessageReader<Brush>,
-    mut targeted: MessageReader<TargetedBrush>,
+    mut requests: Requests,
     mut terrains: Query<(Entity, &mut Terrain, Option<&LooseGround>, Option<&mut EditOutbox>)>,
-    places: TransformHelper,
+    places: Places,
     mut answers: MessageWriter<BrushApplied>,
     mut found: MessageWriter<LoosePieceFound>,
     mut figures: ResMut<BurrowFigures>,
+    reports: Reports,
 ) {
     let start = Instant::now();
+    let (brushes, targeted) = requests.take_brushes();
     for (entity, mut terrain, loose, _) in &mut terrains {
         let loose = loose.map(|&loose| loose.into());
         if loose.is_some() && loose.as_ref() != terrain.loose() {
@@ -45,12 +51,12 @@ pub(super) fn collect_brushes(
     };
     // Brushes of one frame are undone together.
     let together = Together::Batch(unique());
-    for brush in brushes.read() {
+    for brush in &brushes {
         // The rejection that is sent if no terrain answers.
         let mut unanswered = Some(Rejection::OutsideWorld);
         // Only terrains that queue a brush are borrowed mutably, so that others do not count as changed.
         for (entity, mut terrain, _, outbox) in &mut terrains {
-            let Ok(place) = places.compute_global_transform(entity) else { continue };
+            let Some(place) = places.of(entity).filter(is_usable) else { continue };
             match Effect::of(brush, &place, terrain.world().grid()) {
                 Effect::Taken(edit) => {
                     match (outbox, terrain.admit(Some(&edit))) {
@@ -61,6 +67,7 @@ pub(super) fn collect_brushes(
                     unanswered = None;
                 }
                 Effect::Refused(error) => {
+                    warn_of_invalid(entity, &error, &reports);
                     reject(brush, Some(entity), error.into());
                     unanswered = None;
                 }
@@ -69,13 +76,24 @@ pub(super) fn collect_brushes(
             }
         }
         if let Some(why) = unanswered {
+            // Later ones may be meant so.
+            if figures.brushes == 0
+                && let Some((entity, terrain, ..)) = terrains.iter().next()
+                && reports.is_new(entity, Report::BrushBeside)
+            {
+                warn_of_beside((entity, terrain), brush, places.of(entity));
+            }
             reject(brush, None, why);
         }
     }
-    for &TargetedBrush { terrain: entity, ref brush } in targeted.read() {
-        match (terrains.get_mut(entity), places.compute_global_transform(entity)) {
-            (Ok((_, mut terrain, _, outbox)), Ok(place)) => {
-                let edit = Edit::quantize(&to_terrain(brush, &place)).map_err(Rejection::from);
+    for &TargetedBrush { terrain: entity, ref brush } in &targeted {
+        match (terrains.get_mut(entity), places.of(entity).filter(is_usable)) {
+            (Ok((_, mut terrain, _, outbox)), Some(place)) => {
+                let edit = Edit::quantize(&to_terrain(brush, &place));
+                if let Err(error) = &edit {
+                    warn_of_invalid(entity, error, &reports);
+                }
+                let edit = edit.map_err(Rejection::from);
                 match (outbox, terrain.admit(edit.as_ref().ok()), edit) {
                     (Some(mut outbox), _, Ok(edit)) => outbox.edits.push(edit),
                     (Some(_), _, Err(rejection)) | (None, Err(rejection), _) => {
@@ -87,7 +105,37 @@ pub(super) fn collect_brushes(
             _ => reject(brush, Some(entity), Rejection::TerrainGone),
         }
     }
-    figures.main_thread = start.elapsed();
+    figures.begin_frame(start.elapsed());
+}
+
+/// Logs the first brush that a terrain cannot apply. Receipts say it of each.
+fn warn_of_invalid(terrain: Entity, error: &BrushError, reports: &Reports) {
+    if reports.is_new(terrain, Report::BrushInvalid) {
+        warn!(
+            "a brush was rejected by the terrain {terrain}: {error}. Read `BrushApplied` to hear of others"
+        );
+    }
+}
+
+/// Logs that the first brushes reach no terrain.
+fn warn_of_beside((entity, terrain): (Entity, &Terrain), brush: &Brush, place: Option<GlobalTransform>) {
+    let [at, _] = brush.shape.extent().ends;
+    let bounds = terrain.world().grid().edit_bounds();
+    let corners = place.map(|place| [bounds.min, bounds.max].map(|at| place.transform_point(at.as_vec3())));
+    let extent = corners.map_or_else(
+        || "has no place".to_owned(),
+        |[min, max]| {
+            let (low, high) = (min.min(max), min.max(max));
+            format!(
+                "reaches from {:.0} to {:.0} along x and from {:.0} to {:.0} along z",
+                low.x, high.x, low.z, high.z
+            )
+        },
+    );
+    warn!(
+        "a brush at {at} reaches no terrain: brushes are in world space and metres, and the terrain {entity} {extent}. Read \
+         `BrushApplied` to hear of others"
+    );
 }
 
 /// How a brush in world space affects a terrain.
@@ -119,16 +167,16 @@ impl Effect {
 
 /// Queues undo and redo behind the brushes of this frame. A step without any terrain is answered at once.
 pub(super) fn collect_steps(
-    mut undos: MessageReader<Undo>,
-    mut redos: MessageReader<Redo>,
+    mut requests: Requests,
     mut terrains: Query<(Entity, &mut Terrain, Option<&mut EditOutbox>)>,
     mut messages: HistoryMessages,
     mut found: MessageWriter<LoosePieceFound>,
     mut figures: ResMut<BurrowFigures>,
 ) {
     let start = Instant::now();
-    let undos = undos.read().map(|&Undo { terrain }| (HistoryStep::Undo, terrain));
-    let redos = redos.read().map(|&Redo { terrain }| (HistoryStep::Redo, terrain));
+    let (undos, redos) = requests.take_steps();
+    let undos = undos.into_iter().map(|Undo { terrain }| (HistoryStep::Undo, terrain));
+    let redos = redos.into_iter().map(|Redo { terrain }| (HistoryStep::Redo, terrain));
     for (step, target) in undos.chain(redos) {
         let mut is_taken = false;
         let mut submit = |mut terrain: Mut<Terrain>, outbox: Option<Mut<EditOutbox>>| {
@@ -154,7 +202,7 @@ pub(super) fn collect_steps(
         let receipts = send_history(entity, &mut terrain, &mut messages);
         found.write_batch(receipts.iter().flat_map(|receipt| pieces_again(entity, receipt)));
     }
-    figures.main_thread += start.elapsed();
+    figures.measure(start.elapsed());
 }
 
 /// The pieces that the brushes of these receipts cut off.
@@ -182,7 +230,7 @@ pub(super) fn pieces_again(
 /// A terrain with [`LooseGround`] looks for pieces at once.
 pub(super) fn enable_loose_search(
     new: On<Insert, (LooseGround, Terrain)>,
-    mut terrains: Query<(&mut Terrain, &LooseGround)>,
+    mut terrains: Query<(&mut Terrain, &LooseGround), Allow<Disabled>>,
 ) {
     if let Ok((mut terrain, &loose)) = terrains.get_mut(new.entity) {
         terrain.set_loose(Some(loose.into()));
@@ -190,7 +238,10 @@ pub(super) fn enable_loose_search(
 }
 
 /// A terrain without [`LooseGround`] stops looking for pieces.
-pub(super) fn disable_loose_search(gone: On<Remove, LooseGround>, mut terrains: Query<&mut Terrain>) {
+pub(super) fn disable_loose_search(
+    gone: On<Remove, LooseGround>,
+    mut terrains: Query<&mut Terrain, Allow<Disabled>>,
+) {
     if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
         terrain.set_loose(None);
     }
@@ -232,7 +283,7 @@ fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
 pub(super) fn answer_removed(
     gone: On<Discard, Terrain>,
     mut commands: Commands,
-    mut terrains: Query<&mut Terrain>,
+    mut terrains: Query<&mut Terrain, Allow<Disabled>>,
     mut answers: MessageWriter<BrushApplied>,
     mut messages: HistoryMessages,
 ) {
@@ -252,7 +303,7 @@ pub(super) fn answer_removed(
 }
 
 /// Frees the history of a despawned terrain on another thread.
-pub(super) fn free_history(gone: On<Despawn, Terrain>, mut terrains: Query<&mut Terrain>) {
+pub(super) fn free_history(gone: On<Despawn, Terrain>, mut terrains: Query<&mut Terrain, Allow<Disabled>>) {
     if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
         free_later(terrain.rebudget_undo(0));
     }

@@ -1,5 +1,6 @@
 //! Starts transactions, and commits each of them whole in one frame.
 
+use bevy::camera::visibility::VisibilityClass;
 use bevy::diagnostic::Diagnostics;
 use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
@@ -8,18 +9,19 @@ use bevy::prelude::*;
 use super::collect::{HistoryMessages, send_history};
 use super::diagnostics::measure_commit;
 use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive};
-use super::figures::{TaskTimes, start_measuring, stop_measuring};
-use super::level_state::{LevelState, ShownLevels, WantedTiles};
+use super::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
+use super::level_state::{LevelState, ShownLevels, WantedTiles, Watchers};
 use super::load::Loading;
 use super::meshes::{BuiltMesh, VertexExtras};
-use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
+use super::processor::{BuildSettings, BuiltNode, BuiltSurface};
+use super::reports::{Report, Reports};
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
-    LoosePieceFound, MaterialColors, SlimVertices, SurfaceProcessors, free_later,
+    LoosePieceFound, MaterialColors, SlimVertices, free_later,
 };
 use crate::lattice::ChunkPos;
-use crate::terrain::{Drawn, FieldNews, Rejection, Terrain, World as Ground};
+use crate::terrain::{Drawn, FieldNews, Receipt, Rejection, Terrain, World as Ground};
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
 pub(super) fn begin_transactions(
@@ -35,8 +37,7 @@ pub(super) fn begin_transactions(
         ),
         (Without<Loading>, Without<InFlight>, Without<Held>),
     >,
-    assets: Option<Res<Assets<Mesh>>>,
-    processors: Res<SurfaceProcessors>,
+    build: BuildSettings,
     engine: Res<BurrowEngine>,
     mut figures: ResMut<BurrowFigures>,
     mut history: HistoryMessages,
@@ -60,12 +61,12 @@ pub(super) fn begin_transactions(
         }
         let engine = terrain.engine().unwrap_or(&engine).clone();
         let extras = VertexExtras::of(colors, is_slim);
-        let mut builder = SurfaceBuilder::new((entity, &terrain), extras, assets.is_some(), &processors);
+        let mut builder = build.builder((entity, &terrain), extras);
         builder.revision += 1;
         let task = InFlight::transaction(counter.next(), entity, transaction, engine, builder);
         commands.entity(entity).try_insert(task);
     }
-    figures.main_thread += start.elapsed();
+    figures.measure(start.elapsed());
 }
 
 /// What commits change: entities, meshes and figures.
@@ -75,6 +76,7 @@ pub(super) struct Display<'w, 's> {
     assets: Option<ResMut<'w, Assets<Mesh>>>,
     meshes: Query<'w, 's, &'static Mesh3d>,
     wanted: Res<'w, WantedTiles>,
+    reports: Reports<'w>,
     figures: ResMut<'w, BurrowFigures>,
     diagnostics: Diagnostics<'w, 's>,
 }
@@ -95,7 +97,7 @@ pub(super) fn commit_transactions(
         &mut Terrain,
         &mut TerrainEntities,
         &mut InFlight,
-        Option<(&mut LevelState, &mut ShownLevels)>,
+        Option<(&mut LevelState, Option<&mut ShownLevels>, &Watchers)>,
     )>,
     mut display: Display,
     mut messages: CommitMessages,
@@ -139,14 +141,14 @@ fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
     mut entities: Mut<TerrainEntities>,
-    levels: Option<(Mut<LevelState>, Mut<ShownLevels>)>,
+    levels: Option<(Mut<LevelState>, Option<Mut<ShownLevels>>, &Watchers)>,
     output: Option<TaskOutput>,
     display: &mut Display,
     messages: &mut CommitMessages,
 ) -> bool {
     let start = Instant::now();
     let Some(TaskOutput { change, surfaces, nodes, pieces, times }) =
-        output.or_else(|| output_of_panicked(&mut terrain, ticket))
+        output.or_else(|| output_of_panicked((entity, &mut terrain), ticket, &display.reports))
     else {
         return false;
     };
@@ -159,7 +161,7 @@ fn commit(
                 display.show_nodes((entity, terrain.world()), &mut entities, nodes);
                 // A game that changes the ground in each frame is always one step ahead; all that was loaded is shown.
                 entities.trigger_ready(&mut display.commands, entity);
-                display.figures.main_thread += start.elapsed();
+                display.figures.measure(start.elapsed());
             }
             return is_shown;
         }
@@ -175,13 +177,29 @@ fn commit(
             return false;
         }
         display.show_nodes((entity, terrain.world()), &mut entities, nodes);
-        if let (Some((mut state, mut shown)), Some(drawn)) = (levels, terrain.drawn_cut()) {
-            shown.set_if_neq(ShownLevels::of(drawn.cut(), state.count(changed)));
+        if let (Some((mut state, shown, watchers)), Some(drawn)) = (levels, terrain.drawn_cut()) {
+            let now = ShownLevels::of(drawn.cut(), state.count(changed));
+            match shown {
+                Some(mut shown) => {
+                    shown.set_if_neq(now);
+                }
+                // The game removed it.
+                None => {
+                    display.commands.entity(entity).try_insert(now);
+                }
+            }
             if state.is_settled {
+                let is_seen = display.assets.is_none() || !watchers.eyes.is_empty();
+                if !is_seen && display.reports.is_new(entity, Report::NobodyLooks) {
+                    warn!(
+                        "the terrain {entity} has levels of detail and is drawn at its coarsest, as no camera looks at it: \
+                         spawn a `Camera3d` whose `RenderLayers` meet the terrain's, or a `DetailSource` while the game loads"
+                    );
+                }
                 entities.trigger_ready(&mut display.commands, entity);
             }
         }
-        display.figures.main_thread += start.elapsed();
+        display.figures.measure(start.elapsed());
         return true;
     }
     let is_whole = commit.is_whole();
@@ -199,8 +217,11 @@ fn commit(
     let triangles = surfaces.iter().map(BuiltSurface::triangles).sum();
     display.show((entity, terrain.world()), &mut entities, surfaces, &fields, is_step);
     display.show_nodes((entity, terrain.world()), &mut entities, nodes);
-    if receipts.iter().any(|receipt| receipt.outcome == Err(Rejection::Panicked)) {
-        warn_once!("a brush was rejected because applying it panicked; this is a bug, please report it");
+    let has_panicked = |receipt: &Receipt| receipt.outcome == Err(Rejection::Panicked);
+    if receipts.iter().any(has_panicked) && display.reports.is_new(entity, Report::BrushPanicked) {
+        warn!(
+            "a brush was rejected by the terrain {entity} because applying it panicked; this is a bug, please report it"
+        );
     }
     let brushes = receipts.len() as u64;
     messages.found.write_batch(pieces);
@@ -214,8 +235,14 @@ fn commit(
 
 /// What is committed instead if a task panicked: the rejection of its transaction. `None` if it was not a transaction, or
 /// the terrain no longer waits for it; the terrain is loaded anew then.
-fn output_of_panicked(terrain: &mut Mut<Terrain>, ticket: Option<u64>) -> Option<TaskOutput> {
-    error_once!("a task of the plugin's panicked; this is a bug, please report it");
+fn output_of_panicked(
+    (entity, terrain): (Entity, &mut Mut<Terrain>),
+    ticket: Option<u64>,
+    reports: &Reports,
+) -> Option<TaskOutput> {
+    if reports.is_new(entity, Report::TaskPanicked) {
+        error!("a task of the terrain {entity} panicked; this is a bug, please report it");
+    }
     let rejected = ticket.and_then(|ticket| terrain.rejected(ticket));
     let Some(rejected) = rejected else {
         terrain.bypass_change_detection().forget_unseen();
@@ -323,11 +350,15 @@ impl Display<'_, '_> {
                 entities.despawn_tile(&mut self.commands, tile);
             }
             _ => {
-                self.commands.entity(child).try_remove::<Mesh3d>();
+                self.commands.entity(child).try_remove::<Drawing>();
             }
         }
     }
 }
+
+/// What an entity loses when it draws nothing. Bevy adds to the list of visibility classes with each `Mesh3d` that is inserted
+/// and never takes anything from it: the entity would be seen twice after the next one.
+type Drawing = (Mesh3d, VisibilityClass);
 
 /// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes into
 /// view or gets another material.
@@ -348,7 +379,7 @@ fn swap(
     let Ok(mut child) = commands.get_entity(child) else { return };
     match (mesh, shown) {
         (None, _) => {
-            child.try_remove::<Mesh3d>();
+            child.try_remove::<Drawing>();
         }
         (Some((mesh, facts)), shown) => {
             let mut new = Some(mesh);

@@ -1,18 +1,28 @@
 //! Components of terrains, tiles, chunks, fields and pieces.
 
-use bevy::ecs::component::{Component, Mutable, StorageType};
+use bevy::ecs::component::{Component, ComponentId, Mutable, RequiredComponentsRegistrator, StorageType};
 use bevy::prelude::*;
 
+use super::places::TerrainPlace;
 use crate::brush::Edit;
 use crate::lattice::{ChunkPos, TilePos};
 use crate::levels::Node;
 use crate::terrain::{HistoryStep, Terrain};
 use crate::volume;
 
-/// The model itself is the component; see [`Terrain`].
+/// The model itself is the component; see [`Terrain`]. What it requires is there in any order of plugins and spawns.
 impl Component for Terrain {
     const STORAGE_TYPE: StorageType = StorageType::Table;
     type Mutability = Mutable;
+
+    fn register_required_components(_: ComponentId, required: &mut RequiredComponentsRegistrator) {
+        required.register_required(Transform::default);
+        required.register_required(Visibility::default);
+        required.register_required(MaterialColors::default);
+        required.register_required(TerrainPlace::default);
+        #[cfg(feature = "render")]
+        required.register_required(super::materials::Materials::default);
+    }
 }
 
 /// A tile of the heightmap: child of its [`Terrain`]. Has a `Mesh3d` while some of its cells are not dug.

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::BurrowEngine;
@@ -10,10 +11,19 @@ use crate::backend::{Engine, EngineState};
 use crate::terrain::Terrain;
 
 /// How often engines free memory that they have not used lately.
-pub(super) const TRIMMED_EVERY: Duration = Duration::from_secs(30);
+const TRIMMED_EVERY: Duration = Duration::from_secs(30);
 
 /// Engines free memory at each transaction; this covers the time in which there are none.
-pub(super) fn trim_engines(engine: Res<BurrowEngine>, terrains: Query<&Terrain>) {
+pub(super) fn trim_engines(
+    engine: Res<BurrowEngine>,
+    terrains: Query<&Terrain>,
+    mut last: Local<Option<Instant>>,
+) {
+    let since = *last.get_or_insert_with(Instant::now);
+    if since.elapsed() < TRIMMED_EVERY {
+        return;
+    }
+    *last = Some(Instant::now());
     let own = terrains.iter().filter_map(Terrain::engine);
     let opened = own.chain([&engine.0]).filter(|engine| matches!(engine.state(), EngineState::Cuda(_)));
     let opened: Vec<Engine> = opened.cloned().collect();

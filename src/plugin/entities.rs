@@ -23,6 +23,8 @@ pub struct TerrainEntities {
     pub(super) is_slim: bool,
     /// Were they built with [`LevelsOfDetail`](super::LevelsOfDetail)?
     pub(super) has_levels: bool,
+    /// Must all of them be built anew?
+    pub(super) is_outdated: bool,
     drawn: HashMap<Drawn, Entity>,
     /// Nodes of level 1 and above.
     nodes: HashMap<Node, Entity>,
@@ -40,6 +42,7 @@ impl TerrainEntities {
             voxel_size,
             is_slim,
             has_levels,
+            is_outdated: false,
             drawn: HashMap::default(),
             nodes: HashMap::default(),
             fields: HashMap::default(),
@@ -246,12 +249,15 @@ impl TerrainEntities {
     }
 }
 
-/// Spawns a child, unless its parent is gone by the time the command runs.
+/// Spawns a child, unless its parent is gone by the time the command runs. It belongs to its parent from the start, for
+/// observers of what it is.
 fn spawn_below(commands: &mut Commands, parent: Entity, bundle: impl Bundle) -> Entity {
-    let child = commands.spawn(bundle).id();
+    let child = commands.spawn_empty().id();
     commands.queue(move |world: &mut bevy::ecs::world::World| {
-        if let Ok(mut parent) = world.get_entity_mut(parent) {
-            parent.add_child(child);
+        if world.get_entity(parent).is_ok() {
+            if let Ok(mut child) = world.get_entity_mut(child) {
+                child.insert((bundle, ChildOf(parent)));
+            }
         } else {
             world.despawn(child);
         }

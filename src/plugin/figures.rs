@@ -7,7 +7,8 @@ use bevy::prelude::*;
 
 use super::Times;
 
-/// What the plugin did lately.
+/// What the plugin did lately. It counts as changed in frames with a commit; [`main_thread`](Self::main_thread) alone, which is
+/// measured in every frame, does not count.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct BurrowFigures {
@@ -48,6 +49,25 @@ impl BurrowFigures {
         self.last_commit = commit;
         self.commit_times.push(commit);
         self.main_thread += commit;
+    }
+}
+
+/// How long the main thread took, without a change that the game would notice.
+pub(super) trait MainThread {
+    /// Begins a frame.
+    fn begin_frame(&mut self, took: Duration);
+
+    /// Adds to this frame.
+    fn measure(&mut self, took: Duration);
+}
+
+impl MainThread for ResMut<'_, BurrowFigures> {
+    fn begin_frame(&mut self, took: Duration) {
+        self.bypass_change_detection().main_thread = took;
+    }
+
+    fn measure(&mut self, took: Duration) {
+        self.bypass_change_detection().main_thread += took;
     }
 }
 

@@ -6,15 +6,28 @@ use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
 use crate::lattice::TilePos;
-use crate::levels::{Choice, Cut, Eye};
+use crate::levels::{Choice, Cut, Eye, View};
 use crate::terrain::{KnownNodes, Version};
 
 /// Draws far ground coarsely: insert it on a terrain's entity, and worlds may be many kilometres wide.
 ///
 /// The ground is cut into squares, each of which is drawn at one of several levels of detail: at level L, its cells are 2^L
-/// voxels wide. Levels are chosen by what cameras see of them in pixels, for all active cameras with a perspective projection
-/// together. Where they look does not matter, so turning changes nothing. Everything drawn together stays closed, and edits
-/// are exact everywhere: levels change what is drawn and nothing else.
+/// voxels wide. Levels are chosen by the size of cells on the screen. Everything drawn together stays closed, and edits are
+/// exact everywhere: levels change what is drawn and nothing else.
+///
+/// # Which cameras count
+///
+/// | camera | levels |
+/// | --- | --- |
+/// | any perspective, custom and off-axis ones included | by distance. Where it looks does not matter, so turning changes nothing |
+/// | orthographic | by size on the screen in what is in view, coarser around it |
+/// | inactive, or with a picture of no size, say of a minimised window | none |
+/// | whose `RenderLayers` do not meet the terrain's | none |
+/// | a `Camera2d` | none |
+/// | none, but a [`DetailSource`] | as for a camera at its place |
+///
+/// All that count decide together. While none does, all stays as it is for those that looked last. Distances and speeds are
+/// measured in the terrain's own space and in real time: shifted origins and slow motion change nothing.
 ///
 /// The defaults need no change. A terrain that gets or loses this component loads anew.
 ///
@@ -23,7 +36,7 @@ use crate::terrain::{KnownNodes, Version};
 /// into view and when they change.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default)]
-#[require(ShownLevels)]
+#[require(ShownLevels, Watchers)]
 pub struct LevelsOfDetail {
     /// Metres; ground farther away from all cameras is drawn at the coarsest level that the rest allows.
     pub view_distance: f32,
@@ -96,6 +109,43 @@ impl ShownLevels {
     }
 }
 
+/// A place around which ground is drawn as finely as for a perspective camera there, though there is none: for a loading screen
+/// that waits for [`TerrainReady`](super::TerrainReady) before it spawns the player's camera, or for a place that a cut scene
+/// will soon show. Insert it on an entity with a `Transform`, and remove it when it is no longer needed.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Component, Default)]
+#[require(Transform)]
+pub struct DetailSource {
+    /// The vertical field of view in radians.
+    pub fov: f32,
+    /// The height of the picture in pixels.
+    pub picture_height: f32,
+}
+
+impl Default for DetailSource {
+    /// Bevy's default field of view, in a picture of 1,080 lines.
+    fn default() -> Self {
+        Self { fov: std::f32::consts::FRAC_PI_4, picture_height: 1080.0 }
+    }
+}
+
+/// Who looks at a terrain, in its voxels; while nobody does, those who looked last.
+#[derive(Component, Default)]
+pub(super) struct Watchers {
+    pub eyes: Vec<(Entity, Eye)>,
+    /// Whether somebody looked in the last frame.
+    pub is_current: bool,
+    /// The size of the voxels.
+    pub voxel_size: f32,
+}
+
+impl Watchers {
+    /// Everybody who looks.
+    pub fn eyes(&self) -> Vec<Eye> {
+        self.eyes.iter().map(|&(_, eye)| eye).collect()
+    }
+}
+
 /// Tiles that need an entity of their own even while they are not drawn at level 0, by terrain.
 #[derive(Resource, Default)]
 pub(crate) struct WantedTiles(pub(crate) HashMap<Entity, HashSet<TilePos>>);
@@ -119,6 +169,17 @@ pub(super) struct LevelState {
     pub edits: u32,
     /// Were all nodes drawn once?
     pub is_complete: bool,
+}
+
+/// Whether views differ by less than what changes levels.
+fn is_same_view(a: View, b: View) -> bool {
+    match (a, b) {
+        (View::Perspective, View::Perspective) => true,
+        (View::Parallel { axis: a, radius }, View::Parallel { axis: b, radius: other }) => {
+            a.distance(b) < NEAR && (radius - other).abs() < NEAR
+        }
+        _ => false,
+    }
 }
 
 /// How far an eye moves before levels are chosen again, in voxels.
@@ -146,6 +207,7 @@ impl LevelState {
         let is_near = |(a, b): (&Eye, &Eye)| {
             a.position.distance(b.position) < NEAR
                 && a.pixels == b.pixels
+                && is_same_view(a.view, b.view)
                 && a.velocity.distance(b.velocity) < NEAR.max(a.velocity.length() / 4.0)
         };
         self.settings.as_ref() != Some(settings)

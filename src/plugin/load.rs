@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use bevy::ecs::entity::EntityHashMap;
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use rayon::prelude::*;
@@ -11,10 +12,12 @@ use rayon::prelude::*;
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
 use super::level_state::{LevelState, LevelsOfDetail, ShownLevels};
 use super::meshes::{BuiltMesh, MeshFacts, VertexExtras};
-use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
+use super::places::{LocalPlaces, TerrainPlace, place_terrain};
+use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
+use super::reports::{Report, Reports};
 use super::task::{InFlight, TaskCounter};
 use super::threads::{ThreadTask, Threads, panic_message};
-use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SlimVertices, SurfaceProcessors};
+use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SlimVertices};
 use crate::lattice::ChunkPos;
 use crate::levels::Cut;
 use crate::terrain::{Drawn, DrawnCut, KnownNodes, Terrain, World};
@@ -59,17 +62,37 @@ type Idle = (Without<Loading>, Without<InFlight>, Without<Held>);
 
 /// Scales the entities of terrains to the size of their voxels.
 pub(super) fn scale_terrains(
-    mut terrains: Query<(&Terrain, &mut Transform), Or<(Changed<Transform>, Changed<Terrain>)>>,
+    mut terrains: Query<
+        (Entity, &Terrain, &mut Transform, &mut TerrainPlace),
+        Or<(Changed<Transform>, Changed<Terrain>)>,
+    >,
+    reports: Reports,
 ) {
-    for (terrain, transform) in &mut terrains {
-        scale(transform, terrain);
+    for (entity, terrain, mut transform, mut place) in &mut terrains {
+        scale((entity, terrain), &mut transform, &mut place, &reports);
     }
 }
 
-fn scale(mut transform: Mut<Transform>, terrain: &Terrain) {
-    let scale = Vec3::splat(terrain.voxel_size());
-    if transform.scale != scale {
-        transform.scale = scale;
+fn scale(
+    (entity, terrain): (Entity, &Terrain),
+    transform: &mut Mut<Transform>,
+    place: &mut Mut<TerrainPlace>,
+    reports: &Reports,
+) {
+    let size = terrain.voxel_size();
+    let (scale, own) = (Vec3::splat(size), transform.scale);
+    let former = Vec3::splat(place.scale);
+    place.set_if_neq(TerrainPlace { scale: size, ..**place });
+    if own == scale {
+        return;
+    }
+    transform.scale = scale;
+    // Not one that the plugin wrote for another voxel size.
+    if own != Vec3::ONE && own != former && reports.is_new(entity, Report::ScaleReplaced) {
+        warn!(
+            "the scale {own} of the terrain {entity} was replaced by the size of its voxels, {size} m: choose another \
+             `voxel_size` in its `TerrainSettings`, or scale a parent of it"
+        );
     }
 }
 
@@ -79,19 +102,24 @@ fn scale(mut transform: Mut<Transform>, terrain: &Terrain) {
 pub(super) fn prepare_new(
     new: On<Insert, Terrain>,
     mut commands: Commands,
-    terrains: Query<(&Terrain, Option<&TerrainEntities>, Option<&Children>)>,
-    mut places: ParamSet<(Query<&mut Transform>, TransformHelper, Query<&mut GlobalTransform>)>,
+    terrains: Query<(&Terrain, Option<&TerrainEntities>, Option<&Children>), Allow<Disabled>>,
+    mut places: ParamSet<(
+        Query<(&mut Transform, &mut TerrainPlace), Allow<Disabled>>,
+        LocalPlaces,
+        Query<(&mut GlobalTransform, &mut TerrainPlace), Allow<Disabled>>,
+    )>,
+    reports: Reports,
 ) {
     let entity = new.entity;
     let Ok((terrain, entities, children)) = terrains.get(entity) else { return };
     commands.entity(entity).try_remove::<(Loading, InFlight)>();
     drop_resized(&mut commands, entity, terrain, entities, children);
-    if let Ok(transform) = places.p0().get_mut(entity) {
-        scale(transform, terrain);
+    if let Ok((mut transform, mut place)) = places.p0().get_mut(entity) {
+        scale((entity, terrain), &mut transform, &mut place, &reports);
     }
-    let Ok(now) = places.p1().compute_global_transform(entity) else { return };
-    if let Ok(place) = places.p2().get_mut(entity) {
-        put(place, now);
+    let now = places.p1().of(entity);
+    if let Ok((mut global, mut place)) = places.p2().get_mut(entity) {
+        place_terrain(now, &mut global, &mut place);
     }
 }
 
@@ -140,7 +168,7 @@ fn drop_resized(
 /// Despawns the entities below a terrain when only its component is removed.
 pub(super) fn remove_with_terrain(
     gone: On<Remove, Terrain>,
-    terrains: Query<(&TerrainEntities, Option<&Children>)>,
+    terrains: Query<(&TerrainEntities, Option<&Children>), Allow<Disabled>>,
     mut commands: Commands,
 ) {
     if let Ok((entities, children)) = terrains.get(gone.entity) {
@@ -153,18 +181,18 @@ pub(super) fn remove_with_terrain(
 pub(super) fn drop_other_vertices(
     new: On<Insert, SlimVertices>,
     mut commands: Commands,
-    loading: Query<&Loading>,
+    loading: Query<&Loading, Allow<Disabled>>,
 ) {
     if loading.get(new.entity).is_ok_and(|loading| !loading.is_slim) {
         commands.entity(new.entity).try_remove::<Loading>();
     }
 }
 
-/// Nor one that loses them.
+/// A terrain that loses slim vertices need not wait for them.
 pub(super) fn drop_slim_vertices(
     gone: On<Remove, SlimVertices>,
     mut commands: Commands,
-    loading: Query<&Loading>,
+    loading: Query<&Loading, Allow<Disabled>>,
 ) {
     if loading.get(gone.entity).is_ok_and(|loading| loading.is_slim) {
         commands.entity(gone.entity).try_remove::<Loading>();
@@ -186,20 +214,20 @@ pub(super) fn start_loading(
         ),
         Idle,
     >,
-    assets: Option<Res<Assets<Mesh>>>,
-    processors: Res<SurfaceProcessors>,
+    build: BuildSettings,
     settings: Res<BurrowSettings>,
     mut counter: ResMut<TaskCounter>,
 ) {
     for (entity, mut terrain, colors, is_slim, has_levels, entities) in &mut terrains {
-        let is_same_kind =
-            |entities: &&TerrainEntities| (entities.is_slim, entities.has_levels) == (is_slim, has_levels);
+        let is_same_kind = |entities: &&TerrainEntities| {
+            !entities.is_outdated && (entities.is_slim, entities.has_levels) == (is_slim, has_levels)
+        };
         let entities_of_kind = entities.filter(is_same_kind);
         if entities_of_kind.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
         let extras = VertexExtras::of(colors, is_slim);
-        let builder = SurfaceBuilder::new((entity, &terrain), extras, assets.is_some(), &processors);
+        let builder = build.builder((entity, &terrain), extras);
         // For the game this is no change.
         let model = terrain.bypass_change_detection();
         let unseen = entities_of_kind.and_then(|entities| model.take_unseen(entities.shown));
@@ -221,33 +249,6 @@ pub(super) fn start_loading(
         let (waiting, ready) = (Vec::new(), HashMap::default());
         let loading = Loading { world, is_slim, has_levels, task, waiting, ready, levels: None };
         commands.entity(entity).try_insert(loading);
-    }
-}
-
-/// Updates the global transforms of terrains before they are queried; Bevy does so only at the end of the frame, if at all.
-pub(super) fn place_terrains(
-    places: TransformHelper,
-    mut terrains: Query<(Entity, &mut GlobalTransform), With<Terrain>>,
-) {
-    for (entity, place) in &mut terrains {
-        match places.compute_global_transform(entity) {
-            Ok(now) => put(place, now),
-            Err(error) => {
-                warn_once!("the terrain {entity} has no global transform, and no brush reaches it: {error}")
-            }
-        }
-    }
-}
-
-fn put(mut place: Mut<GlobalTransform>, now: GlobalTransform) {
-    if *place != now {
-        *place = now;
-        if !keeps_bits(&now) {
-            warn_once!(
-                "a terrain is rotated, its scale is not a power of two, or its position is not in whole voxels: hairline \
-                 cracks may show at its seams"
-            );
-        }
     }
 }
 
@@ -433,21 +434,6 @@ fn show_nodes(
     }
 }
 
-/// Do both sides of seams keep the same bits there? They do if the terrain is not rotated, its scale is a power of two, and
-/// it is moved by whole voxels.
-fn keeps_bits(place: &GlobalTransform) -> bool {
-    let (scale, rotation, translation) = place.to_scale_rotation_translation();
-    scale == Vec3::splat(scale.x)
-        && is_power_of_two(scale.x)
-        && rotation == Quat::IDENTITY
-        && (translation / scale.x).fract() == Vec3::ZERO
-}
-
-fn is_power_of_two(number: f32) -> bool {
-    let has_mantissa = number.to_bits().trailing_zeros() < f32::MANTISSA_DIGITS - 1;
-    number.is_normal() && number > 0.0 && !has_mantissa
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -467,35 +453,5 @@ mod tests {
         assert!(!end(false) && end(true), "once is no trouble");
         assert_eq!([(); 3].map(|()| end(false)), [false, false, true], "it ends");
         assert_eq!([(); 3].map(|()| end(false)), [false, false, true], "another time too");
-    }
-
-    #[test]
-    fn seams_keep_their_bits_on_whole_voxels_of_a_power_of_two() {
-        let place = |x, scale| Transform::from_xyz(x, -3.0, 12.0).with_scale(Vec3::splat(scale));
-        let keeps = |place: Transform| keeps_bits(&place.into());
-        for (x, scale) in [(70.0, 1.0), (0.5, 0.5), (3.0, 0.0625), (-8.0, 1.0)] {
-            assert!(keeps(place(x, scale)), "{scale} at {x}");
-        }
-        for (x, scale) in [(70.5, 1.0), (0.75, 0.5), (70.0, 2.0), (0.0, 0.3), (12.0, 3.0), (0.0, -1.0)] {
-            assert!(!keeps(place(x, scale)), "{scale} at {x}");
-        }
-        assert!(!keeps(Transform::from_scale(Vec3::new(1.0, 2.0, 1.0))));
-        assert!(!keeps(Transform::from_rotation(Quat::from_rotation_y(0.5))));
-    }
-
-    #[test]
-    fn a_parent_may_have_a_scale_of_a_power_of_two_as_well() {
-        let terrain = Transform::from_xyz(1.5, 2.0, -4.0).with_scale(Vec3::splat(0.5));
-        let below = |parent: Transform| keeps_bits(&(GlobalTransform::from(parent) * terrain));
-        assert!([0.25, 1.0, 4.0].into_iter().all(|scale| below(Transform::from_scale(Vec3::splat(scale)))));
-        assert!(!below(Transform::from_scale(Vec3::splat(3.0))));
-        // Half a voxel of a metre.
-        assert!(!below(Transform::from_xyz(0.5, 0.0, 0.0).with_scale(Vec3::splat(2.0))));
-    }
-
-    #[test]
-    fn powers_of_two_have_no_mantissa() {
-        assert!([1.0, 0.125, 64.0, f32::MIN_POSITIVE].into_iter().all(is_power_of_two));
-        assert!(![0.0, 3.0, 1.5, -2.0, f32::INFINITY, f32::NAN].into_iter().any(is_power_of_two));
     }
 }

@@ -61,12 +61,13 @@ impl VertexExtras {
 #[derive(Clone)]
 pub(crate) struct MeshBuilder {
     extras: VertexExtras,
+    usages: RenderAssetUsages,
     ground: Arc<Ground>,
 }
 
 impl MeshBuilder {
-    pub(crate) fn new(world: &World, extras: VertexExtras) -> Self {
-        Self { extras, ground: world.shared_ground() }
+    pub(crate) fn new(world: &World, extras: VertexExtras, usages: RenderAssetUsages) -> Self {
+        Self { extras, usages, ground: world.shared_ground() }
     }
 
     /// Builds the Bevy mesh of a surface whose positions count from this point, in the task.
@@ -197,7 +198,7 @@ impl<'a> Arrays<'a> {
         copy(&mut self.normals, &copies);
         copy(&mut self.depths, &copies);
         copy(&mut self.colors, &copies);
-        let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, self.mesh_builder.usages)
             .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, self.positions)
             .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, self.normals)
             .with_inserted_attribute(ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(ids))
@@ -365,8 +366,10 @@ mod tests {
             let ground = Ground::from_noise(70, 60, &noise).unwrap().with_materials(&control).unwrap();
             let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
             let mut terrain = Terrain::new(ground, &settings).unwrap();
-            let builders = [true, false]
-                .map(|is_slim| MeshBuilder::new(terrain.world(), VertexExtras::of(Some(&colors), is_slim)));
+            let builders = [true, false].map(|is_slim| {
+                let extras = VertexExtras::of(Some(&colors), is_slim);
+                MeshBuilder::new(terrain.world(), extras, RenderAssetUsages::RENDER_WORLD)
+            });
             let mut compared = 0;
             for i in 0..9 {
                 let place = Vec3::new((i * 23 % 71) as f32, (i * 7 % 12) as f32, (i * 31 % 61) as f32);

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
 
 use super::MaterialColors;
@@ -11,12 +12,16 @@ use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, ReturnedPiece, Terrain
 
 /// A brush in world space. It edits every terrain that it reaches, hidden ones too.
 ///
+/// Like all messages of the plugin it is reflected, for editors and Bevy's remote protocol: its method `world.write_message` takes
+/// `{"message": "bevy_burrow::brush::request::Brush", "value": {"shape": "sphere", "center": [8, 0, 8], "radius": 4, "op": "dig"}}`.
+///
 /// If a parent stretches a terrain, the points, axes and heights of a brush are transformed exactly. Its sizes (radii, half
 /// sides, amounts, falloff, roughness) are scaled by the cube root of the change in volume: in voxels, a ball stays a ball.
 impl Message for Brush {}
 
 /// A brush in world space for one terrain alone.
-#[derive(Message, Clone, Debug, PartialEq)]
+#[derive(Message, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Message, Clone, Debug, PartialEq)]
 pub struct TargetedBrush {
     /// The terrain's entity.
     pub terrain: Entity,
@@ -26,7 +31,8 @@ pub struct TargetedBrush {
 
 /// The result of a brush: one message for each terrain that it reaches, applied or rejected. Bounds are in voxels of the
 /// terrain.
-#[derive(Message, Clone, Debug, PartialEq)]
+#[derive(Message, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Message, Clone, Debug, PartialEq)]
 pub struct BrushApplied {
     /// The terrain; `None` for a brush that reaches none, or whose position is not a number.
     pub terrain: Option<Entity>,
@@ -53,14 +59,16 @@ pub struct BrushApplied {
 ///     }
 /// }
 /// ```
-#[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Message, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Message, Default, Clone, Debug, PartialEq)]
 pub struct Undo {
     /// The terrain's entity; `None` for every terrain there is.
     pub terrain: Option<Entity>,
 }
 
 /// Does again what was undone last. See [`Undo`].
-#[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Message, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Message, Default, Clone, Debug, PartialEq)]
 pub struct Redo {
     /// The terrain's entity; `None` for every terrain there is.
     pub terrain: Option<Entity>,
@@ -68,7 +76,8 @@ pub struct Redo {
 
 /// The result of an [`Undo`] or [`Redo`], sent in the frame in which its meshes are shown: one for each terrain that it is
 /// for.
-#[derive(Message, Clone, Debug, PartialEq)]
+#[derive(Message, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Message, Clone, Debug, PartialEq)]
 pub struct HistoryMoved {
     /// The terrain; `None` if there is none at all.
     pub terrain: Option<Entity>,
@@ -79,7 +88,8 @@ pub struct HistoryMoved {
 /// A brush cut off a piece of ground, on a terrain with [`LooseGround`](super::LooseGround). A piece that vanishes or breaks
 /// off is gone from the ground in the frame of this message. The brush's receipt lists its pieces as well. A redo that cuts
 /// a piece off again sends this again, with the same [id](LoosePiece::id).
-#[derive(Message, Clone, Debug, PartialEq)]
+#[derive(Message, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Message, Clone, Debug, PartialEq)]
 pub struct LoosePieceFound {
     /// The terrain. Positions of the piece are in its space, in voxels.
     pub terrain: Entity,
@@ -88,6 +98,7 @@ pub struct LoosePieceFound {
     /// Its bounds, voxels, materials and, if it broke off, its surface.
     pub piece: LoosePiece,
     /// Its mesh, built in the transaction's task; `None` if there are no meshes.
+    #[reflect(ignore, clone)]
     pub(super) mesh: Option<Arc<Mesh>>,
 }
 
@@ -121,7 +132,8 @@ impl LoosePieceFound {
         if let Some(mesh) = &self.mesh {
             return Some(Mesh::clone(mesh));
         }
-        self.build(&MeshBuilder::new(terrain.world(), VertexExtras::of(Some(colors), false)))
+        let extras = VertexExtras::of(Some(colors), false);
+        self.build(&MeshBuilder::new(terrain.world(), extras, RenderAssetUsages::RENDER_WORLD))
     }
 
     fn build(&self, mesh_builder: &MeshBuilder) -> Option<Mesh> {

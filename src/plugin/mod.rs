@@ -15,6 +15,7 @@
 //! or removed. An entity that is spawned with its own, of the same type, keeps it until the terrain's changes.
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
+//! [`Terrain`]: crate::terrain::Terrain
 //!
 //! A [`SurfaceProcessor`] builds extra data for each surface off-thread, and swaps it in with the mesh. Figures are in
 //! [`BurrowFigures`], and in Bevy's [`diagnostics`]; transactions, edits, meshes, commits and loads have tracing spans.
@@ -27,16 +28,24 @@ mod engine;
 mod entities;
 mod figures;
 mod heightmap;
+mod inbox;
 mod level_state;
 mod levels;
 mod load;
+#[cfg(feature = "render")]
+mod materials;
 mod meshes;
 mod messages;
 mod palettes;
+#[cfg(feature = "picking")]
+mod picking;
+mod places;
 mod processor;
 mod propagate;
 mod query;
 mod reach;
+mod redraw;
+mod reports;
 mod settings;
 mod task;
 mod threads;
@@ -53,16 +62,24 @@ pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
 pub(crate) use level_state::WantedTiles;
-pub use level_state::{LevelsOfDetail, ShownLevels};
+pub use level_state::{DetailSource, LevelsOfDetail, ShownLevels};
+#[cfg(feature = "render")]
+pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
 pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
     LoosePieceFound, LoosePieceReturned, Redo, TargetedBrush, TerrainReady, Undo,
 };
+#[cfg(feature = "picking")]
+pub use picking::TerrainPickingPlugin;
+#[cfg(feature = "avian")]
+pub(crate) use places::Places;
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
+pub use propagate::TerrainPropagatePlugin;
 #[cfg(feature = "render")]
-pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_inherited};
+pub(crate) use propagate::{Inherited, remove_inherited};
 pub use query::{TerrainHit, Terrains};
+pub use redraw::Redraw;
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 pub use threads::ThreadSettings;
 pub(crate) use threads::free_later;
@@ -73,11 +90,10 @@ pub(crate) use threads::{ThreadTask, Threads};
 pub use times::Times;
 
 use bevy::app::PluginGroupBuilder;
+use bevy::ecs::reflect::ReflectMessage;
 use bevy::prelude::*;
-use bevy::time::common_conditions::on_timer;
 
 use crate::brush::Brush;
-use crate::terrain::Terrain;
 
 /// Everything a game needs. Parts can be disabled, as in any plugin group.
 ///
@@ -88,6 +104,7 @@ use crate::terrain::Terrain;
 /// | --- | --- |
 /// | [`TerrainPlugin`] | transactions, entities, messages |
 /// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
+/// | `TerrainPickingPlugin` | hits of pointers on the ground, for `bevy_picking` (feature `picking`) |
 /// | `SavePlugin` | saves worlds of terrains with a `SavedWorld` (feature `store`) |
 /// | `TerrainMaterialPlugin<StandardMaterial>` | propagates materials to tiles, chunks and pieces (feature `render`) |
 /// | `GroundPlugin` | texture layers for terrains with a `GroundLook` (feature `render`) |
@@ -97,6 +114,8 @@ pub struct BurrowPlugins;
 impl PluginGroup for BurrowPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>().add(TerrainPlugin).add(HeightmapPlugin);
+        #[cfg(feature = "picking")]
+        let group = group.add(TerrainPickingPlugin);
         #[cfg(feature = "store")]
         let group = group.add(crate::saves::SavePlugin);
         #[cfg(feature = "render")]
@@ -108,6 +127,27 @@ impl PluginGroup for BurrowPlugins {
 }
 
 /// What the plugin does each frame in `Update`, in this order.
+///
+/// A game may run them in some states only. Nothing is lost meanwhile: brushes, undos and redos are kept and answered
+/// afterwards, and what was put on a terrain, changed or removed is caught up with. Despawned terrains answer at once.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::prelude::*;
+/// # #[derive(Resource, PartialEq)] struct Playing(bool);
+/// # let mut app = App::new();
+/// app.configure_sets(
+///     Update,
+///     (
+///         BurrowSystems::Load,
+///         BurrowSystems::Collect,
+///         BurrowSystems::Commit,
+///         BurrowSystems::Begin,
+///         BurrowSystems::Propagate,
+///     )
+///         .run_if(resource_equals(Playing(true))),
+/// );
+/// ```
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BurrowSystems {
     /// New terrains are loaded; their tiles appear all at once when all meshes are built.
@@ -139,9 +179,12 @@ impl Plugin for TerrainPlugin {
             .init_resource::<ThreadSettings>()
             .init_resource::<task::TaskCounter>()
             .init_resource::<SurfaceProcessors>()
-            .init_resource::<levels::Eyes>()
+            .init_resource::<inbox::Inbox>()
+            .init_resource::<reports::Reported>()
             .init_resource::<WantedTiles>()
             .add_message::<Brush>()
+            .register_type::<Brush>()
+            .register_type_data::<Brush, ReflectMessage>()
             .add_message::<TargetedBrush>()
             .add_message::<BrushApplied>()
             .add_message::<Undo>()
@@ -149,9 +192,6 @@ impl Plugin for TerrainPlugin {
             .add_message::<HistoryMoved>()
             .add_message::<LoosePieceFound>()
             .add_message::<LoosePieceReturned>()
-            .register_required_components::<Terrain, Transform>()
-            .register_required_components::<Terrain, Visibility>()
-            .register_required_components::<Terrain, MaterialColors>()
             .add_observer(load::prepare_new)
             .add_observer(collect::free_history)
             .add_observer(collect::answer_removed)
@@ -160,6 +200,8 @@ impl Plugin for TerrainPlugin {
             .add_observer(load::remove_with_terrain)
             .add_observer(load::drop_other_vertices)
             .add_observer(load::drop_slim_vertices)
+            .add_observer(redraw::redraw)
+            .add_observer(reports::forget_reports)
             .configure_sets(
                 Update,
                 (
@@ -179,7 +221,8 @@ impl Plugin for TerrainPlugin {
                         load::drop_stray_tasks,
                         load::drop_replaced,
                         load::start_loading,
-                        load::place_terrains,
+                        places::place_terrains,
+                        levels::find_eyes,
                         load::finish_loading,
                         levels::keep_wanted_tiles,
                     )
@@ -187,10 +230,9 @@ impl Plugin for TerrainPlugin {
                         .in_set(BurrowSystems::Load),
                     (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
                     commit::commit_transactions.in_set(BurrowSystems::Commit),
-                    (levels::find_eyes, levels::begin_level_changes, commit::begin_transactions)
+                    (levels::begin_level_changes, commit::begin_transactions)
                         .chain()
                         .in_set(BurrowSystems::Begin),
-                    diagnostics::measure_frame.after(BurrowSystems::Begin),
                 ),
             );
         #[cfg(feature = "replicon")]
@@ -199,7 +241,12 @@ impl Plugin for TerrainPlugin {
             FollowCommits.in_set(BurrowSystems::Commit).after(commit::commit_transactions),
         );
         app.add_systems(First, threads::resize_pools.run_if(resource_exists_and_changed::<ThreadSettings>));
-        app.add_systems(Update, engine::trim_engines.run_if(on_timer(engine::TRIMMED_EVERY)));
+        // In every frame, whatever the game gates.
+        app.add_systems(Last, (inbox::keep_requests, places::find_external_places))
+            // They read terrains, which systems in `Update` and `Last` change.
+            .add_systems(PostUpdate, (diagnostics::measure_frame, engine::trim_engines))
+            // Terrains that were spawned before the plugin was added.
+            .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
         diagnostics::register(app);
         propagate::add(app);
     }

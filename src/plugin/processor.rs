@@ -2,12 +2,15 @@
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use bevy::asset::RenderAssetUsages;
+use bevy::ecs::system::SystemParam;
+use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
-use super::ShownSurface;
 use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
+use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::levels::Node;
 use crate::surface::SurfaceMesh;
@@ -91,33 +94,40 @@ pub trait SurfaceProcessor: Send + Sync + 'static {
 
 /// All surface processors. A processor that is added later is not called for surfaces that are already shown.
 #[derive(Resource, Clone, Default)]
-pub struct SurfaceProcessors(Vec<Arc<dyn SurfaceProcessor>>);
+pub struct SurfaceProcessors {
+    processors: Vec<Arc<dyn SurfaceProcessor>>,
+    /// Terrains on which one of them panicked, for one message each.
+    failed: Arc<Mutex<HashSet<Entity>>>,
+}
 
 impl SurfaceProcessors {
     /// Adds a processor.
     pub fn add(&mut self, processor: impl SurfaceProcessor) {
-        self.0.push(Arc::new(processor));
+        self.processors.push(Arc::new(processor));
     }
 
     /// Are there no processors?
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.processors.is_empty()
+    }
+
+    /// Runs code of a processor. If it panics, an error is logged once for each terrain, and the ground is shown without its
+    /// data.
+    fn guarded<T>(&self, terrain: Entity, work: impl FnOnce() -> T) -> Option<T> {
+        let done = catch_unwind(AssertUnwindSafe(work));
+        if done.is_err() && self.failed.lock().unwrap_or_else(PoisonError::into_inner).insert(terrain) {
+            error!(
+                "a surface processor panicked on the terrain {terrain}; the ground is shown without its data"
+            );
+        }
+        done.ok()
     }
 }
 
 impl fmt::Debug for SurfaceProcessors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SurfaceProcessors").field("count", &self.0.len()).finish_non_exhaustive()
+        f.debug_struct("SurfaceProcessors").field("count", &self.processors.len()).finish_non_exhaustive()
     }
-}
-
-/// Runs code of a processor. If it panics, an error is logged once, and the ground is shown without its data.
-fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
-    let done = catch_unwind(AssertUnwindSafe(work));
-    if done.is_err() {
-        error_once!("a surface processor panicked; the ground is shown without its data");
-    }
-    done.ok()
 }
 
 /// The new surface of a tile or chunk, ready to be swapped in.
@@ -162,6 +172,22 @@ pub(super) fn node_origin(grid: ChunkGrid, node: Node) -> IVec3 {
     IVec3::new(x * grid.size(), 0, z * grid.size())
 }
 
+/// What the app says about surfaces: whether there are meshes, who reads them, and what else is built.
+#[derive(SystemParam)]
+pub(super) struct BuildSettings<'w> {
+    assets: Option<Res<'w, Assets<Mesh>>>,
+    processors: Res<'w, SurfaceProcessors>,
+    settings: Res<'w, BurrowSettings>,
+}
+
+impl BuildSettings<'_> {
+    /// A builder for a terrain's world as it is now.
+    pub fn builder(&self, terrain: (Entity, &Terrain), extras: VertexExtras) -> SurfaceBuilder {
+        let usages = self.assets.as_ref().map(|_| self.settings.mesh_usages);
+        SurfaceBuilder::new(terrain, extras, usages, &self.processors)
+    }
+}
+
 /// Builds meshes and extra data for the surfaces of one terrain, in a task.
 #[derive(Clone)]
 pub(super) struct SurfaceBuilder {
@@ -180,7 +206,7 @@ impl SurfaceBuilder {
     pub fn new(
         (entity, terrain): (Entity, &Terrain),
         extras: VertexExtras,
-        has_meshes: bool,
+        mesh_usages: Option<RenderAssetUsages>,
         processors: &SurfaceProcessors,
     ) -> Self {
         let world = terrain.world();
@@ -189,7 +215,7 @@ impl SurfaceBuilder {
             voxel_size: terrain.voxel_size(),
             grid: world.grid(),
             revision: world.revision(),
-            mesh_builder: has_meshes.then(|| MeshBuilder::new(world, extras)),
+            mesh_builder: mesh_usages.map(|usages| MeshBuilder::new(world, extras, usages)),
             processors: processors.clone(),
         }
     }
@@ -235,9 +261,11 @@ impl SurfaceBuilder {
         draft: impl FnOnce() -> SurfaceDraft,
     ) -> BuiltSurface {
         let part = &Part::new(self.terrain, self.voxel_size, self.grid, self.revision, drawn);
-        let wants =
-            |processor: &&Arc<dyn SurfaceProcessor>| guarded(|| processor.wants(part)).unwrap_or(false);
-        let processors: Vec<_> = self.processors.0.iter().filter(wants).collect();
+        let guarded = &self.processors;
+        let wants = |processor: &&Arc<dyn SurfaceProcessor>| {
+            guarded.guarded(part.terrain, || processor.wants(part)).unwrap_or(false)
+        };
+        let processors: Vec<_> = self.processors.processors.iter().filter(wants).collect();
         let mut built = BuiltSurface {
             drawn,
             mesh: None,
@@ -254,7 +282,9 @@ impl SurfaceBuilder {
         built.mesh = mesh_builder.and_then(|builder| builder.build(part.origin, &draft));
         if !processors.is_empty() {
             let surface = &draft.surface();
-            let build = |processor: &Arc<dyn SurfaceProcessor>| guarded(|| processor.build(part, surface));
+            let build = |processor: &Arc<dyn SurfaceProcessor>| {
+                guarded.guarded(part.terrain, || processor.build(part, surface))
+            };
             built.actions = processors.into_iter().filter_map(build).flatten().collect();
         }
         built

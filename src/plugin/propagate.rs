@@ -3,6 +3,9 @@
 //!
 //! Bevy's `HierarchyPropagatePlugin` does not fit: games would have to wrap each component in a `Propagate`, and a piece that
 //! is spawned with its own component would lose it.
+//!
+//! What was propagated is kept as [`Source`]s on the terrain and [`Inherited`] on the parts. So nothing is missed while a game
+//! does not run these systems.
 
 use std::marker::PhantomData;
 
@@ -16,14 +19,56 @@ use bevy::prelude::*;
 use super::{BurrowSystems, Chunk, GroundPiece, Tile};
 use crate::terrain::Terrain;
 
+/// Propagates a component of any type from a terrain's entity to its tiles, chunks and [pieces](GroundPiece): when it is
+/// inserted, changed or removed. `BurrowPlugins` do so for `RenderLayers`, and with the feature `render` for materials,
+/// `NotShadowCaster` and `NotShadowReceiver`.
+///
+/// A tile, chunk or piece that is spawned with its own keeps it until the terrain's changes.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::plugin::TerrainPropagatePlugin;
+/// #[derive(Component, Clone)]
+/// struct Minimap;
+///
+/// App::new().add_plugins(TerrainPropagatePlugin::<Minimap>::default());
+/// ```
+pub struct TerrainPropagatePlugin<C: Component + Clone>(PhantomData<fn() -> C>);
+
+impl<C: Component + Clone> Default for TerrainPropagatePlugin<C> {
+    fn default() -> Self {
+        Self(PhantomData)
+    }
+}
+
+impl<C: Component + Clone> Plugin for TerrainPropagatePlugin<C> {
+    fn build(&self, app: &mut App) {
+        propagate_to_ground::<C>(app);
+        propagate_to_pieces::<C>(app);
+    }
+}
+
+/// The steps of [`BurrowSystems::Propagate`], in this order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum PropagateSteps {
+    /// Notes which materials terrains have, and chooses one of several.
+    Choose,
+    /// Propagates components.
+    Propagate,
+}
+
 /// Adds the systems that propagate layers and shadows.
 pub(super) fn add(app: &mut App) {
-    propagate_with_pieces::<RenderLayers>(app);
+    app.configure_sets(
+        Update,
+        (PropagateSteps::Choose, PropagateSteps::Propagate).chain().in_set(BurrowSystems::Propagate),
+    )
+    .add_plugins(TerrainPropagatePlugin::<RenderLayers>::default());
     #[cfg(feature = "render")]
-    {
-        propagate_with_pieces::<NotShadowCaster>(app);
-        propagate_with_pieces::<NotShadowReceiver>(app);
-    }
+    app.add_plugins((
+        TerrainPropagatePlugin::<NotShadowCaster>::default(),
+        TerrainPropagatePlugin::<NotShadowReceiver>::default(),
+    ));
 }
 
 /// Marks an entity whose component of this type comes from its terrain.
@@ -36,15 +81,40 @@ impl<C: Component> Default for Inherited<C> {
     }
 }
 
-/// Propagates a component of a terrain to its tiles, chunks and pieces.
-pub(crate) fn propagate_with_pieces<C: Component + Clone>(app: &mut App) {
-    propagate_to_ground::<C>(app);
-    propagate::<C, GroundPiece, ()>(app);
+/// Marks a terrain whose component of this type was propagated along a relationship.
+#[derive(Component)]
+pub(crate) struct Source<C: Component, R: Relationship>(PhantomData<fn() -> (C, R)>);
+
+impl<C: Component, R: Relationship> Default for Source<C, R> {
+    fn default() -> Self {
+        Self(PhantomData)
+    }
 }
+
+/// Marks a terrain whose component of this type is not propagated, as another one takes precedence.
+#[derive(Component)]
+pub(crate) struct Overruled<C: Component>(PhantomData<fn() -> C>);
+
+impl<C: Component> Default for Overruled<C> {
+    fn default() -> Self {
+        Self(PhantomData)
+    }
+}
+
+/// Terrains whose component of this type is propagated.
+type Active<C> = (With<Terrain>, Without<Overruled<C>>);
+
+/// Terrains whose component of this type is not, or no more.
+type Inactive<C> = (With<Terrain>, Or<(Without<C>, With<Overruled<C>>)>);
 
 /// Propagates a component of a terrain to its tiles and chunks.
 pub(crate) fn propagate_to_ground<C: Component + Clone>(app: &mut App) {
     propagate::<C, ChildOf, Or<(With<Tile>, With<Chunk>)>>(app);
+}
+
+/// Propagates a component of a terrain to its pieces.
+pub(super) fn propagate_to_pieces<C: Component + Clone>(app: &mut App) {
+    propagate::<C, GroundPiece, ()>(app);
 }
 
 /// Propagates a component of a terrain along a relationship when it is inserted, changed or removed.
@@ -53,21 +123,26 @@ fn propagate<C: Component + Clone, R: Relationship, F: QueryFilter + 'static>(ap
         Update,
         (remove_inherited::<C, R>, insert_on_new::<C, R, F>, insert_changed::<C, R, F>)
             .chain()
-            .in_set(BurrowSystems::Propagate),
+            .in_set(PropagateSteps::Propagate),
     );
 }
 
 /// Removes a component from the entities that inherited it once their terrain no longer has it.
 pub(crate) fn remove_inherited<C: Component, R: Relationship>(
     mut commands: Commands,
-    mut removed: RemovedComponents<C>,
-    terrains: Query<&R::RelationshipTarget, (With<Terrain>, Without<C>)>,
+    lost: Query<(Entity, Option<&R::RelationshipTarget>), (Inactive<C>, With<Source<C, R>>)>,
+    new: Query<Entity, (Active<C>, With<C>, Without<Source<C, R>>)>,
     inherited: Query<(), With<Inherited<C>>>,
 ) {
-    for sources in removed.read().filter_map(|entity| terrains.get(entity).ok()) {
-        for entity in sources.iter().filter(|&entity| inherited.contains(entity)) {
+    for (terrain, sources) in &lost {
+        let sources = sources.into_iter().flat_map(|sources| sources.iter());
+        for entity in sources.filter(|&entity| inherited.contains(entity)) {
             commands.entity(entity).try_remove::<(C, Inherited<C>)>();
         }
+        commands.entity(terrain).try_remove::<Source<C, R>>();
+    }
+    for terrain in &new {
+        commands.entity(terrain).try_insert(Source::<C, R>::default());
     }
 }
 
@@ -75,7 +150,7 @@ pub(crate) fn remove_inherited<C: Component, R: Relationship>(
 fn insert_on_new<C: Component + Clone, R: Relationship, F: QueryFilter>(
     mut commands: Commands,
     new: Query<(Entity, &R), (F, Added<R>, Without<C>)>,
-    terrains: Query<&C, With<Terrain>>,
+    terrains: Query<&C, Active<C>>,
 ) {
     for (entity, link) in &new {
         if let Ok(component) = terrains.get(link.get()) {
@@ -84,9 +159,10 @@ fn insert_on_new<C: Component + Clone, R: Relationship, F: QueryFilter>(
     }
 }
 
+/// Inserts a component that is new or changed into all entities but those that are new themselves.
 fn insert_changed<C: Component + Clone, R: Relationship, F: QueryFilter>(
     mut commands: Commands,
-    terrains: Query<(&C, &R::RelationshipTarget), (With<Terrain>, Changed<C>)>,
+    terrains: Query<(&C, &R::RelationshipTarget), (Active<C>, Or<(Changed<C>, Added<Source<C, R>>)>)>,
     links: Query<Ref<R>, F>,
 ) {
     for (component, sources) in &terrains {

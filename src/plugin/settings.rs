@@ -1,5 +1,6 @@
 //! Settings, as resources and components.
 
+use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
 
 use crate::backend::{Backend, Engine};
@@ -31,11 +32,17 @@ pub struct BurrowSettings {
     pub swaps_per_frame: usize,
     /// Meshes of tiles and chunks passed to the renderer per frame while a terrain loads. They are shown once all are there.
     pub loads_per_frame: usize,
+    /// Where the meshes of tiles and chunks are kept. In the render world only, unless set otherwise: that saves memory and a
+    /// copy of each mesh, but Bevy's `Mesh` methods panic once such a mesh was extracted. Crates that read the meshes of a game,
+    /// for colliders, navigation or mesh picking, need `RenderAssetUsages::default()`, which keeps them in both worlds.
+    ///
+    /// It holds for meshes that are built after a change; see [`Redraw`](super::Redraw).
+    pub mesh_usages: RenderAssetUsages,
 }
 
 impl Default for BurrowSettings {
     fn default() -> Self {
-        Self { swaps_per_frame: 256, loads_per_frame: 256 }
+        Self { swaps_per_frame: 256, loads_per_frame: 256, mesh_usages: RenderAssetUsages::RENDER_WORLD }
     }
 }
 

@@ -37,6 +37,7 @@ pub struct History {
 
 /// The result of a step. Each submitted step gets exactly one.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct HistoryReceipt {
     /// Undo or redo.
     pub step: HistoryStep,

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 
-use glam::{Vec2, Vec3Swizzles};
+use glam::Vec3;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -11,8 +11,11 @@ use super::level_meshes::GroundFacts;
 use super::world::{Version, World};
 use crate::levels::{Choice, Cut, Eye, LevelGrid, Node, NodeFacts};
 
+/// How many nodes are known before any is forgotten.
+const KEPT_NODES: usize = 32_768;
+
 /// What is known of nodes, shared with tasks. Heights and errors depend on the ground alone, and are kept for nodes that were
-/// drawn once.
+/// drawn once, until there are too many.
 #[derive(Default)]
 pub struct KnownNodes {
     facts: RwLock<FxHashMap<Node, GroundFacts>>,
@@ -72,18 +75,53 @@ impl KnownNodes {
         };
         let nearest = |node: Node| {
             let (low, high) = cut.grid().columns(node);
-            let [low, high] = [low, high].map(|column| Vec2::new(column.x as f32, column.z as f32));
-            let distance = |eye: &Eye| {
-                let place = eye.position.xz();
-                place.distance(place.clamp(low, high.max(low)))
-            };
-            eyes.iter().map(distance).fold(f32::INFINITY, f32::min) as u64
+            // However high it is.
+            let low = Vec3::new(low.x as f32, f32::NEG_INFINITY, low.z as f32);
+            let high = Vec3::new(high.x as f32, f32::INFINITY, high.z as f32);
+            let distances = eyes.iter().map(|eye| eye.distance(low, high));
+            distances.fold(f32::INFINITY, f32::min) as u64
         };
         let mut next = cut.clone();
         let step = next.step_to(&target, most, nearest).unwrap_or_default();
         self.learn(world, cut.grid(), step.new.iter().copied());
         let changed = next.nodes().filter(|&node| !target.contains(node)).count();
         self.waiting.store(changed.max(step.new.len()), Ordering::Relaxed);
+        self.forget(&next, KEPT_NODES);
         next
+    }
+
+    /// Forgets nodes that are neither in this cut nor above it, once more than `most` and many more than these are known.
+    fn forget(&self, cut: &Cut, most: usize) {
+        if self.read().len() > most.max(8 * cut.nodes().count()) {
+            let mut facts = self.facts.write().unwrap_or_else(PoisonError::into_inner);
+            facts.retain(|&node, _| cut.contains(node) || cut.is_split(node));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::Ground;
+    use crate::terrain::{Terrain, TerrainSettings};
+
+    #[test]
+    fn nodes_that_are_not_drawn_are_forgotten_once_there_are_many() {
+        let settings = TerrainSettings { chunk_size: 8, ..TerrainSettings::default() };
+        let terrain = Terrain::new(Ground::flat(320, 270, 8.0).unwrap(), &settings).unwrap();
+        let (world, known) = (terrain.world(), KnownNodes::default());
+        let grid = world.level_grid(u8::MAX);
+        let (coarse, fine) = (Cut::coarsest(grid), Cut::new(grid, |_| true));
+        known.learn(world, grid, coarse.nodes().chain(fine.nodes()));
+        let all = known.read().len();
+        known.forget(&coarse, all);
+        known.forget(&fine, 0);
+        assert_eq!(known.read().len(), all, "few are known, or all are needed");
+        known.forget(&coarse, 0);
+        let mut rest: Vec<Node> = known.read().keys().copied().collect();
+        let mut drawn: Vec<Node> = coarse.nodes().collect();
+        rest.sort_unstable();
+        drawn.sort_unstable();
+        assert_eq!(rest, drawn);
     }
 }

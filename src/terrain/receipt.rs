@@ -7,6 +7,7 @@ use crate::volume::{FieldId, MaterialCounts, Refused, Scenario};
 
 /// The result of a brush. Each submitted brush gets exactly one receipt.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct Receipt {
     /// The brush's tag.
     pub tag: u64,

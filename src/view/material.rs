@@ -5,10 +5,13 @@ use std::marker::PhantomData;
 use bevy::prelude::*;
 
 use super::vertex::VertexPlugin;
-use crate::plugin::propagate_with_pieces;
+use crate::plugin::propagate_material;
 
 /// Propagates the `MeshMaterial3d<M>` of a terrain's entity to its tiles, chunks and [pieces](crate::plugin::GroundPiece), also
 /// when it changes or is removed. A piece that is spawned with its own keeps it until the terrain's changes.
+///
+/// A terrain is drawn with one material: the one of a [`GroundLook`](super::GroundLook) before any other, or else the one whose
+/// plugin was added last. A warning names the others.
 ///
 /// `BurrowPlugins` contain it for `StandardMaterial`; add it for each material type of your own, before or after Bevy's
 /// plugins. Vertex colours carry the terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
@@ -26,6 +29,6 @@ impl<M: Material> Default for TerrainMaterialPlugin<M> {
 impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     fn build(&self, app: &mut App) {
         VertexPlugin::add_once(app);
-        propagate_with_pieces::<MeshMaterial3d<M>>(app);
+        propagate_material::<M>(app);
     }
 }

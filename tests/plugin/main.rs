@@ -1,24 +1,35 @@
 //! The Bevy plugin from outside: brushes go in as messages; frames, messages and entities are checked frame by frame.
 #![cfg(feature = "plugin")]
 
+mod cameras;
 #[cfg(feature = "debug")]
 mod debug_views;
 mod despawning;
 mod diagnostics;
 mod entities;
+mod gates;
 mod heightmaps;
 mod history;
 mod holes;
 mod levels;
+mod lifecycle;
 mod loading;
+#[cfg(feature = "examples")]
+mod looks;
 mod loose;
 #[cfg(feature = "render")]
 mod materials;
+mod mistakes;
 mod order;
+mod origins;
+#[cfg(feature = "picking")]
+mod picking;
+mod plugins;
 mod processors;
 mod propagate;
 mod queries;
 mod receipts;
+mod reflection;
 mod replacing;
 mod saved;
 mod saved_changes;

@@ -55,10 +55,15 @@ impl Stage {
     /// An app with these plugins besides those of the crate, and some after them.
     pub fn with_all<M, N>(before: impl bevy::app::Plugins<M>, after: impl bevy::app::Plugins<N>) -> Self {
         let mut app = App::new();
-        app.add_plugins(before)
-            .add_plugins(BurrowPlugins)
-            .add_plugins(after)
-            .init_resource::<Receipts>()
+        app.add_plugins(before).add_plugins(BurrowPlugins).add_plugins(after);
+        app.finish();
+        app.cleanup();
+        Self::of(app)
+    }
+
+    /// An app that has the plugin.
+    pub fn of(mut app: App) -> Self {
+        app.init_resource::<Receipts>()
             .init_resource::<ReadyTerrains>()
             .add_observer(|ready: On<TerrainReady>, mut terrains: ResMut<ReadyTerrains>| {
                 terrains.0.push(ready.entity)
@@ -66,9 +71,41 @@ impl Stage {
             .add_systems(Last, |mut new: MessageReader<BrushApplied>, mut kept: ResMut<Receipts>| {
                 kept.0.extend(new.read().cloned());
             });
+        Self { app }
+    }
+
+    /// Bevy's own plugins, without a window and without a renderer: materials are assets, and nothing is drawn.
+    #[cfg(feature = "examples")]
+    pub fn windowless() -> Self {
+        Self::windowless_with(())
+    }
+
+    /// The same with more plugins.
+    #[cfg(feature = "examples")]
+    pub fn windowless_with<M>(after: impl bevy::app::Plugins<M>) -> Self {
+        use bevy::app::PluginsState;
+        use bevy::log::LogPlugin;
+        use bevy::render::RenderPlugin;
+        use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+        use bevy::render::settings::WgpuSettings;
+        use bevy::window::ExitCondition;
+        use bevy::winit::WinitPlugin;
+
+        let settings = WgpuSettings { backends: None, ..default() };
+        let plugins = DefaultPlugins
+            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+            .set(RenderPlugin { render_creation: settings.into(), ..default() })
+            .disable::<LogPlugin>()
+            .disable::<WinitPlugin>()
+            .disable::<PipelinedRenderingPlugin>();
+        let mut app = App::new();
+        app.add_plugins(plugins).add_plugins(BurrowPlugins).add_plugins(after);
+        while app.plugins_state() == PluginsState::Adding {
+            bevy::tasks::tick_global_task_pools_on_main_thread();
+        }
         app.finish();
         app.cleanup();
-        Self { app }
+        Self::of(app)
     }
 
     /// Makes the app record messages of one more kind.

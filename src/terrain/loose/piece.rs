@@ -58,6 +58,7 @@ pub struct Run {
 /// game's, not the terrain's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Plain", into = "Plain")]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct LoosePiece {
     /// Its name. A saved piece does not store it, since `runs` and `materials` decide it.
     pub id: PieceId,

@@ -37,7 +37,10 @@ use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
 use super::vertex::VertexPlugin;
-use crate::plugin::{BurrowSystems, GroundPiece, SlimVertices, propagate_to_ground, remove_inherited};
+use crate::plugin::{
+    BurrowSystems, GroundPiece, SlimVertices, propagate_look, remove_inherited, warn_of_textures,
+    warn_of_undrawn,
+};
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
@@ -55,7 +58,9 @@ impl Plugin for GroundPlugin {
         VertexPlugin::add_once(app);
         embedded_asset!(app, "ground.wgsl");
         // Pieces have one of their own, which knows where they were in the ground.
-        propagate_to_ground::<MeshMaterial3d<GroundMaterial>>(app);
+        propagate_look::<GroundMaterial>(app);
+        warn_of_undrawn::<GroundLook>(app);
+        warn_of_textures(app);
         keep_materials(app);
         app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
             .add_systems(Update, textures::load_textures.before(add_materials).after(BurrowSystems::Begin));
@@ -141,14 +146,12 @@ fn thicken_vertices(gone: On<Remove, GroundLook>, mut commands: Commands) {
 /// Takes the material of a terrain that has lost its look, and has no other one by now.
 fn remove_materials(
     mut commands: Commands,
-    mut removed: RemovedComponents<GroundLook>,
-    with_own: Query<(&MeshMaterial3d<GroundMaterial>, &OwnMaterial), Without<GroundLook>>,
+    with_own: Query<(Entity, Option<&MeshMaterial3d<GroundMaterial>>, &OwnMaterial), Without<GroundLook>>,
 ) {
-    for entity in removed.read() {
-        let Ok((material, own)) = with_own.get(entity) else { continue };
+    for (entity, material, own) in &with_own {
         let mut terrain = commands.entity(entity);
         terrain.try_remove::<OwnMaterial>();
-        if material.0.id() == own.0 {
+        if material.is_some_and(|material| material.0.id() == own.0) {
             terrain.try_remove::<MeshMaterial3d<GroundMaterial>>();
         }
     }
@@ -163,9 +166,18 @@ fn follow(
     mut materials: ResMut<Assets<GroundMaterial>>,
 ) {
     for (look, place, material) in &looks {
+        // Bevy prepares the material and all tiles anew once it is touched, and a terrain's place counts as changed whenever
+        // anything below it moves.
+        let (uniform, quality) = (GroundUniform::new(look, place), look.quality);
+        let is_other = |material: &GroundMaterial| {
+            material.extension.uniform != uniform || material.extension.quality != quality
+        };
+        if !materials.get(&material.0).is_some_and(is_other) {
+            continue;
+        }
         if let Some(mut material) = materials.get_mut(&material.0) {
-            material.extension.uniform = GroundUniform::new(look, place);
-            material.extension.quality = look.quality;
+            material.extension.uniform = uniform;
+            material.extension.quality = quality;
         }
     }
 }

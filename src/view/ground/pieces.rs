@@ -50,9 +50,8 @@ pub(super) fn follow(
         let Some(terrain) = terrain.and_then(|terrain| materials.get(&terrain.0)) else { continue };
         let extension = of_piece(&terrain.extension, piece);
         // A terrain that only moved changes nothing for its pieces.
-        if let Some(mut own) = materials.get_mut(&own.0)
-            && own.extension != extension
-        {
+        let is_other = materials.get(&own.0).is_some_and(|own| own.extension != extension);
+        if is_other && let Some(mut own) = materials.get_mut(&own.0) {
             own.extension = extension;
         }
     }

@@ -1,0 +1,43 @@
+//! Builds everything that is drawn once more.
+
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::prelude::*;
+
+use super::entities::TerrainEntities;
+use super::load::Loading;
+use crate::terrain::Terrain;
+
+/// Builds all meshes of terrains anew: trigger it after the graphics device was lost, as meshes are kept in the render world
+/// only, or after a change of [`BurrowSettings::mesh_usages`](super::BurrowSettings::mesh_usages) or of
+/// [`MaterialColors`](super::MaterialColors). Edits go on, what is drawn stays until the new meshes are there, and
+/// [`TerrainReady`](super::TerrainReady) follows.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::plugin::Redraw;
+/// fn after_device_loss(mut commands: Commands) {
+///     commands.trigger(Redraw::default());
+/// }
+/// ```
+#[derive(Event, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Redraw {
+    /// The terrain's entity; `None` for every terrain there is.
+    pub terrain: Option<Entity>,
+}
+
+/// Has terrains loaded anew.
+pub(super) fn redraw(
+    asked: On<Redraw>,
+    mut commands: Commands,
+    mut terrains: Query<(Entity, Option<&mut TerrainEntities>), (With<Terrain>, Allow<Disabled>)>,
+) {
+    let Redraw { terrain } = *asked;
+    for (entity, entities) in &mut terrains {
+        if terrain.is_none_or(|terrain| terrain == entity) {
+            if let Some(mut entities) = entities {
+                entities.is_outdated = true;
+            }
+            commands.entity(entity).try_remove::<Loading>();
+        }
+    }
+}

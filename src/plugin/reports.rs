@@ -1,0 +1,71 @@
+//! What was logged of each terrain, so that each message names its terrain and comes once.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use bevy::ecs::system::SystemParam;
+use bevy::platform::collections::HashSet;
+use bevy::prelude::*;
+
+use crate::terrain::Terrain;
+
+/// Something that is logged once for each terrain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Report {
+    /// Its place is not finite, or a scale is 0.
+    NoPlace,
+    /// A parent mirrors it.
+    Mirrored,
+    /// A parent stretches it.
+    Stretched,
+    /// Seams may show where it stands.
+    Unaligned,
+    /// The game gave it a scale.
+    ScaleReplaced,
+    /// It has materials of several types.
+    #[cfg(feature = "render")]
+    SeveralMaterials,
+    /// It has no material.
+    #[cfg(feature = "render")]
+    NoMaterial,
+    /// Applying a brush panicked.
+    BrushPanicked,
+    /// A task panicked.
+    TaskPanicked,
+    /// A brush has numbers that are not allowed.
+    BrushInvalid,
+    /// The first brushes reach no terrain.
+    BrushBeside,
+    /// It is so far from the origin that numbers are coarse.
+    Far,
+    /// It has levels of detail, and nobody looks.
+    NobodyLooks,
+    /// It has a material with textures, and no texture coordinates.
+    #[cfg(feature = "render")]
+    Textures,
+}
+
+/// What was logged. It is locked and not borrowed mutably, so that systems which log need no order.
+#[derive(Resource, Default)]
+pub(crate) struct Reported(Mutex<HashSet<(Entity, Report)>>);
+
+impl Reported {
+    fn lock(&self) -> MutexGuard<'_, HashSet<(Entity, Report)>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Logs what is new.
+#[derive(SystemParam)]
+pub(crate) struct Reports<'w>(Res<'w, Reported>);
+
+impl Reports<'_> {
+    /// Whether this was not reported of the entity before. It counts as reported from now on.
+    pub(crate) fn is_new(&self, entity: Entity, report: Report) -> bool {
+        self.0.lock().insert((entity, report))
+    }
+}
+
+/// Forgets what was logged of a terrain that is gone.
+pub(super) fn forget_reports(gone: On<Remove, Terrain>, reported: Res<Reported>) {
+    reported.lock().retain(|(entity, _)| *entity != gone.entity);
+}

@@ -1,0 +1,765 @@
+//! What a terrain may carry, crossed with what may happen to it in each phase of its life. After each event the same laws hold:
+//! every message is answered once, every applied brush has its ground, nothing waits for ever, nothing is left over, seams are
+//! flawless, and the world is that of a plain model.
+//!
+//! | variable | meaning |
+//! | --- | --- |
+//! | `BURROW_SEQUENCES` | random sequences of 20 events, 8 unless set |
+//! | `BURROW_SEED` | the seed of the first of them |
+
+use std::fmt::Debug;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use bevy::camera::visibility::RenderLayers;
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::mesh::MeshPlugin;
+use bevy::prelude::*;
+use bevy_burrow::plugin::{CommitAction, Held, Part, SurfaceProcessor, SurfaceProcessors};
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::SurfaceMesh;
+use fastrand::Rng;
+
+use crate::stage::Stage;
+
+/// Something that a terrain carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Load {
+    Nothing,
+    Levels,
+    Loose,
+    Layers,
+    SlimVertices,
+    Parent,
+    #[cfg(feature = "render")]
+    Material,
+    #[cfg(feature = "avian")]
+    Physics,
+    #[cfg(feature = "store")]
+    Saved,
+}
+
+const LOADS: &[Load] = &[
+    Load::Nothing,
+    Load::Levels,
+    Load::Loose,
+    Load::Layers,
+    Load::SlimVertices,
+    Load::Parent,
+    #[cfg(feature = "render")]
+    Load::Material,
+    #[cfg(feature = "avian")]
+    Load::Physics,
+    #[cfg(feature = "store")]
+    Load::Saved,
+];
+
+/// What a terrain is doing when something happens to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Idle,
+    Loading,
+    Transaction,
+    LevelChange,
+}
+
+const PHASES: [Phase; 4] = [Phase::Idle, Phase::Loading, Phase::Transaction, Phase::LevelChange];
+
+/// Something that happens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Event {
+    Dig,
+    DigBeside,
+    Undo,
+    Redo,
+    OwnEdit,
+    Replace,
+    ReplaceResized,
+    Swap,
+    RemoveAndInsert,
+    DespawnAndSpawn,
+    Disable,
+    Gate,
+    Pause,
+    Hold,
+    Move,
+    Reparent,
+    Redraw,
+    CameraOff,
+    ToggleLevels,
+    ToggleLayers,
+    ToggleSlim,
+    Hide,
+    DespawnPart,
+    Another,
+}
+
+const EVENTS: [Event; 24] = [
+    Event::Dig,
+    Event::DigBeside,
+    Event::Undo,
+    Event::Redo,
+    Event::OwnEdit,
+    Event::Replace,
+    Event::ReplaceResized,
+    Event::Swap,
+    Event::RemoveAndInsert,
+    Event::DespawnAndSpawn,
+    Event::Disable,
+    Event::Gate,
+    Event::Pause,
+    Event::Hold,
+    Event::Move,
+    Event::Reparent,
+    Event::Redraw,
+    Event::CameraOff,
+    Event::ToggleLevels,
+    Event::ToggleLayers,
+    Event::ToggleSlim,
+    Event::Hide,
+    Event::DespawnPart,
+    Event::Another,
+];
+
+/// Something that was asked of a terrain, in order.
+#[derive(Clone, Debug)]
+enum Request {
+    Brush(Brush),
+    Step(HistoryStep),
+    /// A game's own edit, which is done at once.
+    Own(Brush),
+}
+
+/// What is expected of one terrain on an entity.
+struct Expected {
+    /// A plain model, which did all that was checked.
+    plain: Terrain,
+    /// What was asked since, in order.
+    requests: Vec<Request>,
+}
+
+impl Expected {
+    /// A terrain, and what is expected of it.
+    fn new(load: Load, rng: &mut Rng, voxel_size: f32) -> (Terrain, Self) {
+        let noise = NoiseHeights { seed: rng.u32(..), scale: 24.0, amplitude: 12.0, base: 4.0, ..default() };
+        let model = || {
+            let ground = Ground::from_noise(64, 64, &noise).expect("valid");
+            Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size }).expect("valid")
+        };
+        let mut plain = model();
+        if load == Load::Loose {
+            plain.set_loose(Some(loose().into()));
+        }
+        (model(), Self { plain, requests: Vec::new() })
+    }
+}
+
+fn loose() -> LooseGround {
+    LooseGround { crumbs: 64, debris: 4096, ..default() }
+}
+
+/// Makes transactions slow while it is asked to, so that things happen in the middle of them.
+struct Slow(Arc<AtomicBool>);
+
+impl SurfaceProcessor for Slow {
+    fn wants(&self, _: &Part) -> bool {
+        if self.0.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        false
+    }
+
+    fn build(&self, _: &Part, _: &SurfaceMesh) -> Option<CommitAction> {
+        None
+    }
+}
+
+#[derive(Resource, PartialEq)]
+struct Runs(bool);
+
+/// An app in which things happen to a terrain.
+struct Life {
+    stage: Stage,
+    terrain: Entity,
+    camera: Entity,
+    load: Load,
+    expected: Expected,
+    rng: Rng,
+    tag: u64,
+    /// Brushes that must be answered once each.
+    sent: Vec<u64>,
+    steps_sent: usize,
+    steps_heard: usize,
+    /// Whether something was sent that no frame has collected yet.
+    is_uncollected: bool,
+    /// Whether a step is among that.
+    has_step: bool,
+    is_slow: Arc<AtomicBool>,
+    /// Entities before there was a terrain.
+    before: usize,
+    #[cfg(feature = "store")]
+    folder: std::path::PathBuf,
+}
+
+impl Life {
+    fn new(load: Load, seed: u64) -> Self {
+        let base = (MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin);
+        #[cfg(feature = "avian")]
+        let stage = match load {
+            Load::Physics => Stage::with_all(
+                base,
+                (avian3d::prelude::PhysicsPlugins::default(), bevy_burrow::physics::TerrainPhysicsPlugin),
+            ),
+            _ => Stage::with(base),
+        };
+        #[cfg(not(feature = "avian"))]
+        let stage = Stage::with(base);
+        let mut stage = stage.recording::<HistoryMoved>();
+        #[cfg(feature = "render")]
+        stage.app.init_asset::<StandardMaterial>();
+        stage
+            .app
+            .insert_resource(BurrowSettings { loads_per_frame: 8, swaps_per_frame: 24, ..default() })
+            .insert_resource(Runs(true))
+            .configure_sets(
+                Update,
+                (
+                    BurrowSystems::Load,
+                    BurrowSystems::Collect,
+                    BurrowSystems::Commit,
+                    BurrowSystems::Begin,
+                    BurrowSystems::Propagate,
+                )
+                    .run_if(resource_equals(Runs(true))),
+            );
+        let mut rng = Rng::with_seed(seed);
+        let place = Transform::from_xyz(20.0, 30.0, 20.0);
+        let camera = (Camera::default(), bevy::camera::Projection::default(), place);
+        let camera = stage.app.world_mut().spawn(camera).id();
+        #[cfg(feature = "avian")]
+        if load == Load::Physics {
+            let source = bevy_burrow::physics::ColliderSource { radius: 40.0 };
+            stage.app.world_mut().spawn((source, Transform::from_xyz(40.0, 20.0, 40.0)));
+        }
+        let is_slow = Arc::<AtomicBool>::default();
+        stage.app.world_mut().resource_mut::<SurfaceProcessors>().add(Slow(Arc::clone(&is_slow)));
+        let before = entities(&mut stage);
+        let (model, expected) = Expected::new(load, &mut rng, 1.0);
+        let mut life = Self {
+            stage,
+            terrain: Entity::PLACEHOLDER,
+            camera,
+            load,
+            expected,
+            rng,
+            tag: 0,
+            sent: Vec::new(),
+            steps_sent: 0,
+            steps_heard: 0,
+            is_uncollected: false,
+            has_step: false,
+            is_slow,
+            before,
+            #[cfg(feature = "store")]
+            folder: std::env::temp_dir().join(format!("burrow-life-{}-{load:?}-{seed}", std::process::id())),
+        };
+        life.spawn(model);
+        life
+    }
+
+    /// Spawns a terrain with its load.
+    fn spawn(&mut self, model: Terrain) {
+        self.terrain = self.stage.app.world_mut().spawn(model).id();
+        let load = self.load;
+        let mut entity = self.stage.app.world_mut().entity_mut(self.terrain);
+        match load {
+            Load::Nothing => {}
+            Load::Levels => {
+                entity.insert(levels());
+            }
+            Load::Loose => {
+                entity.insert(loose());
+            }
+            Load::Layers => {
+                entity.insert(RenderLayers::from_layers(&[0, 3]));
+            }
+            Load::SlimVertices => {
+                entity.insert(SlimVertices);
+            }
+            Load::Parent => {
+                let id = entity.id();
+                let root = (Transform::from_xyz(32.0, 0.0, 64.0), Visibility::default());
+                let root = self.stage.app.world_mut().spawn(root).id();
+                self.stage.app.world_mut().entity_mut(id).insert(ChildOf(root));
+            }
+            #[cfg(feature = "render")]
+            Load::Material => {
+                let id = entity.id();
+                let world = self.stage.app.world_mut();
+                let material =
+                    world.resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default());
+                world.entity_mut(id).insert(MeshMaterial3d(material));
+            }
+            #[cfg(feature = "avian")]
+            Load::Physics => {}
+            #[cfg(feature = "store")]
+            Load::Saved => {
+                // The former world may still be closing.
+                entity.insert(SavedWorld::new(self.folder.join(self.tag.to_string())));
+            }
+        }
+    }
+
+    fn is_alive(&self) -> bool {
+        self.stage.app.world().get::<Terrain>(self.terrain).is_some()
+    }
+
+    /// A brush for the ground somewhere, in world space.
+    fn brush(&mut self) -> Brush {
+        let (x, z) = (self.rng.u32(0..256) as f32 / 4.0, self.rng.u32(0..256) as f32 / 4.0);
+        let ground = self.expected.plain.world();
+        let height = ground.height(x.into(), z.into()).unwrap_or_default().round() as f32;
+        // Quarters of voxels have the same bits in world space.
+        let shape = Shape::sphere(Vec3::new(x, height, z), 2.0 + self.rng.u32(0..16) as f32 / 4.0);
+        let brush = match self.rng.u32(0..4) {
+            0 => Brush::add(shape, MaterialId(4)),
+            1 => Brush::dig(shape).with_roughness(Roughness::new(1.0, 3.0, self.rng.u32(..))),
+            _ => Brush::dig(shape),
+        };
+        self.tag += 1;
+        // Each has its own stroke: when a pause ends, brushes of many frames come at once.
+        brush.with_tag(self.tag).with_stroke(self.tag)
+    }
+
+    /// Sends a brush in voxels of the terrain to the terrain, wherever that is.
+    fn dig(&mut self) {
+        // Brushes of a frame are read before its steps.
+        self.collect_steps();
+        let brush = self.brush();
+        self.sent.push(brush.tag);
+        self.is_uncollected = true;
+        let place = self.place();
+        let Some(place) = place.filter(|_| self.is_alive()) else {
+            self.stage.send(brush);
+            return;
+        };
+        let (scale, rotation, translation) = place.to_scale_rotation_translation();
+        let world = brush.clone().transformed(rotation, translation, scale.x);
+        self.expected.requests.push(Request::Brush(brush));
+        self.stage.send_to(self.terrain, world);
+    }
+
+    /// Where the terrain is, by the transforms of it and of its parent.
+    fn place(&self) -> Option<GlobalTransform> {
+        let world = self.stage.app.world();
+        let local = *world.get::<Transform>(self.terrain)?;
+        let parent =
+            world.get::<ChildOf>(self.terrain).and_then(|parent| world.get::<Transform>(parent.parent()));
+        Some(parent.map_or(GlobalTransform::IDENTITY, |parent| GlobalTransform::from(*parent)) * local)
+    }
+
+    fn step(&mut self, step: HistoryStep) {
+        if !self.is_alive() {
+            return;
+        }
+        // And undos before redos.
+        self.collect_steps();
+        self.steps_sent += 1;
+        self.is_uncollected = true;
+        self.has_step = true;
+        self.expected.requests.push(Request::Step(step));
+        let terrain = Some(self.terrain);
+        match step {
+            HistoryStep::Undo => self.stage.write(Undo { terrain }),
+            HistoryStep::Redo => self.stage.write(Redo { terrain }),
+        }
+    }
+
+    /// Another terrain takes the place of the one that is there: what is asked of that one is no longer expected.
+    fn renew(&mut self, voxel_size: f32) -> Terrain {
+        self.collect();
+        #[cfg(feature = "store")]
+        self.stage.app.world_mut().entity_mut(self.terrain).remove::<SavedWorld>();
+        let (model, expected) = Expected::new(self.load, &mut self.rng, voxel_size);
+        self.expected = expected;
+        model
+    }
+
+    /// What was sent reaches the terrain as it is now.
+    fn collect(&mut self) {
+        if self.is_uncollected {
+            self.run(1);
+        }
+    }
+
+    fn collect_steps(&mut self) {
+        if self.has_step {
+            self.run(1);
+        }
+    }
+
+    fn run(&mut self, frames: usize) {
+        self.stage.frames(frames);
+        self.is_uncollected &= frames == 0;
+        self.has_step &= frames == 0;
+    }
+
+    /// Brings the terrain into a phase.
+    fn reach(&mut self, phase: Phase) {
+        match phase {
+            Phase::Idle => self.settle(),
+            Phase::Loading => {
+                self.stage.app.world_mut().trigger(Redraw::default());
+                self.run(2);
+            }
+            Phase::Transaction => {
+                self.settle();
+                self.is_slow.store(true, Ordering::Relaxed);
+                self.dig();
+                self.dig();
+                self.run(1);
+            }
+            Phase::LevelChange => {
+                self.settle();
+                let to = Vec3::new(self.rng.f32() * 96.0, 25.0, self.rng.f32() * 96.0);
+                self.stage.app.world_mut().get_mut::<Transform>(self.camera).expect("a camera").translation =
+                    to;
+                self.stage.frame();
+            }
+        }
+    }
+
+    /// Runs some frames, perhaps none, with what is going on going on.
+    fn frames(&mut self) {
+        let count = self.rng.usize(0..4);
+        self.run(count);
+    }
+
+    fn happen(&mut self, event: Event) {
+        let terrain = self.terrain;
+        match event {
+            Event::Dig => (0..self.rng.usize(1..4)).for_each(|_| self.dig()),
+            Event::DigBeside => {
+                let brush = self.brush();
+                self.sent.push(brush.tag);
+                self.stage.send(brush.transformed(Quat::IDENTITY, Vec3::X * 9000.0, 1.0));
+            }
+            Event::Undo => self.step(HistoryStep::Undo),
+            Event::Redo => self.step(HistoryStep::Redo),
+            Event::OwnEdit => {
+                self.settle();
+                let brush = self.brush();
+                let mut model =
+                    self.stage.app.world_mut().get_mut::<Terrain>(terrain).expect("it is settled");
+                model.apply([&brush]);
+                self.expected.requests.push(Request::Own(brush));
+            }
+            Event::Replace | Event::ReplaceResized => {
+                let voxel_size = if event == Event::Replace { 1.0 } else { 0.5 };
+                let model = self.renew(voxel_size);
+                self.stage.app.world_mut().entity_mut(terrain).insert(model);
+            }
+            Event::Swap => {
+                // What waits in a terrain goes where the terrain goes, so all is answered first.
+                self.settle();
+                let model = self.renew(1.0);
+                let mut own = self.stage.app.world_mut().get_mut::<Terrain>(terrain).expect("it is settled");
+                drop(std::mem::replace(&mut *own, model));
+            }
+            Event::RemoveAndInsert => {
+                let model = self.renew(1.0);
+                self.stage.app.world_mut().entity_mut(terrain).remove::<Terrain>();
+                self.frames();
+                self.stage.app.world_mut().entity_mut(terrain).insert(model);
+            }
+            Event::DespawnAndSpawn => {
+                let parent = self.stage.app.world().get::<ChildOf>(terrain).map(ChildOf::parent);
+                self.collect();
+                self.stage.app.world_mut().despawn(parent.unwrap_or(terrain));
+                let (model, expected) = Expected::new(self.load, &mut self.rng, 1.0);
+                self.expected = expected;
+                self.frames();
+                self.spawn(model);
+            }
+            Event::Disable => {
+                self.collect();
+                self.stage.app.world_mut().entity_mut(terrain).insert(Disabled);
+                self.frames();
+                self.stage.app.world_mut().entity_mut(terrain).remove::<Disabled>();
+            }
+            Event::Gate => {
+                self.collect();
+                self.stage.app.world_mut().resource_mut::<Runs>().0 = false;
+                self.stage.frames(3);
+                self.dig();
+                self.stage.frames(3);
+                self.is_uncollected = true;
+                self.stage.app.world_mut().resource_mut::<Runs>().0 = true;
+            }
+            Event::Pause => {
+                self.stage.app.world_mut().resource_mut::<Time<Virtual>>().pause();
+                self.dig();
+                self.frames();
+                self.stage.app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+            }
+            Event::Hold => {
+                let is_held = self.stage.app.world().entity(terrain).contains::<Held>();
+                self.stage.app.world_mut().entity_mut(terrain).insert(Held);
+                self.dig();
+                self.frames();
+                if !is_held {
+                    self.stage.app.world_mut().entity_mut(terrain).remove::<Held>();
+                }
+            }
+            Event::Move => {
+                self.collect();
+                let to = Vec3::new(self.rng.i32(-9..9) as f32, self.rng.i32(-9..9) as f32, 32.0);
+                self.stage.app.world_mut().get_mut::<Transform>(terrain).expect("a place").translation = to;
+            }
+            Event::Reparent => {
+                self.collect();
+                let root = (Transform::from_xyz(-64.0, 8.0, 0.0), Visibility::default());
+                let world = self.stage.app.world_mut();
+                let old = world.get::<ChildOf>(terrain).map(ChildOf::parent);
+                let root = world.spawn(root).id();
+                world.entity_mut(terrain).insert(ChildOf(root));
+                if let Some(old) = old {
+                    world.despawn(old);
+                }
+            }
+            Event::Redraw => self.stage.app.world_mut().trigger(Redraw { terrain: Some(terrain) }),
+            Event::CameraOff => {
+                let mut camera = self.stage.app.world_mut().get_mut::<Camera>(self.camera).expect("a camera");
+                camera.is_active = !camera.is_active;
+            }
+            Event::ToggleLevels => self.toggle(levels()),
+            Event::ToggleLayers => self.toggle(RenderLayers::from_layers(&[0, 5])),
+            Event::ToggleSlim => self.toggle(SlimVertices),
+            Event::Hide => self.toggle(Visibility::Hidden),
+            Event::DespawnPart => {
+                // A tile that a game despawns by mistake comes back with the next mesh; here all are built anew.
+                if let Some(&tile) = self.stage.with_component::<Chunk>().first() {
+                    self.stage.app.world_mut().despawn(tile);
+                    self.stage.app.world_mut().trigger(Redraw::default());
+                }
+            }
+            Event::Another => {
+                let (model, _) = Expected::new(self.load, &mut self.rng, 2.0);
+                let place = Transform::from_xyz(4000.0, 0.0, 0.0);
+                let other = self.stage.app.world_mut().spawn((model, place)).id();
+                self.frames();
+                self.stage.app.world_mut().despawn(other);
+            }
+        }
+    }
+
+    fn toggle<C: Component>(&mut self, component: C) {
+        let mut entity = self.stage.app.world_mut().entity_mut(self.terrain);
+        if std::any::TypeId::of::<C>() == std::any::TypeId::of::<Visibility>() {
+            entity.insert(component);
+        } else if entity.contains::<C>() {
+            entity.remove::<C>();
+        } else {
+            entity.insert(component);
+        }
+    }
+
+    /// Runs until nothing is under way.
+    fn settle(&mut self) {
+        let terrain = self.terrain;
+        self.is_slow.store(false, Ordering::Relaxed);
+        self.run(2);
+        self.stage.frames_until("nothing is under way", |stage| {
+            let world = stage.app.world();
+            let model = world.get::<Terrain>(terrain).expect("it is there");
+            let is_held = world.entity(terrain).contains::<Held>();
+            let shown = world.get::<ShownLevels>(terrain);
+            let has_levels = world.entity(terrain).contains::<LevelsOfDetail>();
+            let levels =
+                !has_levels || shown.is_some_and(|shown| shown.waiting == 0 && !shown.nodes.is_empty());
+            !is_held && levels && model.queued() == 0 && !model.is_busy() && is_ready(stage)
+        });
+    }
+
+    /// Checks all laws.
+    fn check(&mut self, what: &dyn Debug) {
+        self.settle();
+        self.run(2);
+        self.settle();
+        self.steps_heard += self.stage.recorded::<HistoryMoved>().len();
+        // Every message is answered, once.
+        let mut tags = self.stage.tags();
+        tags.sort_unstable();
+        self.sent.sort_unstable();
+        assert_eq!(tags, self.sent, "{what:?}: answers");
+        assert_eq!(self.steps_heard, self.steps_sent, "{what:?}: answers to steps");
+        // The world is that of a plain model which did what was answered as done.
+        let applied = |tag: u64| {
+            let receipt = self.stage.receipts().iter().find(|applied| applied.receipt.tag == tag);
+            receipt.is_some_and(|applied| applied.receipt.outcome.is_ok())
+        };
+        let plain = &mut self.expected.plain;
+        for request in self.expected.requests.drain(..) {
+            match request {
+                Request::Brush(brush) if !applied(brush.tag) => {}
+                Request::Brush(brush) | Request::Own(brush) => {
+                    plain.apply([brush]);
+                }
+                Request::Step(HistoryStep::Undo) => {
+                    plain.undo();
+                }
+                Request::Step(HistoryStep::Redo) => {
+                    plain.redo();
+                }
+            }
+        }
+        let expected = plain.world().hash();
+        let terrain = self.terrain;
+        assert_eq!(self.stage.hash(terrain), expected, "{what:?}: the world");
+        let seams = self.stage.terrain(terrain).world().check_seams();
+        assert!(seams.is_flawless(), "{what:?}: {seams:?}");
+        self.stage.assert_whole(terrain, &format!("{what:?}"));
+        self.check_entities(what);
+    }
+
+    /// No part belongs to nobody, and each is there once.
+    fn check_entities(&mut self, what: &dyn Debug) {
+        let terrain = self.terrain;
+        let world = self.stage.app.world_mut();
+        let mut parts = world.query::<(Option<&Tile>, Option<&Chunk>, Option<&Field>, &ChildOf)>();
+        let (mut tiles, mut chunks, mut fields) = (Vec::new(), Vec::new(), 0);
+        for (tile, chunk, field, parent) in parts.iter(world) {
+            if let Some(&Tile { x, z, level }) = tile {
+                assert_eq!(parent.parent(), terrain, "{what:?}: a tile of nobody");
+                tiles.push((level, x, z));
+            }
+            if let Some(&Chunk { x, y, z }) = chunk {
+                assert_eq!(parent.parent(), terrain, "{what:?}: a chunk of nobody");
+                chunks.push((x, y, z));
+            }
+            fields += usize::from(field.is_some());
+        }
+        let lonely = |world: &mut World| {
+            let mut lonely =
+                world.query_filtered::<(), (Or<(With<Tile>, With<Chunk>, With<Field>)>, Without<ChildOf>)>();
+            lonely.iter(world).count()
+        };
+        assert_eq!(lonely(world), 0, "{what:?}: parts without a parent");
+        let all = (tiles.len(), chunks.len());
+        tiles.sort_unstable();
+        tiles.dedup();
+        chunks.sort_unstable();
+        chunks.dedup();
+        assert_eq!((tiles.len(), chunks.len()), all, "{what:?}: parts that are there twice");
+        let model = self.stage.terrain(terrain).world();
+        let expected: usize = model.fields().map(|(_, fields)| fields.len()).sum();
+        assert_eq!(fields, expected, "{what:?}: fields");
+    }
+
+    /// Ends the life: nothing is left of it.
+    fn end(mut self) {
+        let world = self.stage.app.world_mut();
+        let parent = world.get::<ChildOf>(self.terrain).map(ChildOf::parent);
+        world.despawn(parent.unwrap_or(self.terrain));
+        self.stage.frames(6);
+        let meshes = self.stage.meshes();
+        assert_eq!(meshes, 0, "meshes are left");
+        let world = self.stage.app.world_mut();
+        let mut rest = world.query_filtered::<(), (
+            Or<(With<Tile>, With<Chunk>, With<Field>, With<Terrain>)>,
+            Allow<Disabled>,
+        )>();
+        assert_eq!(rest.iter(world).count(), 0, "entities are left");
+        let after = entities(&mut self.stage);
+        assert!(after <= self.before + FEW, "{after} entities, {} before", self.before);
+        #[cfg(feature = "store")]
+        drop(std::fs::remove_dir_all(&self.folder));
+    }
+}
+
+fn levels() -> LevelsOfDetail {
+    LevelsOfDetail { cell_pixels: 40.0, error_pixels: 1.0, ..default() }
+}
+
+fn is_ready(stage: &mut Stage) -> bool {
+    use bevy::ecs::system::RunSystemOnce;
+    let ask = |terrains: Terrains| terrains.is_ready(Vec3::NEG_INFINITY, Vec3::INFINITY);
+    stage.app.world_mut().run_system_once(ask).expect("it can be asked")
+}
+
+fn entities(stage: &mut Stage) -> usize {
+    let world = stage.app.world_mut();
+    world
+        .query_filtered::<(), (Without<bevy::ecs::observer::Observer>, Allow<Disabled>)>()
+        .iter(world)
+        .count()
+}
+
+/// Entities that Bevy itself may add while an app runs, for resources say.
+const FEW: usize = 8;
+
+#[test]
+fn all_that_a_terrain_carries_survives_all_that_happens_in_every_phase() {
+    for (number, &load) in LOADS.iter().enumerate() {
+        for phase in PHASES {
+            let mut life = Life::new(load, number as u64);
+            for event in EVENTS {
+                life.reach(phase);
+                life.happen(event);
+                life.frames();
+                life.check(&(load, phase, event));
+            }
+            life.end();
+        }
+    }
+}
+
+/// Runs a sequence of events, with few checks in between.
+fn run(seed: u64, load: Load, events: &[Event]) {
+    let mut life = Life::new(load, seed);
+    for (number, &event) in events.iter().enumerate() {
+        life.happen(event);
+        life.frames();
+        if number % 5 == 4 {
+            life.check(&(seed, load, &events[..=number]));
+        }
+    }
+    life.check(&(seed, load, events));
+    life.end();
+}
+
+/// The shortest part of a sequence that still fails.
+fn reduce(seed: u64, load: Load, mut events: Vec<Event>) -> Vec<Event> {
+    let fails = |events: &[Event]| catch_unwind(AssertUnwindSafe(|| run(seed, load, events))).is_err();
+    let mut at = 0;
+    while at < events.len() {
+        let mut fewer = events.clone();
+        fewer.remove(at);
+        if fails(&fewer) {
+            events = fewer;
+        } else {
+            at += 1;
+        }
+    }
+    events
+}
+
+fn variable(name: &str, or: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(or)
+}
+
+#[test]
+fn random_sequences_of_events_break_nothing() {
+    let first = variable("BURROW_SEED", 0);
+    for seed in first..first + variable("BURROW_SEQUENCES", 8) {
+        let mut rng = Rng::with_seed(seed);
+        let load = LOADS[rng.usize(..LOADS.len())];
+        let events: Vec<Event> = (0..20).map(|_| EVENTS[rng.usize(..EVENTS.len())]).collect();
+        if catch_unwind(AssertUnwindSafe(|| run(seed, load, &events))).is_err() {
+            let least = reduce(seed, load, events);
+            panic!("seed {seed} with {load:?} fails: {least:?}");
+        }
+    }
+}
