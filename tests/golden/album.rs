@@ -12,7 +12,7 @@ use image::RgbImage;
 const THRESHOLD: f32 = 0.01;
 
 /// The threshold, or the value of `BURROW_FLIP`: another renderer filters textures and shadows a little differently.
-fn threshold() -> f32 {
+pub fn threshold() -> f32 {
     std::env::var("BURROW_FLIP").ok().and_then(|value| value.parse().ok()).unwrap_or(THRESHOLD)
 }
 

@@ -122,6 +122,17 @@ impl Studio {
         self.app.world_mut().entity_mut(self.camera).insert(place);
     }
 
+    /// Replaces the camera by another one with the same place and lens, without fog, and whatever else is given.
+    pub fn renew_camera(&mut self, more: impl Bundle) {
+        let world = self.app.world_mut();
+        let old = world.entity(self.camera);
+        let kept = (old.get::<Transform>().copied(), old.get::<Projection>().cloned());
+        assert!(world.despawn(self.camera));
+        let new = (Camera3d::default(), RenderTarget::from(self.film.clone()));
+        let kept = (kept.0.unwrap_or_default(), kept.1.unwrap_or_default());
+        self.camera = world.spawn((new, kept)).insert(more).id();
+    }
+
     /// Sets the sun's direction.
     pub fn sun(&mut self, from: Vec3) {
         let place = Transform::from_translation(from).looking_at(Vec3::ZERO, Vec3::Y);

@@ -41,11 +41,7 @@ const REACH: f32 = 1500.0;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let is_all = std::env::var("BURROW_COMBINATIONS").is_ok_and(|value| value == "all");
-    let camera = studio.camera;
-    let fog = studio.app.world_mut().entity_mut(camera).take::<DistanceFog>();
-    let clear = studio.app.world_mut().resource_mut::<ClearColor>().0;
     studio.app.world_mut().resource_mut::<ClearColor>().0 = Color::linear_rgb(1.0, 0.0, 1.0);
-    studio.app.world_mut().entity_mut(camera).insert(Tonemapping::None);
     let (mut pictures, mut ground, mut control) = (0, 0, None);
     for has_levels in [false, true] {
         if has_levels && !is_all {
@@ -54,7 +50,6 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         for dress in DRESSES.into_iter().filter(|&dress| is_all || dress != Dress::Look(GroundQuality::Low)) {
             set_up(studio, dress, has_levels);
             for (prepass, name) in PREPASSES.into_iter().enumerate() {
-                set_prepasses(studio, prepass);
                 for (msaa, has_shadows) in
                     [(Msaa::Off, true), (Msaa::Off, false), (Msaa::Sample4, true), (Msaa::Sample4, false)]
                 {
@@ -63,7 +58,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
                     if !is_possible || !is_all && (msaa == Msaa::Sample4 || !has_shadows) {
                         continue;
                     }
-                    studio.app.world_mut().entity_mut(camera).insert(msaa);
+                    set_camera(studio, prepass, msaa);
                     studio.one::<DirectionalLight>().shadow_maps_enabled = has_shadows;
                     let what =
                         format!("{dress:?}, {name}, {msaa:?}, shadows {has_shadows}, levels {has_levels}");
@@ -75,20 +70,14 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
             }
             // Two shaders that do not agree: how many holes would there be on this renderer?
             if control.is_none() {
-                set_prepasses(studio, 1);
+                set_camera(studio, 1, Msaa::Off);
                 control = Some(with_bevys_prepass(studio));
             }
         }
-        studio.app.world_mut().entity_mut(camera).insert(Msaa::Off);
-        set_prepasses(studio, 0);
-        studio.one::<DirectionalLight>().shadow_maps_enabled = true;
     }
     println!(
         "{pictures} pictures with {ground} pixels of ground; with a prepass of Bevy's own shader {control:?}"
     );
-    let world = studio.app.world_mut();
-    world.entity_mut(camera).insert((Tonemapping::default(), fog.unwrap_or_default()));
-    world.resource_mut::<ClearColor>().0 = clear;
     close(studio);
 }
 
@@ -177,14 +166,13 @@ fn close(studio: &mut Studio) {
     studio.close_terrain();
 }
 
-fn set_prepasses(studio: &mut Studio, prepass: usize) {
-    let (method, camera) = (
-        if prepass == 4 { OpaqueRendererMethod::Deferred } else { OpaqueRendererMethod::Forward },
-        studio.camera,
-    );
+/// Has a new camera take the pictures: one whose prepasses are removed keeps what its renderer made for them.
+fn set_camera(studio: &mut Studio, prepass: usize, msaa: Msaa) {
+    studio.renew_camera((msaa, Tonemapping::None));
+    let method = if prepass == 4 { OpaqueRendererMethod::Deferred } else { OpaqueRendererMethod::Forward };
+    let camera = studio.camera;
     let world = studio.app.world_mut();
     let mut camera = world.entity_mut(camera);
-    camera.remove::<(DepthPrepass, NormalPrepass, MotionVectorPrepass, DeferredPrepass)>();
     match prepass {
         0 => &mut camera,
         1 => camera.insert(DepthPrepass),

@@ -195,7 +195,7 @@ impl Story {
         drop(game);
         for (kind, expected) in expected.into_iter().enumerate() {
             let Some(expected) = expected else { continue };
-            let ground = level(kind).world().shared_ground();
+            let ground = Arc::new(level(kind).world().ground().clone());
             let options = StoreOptions { base_changed: BaseChanged::Refuse, ..StoreOptions::default() };
             let opened = Store::open(&folders[kind].0, ground, options);
             let (_, opened) = opened.unwrap_or_else(|why| panic!("{story}: {why}"));
