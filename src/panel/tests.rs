@@ -18,6 +18,7 @@ struct Screen {
     size: Vec2,
     tool: BrushTool,
     panel: BurrowPanel,
+    files: Files,
     settings: BurrowSettings,
     controls: TerrainControls,
     terrains: Vec<Terrain>,
@@ -37,6 +38,7 @@ impl Screen {
             size: Vec2::new(width, height),
             tool: BrushTool::default(),
             panel: BurrowPanel::default(),
+            files: Files::default(),
             settings: BurrowSettings::default(),
             controls: TerrainControls::default(),
             terrains: (0..terrains).map(terrain).collect(),
@@ -71,21 +73,28 @@ impl Screen {
         let _ = self.context.run_ui(input, |ui| {
             let context = ui.ctx().clone();
             let was_typing = context.text_edit_focused();
-            column(&context, BRUSH, Align2::LEFT_TOP, "Brush", |ui| {
-                brush_column::show(ui, &mut self.tool, &materials, voxel, self.panel.rejection.as_deref());
+            files::ask(&context, &mut self.files);
+            fold_one(&context, true);
+            let head = |ui: &mut Ui, panel: &mut BurrowPanel| brush_column::head(ui, panel);
+            column(&context, BRUSH, Align2::LEFT_TOP, "Brush", &mut self.panel, head, |ui, panel| {
+                brush_column::show(ui, &mut self.tool, &materials, voxel, panel);
             });
-            column(&context, WORLD, Align2::RIGHT_TOP, "World", |ui| {
-                let mut content = Content {
-                    terrains: &lines,
-                    chosen,
-                    figures: &figures,
-                    survey: &survey,
-                    settings: &mut self.settings,
-                    controls: &mut self.controls,
-                    materials: &materials,
-                    actions: &mut actions,
-                };
-                world_column::show(ui, &mut self.panel, &mut content);
+            let content = Content {
+                terrains: &lines,
+                chosen,
+                figures: &figures,
+                survey: &survey,
+                settings: &mut self.settings,
+                controls: &mut self.controls,
+                materials: &materials,
+                actions: &mut actions,
+            };
+            let mut both = (&mut self.panel, content);
+            let head = |ui: &mut Ui, (panel, content): &mut (&mut BurrowPanel, Content)| {
+                world_column::head(ui, panel, &self.files, content);
+            };
+            column(&context, WORLD, Align2::RIGHT_TOP, "World", &mut both, head, |ui, (panel, content)| {
+                world_column::show(ui, panel, content);
             });
             free_keyboard(&context, was_typing);
         });
@@ -177,8 +186,8 @@ fn tiles_and_sliders_set_the_brush() {
 #[test]
 fn sculpting_makes_ground_of_a_material_where_told_so() {
     let mut screen = Screen::new(1280.0, 1600.0, 1);
-    assert!(!screen.places.0.contains_key("New ground"));
-    for name in ["Raise", "New ground", "Of a material", "Clay"] {
+    assert!(!screen.places.0.contains_key("Fill"));
+    for name in ["Raise", "Fill", "Fill material", "Clay"] {
         let at = screen.middle(name);
         screen.click(at);
         screen.frame(Vec::new());
@@ -199,7 +208,7 @@ fn rules_and_loose_pieces_are_set_where_they_are_shown() {
         click(&mut screen, section);
     }
     assert_eq!(screen.controls, TerrainControls::default());
-    for name in ["Bedrock", "Rule of Clay", "Hardness", "Unbreakable", "Found after digs", "are found"] {
+    for name in ["Bedrock", "Rule of Clay", "Hardness", "Unbreakable", "Find after digs", "Search up to"] {
         click(&mut screen, name);
     }
     let TerrainControls { rules, loose, .. } = screen.controls.clone();
@@ -210,7 +219,7 @@ fn rules_and_loose_pieces_are_set_where_they_are_shown() {
     let largest = loose.expect("switched on").largest;
     assert_eq!(loose, Some(LooseGround { largest, ..default }));
     assert!((100..1000).contains(&largest), "the middle of a logarithmic slider: {largest}");
-    for name in ["Bedrock", "Unbreakable", "Found after digs"] {
+    for name in ["Bedrock", "Unbreakable", "Find after digs"] {
         click(&mut screen, name);
     }
     assert_eq!((screen.controls.rules.bedrock, screen.controls.loose), (None, None));
@@ -223,7 +232,7 @@ fn looks_are_set_where_there_is_one() {
     assert!(!screen.places.0.contains_key("Look"));
     screen.controls.look = Some(GroundLook::default());
     screen.frame(Vec::new());
-    for name in ["Look", "Plain", "Variety", "Far"] {
+    for name in ["Look", "Plain", "Variety", "Scale to"] {
         let at = screen.middle(name);
         screen.click(at);
         screen.frame(Vec::new());
@@ -452,6 +461,7 @@ fn app_and_context() -> (App, egui::Context) {
         .init_resource::<BurrowSettings>()
         .init_resource::<BurrowFigures>()
         .init_resource::<Survey>()
+        .init_resource::<Files>()
         .init_resource::<PanelPlaces>()
         .init_resource::<EguiUserTextures>()
         .add_message::<PanelAction>()
@@ -500,9 +510,11 @@ fn flat() -> Terrain {
 fn what_a_seam_check_found_is_said_of_the_ground_that_was_checked() {
     let mut app = App::new();
     app.init_resource::<BurrowPanel>()
+        .init_resource::<Files>()
         .add_message::<PanelAction>()
         .add_message::<Undo>()
         .add_message::<Redo>()
+        .add_message::<AppExit>()
         .add_systems(Update, (perform_actions, survey::finish_seam_check).chain());
     let [checked, other] = [(); 2].map(|()| app.world_mut().spawn(flat()).id());
     app.world_mut().resource_mut::<BurrowPanel>().terrain = Some(checked);
