@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Id, Key, Modal, RichText, TextEdit, Ui};
+use bevy_egui::egui::{self, Id, Modal, RichText, TextEdit, Ui};
 
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::theme::{self, ACCENT, BRIGHT, FAINT};
@@ -33,6 +33,29 @@ pub struct Files {
 enum Question {
     Unsaved(PanelAction),
     Replace(PathBuf),
+}
+
+impl Question {
+    fn text(&self) -> String {
+        match self {
+            Self::Unsaved(_) => texts::UNSAVED_QUESTION.into(),
+            Self::Replace(path) => texts::replace(path.display()),
+        }
+    }
+
+    /// The buttons below it.
+    fn answers(&self) -> &'static [(&'static str, Answer)] {
+        const UNSAVED: &[(&str, Answer)] = &[
+            (texts::SAVE_CHANGES, Answer::Yes),
+            (texts::DISCARD, Answer::Discard),
+            (texts::CANCEL, Answer::Cancel),
+        ];
+        const REPLACE: &[(&str, Answer)] = &[(texts::REPLACE, Answer::Yes), (texts::CANCEL, Answer::Cancel)];
+        match self {
+            Self::Unsaved(_) => UNSAVED,
+            Self::Replace(_) => REPLACE,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +89,18 @@ impl Files {
 
     pub fn forget_next(&mut self) {
         self.then = None;
+    }
+
+    #[cfg(test)]
+    pub fn is_asking(&self) -> bool {
+        self.question.is_some()
+    }
+
+    /// Answers by the label of a button.
+    #[cfg(test)]
+    pub fn reply(&mut self, label: &str) {
+        let answers = self.question.as_ref().map_or(&[][..], |question| question.answers());
+        self.answer = answers.iter().find(|answer| answer.0 == label).map(|answer| answer.1);
     }
 
     /// The action to perform now, if it may be: one that loses something is asked about first.
@@ -192,20 +227,7 @@ pub(super) fn bar(
 /// Asks, over everything else.
 pub(super) fn ask(context: &egui::Context, files: &mut Files) {
     let Some(question) = files.question.clone() else { return };
-    let (text, answers): (String, &[(&str, Answer)]) = match &question {
-        Question::Unsaved(_) => (
-            texts::UNSAVED_QUESTION.into(),
-            &[
-                (texts::SAVE_CHANGES, Answer::Yes),
-                (texts::DISCARD, Answer::Discard),
-                (texts::CANCEL, Answer::Cancel),
-            ],
-        ),
-        Question::Replace(path) => (
-            texts::replace(path.display()),
-            &[(texts::REPLACE, Answer::Yes), (texts::CANCEL, Answer::Cancel)],
-        ),
-    };
+    let (text, answers) = (question.text(), question.answers());
     Modal::new(Id::new("burrow question")).frame(theme::card()).show(context, |ui| {
         ui.set_style(theme::style());
         ui.set_width(320.0);
@@ -215,12 +237,6 @@ pub(super) fn ask(context: &egui::Context, files: &mut Files) {
             if button(ui, name, 320.0, true).clicked() {
                 files.answer = Some(*answer);
             }
-        }
-        if ui.input(|input| input.key_pressed(Key::Enter))
-            && answers[0].1 == Answer::Yes
-            && answers.len() == 3
-        {
-            files.answer = Some(Answer::Yes);
         }
     });
 }

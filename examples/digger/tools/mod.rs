@@ -53,71 +53,17 @@ struct ToolStats {
     power: u8,
 }
 
+/// The tools, in the order of their slots.
+#[rustfmt::skip]
 const STATS: [ToolStats; 8] = [
-    ToolStats {
-        slot: Action::Slot1,
-        period: 0.44,
-        hit: 0.20,
-        reach: 9.0,
-        radius: (1.0, 3.5, 1.8),
-        power: 150,
-    },
-    ToolStats {
-        slot: Action::Slot2,
-        period: 0.36,
-        hit: 0.20,
-        reach: 9.0,
-        radius: (1.5, 6.0, 3.0),
-        power: 75,
-    },
-    ToolStats {
-        slot: Action::Slot3,
-        period: 0.20,
-        hit: 0.12,
-        reach: 8.0,
-        radius: (1.0, 3.5, 2.1),
-        power: 190,
-    },
-    ToolStats {
-        slot: Action::Slot4,
-        period: 0.26,
-        hit: 0.10,
-        reach: 40.0,
-        radius: (1.0, 12.0, 2.0),
-        power: u8::MAX,
-    },
-    ToolStats {
-        slot: Action::Slot5,
-        period: 0.26,
-        hit: 0.12,
-        reach: 40.0,
-        radius: (1.0, 12.0, 2.5),
-        power: u8::MAX,
-    },
-    ToolStats {
-        slot: Action::Slot6,
-        period: 0.80,
-        hit: 0.28,
-        reach: 40.0,
-        radius: (5.5, 5.5, 5.5),
-        power: u8::MAX,
-    },
-    ToolStats {
-        slot: Action::Slot7,
-        period: 0.50,
-        hit: 0.16,
-        reach: 14.0,
-        radius: (0.3, 0.3, 0.3),
-        power: u8::MAX,
-    },
-    ToolStats {
-        slot: Action::Slot8,
-        period: 0.50,
-        hit: 0.20,
-        reach: 40.0,
-        radius: (0.3, 0.3, 0.3),
-        power: u8::MAX,
-    },
+    ToolStats { slot: Action::Slot1, period: 0.44, hit: 0.20, reach: 9.0, radius: (1.0, 3.5, 1.8), power: 150 },
+    ToolStats { slot: Action::Slot2, period: 0.36, hit: 0.20, reach: 9.0, radius: (1.5, 6.0, 3.0), power: 75 },
+    ToolStats { slot: Action::Slot3, period: 0.20, hit: 0.12, reach: 8.0, radius: (1.0, 3.5, 2.1), power: 190 },
+    ToolStats { slot: Action::Slot4, period: 0.26, hit: 0.10, reach: 40.0, radius: (1.0, 12.0, 2.0), power: u8::MAX },
+    ToolStats { slot: Action::Slot5, period: 0.26, hit: 0.12, reach: 40.0, radius: (1.0, 12.0, 2.5), power: u8::MAX },
+    ToolStats { slot: Action::Slot6, period: 0.80, hit: 0.28, reach: 40.0, radius: (5.5, 5.5, 5.5), power: u8::MAX },
+    ToolStats { slot: Action::Slot7, period: 0.50, hit: 0.16, reach: 14.0, radius: (0.3, 0.3, 0.3), power: u8::MAX },
+    ToolStats { slot: Action::Slot8, period: 0.50, hit: 0.20, reach: 40.0, radius: (0.3, 0.3, 0.3), power: u8::MAX },
 ];
 
 impl Tool {

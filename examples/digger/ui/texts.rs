@@ -62,17 +62,10 @@ pub const PRESS_KEY: &str = "press a key ...";
 pub const ON: &str = "on";
 pub const OFF: &str = "off";
 /// The rows of the settings page.
+#[rustfmt::skip]
 pub const SETTING: [&str; 10] = [
-    "Look sensitivity",
-    "Invert look (Y axis)",
-    "Field of view",
-    "View distance",
-    "Quality",
-    "Interface size",
-    "Day length",
-    "Brush radius",
-    "Build shape",
-    "Limited materials",
+    "Look sensitivity", "Invert look (Y axis)", "Field of view", "View distance", "Quality", "Interface size",
+    "Day length", "Brush radius", "Build shape", "Limited materials",
 ];
 pub const QUALITY: [&str; 3] = ["low", "medium", "high"];
 pub const SHAPES: [&str; 3] = ["sphere", "cube", "beam"];
@@ -82,55 +75,20 @@ pub const SETTINGS_NOTES: &str = "View distance: anything farther away fades int
 pub const HELP_SUMMARY: &str = "You can dig every hill, and build with what you have dug.";
 pub const HELP_GAMEPAD: &str =
     "A gamepad's left stick walks and selects menu items. Its right stick looks around.";
+#[rustfmt::skip]
 pub const HELP_KEYS: [&str; 14] = [
-    "walk",
-    "run",
-    "jump",
-    "use the tool; hold to repeat",
-    "build with the chosen material",
-    "brush size",
-    "choose a material",
-    "build shape",
-    "next tool",
-    "previous tool",
-    "headlamp",
-    "undo, redo",
-    "frame times, terrain panel",
-    "pause",
+    "walk", "run", "jump", "use the tool; hold to repeat", "build with the chosen material", "brush size",
+    "choose a material", "build shape", "next tool", "previous tool", "headlamp", "undo, redo",
+    "frame times, terrain panel", "pause",
 ];
 
 /// The actions, in the order of `Action`.
+#[rustfmt::skip]
 pub const ACTIONS: [&str; 30] = [
-    "walk forward",
-    "walk back",
-    "walk left",
-    "walk right",
-    "run",
-    "jump",
-    "use tool",
-    "build",
-    "pickaxe",
-    "shovel",
-    "drill",
-    "builder",
-    "painter",
-    "bomb",
-    "lamp",
-    "ball",
-    "next tool",
-    "previous tool",
-    "next material",
-    "previous material",
-    "larger brush",
-    "smaller brush",
-    "build shape",
-    "headlamp",
-    "undo",
-    "redo",
-    "help",
-    "frame times",
-    "terrain panel",
-    "pause",
+    "walk forward", "walk back", "walk left", "walk right", "run", "jump", "use tool", "build", "pickaxe",
+    "shovel", "drill", "builder", "painter", "bomb", "lamp", "ball", "next tool", "previous tool",
+    "next material", "previous material", "larger brush", "smaller brush", "build shape", "headlamp", "undo",
+    "redo", "help", "frame times", "terrain panel", "pause",
 ];
 
 /// The tools and what they are for, in the order of `Tool`.

@@ -4,6 +4,7 @@
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
+use bevy::state::state::{StateTransitionEvent, StateTransitionSystems};
 
 use crate::player::game_state::{GameState, MenuPage};
 use crate::player::input::ActionSystems;
@@ -132,7 +133,7 @@ impl Plugin for UiPlugin {
                         .run_if(not(in_state(MenuPage::None))),
                 ),
             )
-            .add_systems(StateTransition, move_focus.run_if(on_message::<StateTransitionEvent<MenuPage>>))
+            .add_systems(StateTransition, move_focus.after(StateTransitionSystems::EnterSchedules))
             // The menus of the pause and of the title are the same page.
             .add_systems(OnEnter(GameState::Title), forget_focus)
             .add_systems(OnEnter(GameState::Playing), forget_focus);
