@@ -125,10 +125,10 @@ fn perform_actions(
         match files.admit(*action, &panel) {
             None => {}
             Some(PanelAction::Undo) => {
-                drop(chosen.map(|terrain| undos.write(Undo { terrain: Some(terrain) })))
+                undos.write_batch(chosen.map(|terrain| Undo { terrain: Some(terrain) }));
             }
             Some(PanelAction::Redo) => {
-                drop(chosen.map(|terrain| redos.write(Redo { terrain: Some(terrain) })))
+                redos.write_batch(chosen.map(|terrain| Redo { terrain: Some(terrain) }));
             }
             Some(PanelAction::CheckSeams) => {
                 if let (Some((entity, terrain)), None) = (terrain, &check) {

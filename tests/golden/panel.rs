@@ -85,14 +85,8 @@ const FIGURES: [&str; 12] = [
 ];
 
 /// Widgets that show timings.
-const TIMES: [&str; 6] = [
-    "transaction",
-    "p50, p95, p99",
-    "meshes swapped per frame",
-    "frame",
-    "main-thread time",
-    "Last stage",
-];
+const TIMES: [&str; 6] =
+    ["transaction", "p50, p95, p99", "meshes swapped per frame", "frame", "main-thread time", "Last stage"];
 
 fn pixels(picture: &RgbImage, place: Rect) -> impl Iterator<Item = UVec2> + use<> {
     let (from, to) = (place.min.as_uvec2(), place.max.ceil().as_uvec2().min(picture.dimensions().into()));

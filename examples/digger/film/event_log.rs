@@ -4,6 +4,7 @@
 mod frame_log;
 
 use bevy::prelude::*;
+use bevy::ui::UiGlobalTransform;
 use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;

@@ -61,7 +61,7 @@ impl FromStr for Address {
         let text = text.trim();
         let no_address = || NoAddress(text.into());
         let (place, seed) = text.split_once('#').unwrap_or((text, "0"));
-        let seed = seed.parse().map_err(|_| no_address())?;
+        let seed = seed.parse::<u32>().map_err(|_| no_address())?;
         let numbers = match place.strip_prefix("localhost") {
             Some(port) => format!("127.0.0.1{port}"),
             None => place.into(),

@@ -352,6 +352,8 @@ fn tell_trouble(mut troubles: MessageReader<StoreTroubleFound>, mut hints: Messa
 
 #[cfg(test)]
 mod tests {
+    use bevy::ecs::system::RunSystemOnce;
+
     use super::*;
     use crate::tools::Tool;
     use crate::ui::settings::Settings;
@@ -381,7 +383,7 @@ mod tests {
     struct Placed(Vec<SavedLamp>);
 
     fn saved(app: &mut App) -> SavedGame {
-        app.world_mut().run_system_cached(|game: PlayedGame| game.saved()).expect("a system")
+        app.world_mut().run_system_once(|game: PlayedGame| game.saved()).expect("a system")
     }
 
     #[test]
@@ -403,7 +405,7 @@ mod tests {
 
         let mut restored = self::app();
         let restore = move |mut game: PlayedGame| game.restore(read.clone());
-        restored.world_mut().run_system_cached(restore).expect("a system");
+        restored.world_mut().run_system_once(restore).expect("a system");
         assert_eq!(restored.world().resource::<Placed>().0, [lamp]);
         // The player is not there yet: the place must not be forgotten meanwhile.
         assert_eq!(saved(&mut restored), SavedGame { lamps: Vec::new(), ..game });

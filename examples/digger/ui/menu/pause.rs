@@ -115,17 +115,17 @@ mod tests {
             [P::Worlds, P::World, P::NewWorld, P::Together, P::Settings, P::Controls, P::Help, P::Question]
         {
             let parent = page.parent().unwrap_or(P::Menu);
-            if page == P::Question {
-                super::super::question::ask(&mut app.world_mut().commands(), parent, "?", "yes", |_| {});
-            }
             go_to(&mut app, parent);
             app.world_mut().resource_mut::<widgets::FocusedItem>().0 = 2;
-            go_to(&mut app, page);
-            assert_eq!(
-                app.world().resource::<widgets::FocusedItem>().0,
-                0,
-                "{page:?} begins at its first item"
-            );
+            if page == P::Question {
+                crate::ui::menu::question::ask(&mut app.world_mut().commands(), parent, "?", "yes", |_| {});
+                app.world_mut().flush();
+                app.update();
+            } else {
+                go_to(&mut app, page);
+            }
+            let focus = app.world().resource::<widgets::FocusedItem>().0;
+            assert_eq!(focus, 0, "{page:?} begins at its first item");
             tap_key(&mut app, KeyCode::Escape);
             assert_eq!(now(&app), (GameState::Title, parent), "{page:?}");
             assert_eq!(app.world().resource::<widgets::FocusedItem>().0, 2, "{page:?}");

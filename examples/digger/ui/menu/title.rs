@@ -90,14 +90,14 @@ fn open(
         left.spawn((ImageNode::new(images.logo.clone()), logo));
         let below = Node { margin: UiRect::bottom(px(34)), ..default() };
         left.spawn((widgets::text(texts::TAGLINE, 17.0, GREY), below));
+        let saves_worlds = saves::new_name().is_some();
         let saved = played.0.as_deref().filter(|_| !matches!(*party, Party::Guest(..)));
         let first = match saved {
             Some(folder) => texts::continue_world(&saves::name(folder)),
-            None if game.has_begun => texts::CONTINUE.into(),
+            None if game.has_begun && (!saves_worlds || *party != Party::Alone) => texts::CONTINUE.into(),
             None => texts::PLAY.into(),
         };
         left.spawn(widgets::button(0, &first, WIDTH)).observe(start);
-        let saves_worlds = saves::new_name().is_some();
         if saves_worlds {
             for (at, (words, page)) in
                 [(texts::NEW_WORLD, MenuPage::NewWorld), (texts::WORLDS, MenuPage::Worlds)]
@@ -135,7 +135,7 @@ fn start(
     party: Res<Party>,
 ) {
     game.is_wanted = true;
-    if played.0.is_none() && !game.has_begun && *party == Party::Alone {
+    if played.0.is_none() && *party == Party::Alone {
         played.0 = saves::new_name().and_then(|name| saves::create(&name, 0).ok());
         if played.0.is_some() {
             worlds::begin(&mut commands, &mut game);

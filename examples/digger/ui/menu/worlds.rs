@@ -1,8 +1,7 @@
 //! The pages of saved worlds: the list, in which each continues where it was left, one world, and a new one.
 
 use std::io;
-use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::path::PathBuf;
 
 use bevy::prelude::*;
 
@@ -237,6 +236,7 @@ mod tests {
     fn app(page: MenuPage) -> App {
         let plugin = |app: &mut App| {
             app.init_resource::<Assets<Image>>()
+                .init_resource::<bevy_burrow::view::GroundLoading>()
                 .init_resource::<PlayedWorld>()
                 .init_resource::<Party>()
                 .add_message::<Hint>()
@@ -252,6 +252,7 @@ mod tests {
             go_to(&mut app, state);
             let folder = PathBuf::from("no such world");
             play(&mut app.world_mut().commands(), folder.clone());
+            app.world_mut().flush();
             app.update();
             app.update();
             assert!(app.world().resource::<Start>().is_wanted, "from {state:?}");
