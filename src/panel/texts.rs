@@ -4,40 +4,32 @@ pub const BRUSH: &str = "Brush";
 pub const WORLD: &str = "World";
 
 // The left column.
-pub const OPERATION: &str = "Operation";
-pub const SHAPE: &str = "Shape";
-pub const MATERIAL: &str = "Material";
-pub const FILL: &str = "Fill";
-pub const FILL_MATERIAL: &str = "Fill material";
-pub const SURFACE: &str = "Surface";
-pub const STROKE: &str = "Stroke";
-pub const REJECTED: &str = "Rejected";
-pub const POINTER: &str = "Under the pointer";
-pub const RATE: &str = "Rate";
-pub const RATE_HELP: &str = "Brushes per second while the button is held. One held stroke is one undo step.";
-pub const POWER: &str = "Power";
-pub const POWER_HELP: &str = "How hard a material this brush can dig, where the terrain has digging rules";
-pub const IMAGE: &str = "Image";
-pub const RIDGE: &str = "Ridge";
-pub const STRENGTH: &str = "Strength";
-pub const FALLOFF: &str = "Falloff";
-pub const FALLOFF_HELP: &str = "Over this width the effect fades out, from the border inwards";
-pub const AMOUNT: &str = "Amount";
-pub const HEIGHT: &str = "Height";
-pub const STEP: &str = "Step";
+/// Defines texts by name.
+macro_rules! texts {
+    ($($name:ident = $text:literal),* $(,)?) => { $(pub const $name: &str = $text;)* };
+}
+
+texts! {
+    OPERATION = "Operation", SHAPE = "Shape", MATERIAL = "Material", FILL = "Fill",
+    FILL_MATERIAL = "Fill material", SURFACE = "Surface", STROKE = "Stroke", REJECTED = "Rejected",
+    POINTER = "Under the pointer", RATE = "Rate",
+    RATE_HELP = "Brushes per second while the button is held. One held stroke is one undo step.",
+    POWER = "Power",
+    POWER_HELP = "How hard a material this brush can dig, where the terrain has digging rules",
+    IMAGE = "Image", RIDGE = "Ridge", STRENGTH = "Strength", FALLOFF = "Falloff",
+    FALLOFF_HELP = "Over this width the effect fades out, from the border inwards", AMOUNT = "Amount",
+    HEIGHT = "Height", STEP = "Step",
+}
 pub const HALF_SIZES: [&str; 3] = ["Half width", "Half height", "Half depth"];
-pub const TURN: &str = "Turn";
-pub const RADIUS: &str = "Radius";
-pub const TUBE: &str = "Tube";
-pub const LENGTH: &str = "Length";
-pub const SINK: &str = "Sink";
-pub const SINK_HELP: &str = "How deep the brush is placed: at -100 % it rests on the ground, at 0 % it is half in the ground, at 100 % just below";
+texts! {
+    TURN = "Turn", RADIUS = "Radius", TUBE = "Tube", LENGTH = "Length", SINK = "Sink",
+    SINK_HELP = "How deep the brush is placed: at -100 % it rests on the ground, at 0 % it is half in the ground, at 100 % just below",
+}
 pub const ALIGN: [&str; 2] = ["Upright", "Along the surface"];
-pub const ROUGH: &str = "Rough";
-pub const BUMPS: &str = "Bumps";
-pub const WIDTH: &str = "Width";
-pub const PATTERN: &str = "Pattern";
-pub const TORUS_STAMP: &str = "A stamp can't have this shape";
+texts! {
+    ROUGH = "Rough", BUMPS = "Bumps", WIDTH = "Width", PATTERN = "Pattern",
+    TORUS_STAMP = "A stamp can't have this shape",
+}
 /// The operations and what they do, in the order of `ToolOperation`.
 pub const OPERATIONS: [(&str, &str); 11] = [
     ("Dig", "Removes ground"),
@@ -56,55 +48,31 @@ pub const OPERATIONS: [(&str, &str); 11] = [
 pub const SHAPES: [&str; 6] = ["Sphere", "Box", "Cylinder", "Capsule", "Cone", "Torus"];
 
 // Files, and questions about them.
-pub const NEW: &str = "New";
-pub const NEW_HELP: &str = "Starts again from the ground without any edits";
-pub const OPEN: &str = "Open";
-pub const OPEN_HELP: &str =
-    "Opens a level from this folder or packed file. It must have been made on the same ground.";
-pub const SAVE: &str = "Save";
-pub const SAVE_HELP: &str = "Saves the level: one file for each region, for version control";
-pub const SAVE_AS: &str = "Save as";
-pub const SAVE_AS_HELP: &str = "Saves the level in the folder that is typed above";
-pub const FOLDER: &str = "Level folder";
-pub const UNSAVED: &str = "unsaved changes";
-pub const UNSAVED_QUESTION: &str = "There are unsaved changes. They will be lost unless you save them.";
-pub const SAVE_CHANGES: &str = "Save changes";
-pub const DISCARD: &str = "Discard changes";
-pub const CANCEL: &str = "Cancel";
-pub const REPLACE: &str = "Replace";
-pub const SAVING: &str = "Saving the level ...";
-pub const OPENING: &str = "Opening the level ...";
-pub const STARTED_ANEW: &str = "Started a new level";
+texts! {
+    NEW = "New", NEW_HELP = "Starts again from the ground without any edits", OPEN = "Open",
+    OPEN_HELP = "Opens a level from this folder or packed file. It must have been made on the same ground.",
+    SAVE = "Save", SAVE_HELP = "Saves the level: one file for each region, for version control",
+    SAVE_AS = "Save as", SAVE_AS_HELP = "Saves the level in the folder that is typed above",
+    FOLDER = "Level folder", UNSAVED = "unsaved changes",
+    UNSAVED_QUESTION = "There are unsaved changes. They will be lost unless you save them.",
+    SAVE_CHANGES = "Save changes", DISCARD = "Discard changes", CANCEL = "Cancel", REPLACE = "Replace",
+    SAVING = "Saving the level ...", OPENING = "Opening the level ...", STARTED_ANEW = "Started a new level",
+}
 
 // The right column.
-pub const UNDO: &str = "Undo";
-pub const REDO: &str = "Redo";
-pub const HISTORY_STEPS: &str = "Steps";
-pub const CHECK_SEAMS: &str = "Check seams";
-pub const CHECK_SEAMS_HELP: &str = "Checks every triangle of the terrain";
-pub const CHECKING: &str = "Checking every seam ...";
-pub const SAVE_PICTURE: &str = "Save picture";
-pub const TAKING_PICTURE: &str = "Taking a picture ...";
-pub const NO_PICTURE: &str = "The picture could not be taken";
-pub const NO_PICTURE_HERE: &str = "No picture can be taken of this camera";
-pub const TERRAIN: &str = "Terrain";
-pub const NO_TERRAIN: &str = "There is no terrain.";
-pub const SIZE: &str = "Size";
-pub const VOXEL: &str = "Voxel size";
-pub const CHUNK: &str = "Chunk size";
-pub const REVISION: &str = "Revision";
-pub const RULES: &str = "Digging rules";
-pub const BEDROCK: &str = "Bedrock";
-pub const BELOW: &str = "Below";
-pub const BELOW_HELP: &str = "Nothing below this height can be dug";
-pub const RULE_OF: &str = "Rule of ";
-pub const HARDNESS: &str = "Hardness";
-pub const HARDNESS_HELP: &str =
-    "A brush of this power or more digs at full speed; with half of it or less, it does not dig";
-pub const UNBREAKABLE: &str = "Unbreakable";
-pub const PROTECTED: &str = "Protected boxes";
-pub const LOOSE: &str = "Loose pieces";
-pub const LOOSE_FIND: &str = "Find after digs";
+texts! {
+    UNDO = "Undo", REDO = "Redo", HISTORY_STEPS = "Steps", CHECK_SEAMS = "Check seams",
+    CHECK_SEAMS_HELP = "Checks every triangle of the terrain", CHECKING = "Checking every seam ...",
+    SAVE_PICTURE = "Save picture", TAKING_PICTURE = "Taking a picture ...",
+    NO_PICTURE = "The picture could not be taken", NO_PICTURE_HERE = "No picture can be taken of this camera",
+    TERRAIN = "Terrain", NO_TERRAIN = "There is no terrain.", SIZE = "Size", VOXEL = "Voxel size",
+    CHUNK = "Chunk size", REVISION = "Revision", RULES = "Digging rules", BEDROCK = "Bedrock",
+    BELOW = "Below", BELOW_HELP = "Nothing below this height can be dug", RULE_OF = "Rule of ",
+    HARDNESS = "Hardness",
+    HARDNESS_HELP = "A brush of this power or more digs at full speed; with half of it or less, it does not dig",
+    UNBREAKABLE = "Unbreakable", PROTECTED = "Protected boxes", LOOSE = "Loose pieces",
+    LOOSE_FIND = "Find after digs",
+}
 pub const LOOSE_SIZES: [(&str, &str); 3] = [
     ("Remove up to", "Pieces of up to this many voxels vanish"),
     ("Detach up to", "Larger pieces of up to this many voxels break off and fall"),
@@ -113,70 +81,44 @@ pub const LOOSE_SIZES: [(&str, &str); 3] = [
 pub const VOXELS: &str = " voxels";
 pub const LOOK: &str = "Look";
 pub const QUALITY: [&str; 2] = ["Plain", "Fine"];
-pub const VARIETY: &str = "Variety";
-pub const VARIETY_HELP: &str = "How much colours vary from place to place";
-pub const SCALE_STARTS: &str = "Scale from";
-pub const SCALE_ENDS: &str = "Scale to";
-pub const SCALE_HELP: &str =
-    "Distances at which textures start to grow, and where they are six times as large";
-pub const SETTINGS: &str = "Settings";
-pub const UNDO_MEMORY: &str = "History";
-pub const UNDO_MEMORY_HELP: &str = "Memory that the undo history of this terrain may use";
-pub const SWAPS: &str = "Swaps";
-pub const SWAPS_HELP: &str =
-    "Meshes that are replaced per frame, at most, after edits. Fewer make frames smoother.";
-pub const LOADS: &str = "Loads";
-pub const LOADS_HELP: &str =
-    "Meshes that are uploaded per frame, at most, while a terrain loads. Fewer make loading slower.";
-pub const DEBUG: &str = "Debug views";
-pub const REACH: &str = "Reach";
-pub const NEAR: &str = "Near";
-pub const NEAR_HELP: &str = "How far normals and wires reach";
+texts! {
+    VARIETY = "Variety", VARIETY_HELP = "How much colours vary from place to place",
+    SCALE_STARTS = "Scale from", SCALE_ENDS = "Scale to",
+    SCALE_HELP = "Distances at which textures start to grow, and where they are six times as large",
+    SETTINGS = "Settings", UNDO_MEMORY = "History",
+    UNDO_MEMORY_HELP = "Memory that the undo history of this terrain may use", SWAPS = "Swaps",
+    SWAPS_HELP = "Meshes that are replaced per frame, at most, after edits. Fewer make frames smoother.",
+    LOADS = "Loads",
+    LOADS_HELP = "Meshes that are uploaded per frame, at most, while a terrain loads. Fewer make loading slower.",
+    DEBUG = "Debug views", REACH = "Reach", NEAR = "Near", NEAR_HELP = "How far normals and wires reach",
+}
 
 // Diagnostics.
-pub const DIAGNOSTICS: &str = "Diagnostics";
-pub const TRANSACTION: &str = "transaction";
-pub const PERCENTILES: &str = "p50, p95, p99";
-pub const SWAPPED: &str = "meshes swapped per frame";
-pub const FRAME: &str = "frame";
-pub const MAIN_THREAD: &str = "main-thread time";
-pub const QUEUE: &str = "Queue";
-pub const BRUSHES: &str = "Brushes";
-pub const COMMITS: &str = "Commits";
-pub const LEVELS: &str = "Squares by level";
-pub const MEMORY: [&str; 6] = ["Ground", "Samples", "Materials", "Meshes", "Parts", "Index"];
-pub const ALL_MEMORY: &str = "All memory";
-pub const EDITS_MEMORY: &str = "Of edits";
-pub const GPU_MESHES: &str = "Meshes on the GPU";
-pub const FIELDS: &str = "Fields";
-pub const CHUNKS: &str = "Chunks";
-pub const BRICKS: &str = "Bricks";
-pub const MASK_CELLS: &str = "Mask cells";
-pub const HASH: &str = "Hash";
-pub const BACKEND: &str = "Backend";
-pub const CPU: &str = "CPU";
-pub const CPU_UNOPENED: &str = "CPU (CUDA not opened yet)";
-pub const CPU_OPENING: &str = "CPU (opening CUDA)";
-pub const CPU_ONLY: &str = "CPU (no CUDA device)";
+texts! {
+    DIAGNOSTICS = "Diagnostics", TRANSACTION = "transaction", PERCENTILES = "p50, p95, p99",
+    SWAPPED = "meshes swapped per frame", FRAME = "frame", MAIN_THREAD = "main-thread time", QUEUE = "Queue",
+    BRUSHES = "Brushes", COMMITS = "Commits", LEVELS = "Squares by level",
+}
+#[rustfmt::skip]
+pub const MEMORY: [&str; 6] = [
+    "Ground", "Samples", "Materials", "Meshes", "Parts", "Index",
+];
+texts! {
+    ALL_MEMORY = "All memory", EDITS_MEMORY = "Of edits", GPU_MESHES = "Meshes on the GPU", FIELDS = "Fields",
+    CHUNKS = "Chunks", BRICKS = "Bricks", MASK_CELLS = "Mask cells", HASH = "Hash", BACKEND = "Backend",
+    CPU = "CPU", CPU_UNOPENED = "CPU (CUDA not opened yet)", CPU_OPENING = "CPU (opening CUDA)",
+    CPU_ONLY = "CPU (no CUDA device)",
+}
 pub const STAGES: [&str; 2] = ["CPU stages", "CUDA stages"];
-pub const LAST: &str = "Last stage";
-pub const EDITED: &str = "bricks edited";
-pub const MESHED: &str = "blocks meshed";
+texts! {
+    LAST = "Last stage", EDITED = "bricks edited", MESHED = "blocks meshed",
+}
 pub const EXPECTED: [&str; 2] = ["CPU estimate", "CUDA estimate"];
 
 /// Names of the materials of the plugin's default ground look, by id.
+#[rustfmt::skip]
 pub const MATERIALS: [&str; 12] = [
-    "Rock",
-    "Grass",
-    "Sand",
-    "Snow",
-    "Clay",
-    "Concrete",
-    "Coal",
-    "Gold",
-    "Soil",
-    "Sandstone",
-    "Shale",
+    "Rock", "Grass", "Sand", "Snow", "Clay", "Concrete", "Coal", "Gold", "Soil", "Sandstone", "Shale",
     "Gravel",
 ];
 

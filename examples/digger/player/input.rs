@@ -17,37 +17,11 @@ use crate::ui::texts;
 /// Something that the player can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[rustfmt::skip]
 pub enum Action {
-    Forward,
-    Back,
-    Left,
-    Right,
-    Run,
-    Jump,
-    Use,
-    Build,
-    Slot1,
-    Slot2,
-    Slot3,
-    Slot4,
-    Slot5,
-    Slot6,
-    Slot7,
-    Slot8,
-    NextTool,
-    PreviousTool,
-    NextMaterial,
-    PreviousMaterial,
-    Grow,
-    Shrink,
-    BuildShape,
-    Headlamp,
-    Undo,
-    Redo,
-    Help,
-    FrameTimes,
-    Panel,
-    Pause,
+    Forward, Back, Left, Right, Run, Jump, Use, Build, Slot1, Slot2, Slot3, Slot4, Slot5, Slot6, Slot7,
+    Slot8, NextTool, PreviousTool, NextMaterial, PreviousMaterial, Grow, Shrink, BuildShape, Headlamp, Undo,
+    Redo, Help, FrameTimes, Panel, Pause,
 }
 
 impl Action {

@@ -2,65 +2,31 @@
 
 use std::fmt::Display;
 
-pub const TAGLINE: &str = "a real landscape that you can dig";
-pub const PLAY: &str = "Play";
-pub const CONTINUE: &str = "Continue";
-pub const NEW_WORLD: &str = "New world";
-pub const WORLDS: &str = "Worlds";
-pub const MULTIPLAYER: &str = "Multiplayer";
-pub const SETTINGS: &str = "Settings";
-pub const CONTROLS: &str = "Controls";
-pub const HELP: &str = "Help";
-pub const QUIT: &str = "Quit";
-pub const BACK: &str = "Back";
+/// Defines texts by name.
+macro_rules! texts {
+    ($($name:ident = $text:literal),* $(,)?) => { $(pub const $name: &str = $text;)* };
+}
 
-pub const PAUSED: &str = "Paused";
-pub const RESUME: &str = "Resume";
-pub const MAIN_MENU: &str = "Main menu";
-pub const SAVE_AND_QUIT: &str = "Save and quit";
-
-pub const CREATING_TEXTURES: &str = "Creating textures";
-pub const READING_WORLD: &str = "Reading the world";
-pub const JOINING: &str = "Joining";
-pub const LOADING_LANDSCAPE: &str = "Loading the landscape";
-
-pub const MORE_WORLDS: &str = "More worlds";
-pub const NO_WORLDS: &str = "There are no saved worlds yet.";
-pub const WORLDS_HELP: &str =
-    "Choose a world to play it. The > button or the right arrow key renames, copies or deletes it.";
-pub const WORLD_NAME: &str = "Name";
-pub const SEED: &str = "Seed";
-pub const SEED_HELP: &str =
-    "The seed decides where hills, layers of rock and ore are. The same seed makes the same world.";
-pub const CREATE: &str = "Create and play";
-pub const WORLD: &str = "World";
-pub const PLAY_WORLD: &str = "Play this world";
-pub const DUPLICATE: &str = "Duplicate";
-pub const DELETE: &str = "Delete";
-pub const CURRENT: &str = ", open now";
-pub const COPY: &str = "copy";
-
-pub const SURE: &str = "Are you sure?";
-pub const CANCEL: &str = "Cancel";
-pub const RESET: &str = "Reset";
-pub const RESET_CONTROLS: &str = "All keys and buttons get their default actions.";
-pub const RESET_SETTINGS: &str = "All settings on this page get their default values.";
-pub const NEW_UNSAVED: &str = "Nothing is saved on this machine: the world that you have dug will be lost.";
-
-pub const YOUR_NAME: &str = "Your name";
-pub const HOST_ADDRESS: &str = "Host address";
-pub const HOST: &str = "Host this world";
-pub const STOP_HOSTING: &str = "Stop hosting";
-pub const LEAVE: &str = "Leave";
-pub const JOIN: &str = "Join";
-pub const THIS_MACHINE: &str = "this machine's address";
-pub const NOT_SAVED: &str = ". Nothing is saved.";
-
-pub const CHOOSE_ACTION: &str = "Choose an action, then press its new key or button.";
-pub const PRESS_KEY: &str = "press a key ...";
-
-pub const ON: &str = "on";
-pub const OFF: &str = "off";
+texts! {
+    TAGLINE = "a real landscape that you can dig", PLAY = "Play", CONTINUE = "Continue",
+    NEW_WORLD = "New world", WORLDS = "Worlds", MULTIPLAYER = "Multiplayer", SETTINGS = "Settings",
+    CONTROLS = "Controls", HELP = "Help", QUIT = "Quit", BACK = "Back", PAUSED = "Paused", RESUME = "Resume",
+    MAIN_MENU = "Main menu", SAVE_AND_QUIT = "Save and quit", CREATING_TEXTURES = "Creating textures",
+    READING_WORLD = "Reading the world", JOINING = "Joining", LOADING_LANDSCAPE = "Loading the landscape",
+    MORE_WORLDS = "More worlds", NO_WORLDS = "There are no saved worlds yet.",
+    WORLDS_HELP = "Choose a world to play it. The > button or the right arrow key renames, copies or deletes it.",
+    WORLD_NAME = "Name", SEED = "Seed",
+    SEED_HELP = "The seed decides where hills, layers of rock and ore are. The same seed makes the same world.",
+    CREATE = "Create and play", WORLD = "World", PLAY_WORLD = "Play this world", DUPLICATE = "Duplicate",
+    DELETE = "Delete", CURRENT = ", open now", COPY = "copy", SURE = "Are you sure?", CANCEL = "Cancel",
+    RESET = "Reset", RESET_CONTROLS = "All keys and buttons get their default actions.",
+    RESET_SETTINGS = "All settings on this page get their default values.",
+    NEW_UNSAVED = "Nothing is saved on this machine: the world that you have dug will be lost.",
+    YOUR_NAME = "Your name", HOST_ADDRESS = "Host address", HOST = "Host this world",
+    STOP_HOSTING = "Stop hosting", LEAVE = "Leave", JOIN = "Join", THIS_MACHINE = "this machine's address",
+    NOT_SAVED = ". Nothing is saved.", CHOOSE_ACTION = "Choose an action, then press its new key or button.",
+    PRESS_KEY = "press a key ...", ON = "on", OFF = "off",
+}
 /// The rows of the settings page.
 #[rustfmt::skip]
 pub const SETTING: [&str; 10] = [
@@ -110,17 +76,13 @@ pub const BEDROCK: &str = "bedrock";
 
 /// The directions of the compass, clockwise from north.
 pub const COMPASS: [&str; 8] = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
-pub const HEADLAMP_ON: &str = "headlamp";
-pub const SAVING: &str = "saving";
-pub const SOMEBODY: &str = "somebody";
-
-pub const TOO_FAR: &str = "Too far away. Move closer.";
-pub const UNBREAKABLE: &str = "Bedrock can't be broken.";
-pub const BROUGHT_BACK: &str = "You are back on solid ground.";
-pub const HOST_LOST: &str = "The host can't be reached. What you dig meanwhile is sent later.";
-pub const OTHER_VERSION: &str = "The host has another version of the game.";
-pub const ARRIVED: &str = "has joined";
-pub const LEFT: &str = "has left";
+texts! {
+    HEADLAMP_ON = "headlamp", SAVING = "saving", SOMEBODY = "somebody",
+    TOO_FAR = "Too far away. Move closer.", UNBREAKABLE = "Bedrock can't be broken.",
+    BROUGHT_BACK = "You are back on solid ground.",
+    HOST_LOST = "The host can't be reached. What you dig meanwhile is sent later.",
+    OTHER_VERSION = "The host has another version of the game.", ARRIVED = "has joined", LEFT = "has left",
+}
 
 pub fn continue_world(name: &str) -> String {
     format!("{CONTINUE} {name}")
