@@ -135,7 +135,7 @@ class Stage:
     def focus(self, title):
         """Gives the window the keyboard: there is no window manager to do so."""
         found = subprocess.run(
-            ["xdotool", "search", "--sync", "--onlyvisible", "--pid", str(self.program.pid), "--name", title],
+            ["xdotool", "search", "--sync", "--all", "--onlyvisible", "--pid", str(self.program.pid), "--name", title],
             env=self.env, check=True, capture_output=True, text=True, timeout=self.patience,
         )
         self.window = found.stdout.split()[0]
