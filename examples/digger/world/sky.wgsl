@@ -95,10 +95,11 @@ fn fragment(in: VertexOutput) -> @location(0) vec4<f32> {
     let at = apart(direction, sky.moon.xyz);
     if length(at) < 0.05 {
         let seas = textureSampleLevel(noise, noise_sampler, at * 4.0 + 0.2, 0.0).r;
-        let disc = smoothstep(0.0458, 0.0431, length(at));
+        let disc = 1.0 - smoothstep(0.0431, 0.0458, length(at));
         color += vec3(0.82, 0.86, 0.92) * (0.55 + 0.55 * seas) * disc * sky.moon.a;
     }
-    let disc = smoothstep(0.0283, 0.0173, length(apart(direction, sky.sun.xyz))) * smoothstep(-0.02, 0.0, direction.y);
+    let from_sun = length(apart(direction, sky.sun.xyz));
+    let disc = (1.0 - smoothstep(0.0173, 0.0283, from_sun)) * smoothstep(-0.02, 0.0, direction.y);
     color += sky.sun.a * vec3(1.0, 0.86, 0.64) * 4.0 * disc;
 
     // Clouds are on a plane overhead that bends down to the horizon.
