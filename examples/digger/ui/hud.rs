@@ -506,7 +506,7 @@ mod tests {
 
     #[test]
     fn the_compass_turns_with_the_player() {
-        let yaws = [0.0, -0.785, -1.57, 3.14, 1.57, 6.28, 0.3];
+        let yaws = [0.0, -0.8, -1.5, 3.1, 1.5, 6.3, 0.3];
         assert_eq!(yaws.map(compass), ["N", "NE", "E", "S", "W", "N", "N"]);
         // The sun rises where the game says that the east is.
         let sunrise = Clock { hour: 6.0, runs: true }.sun();
