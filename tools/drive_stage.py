@@ -15,21 +15,58 @@ class Failed(Exception):
 class Stage:
     """A program in a window of its own display."""
 
-    def __init__(self, command, out, size, patience):
+    def __init__(self, command, out, size, patience, beside=None):
+        """`beside` another stage, a second program has a window on the same display, and settings and worlds of its own."""
         self.out, self.size, self.patience = out, size, patience
         self.shots = []
         self.log = out / "log.txt"
         self.server = self.program = self.written = None
         try:
-            self.start(command)
+            self.start(command, beside)
         except BaseException:
             self.close()
             raise
 
-    def start(self, command):
+    def start(self, command, beside):
         """Starts the display, and the program on it."""
-        out, size = self.out, self.size
+        out = self.out
         out.mkdir(parents=True, exist_ok=True)
+        display = beside.env["DISPLAY"][1:] if beside else self.open_display()
+        self.env = dict(os.environ, DISPLAY=f":{display}", WINIT_UNIX_BACKEND="x11", WINIT_X11_SCALE_FACTOR="1")
+        self.env.pop("WAYLAND_DISPLAY", None)
+        # Settings and worlds of whoever plays here by hand stay as they are.
+        for variable, folder in (("XDG_CONFIG_HOME", "config"), ("XDG_DATA_HOME", "data")):
+            folder = out.resolve() / folder
+            shutil.rmtree(folder, ignore_errors=True)
+            self.env[variable] = str(folder)
+        self.command = command
+        self.prepare()
+        self.written = open(self.log, "wb")
+        self.started = time.monotonic()
+        self.run()
+
+    def prepare(self):
+        """Settings with which a renderer in software is as fast as may be, for programs that have settings."""
+        file = self.out.resolve() / "config" / "bevy_burrow" / "digger.json"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text('{ "quality": "low", "view_distance": 200, "day_minutes": 0 }')
+
+    def run(self):
+        """Starts the program, or starts it again: what it says goes on in the same log."""
+        self.program = subprocess.Popen(self.command, env=self.env, stdout=self.written, stderr=subprocess.STDOUT)
+
+    def wait_for_end(self):
+        """Waits until the program has ended by itself."""
+        try:
+            status = self.program.wait(self.patience)
+        except subprocess.TimeoutExpired:
+            raise Failed("the program does not end") from None
+        if status != 0:
+            raise Failed(f"the program ended with {status}")
+
+    def open_display(self):
+        """Starts a display, and returns its number."""
+        size = self.size
         read, write = os.pipe()
         # Xvfb itself picks a display that is free, and tells when it is ready.
         self.server = subprocess.Popen(
@@ -42,15 +79,7 @@ class Stage:
             display = told.readline().strip()
         if not display:
             raise Failed("Xvfb did not start")
-        self.env = dict(os.environ, DISPLAY=f":{display}", WINIT_UNIX_BACKEND="x11", WINIT_X11_SCALE_FACTOR="1")
-        self.env.pop("WAYLAND_DISPLAY", None)
-        # The settings of whoever plays here by hand stay as they are.
-        config = out.resolve() / "config"
-        shutil.rmtree(config, ignore_errors=True)
-        self.env["XDG_CONFIG_HOME"] = str(config)
-        self.written = open(self.log, "wb")
-        self.started = time.monotonic()
-        self.program = subprocess.Popen(command, env=self.env, stdout=self.written, stderr=subprocess.STDOUT)
+        return display
 
     def close(self):
         """Ends the program and the display, as far as they were started."""
@@ -106,10 +135,11 @@ class Stage:
     def focus(self, title):
         """Gives the window the keyboard: there is no window manager to do so."""
         found = subprocess.run(
-            ["xdotool", "search", "--sync", "--onlyvisible", "--name", title],
+            ["xdotool", "search", "--sync", "--all", "--onlyvisible", "--pid", str(self.program.pid), "--name", title],
             env=self.env, check=True, capture_output=True, text=True, timeout=self.patience,
         )
         self.window = found.stdout.split()[0]
+        self.xdo("windowraise", self.window)
         self.xdo("windowfocus", self.window)
 
     def move(self, x, y):

@@ -22,10 +22,11 @@
 //!
 //! Keys are bound by their position on an American keyboard. The menus show the letters of the player's own layout.
 //!
-//! What is dug is saved as it is dug, with the inventory and the player's place: the title continues the world that was played
-//! last, and `--world NAME` another one, or a new one of that name. Scripts save only with `--world`.
+//! What is dug is saved as it is dug, with the inventory, the tools, the lamps and the player's place: the title continues the
+//! world that was played last, "Worlds" lists all, and `--world NAME` plays one, or a new one of that name. Scripts save only
+//! with `--world`.
 //!
-//! Others can join: choose "Together" on the title, or start with `--host`, and with `--join ADDRESS` on their machines.
+//! Others can join: choose "Multiplayer" on the title, or start with `--host`, and with `--join ADDRESS` on their machines.
 //!
 //! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows into
 //! mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
@@ -71,7 +72,7 @@ use clap::Parser;
 
 use crate::party::connection::{Address, Party};
 use crate::ui::settings::{Settings, SettingsFile};
-use crate::world::saves::PlayedWorld;
+use crate::world::saves::{self, PlayedWorld};
 
 /// A first-person game on a landscape that can be dug.
 #[derive(Parser, Clone, Debug)]
@@ -132,7 +133,7 @@ impl Options {
 
     /// Who plays in it.
     fn party(&self) -> Party {
-        let guest = self.join.map(|Address(host)| Party::Guest(host));
+        let guest = self.join.map(|Address(host, seed)| Party::Guest(host, seed));
         guest.or(self.host.map(Party::Host)).unwrap_or_default()
     }
 }
@@ -240,7 +241,9 @@ fn open_window(options: &Options) -> App {
         Window { title: "Digger".into(), resolution: (options.width, options.height).into(), ..default() };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
+    let new_world = || saves::create(&saves::new_name()?, 0).ok();
     let world = options.saved_world().or_else(PlayedWorld::latest);
+    let world = world.or_else(|| options.host.and_then(|_| new_world()));
     game(&mut app, options.backend.engine(), SettingsFile::of_user(), world, options.party());
     if let Some(name) = &options.name {
         app.world_mut().resource_mut::<Settings>().name.clone_from(name);

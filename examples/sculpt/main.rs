@@ -8,17 +8,21 @@
 //!
 //! | control | does |
 //! | --- | --- |
-//! | left button, held | a stroke with the panel's brush under the mouse |
-//! | right button, held | looks around |
+//! | left button, held | a stroke with the panel's brush under the mouse: one step of undo |
+//! | the same with `Shift`, `Ctrl` | the opposite operation, smooth |
+//! | `Alt` or `L` and the left button | takes the ground's material, draws a straight line from the last stroke |
+//! | right button, held | looks around; the wheel changes the speed |
 //! | `W` `A` `S` `D`, `Q`, `E`, left `Shift` | flies, down, up, faster |
+//! | `F` | flies to what is under the mouse |
 //! | wheel, `[`, `]` | size of the brush |
-//! | `Tab` | next operation |
+//! | `1` to `9`, `0`, `-`, or `Tab` | operations |
 //! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
+//! | `Ctrl+N`, `Ctrl+O`, `Ctrl+S`, `Ctrl+Shift+S` | new, open, save, save as |
 //! | `H` | takes the height under the mouse for levelling |
 //! | `F1` | shows and hides the panel |
 //! | `F12` | saves a picture |
 //! | a PNG dropped on the window | becomes the stamp, as with `--stamp`: plain grey, white is high |
-//! | `Esc` | quits |
+//! | `Esc` | quits, and asks before changes are lost |
 //!
 //! With `--headless`, or without a display, a script sculpts instead and saves pictures, panel included, in `--out`.
 //! Each stroke's receipt is a line on standard output.
@@ -92,11 +96,17 @@ fn main() -> ExitCode {
         ..default()
     };
     let mut app = App::new();
-    app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
+    app.add_plugins(DefaultPlugins.set(WindowPlugin {
+        primary_window: Some(window),
+        // The panel asks first where changes are not saved.
+        close_when_requested: false,
+        ..default()
+    }));
     editor(&mut app, &options);
     app.add_plugins((stroke::MousePlugin, stamps::DropPlugin));
     if let Some(file) = &options.stamp {
-        stamps::take(file, &mut app.world_mut().resource_mut::<BrushTool>());
+        let taken = stamps::take(file, &mut app.world_mut().resource_mut::<BrushTool>());
+        app.world_mut().resource_mut::<BurrowPanel>().report(taken);
     }
     app.run().report()
 }
@@ -111,5 +121,7 @@ fn editor(app: &mut App, options: &Options) {
         stroke::StrokePlugin,
         journal::JournalPlugin,
     ));
-    app.world_mut().resource_mut::<BurrowPanel>().pictures = options.out.clone();
+    let mut panel = app.world_mut().resource_mut::<BurrowPanel>();
+    panel.pictures = options.out.clone();
+    panel.level = options.out.join("level");
 }

@@ -17,7 +17,7 @@ use software::draws_in_software;
 const SIDE: u32 = 256;
 const SKY: Color = Color::srgb(0.62, 0.74, 0.88);
 
-/// The centre of the script's edits, at which the camera looks at first.
+/// The centre of the level and of the script's edits, at which the camera looks at first.
 pub const MIDDLE: Vec3 = Vec3::new(128.0, 0.0, 128.0);
 
 pub struct ScenePlugin;
@@ -63,10 +63,11 @@ fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>
         Camera3d::default(),
         Tonemapping::AcesFitted,
         Msaa::Off,
-        DistanceFog { color: SKY, falloff: FogFalloff::Linear { start: 180.0, end: 420.0 }, ..default() },
+        // It hides nothing of the level from wherever all of it is in view.
+        DistanceFog { color: SKY, falloff: FogFalloff::Linear { start: 500.0, end: 1600.0 }, ..default() },
         // The mouse wheel changes the brush size.
         FreeCamera { scroll_factor: 0.0, ..flight::free_camera(24.0, 80.0) },
-        Transform::from_translation(MIDDLE + Vec3::new(-26.0, 62.0, 58.0))
-            .looking_at(MIDDLE + Vec3::Y * 4.0, Vec3::Y),
+        // All of the level is in view.
+        Transform::from_translation(MIDDLE + Vec3::new(-70.0, 150.0, 190.0)).looking_at(MIDDLE, Vec3::Y),
     ));
 }

@@ -121,6 +121,9 @@ impl Stage {
         });
         app.update();
         let camera = app.world_mut().query_filtered::<Entity, With<Camera3d>>().single(app.world())?;
+        let place = MIDDLE + Vec3::new(-26.0, 62.0, 58.0);
+        let place = Transform::from_translation(place).looking_at(MIDDLE + Vec3::Y * 4.0, Vec3::Y);
+        app.world_mut().entity_mut(camera).insert(place);
         let photographer = Photographer::new(&mut app, camera, (options.width, options.height));
         Ok(Self { app, camera, photographer, folder: options.out.clone(), strokes: 0 })
     }

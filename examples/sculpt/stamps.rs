@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 use bevy_burrow::ground::ImageError;
-use bevy_burrow::panel::{BrushTool, StampImage, ToolOperation};
+use bevy_burrow::panel::{BrushTool, BurrowPanel, StampImage, ToolOperation};
 use bevy_burrow::prelude::*;
 
 /// The script's default stamp.
@@ -41,15 +41,15 @@ pub enum StampError {
     Brush(#[from] BrushError),
 }
 
-/// Uses a file's image as the stamp. On an error, it is logged, and the tool stays as it is.
-pub fn take(file: &Path, tool: &mut impl DerefMut<Target = BrushTool>) {
-    match read(file) {
-        Ok(stamp) => {
-            let tool = &mut **tool;
-            (tool.stamp, tool.operation) = (stamp, ToolOperation::Stamp);
-        }
-        Err(why) => error!("{} cannot be used as a stamp: {why}", file.display()),
-    }
+/// Uses a file's image as the stamp. Returns what to tell; on an error, the tool stays as it is.
+///
+/// # Errors
+/// If the file is no valid stamp.
+pub fn take(file: &Path, tool: &mut impl DerefMut<Target = BrushTool>) -> Result<String, String> {
+    let stamp = read(file).map_err(|why| format!("{} can't be used as a stamp: {why}", file.display()))?;
+    let tool = &mut **tool;
+    (tool.stamp, tool.operation) = (stamp, ToolOperation::Stamp);
+    Ok(format!("{} is the stamp now", file.display()))
 }
 
 /// A file's image, or the crater if there is no file.
@@ -62,10 +62,14 @@ pub fn read_or_crater(file: Option<&Path>) -> Result<StampImage> {
     })
 }
 
-fn take_dropped(mut drops: MessageReader<FileDragAndDrop>, mut tool: ResMut<BrushTool>) {
+fn take_dropped(
+    mut drops: MessageReader<FileDragAndDrop>,
+    mut tool: ResMut<BrushTool>,
+    mut panel: ResMut<BurrowPanel>,
+) {
     for message in drops.read() {
         if let FileDragAndDrop::DroppedFile { path_buf, .. } = message {
-            take(path_buf, &mut tool);
+            panel.report(take(path_buf, &mut tool));
         }
     }
 }

@@ -19,7 +19,7 @@ fn folder(name: &str) -> PathBuf {
 /// The tool after these files were dropped on the window, one by one.
 fn drop_files(files: &[&Path]) -> BrushTool {
     let mut app = App::new();
-    app.init_resource::<BrushTool>().add_plugins(DropPlugin);
+    app.init_resource::<BrushTool>().init_resource::<BurrowPanel>().add_plugins(DropPlugin);
     for file in files {
         let (window, path_buf) = (Entity::PLACEHOLDER, file.to_path_buf());
         app.world_mut().write_message(FileDragAndDrop::HoveredFile { window, path_buf: path_buf.clone() });

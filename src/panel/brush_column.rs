@@ -1,91 +1,109 @@
 //! The left column: operation, shape, size, material and roughness of the brush.
 
 use bevy::math::{EulerRot, Quat, Vec3};
-use bevy_egui::egui::{self, Color32, Pos2, Rect, Shape, Stroke, Ui, Vec2};
+use bevy_egui::egui::{self, Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 
 use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, STEP, TUBE};
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, BAD, FAINT};
 use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
-use super::{BrushTool, ToolAlign, ToolOperation, ToolShape};
+use super::{BrushTool, BurrowPanel, ToolAlign, ToolOperation, ToolShape, texts};
 
-/// Draws the column for a terrain whose voxels are `voxel` metres wide. `rejection` is why the last brush was
-/// rejected.
+/// Draws what is always in sight: where the pointer is.
+pub fn head(ui: &mut Ui, panel: &BurrowPanel) {
+    if let Some(Vec3 { x, y, z }) = panel.pointer {
+        figure(ui, texts::POINTER, format!("{x:.1}  {y:.1}  {z:.1} m"));
+    }
+}
+
+/// Draws the column for a terrain whose voxels are `voxel` metres wide.
 pub fn show(
     ui: &mut Ui,
     tool: &mut BrushTool,
     materials: &[(Color32, String)],
     voxel: f32,
-    rejection: Option<&str>,
+    panel: &BurrowPanel,
 ) {
-    if let Some(why) = rejection {
-        let line = ui.label(egui::RichText::new(format!("Rejected: {why}")).color(BAD).size(12.0));
-        note(ui, "Rejected", line.rect);
+    if let Some(why) = panel.rejection.as_deref() {
+        let line = ui.label(egui::RichText::new(texts::rejected(why)).color(BAD).size(12.0));
+        note(ui, texts::REJECTED, line.rect);
     }
-    section(ui, "Operation", true, |ui| operations(ui, tool, voxel));
-    section(ui, "Shape", true, |ui| shape(ui, tool, voxel));
+    section(ui, texts::OPERATION, true, |ui| operations(ui, tool, voxel, panel));
+    section(ui, texts::SHAPE, true, |ui| shape(ui, tool, voxel));
     let row = tool.operation.row();
     if row.needs.contains(&Need::Material) {
-        section(ui, "Material", true, |ui| material(ui, tool, materials));
+        section(ui, texts::MATERIAL, true, |ui| material(ui, tool, materials));
     } else if row.sculpts() {
-        section(ui, "New ground", false, |ui| {
-            switch(ui, "Of a material", &mut tool.is_of_material);
+        section(ui, texts::FILL, false, |ui| {
+            switch(ui, texts::FILL_MATERIAL, &mut tool.is_of_material);
             if tool.is_of_material {
                 material(ui, tool, materials);
             }
         });
     }
-    section(ui, "Surface", true, |ui| surface(ui, tool, voxel));
-    section(ui, "Stroke", true, |ui| {
-        slider(ui, "Rate", &mut tool.rate, 1.0..=30.0, |slider| slider.max_decimals(0).suffix(" /s"));
-        slider(ui, "Power", &mut tool.power, 0..=u8::MAX, |slider| slider).on_hover_text(
-            "How hard the material may be that it takes away, where the terrain has digging rules",
-        );
+    section(ui, texts::SURFACE, true, |ui| surface(ui, tool, voxel));
+    section(ui, texts::STROKE, true, |ui| {
+        slider(ui, texts::RATE, &mut tool.rate, 1.0..=30.0, |slider| slider.max_decimals(0).suffix(" /s"))
+            .on_hover_text(texts::RATE_HELP);
+        slider(ui, texts::POWER, &mut tool.power, 0..=u8::MAX, |slider| slider)
+            .on_hover_text(texts::POWER_HELP);
     });
 }
 
-fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
-    let names: Vec<&str> = OPERATIONS.iter().map(|row| row.name).collect();
+fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel) {
+    let names: Vec<&str> = OPERATIONS.iter().map(|row| row.name()).collect();
     let chosen = OPERATIONS.iter().position(|row| row.tool == tool.operation).unwrap_or_default();
-    let clicked = tiles(ui, 4, &names, chosen, |ui, at, rect, color| {
-        let Some(row) = OPERATIONS.get(at) else { return };
-        let place =
-            |x: f32, y: f32| Pos2::new(rect.left() + rect.width() * x, rect.bottom() - rect.height() * y);
-        let steps = (0..=32).map(|step| step as f32 / 32.0);
-        let (before, after): (Vec<Pos2>, Vec<Pos2>) = steps
-            .map(|x| {
-                let (before, after) = (row.profile)(x);
-                (place(x, before), place(x, after))
-            })
-            .unzip();
-        ui.painter().extend(Shape::dashed_line(&before, Stroke::new(1.0, FAINT), 2.0, 2.0));
-        ui.painter().line(after, Stroke::new(2.0, if at == chosen { ACCENT } else { color }));
-    });
+    let clicked = tiles(
+        ui,
+        4,
+        &names,
+        chosen,
+        |_| true,
+        |ui, at, rect, color| {
+            let Some(row) = OPERATIONS.get(at) else { return };
+            let place =
+                |x: f32, y: f32| Pos2::new(rect.left() + rect.width() * x, rect.bottom() - rect.height() * y);
+            if let Some(key) = panel.keys.get(row.name()) {
+                let corner = rect.right_top() + Vec2::new(6.0, -3.0);
+                ui.painter().text(corner, Align2::RIGHT_TOP, key, FontId::proportional(9.0), FAINT);
+            }
+            let steps = (0..=32).map(|step| step as f32 / 32.0);
+            let (before, after): (Vec<Pos2>, Vec<Pos2>) = steps
+                .map(|x| {
+                    let (before, after) = (row.profile)(x);
+                    (place(x, before), place(x, after))
+                })
+                .unzip();
+            ui.painter().extend(Shape::dashed_line(&before, Stroke::new(1.0, FAINT), 2.0, 2.0));
+            ui.painter().line(after, Stroke::new(2.0, if at == chosen { ACCENT } else { color }));
+        },
+    );
     if let Some(row) = clicked.and_then(|at| OPERATIONS.get(at)) {
         tool.operation = row.tool;
     }
     let row = tool.operation.row();
-    ui.label(egui::RichText::new(row.help).color(FAINT).size(11.0));
+    ui.label(egui::RichText::new(row.help()).color(FAINT).size(11.0));
     if tool.operation == ToolOperation::Stamp {
-        figure(ui, "Image", tool.stamp.label());
+        figure(ui, texts::IMAGE, tool.stamp.label());
     }
     for need in row.needs {
         match need {
             Need::Material => continue,
-            Need::Strength => slider(ui, "Strength", &mut tool.strength, 0.0..=1.0, percent),
-            Need::Falloff => slider(ui, "Falloff", &mut tool.falloff, FALLOFF.range(voxel), metres),
-            Need::Amount => slider(ui, "Amount", &mut tool.amount, AMOUNT.range(voxel), metres),
-            Need::Level => slider(ui, "Height", &mut tool.level, -128.0..=256.0, metres),
-            Need::Step => slider(ui, "Step", &mut tool.step, STEP.range(voxel), metres),
+            Need::Strength => slider(ui, texts::STRENGTH, &mut tool.strength, 0.0..=1.0, percent),
+            Need::Falloff => slider(ui, texts::FALLOFF, &mut tool.falloff, FALLOFF.range(voxel), metres)
+                .on_hover_text(texts::FALLOFF_HELP),
+            Need::Amount => slider(ui, texts::AMOUNT, &mut tool.amount, AMOUNT.range(voxel), metres),
+            Need::Level => slider(ui, texts::HEIGHT, &mut tool.level, -128.0..=256.0, metres),
+            Need::Step => slider(ui, texts::STEP, &mut tool.step, STEP.range(voxel), metres),
         };
     }
 }
 
 fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
-    let names = ToolShape::ALL.map(|shape| format!("{shape:?}"));
-    let names = names.each_ref().map(String::as_str);
-    let chosen = ToolShape::ALL.iter().position(|&shape| shape == tool.shape).unwrap_or_default();
-    let clicked = tiles(ui, ToolShape::ALL.len(), &names, chosen, |ui, at, rect, color| {
+    let now = tool.fitting_shape();
+    let chosen = ToolShape::ALL.iter().position(|&shape| shape == now).unwrap_or_default();
+    let fits = |at: usize| ToolShape::ALL.get(at).is_some_and(|&shape| tool.operation.fits(shape));
+    let clicked = tiles(ui, 3, &texts::SHAPES, chosen, fits, |ui, at, rect, color| {
         let color = if at == chosen { ACCENT } else { color };
         if let Some(&shape) = ToolShape::ALL.get(at) {
             draw_shape(ui, shape, rect, Stroke::new(1.5, color));
@@ -94,27 +112,27 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     if let Some(&shape) = clicked.and_then(|at| ToolShape::ALL.get(at)) {
         tool.shape = shape;
     }
+    let now = tool.fitting_shape();
     let radii = RADIUS.range(voxel);
-    if tool.shape == ToolShape::Box {
-        slider(ui, "Half width", &mut tool.half.x, radii.clone(), length);
-        slider(ui, "Half height", &mut tool.half.y, radii.clone(), length);
-        slider(ui, "Half depth", &mut tool.half.z, radii, length);
-        slider(ui, "Turn", &mut tool.turn, -180.0..=180.0, |slider| slider.max_decimals(0).suffix("°"));
+    if now == ToolShape::Box {
+        slider(ui, texts::HALF_SIZES[0], &mut tool.half.x, radii.clone(), length);
+        slider(ui, texts::HALF_SIZES[1], &mut tool.half.y, radii.clone(), length);
+        slider(ui, texts::HALF_SIZES[2], &mut tool.half.z, radii, length);
+        slider(ui, texts::TURN, &mut tool.turn, -180.0..=180.0, |slider| slider.max_decimals(0).suffix("°"));
     } else {
-        slider(ui, "Radius", &mut tool.radius, radii, length);
+        slider(ui, texts::RADIUS, &mut tool.radius, radii, length);
     }
-    if tool.shape == ToolShape::Torus {
-        slider(ui, "Tube", &mut tool.tube, TUBE.range(voxel), length);
+    if now == ToolShape::Torus {
+        slider(ui, texts::TUBE, &mut tool.tube, TUBE.range(voxel), length);
     }
-    if tool.shape.is_long() {
-        slider(ui, "Length", &mut tool.length, LENGTH.range(voxel), length);
+    if now.is_long() {
+        slider(ui, texts::LENGTH, &mut tool.length, LENGTH.range(voxel), length);
     }
-    slider(ui, "Sink", &mut tool.sink, -1.0..=1.0, percent);
+    slider(ui, texts::SINK, &mut tool.sink, -1.0..=1.0, percent).on_hover_text(texts::SINK_HELP);
     let aligns = [ToolAlign::Upright, ToolAlign::Surface];
     let chosen = usize::from(tool.align == ToolAlign::Surface);
-    if tool.shape != ToolShape::Sphere
-        && let Some(&align) =
-            choice(ui, &["Upright", "Along the surface"], chosen).and_then(|at| aligns.get(at))
+    if (now != ToolShape::Sphere || tool.operation == ToolOperation::Stamp)
+        && let Some(&align) = choice(ui, &texts::ALIGN, chosen).and_then(|at| aligns.get(at))
     {
         tool.align = align;
     }
@@ -134,12 +152,12 @@ fn material(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) 
 }
 
 fn surface(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
-    switch(ui, "Rough", &mut tool.is_rough);
+    switch(ui, texts::ROUGH, &mut tool.is_rough);
     if tool.is_rough {
         let bumps = BUMP.range(voxel);
-        slider(ui, "Bumps", &mut tool.bump, bumps, |slider| slider.fixed_decimals(2).suffix(" m"));
-        slider(ui, "Width", &mut tool.bump_width, BUMP_WIDTH.range(voxel), length);
-        slider(ui, "Pattern", &mut tool.seed, 0..=99, |slider| slider);
+        slider(ui, texts::BUMPS, &mut tool.bump, bumps, |slider| slider.fixed_decimals(2).suffix(" m"));
+        slider(ui, texts::WIDTH, &mut tool.bump_width, BUMP_WIDTH.range(voxel), length);
+        slider(ui, texts::PATTERN, &mut tool.seed, 0..=99, |slider| slider);
     }
 }
 

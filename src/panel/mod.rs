@@ -24,6 +24,7 @@
 
 mod brush_column;
 mod context;
+mod files;
 mod lengths;
 mod level;
 mod look_section;
@@ -34,6 +35,7 @@ mod rules_section;
 mod state;
 mod survey;
 mod terrain_controls;
+mod texts;
 mod theme;
 mod tool;
 mod widgets;
@@ -45,7 +47,7 @@ pub use tool::{BrushTool, StampImage, ToolAlign, ToolShape};
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Align2, Color32, Id, LayerId, Order, RichText, ScrollArea, Ui, Vec2};
+use bevy_egui::egui::{self, Align2, Color32, Id, LayerId, Order, ScrollArea, Ui, Vec2};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
 
 use crate::plugin::{
@@ -53,6 +55,8 @@ use crate::plugin::{
 };
 use crate::terrain::Terrain;
 use crate::view::GroundLook;
+use files::Files;
+use state::Note;
 use survey::Survey;
 use terrain_controls::TerrainControls;
 use world_column::{Content, TerrainLine};
@@ -76,6 +80,7 @@ impl Plugin for BurrowPanelPlugin {
             .init_resource::<PanelInput>()
             .init_resource::<PanelPlaces>()
             .init_resource::<Survey>()
+            .init_resource::<Files>()
             .init_resource::<picture::Saving>()
             .add_message::<PanelAction>()
             .add_systems(PreUpdate, state::read_input.after(EguiPreUpdateSet::BeginPass))
@@ -88,8 +93,11 @@ impl Plugin for BurrowPanelPlugin {
                     picture::finish,
                     level::finish,
                     picture::give_up,
+                    files::answer,
                     perform_actions,
+                    files::watch,
                     note_rejection,
+                    forget_note,
                 )
                     .chain()
                     .after(BurrowSystems::Begin),
@@ -103,32 +111,47 @@ fn perform_actions(
     mut commands: Commands,
     mut actions: MessageReader<PanelAction>,
     mut panel: ResMut<BurrowPanel>,
+    mut files: ResMut<Files>,
     check: Option<Res<survey::SeamCheck>>,
     terrains: Query<(Entity, &Terrain)>,
     cameras: Query<&RenderTarget, With<PrimaryEguiContext>>,
     mut undos: MessageWriter<Undo>,
     mut redos: MessageWriter<Redo>,
+    mut exit: MessageWriter<AppExit>,
 ) {
     for action in actions.read() {
         let chosen = survey::chosen(&panel, &terrains);
-        match action {
-            PanelAction::Undo => drop(chosen.map(|terrain| undos.write(Undo { terrain: Some(terrain) }))),
-            PanelAction::Redo => drop(chosen.map(|terrain| redos.write(Redo { terrain: Some(terrain) }))),
-            PanelAction::CheckSeams => {
-                let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
+        let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
+        match files.admit(*action, &panel) {
+            None => {}
+            Some(PanelAction::Undo) => {
+                undos.write_batch(chosen.map(|terrain| Undo { terrain: Some(terrain) }));
+            }
+            Some(PanelAction::Redo) => {
+                redos.write_batch(chosen.map(|terrain| Redo { terrain: Some(terrain) }));
+            }
+            Some(PanelAction::CheckSeams) => {
                 if let (Some((entity, terrain)), None) = (terrain, &check) {
                     survey::start_seam_check(&mut commands, &mut panel, entity, terrain);
                 }
             }
-            PanelAction::SavePicture => picture::save(&mut commands, &mut panel, cameras.iter().next()),
-            PanelAction::SaveLevel => {
-                let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
-                terrain.into_iter().for_each(|(_, terrain)| level::save(&mut commands, &mut panel, terrain));
+            Some(PanelAction::SavePicture) => picture::save(&mut commands, &mut panel, cameras.iter().next()),
+            Some(action @ (PanelAction::SaveLevel | PanelAction::SaveLevelAs)) => {
+                let target = match action {
+                    PanelAction::SaveLevel => files.target(&panel),
+                    _ => panel.level.clone(),
+                };
+                terrain
+                    .into_iter()
+                    .for_each(|own| level::save(&mut commands, &mut panel, own, target.clone()));
             }
-            PanelAction::LoadLevel => {
-                let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
+            Some(PanelAction::LoadLevel) => {
                 terrain.into_iter().for_each(|own| level::load(&mut commands, &mut panel, own));
             }
+            Some(PanelAction::NewLevel) => {
+                terrain.into_iter().for_each(|own| level::renew(&mut commands, &mut panel, own));
+            }
+            Some(PanelAction::Quit) => drop(exit.write(AppExit::Success)),
         }
     }
 }
@@ -153,6 +176,29 @@ fn note_rejection(
     }
 }
 
+/// Seconds after which a message about something that went well is gone.
+const NOTE_SHOWN: f32 = 12.0;
+
+/// Removes messages that are old, except for errors and what still goes on.
+fn forget_note(
+    time: Option<Res<Time<Real>>>,
+    mut panel: ResMut<BurrowPanel>,
+    mut last: Local<(Option<Note>, f32)>,
+) {
+    if last.0 != panel.note {
+        *last = (panel.note.clone(), 0.0);
+    }
+    last.1 += time.map_or(0.0, |time| time.delta_secs());
+    let is_good = match &last.0 {
+        Some(Note::Good(_)) => true,
+        Some(Note::Seams(verdict)) => verdict.is_flawless,
+        _ => false,
+    };
+    if is_good && last.1 > NOTE_SHOWN {
+        panel.note = None;
+    }
+}
+
 /// Draws both columns.
 fn draw(
     mut contexts: EguiContexts,
@@ -161,6 +207,7 @@ fn draw(
     mut settings: ResMut<BurrowSettings>,
     figures: Res<BurrowFigures>,
     survey: Res<Survey>,
+    mut files: ResMut<Files>,
     terrains: Query<(Entity, &Terrain)>,
     parts: Query<(Option<&Name>, Option<&MaterialColors>, Option<&LooseGround>, Option<&GroundLook>)>,
     mut places: ResMut<PanelPlaces>,
@@ -168,11 +215,13 @@ fn draw(
     mut actions: MessageWriter<PanelAction>,
     mut commands: Commands,
 ) {
-    let (true, Ok(context)) = (panel.is_open, contexts.ctx_mut()) else {
-        // No widgets are shown.
-        places.set_if_neq(PanelPlaces::default());
+    let Ok(context) = contexts.ctx_mut() else { return };
+    // A question is asked even while the panel is closed.
+    files::ask(context, files.bypass_change_detection());
+    if !panel.is_open {
+        places.set_if_neq(widgets::places(context));
         return;
-    };
+    }
     let was_typing = context.text_edit_focused();
     let chosen = survey::chosen(&panel, &terrains);
     let part = chosen.and_then(|entity| parts.get(entity).ok());
@@ -197,24 +246,30 @@ fn draw(
     let (mut new_tool, mut new_panel, mut new_settings) = (tool.clone(), panel.clone(), settings.clone());
     let mut new_controls = controls.clone();
     let mut pressed = Vec::new();
+    let mut content = Content {
+        terrains: &lines,
+        chosen,
+        figures: &figures,
+        survey: &survey,
+        settings: &mut new_settings,
+        controls: &mut new_controls,
+        materials: &materials,
+        actions: &mut pressed,
+    };
+    fold_one(context, panel.shows_brush && panel.shows_world);
     if panel.shows_brush {
-        column(context, BRUSH, Align2::LEFT_TOP, "Brush", |ui| {
-            brush_column::show(ui, &mut new_tool, &materials, voxel, panel.rejection.as_deref());
+        let head = |ui: &mut Ui, _: &mut ()| brush_column::head(ui, &panel);
+        column(context, BRUSH, Align2::LEFT_TOP, texts::BRUSH, &mut (), head, |ui, ()| {
+            brush_column::show(ui, &mut new_tool, &materials, voxel, &panel);
         });
     }
     if panel.shows_world {
-        column(context, WORLD, Align2::RIGHT_TOP, "World", |ui| {
-            let mut content = Content {
-                terrains: &lines,
-                chosen,
-                figures: &figures,
-                survey: &survey,
-                settings: &mut new_settings,
-                controls: &mut new_controls,
-                materials: &materials,
-                actions: &mut pressed,
-            };
-            world_column::show(ui, &mut new_panel, &mut content);
+        let mut both = (&mut new_panel, &mut content);
+        let head = |ui: &mut Ui, (panel, content): &mut (&mut BurrowPanel, &mut Content)| {
+            world_column::head(ui, panel, &files, content);
+        };
+        column(context, WORLD, Align2::RIGHT_TOP, texts::WORLD, &mut both, head, |ui, (panel, content)| {
+            world_column::show(ui, panel, content);
             #[cfg(feature = "debug")]
             if let Some(debug) = &mut debug {
                 let mut new = (**debug).clone();
@@ -265,30 +320,64 @@ fn materials(panel: &BurrowPanel, colors: &MaterialColors) -> Vec<(Color32, Stri
     panel.materials.iter().enumerate().map(|(at, name)| (color(at), name.clone())).collect()
 }
 
-/// A framed column along one side of the window, at most as high as the window.
-fn column(
+/// Whether a column is unfolded.
+fn is_unfolded(context: &egui::Context, id: &'static str) -> bool {
+    context.data(|data| data.get_temp(Id::new((id, "open")))).unwrap_or(true)
+}
+
+fn unfold(context: &egui::Context, id: &'static str, is_open: bool) {
+    context.data_mut(|data| data.insert_temp(Id::new((id, "open")), is_open));
+}
+
+/// In a narrow window, only one of two columns is unfolded: the one that was unfolded last.
+fn fold_one(context: &egui::Context, are_two: bool) {
+    let is_narrow = context.viewport_rect().width() < 2.0 * theme::COLUMN + theme::LEAST_VIEW;
+    let last = Id::new("burrow unfolded last");
+    let now = [BRUSH, WORLD].map(|id| is_unfolded(context, id));
+    let newest: &'static str = context.data(|data| data.get_temp(last)).unwrap_or(BRUSH);
+    if are_two && is_narrow && now == [true, true] {
+        unfold(context, if newest == BRUSH { WORLD } else { BRUSH }, false);
+    }
+}
+
+/// A framed column along one side of the window, at most as high as the window. A click on its title folds it. The head stays
+/// in sight, and the content scrolls below it.
+fn column<T>(
     context: &egui::Context,
     id: &'static str,
     side: Align2,
     title: &str,
-    content: impl FnOnce(&mut Ui),
+    data: &mut T,
+    head: impl FnOnce(&mut Ui, &mut T),
+    content: impl FnOnce(&mut Ui, &mut T),
 ) {
     let height = context.viewport_rect().height() - 2.0 * theme::GAP;
     let offset = Vec2::new(if side == Align2::LEFT_TOP { theme::GAP } else { -theme::GAP }, theme::GAP);
+    let is_open = is_unfolded(context, id);
     egui::Area::new(Id::new(id)).order(Order::Middle).anchor(side, offset).show(context, |ui| {
         ui.set_style(theme::style());
         ui.set_max_height(height);
         let card = theme::card();
-        let inside = theme::COLUMN - card.inner_margin.sum().x;
+        let inside = if is_open { theme::COLUMN - card.inner_margin.sum().x } else { theme::FOLDED };
         card.show(ui, |ui| {
             // Must precede all widgets: later it would move the following ones to the top.
             ui.set_max_height(height - card.inner_margin.sum().y);
             ui.set_width(inside);
-            ui.label(RichText::new(title).heading().color(theme::BRIGHT));
-            let rest = (height - card.inner_margin.sum().y - 30.0).max(80.0);
+            if widgets::title(ui, title, is_open) {
+                unfold(context, id, !is_open);
+                context.data_mut(|data| data.insert_temp(Id::new("burrow unfolded last"), id));
+            }
+            if !is_open {
+                return;
+            }
+            let top = ui.cursor().top();
+            head(ui, data);
+            let used = 30.0 + ui.cursor().top() - top;
+            let rest = (height - card.inner_margin.sum().y - used).max(60.0);
             ScrollArea::vertical().max_height(rest).auto_shrink([false, true]).show(ui, |ui| {
-                ui.set_width(inside);
-                content(ui);
+                // The scroll bar floats over the margin at the right.
+                ui.set_width(inside - theme::SCROLL_BAR);
+                content(ui, data);
             });
         });
     });

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::BrushTool;
+use super::{BrushTool, ToolShape, texts};
 use crate::brush::{Operation, Stamp};
 use crate::plugin::TerrainHit;
 
@@ -50,8 +50,6 @@ use Need::{Amount, Falloff, Level, Material, Step, Strength};
 /// A row of the table: an operation.
 pub(super) struct Row {
     pub tool: ToolOperation,
-    pub name: &'static str,
-    pub help: &'static str,
     pub needs: &'static [Need],
     /// The icon: the ground's height before and after, in 0 to 1, from left (0) to right (1).
     pub profile: fn(f32) -> (f32, f32),
@@ -63,6 +61,14 @@ impl Row {
         (self.make)(tool, hit)
     }
 
+    pub fn name(&self) -> &'static str {
+        texts::OPERATIONS[self.tool as usize].0
+    }
+
+    pub fn help(&self) -> &'static str {
+        texts::OPERATIONS[self.tool as usize].1
+    }
+
     /// Whether it is a sculpting operation, which has a strength and a falloff.
     pub fn sculpts(&self) -> bool {
         self.needs.contains(&Strength)
@@ -72,28 +78,28 @@ impl Row {
 /// Every operation, in the panel's order, which is also the order of [`ToolOperation`].
 #[rustfmt::skip]
 pub(super) const OPERATIONS: &[Row] = &[
-    Row { tool: ToolOperation::Dig, name: "Dig", help: "Takes ground away", needs: &[],
+    Row { tool: ToolOperation::Dig, needs: &[],
         profile: |x| (0.62, 0.62 - 0.5 * bowl(x)), make: |_, _| Operation::Dig },
-    Row { tool: ToolOperation::Add, name: "Build", help: "Fills the shape with ground", needs: &[Material],
+    Row { tool: ToolOperation::Add, needs: &[Material],
         profile: |x| (0.3, 0.3 + 0.5 * bowl(x)), make: |tool, _| Operation::Add { material: tool.material_id() } },
-    Row { tool: ToolOperation::Paint, name: "Paint", help: "Changes the material of ground that is there", needs: &[Material],
+    Row { tool: ToolOperation::Paint, needs: &[Material],
         profile: |x| (0.25, 0.5 + 0.12 * (x * 6.0).sin()), make: |tool, _| Operation::Paint { material: tool.material_id() } },
-    Row { tool: ToolOperation::Smooth, name: "Smooth", help: "Evens out bumps and edges", needs: &[Strength, Falloff],
+    Row { tool: ToolOperation::Smooth, needs: &[Strength, Falloff],
         profile: |x| (0.5 + 0.3 * triangle_wave(x * 4.0), 0.5 + 0.08 * (x * 12.0).sin()), make: |_, _| Operation::Smooth },
-    Row { tool: ToolOperation::Sharpen, name: "Sharpen", help: "Deepens bumps and edges", needs: &[Strength, Falloff],
+    Row { tool: ToolOperation::Sharpen, needs: &[Strength, Falloff],
         profile: |x| (0.5 + 0.1 * (x * 12.0).sin(), 0.5 + 0.4 * triangle_wave(x * 3.0)), make: |_, _| Operation::Sharpen },
-    Row { tool: ToolOperation::Flatten, name: "Flatten", help: "Makes a plane, as the surface lies", needs: &[Strength, Falloff],
+    Row { tool: ToolOperation::Flatten, needs: &[Strength, Falloff],
         profile: |x| (0.2 + 0.6 * x + 0.15 * (x * 14.0).sin(), 0.2 + 0.6 * x),
         make: |_, hit| Operation::Flatten { point: hit.position, normal: hit.normal } },
-    Row { tool: ToolOperation::Level, name: "Level", help: "Makes the ground level at a height", needs: &[Level, Strength, Falloff],
+    Row { tool: ToolOperation::Level, needs: &[Level, Strength, Falloff],
         profile: |x| (0.5 + 0.35 * (x * 8.0).sin(), 0.5), make: |tool, _| Operation::Level { height: tool.level } },
-    Row { tool: ToolOperation::Raise, name: "Raise", help: "Moves the surface outwards", needs: &[Amount, Strength, Falloff],
+    Row { tool: ToolOperation::Raise, needs: &[Amount, Strength, Falloff],
         profile: |x| (0.25, 0.25 + 0.6 * bell(x)), make: |tool, _| Operation::Raise { amount: tool.amount } },
-    Row { tool: ToolOperation::Lower, name: "Lower", help: "Moves the surface inwards", needs: &[Amount, Strength, Falloff],
+    Row { tool: ToolOperation::Lower, needs: &[Amount, Strength, Falloff],
         profile: |x| (0.75, 0.75 - 0.6 * bell(x)), make: |tool, _| Operation::Lower { amount: tool.amount } },
-    Row { tool: ToolOperation::Stamp, name: "Stamp", help: "Presses an image onto the ground", needs: &[Amount, Strength, Falloff],
+    Row { tool: ToolOperation::Stamp, needs: &[Amount, Strength, Falloff],
         profile: |x| (0.2, 0.2 + 0.7 * (1.0 - (x - 0.5).abs() * 2.6).max(0.0)), make: stamp },
-    Row { tool: ToolOperation::Terrace, name: "Terrace", help: "Cuts slopes into steps", needs: &[Step, Strength, Falloff],
+    Row { tool: ToolOperation::Terrace, needs: &[Step, Strength, Falloff],
         profile: |x| (0.1 + 0.8 * x, 0.1 + 0.8 * (x * 3.0).round() / 3.0),
         make: |tool, _| Operation::Terrace { step: tool.step, base: 0.0 } },
 ];
@@ -133,7 +139,12 @@ impl ToolOperation {
 
     /// Its name on the panel.
     pub fn name(self) -> &'static str {
-        self.row().name
+        self.row().name()
+    }
+
+    /// Whether a brush of this operation may have a shape. A stamp covers a whole area, so it can't be a ring.
+    pub fn fits(self, shape: ToolShape) -> bool {
+        self != Self::Stamp || shape != ToolShape::Torus
     }
 
     pub(super) fn row(self) -> &'static Row {
@@ -148,8 +159,8 @@ mod tests {
     #[test]
     fn each_operation_has_one_row_in_the_order_of_the_enum() {
         for (at, row) in OPERATIONS.iter().enumerate() {
-            assert_eq!(row.tool as usize, at, "{}", row.name);
-            assert_eq!(row.tool.row().name, row.name);
+            assert_eq!(row.tool as usize, at, "{}", row.name());
+            assert_eq!(row.tool.row().name(), row.name());
         }
     }
 
@@ -158,7 +169,11 @@ mod tests {
         for row in OPERATIONS {
             for x in (0..=50).map(|x| x as f32 / 50.0) {
                 let (before, after) = (row.profile)(x);
-                assert!((0.0..=1.0).contains(&before) && (0.0..=1.0).contains(&after), "{} at {x}", row.name);
+                assert!(
+                    (0.0..=1.0).contains(&before) && (0.0..=1.0).contains(&after),
+                    "{} at {x}",
+                    row.name()
+                );
             }
         }
     }

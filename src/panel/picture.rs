@@ -12,12 +12,13 @@ use bevy::window::WindowRef;
 use image::ImageFormat;
 
 use super::state::{BurrowPanel, Note};
+use super::texts;
 
 /// Maximum number of pictures in a folder.
 const MAX_PICTURES: u32 = 9999;
 
 /// Note that is shown until a picture is captured.
-const CAPTURING_NOTE: &str = "taking a picture ...";
+const CAPTURING_NOTE: &str = texts::TAKING_PICTURE;
 
 /// How many frames to wait for a picture. Most are captured after a few.
 const MAX_WAIT_FRAMES: u32 = 300;
@@ -37,7 +38,7 @@ pub(super) fn save(commands: &mut Commands, panel: &mut BurrowPanel, target: Opt
         Some(RenderTarget::Window(WindowRef::Entity(window))) => Screenshot::window(*window),
         None | Some(RenderTarget::Window(WindowRef::Primary)) => Screenshot::primary_window(),
         Some(_) => {
-            panel.note = Some(Note::Bad("this camera draws where no picture can be taken".into()));
+            panel.note = Some(Note::Bad(texts::NO_PICTURE_HERE.into()));
             return;
         }
     };
@@ -58,8 +59,8 @@ pub(super) fn finish(mut saving: ResMut<Saving>, mut panel: ResMut<BurrowPanel>)
     saving.0.retain_mut(|task| {
         let Some(done) = check_ready(task) else { return true };
         panel.note = Some(match done {
-            Ok(path) => Note::Good(format!("saved {}", path.display())),
-            Err(error) => Note::Bad(format!("no picture in {}: {error}", panel.pictures.display())),
+            Ok(path) => Note::Good(texts::saved(path.display())),
+            Err(error) => Note::Bad(texts::not_saved_picture(panel.pictures.display(), error)),
         });
         false
     });
@@ -76,7 +77,7 @@ pub(super) fn give_up(
     let is_waiting = matches!(&panel.note, Some(Note::Busy(text)) if text == CAPTURING_NOTE);
     *waited = if is_waiting && saving.0.is_empty() { *waited + 1 } else { 0 };
     if *waited > MAX_WAIT_FRAMES {
-        panel.note = Some(Note::Bad("no picture came".into()));
+        panel.note = Some(Note::Bad(texts::NO_PICTURE.into()));
         // Keep those that Bevy is capturing: it still looks for the entity, and a late picture is saved.
         requested.iter().for_each(|picture| commands.entity(picture).try_despawn());
     }
@@ -166,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_picture_that_does_not_come_is_given_up() {
-        let given_up = Some(Note::Bad("no picture came".into()));
+        let given_up = Some(Note::Bad(texts::NO_PICTURE.into()));
         assert_eq!(final_note(false), (given_up.clone(), 0));
         assert_eq!(final_note(true), (given_up, 1), "Bevy may have it in hand");
     }

@@ -3,7 +3,7 @@
 use bevy_egui::egui::{Color32, RichText, Ui};
 
 use super::terrain_controls::TerrainControls;
-use super::theme::FAINT;
+use super::texts;
 use super::widgets::{count, figure, metres, section, slider, swatches, switch};
 use crate::ground::MaterialId;
 use crate::plugin::LooseGround;
@@ -17,8 +17,8 @@ pub fn show(
     materials: &[(Color32, String)],
     voxel: f32,
 ) {
-    section(ui, "Digging rules", false, |ui| rules(ui, &mut controls.rules, material, materials, voxel));
-    section(ui, "Loose pieces", false, |ui| loose(ui, &mut controls.loose));
+    section(ui, texts::RULES, false, |ui| rules(ui, &mut controls.rules, material, materials, voxel));
+    section(ui, texts::LOOSE, false, |ui| loose(ui, &mut controls.loose));
 }
 
 fn rules(
@@ -29,35 +29,35 @@ fn rules(
     voxel: f32,
 ) {
     let mut has_bedrock = rules.bedrock.is_some();
-    if switch(ui, "Bedrock", &mut has_bedrock).changed() {
+    if switch(ui, texts::BEDROCK, &mut has_bedrock).changed() {
         rules.bedrock = has_bedrock.then_some(0);
     }
     if let Some(bedrock) = &mut rules.bedrock {
         let mut height = *bedrock as f32 * voxel;
-        let below = slider(ui, "Below", &mut height, -128.0..=256.0, metres);
+        let below = slider(ui, texts::BELOW, &mut height, -128.0..=256.0, metres);
         // Write only on change, as not every height survives the conversion to metres.
-        if below.on_hover_text("Nothing solid below this height is taken away").changed() {
+        if below.on_hover_text(texts::BELOW_HELP).changed() {
             *bedrock = (height / voxel).round() as i32;
         }
     }
     let colors: Vec<(Color32, &str)> =
         materials.iter().map(|(color, name)| (*color, name.as_str())).collect();
-    if let Some(at) = swatches(ui, "Rule of ", &colors, *material) {
+    if let Some(at) = swatches(ui, texts::RULE_OF, &colors, *material) {
         *material = at;
     }
     if let (Some((_, name)), Ok(id)) = (materials.get(*material), u8::try_from(*material)) {
         ui.label(RichText::new(name).size(12.0));
         let id = MaterialId(id);
         let mut hardness = rules.hardness.get(&id).copied().unwrap_or_default();
-        if slider(ui, "Hardness", &mut hardness, 0..=u8::MAX, |slider| slider)
-            .on_hover_text("A brush of this power digs as ever, of half of it or less not at all")
+        if slider(ui, texts::HARDNESS, &mut hardness, 0..=u8::MAX, |slider| slider)
+            .on_hover_text(texts::HARDNESS_HELP)
             .changed()
         {
             rules.hardness.insert(id, hardness);
             rules.hardness.retain(|_, hardness| *hardness > 0);
         }
         let mut is_unbreakable = rules.unbreakable.contains(&id);
-        if switch(ui, "Unbreakable", &mut is_unbreakable).changed() {
+        if switch(ui, texts::UNBREAKABLE, &mut is_unbreakable).changed() {
             match is_unbreakable {
                 true => rules.unbreakable.insert(id),
                 false => rules.unbreakable.remove(&id),
@@ -65,23 +65,18 @@ fn rules(
         }
     }
     if !rules.protected.is_empty() {
-        figure(ui, "Protected boxes", count(rules.protected.len()));
+        figure(ui, texts::PROTECTED, count(rules.protected.len()));
     }
 }
 
 fn loose(ui: &mut Ui, loose: &mut Option<LooseGround>) {
     let mut is_on = loose.is_some();
-    if switch(ui, "Found after digs", &mut is_on).changed() {
+    if switch(ui, texts::LOOSE_FIND, &mut is_on).changed() {
         *loose = is_on.then(LooseGround::default);
     }
     let Some(loose) = loose else { return };
-    ui.label(RichText::new("In voxels, the largest that ...").color(FAINT).size(11.0));
-    let sizes = [
-        ("vanish", &mut loose.crumbs, "Pieces up to this size vanish"),
-        ("break off", &mut loose.debris, "Larger ones, up to this size, come out of the ground"),
-        ("are found", &mut loose.largest, "What is larger than this counts as tied to the world"),
-    ];
-    for (name, size, help) in sizes {
+    let sizes = [&mut loose.crumbs, &mut loose.debris, &mut loose.largest];
+    for ((name, help), size) in texts::LOOSE_SIZES.into_iter().zip(sizes) {
         slider(ui, name, size, 0..=1 << 16, |slider| slider.logarithmic(true)).on_hover_text(help);
     }
 }

@@ -6,6 +6,7 @@ use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy_egui::EguiContext;
 
+use super::texts;
 use crate::terrain::World;
 
 /// The state of the panel. [`BrushTool`](super::BrushTool) holds the brush that it edits.
@@ -27,6 +28,10 @@ pub struct BurrowPanel {
     pub pictures: PathBuf,
     /// Folder in which levels are saved and from which they are loaded; it can be typed into the panel.
     pub level: PathBuf,
+    /// Keys that the game binds to the panel's tiles and buttons, by their names: shown on them.
+    pub keys: HashMap<String, String>,
+    /// Where the pointer meets the ground, if the game wants it shown.
+    pub pointer: Option<Vec3>,
     /// Index of the material whose rules are shown.
     pub(super) material: usize,
     /// The current message: the last seam check or picture.
@@ -38,32 +43,27 @@ pub struct BurrowPanel {
 impl Default for BurrowPanel {
     /// Open, with the materials of the plugin's default ground look.
     fn default() -> Self {
-        let names = [
-            "Rock",
-            "Grass",
-            "Sand",
-            "Snow",
-            "Clay",
-            "Concrete",
-            "Coal",
-            "Gold",
-            "Soil",
-            "Sandstone",
-            "Shale",
-            "Gravel",
-        ];
         Self {
             is_open: true,
             shows_brush: true,
             shows_world: true,
             terrain: None,
-            materials: names.map(String::from).to_vec(),
+            materials: texts::MATERIALS.map(String::from).to_vec(),
             pictures: PathBuf::from("pictures"),
             level: PathBuf::from("level"),
+            keys: HashMap::default(),
+            pointer: None,
             material: 0,
             note: None,
             rejection: None,
         }
+    }
+}
+
+impl BurrowPanel {
+    /// Shows a message, as of something that was done or that failed.
+    pub fn report(&mut self, message: Result<String, String>) {
+        self.note = Some(message.map_or_else(Note::Bad, Note::Good));
     }
 }
 
@@ -95,7 +95,7 @@ impl Verdict {
         if terrain != self.terrain {
             return None;
         }
-        let then = || format!("revision {}: {}", self.revision, self.text);
+        let then = || texts::at_revision(self.revision, &self.text);
         Some(if world.hash() == self.hash { self.text.clone() } else { then() })
     }
 }
@@ -112,10 +112,18 @@ pub enum PanelAction {
     Redo,
     /// Saves a screenshot of the camera that draws the panel, including the panel.
     SavePicture,
-    /// Saves the terrain as a [level](crate::store::Level) in the [folder](BurrowPanel::level), in a task.
+    /// Saves the terrain as a [level](crate::store::Level) in a task: where it was opened from or saved last, or else in the
+    /// [folder](BurrowPanel::level). Asks before another level is replaced.
     SaveLevel,
-    /// Puts the level of that folder, or packed file, in the terrain's place; it must have been made on the same ground.
+    /// Saves the terrain as a level in the [folder](BurrowPanel::level). Asks before another level is replaced.
+    SaveLevelAs,
+    /// Puts the level of that folder, or packed file, in the terrain's place; it must have been made on the same ground. Asks
+    /// before unsaved changes are lost.
     LoadLevel,
+    /// Puts the ground without any edits in the terrain's place. Asks before unsaved changes are lost.
+    NewLevel,
+    /// Ends the app. Asks before unsaved changes are lost. If that is asked already, the question is taken back.
+    Quit,
 }
 
 /// Whether the panel, or any other egui context, uses the pointer or the keyboard in this frame. Contexts of all

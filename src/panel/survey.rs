@@ -6,6 +6,7 @@ use bevy::prelude::*;
 
 use super::plot::Line;
 use super::state::{BurrowPanel, Note, Verdict};
+use super::texts;
 use crate::backend::{Choice, EngineState};
 use crate::plugin::{BurrowEngine, BurrowFigures, MeshBytes, ThreadTask, Threads};
 use crate::surface::SeamReport;
@@ -136,7 +137,7 @@ pub(super) fn start_seam_check(
 ) {
     let world = terrain.snapshot();
     let task = ThreadTask::start(Threads::Background, move || check_seams(entity, &world));
-    panel.note = Some(Note::Busy("checking every seam ...".into()));
+    panel.note = Some(Note::Busy(texts::CHECKING.into()));
     commands.insert_resource(SeamCheck(task));
 }
 
@@ -166,7 +167,7 @@ fn check_seams(terrain: Entity, world: &World) -> Verdict {
 fn describe(report: &SeamReport) -> String {
     let triangles = super::widgets::count(report.triangles);
     if report.is_flawless() {
-        return format!("closed: no open edge in {triangles} triangles");
+        return texts::closed(&triangles);
     }
     let (open, unbalanced) = (report.open, report.unbalanced);
     let touching = report.nonmanifold_edges + report.nonmanifold_vertices;

@@ -18,6 +18,7 @@ struct Screen {
     size: Vec2,
     tool: BrushTool,
     panel: BurrowPanel,
+    files: Files,
     settings: BurrowSettings,
     controls: TerrainControls,
     terrains: Vec<Terrain>,
@@ -37,6 +38,7 @@ impl Screen {
             size: Vec2::new(width, height),
             tool: BrushTool::default(),
             panel: BurrowPanel::default(),
+            files: Files::default(),
             settings: BurrowSettings::default(),
             controls: TerrainControls::default(),
             terrains: (0..terrains).map(terrain).collect(),
@@ -71,21 +73,28 @@ impl Screen {
         let _ = self.context.run_ui(input, |ui| {
             let context = ui.ctx().clone();
             let was_typing = context.text_edit_focused();
-            column(&context, BRUSH, Align2::LEFT_TOP, "Brush", |ui| {
-                brush_column::show(ui, &mut self.tool, &materials, voxel, self.panel.rejection.as_deref());
+            files::ask(&context, &mut self.files);
+            fold_one(&context, true);
+            let head = |ui: &mut Ui, panel: &mut BurrowPanel| brush_column::head(ui, panel);
+            column(&context, BRUSH, Align2::LEFT_TOP, "Brush", &mut self.panel, head, |ui, panel| {
+                brush_column::show(ui, &mut self.tool, &materials, voxel, panel);
             });
-            column(&context, WORLD, Align2::RIGHT_TOP, "World", |ui| {
-                let mut content = Content {
-                    terrains: &lines,
-                    chosen,
-                    figures: &figures,
-                    survey: &survey,
-                    settings: &mut self.settings,
-                    controls: &mut self.controls,
-                    materials: &materials,
-                    actions: &mut actions,
-                };
-                world_column::show(ui, &mut self.panel, &mut content);
+            let content = Content {
+                terrains: &lines,
+                chosen,
+                figures: &figures,
+                survey: &survey,
+                settings: &mut self.settings,
+                controls: &mut self.controls,
+                materials: &materials,
+                actions: &mut actions,
+            };
+            let mut both = (&mut self.panel, content);
+            let head = |ui: &mut Ui, (panel, content): &mut (&mut BurrowPanel, Content)| {
+                world_column::head(ui, panel, &self.files, content);
+            };
+            column(&context, WORLD, Align2::RIGHT_TOP, "World", &mut both, head, |ui, (panel, content)| {
+                world_column::show(ui, panel, content);
             });
             free_keyboard(&context, was_typing);
         });
@@ -177,8 +186,8 @@ fn tiles_and_sliders_set_the_brush() {
 #[test]
 fn sculpting_makes_ground_of_a_material_where_told_so() {
     let mut screen = Screen::new(1280.0, 1600.0, 1);
-    assert!(!screen.places.0.contains_key("New ground"));
-    for name in ["Raise", "New ground", "Of a material", "Clay"] {
+    assert!(!screen.places.0.contains_key("Fill"));
+    for name in ["Raise", "Fill", "Fill material", "Clay"] {
         let at = screen.middle(name);
         screen.click(at);
         screen.frame(Vec::new());
@@ -199,7 +208,7 @@ fn rules_and_loose_pieces_are_set_where_they_are_shown() {
         click(&mut screen, section);
     }
     assert_eq!(screen.controls, TerrainControls::default());
-    for name in ["Bedrock", "Rule of Clay", "Hardness", "Unbreakable", "Found after digs", "are found"] {
+    for name in ["Bedrock", "Rule of Clay", "Hardness", "Unbreakable", "Find after digs", "Search up to"] {
         click(&mut screen, name);
     }
     let TerrainControls { rules, loose, .. } = screen.controls.clone();
@@ -210,7 +219,7 @@ fn rules_and_loose_pieces_are_set_where_they_are_shown() {
     let largest = loose.expect("switched on").largest;
     assert_eq!(loose, Some(LooseGround { largest, ..default }));
     assert!((100..1000).contains(&largest), "the middle of a logarithmic slider: {largest}");
-    for name in ["Bedrock", "Unbreakable", "Found after digs"] {
+    for name in ["Bedrock", "Unbreakable", "Find after digs"] {
         click(&mut screen, name);
     }
     assert_eq!((screen.controls.rules.bedrock, screen.controls.loose), (None, None));
@@ -223,7 +232,7 @@ fn looks_are_set_where_there_is_one() {
     assert!(!screen.places.0.contains_key("Look"));
     screen.controls.look = Some(GroundLook::default());
     screen.frame(Vec::new());
-    for name in ["Look", "Plain", "Variety", "Far"] {
+    for name in ["Look", "Plain", "Variety", "Scale to"] {
         let at = screen.middle(name);
         screen.click(at);
         screen.frame(Vec::new());
@@ -452,6 +461,7 @@ fn app_and_context() -> (App, egui::Context) {
         .init_resource::<BurrowSettings>()
         .init_resource::<BurrowFigures>()
         .init_resource::<Survey>()
+        .init_resource::<Files>()
         .init_resource::<PanelPlaces>()
         .init_resource::<EguiUserTextures>()
         .add_message::<PanelAction>()
@@ -500,9 +510,11 @@ fn flat() -> Terrain {
 fn what_a_seam_check_found_is_said_of_the_ground_that_was_checked() {
     let mut app = App::new();
     app.init_resource::<BurrowPanel>()
+        .init_resource::<Files>()
         .add_message::<PanelAction>()
         .add_message::<Undo>()
         .add_message::<Redo>()
+        .add_message::<AppExit>()
         .add_systems(Update, (perform_actions, survey::finish_seam_check).chain());
     let [checked, other] = [(); 2].map(|()| app.world_mut().spawn(flat()).id());
     app.world_mut().resource_mut::<BurrowPanel>().terrain = Some(checked);
@@ -528,6 +540,157 @@ fn what_a_seam_check_found_is_said_of_the_ground_that_was_checked() {
     terrain.apply([dig]);
     let then = format!("revision {}: {}", verdict.revision, verdict.text);
     assert_eq!(said(&app, checked), Some(then));
+}
+
+/// An editor without a window, whose level is in a folder of its own.
+fn editor(name: &str) -> (App, Entity, std::path::PathBuf) {
+    let folder = std::env::temp_dir().join(format!("burrow_files_{}_{name}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    let mut app = App::new();
+    app.insert_resource(BurrowPanel { level: folder.clone(), ..BurrowPanel::default() })
+        .init_resource::<Files>()
+        .add_message::<PanelAction>()
+        .add_message::<Undo>()
+        .add_message::<Redo>()
+        .add_message::<AppExit>()
+        .add_systems(Update, (level::finish, files::answer, perform_actions, files::watch).chain());
+    let terrain = app.world_mut().spawn(flat()).id();
+    app.update();
+    (app, terrain, folder)
+}
+
+/// Performs an action, answers what is asked if there is an answer, and waits until nothing goes on any more.
+fn act(app: &mut App, action: PanelAction, answer: Option<&str>) -> bool {
+    app.world_mut().write_message(action);
+    app.update();
+    let is_asked = app.world().resource::<Files>().is_asking();
+    if let Some(answer) = answer {
+        app.world_mut().resource_mut::<Files>().reply(answer);
+    }
+    for _ in 0..10_000 {
+        app.update();
+        let is_busy = matches!(app.world().resource::<BurrowPanel>().note, Some(Note::Busy(_)));
+        if !is_busy && app.world().resource::<Messages<PanelAction>>().is_empty() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    app.update();
+    is_asked
+}
+
+fn dig_at(app: &mut App, terrain: Entity, x: f32) -> u64 {
+    let dig = crate::brush::Brush::dig(crate::brush::Shape::sphere(Vec3::new(x, 8.0, 32.0), 4.0));
+    let mut terrain = app.world_mut().get_mut::<Terrain>(terrain).expect("it is there");
+    terrain.apply([dig]);
+    let hash = terrain.world().hash();
+    app.update();
+    hash
+}
+
+fn hash(app: &App, terrain: Entity) -> u64 {
+    app.world().get::<Terrain>(terrain).expect("it is there").world().hash()
+}
+
+#[test]
+fn unsaved_changes_are_marked_and_asked_about_before_they_are_lost() {
+    let (mut app, terrain, folder) = editor("unsaved");
+    let pristine = hash(&app, terrain);
+    assert!(!app.world().resource::<Files>().is_unsaved);
+    let saved = dig_at(&mut app, terrain, 20.0);
+    assert!(app.world().resource::<Files>().is_unsaved);
+    assert!(!act(&mut app, PanelAction::SaveLevel, None), "nothing is there to be replaced");
+    assert!(folder.exists() && !app.world().resource::<Files>().is_unsaved);
+    assert!(!act(&mut app, PanelAction::SaveLevel, None), "the level that is open");
+    let changed = dig_at(&mut app, terrain, 40.0);
+    for action in [PanelAction::LoadLevel, PanelAction::NewLevel, PanelAction::Quit] {
+        assert!(act(&mut app, action, Some(texts::CANCEL)), "{action:?}");
+        assert_eq!(hash(&app, terrain), changed, "{action:?}");
+        assert!(app.world().resource::<Messages<AppExit>>().is_empty());
+    }
+    assert!(act(&mut app, PanelAction::LoadLevel, Some(texts::DISCARD)));
+    assert_eq!(hash(&app, terrain), saved);
+    assert!(!act(&mut app, PanelAction::NewLevel, None), "all is saved");
+    assert_eq!(hash(&app, terrain), pristine);
+    assert!(!app.world().resource::<Files>().is_unsaved);
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn saving_before_one_quits_quits_once_it_is_saved() {
+    let (mut app, terrain, folder) = editor("quit");
+    let changed = dig_at(&mut app, terrain, 20.0);
+    assert!(act(&mut app, PanelAction::Quit, Some(texts::SAVE_CHANGES)));
+    assert_eq!(app.world().resource::<Messages<AppExit>>().len(), 1);
+    assert!(!act(&mut app, PanelAction::LoadLevel, None));
+    assert_eq!(hash(&app, terrain), changed);
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn another_level_is_replaced_only_after_a_question() {
+    let (mut app, terrain, folder) = editor("replace");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    dig_at(&mut app, terrain, 20.0);
+    for (answer, is_unsaved) in [(texts::CANCEL, true), (texts::REPLACE, false)] {
+        assert!(act(&mut app, PanelAction::SaveLevel, Some(answer)));
+        assert_eq!(app.world().resource::<Files>().is_unsaved, is_unsaved, "{answer}");
+    }
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn in_a_narrow_window_one_column_is_unfolded() {
+    let mut screen = Screen::new(640.0, 360.0, 1);
+    for (here, there, column) in
+        [("Dig", "Undo", "World"), ("Undo", "Dig", "Brush"), ("Dig", "Undo", "World")]
+    {
+        assert!(screen.places.0.contains_key(here) && !screen.places.0.contains_key(there), "{here}");
+        for (name, place) in &screen.places.0 {
+            assert!(place.min.x >= 0.0 && place.max.x <= 640.0, "{name} {place:?}");
+        }
+        let at = screen.middle(column);
+        screen.click(at);
+        (0..2).for_each(|_| screen.frame(Vec::new()));
+    }
+}
+
+#[test]
+fn what_does_not_apply_can_not_be_chosen() {
+    let mut screen = Screen::new(1280.0, 720.0, 1);
+    for (operation, shape) in [("Dig", ToolShape::Torus), ("Stamp", ToolShape::Box)] {
+        for name in [operation, "Box", "Torus"] {
+            let at = screen.middle(name);
+            screen.click(at);
+        }
+        assert_eq!(screen.tool.shape, shape, "{operation}");
+    }
+}
+
+#[test]
+fn keys_of_the_game_and_the_pointer_are_shown() {
+    let mut screen = Screen::new(1280.0, 720.0, 1);
+    assert!(!screen.places.0.contains_key(texts::POINTER));
+    screen.panel.pointer = Some(Vec3::ONE);
+    screen.panel.keys.insert("Dig".into(), "1".into());
+    (0..2).for_each(|_| screen.frame(Vec::new()));
+    assert!(screen.places.0.contains_key(texts::POINTER));
+}
+
+#[test]
+fn good_news_is_not_shown_for_ever() {
+    let mut app = App::new();
+    app.insert_resource(Time::<Real>::default())
+        .init_resource::<BurrowPanel>()
+        .add_systems(Update, forget_note);
+    for (message, stays) in [(Ok("done".to_string()), false), (Err("failed".to_string()), true)] {
+        app.world_mut().resource_mut::<BurrowPanel>().report(message);
+        for _ in 0..30 {
+            app.world_mut().resource_mut::<Time<Real>>().advance_by(Duration::from_secs(1));
+            app.update();
+        }
+        assert_eq!(app.world().resource::<BurrowPanel>().note.is_some(), stays);
+    }
 }
 
 #[test]

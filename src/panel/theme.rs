@@ -10,6 +10,12 @@ use bevy_egui::egui::{
 
 /// Width of a column.
 pub const COLUMN: f32 = 272.0;
+/// Width of a folded column.
+pub const FOLDED: f32 = 64.0;
+/// Width of the view that is left between two columns at least.
+pub const LEAST_VIEW: f32 = 200.0;
+/// Width that is left free for the scroll bar.
+pub const SCROLL_BAR: f32 = 10.0;
 /// Distance from the window's border to a column.
 pub const GAP: f32 = 12.0;
 

@@ -6,6 +6,7 @@ use bevy::prelude::*;
 
 use super::lengths::RADIUS;
 use super::operations::ToolOperation;
+use super::texts;
 use crate::brush::{Brush, FULL_POWER, Roughness, Shape};
 use crate::ground::{GreyImage, MaterialId};
 use crate::plugin::TerrainHit;
@@ -125,7 +126,7 @@ impl StampImage {
     /// The label in the panel: the image's name, or its size without one.
     pub(super) fn label(&self) -> String {
         match (&self.image, &self.name) {
-            (None, _) => "Ridge".into(),
+            (None, _) => texts::RIDGE.into(),
             (Some(_), Some(name)) => name.to_string(),
             (Some(image), None) => format!("{} x {} samples", image.width(), image.height()),
         }
@@ -212,10 +213,26 @@ impl BrushTool {
         self.shape_around(hit.position - axis * self.sink * self.reach(), axis)
     }
 
+    /// The shape that its operation has: the chosen one if it [fits](ToolOperation::fits), else a sphere.
+    pub fn fitting_shape(&self) -> ToolShape {
+        if self.operation.fits(self.shape) { self.shape } else { ToolShape::Sphere }
+    }
+
+    /// The height of a stamp above the ground at a place in its square, for a preview: `u` and `v` go from -1 to 1. `None` for
+    /// other operations.
+    pub fn stamp_height(&self, u: f32, v: f32) -> Option<f32> {
+        let image = self.stamp.image().filter(|_| self.operation == ToolOperation::Stamp)?;
+        let at = |part: f32, samples: u32| {
+            ((0.5 + 0.5 * part.clamp(-1.0, 1.0)) * (samples - 1) as f32).round() as usize
+        };
+        let sample = at(v, image.height()) * image.width() as usize + at(u, image.width());
+        Some(f32::from(*image.samples().get(sample)?) / f32::from(u16::MAX) * self.amount)
+    }
+
     /// The shape around its centre.
     pub(super) fn shape_around(&self, middle: Vec3, axis: Vec3) -> Shape {
         let end = middle - axis * self.length / 2.0;
-        match self.shape {
+        match self.fitting_shape() {
             ToolShape::Sphere => Shape::sphere(middle, self.radius),
             ToolShape::Box => {
                 let turn = Quat::from_rotation_y(self.turn.to_radians());
@@ -237,7 +254,7 @@ impl BrushTool {
     }
 
     /// Half of its largest horizontal extent.
-    pub(super) fn width(&self) -> f32 {
+    pub fn width(&self) -> f32 {
         if self.shape == ToolShape::Box { self.half.x.max(self.half.z) } else { self.radius }
     }
 
@@ -253,7 +270,7 @@ impl BrushTool {
 
     /// Half extent along its axis.
     fn reach(&self) -> f32 {
-        match self.shape {
+        match self.fitting_shape() {
             ToolShape::Sphere => self.radius,
             ToolShape::Box => self.half.y,
             ToolShape::Cylinder | ToolShape::Cone => self.length / 2.0,
@@ -364,6 +381,30 @@ mod tests {
         let unnamed = StampImage { name: None, ..named.clone() };
         let labels = [&StampImage::default(), &named, &unnamed].map(StampImage::label);
         assert_eq!(labels, ["Ridge", "Dunes", "3 x 2 samples"]);
+    }
+
+    #[test]
+    fn a_stamp_is_no_ring() {
+        let ring = BrushTool { shape: ToolShape::Torus, ..BrushTool::default() };
+        let stamp = BrushTool { operation: ToolOperation::Stamp, ..ring.clone() };
+        assert!(matches!(ring.shape_at(&hit()), Shape::Torus(_)));
+        assert_eq!(stamp.shape_at(&hit()), Shape::sphere(hit().position, ring.radius));
+        // The shape is not forgotten.
+        assert_eq!(BrushTool { operation: ToolOperation::Dig, ..stamp }, ring);
+    }
+
+    #[test]
+    fn the_preview_of_a_stamp_is_as_high_as_its_image() {
+        let image = GreyImage::from_samples(2, 2, vec![0, u16::MAX, 0, 0]).expect("four samples");
+        let tool = BrushTool {
+            operation: ToolOperation::Stamp,
+            stamp: StampImage::new("step", image),
+            amount: 3.0,
+            ..BrushTool::default()
+        };
+        let heights = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)].map(|(u, v)| tool.stamp_height(u, v));
+        assert_eq!(heights, [Some(0.0), Some(3.0), Some(0.0)]);
+        assert_eq!(BrushTool::default().stamp_height(0.0, 0.0), None);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use bevy_egui::egui::{
 };
 
 use super::PanelPlaces;
+use super::texts;
 use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
 
 /// Positions of the widgets drawn in this frame.
@@ -29,6 +30,18 @@ pub fn note(ui: &Ui, name: &str, rect: Rect) {
 /// Takes the positions of this frame's widgets.
 pub fn places(context: &Context) -> PanelPlaces {
     context.data_mut(|data| std::mem::take(data.get_temp_mut_or_default::<Drawn>(Id::NULL))).0
+}
+
+/// The title of a column, and whether it was clicked: that folds the column, or unfolds it.
+pub fn title(ui: &mut Ui, name: &str, is_open: bool) -> bool {
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
+    note(ui, name, rect);
+    let response = response.on_hover_cursor(CursorIcon::PointingHand);
+    let color = if response.hovered() { ACCENT } else { BRIGHT };
+    ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, name, FontId::proportional(18.0), color);
+    let mark = if is_open { "-" } else { "+" };
+    ui.painter().text(rect.right_center(), Align2::RIGHT_CENTER, mark, FontId::proportional(18.0), color);
+    response.clicked()
 }
 
 /// A section whose heading opens and closes it.
@@ -61,12 +74,13 @@ pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl Fn
     }
 }
 
-/// A grid of tiles with `columns` per row; returns which one was clicked.
+/// A grid of tiles with `columns` per row, of which some can't be chosen; returns which one was clicked.
 pub fn tiles(
     ui: &mut Ui,
     columns: usize,
     names: &[&str],
     chosen: usize,
+    is_enabled: impl Fn(usize) -> bool,
     icon: impl Fn(&Ui, usize, Rect, Color32),
 ) -> Option<usize> {
     let gap = 6.0;
@@ -77,9 +91,13 @@ pub fn tiles(
             ui.spacing_mut().item_spacing.x = gap;
             for (column, name) in line.iter().enumerate() {
                 let at = row * columns + column;
-                let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 48.0), Sense::click());
+                let is_enabled = is_enabled(at);
+                let sense = if is_enabled { Sense::click() } else { Sense::hover() };
+                let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 48.0), sense);
                 note(ui, name, rect);
                 let color = frame_tile(ui, rect, &response, at == chosen);
+                let color = if is_enabled { color } else { FAINT.gamma_multiply(0.4) };
+                let response = if is_enabled { response } else { response.on_hover_text(texts::TORUS_STAMP) };
                 let area = Rect::from_min_max(
                     rect.min + Vec2::new(10.0, 6.0),
                     Pos2::new(rect.right() - 10.0, rect.bottom() - 19.0),
@@ -163,7 +181,7 @@ pub fn slider<N: Numeric>(
     format: impl FnOnce(Slider<'_>) -> Slider<'_>,
 ) -> Response {
     ui.horizontal(|ui| {
-        let (rect, _) = ui.allocate_exact_size(Vec2::new(70.0, 20.0), Sense::hover());
+        let (rect, _) = ui.allocate_exact_size(Vec2::new(78.0, 20.0), Sense::hover());
         let font = FontId::proportional(13.0);
         ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, name, font, TEXT);
         ui.spacing_mut().slider_width = (ui.available_width() - 62.0).max(40.0);

@@ -1,14 +1,15 @@
-//! The right column: buttons, terrain, statistics, memory, engine, settings.
+//! The right column: files and buttons, terrain, settings, and diagnostics.
 
 use bevy::prelude::Entity;
 use bevy_egui::egui::{Color32, RichText, Ui, Vec2};
 
+use super::files::{self, Files};
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::survey::{Counts, Survey};
 use super::terrain_controls::TerrainControls;
 use super::theme::{ACCENT, BAD, BLUE, BRIGHT, FAINT, GOOD, PARTS};
 use super::widgets::{button, bytes, choice, count, figure, figure_in, section, share, slider, time};
-use super::{look_section, plot, rules_section};
+use super::{look_section, plot, rules_section, texts};
 use crate::backend::{Choice, EngineState, Stage};
 use crate::plugin::{BurrowFigures, BurrowSettings, ShownLevels, Times};
 use crate::terrain::{History, Terrain};
@@ -32,19 +33,18 @@ pub struct Content<'a> {
     pub actions: &'a mut Vec<PanelAction>,
 }
 
+/// Draws what is always in sight: files, history, pictures, and the current message.
+pub fn head(ui: &mut Ui, panel: &mut BurrowPanel, files: &Files, content: &mut Content) {
+    let chosen = content.terrains.iter().find(|line| Some(line.entity) == content.chosen);
+    files::bar(ui, panel, files, content.actions, chosen.is_some());
+    buttons(ui, panel, content.actions, chosen);
+    note(ui, panel, chosen);
+}
+
 /// Draws the column.
 pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     let chosen = content.terrains.iter().find(|line| Some(line.entity) == content.chosen);
-    buttons(ui, panel, content.actions, chosen);
-    note(ui, panel, chosen);
-    section(ui, "Terrain", true, |ui| terrain(ui, panel, content.terrains, chosen));
-    section(ui, "Live", true, |ui| live(ui, content.figures, content.survey));
-    if let Some(counts) = &content.survey.counts {
-        section(ui, "Memory", true, |ui| memory(ui, counts, content.survey.mesh_bytes));
-    }
-    if let Some((state, stages, last)) = &content.survey.engine {
-        section(ui, "Engine", true, |ui| engine(ui, state, *stages, last.as_ref()));
-    }
+    section(ui, texts::TERRAIN, true, |ui| terrain(ui, panel, content.terrains, chosen));
     if let Some(line) = chosen {
         let voxel = line.terrain.voxel_size();
         rules_section::show(ui, content.controls, &mut panel.material, content.materials, voxel);
@@ -53,9 +53,18 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
         }
     }
     let undo_budget = chosen.is_some().then_some(&mut content.controls.undo_budget);
-    section(ui, "Settings", false, |ui| {
-        settings(ui, undo_budget, content.settings);
-        level(ui, panel, content.actions, chosen.is_some());
+    section(ui, texts::SETTINGS, false, |ui| settings(ui, undo_budget, content.settings));
+    section(ui, texts::DIAGNOSTICS, false, |ui| {
+        live(ui, content.figures, content.survey);
+        if let Some(line) = chosen {
+            levels(ui, line);
+        }
+        if let Some(counts) = &content.survey.counts {
+            memory(ui, counts, content.survey.mesh_bytes);
+        }
+        if let Some((state, stages, last)) = &content.survey.engine {
+            engine(ui, state, *stages, last.as_ref());
+        }
     });
 }
 
@@ -64,42 +73,23 @@ fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, cho
     let width = share(ui, 2);
     let history = chosen.map(|line| line.terrain.history());
     let History { undos, redos, bytes: held } = history.unwrap_or_default();
+    let key = |name: &str| panel.keys.get(name).cloned().unwrap_or_default();
     ui.horizontal(|ui| {
-        if button(ui, "Undo", width, undos > 0).clicked() {
+        if button(ui, texts::UNDO, width, undos > 0).on_hover_text(key(texts::UNDO)).clicked() {
             actions.push(PanelAction::Undo);
         }
-        if button(ui, "Redo", width, redos > 0).clicked() {
+        if button(ui, texts::REDO, width, redos > 0).on_hover_text(key(texts::REDO)).clicked() {
             actions.push(PanelAction::Redo);
         }
     });
-    figure(ui, "Undo, redo", format!("{undos}, {redos} steps, {}", bytes(held)));
+    figure(ui, texts::HISTORY_STEPS, texts::steps(undos, redos, &bytes(held)));
     ui.horizontal(|ui| {
-        let seams = button(ui, "Check seams", width, chosen.is_some() && !is_busy);
-        if seams.on_hover_text("Looks at every triangle of the terrain").clicked() {
+        let seams = button(ui, texts::CHECK_SEAMS, width, chosen.is_some() && !is_busy);
+        if seams.on_hover_text(texts::CHECK_SEAMS_HELP).clicked() {
             actions.push(PanelAction::CheckSeams);
         }
-        if button(ui, "Save picture", width, true).clicked() {
+        if button(ui, texts::SAVE_PICTURE, width, true).on_hover_text(key(texts::SAVE_PICTURE)).clicked() {
             actions.push(PanelAction::SavePicture);
-        }
-    });
-}
-
-/// Where levels are saved and loaded.
-fn level(ui: &mut Ui, panel: &mut BurrowPanel, actions: &mut Vec<PanelAction>, has_terrain: bool) {
-    let is_free = has_terrain && !matches!(panel.note, Some(Note::Busy(_)));
-    let mut folder = panel.level.display().to_string();
-    if ui.text_edit_singleline(&mut folder).changed() {
-        panel.level = folder.into();
-    }
-    let width = share(ui, 2);
-    ui.horizontal(|ui| {
-        let save = button(ui, "Save level", width, is_free);
-        if save.on_hover_text("One file for each region, for version control").clicked() {
-            actions.push(PanelAction::SaveLevel);
-        }
-        let load = button(ui, "Load level", width, is_free);
-        if load.on_hover_text("From a folder or a packed file, over the same ground").clicked() {
-            actions.push(PanelAction::LoadLevel);
         }
     });
 }
@@ -122,7 +112,7 @@ fn note(ui: &mut Ui, panel: &BurrowPanel, chosen: Option<&TerrainLine>) {
 
 fn terrain(ui: &mut Ui, panel: &mut BurrowPanel, terrains: &[TerrainLine], chosen: Option<&TerrainLine>) {
     let Some(line) = chosen else {
-        ui.label(RichText::new("There is no terrain.").color(FAINT).size(12.0));
+        ui.label(RichText::new(texts::NO_TERRAIN).color(FAINT).size(12.0));
         return;
     };
     if terrains.len() > 1 {
@@ -139,32 +129,40 @@ fn terrain(ui: &mut Ui, panel: &mut BurrowPanel, terrains: &[TerrainLine], chose
     }
     let (grid, voxel) = (line.terrain.world().grid(), line.terrain.voxel_size());
     let metres = |voxels: i32| voxels as f32 * voxel;
-    figure(ui, "Size", format!("{} x {} m", metres(grid.width()), metres(grid.depth())));
-    figure(ui, "Voxel, chunk", format!("{voxel} m, {} voxels", grid.size()));
-    figure(ui, "Revision", count(line.terrain.world().revision() as usize));
+    figure(ui, texts::SIZE, format!("{} x {} m", metres(grid.width()), metres(grid.depth())));
+    figure(ui, texts::VOXEL, format!("{voxel} m"));
+    figure(ui, texts::CHUNK, format!("{}{}", grid.size(), texts::VOXELS));
+    figure(ui, texts::REVISION, count(line.terrain.world().revision() as usize));
+}
+
+fn levels(ui: &mut Ui, line: &TerrainLine) {
     if let Some(drawn) = line.terrain.drawn_cut() {
         let nodes = ShownLevels::of(drawn.cut(), 0).nodes;
-        figure(ui, "Squares by level", nodes.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
+        figure(ui, texts::LEVELS, nodes.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
     }
 }
 
 fn live(ui: &mut Ui, figures: &BurrowFigures, survey: &Survey) {
     let recent = figures.transactions.iter().map(|took| took.as_secs_f32() * 1e3);
     let recent: Vec<f32> = recent.skip(figures.transactions.len().saturating_sub(180)).collect();
-    plot::line(ui, recent.into_iter(), 1.0, ACCENT, "transaction", &time(figures.transactions.iter().last()));
-    figure(ui, "p50, p95, p99", percentiles(&figures.transactions));
-    let now = survey.swaps_now.to_string();
-    plot::line(ui, survey.swaps.iter(), 8.0, BLUE, "meshes swapped per frame", &now);
-    let last = survey.frame_ms.iter().last().unwrap_or_default();
-    plot::line(ui, survey.frame_ms.iter(), 16.7, GOOD, "frame", &format!("{last:.1} ms"));
-    let own = time(Some(figures.main_thread));
-    plot::line(ui, survey.main_thread_us.iter(), 100.0, PARTS[4], "own work on the main thread", &own);
-    figure(ui, "Queue", format!("{} waiting", survey.queued));
-    figure(
+    plot::line(
         ui,
-        "Brushes, commits",
-        format!("{}, {}", count(figures.brushes as usize), count(figures.commits as usize)),
+        recent.into_iter(),
+        1.0,
+        ACCENT,
+        texts::TRANSACTION,
+        &time(figures.transactions.iter().last()),
     );
+    figure(ui, texts::PERCENTILES, percentiles(&figures.transactions));
+    let now = survey.swaps_now.to_string();
+    plot::line(ui, survey.swaps.iter(), 8.0, BLUE, texts::SWAPPED, &now);
+    let last = survey.frame_ms.iter().last().unwrap_or_default();
+    plot::line(ui, survey.frame_ms.iter(), 16.7, GOOD, texts::FRAME, &format!("{last:.1} ms"));
+    let own = time(Some(figures.main_thread));
+    plot::line(ui, survey.main_thread_us.iter(), 100.0, PARTS[4], texts::MAIN_THREAD, &own);
+    figure(ui, texts::QUEUE, count(survey.queued));
+    figure(ui, texts::BRUSHES, count(figures.brushes as usize));
+    figure(ui, texts::COMMITS, count(figures.commits as usize));
 }
 
 /// The 50th, 95th and 99th percentile.
@@ -174,14 +172,8 @@ fn percentiles(times: &Times) -> String {
 
 fn memory(ui: &mut Ui, counts: &Counts, mesh_bytes: usize) {
     let memory = counts.memory;
-    let kinds = [
-        ("Ground", memory.ground),
-        ("Samples", memory.samples),
-        ("Materials", memory.materials),
-        ("Meshes", memory.meshes),
-        ("Parts", memory.parts),
-        ("Index", memory.index),
-    ];
+    let sizes = [memory.ground, memory.samples, memory.materials, memory.meshes, memory.parts, memory.index];
+    let kinds: Vec<(&str, usize)> = texts::MEMORY.into_iter().zip(sizes).collect();
     let parts: Vec<(usize, Color32)> =
         kinds.iter().zip(PARTS).map(|(&(_, size), color)| (size, color)).collect();
     plot::parts(ui, &parts);
@@ -196,62 +188,71 @@ fn memory(ui: &mut Ui, counts: &Counts, mesh_bytes: usize) {
             }
         });
     }
-    figure(ui, "All, edits", format!("{}, {}", bytes(memory.total()), bytes(memory.edits())));
-    figure(ui, "Meshes on the card", bytes(mesh_bytes));
-    figure(ui, "Fields, chunks", format!("{}, {}", count(counts.fields), count(counts.chunks)));
-    figure(ui, "Bricks, mask cells", format!("{}, {}", count(counts.bricks), count(counts.cells)));
-    figure(ui, "Hash", format!("{:016x}", counts.hash));
+    figure(ui, texts::ALL_MEMORY, bytes(memory.total()));
+    figure(ui, texts::EDITS_MEMORY, bytes(memory.edits()));
+    figure(ui, texts::GPU_MESHES, bytes(mesh_bytes));
+    figure(ui, texts::FIELDS, count(counts.fields));
+    figure(ui, texts::CHUNKS, count(counts.chunks));
+    figure(ui, texts::BRICKS, count(counts.bricks));
+    figure(ui, texts::MASK_CELLS, count(counts.cells));
+    figure(ui, texts::HASH, format!("{:016x}", counts.hash));
 }
 
 fn engine(ui: &mut Ui, state: &EngineState, [cpu, cuda]: [u64; 2], last: Option<&Choice>) {
     match state {
-        EngineState::Cpu => figure(ui, "Backend", "processor"),
-        EngineState::Unopened => figure(ui, "Backend", "processor, no card opened yet"),
-        EngineState::Opening => figure(ui, "Backend", "processor, opening a card"),
-        EngineState::Cuda(name) => figure_in(ui, "Backend", name, GOOD),
+        EngineState::Cpu => figure(ui, texts::BACKEND, texts::CPU),
+        EngineState::Unopened => figure(ui, texts::BACKEND, texts::CPU_UNOPENED),
+        EngineState::Opening => figure(ui, texts::BACKEND, texts::CPU_OPENING),
+        EngineState::Cuda(name) => figure_in(ui, texts::BACKEND, name, GOOD),
         EngineState::Lost(why) => {
-            figure_in(ui, "Backend", "processor, without a card", BAD);
+            figure(ui, texts::BACKEND, texts::CPU_ONLY);
             ui.label(RichText::new(why).color(FAINT).size(11.0));
         }
     }
-    figure(ui, "Stages", format!("{} processor, {} card", count(cpu as usize), count(cuda as usize)));
+    for (name, stages) in texts::STAGES.into_iter().zip([cpu, cuda]) {
+        figure(ui, name, count(stages as usize));
+    }
     let Some(choice) = last else { return };
     let what = match choice.stage {
-        Stage::Edit => "bricks edited",
-        Stage::Mesh => "blocks meshed",
+        Stage::Edit => texts::EDITED,
+        Stage::Mesh => texts::MESHED,
     };
-    figure(ui, "Last", format!("{} {what} in {}", count(choice.amount), time(Some(choice.took))));
+    figure(ui, texts::LAST, format!("{} {what} in {}", count(choice.amount), time(Some(choice.took))));
     if let Some(estimate) = choice.estimate {
-        let (cpu, cuda) = (time(Some(estimate.cpu)), time(Some(estimate.cuda)));
-        figure(ui, "Expected", format!("{cpu} processor, {cuda} card"));
+        for (name, estimate) in texts::EXPECTED.into_iter().zip([estimate.cpu, estimate.cuda]) {
+            figure(ui, name, time(Some(estimate)));
+        }
     }
 }
 
 fn settings(ui: &mut Ui, undo_budget: Option<&mut usize>, settings: &mut BurrowSettings) {
     if let Some(bytes) = undo_budget {
         let mut mebibytes = *bytes >> 20;
-        let history = slider(ui, "History", &mut mebibytes, 0..=1024, |slider| slider.suffix(" MiB"));
+        let history =
+            slider(ui, texts::UNDO_MEMORY, &mut mebibytes, 0..=1024, |slider| slider.suffix(" MiB"));
         // Write only on change, as not every budget is a whole number of MiB.
-        if history.on_hover_text("What undo may take of memory, on this terrain").changed() {
+        if history.on_hover_text(texts::UNDO_MEMORY_HELP).changed() {
             *bytes = mebibytes << 20;
         }
     }
-    slider(ui, "Swaps", &mut settings.swaps_per_frame, 1..=4096, |slider| slider.logarithmic(true))
-        .on_hover_text("Meshes swapped per frame, at most");
-    slider(ui, "Loads", &mut settings.loads_per_frame, 1..=4096, |slider| slider.logarithmic(true))
-        .on_hover_text("Tile meshes handed to the renderer per frame while a terrain loads");
+    slider(ui, texts::SWAPS, &mut settings.swaps_per_frame, 1..=4096, |slider| slider.logarithmic(true))
+        .on_hover_text(texts::SWAPS_HELP);
+    slider(ui, texts::LOADS, &mut settings.loads_per_frame, 1..=4096, |slider| slider.logarithmic(true))
+        .on_hover_text(texts::LOADS_HELP);
 }
 
 /// Draws the switches of the debug views.
 #[cfg(feature = "debug")]
 pub fn debug(ui: &mut Ui, debug: &mut crate::debug::BurrowDebug) {
-    section(ui, "Debug views", false, |ui| {
+    section(ui, texts::DEBUG, false, |ui| {
         for view in crate::debug::DebugView::ALL {
             super::widgets::switch(ui, view.name(), debug.switch(view));
         }
-        slider(ui, "Reach", &mut debug.radius, 8.0..=512.0, |slider| slider.logarithmic(true).suffix(" m"));
-        slider(ui, "Near", &mut debug.near, 4.0..=64.0, |slider| slider.logarithmic(true).suffix(" m"))
-            .on_hover_text("How far normals and wires reach");
+        slider(ui, texts::REACH, &mut debug.radius, 8.0..=512.0, |slider| {
+            slider.logarithmic(true).suffix(" m")
+        });
+        slider(ui, texts::NEAR, &mut debug.near, 4.0..=64.0, |slider| slider.logarithmic(true).suffix(" m"))
+            .on_hover_text(texts::NEAR_HELP);
     });
 }
 

@@ -21,7 +21,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     world.entity_mut(terrain).insert(Name::new("Hills"));
     *world.resource_mut::<BrushTool>() =
         BrushTool { operation: ToolOperation::Raise, shape: ToolShape::Cylinder, ..default() };
-    studio.resize((1280, 1040));
+    studio.resize((1280, 1200));
+    unfold(studio, &[("Diagnostics", true)]);
     // Terrain and engine figures are updated twice a second of app time (16 ms per frame), in tasks.
     let mut frames = 0;
     studio.until("figures", |_| {
@@ -29,18 +30,21 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         frames > 100
     });
     photograph(studio, album, "panel", &FIGURES);
+    let closed = ["Terrain", "Diagnostics"].map(|name| (name, false));
+    let open = ["Fill", "Digging rules", "Loose pieces", "Look", "Settings"].map(|name| (name, true));
+    unfold(studio, &[&closed[..], &open[..]].concat());
+    photograph(studio, album, "panel_settings", &SETTINGS);
+}
+
+/// Opens and closes sections.
+fn unfold(studio: &mut Studio, sections: &[(&str, bool)]) {
     let world = studio.app.world_mut();
     for mut context in world.query::<&mut EguiContext>().iter_mut(world) {
-        let mut open = |name: &str, is_open: bool| {
-            let id = Id::new(("burrow section", name));
-            context.get_mut().data_mut(|data| data.insert_temp(id, is_open));
-        };
-        ["Terrain", "Live", "Memory", "Engine"].into_iter().for_each(|name| open(name, false));
-        ["New ground", "Digging rules", "Loose pieces", "Look", "Settings"]
-            .into_iter()
-            .for_each(|name| open(name, true));
+        for (name, is_open) in sections {
+            let id = Id::new(("burrow section", *name));
+            context.get_mut().data_mut(|data| data.insert_temp(id, *is_open));
+        }
     }
-    photograph(studio, album, "panel_settings", &SETTINGS);
 }
 
 /// Takes a picture and compares each widget separately, so that differences in small ones are noticed as well.
@@ -63,7 +67,7 @@ fn photograph(studio: &mut Studio, album: &mut Album, name: &str, widgets: &[&st
 /// Mean FLIP above which a widget counts as different.
 const WIDGET: f32 = 0.05;
 
-const SETTINGS: [&str; 6] = ["Of a material", "Bedrock", "Found after digs", "Variety", "Far", "History"];
+const SETTINGS: [&str; 6] = ["Fill material", "Bedrock", "Find after digs", "Variety", "Scale to", "History"];
 
 const FIGURES: [&str; 12] = [
     "Undo",
@@ -75,20 +79,14 @@ const FIGURES: [&str; 12] = [
     "Radius",
     "Falloff",
     "Queue",
-    "Fields, chunks",
+    "Fields",
     "Hash",
     "Backend",
 ];
 
 /// Widgets that show timings.
-const TIMES: [&str; 6] = [
-    "transaction",
-    "p50, p95, p99",
-    "meshes swapped per frame",
-    "frame",
-    "own work on the main thread",
-    "Last",
-];
+const TIMES: [&str; 6] =
+    ["transaction", "p50, p95, p99", "meshes swapped per frame", "frame", "main-thread time", "Last stage"];
 
 fn pixels(picture: &RgbImage, place: Rect) -> impl Iterator<Item = UVec2> + use<> {
     let (from, to) = (place.min.as_uvec2(), place.max.ceil().as_uvec2().min(picture.dimensions().into()));

@@ -4,14 +4,20 @@
 mod frame_log;
 
 use bevy::prelude::*;
+use bevy::ui::UiGlobalTransform;
 use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
 
+use crate::party::players::PlayerInfo;
 use crate::player::Player;
 use crate::player::camera::PlayerCamera;
 use crate::player::game_state::{GameState, MenuPage};
+use crate::player::headlamp::HeadlampSwitch;
 use crate::tools::Hand;
+use crate::tools::lamps::SavedLamps;
+use crate::ui::hud::Hint;
+use crate::ui::widgets::{FocusedItem, MenuItem};
 
 /// Logs events. `tools/drive.py` reads them.
 pub struct EventLogPlugin;
@@ -22,6 +28,7 @@ impl Plugin for EventLogPlugin {
             Last,
             (
                 (log_page, log_ready, log_textures, log_tool, log_aim, log_edits, log_history, log_camera),
+                (log_items, log_texts, log_hints, log_game),
                 frame_log::tell_frame,
             )
                 .chain(),
@@ -34,6 +41,68 @@ fn log_page(state: Res<State<GameState>>, page: Res<State<MenuPage>>) {
     if state.is_changed() || page.is_changed() {
         println!("page {:?} {:?}", state.get(), page.get());
     }
+}
+
+/// Logs the menu's items, the selected one first, as JSON.
+fn log_items(
+    focus: Res<FocusedItem>,
+    items: Query<(Entity, &MenuItem)>,
+    children: Query<&Children>,
+    texts: Query<&Text>,
+    mut last: Local<String>,
+) {
+    let mut all: Vec<(usize, &str)> = Vec::new();
+    for (entity, item) in &items {
+        let text = children.iter_descendants(entity).find_map(|child| texts.get(child).ok());
+        all.extend(text.map(|text| (item.0, text.0.as_str())));
+    }
+    all.sort_unstable();
+    let names: Vec<&str> = all.into_iter().map(|(_, name)| name).collect();
+    log_change(format!("items {} {}", focus.0, serde_json::json!(names)), &mut last);
+}
+
+/// Logs the places of all visible texts whenever a page has opened: left, top, right, bottom, and whether all is in sight.
+fn log_texts(
+    state: Res<State<MenuPage>>,
+    texts: Query<(&Text, &ComputedNode, &UiGlobalTransform, &InheritedVisibility)>,
+    mut frames: Local<u32>,
+) {
+    *frames = if state.is_changed() { 0 } else { *frames + 1 };
+    if *frames != 4 {
+        return;
+    }
+    for (text, node, place, _) in texts.iter().filter(|(text, .., shown)| shown.get() && !text.0.is_empty()) {
+        let (middle, half) = (place.translation, node.size() / 2.0);
+        let (from, to) = (middle - half, middle + half);
+        let words = serde_json::json!(text.0);
+        println!("text {words} {:.0} {:.0} {:.0} {:.0}", from.x, from.y, to.x, to.y);
+    }
+    println!("texts end");
+}
+
+fn log_hints(mut hints: MessageReader<Hint>) {
+    for Hint(text) in hints.read() {
+        println!("hint {text}");
+    }
+}
+
+/// Logs what a saved game has to bring back, rounded.
+fn log_game(
+    players: Query<(&Player, &Transform)>,
+    headlamp: Res<HeadlampSwitch>,
+    lamps: SavedLamps,
+    worlds: Query<&SavedWorld>,
+    others: Query<&PlayerInfo>,
+    mut last: Local<String>,
+) {
+    let place = players.iter().next().map(|(_, place)| place.translation.round());
+    let (lamps, players) = (lamps.all().len(), others.iter().count());
+    let world = worlds.iter().next().and_then(|world| world.path.file_name());
+    let world = world.map_or_else(|| "none".into(), |name| name.to_string_lossy());
+    let place = place.map_or_else(|| "none".into(), |place| format!("{} {} {}", place.x, place.y, place.z));
+    let line =
+        format!("game headlamp={} lamps={lamps} players={players} place={place} world={world}", headlamp.0);
+    log_change(line, &mut last);
 }
 
 fn log_ready(players: Query<(), Added<Player>>) {

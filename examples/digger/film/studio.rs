@@ -119,7 +119,7 @@ impl Studio {
         let player = wait_for_player(&mut app, renders, meanwhile)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
-        world.resource_mut::<UiScale>().0 = scale_for(options.width as f32, options.height as f32, true);
+        world.resource_mut::<UiScale>().0 = scale_for(options.width as f32, options.height as f32, 1.0, true);
         // It stays a bright afternoon, and the title is skipped.
         world.resource_mut::<Clock>().runs = false;
         world.resource_mut::<ShowHud>().0 = false;

@@ -38,7 +38,7 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
 fn play(options: &Options, renderer: Option<RenderResources>) -> Result {
     let free_port = || Ok::<_, BevyError>(UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()?.port());
     let port = options.host.map_or_else(free_port, Ok)?;
-    let join = Some(Address((Ipv4Addr::LOCALHOST, port).into()));
+    let join = Some(Address((Ipv4Addr::LOCALHOST, port).into(), 0));
     let mut host = Studio::open(&Options { host: Some(port), ..options.clone() }, renderer)?;
     let guest = Options { host: None, join, world: None, ..options.clone() };
     let guest = Studio::open_while(&guest, None, || host.wait(1))?;

@@ -1,12 +1,13 @@
 //! Hosting and joining: what the terrain's `SharedTerrain` needs around it comes and goes with it.
 
+use std::fmt;
 use std::net::{AddrParseError, IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::str::FromStr;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use bevy::prelude::*;
-use bevy_burrow::net::{ClientEvent, Rate, Reach, Server, ServerSettings, UndoPolicy};
+use bevy_burrow::net::{ClientEvent, Kick, Rate, Reach, Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{GroundJoined, GroundServer, GroundServerEvent, SharedTerrain, TogetherPlugin};
 use bevy_replicon::prelude::*;
@@ -15,6 +16,7 @@ use bevy_replicon_renet::RepliconRenetPlugins;
 use super::udp;
 use crate::player::game_state::GameState;
 use crate::ui::hud::Hint;
+use crate::ui::texts;
 use crate::world::landscape::{self, NewGame, OriginalGround};
 use crate::world::saves::PlayedWorld;
 
@@ -30,31 +32,43 @@ pub enum Party {
     Alone,
     /// This machine has the world, and others may join at this port.
     Host(u16),
-    /// The world of another machine.
-    Guest(SocketAddr),
+    /// The world of another machine, and its seed.
+    Guest(SocketAddr, u32),
 }
 
 /// Text that is no address.
 #[derive(Debug, PartialEq, thiserror::Error)]
-#[error("{0:?} is no address: write 192.168.0.7, or 192.168.0.7:5100")]
+#[error("{0:?} is not a valid address. Try 192.168.0.7 or 192.168.0.7:5100.")]
 pub struct NoAddress(String);
 
-/// The address of a host, with or without a port.
+/// The address of a host, and the seed of its world, with or without a port and a seed: `192.168.0.7:5100#3`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Address(pub SocketAddr);
+pub struct Address(pub SocketAddr, pub u32);
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.1 {
+            0 => write!(f, "{}", self.0),
+            seed => write!(f, "{}#{seed}", self.0),
+        }
+    }
+}
 
 impl FromStr for Address {
     type Err = NoAddress;
 
     fn from_str(text: &str) -> Result<Self, NoAddress> {
         let text = text.trim();
-        let numbers = match text.strip_prefix("localhost") {
+        let no_address = || NoAddress(text.into());
+        let (place, seed) = text.split_once('#').unwrap_or((text, "0"));
+        let seed = seed.parse::<u32>().map_err(|_| no_address())?;
+        let numbers = match place.strip_prefix("localhost") {
             Some(port) => format!("127.0.0.1{port}"),
-            None => text.into(),
+            None => place.into(),
         };
         let with_port = numbers.parse::<SocketAddrV4>();
         let address = with_port.or_else(|_| Ok(SocketAddrV4::new(numbers.parse()?, PORT)));
-        address.map(|address| Self(address.into())).map_err(|_: AddrParseError| NoAddress(text.into()))
+        address.map(|address| Self(address.into(), seed)).map_err(|_: AddrParseError| no_address())
     }
 }
 
@@ -139,11 +153,11 @@ fn open(
             });
             commands.queue(move |world: &mut World| {
                 if let Err(why) = udp::listen(world, (Ipv4Addr::UNSPECIFIED, port).into(), PLAYERS) {
-                    world.write_message(Hint(format!("nobody can join: {why}")));
+                    world.write_message(Hint(texts::nobody_can_join(why)));
                 }
             });
         }
-        Party::Guest(_) => {
+        Party::Guest(..) => {
             if own.0 == 0 {
                 commands.insert_resource(OwnNumber(fastrand::u64(1..u64::MAX / 2)));
             }
@@ -167,7 +181,7 @@ fn serve_unsaved(
     for event in events.read() {
         match event {
             GroundServerEvent::Opened(Err(why)) => {
-                hints.write(Hint(format!("nothing is saved: {why}")));
+                hints.write(Hint(texts::nothing_saved(why)));
                 if let (Some(ground), Some(server)) = (&ground, &mut server) {
                     server.serve_instead(unsaved(ground)?);
                 }
@@ -209,7 +223,7 @@ fn connect(
     own: Res<OwnNumber>,
     next: Option<ResMut<NextTry>>,
 ) {
-    let (&Party::Guest(server), Some(mut next)) = (&*party, next) else { return };
+    let (&Party::Guest(server, _), Some(mut next)) = (&*party, next) else { return };
     next.0 -= time.delta_secs();
     if next.0 > 0.0 {
         return;
@@ -218,7 +232,7 @@ fn connect(
     let number = own.0;
     commands.queue(move |world: &mut World| {
         if let Err(why) = udp::connect(world, server, number) {
-            world.write_message(Hint(format!("there is no way to {server}: {why}")));
+            world.write_message(Hint(texts::unreachable(server, why)));
         }
     });
 }
@@ -226,12 +240,12 @@ fn connect(
 fn announce_loss(next: Option<Res<NextTry>>, mut hints: MessageWriter<Hint>) {
     // Who has left does not try again.
     if next.is_some() {
-        hints.write(Hint("the host can't be reached: what you dig meanwhile is sent later".into()));
+        hints.write(Hint(texts::HOST_LOST.into()));
     }
 }
 
 fn tell_other_version(_: On<ProtocolMismatch>, mut hints: MessageWriter<Hint>) {
-    hints.write(Hint("the host has another version of the game".into()));
+    hints.write(Hint(texts::OTHER_VERSION.into()));
 }
 
 /// What the host's server says about this player.
@@ -243,7 +257,7 @@ fn follow_host(
 ) {
     for message in joined.read() {
         if let ClientEvent::Kicked(why) = message.event {
-            hints.write(Hint(format!("the host has sent you away: {why}")));
+            hints.write(Hint(if why == Kick::Ground { texts::other_seed() } else { texts::removed(why) }));
             *party = Party::Alone;
             commands.trigger(NewGame);
             commands.set_state(GameState::Title);
@@ -262,6 +276,8 @@ mod tests {
             (" 10.0.0.1:99 ", Some("10.0.0.1:99")),
             ("localhost", Some("127.0.0.1:5100")),
             ("localhost:7", Some("127.0.0.1:7")),
+            ("10.0.0.1#12", Some("10.0.0.1:5100#12")),
+            ("10.0.0.1#x", None),
             // Sockets are of version 4.
             ("::1", None),
             ("", None),
@@ -269,7 +285,7 @@ mod tests {
             ("192.168.0.7:port", None),
         ] {
             let address: Result<Address, NoAddress> = text.parse();
-            assert_eq!(address.ok().map(|address| address.0.to_string()).as_deref(), expected, "{text}");
+            assert_eq!(address.ok().map(|address| address.to_string()).as_deref(), expected, "{text}");
         }
     }
 }

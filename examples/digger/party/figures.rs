@@ -129,10 +129,11 @@ fn spawn_figure(
             head.spawn((Lamp(of), lamp, children![light]));
         });
     });
-    let node = Node { position_type: PositionType::Absolute, ..default() };
+    let padding = UiRect::axes(px(6), px(1));
+    let node = Node { position_type: PositionType::Absolute, padding, ..default() };
     commands.spawn((
         NameTag(of),
-        node,
+        widgets::panel(node),
         Visibility::Hidden,
         children![widgets::text(cleaned(&player.name), 16.0, widgets::WHITE)],
     ));

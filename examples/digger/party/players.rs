@@ -17,6 +17,7 @@ use crate::player::body::Body;
 use crate::player::headlamp::HeadlampSwitch;
 use crate::ui::hud::Hint;
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 use crate::world::day::Clock;
 use crate::world::landscape::ORIGIN;
 
@@ -110,7 +111,7 @@ pub fn voxel(place: Vec3) -> IVec3 {
 pub fn cleaned(name: &str) -> String {
     let visible = name.chars().filter(|letter| letter.is_ascii_graphic() || *letter == ' ');
     let name: String = visible.take(MOST_LETTERS).collect();
-    if name.trim().is_empty() { "somebody".into() } else { name.trim().into() }
+    if name.trim().is_empty() { texts::SOMEBODY.into() } else { name.trim().into() }
 }
 
 /// The name from the settings, or the user's on this machine.
@@ -200,18 +201,18 @@ fn place(
 /// Follows the host's time of day.
 fn follow_clock(party: Res<Party>, hosts: Query<&HostClock, Changed<HostClock>>, mut clock: ResMut<Clock>) {
     for hour in hosts.iter().filter(|hour| hour.0.is_finite()) {
-        if matches!(*party, Party::Guest(_)) && (clock.hour - hour.0).abs() > CLOCK_DIFFERENCE {
+        if matches!(*party, Party::Guest(..)) && (clock.hour - hour.0).abs() > CLOCK_DIFFERENCE {
             clock.hour = hour.0.rem_euclid(24.0);
         }
     }
 }
 
 fn announce_arrival(new: On<Add, PlayerInfo>, mut announcer: Announcer) {
-    announcer.tell(new.entity, "is here");
+    announcer.tell(new.entity, texts::ARRIVED);
 }
 
 fn announce_leaving(gone: On<Remove, PlayerInfo>, mut announcer: Announcer) {
-    announcer.tell(gone.entity, "has gone");
+    announcer.tell(gone.entity, texts::LEFT);
 }
 
 /// Says what other players do.

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::player::input::Action;
 use crate::ui::labels::Labels;
+use crate::ui::texts;
 
 /// A key, a button, or a turn of the wheel. The settings file has it as a text such as `KeyW`, `Mouse Left` or `Pad
 /// South`.
@@ -93,11 +94,16 @@ impl TryFrom<String> for Binding {
     }
 }
 
+/// The usual name, for players.
 impl fmt::Display for Binding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = String::from(*self);
-        let short = text.strip_prefix("Key").or_else(|| text.strip_prefix("Digit")).unwrap_or(&text);
-        f.write_str(short)
+        f.write_str(&match self {
+            Self::Key(key) => texts::key(&format!("{key:?}")),
+            Self::Mouse(button) => texts::mouse(&format!("{button:?}")),
+            Self::WheelUp => texts::WHEEL[0].into(),
+            Self::WheelDown => texts::WHEEL[1].into(),
+            Self::Pad(button) => texts::pad(&format!("{button:?}")),
+        })
     }
 }
 
@@ -137,7 +143,7 @@ impl From<BTreeMap<String, Vec<String>>> for Bindings {
                 }
             }
         }
-        for (action, _, defaults) in Action::ALL {
+        for (action, defaults) in Action::ALL {
             let own = all.entry(action).or_default();
             if own.is_empty() || unreadable.contains(&action) {
                 own.extend(defaults.iter().filter(|binding| taken.insert(**binding)));
@@ -149,7 +155,7 @@ impl From<BTreeMap<String, Vec<String>>> for Bindings {
 
 impl Default for Bindings {
     fn default() -> Self {
-        Self(Action::ALL.iter().map(|(action, _, bindings)| (*action, bindings.to_vec())).collect())
+        Self(Action::ALL.iter().map(|(action, bindings)| (*action, bindings.to_vec())).collect())
     }
 }
 

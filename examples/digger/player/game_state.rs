@@ -27,11 +27,29 @@ pub enum MenuPage {
     Menu,
     /// The saved worlds.
     Worlds,
+    /// One of them: its name, a copy, its end.
+    World,
+    NewWorld,
     /// Hosting and joining.
     Together,
     Settings,
     Controls,
     Help,
+    /// A question before something is lost.
+    Question,
+}
+
+impl MenuPage {
+    /// The page that this one leads back to. A question leads back to where it was asked.
+    pub const fn parent(self) -> Option<Self> {
+        match self {
+            Self::None | Self::Menu | Self::Question => None,
+            Self::World => Some(Self::Worlds),
+            Self::Worlds | Self::NewWorld | Self::Together | Self::Settings | Self::Controls | Self::Help => {
+                Some(Self::Menu)
+            }
+        }
+    }
 }
 
 /// Changes the states. Time and the mouse cursor follow them.

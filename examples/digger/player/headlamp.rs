@@ -91,6 +91,18 @@ fn switch_lights(
     }
 }
 
+/// The share of its power that a light needs where ground in these directions is nearer than `full` metres.
+pub fn share_of_power(terrains: &Terrains, origin: Vec3, directions: [Vec3; 5], full: f32) -> f32 {
+    let distance = |direction: Vec3| {
+        let ray = Ray3d::new(origin, Dir3::new(direction).unwrap_or(Dir3::NEG_Z));
+        terrains.raycast(ray, full).map_or(full, |hit| hit.distance.max(0.5))
+    };
+    // The geometric mean.
+    let logarithms = directions.map(|direction| distance(direction).ln());
+    let metres = (logarithms.iter().sum::<f32>() / logarithms.len() as f32).exp();
+    (metres / full).powf(1.6)
+}
+
 /// Adapts the power to the distance of the ground ahead, so that near rock is lit but not overexposed.
 fn dim_lights(
     time: Res<Time>,
@@ -101,15 +113,7 @@ fn dim_lights(
     // Ahead, and around the beam's edge.
     let directions = [(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25)]
         .map(|(right, up)| camera.rotation() * Vec3::new(right, up, -1.0));
-    let distance = |direction: Vec3| {
-        let ray = Ray3d::new(camera.translation(), Dir3::new(direction).unwrap_or(Dir3::NEG_Z));
-        let hit = terrains.raycast(ray, FULL_POWER_DISTANCE);
-        hit.map_or(FULL_POWER_DISTANCE, |hit| hit.distance.max(0.5))
-    };
-    // The geometric mean.
-    let logarithms = directions.map(|direction| distance(direction).ln());
-    let metres = (logarithms.iter().sum::<f32>() / logarithms.len() as f32).exp();
-    let power = (metres / FULL_POWER_DISTANCE).powf(1.6);
+    let power = share_of_power(&terrains, camera.translation(), directions, FULL_POWER_DISTANCE);
     for (lamp, mut light) in &mut lamps {
         light.intensity += (power * lamp.0 - light.intensity) * (1.0 - (-8.0 * time.delta_secs()).exp());
     }

@@ -12,85 +12,60 @@ use serde::{Deserialize, Serialize};
 use crate::player::bindings::Binding;
 use crate::ui::labels::{self, Labels};
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 
 /// Something that the player can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[rustfmt::skip]
 pub enum Action {
-    Forward,
-    Back,
-    Left,
-    Right,
-    Run,
-    Jump,
-    Use,
-    Build,
-    Slot1,
-    Slot2,
-    Slot3,
-    Slot4,
-    Slot5,
-    Slot6,
-    Slot7,
-    Slot8,
-    NextTool,
-    PreviousTool,
-    NextMaterial,
-    PreviousMaterial,
-    Grow,
-    Shrink,
-    BuildShape,
-    Headlamp,
-    Undo,
-    Redo,
-    Help,
-    FrameTimes,
-    Panel,
-    Pause,
+    Forward, Back, Left, Right, Run, Jump, Use, Build, Slot1, Slot2, Slot3, Slot4, Slot5, Slot6, Slot7,
+    Slot8, NextTool, PreviousTool, NextMaterial, PreviousMaterial, Grow, Shrink, BuildShape, Headlamp, Undo,
+    Redo, Help, FrameTimes, Panel, Pause,
 }
 
 impl Action {
-    /// All actions with their labels and their default bindings, in the order of the controls page.
-    pub const ALL: [(Self, &str, &[Binding]); 30] = {
+    /// All actions with their default bindings, in the order of the controls page.
+    pub const ALL: [(Self, &[Binding]); 30] = {
         use Binding::{Key, Mouse, Pad, WheelDown, WheelUp};
         use GamepadButton as G;
         use KeyCode as K;
         [
-            (Self::Forward, "forward", &[Key(K::KeyW), Key(K::ArrowUp)]),
-            (Self::Back, "back", &[Key(K::KeyS), Key(K::ArrowDown)]),
-            (Self::Left, "left", &[Key(K::KeyA), Key(K::ArrowLeft)]),
-            (Self::Right, "right", &[Key(K::KeyD), Key(K::ArrowRight)]),
-            (Self::Run, "run", &[Key(K::ShiftLeft), Pad(G::LeftThumb)]),
-            (Self::Jump, "jump", &[Key(K::Space), Pad(G::South)]),
-            (Self::Use, "use the tool", &[Mouse(MouseButton::Left), Pad(G::RightTrigger2)]),
-            (Self::Build, "build", &[Mouse(MouseButton::Right), Pad(G::LeftTrigger2)]),
-            (Self::Grow, "larger brush", &[WheelUp, Key(K::Equal), Pad(G::DPadUp)]),
-            (Self::Shrink, "smaller brush", &[WheelDown, Key(K::Minus), Pad(G::DPadDown)]),
-            (Self::BuildShape, "shape of what is built", &[Key(K::KeyC), Pad(G::West)]),
-            (Self::Headlamp, "headlamp", &[Key(K::KeyF), Pad(G::North)]),
-            (Self::Slot1, "pickaxe", &[Key(K::Digit1)]),
-            (Self::Slot2, "shovel", &[Key(K::Digit2)]),
-            (Self::Slot3, "drill", &[Key(K::Digit3)]),
-            (Self::Slot4, "builder", &[Key(K::Digit4)]),
-            (Self::Slot5, "painter", &[Key(K::Digit5)]),
-            (Self::Slot6, "bomb", &[Key(K::Digit6)]),
-            (Self::Slot7, "lamp", &[Key(K::Digit7)]),
-            (Self::Slot8, "ball", &[Key(K::Digit8)]),
-            (Self::NextTool, "next tool", &[Pad(G::RightTrigger)]),
-            (Self::PreviousTool, "previous tool", &[Pad(G::LeftTrigger)]),
-            (Self::NextMaterial, "next material", &[Key(K::KeyE), Pad(G::DPadRight)]),
-            (Self::PreviousMaterial, "previous material", &[Key(K::KeyQ), Pad(G::DPadLeft)]),
-            (Self::Undo, "undo", &[Key(K::KeyZ), Pad(G::East)]),
-            (Self::Redo, "redo", &[Key(K::KeyY), Pad(G::RightThumb)]),
-            (Self::Help, "help", &[Key(K::KeyH), Pad(G::Select)]),
-            (Self::FrameTimes, "frame times", &[Key(K::F3)]),
-            (Self::Panel, "panel", &[Key(K::F1)]),
-            (Self::Pause, "pause", &[Key(K::Escape), Pad(G::Start)]),
+            (Self::Forward, &[Key(K::KeyW), Key(K::ArrowUp)]),
+            (Self::Back, &[Key(K::KeyS), Key(K::ArrowDown)]),
+            (Self::Left, &[Key(K::KeyA), Key(K::ArrowLeft)]),
+            (Self::Right, &[Key(K::KeyD), Key(K::ArrowRight)]),
+            (Self::Run, &[Key(K::ShiftLeft), Pad(G::LeftThumb)]),
+            (Self::Jump, &[Key(K::Space), Pad(G::South)]),
+            (Self::Use, &[Mouse(MouseButton::Left), Pad(G::RightTrigger2)]),
+            (Self::Build, &[Mouse(MouseButton::Right), Pad(G::LeftTrigger2)]),
+            (Self::Grow, &[WheelUp, Key(K::Equal), Pad(G::DPadUp)]),
+            (Self::Shrink, &[WheelDown, Key(K::Minus), Pad(G::DPadDown)]),
+            (Self::BuildShape, &[Key(K::KeyC), Pad(G::West)]),
+            (Self::Headlamp, &[Key(K::KeyF), Pad(G::North)]),
+            (Self::Slot1, &[Key(K::Digit1)]),
+            (Self::Slot2, &[Key(K::Digit2)]),
+            (Self::Slot3, &[Key(K::Digit3)]),
+            (Self::Slot4, &[Key(K::Digit4)]),
+            (Self::Slot5, &[Key(K::Digit5)]),
+            (Self::Slot6, &[Key(K::Digit6)]),
+            (Self::Slot7, &[Key(K::Digit7)]),
+            (Self::Slot8, &[Key(K::Digit8)]),
+            (Self::NextTool, &[Pad(G::RightTrigger)]),
+            (Self::PreviousTool, &[Pad(G::LeftTrigger)]),
+            (Self::NextMaterial, &[Key(K::KeyE), Pad(G::DPadRight)]),
+            (Self::PreviousMaterial, &[Key(K::KeyQ), Pad(G::DPadLeft)]),
+            (Self::Undo, &[Key(K::KeyZ), Pad(G::East)]),
+            (Self::Redo, &[Key(K::KeyY), Pad(G::RightThumb)]),
+            (Self::Help, &[Key(K::KeyH), Pad(G::Select)]),
+            (Self::FrameTimes, &[Key(K::F3)]),
+            (Self::Panel, &[Key(K::F1)]),
+            (Self::Pause, &[Key(K::Escape), Pad(G::Start)]),
         ]
     };
 
     pub fn label(self) -> &'static str {
-        Self::ALL.iter().find(|(action, ..)| *action == self).map_or("?", |(_, label, _)| label)
+        texts::ACTIONS[self as usize]
     }
 }
 

@@ -11,6 +11,7 @@ use bevy_burrow::prelude::*;
 use crate::film::places::Places;
 use crate::player::{self, Player, Scripted};
 use crate::ui::hud::Hint;
+use crate::ui::texts;
 
 /// Players this many metres below all air are lost. Those who are just built over are lifted by the plugin's physics.
 const DEPTH: f32 = 4.0;
@@ -46,7 +47,7 @@ fn bring_back(
         let start = player::start(&places, |place| terrains.height(place.x, place.y));
         let place = character.standing_at(start + Vec3::Y * 0.1);
         commands.entity(player).insert((place, Position(place.translation), CharacterMotion::default()));
-        hints.write(Hint("back on solid ground".into()));
+        hints.write(Hint(texts::BROUGHT_BACK.into()));
     }
 }
 

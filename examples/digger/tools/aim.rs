@@ -14,6 +14,7 @@ use crate::tools::digging::affordable_radius;
 use crate::tools::inventory::Inventory;
 use crate::tools::{Hand, Tool, cycle};
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 use crate::ui::widgets::RED;
 
 /// Where the camera's line of sight meets the ground.
@@ -43,11 +44,7 @@ impl BuildShape {
     }
 
     pub const fn label(self) -> &'static str {
-        match self {
-            Self::Sphere => "sphere",
-            Self::Cube => "cube",
-            Self::Beam => "beam",
-        }
+        texts::SHAPES[self as usize]
     }
 
     /// The brush's shape for this aim.

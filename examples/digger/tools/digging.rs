@@ -11,6 +11,7 @@ use crate::tools::inventory::Inventory;
 use crate::tools::{Hand, Tool, ToolUsed};
 use crate::ui::hud::Hint;
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 use crate::world::landscape;
 use crate::world::particles::{Burst, ParticleKind};
 
@@ -25,6 +26,7 @@ impl Plugin for DiggingPlugin {
         app.init_resource::<PendingHits>()
             .add_observer(dig)
             .add_observer(build_or_paint)
+            .add_observer(tell_reach)
             .add_systems(Update, throw_chips.after(BurrowSystems::Commit));
     }
 }
@@ -86,6 +88,13 @@ fn dig(
     shake.add(if used.tool == Tool::Drill { 0.12 } else { 0.3 });
 }
 
+/// Tells the player why nothing happens.
+fn tell_reach(used: On<ToolUsed>, mut hints: MessageWriter<Hint>) {
+    if used.aim.is_none() && !matches!(used.tool, Tool::Bomb | Tool::Ball) {
+        hints.write(Hint(texts::TOO_FAR.into()));
+    }
+}
+
 /// Building and painting both use up the material.
 fn build_or_paint(
     used: On<ToolUsed>,
@@ -106,7 +115,7 @@ fn build_or_paint(
     if settings.survival {
         let available = inventory.available(material);
         let Some((affordable, voxels)) = affordable_radius(used.tool, radius, available, shape) else {
-            hints.write(Hint(format!("not enough {}: dig some first", landscape::name(material))));
+            hints.write(Hint(texts::not_enough(landscape::name(material))));
             return;
         };
         inventory.reserve(tag, material, voxels);

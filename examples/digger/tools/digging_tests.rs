@@ -41,7 +41,7 @@ fn building_and_painting_need_material_unless_they_are_free() {
         let mut app = app();
         choose(&mut app, ROCK);
         assert_eq!(use_tool(&mut app, tool), []);
-        assert_eq!(drain_hints(&mut app), ["not enough rock: dig some first"]);
+        assert_eq!(drain_hints(&mut app), ["Not enough rock. Dig some first."]);
         app.world_mut().resource_mut::<Settings>().survival = false;
         assert_eq!(use_tool(&mut app, tool).len(), 1);
     }

@@ -6,10 +6,11 @@ use bevy_burrow::volume::MaterialCounts;
 
 use crate::tools::inventory::FIRST_PLAYER_TAG;
 use crate::ui::hud::Hint;
+use crate::ui::texts;
 use crate::world::landscape::{self, COAL, CONCRETE, GOLD, ROCK, SANDSTONE, SHALE};
 
 /// Below this height, nothing breaks.
-const BEDROCK: i32 = -32;
+pub const BEDROCK: i32 = -32;
 
 /// A pickaxe breaks all but concrete and gold at once, a drill all but gold, and a bomb everything.
 pub fn rules() -> DiggingRules {
@@ -46,11 +47,11 @@ pub fn explain(mut receipts: MessageReader<BrushApplied>, mut hints: MessageWrit
             most.filter(|_| counts.total() > broken)
         };
         if refused.unbreakable.total() > broken {
-            hints.write(Hint("bedrock: nothing breaks it".into()));
+            hints.write(Hint(texts::UNBREAKABLE.into()));
         } else if let Some(name) = most(&refused.too_hard) {
-            hints.write(Hint(format!("{name} is too hard for this")));
+            hints.write(Hint(texts::too_hard(name)));
         } else if let Some(name) = most(&refused.slowed) {
-            hints.write(Hint(format!("{name} is hard: keep at it")));
+            hints.write(Hint(texts::hard(name)));
         }
     }
 }
@@ -100,9 +101,9 @@ mod tests {
         app.add_plugins((MinimalPlugins, HardnessPlugin)).add_message::<BrushApplied>().add_message::<Hint>();
         for (material, depth, power, tag, hint) in [
             (ROCK, 4.0, 100, FIRST_PLAYER_TAG, ""),
-            (GOLD, 4.0, 100, FIRST_PLAYER_TAG, "gold is too hard for this"),
-            (GOLD, 4.0, 115, FIRST_PLAYER_TAG, "gold is hard: keep at it"),
-            (ROCK, 50.0, 255, FIRST_PLAYER_TAG, "bedrock: nothing breaks it"),
+            (GOLD, 4.0, 100, FIRST_PLAYER_TAG, "This tool is too weak for gold."),
+            (GOLD, 4.0, 115, FIRST_PLAYER_TAG, "gold is hard. Keep digging."),
+            (ROCK, 50.0, 255, FIRST_PLAYER_TAG, "Bedrock can't be broken."),
             // A script's brush.
             (ROCK, 50.0, 255, 0, ""),
         ] {

@@ -22,6 +22,7 @@ use crate::player::input::{Action, Actions};
 use crate::tools::hardness;
 use crate::ui::hud::Hint;
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 use crate::world::landscape::{CONCRETE, MATERIALS, NewGame, name};
 
 /// Tags from here on are those of the player's brushes. Scripts use smaller ones, and their brushes are free.
@@ -173,7 +174,7 @@ impl Inventory {
     }
 
     fn apply(&mut self, change: &Amounts) -> Vec<(MaterialId, i64)> {
-        let materials = MATERIALS.iter().map(|&(material, _)| material).zip(change.iter().copied());
+        let materials = MATERIALS.into_iter().zip(change.iter().copied());
         let changes: Vec<_> = materials.filter(|(_, by)| *by != 0).collect();
         changes.iter().for_each(|&(material, by)| self.gain(material, by));
         changes
@@ -229,8 +230,7 @@ fn read_receipts(
             let amount = inventory.amount(material);
             // Only once; after that the number is red.
             if amount < 0 && amount - by >= 0 {
-                let name = name(material);
-                hints.write(Hint(format!("{} {name} in debt: dig more {name} to pay it back", -amount)));
+                hints.write(Hint(texts::debt(-amount, name(material))));
             }
             changes.write(AmountChanged { material, by });
         }

@@ -3,13 +3,17 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use bevy::ecs::system::SystemParam;
 use bevy::light::NotShadowCaster;
 use bevy::prelude::*;
 use bevy::time::common_conditions::on_timer;
 use bevy_burrow::prelude::*;
+use serde::{Deserialize, Serialize};
 
+use crate::player::{Player, headlamp};
 use crate::tools::{Tool, ToolUsed};
 use crate::ui::hud::Hint;
+use crate::ui::texts;
 use crate::world::landscape::DespawnOnNewGame;
 
 /// The oldest lamp is removed if there would be more.
@@ -18,6 +22,10 @@ const MAX_LAMPS: usize = 24;
 const POWER: f32 = 2_200_000.0;
 /// The middle of the bulb, seen from the foot.
 const BULB: Vec3 = Vec3::new(0.0, 0.38, 0.0);
+/// Where its light is.
+const LIGHT: Vec3 = Vec3::new(0.0, 0.55, 0.0);
+/// With ground this many metres away on all sides, a lamp has its full power. In a tunnel, that would burn out to white.
+const FULL_POWER_DISTANCE: f32 = 12.0;
 
 #[derive(Component, Clone, Copy, Debug)]
 #[require(Transform, Visibility, DespawnOnNewGame)]
@@ -26,9 +34,32 @@ struct Lamp {
     root: Vec3,
 }
 
+/// A lamp as it is saved. Triggering it puts a lamp there.
+#[derive(Event, Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SavedLamp {
+    pub foot: Vec3,
+    pub normal: Vec3,
+}
+
+/// What is saved of the lamps.
+#[derive(SystemParam)]
+pub struct SavedLamps<'w, 's> {
+    order: Option<Res<'w, Lamps>>,
+    lamps: Query<'w, 's, &'static Transform, With<Lamp>>,
+}
+
+impl SavedLamps<'_, '_> {
+    /// All lamps, the oldest first.
+    pub fn all(&self) -> Vec<SavedLamp> {
+        let order = self.order.iter().flat_map(|lamps| &lamps.0);
+        let places = order.filter_map(|lamp| self.lamps.get(*lamp).ok());
+        places.map(|place| SavedLamp { foot: place.translation, normal: *place.up() }).collect()
+    }
+}
+
 /// All lamps, the oldest first.
 #[derive(Resource, Default, Debug)]
-struct Lamps(VecDeque<Entity>);
+pub struct Lamps(VecDeque<Entity>);
 
 #[derive(Resource)]
 struct LampAssets {
@@ -46,7 +77,14 @@ impl Plugin for LampsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Lamps>()
             .add_systems(Startup, create_assets)
-            .add_systems(Update, remove_loose_lamps.run_if(on_timer(Duration::from_millis(200))))
+            .add_systems(
+                Update,
+                // Without a player, the ground may not have loaded.
+                (remove_loose_lamps, dim_lamps)
+                    .run_if(any_with_component::<Player>)
+                    .run_if(on_timer(Duration::from_millis(200))),
+            )
+            .add_observer(use_lamp)
             .add_observer(place)
             .add_observer(forget);
     }
@@ -72,18 +110,27 @@ fn create_assets(
     });
 }
 
+fn use_lamp(used: On<ToolUsed>, mut commands: Commands) {
+    if let Some(aim) = used.aim.filter(|_| used.tool == Tool::Lamp) {
+        commands.trigger(SavedLamp { foot: aim.point, normal: aim.normal });
+    }
+}
+
 fn place(
-    used: On<ToolUsed>,
+    new: On<SavedLamp>,
     mut commands: Commands,
     assets: Res<LampAssets>,
     mut lamps: ResMut<Lamps>,
     mut hints: MessageWriter<Hint>,
 ) {
-    let Some(aim) = used.aim.filter(|_| used.tool == Tool::Lamp) else { return };
+    let SavedLamp { foot, normal } = *new.event();
+    if !foot.is_finite() || !normal.is_finite() {
+        return;
+    }
     if lamps.0.len() >= MAX_LAMPS
         && let Some(oldest) = lamps.0.pop_front()
     {
-        hints.write(Hint(format!("there are only {MAX_LAMPS} lamps: the oldest one was moved here")));
+        hints.write(Hint(texts::lamps_used_up(MAX_LAMPS)));
         commands.entity(oldest).despawn();
     }
     let part = |mesh: &Handle<Mesh>, material: &Handle<StandardMaterial>, y: f32| {
@@ -96,21 +143,22 @@ fn place(
     };
     let light = PointLight {
         color: Color::srgb(1.0, 0.80, 0.52),
-        intensity: POWER,
+        intensity: 0.0,
         range: 26.0,
         radius: 0.1,
         ..default()
     };
-    let rotation = Quat::from_rotation_arc(Vec3::Y, aim.normal.normalize_or(Vec3::Y));
+    let normal = normal.normalize_or(Vec3::Y);
+    let rotation = Quat::from_rotation_arc(Vec3::Y, normal);
     let lamp = commands.spawn((
         Name::new("lamp"),
-        Lamp { root: aim.point - aim.normal * 0.4 },
-        Transform::from_translation(aim.point).with_rotation(rotation),
+        Lamp { root: foot - normal * 0.4 },
+        Transform::from_translation(foot).with_rotation(rotation),
         children![
             part(&assets.post, &assets.iron, 0.12),
             part(&assets.bulb, &assets.glow, BULB.y),
             part(&assets.cap, &assets.iron, 0.50),
-            (light, Transform::from_xyz(0.0, 0.55, 0.0)),
+            (light, Transform::from_translation(LIGHT)),
         ],
     ));
     lamps.0.push_back(lamp.id());
@@ -125,6 +173,24 @@ fn remove_loose_lamps(mut commands: Commands, terrains: Terrains, lamps: Query<(
     }
 }
 
+/// Adapts the power of lamps to the distance of the ground around them.
+fn dim_lamps(
+    terrains: Terrains,
+    lamps: Query<(&Transform, &Children), With<Lamp>>,
+    mut lights: Query<&mut PointLight>,
+) {
+    for (place, children) in &lamps {
+        let origin = place.transform_point(LIGHT);
+        let directions =
+            [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z, Vec3::Y].map(|direction| place.rotation * direction);
+        let power = POWER * headlamp::share_of_power(&terrains, origin, directions, FULL_POWER_DISTANCE);
+        let mut own = lights.iter_many_mut(children.iter());
+        while let Some(mut light) = own.fetch_next() {
+            light.intensity = power;
+        }
+    }
+}
+
 fn forget(removed: On<Remove, Lamp>, mut lamps: ResMut<Lamps>) {
     lamps.0.retain(|lamp| *lamp != removed.entity);
 }
@@ -133,6 +199,27 @@ fn forget(removed: On<Remove, Lamp>, mut lamps: ResMut<Lamps>) {
 mod tests {
     use super::*;
     use crate::test_support::spawn_flat_terrain;
+
+    #[test]
+    fn a_lamp_near_walls_is_dimmed() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, BurrowPlugins));
+        let terrain = spawn_flat_terrain(&mut app);
+        app.update();
+        let pit = Brush::dig(Shape::cylinder(Vec3::new(30.0, 12.0, 30.0), Vec3::Y * 20.0, 2.0));
+        app.world_mut().get_mut::<Terrain>(terrain).expect("it is there").apply([pit]);
+        let power = |app: &mut App, foot: Vec3| {
+            let lamp =
+                (Lamp { root: foot }, Transform::from_translation(foot), children![PointLight::default()]);
+            let lamp = app.world_mut().spawn(lamp).id();
+            app.world_mut().run_system_cached(dim_lamps).expect("a system");
+            let light = app.world().get::<Children>(lamp).expect("a light")[0];
+            app.world().get::<PointLight>(light).expect("a light").intensity
+        };
+        let [open, narrow] =
+            [Vec3::new(10.0, 20.0, 10.0), Vec3::new(30.0, 12.0, 30.0)].map(|foot| power(&mut app, foot));
+        assert!(open > 0.9 * POWER && narrow < 0.2 * POWER, "{open} {narrow}");
+    }
 
     #[test]
     fn lamps_in_the_air_or_in_the_ground_are_removed() {

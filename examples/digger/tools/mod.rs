@@ -15,6 +15,7 @@ pub mod tool_in_hand;
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use self::aim::{Aim, BuildShape};
 use crate::player::PlayerControlSystems;
@@ -22,9 +23,10 @@ use crate::player::camera::PlayerCamera;
 use crate::player::game_state::GameState;
 use crate::player::input::{Action, Actions};
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 use crate::world::landscape::{MATERIALS, NewGame, ROCK};
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Tool {
     #[default]
     Pickaxe,
@@ -40,8 +42,6 @@ pub enum Tool {
 struct ToolStats {
     /// The action that selects it.
     slot: Action,
-    label: &'static str,
-    purpose: &'static str,
     /// Seconds of a swing, and from its start to the hit.
     period: f32,
     hit: f32,
@@ -53,87 +53,17 @@ struct ToolStats {
     power: u8,
 }
 
+/// The tools, in the order of their slots.
+#[rustfmt::skip]
 const STATS: [ToolStats; 8] = [
-    ToolStats {
-        slot: Action::Slot1,
-        label: "pickaxe",
-        purpose: "breaks the ground, blow by blow",
-        period: 0.44,
-        hit: 0.20,
-        reach: 6.5,
-        radius: (1.0, 3.5, 1.8),
-        power: 150,
-    },
-    ToolStats {
-        slot: Action::Slot2,
-        label: "shovel",
-        purpose: "smooths what is rough",
-        period: 0.36,
-        hit: 0.20,
-        reach: 9.0,
-        radius: (1.5, 6.0, 3.0),
-        power: 75,
-    },
-    ToolStats {
-        slot: Action::Slot3,
-        label: "drill",
-        purpose: "drives a tunnel straight ahead",
-        period: 0.20,
-        hit: 0.12,
-        reach: 6.0,
-        radius: (1.0, 3.5, 2.1),
-        power: 190,
-    },
-    ToolStats {
-        slot: Action::Slot4,
-        label: "builder",
-        purpose: "puts down what was dug",
-        period: 0.26,
-        hit: 0.10,
-        reach: 40.0,
-        radius: (1.0, 12.0, 2.0),
-        power: u8::MAX,
-    },
-    ToolStats {
-        slot: Action::Slot5,
-        label: "painter",
-        purpose: "paints the ground with what was dug",
-        period: 0.26,
-        hit: 0.12,
-        reach: 40.0,
-        radius: (1.0, 12.0, 2.5),
-        power: u8::MAX,
-    },
-    ToolStats {
-        slot: Action::Slot6,
-        label: "bomb",
-        purpose: "flies, bounces, and takes a room out of a hill",
-        period: 0.80,
-        hit: 0.28,
-        reach: 40.0,
-        radius: (5.5, 5.5, 5.5),
-        power: u8::MAX,
-    },
-    ToolStats {
-        slot: Action::Slot7,
-        label: "lamp",
-        purpose: "stays where it is put, and lights a cave",
-        period: 0.50,
-        hit: 0.16,
-        reach: 14.0,
-        radius: (0.3, 0.3, 0.3),
-        power: u8::MAX,
-    },
-    ToolStats {
-        slot: Action::Slot8,
-        label: "ball",
-        purpose: "bounces, and rolls to where it is deepest",
-        period: 0.50,
-        hit: 0.20,
-        reach: 40.0,
-        radius: (0.3, 0.3, 0.3),
-        power: u8::MAX,
-    },
+    ToolStats { slot: Action::Slot1, period: 0.44, hit: 0.20, reach: 9.0, radius: (1.0, 3.5, 1.8), power: 150 },
+    ToolStats { slot: Action::Slot2, period: 0.36, hit: 0.20, reach: 9.0, radius: (1.5, 6.0, 3.0), power: 75 },
+    ToolStats { slot: Action::Slot3, period: 0.20, hit: 0.12, reach: 8.0, radius: (1.0, 3.5, 2.1), power: 190 },
+    ToolStats { slot: Action::Slot4, period: 0.26, hit: 0.10, reach: 40.0, radius: (1.0, 12.0, 2.0), power: u8::MAX },
+    ToolStats { slot: Action::Slot5, period: 0.26, hit: 0.12, reach: 40.0, radius: (1.0, 12.0, 2.5), power: u8::MAX },
+    ToolStats { slot: Action::Slot6, period: 0.80, hit: 0.28, reach: 40.0, radius: (5.5, 5.5, 5.5), power: u8::MAX },
+    ToolStats { slot: Action::Slot7, period: 0.50, hit: 0.16, reach: 14.0, radius: (0.3, 0.3, 0.3), power: u8::MAX },
+    ToolStats { slot: Action::Slot8, period: 0.50, hit: 0.20, reach: 40.0, radius: (0.3, 0.3, 0.3), power: u8::MAX },
 ];
 
 impl Tool {
@@ -154,11 +84,11 @@ impl Tool {
     }
 
     pub const fn label(self) -> &'static str {
-        self.stats().label
+        texts::TOOLS[self as usize].0
     }
 
     pub const fn purpose(self) -> &'static str {
-        self.stats().purpose
+        texts::TOOLS[self as usize].1
     }
 
     /// The minimum and maximum radius of its brush.
@@ -190,6 +120,15 @@ fn cycle<T: Copy + PartialEq>(all: &[T], from: T, by: usize) -> T {
     all[(at + by) % all.len()]
 }
 
+/// A [`Hand`] as it is saved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SavedHand {
+    tool: Tool,
+    shape: BuildShape,
+    material: u8,
+    radii: [f32; 8],
+}
+
 /// The player's tool, and how it is set up.
 #[derive(Resource)]
 pub struct Hand {
@@ -211,6 +150,23 @@ impl Hand {
             _ => tool.stats().radius.2,
         });
         Self { tool: default(), shape: settings.shape, material: ROCK, radii, aim: None, preview: true }
+    }
+
+    /// What is saved of it.
+    pub fn saved(&self) -> SavedHand {
+        SavedHand { tool: self.tool, shape: self.shape, material: self.material.0, radii: self.radii }
+    }
+
+    /// Takes over what was saved.
+    pub fn restore(&mut self, saved: &SavedHand) {
+        (self.tool, self.shape) = (saved.tool, saved.shape);
+        if MATERIALS.contains(&MaterialId(saved.material)) {
+            self.material = MaterialId(saved.material);
+        }
+        for (tool, radius) in Tool::ALL.into_iter().zip(saved.radii).filter(|(_, radius)| radius.is_finite())
+        {
+            self.set_radius(tool, radius);
+        }
     }
 
     /// The radius of a tool's brush.
@@ -328,15 +284,14 @@ fn choose(actions: Res<Actions>, mut hand: ResMut<Hand>) {
     if let Some(tool) = Tool::ALL.into_iter().find(|tool| actions.just_pressed(tool.slot())) {
         hand.tool = tool;
     }
-    let materials = MATERIALS.map(|(material, _)| material);
     for (action, by) in [(Action::NextTool, 1), (Action::PreviousTool, Tool::ALL.len() - 1)] {
         if actions.just_pressed(action) {
             hand.tool = cycle(&Tool::ALL, hand.tool, by);
         }
     }
-    for (action, by) in [(Action::NextMaterial, 1), (Action::PreviousMaterial, materials.len() - 1)] {
+    for (action, by) in [(Action::NextMaterial, 1), (Action::PreviousMaterial, MATERIALS.len() - 1)] {
         if actions.just_pressed(action) {
-            hand.material = cycle(&materials, hand.material, by);
+            hand.material = cycle(&MATERIALS, hand.material, by);
         }
     }
     if actions.just_pressed(Action::BuildShape) {

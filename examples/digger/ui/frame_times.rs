@@ -17,7 +17,6 @@ pub struct FrameTimesPlugin;
 impl Plugin for FrameTimesPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<FrameTimes>()
-            .add_systems(Startup, spawn_text)
             .add_systems(Update, toggle.in_set(PlayerControlSystems).run_if(in_state(GameState::Playing)))
             .add_systems(Last, (measure, show).chain());
     }
@@ -36,25 +35,16 @@ struct FrameTimesPanel;
 #[derive(Component)]
 struct FrameTimesText;
 
-fn spawn_text(mut commands: Commands) {
-    let corner = Node {
-        position_type: PositionType::Absolute,
-        left: px(12),
-        top: px(12),
-        padding: UiRect::all(px(8)),
-        ..default()
-    };
-    commands.spawn((
-        FrameTimesPanel,
-        widgets::panel(corner),
-        Visibility::Hidden,
-        children![(FrameTimesText, widgets::text("", 13.0, widgets::WHITE))],
-    ));
+/// The panel, for the heads-up display.
+pub fn panel(node: Node) -> impl Bundle {
+    let node = Node { display: Display::None, ..node };
+    let text = (FrameTimesText, widgets::text("", 13.0, widgets::WHITE));
+    (FrameTimesPanel, widgets::panel(node), children![text])
 }
 
-fn toggle(actions: Res<Actions>, mut panel: Single<&mut Visibility, With<FrameTimesPanel>>) {
+fn toggle(actions: Res<Actions>, mut panel: Single<&mut Node, With<FrameTimesPanel>>) {
     if actions.just_pressed(Action::FrameTimes) {
-        panel.toggle_inherited_hidden();
+        panel.display = if panel.display == Display::None { Display::Flex } else { Display::None };
     }
 }
 
@@ -68,10 +58,10 @@ fn show(
     figures: Res<BurrowFigures>,
     chunks: Query<(), With<Chunk>>,
     levels: Query<&ShownLevels>,
-    panel: Single<&Visibility, With<FrameTimesPanel>>,
+    panel: Single<&Node, With<FrameTimesPanel>>,
     mut text: Single<&mut Text, With<FrameTimesText>>,
 ) {
-    if **panel == Visibility::Hidden {
+    if panel.display == Display::None {
         return;
     }
     let ms = |time: Duration| time.as_secs_f64() * 1e3;

@@ -7,21 +7,28 @@ use bevy_burrow::panel::BurrowPanel;
 use bevy_burrow::prelude::*;
 
 use crate::party::players::PlayerInfo;
+use crate::player::Player;
+use crate::player::body::Body;
 use crate::player::camera::{DetachedCamera, PlayerCamera};
 use crate::player::game_state::GameState;
 use crate::player::headlamp::HeadlampSwitch;
-use crate::player::input::Action;
+use crate::player::input::{Action, Actions};
+use crate::tools::hardness;
 use crate::tools::inventory::{AmountChanged, Inventory};
 use crate::tools::{Hand, Tool};
+use crate::ui::frame_times;
 use crate::ui::images::Images;
 use crate::ui::labels::Labels;
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 use crate::ui::widgets::{self, EDGE, GOLD, GREY, RED, SHADE, WHITE, column, text};
 use crate::world::day::Clock;
-use crate::world::landscape::{self, MATERIALS};
+use crate::world::landscape::{self, BEDROCK, MATERIALS};
 
 /// Seconds that a hint or a find is shown, in real time: also while the game is paused.
 const SHOWN: f32 = 2.6;
+/// Seconds after which it is told that the world is not on the disk yet.
+const SLOW_SAVE: f32 = 5.0;
 /// Finds that are shown at the same time.
 const MAX_FINDS: usize = 4;
 
@@ -46,6 +53,7 @@ impl Plugin for HudPlugin {
                 show_materials,
                 fade_crosshair,
                 show_time,
+                show_whereabouts,
                 show_hints,
                 show_finds,
                 show_core_sample,
@@ -87,6 +95,13 @@ struct Amount(MaterialId);
 #[derive(Component)]
 struct TimeOfDay;
 
+/// Direction of view, height and depth.
+#[derive(Component)]
+struct Whereabouts;
+
+#[derive(Component)]
+struct HintBox;
+
 #[derive(Component)]
 struct Hints;
 
@@ -109,13 +124,28 @@ fn spawn_hud(mut commands: Commands, images: Res<Images>) {
         };
         let colors = (BackgroundColor(WHITE), BorderColor::all(Color::srgba(0.0, 0.0, 0.0, 0.6)));
         hud.spawn((widgets::centered(), children![(Crosshair, dot, colors)]));
-        let left = Node { left: px(16), top: px(12), ..absolute() };
-        hud.spawn((left, children![(CoreSample, text("", 14.0, WHITE))]));
-        let corner = Node { right: px(16), top: px(12), ..absolute() };
-        hud.spawn((corner, children![(TimeOfDay, text("", 17.0, WHITE))]));
+        let left = Node {
+            position_type: PositionType::Absolute,
+            left: px(14),
+            top: px(12),
+            align_items: AlignItems::Start,
+            ..column(px(6))
+        };
+        let padded = || Node { padding: UiRect::axes(px(9), px(6)), ..default() };
+        hud.spawn(left).with_children(|left| {
+            left.spawn((widgets::panel(padded()), children![(CoreSample, text("", 14.0, WHITE))]));
+            left.spawn(frame_times::panel(padded()));
+        });
+        let corner = Node { right: px(14), top: px(12), align_items: AlignItems::End, ..padded() };
+        let corner =
+            Node { position_type: PositionType::Absolute, flex_direction: FlexDirection::Column, ..corner };
+        let lines = children![(TimeOfDay, text("", 16.0, WHITE)), (Whereabouts, text("", 14.0, GREY))];
+        hud.spawn((widgets::panel(corner), lines));
         let top =
             Node { width: percent(100), top: px(92), justify_content: JustifyContent::Center, ..absolute() };
-        hud.spawn((top, children![(Hints, text("", 19.0, GOLD))]));
+        let hint = Node { max_width: percent(46), ..padded() };
+        let hint = (HintBox, widgets::panel(hint), Visibility::Hidden);
+        hud.spawn((top, children![(hint, children![(Hints, widgets::paragraph("", 18.0, GOLD))])]));
         let keys = Node { left: px(14), bottom: px(12), padding: UiRect::axes(px(9), px(6)), ..absolute() };
         hud.spawn((widgets::panel(keys), children![(KeyList, text("", 13.0, GREY))]));
         let bottom = Node {
@@ -159,7 +189,7 @@ fn spawn_slots(parent: &mut ChildSpawnerCommands, images: &Images) {
                 slot,
                 BackgroundColor(SHADE),
                 BorderColor::all(EDGE),
-                children![(images.icon(tool), icon), (key, SlotKey(tool.slot()), text("", 11.0, GREY))],
+                children![(images.icon(tool), icon), (key, SlotKey(tool.slot()), text("", 11.0, WHITE))],
             ));
         }
     });
@@ -168,12 +198,13 @@ fn spawn_slots(parent: &mut ChildSpawnerCommands, images: &Images) {
 /// The inventory, with the latest finds above.
 fn spawn_materials(parent: &mut ChildSpawnerCommands) {
     for at in (0..MAX_FINDS).rev() {
-        parent.spawn((Find(at), text("", 15.0, WHITE)));
+        let node = Node { padding: UiRect::axes(px(8), px(1)), ..default() };
+        parent.spawn((Find(at), widgets::panel(node), Visibility::Hidden, children![text("", 15.0, WHITE)]));
     }
     let list =
         Node { width: px(158), padding: UiRect::all(px(5)), margin: UiRect::top(px(4)), ..column(px(1)) };
     parent.spawn(widgets::panel(list)).with_children(|list| {
-        for (material, name) in MATERIALS {
+        for material in MATERIALS {
             let row = Node {
                 height: px(22),
                 padding: UiRect::horizontal(px(5)),
@@ -195,7 +226,7 @@ fn spawn_materials(parent: &mut ChildSpawnerCommands) {
                         BackgroundColor(swatch_color(material)),
                         BorderColor::all(WHITE.with_alpha(0.45))
                     ),
-                    (text(name, 13.0, WHITE), grow),
+                    (text(landscape::name(material), 13.0, WHITE), grow),
                     (Amount(material), text("", 13.0, GREY)),
                 ],
             ));
@@ -229,21 +260,34 @@ const CORE_DEPTH: i32 = 24;
 fn show_core_sample(
     hand: Res<Hand>,
     terrains: Query<(&Terrain, &GlobalTransform)>,
-    mut core: Single<&mut Text, With<CoreSample>>,
+    mut core: Single<(&mut Text, &ChildOf), With<CoreSample>>,
+    mut boxes: Query<&mut Visibility>,
 ) {
     let lines = hand.aim.zip(terrains.iter().next()).map(|(aim, (terrain, place))| {
         let world = terrain.world();
         let top = place.affine().inverse().transform_point3(aim.point).floor().as_ivec3();
-        let is_solid = |depth: &i32| world.samples().is_solid(top - IVec3::Y * depth);
-        let solid = (0..CORE_DEPTH).filter(is_solid);
-        let mut layers: Vec<(i32, MaterialId)> =
-            solid.map(|depth| (depth, world.samples().material(top - IVec3::Y * depth))).collect();
-        layers.dedup_by_key(|layer| layer.1);
-        let lines =
-            layers.iter().map(|(depth, material)| format!("{depth:>3} m  {}", landscape::name(*material)));
-        lines.collect::<Vec<_>>().join("\n")
+        core_sample(|depth| {
+            let voxel = top - IVec3::Y * depth;
+            let is_solid = world.samples().is_solid(voxel);
+            is_solid
+                .then(|| if voxel.y < hardness::BEDROCK { BEDROCK } else { world.samples().material(voxel) })
+        })
     });
-    core.set_if_neq(Text::new(lines.unwrap_or_default()));
+    let lines = lines.unwrap_or_default();
+    if let Ok(mut shown) = boxes.get_mut(core.1.parent()) {
+        shown.set_if_neq(if lines.is_empty() { Visibility::Hidden } else { Visibility::Inherited });
+    }
+    core.0.set_if_neq(Text::new(lines));
+}
+
+/// The materials by depth. Where nothing can be dug, that is what counts.
+fn core_sample(material_at: impl Fn(i32) -> Option<MaterialId>) -> String {
+    let mut layers: Vec<(i32, MaterialId)> =
+        (0..CORE_DEPTH).filter_map(|depth| Some((depth, material_at(depth)?))).collect();
+    layers.dedup_by_key(|layer| layer.1);
+    let lines =
+        layers.iter().map(|(depth, material)| format!("{depth:>3} m  {}", landscape::name(*material)));
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 fn show_tool(
@@ -290,10 +334,18 @@ fn show_materials(
     }
 }
 
-/// The crosshair is faint where the tool does not reach.
-fn fade_crosshair(hand: Res<Hand>, mut dot: Single<&mut BackgroundColor, With<Crosshair>>) {
-    let reaches = hand.aim.is_some() || matches!(hand.tool, Tool::Bomb | Tool::Ball);
-    dot.set_if_neq(BackgroundColor(WHITE.with_alpha(if reaches { 0.95 } else { 0.30 })));
+/// The crosshair is faint where the tool does not reach, and red while it is used there.
+fn fade_crosshair(
+    hand: Res<Hand>,
+    actions: Res<Actions>,
+    mut dot: Single<&mut BackgroundColor, With<Crosshair>>,
+) {
+    let color = match hand.aim.is_some() || matches!(hand.tool, Tool::Bomb | Tool::Ball) {
+        true => WHITE.with_alpha(0.95),
+        false if actions.pressed(Action::Use) => RED,
+        false => WHITE.with_alpha(0.30),
+    };
+    dot.set_if_neq(BackgroundColor(color));
 }
 
 fn show_time(
@@ -301,38 +353,62 @@ fn show_time(
     lamp: Res<HeadlampSwitch>,
     worlds: Query<(&Terrain, &WorldStore)>,
     others: Query<&PlayerInfo>,
+    clock_time: Res<Time<Real>>,
     mut time: Single<&mut Text, With<TimeOfDay>>,
+    mut behind: Local<f32>,
 ) {
-    let lamp = if lamp.0 { "lamp on   " } else { "" };
     let is_behind = |(terrain, world): (&Terrain, &WorldStore)| world.durable() < terrain.world().revision();
-    let saving = if worlds.iter().any(is_behind) { "saving   " } else { "" };
-    let players = match others.iter().count() {
-        0 | 1 => String::new(),
-        players => format!("{players} players   "),
-    };
-    time.set_if_neq(Text::new(format!("{players}{lamp}{saving}{}", clock.text())));
+    // While the player drills, something always is on its way to the disk.
+    *behind = if worlds.iter().any(is_behind) { *behind + clock_time.delta_secs() } else { 0.0 };
+    let players = others.iter().count();
+    let mut words: Vec<String> = Vec::new();
+    words.extend((players > 1).then(|| texts::players(players)));
+    words.extend(lamp.0.then(|| texts::HEADLAMP_ON.into()));
+    words.extend((*behind > SLOW_SAVE).then(|| texts::SAVING.into()));
+    words.push(clock.text());
+    time.set_if_neq(Text::new(words.join("   ")));
 }
 
+/// Shows where the player looks, how high it is, and how deep below the ground.
+fn show_whereabouts(
+    players: Query<(&Player, Body)>,
+    terrains: Terrains,
+    mut line: Single<&mut Text, With<Whereabouts>>,
+) {
+    let Some((player, body)) = players.iter().next() else { return };
+    let feet = body.feet();
+    let depth = terrains.height(feet.x, feet.z).map_or(0.0, |top| top - feet.y);
+    line.set_if_neq(Text::new(texts::place(compass(player.yaw), feet.y, depth)));
+}
+
+/// The direction of the compass for a yaw, which grows to the left from north, -z.
+fn compass(yaw: f32) -> &'static str {
+    let eighths = (-yaw / std::f32::consts::FRAC_PI_4).round() as i64;
+    texts::COMPASS[eighths.rem_euclid(8) as usize]
+}
+
+/// A hint and its box are shown for a while, and then both are gone.
 fn show_hints(
     time: Res<Time<Real>>,
     mut hints: MessageReader<Hint>,
-    mut line: Single<(&mut Text, &mut TextColor), With<Hints>>,
+    mut text: Single<&mut Text, With<Hints>>,
+    mut shown: Single<&mut Visibility, With<HintBox>>,
     mut left: Local<f32>,
 ) {
-    let (text, color) = &mut *line;
     if let Some(hint) = hints.read().last() {
         text.set_if_neq(Text::new(hint.0.clone()));
-        *left = SHOWN;
+        *left = SHOWN + 0.04 * hint.0.len() as f32;
     }
+    shown.set_if_neq(if *left > 0.0 { Visibility::Inherited } else { Visibility::Hidden });
     *left -= time.delta_secs();
-    color.set_if_neq(TextColor(GOLD.with_alpha((2.0 * *left).clamp(0.0, 1.0))));
 }
 
 /// Shows what was gained and used lately. Changes of the same material are added up.
 fn show_finds(
     time: Res<Time<Real>>,
     mut changes: MessageReader<AmountChanged>,
-    mut lines: Query<(&Find, &mut Text, &mut TextColor)>,
+    mut lines: Query<(&Find, &mut Visibility, &Children)>,
+    mut texts: Query<&mut Text>,
     mut finds: Local<VecDeque<(MaterialId, i64, f32)>>,
 ) {
     for change in changes.read() {
@@ -347,12 +423,12 @@ fn show_finds(
     }
     finds.retain(|find| find.2 > 0.0);
     finds.truncate(MAX_FINDS);
-    for (line, mut text, mut color) in &mut lines {
-        let (words, alpha) = finds.get(line.0).map_or((String::new(), 0.0), |&(material, by, left)| {
-            (format!("{by:+} {}", landscape::name(material)), (2.0 * left).clamp(0.0, 1.0))
-        });
-        text.set_if_neq(Text::new(words));
-        color.set_if_neq(TextColor(WHITE.with_alpha(alpha)));
+    for (line, mut shown, children) in &mut lines {
+        let find = finds.get(line.0);
+        shown.set_if_neq(if find.is_some() { Visibility::Inherited } else { Visibility::Hidden });
+        if let (Some(&(material, by, _)), Ok(mut text)) = (find, texts.get_mut(children[0])) {
+            text.set_if_neq(Text::new(format!("{by:+} {}", landscape::name(material))));
+        }
     }
 }
 
@@ -381,21 +457,59 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hints_disappear_even_while_the_game_is_paused() {
+    fn a_hint_disappears_with_its_box_even_while_the_game_is_paused() {
         let mut app = App::new();
         app.add_plugins(MinimalPlugins)
             .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(500)))
             .add_message::<Hint>()
             .add_systems(Update, show_hints);
-        let line = app.world_mut().spawn((Hints, Text::default(), TextColor::default())).id();
-        let alpha = |app: &App| app.world().get::<TextColor>(line).expect("a line").0.alpha();
+        app.world_mut().spawn((Hints, Text::default()));
+        let shown = app.world_mut().spawn((HintBox, Visibility::Hidden)).id();
+        let is_shown = |app: &App| app.world().get(shown) == Some(&Visibility::Inherited);
         app.world_mut().resource_mut::<Time<Virtual>>().pause();
+        app.update();
+        assert!(!is_shown(&app), "there was none yet");
         app.world_mut().write_message(Hint("look there".into()));
         app.update();
-        assert_eq!(alpha(&app), 1.0);
-        for _ in 0..6 {
+        assert!(is_shown(&app));
+        for _ in 0..7 {
             app.update();
         }
-        assert_eq!(alpha(&app), 0.0);
+        assert!(!is_shown(&app));
+    }
+
+    #[test]
+    fn every_text_of_the_display_has_a_backing() {
+        let mut app = App::new();
+        app.init_resource::<Assets<Image>>().init_resource::<Images>().add_systems(Startup, spawn_hud);
+        app.update();
+        let world = app.world_mut();
+        let mut texts = world.query_filtered::<Entity, With<Text>>();
+        for text in texts.iter(world).collect::<Vec<_>>() {
+            let above =
+                std::iter::successors(Some(text), |at| world.get::<ChildOf>(*at).map(ChildOf::parent));
+            let fills: Vec<f32> = above
+                .filter_map(|node| world.get::<BackgroundColor>(node))
+                .map(|fill| fill.0.alpha())
+                .collect();
+            assert!(fills.iter().any(|alpha| *alpha > 0.7), "{text}: {fills:?}");
+        }
+    }
+
+    #[test]
+    fn the_core_sample_names_bedrock() {
+        let rock =
+            |bedrock: i32| move |depth: i32| Some(if depth < bedrock { landscape::ROCK } else { BEDROCK });
+        assert_eq!(core_sample(rock(2)), "  0 m  rock\n  2 m  bedrock");
+        assert_eq!(core_sample(|_| None), "");
+    }
+
+    #[test]
+    fn the_compass_turns_with_the_player() {
+        let yaws = [0.0, -0.8, -1.5, 3.1, 1.5, 6.3, 0.3];
+        assert_eq!(yaws.map(compass), ["N", "NE", "E", "S", "W", "N", "N"]);
+        // The sun rises where the game says that the east is.
+        let sunrise = Clock { hour: 6.0, runs: true }.sun();
+        assert_eq!(compass(Player::looking(Vec3::ZERO, sunrise).yaw), "E");
     }
 }

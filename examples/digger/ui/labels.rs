@@ -92,6 +92,6 @@ mod tests {
         ]);
         let keys = [KeyCode::Digit1, KeyCode::Digit2, KeyCode::KeyW, KeyCode::KeyM, KeyCode::KeyX];
         assert_eq!(keys.map(|key| label(&some, key)), ["1", "2", "W", "M", "X"]);
-        assert_eq!(some.of(Binding::Mouse(MouseButton::Left)), "Mouse Left");
+        assert_eq!(some.of(Binding::Mouse(MouseButton::Left)), "Left mouse");
     }
 }

@@ -7,4 +7,5 @@ pub mod labels;
 pub mod menu;
 pub mod panel;
 pub mod settings;
+pub mod texts;
 pub mod widgets;

@@ -25,6 +25,8 @@ pub struct Settings {
     pub view_distance: f32,
     /// Of shadows, textures and far ground.
     pub quality: Quality,
+    /// Factor for the size of menus and the heads-up display, as far as there is room.
+    pub ui_scale: f32,
     /// Minutes from sunrise to sunrise; 0 stops the sun.
     pub day_minutes: f32,
     /// The radius of pickaxe and builder in metres.
@@ -58,6 +60,7 @@ impl Default for Settings {
             field_of_view: 70.0,
             view_distance: 6000.0,
             quality: Quality::default(),
+            ui_scale: 1.0,
             day_minutes: 20.0,
             radius: 2.0,
             shape: BuildShape::default(),
@@ -122,6 +125,7 @@ impl Settings {
             (&mut self.view_distance, 200.0, 8000.0),
             (&mut self.day_minutes, 0.0, 120.0),
             (&mut self.radius, 1.0, 12.0),
+            (&mut self.ui_scale, 0.5, 1.5),
         ] {
             *number = number.clamp(low, high);
         }

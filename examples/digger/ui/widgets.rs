@@ -2,20 +2,28 @@
 //!
 //! The mouse, keys and gamepads select menu items alike. An item gets [`Activated`] or [`Adjusted`] and observes it.
 
+use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
+use bevy::state::state::{StateTransitionEvent, StateTransitionSystems};
 
 use crate::player::game_state::{GameState, MenuPage};
 use crate::player::input::ActionSystems;
+use crate::ui::settings::Settings;
 
-pub const SHADE: Color = Color::srgba(0.03, 0.035, 0.05, 0.72);
+pub const SHADE: Color = Color::srgba(0.03, 0.035, 0.05, 0.84);
 pub const EDGE: Color = Color::srgba(1.0, 1.0, 1.0, 0.16);
 pub const WHITE: Color = Color::srgb(0.96, 0.96, 0.94);
 pub const GREY: Color = Color::srgb(0.68, 0.70, 0.72);
 pub const GOLD: Color = Color::srgb(1.0, 0.80, 0.32);
 pub const RED: Color = Color::srgb(1.0, 0.45, 0.35);
 
-/// A line of text.
+/// A line of text. It is never broken: where it may be, there are [`paragraph`]s.
 pub fn text(words: impl Into<String>, size: f32, color: Color) -> impl Bundle {
+    (paragraph(words, size, color), TextLayout::no_wrap())
+}
+
+/// Text that is broken into lines as its node is too narrow for one.
+pub fn paragraph(words: impl Into<String>, size: f32, color: Color) -> impl Bundle {
     (
         Text::new(words),
         TextFont::from_font_size(size),
@@ -78,9 +86,9 @@ pub struct Adjusted {
     pub by: i32,
 }
 
-/// The position of the item that keys and gamepads activate.
-#[derive(Resource, Clone, Copy, Debug, Default)]
-pub struct FocusedItem(pub usize);
+/// The position of the item that keys and gamepads activate, and those of the pages that were left.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct FocusedItem(pub usize, HashMap<MenuPage, usize>);
 
 /// Menus ignore keys, buttons and clicks while this exists.
 #[derive(Resource)]
@@ -125,31 +133,51 @@ impl Plugin for UiPlugin {
                         .run_if(not(in_state(MenuPage::None))),
                 ),
             )
-            .add_systems(StateTransition, reset_focus.run_if(state_changed::<MenuPage>))
+            .add_systems(StateTransition, move_focus.after(StateTransitionSystems::EnterSchedules))
             // The menus of the pause and of the title are the same page.
-            .add_systems(OnEnter(GameState::Title), reset_focus);
+            .add_systems(OnEnter(GameState::Title), forget_focus)
+            .add_systems(OnEnter(GameState::Playing), forget_focus);
     }
 }
 
-fn scale_ui(windows: Query<&Window>, page: Res<State<MenuPage>>, mut scale: ResMut<UiScale>) {
+fn scale_ui(
+    windows: Query<&Window>,
+    page: Res<State<MenuPage>>,
+    settings: Res<Settings>,
+    mut scale: ResMut<UiScale>,
+) {
     if let Some(window) = windows.iter().next() {
-        let new = scale_for(window.width(), window.height(), **page == MenuPage::None);
+        let is_playing = **page == MenuPage::None;
+        let new = scale_for(window.width(), window.height(), settings.ui_scale, is_playing);
         if scale.0 != new {
             scale.0 = new;
         }
     }
 }
 
-/// The scale of the user interface, which is laid out for 1280 x 720. Menus need all of the window; during play, texts
-/// in a small window stay large enough to be read.
-pub fn scale_for(width: f32, height: f32, is_playing: bool) -> f32 {
+/// The scale of the user interface, which is laid out for 1280 x 720, times the factor `wanted` as far as there is room. Menus
+/// need all of the window; during play, texts in a small window stay large enough to be read.
+pub fn scale_for(width: f32, height: f32, wanted: f32, is_playing: bool) -> f32 {
     let fit = (width / 1280.0).min(height / 720.0);
-    let least = if is_playing { (width / 850.0).min(height / 470.0).min(0.75) } else { 0.0 };
-    fit.max(least).clamp(0.4, 3.0)
+    let most = if is_playing { (width / 850.0).min(height / 470.0) } else { fit };
+    (fit.max(most.min(0.75)) * wanted).min(most).clamp(0.3, 4.0)
 }
 
-fn reset_focus(mut focus: ResMut<FocusedItem>) {
-    focus.0 = 0;
+/// Who goes back to a page finds the item selected that led away from it.
+fn move_focus(mut moves: MessageReader<StateTransitionEvent<MenuPage>>, mut focus: ResMut<FocusedItem>) {
+    for transition in moves.read() {
+        let (Some(from), Some(to)) = (transition.exited, transition.entered) else { continue };
+        let left = focus.0;
+        let is_back = from == MenuPage::Question || from == to || from.parent() == Some(to);
+        focus.0 = focus.1.remove(&to).filter(|_| is_back).unwrap_or(if from == to { left } else { 0 });
+        if !is_back {
+            focus.1.insert(from, left);
+        }
+    }
+}
+
+fn forget_focus(mut focus: ResMut<FocusedItem>) {
+    *focus = default();
 }
 
 /// Reacts to the mouse.
@@ -271,11 +299,23 @@ mod tests {
             (2560.0, 1440.0, 2.0, 2.0),
             (640.0, 360.0, 0.5, 0.75),
             (960.0, 540.0, 0.75, 0.75),
-            (64.0, 64.0, 0.4, 0.4),
+            (64.0, 64.0, 0.3, 0.3),
         ] {
-            let scales = [false, true].map(|is_playing| scale_for(width, height, is_playing));
+            let scales = [false, true].map(|is_playing| scale_for(width, height, 1.0, is_playing));
             let is_near = |scale: f32, expected: f32| (scale - expected).abs() < 0.02;
             assert!(is_near(scales[0], menu) && is_near(scales[1], game), "{width}: {scales:?}");
+            // However large they are wanted, menus and the display fit into the window.
+            for wanted in [0.5, 1.5, 4.0] {
+                let [menu, game] =
+                    [false, true].map(|is_playing| scale_for(width, height, wanted, is_playing));
+                let fits = |scale: f32, of: Vec2| {
+                    scale <= 0.3 || scale * of.x <= width + 0.1 && scale * of.y <= height + 0.1
+                };
+                assert!(
+                    fits(menu, vec2(1280.0, 720.0)) && fits(game, vec2(850.0, 470.0)),
+                    "{wanted}: {menu} {game}"
+                );
+            }
         }
     }
 }

@@ -66,72 +66,33 @@ struct Colors {
 }
 
 /// The colours by the height of the sun, as the sine of its angle.
+#[rustfmt::skip]
 const COLORS: [(f32, Colors); 5] = [
-    (
-        -0.28,
-        Colors {
-            zenith: Vec3::new(0.003, 0.006, 0.017),
-            horizon: Vec3::new(0.012, 0.019, 0.038),
-            glow: Vec3::ZERO,
-            spread: 0.0,
-            cloud_light: Vec3::new(0.022, 0.028, 0.045),
-            cloud_shade: Vec3::new(0.006, 0.008, 0.016),
-            ambient: Vec3::new(0.45, 0.57, 0.95),
-            brightness: 95.0,
-        },
-    ),
-    (
-        -0.09,
-        Colors {
-            zenith: Vec3::new(0.022, 0.040, 0.125),
-            horizon: Vec3::new(0.20, 0.14, 0.19),
-            glow: Vec3::new(0.80, 0.26, 0.10),
-            spread: 0.9,
-            cloud_light: Vec3::new(0.34, 0.17, 0.19),
-            cloud_shade: Vec3::new(0.06, 0.06, 0.11),
-            ambient: Vec3::new(0.68, 0.62, 0.92),
-            brightness: 260.0,
-        },
-    ),
-    (
-        0.03,
-        Colors {
-            zenith: Vec3::new(0.065, 0.13, 0.34),
-            horizon: Vec3::new(0.55, 0.37, 0.30),
-            glow: Vec3::new(1.15, 0.46, 0.14),
-            spread: 0.8,
-            cloud_light: Vec3::new(1.10, 0.52, 0.34),
-            cloud_shade: Vec3::new(0.26, 0.21, 0.28),
-            ambient: Vec3::new(0.90, 0.78, 0.86),
-            brightness: 620.0,
-        },
-    ),
-    (
-        0.18,
-        Colors {
-            zenith: Vec3::new(0.075, 0.19, 0.48),
-            horizon: Vec3::new(0.66, 0.62, 0.60),
-            glow: Vec3::new(1.0, 0.66, 0.34),
-            spread: 0.35,
-            cloud_light: Vec3::new(1.22, 1.0, 0.80),
-            cloud_shade: Vec3::new(0.50, 0.50, 0.58),
-            ambient: Vec3::new(0.86, 0.86, 0.95),
-            brightness: 1000.0,
-        },
-    ),
-    (
-        0.45,
-        Colors {
-            zenith: Vec3::new(0.075, 0.21, 0.56),
-            horizon: Vec3::new(0.56, 0.70, 0.86),
-            glow: Vec3::new(1.0, 0.82, 0.58),
-            spread: 0.0,
-            cloud_light: Vec3::new(1.25, 1.20, 1.12),
-            cloud_shade: Vec3::new(0.62, 0.68, 0.78),
-            ambient: Vec3::new(0.78, 0.88, 1.0),
-            brightness: 1250.0,
-        },
-    ),
+    (-0.28, Colors {
+        zenith: Vec3::new(0.003, 0.006, 0.017), horizon: Vec3::new(0.012, 0.019, 0.038), glow: Vec3::ZERO,
+        spread: 0.0, cloud_light: Vec3::new(0.022, 0.028, 0.045), cloud_shade: Vec3::new(0.006, 0.008, 0.016),
+        ambient: Vec3::new(0.45, 0.57, 0.95), brightness: 95.0,
+    }),
+    (-0.09, Colors {
+        zenith: Vec3::new(0.022, 0.040, 0.125), horizon: Vec3::new(0.20, 0.14, 0.19), glow: Vec3::new(0.80, 0.26, 0.10),
+        spread: 0.9, cloud_light: Vec3::new(0.34, 0.17, 0.19), cloud_shade: Vec3::new(0.06, 0.06, 0.11),
+        ambient: Vec3::new(0.68, 0.62, 0.92), brightness: 260.0,
+    }),
+    (0.03, Colors {
+        zenith: Vec3::new(0.065, 0.13, 0.34), horizon: Vec3::new(0.55, 0.37, 0.30), glow: Vec3::new(1.15, 0.46, 0.14),
+        spread: 0.8, cloud_light: Vec3::new(1.10, 0.52, 0.34), cloud_shade: Vec3::new(0.26, 0.21, 0.28),
+        ambient: Vec3::new(0.90, 0.78, 0.86), brightness: 620.0,
+    }),
+    (0.18, Colors {
+        zenith: Vec3::new(0.075, 0.19, 0.48), horizon: Vec3::new(0.66, 0.62, 0.60), glow: Vec3::new(1.0, 0.66, 0.34),
+        spread: 0.35, cloud_light: Vec3::new(1.22, 1.0, 0.80), cloud_shade: Vec3::new(0.50, 0.50, 0.58),
+        ambient: Vec3::new(0.86, 0.86, 0.95), brightness: 1000.0,
+    }),
+    (0.45, Colors {
+        zenith: Vec3::new(0.075, 0.21, 0.56), horizon: Vec3::new(0.56, 0.70, 0.86), glow: Vec3::new(1.0, 0.82, 0.58),
+        spread: 0.0, cloud_light: Vec3::new(1.25, 1.20, 1.12), cloud_shade: Vec3::new(0.62, 0.68, 0.78),
+        ambient: Vec3::new(0.78, 0.88, 1.0), brightness: 1250.0,
+    }),
 ];
 
 impl Colors {

@@ -21,7 +21,8 @@ use crate::film::places::Places;
 use crate::party::connection::Party;
 use crate::party::players::voxel;
 use crate::tools::hardness;
-use crate::world::saves::PlayedWorld;
+use crate::ui::texts;
+use crate::world::saves::{self, PlayedWorld};
 use crate::world::strata::strata;
 
 pub const ROCK: MaterialId = MaterialId(0);
@@ -35,25 +36,16 @@ pub const GOLD: MaterialId = MaterialId(7);
 pub const SOIL: MaterialId = MaterialId(8);
 pub const SANDSTONE: MaterialId = MaterialId(9);
 pub const SHALE: MaterialId = MaterialId(10);
+/// What nothing breaks; nobody carries it.
+pub const BEDROCK: MaterialId = MaterialId(11);
 
-/// The materials and their names, in the order of their ids and of the default `MaterialColors`.
-pub const MATERIALS: [(MaterialId, &str); 11] = [
-    (ROCK, "rock"),
-    (GRASS, "turf"),
-    (SAND, "sand"),
-    (SNOW, "snow"),
-    (CLAY, "clay"),
-    (CONCRETE, "concrete"),
-    (COAL, "coal"),
-    (GOLD, "gold"),
-    (SOIL, "soil"),
-    (SANDSTONE, "sandstone"),
-    (SHALE, "shale"),
-];
+/// The materials that players carry, in the order of their ids and of the default `MaterialColors`.
+pub const MATERIALS: [MaterialId; 11] =
+    [ROCK, GRASS, SAND, SNOW, CLAY, CONCRETE, COAL, GOLD, SOIL, SANDSTONE, SHALE];
 
 /// The name of a material.
 pub fn name(material: MaterialId) -> &'static str {
-    MATERIALS.iter().find(|(id, _)| *id == material).map_or("ground", |(_, name)| name)
+    texts::MATERIALS.get(usize::from(material.0)).unwrap_or(&texts::BEDROCK)
 }
 
 /// The colour of a material.
@@ -119,7 +111,10 @@ impl Plugin for LandscapePlugin {
         app.add_observer(replace_terrain)
             .add_observer(despawn_on_new_game)
             .add_systems(Startup, load_heightmap)
-            .add_systems(Update, (start_generation, spawn_terrain, exit_on_failure));
+            .add_systems(
+                Update,
+                (start_generation.run_if(resource_exists::<GroundIsWanted>), spawn_terrain, exit_on_failure),
+            );
     }
 }
 
@@ -131,54 +126,71 @@ pub struct NewGame;
 #[derive(Component, Clone, Copy, Debug, Default)]
 pub struct DespawnOnNewGame;
 
-/// The ground without any edits, from which new games begin.
+/// The ground without any edits, from which new games begin, and its seed.
 #[derive(Resource, Clone)]
-pub struct OriginalGround(pub Arc<Ground>);
+pub struct OriginalGround(pub Arc<Ground>, pub u32);
 
-/// The heightmap while it loads.
 #[derive(Resource)]
-struct LoadingHeightmap(Handle<HeightmapImage>);
+struct Heightmap(Handle<HeightmapImage>);
 
-/// The task that generates the ground.
+/// The ground has to be generated.
 #[derive(Resource)]
-struct Generation(Task<Result<(Arc<Ground>, Terrain, Places), String>>);
+struct GroundIsWanted;
+
+/// The task that generates the ground of a seed.
+#[derive(Resource)]
+struct Generation(Task<Result<(Arc<Ground>, Terrain, Places), String>>, u32);
 
 /// Spawns the terrain's entity with its look before there is a terrain, so that the textures are made meanwhile.
 fn load_heightmap(mut commands: Commands, assets: Res<AssetServer>) {
     let place = Transform::from_translation(-ORIGIN.as_vec3());
-    commands.spawn((Name::new("Jacksboro fault"), GroundLook::default(), LevelsOfDetail::default(), place));
-    commands.insert_resource(LoadingHeightmap(assets.load(HEIGHTMAP_ASSET)));
+    let mut colors = MaterialColors::default();
+    if let Some(bedrock) = colors.0.get_mut(usize::from(BEDROCK.0)) {
+        *bedrock = LinearRgba::rgb(0.012, 0.011, 0.016);
+    }
+    let look = (GroundLook::default(), colors, LevelsOfDetail::default());
+    commands.spawn((Name::new("Jacksboro fault"), look, place));
+    commands.insert_resource(Heightmap(assets.load(HEIGHTMAP_ASSET)));
+    commands.insert_resource(GroundIsWanted);
 }
 
 /// Starts the task as soon as the heightmap is loaded.
 fn start_generation(
     mut commands: Commands,
-    loading: Option<Res<LoadingHeightmap>>,
+    heightmap: Option<Res<Heightmap>>,
     images: Res<Assets<HeightmapImage>>,
+    played: Res<PlayedWorld>,
+    party: Res<Party>,
 ) {
-    let Some(HeightmapImage(image)) = loading.and_then(|loading| images.get(&loading.0)) else { return };
-    let image = image.clone();
-    commands.insert_resource(Generation(AsyncComputeTaskPool::get().spawn(async move { generate(image) })));
-    commands.remove_resource::<LoadingHeightmap>();
+    let Some(HeightmapImage(image)) = heightmap.and_then(|heightmap| images.get(&heightmap.0)) else {
+        return;
+    };
+    let (image, seed) = (image.clone(), saves::seed(&played, &party));
+    let task = AsyncComputeTaskPool::get().spawn(async move { generate(image, seed) });
+    commands.insert_resource(Generation(task, seed));
+    commands.remove_resource::<GroundIsWanted>();
 }
 
-fn generate(heightmap: GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
-    let ground = ground(heightmap).map_err(|error| error.to_string())?;
+fn generate(heightmap: GreyImage, seed: u32) -> Result<(Arc<Ground>, Terrain, Places), String> {
+    let ground = ground(heightmap, seed).map_err(|error| error.to_string())?;
     let places = Places::find(&ground)?;
     let ground = Arc::new(ground);
     let terrain = new_terrain(&ground).map_err(|error| error.to_string())?;
     Ok((ground, terrain, places))
 }
 
-/// The whole world: heights are computed where they are needed.
-fn ground(heightmap: GreyImage) -> Result<Ground, GroundError> {
+/// The whole world: heights are computed where they are needed. The seed leaves the real land as it is.
+fn ground(heightmap: GreyImage, seed: u32) -> Result<Ground, GroundError> {
     let side = WORLD as i32 - 2 * MOUNTAINS_WIDTH;
     let corner = Column::new(MOUNTAINS_WIDTH, MOUNTAINS_WIDTH);
-    let (hills, mountains) = (NoiseSource::new(&HILLS)?, NoiseSource::new(&MOUNTAINS)?);
+    let (hills, mountains) = (
+        NoiseSource::new(&NoiseHeights { seed: HILLS.seed.wrapping_add(seed), ..HILLS })?,
+        NoiseSource::new(&NoiseHeights { seed: MOUNTAINS.seed.wrapping_add(seed), ..MOUNTAINS })?,
+    );
     let around = InsetSource::new(hills, mountains, corner, [side; 2], MOUNTAINS_MARGIN);
     let real = ImageSource::new(heightmap, &SCALE)?;
     let all = InsetSource::new(real, around, REAL_CORNER, REAL_SIZE, REAL_MARGIN);
-    Ground::from_source(WORLD, WORLD, all)?.with_strata(&strata())
+    Ground::from_source(WORLD, WORLD, all)?.with_strata(&strata(seed))
 }
 
 /// A terrain without any edits.
@@ -192,13 +204,20 @@ pub fn new_terrain(ground: &Arc<Ground>) -> Result<Terrain, BevyError> {
 fn replace_terrain(
     _: On<NewGame>,
     mut commands: Commands,
-    ground: Res<OriginalGround>,
+    ground: Option<Res<OriginalGround>>,
     terrain: Single<Entity, With<GroundLook>>,
     played: Res<PlayedWorld>,
     party: Res<Party>,
-    places: Res<Places>,
+    places: Option<Res<Places>>,
 ) -> Result {
-    insert_terrain(&mut commands.entity(*terrain), new_terrain(&ground.0)?, &played, &party, &places);
+    commands.entity(*terrain).remove::<(SavedWorld, SharedTerrain)>();
+    commands.remove_resource::<Generation>();
+    match (ground, places) {
+        (Some(ground), Some(places)) if ground.1 == saves::seed(&played, &party) => {
+            insert_terrain(&mut commands.entity(*terrain), new_terrain(&ground.0)?, &played, &party, &places);
+        }
+        _ => commands.insert_resource(GroundIsWanted),
+    }
     Ok(())
 }
 
@@ -210,12 +229,12 @@ fn insert_terrain(
     party: &Party,
     places: &Places,
 ) {
-    entity.remove::<(SavedWorld, SharedTerrain)>().insert(terrain);
+    entity.insert(terrain);
     match (party, played.saved()) {
         (Party::Alone, Some(saved)) => drop(entity.insert(saved)),
         (Party::Alone, None) => {}
         // The host's server saves it.
-        (Party::Host(_) | Party::Guest(_), _) => {
+        (Party::Host(_) | Party::Guest(..), _) => {
             let mut shared = SharedTerrain::default();
             shared.place = voxel(places.hillside.mouth);
             entity.insert(shared);
@@ -241,11 +260,14 @@ fn spawn_terrain(
     party: Res<Party>,
     mut exit: MessageWriter<AppExit>,
 ) {
-    let Some(result) = generation.and_then(|mut task| check_ready(&mut task.0)) else { return };
+    let Some((result, seed)) = generation.and_then(|mut task| Some((check_ready(&mut task.0)?, task.1)))
+    else {
+        return;
+    };
     commands.remove_resource::<Generation>();
     match result {
         Ok((ground, model, places)) => {
-            commands.insert_resource(OriginalGround(ground));
+            commands.insert_resource(OriginalGround(ground, seed));
             commands.entity(*terrain).insert(EdgeWalls::default());
             insert_terrain(&mut commands.entity(*terrain), model, &played, &party, &places);
             commands.insert_resource(places);
@@ -277,7 +299,7 @@ mod tests {
         let image = GreyImage::decode_png(HEIGHTMAP, &ImageLimits::default()).expect("a valid image");
         let real = Ground::from_image(&image, &SCALE).expect("valid parameters");
         assert_eq!([real.width(), real.depth()], REAL_SIZE);
-        let world = ground(image).expect("valid parameters");
+        let world = ground(image.clone(), 0).expect("valid parameters");
         let inside = |size: i32| (REAL_MARGIN..=size - REAL_MARGIN).step_by(41);
         for (x, z) in inside(REAL_SIZE[1]).flat_map(|z| inside(REAL_SIZE[0]).map(move |x| (x, z))) {
             let here = world.height(Column::new(ORIGIN.x + x, ORIGIN.z + z));
@@ -287,5 +309,8 @@ mod tests {
         let (count, sum) = edge.fold((0, 0), |(count, sum), height| (count + 1, sum + height));
         assert!(sum / count > real.height_range().1, "{} is not high", sum / count);
         Places::find(&world).expect("all places");
+        let other = ground(image, 7).expect("valid parameters");
+        Places::find(&other).expect("all places");
+        assert_ne!(other.hash(), world.hash());
     }
 }

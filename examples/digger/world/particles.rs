@@ -91,7 +91,7 @@ fn fill_pools(
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) -> Result {
     let matte = StandardMaterial { perceptual_roughness: 1.0, reflectance: 0.0, ..default() };
-    let colors = MATERIALS.map(|(material, _)| crate::world::landscape::colour(material));
+    let colors = MATERIALS.map(crate::world::landscape::colour);
     // The headlamp is close to chips and dust: at their full brightness they would be overexposed.
     let chip_materials = colors
         .map(|color| StandardMaterial { base_color: (color * 0.5).with_alpha(1.0).into(), ..matte.clone() })

@@ -3,19 +3,27 @@
 //! The ground saves itself. Inventory, time of day and the player's place are put beside it in the frame in which they change, so
 //! that after a crash nothing is there twice, or neither here nor there.
 
+use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use bevy::time::common_conditions::on_timer;
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{GroundServer, GroundServerEvent};
 use serde::{Deserialize, Serialize};
 
+use crate::party::connection::Party;
 use crate::player::Player;
 use crate::player::body::Body;
+use crate::player::game_state::GameState;
+use crate::player::headlamp::HeadlampSwitch;
 use crate::tools::inventory::{self, Inventory};
+use crate::tools::lamps::{SavedLamp, SavedLamps};
+use crate::tools::{Hand, SavedHand};
 use crate::ui::hud::Hint;
+use crate::ui::texts;
 use crate::world::day::Clock;
 use crate::world::landscape::NewGame;
 
@@ -23,8 +31,9 @@ use crate::world::landscape::NewGame;
 const KEY: &str = "digger";
 /// How often the player's place is saved.
 const PLACE_EVERY: Duration = Duration::from_secs(2);
-/// Most worlds in the folder of worlds that are listed.
-pub const MOST_WORLDS: usize = 6;
+/// The files in a world's folder with its name, and which is locked while it is open.
+const INFO: &str = "world.json";
+const LOCK: &str = "lock";
 
 /// Saves the game in a folder, or nowhere.
 pub struct SavesPlugin(pub Option<PathBuf>);
@@ -41,10 +50,12 @@ impl Plugin for SavesPlugin {
                 (
                     continue_game,
                     (
-                        put_game
-                            .after(continue_game)
-                            .run_if(resource_exists::<GameIsRead>)
-                            .run_if(resource_changed::<Inventory>.or_else(on_timer(PLACE_EVERY))),
+                        put_game.after(continue_game).run_if(resource_exists::<GameIsRead>).run_if(
+                            resource_changed::<Inventory>
+                                .or_else(on_timer(PLACE_EVERY))
+                                .or_else(on_message::<AppExit>)
+                                .or_else(state_changed::<GameState>),
+                        ),
                         tell_trouble,
                     )
                         .after(BurrowSystems::Commit)
@@ -55,7 +66,7 @@ impl Plugin for SavesPlugin {
     }
 }
 
-/// The folder of the world that is played; `None` where nothing is saved.
+/// The folder of the world that is played; `None` where nothing is saved, or nothing was played yet.
 #[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub struct PlayedWorld(pub Option<PathBuf>);
 
@@ -71,17 +82,67 @@ impl PlayedWorld {
         if is_path { Some(name.into()) } else { Some(folder_of_worlds()?.join(name)) }
     }
 
-    /// The world that was played last, or a new one; `None` on machines without a folder for data.
+    /// The world that was played last.
     pub fn latest() -> Option<PathBuf> {
-        let latest = worlds().into_iter().next().map(|world| world.folder);
-        latest.or_else(new_world)
+        worlds().into_iter().next().map(|world| world.folder)
     }
 }
 
-/// A folder for a world that nobody has begun.
-pub fn new_world() -> Option<PathBuf> {
+/// The name of a world that nobody has begun; `None` on machines without a folder for data.
+pub fn new_name() -> Option<String> {
     let all = folder_of_worlds()?;
-    (1..).map(|number| all.join(format!("world {number}"))).find(|folder| !folder.exists())
+    (1..).map(|number| format!("world {number}")).find(|name| !all.join(name).exists())
+}
+
+/// Makes a folder for a new world. Where one of this name exists, it gets a number.
+///
+/// # Errors
+/// If the folder can't be written.
+pub fn create(name: &str, seed: u32) -> io::Result<PathBuf> {
+    let all = folder_of_worlds().ok_or(io::ErrorKind::NotFound)?;
+    let safe: String =
+        name.trim().chars().map(|c| if c.is_alphanumeric() || " -_".contains(c) { c } else { '_' }).collect();
+    let safe = if safe.is_empty() { "world".into() } else { safe };
+    let folders = std::iter::once(safe.clone()).chain((2..).map(|number| format!("{safe} {number}")));
+    let folder = folders
+        .map(|folder| all.join(folder))
+        .find(|folder| !folder.exists())
+        .ok_or(io::ErrorKind::AlreadyExists)?;
+    std::fs::create_dir_all(&folder)?;
+    let name = if name.trim().is_empty() { self::name(&folder) } else { name.trim().into() };
+    WorldInfo { name: Some(name), seed }.write(&folder)?;
+    Ok(folder)
+}
+
+/// What is known of a world without opening it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+struct WorldInfo {
+    /// The folder's name without one.
+    name: Option<String>,
+    seed: u32,
+}
+
+impl WorldInfo {
+    fn read(folder: &Path) -> Self {
+        let text = std::fs::read(folder.join(INFO)).unwrap_or_default();
+        serde_json::from_slice(&text).unwrap_or_default()
+    }
+
+    fn write(&self, folder: &Path) -> io::Result<()> {
+        let draft = folder.join("world.draft.json");
+        std::fs::write(&draft, serde_json::to_vec_pretty(self)?)?;
+        std::fs::rename(draft, folder.join(INFO))
+    }
+}
+
+/// The seed of the world that is played: the host's, where it is another machine's.
+pub fn seed(played: &PlayedWorld, party: &Party) -> u32 {
+    match (party, &played.0) {
+        (Party::Guest(_, seed), _) => *seed,
+        (_, Some(folder)) => WorldInfo::read(folder).seed,
+        (_, None) => 0,
+    }
 }
 
 /// A world in the user's folder.
@@ -89,18 +150,54 @@ pub fn new_world() -> Option<PathBuf> {
 pub struct FoundWorld {
     pub folder: PathBuf,
     /// When it was saved last.
-    pub saved: std::time::SystemTime,
-}
-
-impl FoundWorld {
-    pub fn name(&self) -> String {
-        name(&self.folder)
-    }
+    pub saved: SystemTime,
 }
 
 /// The name of a world.
 pub fn name(folder: &Path) -> String {
-    folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    let of_folder = || folder.file_name().map(|name| name.to_string_lossy().into_owned());
+    WorldInfo::read(folder).name.or_else(of_folder).unwrap_or_default()
+}
+
+/// Gives a world another name. Its folder stays where it is.
+///
+/// # Errors
+/// If the folder can't be written.
+pub fn rename(folder: &Path, name: &str) -> io::Result<()> {
+    let name = Some(name.trim()).filter(|name| !name.is_empty()).map(String::from);
+    WorldInfo { name, ..WorldInfo::read(folder) }.write(folder)
+}
+
+/// Copies a world that is closed.
+///
+/// # Errors
+/// If its files can't be read, or the copy can't be written.
+pub fn duplicate(folder: &Path) -> io::Result<()> {
+    let WorldInfo { seed, .. } = WorldInfo::read(folder);
+    let name = format!("{} {}", name(folder), texts::COPY);
+    let copy = create(&name, seed)?;
+    copy_files(folder, &copy)?;
+    rename(&copy, &name)
+}
+
+fn copy_files(from: &Path, to: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(to)?;
+    for entry in std::fs::read_dir(from)? {
+        let entry = entry?;
+        let copy = to.join(entry.file_name());
+        match entry.file_type()?.is_dir() {
+            true => copy_files(&entry.path(), &copy)?,
+            false if entry.file_name() == LOCK => {}
+            false => drop(std::fs::copy(entry.path(), copy)?),
+        }
+    }
+    Ok(())
+}
+
+/// Whether nobody has this world open.
+pub fn is_closed(folder: &Path) -> bool {
+    let lock = std::fs::File::open(folder.join(LOCK));
+    lock.map_or(true, |lock| lock.try_lock_shared().is_ok())
 }
 
 /// The user's worlds, those saved last first.
@@ -113,7 +210,6 @@ pub fn worlds() -> Vec<FoundWorld> {
     });
     let mut worlds: Vec<FoundWorld> = found.collect();
     worlds.sort_by_key(|world| std::cmp::Reverse(world.saved));
-    worlds.truncate(MOST_WORLDS);
     worlds
 }
 
@@ -141,31 +237,74 @@ pub struct SavedPlace {
 #[derive(Resource)]
 struct GameIsRead;
 
-/// What is saved beside the ground.
+/// What is saved beside the ground: all that the player has, holds and has placed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct SavedGame {
     inventory: inventory::SavedInventory,
     hour: f32,
     place: Option<SavedPlace>,
+    #[serde(default)]
+    hand: Option<SavedHand>,
+    #[serde(default)]
+    has_headlamp: bool,
+    #[serde(default)]
+    lamps: Vec<SavedLamp>,
+}
+
+/// What of a game is saved, where it is while it is played.
+#[derive(SystemParam)]
+struct PlayedGame<'w, 's> {
+    inventory: ResMut<'w, Inventory>,
+    clock: ResMut<'w, Clock>,
+    hand: ResMut<'w, Hand>,
+    headlamp: ResMut<'w, HeadlampSwitch>,
+    lamps: SavedLamps<'w, 's>,
+    players: Query<'w, 's, (&'static Player, Body)>,
+    /// The place of a player who is not there yet.
+    place: Option<Res<'w, SavedPlace>>,
+    commands: Commands<'w, 's>,
+}
+
+impl PlayedGame<'_, '_> {
+    fn saved(&self) -> SavedGame {
+        let place = self.players.iter().next().map(|(player, body)| {
+            let Player { yaw, pitch } = *player;
+            SavedPlace { feet: body.feet(), yaw, pitch }
+        });
+        SavedGame {
+            inventory: self.inventory.saved(),
+            hour: self.clock.hour,
+            place: place.or(self.place.as_deref().copied()),
+            hand: Some(self.hand.saved()),
+            has_headlamp: self.headlamp.0,
+            lamps: self.lamps.all(),
+        }
+    }
+
+    fn restore(&mut self, game: SavedGame) {
+        self.inventory.restore(&game.inventory);
+        if game.hour.is_finite() {
+            self.clock.hour = game.hour.rem_euclid(24.0);
+        }
+        if let Some(place) = game.place.filter(|place| place.feet.is_finite()) {
+            self.commands.insert_resource(place);
+        }
+        if let Some(hand) = &game.hand {
+            self.hand.restore(hand);
+        }
+        self.headlamp.0 = game.has_headlamp;
+        for lamp in game.lamps {
+            self.commands.trigger(lamp);
+        }
+    }
 }
 
 /// Puts the game beside the ground: the host's, where players share it.
-fn put_game(
-    inventory: Res<Inventory>,
-    clock: Res<Clock>,
-    players: Query<(&Player, Body)>,
-    mut worlds: Query<&mut WorldStore>,
-    mut server: Option<ResMut<GroundServer>>,
-) {
+fn put_game(game: PlayedGame, mut worlds: Query<&mut WorldStore>, mut server: Option<ResMut<GroundServer>>) {
     if worlds.is_empty() && server.is_none() {
         return;
     }
-    let place = players.iter().next().map(|(player, body)| {
-        let Player { yaw, pitch } = *player;
-        SavedPlace { feet: body.feet(), yaw, pitch }
-    });
-    let game = SavedGame { inventory: inventory.saved(), hour: clock.hour, place };
-    let Ok(bytes) = serde_json::to_vec(&game) else { return };
+    let Ok(bytes) = serde_json::to_vec(&game.saved()) else { return };
     if let Some(server) = &mut server
         && server.get(KEY) != Some(&bytes[..])
     {
@@ -182,17 +321,15 @@ fn put_game(
 fn continue_game(
     mut opened: MessageReader<WorldOpened>,
     mut served: MessageReader<GroundServerEvent>,
-    mut commands: Commands,
+    mut game: PlayedGame,
     worlds: Query<&WorldStore>,
     server: Option<Res<GroundServer>>,
-    mut inventory: ResMut<Inventory>,
-    mut clock: ResMut<Clock>,
     mut hints: MessageWriter<Hint>,
 ) {
     let mut games = Vec::new();
     for message in opened.read() {
         if let Err(why) = &message.outcome {
-            hints.write(Hint(format!("nothing is saved: {why}")));
+            hints.write(Hint(texts::nothing_saved(why)));
         }
         games.push(worlds.get(message.terrain).ok().and_then(|world| world.get(KEY)));
     }
@@ -200,18 +337,11 @@ fn continue_game(
         games.push(server.as_deref().and_then(|server| server.get(KEY)));
     }
     if !games.is_empty() {
-        commands.insert_resource(GameIsRead);
+        game.commands.insert_resource(GameIsRead);
     }
-    for game in games {
-        let Some(game) = game.and_then(|bytes| serde_json::from_slice::<SavedGame>(bytes).ok()) else {
-            continue;
-        };
-        inventory.restore(&game.inventory);
-        if game.hour.is_finite() {
-            clock.hour = game.hour.rem_euclid(24.0);
-        }
-        if let Some(place) = game.place.filter(|place| place.feet.is_finite()) {
-            commands.insert_resource(place);
+    for bytes in games.into_iter().flatten() {
+        if let Ok(saved) = serde_json::from_slice(bytes) {
+            game.restore(saved);
         }
     }
 }
@@ -222,7 +352,11 @@ fn tell_trouble(mut troubles: MessageReader<StoreTroubleFound>, mut hints: Messa
 
 #[cfg(test)]
 mod tests {
+    use bevy::ecs::system::RunSystemOnce;
+
     use super::*;
+    use crate::tools::Tool;
+    use crate::ui::settings::Settings;
 
     #[test]
     fn a_name_is_a_folder_among_the_worlds_and_a_path_is_itself() {
@@ -232,18 +366,82 @@ mod tests {
         }
     }
 
+    /// A game without ground, as it is saved.
+    fn app() -> App {
+        let settings = Settings::default();
+        let mut app = App::new();
+        app.init_resource::<Inventory>()
+            .init_resource::<Clock>()
+            .init_resource::<HeadlampSwitch>()
+            .insert_resource(Hand::new(&settings))
+            .add_observer(|lamp: On<SavedLamp>, mut placed: ResMut<Placed>| placed.0.push(*lamp.event()))
+            .init_resource::<Placed>();
+        app
+    }
+
+    #[derive(Resource, Default)]
+    struct Placed(Vec<SavedLamp>);
+
+    fn saved(app: &mut App) -> SavedGame {
+        app.world_mut().run_system_once(|game: PlayedGame| game.saved()).expect("a system")
+    }
+
     #[test]
-    fn what_is_saved_of_a_game_comes_back() {
-        let mut inventory = Inventory::default();
-        inventory.gain(MaterialId(6), 41);
-        let tag = inventory.next_tag();
+    fn all_that_is_saved_of_a_game_comes_back() {
+        let mut app = app();
+        let world = app.world_mut();
+        world.resource_mut::<Inventory>().gain(MaterialId(6), 41);
+        world.resource_mut::<Clock>().hour = 7.5;
+        world.resource_mut::<HeadlampSwitch>().0 = true;
+        let mut hand = world.resource_mut::<Hand>();
+        (hand.tool, hand.material) = (Tool::Builder, MaterialId(6));
+        hand.set_radius(Tool::Builder, 5.5);
+        let tag = world.resource_mut::<Inventory>().next_tag();
+        let lamp = SavedLamp { foot: Vec3::new(9.0, 8.0, 7.0), normal: Vec3::Y };
         let place = Some(SavedPlace { feet: Vec3::new(1.0, 2.0, 3.0), yaw: 0.5, pitch: -0.25 });
-        let game = SavedGame { inventory: inventory.saved(), hour: 7.5, place };
+        let game = SavedGame { place, lamps: vec![lamp], ..saved(&mut app) };
         let read: SavedGame = serde_json::from_slice(&serde_json::to_vec(&game).unwrap()).unwrap();
         assert_eq!(read, game);
-        let mut restored = Inventory::default();
-        restored.restore(&read.inventory);
-        assert_eq!(restored.amount(MaterialId(6)), 41);
-        assert!(restored.next_tag() > tag);
+
+        let mut restored = self::app();
+        let restore = move |mut game: PlayedGame| game.restore(read.clone());
+        restored.world_mut().run_system_once(restore).expect("a system");
+        assert_eq!(restored.world().resource::<Placed>().0, [lamp]);
+        // The player is not there yet: the place must not be forgotten meanwhile.
+        assert_eq!(saved(&mut restored), SavedGame { lamps: Vec::new(), ..game });
+        assert!(restored.world_mut().resource_mut::<Inventory>().next_tag() > tag);
+    }
+
+    #[test]
+    fn a_game_that_an_older_version_saved_can_be_read() {
+        let old = r#"{"inventory":{"amounts":[1,2],"next_tag":4294967300},"hour":7.5,"place":null}"#;
+        let game: SavedGame = serde_json::from_str(old).expect("an older game");
+        assert_eq!((game.hand, game.has_headlamp, game.lamps.len()), (None, false, 0));
+    }
+
+    #[test]
+    fn worlds_are_made_named_copied_and_told_apart() {
+        let all = std::env::temp_dir().join(format!("digger_worlds_{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&all);
+        let folder = all.join("first");
+        std::fs::create_dir_all(folder.join("journal")).expect("a folder");
+        std::fs::write(folder.join("journal").join("1"), b"edits").expect("a file");
+        std::fs::write(folder.join(LOCK), b"").expect("a file");
+        // As an older version left it.
+        assert_eq!((name(&folder).as_str(), WorldInfo::read(&folder).seed), ("first", 0));
+        WorldInfo { name: None, seed: 7 }.write(&folder).expect("written");
+        rename(&folder, " My hill ").expect("written");
+        assert_eq!((name(&folder).as_str(), WorldInfo::read(&folder).seed), ("My hill", 7));
+        rename(&folder, "").expect("written");
+        assert_eq!(name(&folder), "first");
+        let copy = all.join("copy");
+        copy_files(&folder, &copy).expect("copied");
+        assert_eq!(std::fs::read(copy.join("journal").join("1")).expect("copied"), b"edits");
+        assert!(!copy.join(LOCK).exists() && WorldInfo::read(&copy).seed == 7);
+        assert!(is_closed(&folder) && is_closed(&copy));
+        let lock = std::fs::File::create(folder.join(LOCK)).expect("a file");
+        lock.try_lock().expect("free");
+        assert!(!is_closed(&folder), "it is open");
+        std::fs::remove_dir_all(&all).expect("removed");
     }
 }

@@ -57,6 +57,14 @@ fn star(direction: vec3<f32>) -> f32 {
     return step(0.86, chance.x) * smoothstep(size, 0.0, near) * (0.25 + chance.z * chance.z);
 }
 
+// How far two directions are apart in the picture, where a disc stays round however far it is from the middle.
+fn apart(direction: vec3<f32>, body: vec3<f32>) -> vec2<f32> {
+    let ahead = (view.view_from_world * vec4(direction, 0.0)).xyz;
+    let there = (view.view_from_world * vec4(body, 0.0)).xyz;
+    if ahead.z > -0.02 || there.z > -0.02 { return vec2(9.0); }
+    return ahead.xy / -ahead.z - there.xy / -there.z;
+}
+
 fn clouds(at: vec2<f32>) -> f32 {
     let low = textureSampleLevel(noise, noise_sampler, at * 0.075, 0.0).r;
     let high = textureSampleLevel(noise, noise_sampler, at * 0.31 + 0.37, 0.0).r;
@@ -84,16 +92,14 @@ fn fragment(in: VertexOutput) -> @location(0) vec4<f32> {
         color += vec3(0.85, 0.92, 1.0) * (star(turned) * sky.drift.x * smoothstep(0.0, 0.16, direction.y));
     }
     // The moon, with its maria.
-    let moon = dot(direction, sky.moon.xyz);
-    if moon > 0.9985 {
-        let side = normalize(cross(sky.moon.xyz, vec3(0.0, 1.0, 0.0)));
-        let top = cross(side, sky.moon.xyz);
-        let at = vec2(dot(direction, side), dot(direction, top));
+    let at = apart(direction, sky.moon.xyz);
+    if length(at) < 0.05 {
         let seas = textureSampleLevel(noise, noise_sampler, at * 4.0 + 0.2, 0.0).r;
-        let disc = smoothstep(0.99895, 0.99907, moon);
+        let disc = 1.0 - smoothstep(0.0431, 0.0458, length(at));
         color += vec3(0.82, 0.86, 0.92) * (0.55 + 0.55 * seas) * disc * sky.moon.a;
     }
-    let disc = smoothstep(0.99960, 0.99985, sun) * smoothstep(-0.02, 0.0, direction.y);
+    let from_sun = length(apart(direction, sky.sun.xyz));
+    let disc = (1.0 - smoothstep(0.0173, 0.0283, from_sun)) * smoothstep(-0.02, 0.0, direction.y);
     color += sky.sun.a * vec3(1.0, 0.86, 0.64) * 4.0 * disc;
 
     // Clouds are on a plane overhead that bends down to the horizon.

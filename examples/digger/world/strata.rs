@@ -4,13 +4,14 @@
 use bevy::math::Vec2;
 use bevy_burrow::prelude::*;
 
-use crate::world::landscape::{CLAY, COAL, GOLD, GRASS, ROCK, SAND, SANDSTONE, SHALE, SNOW, SOIL};
+use crate::tools::hardness;
+use crate::world::landscape::{BEDROCK, CLAY, COAL, GOLD, GRASS, ROCK, SAND, SANDSTONE, SHALE, SNOW, SOIL};
 
 /// The steepest slope with turf and soil on it.
 const SOIL_SLOPE: f32 = 0.95;
 
-/// The strata, topmost first. Between them is rock.
-pub fn strata() -> Strata {
+/// The strata, topmost first. Between them is rock. The seed decides where ore and folds are.
+pub fn strata(seed: u32) -> Strata {
     let cover = |material, depth, slope| Stratum {
         depth: Interval::below(depth),
         slope: Interval::below(slope),
@@ -19,9 +20,10 @@ pub fn strata() -> Strata {
     let from = |depth, stratum| Stratum { depth: Interval::above(depth), ..stratum };
     let rough = |rough, stratum| Stratum { rough, ..stratum };
     Strata {
-        seed: 11,
+        seed: seed.wrapping_add(11),
         bedding: Bedding { dip: Vec2::new(0.10, -0.06), fold: 6.0, scale: 128 },
         strata: vec![
+            Stratum { height: Interval::below(hardness::BEDROCK as f32), ..Stratum::fill(BEDROCK) },
             rough(7.0, Stratum { height: Interval::above(94.0), ..cover(SNOW, 3.0, 1.2) }),
             rough(2.0, Stratum { height: Interval::below(8.0), ..cover(SAND, 3.0, 0.5) }),
             cover(GRASS, 2.0, SOIL_SLOPE),
@@ -48,9 +50,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_nothing_breaks_looks_like_bedrock() {
+        let ground =
+            Ground::flat(32, 32, 20.0).expect("a world").with_strata(&strata(0)).expect("valid strata");
+        for (y, is_bedrock) in [(hardness::BEDROCK - 1, true), (hardness::BEDROCK + 1, false)] {
+            assert_eq!(ground.material(IVec3::new(9, y, 9)) == BEDROCK, is_bedrock, "at {y}");
+        }
+    }
+
+    #[test]
     fn ore_is_in_reach_of_a_tunnel() {
         let ground =
-            Ground::flat(128, 128, 60.0).expect("a world").with_strata(&strata()).expect("valid strata");
+            Ground::flat(128, 128, 60.0).expect("a world").with_strata(&strata(0)).expect("valid strata");
         let mut found = BTreeMap::<MaterialId, u32>::new();
         // A tunnel of 5 x 5 metres, 10 metres below the surface.
         for (y, z) in (48..53).flat_map(|y| (60..65).map(move |z| (y, z))) {

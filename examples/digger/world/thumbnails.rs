@@ -1,14 +1,12 @@
 //! Small pictures of saved worlds, in their folders: what the player saw last.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use bevy::asset::RenderAssetUsages;
 use bevy::image::{CompressedImageFormats, ImageSampler, ImageType};
 use bevy::prelude::*;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::tasks::IoTaskPool;
-use bevy::time::common_conditions::on_timer;
 use bevy::window::PrimaryWindow;
 
 use super::saves::PlayedWorld;
@@ -19,15 +17,13 @@ use crate::player::game_state::GameState;
 const FILE: &str = "thumbnail.png";
 /// Pixels of its longer side.
 const SIDE: u32 = 192;
-/// How often one is taken during play.
-const EVERY: Duration = Duration::from_secs(20);
 
-/// Takes a picture of the saved world from time to time.
+/// Takes a picture of the saved world when the player pauses: the display is hidden by then, and the menu not shown yet.
 pub struct ThumbnailsPlugin;
 
 impl Plugin for ThumbnailsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(Update, take.run_if(in_state(GameState::Playing)).run_if(on_timer(EVERY)));
+        app.add_systems(OnExit(GameState::Playing), take);
     }
 }
 
@@ -38,7 +34,7 @@ fn take(
     party: Res<Party>,
     windows: Query<(), With<PrimaryWindow>>,
 ) {
-    if matches!(*party, Party::Guest(_)) {
+    if matches!(*party, Party::Guest(..)) {
         return;
     }
     let Some(folder) = played.0.clone().filter(|_| !windows.is_empty()) else { return };

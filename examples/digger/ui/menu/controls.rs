@@ -2,14 +2,15 @@
 
 use bevy::prelude::*;
 
-use super::go_to;
+use super::{question, spawn_back};
 use crate::player::bindings::Binding;
 use crate::player::game_state::MenuPage;
 use crate::player::input::{Action, Actions, WheelSteps};
 use crate::ui::labels::Labels;
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 use crate::ui::widgets::{
-    self, Activated, GOLD, GREY, MenuInputDisabled, MenuItem, MenuPointerSystems, RED, WHITE, text,
+    self, Activated, GOLD, GREY, MenuInputDisabled, MenuItem, MenuPointerSystems, WHITE, text,
 };
 
 /// The controls page.
@@ -43,15 +44,15 @@ struct BindingsText(Action);
 struct Note;
 
 fn open(mut commands: Commands) {
-    super::spawn_page(&mut commands, MenuPage::Controls, "Controls", 1010.0, |column| {
+    super::spawn_page(&mut commands, MenuPage::Controls, texts::CONTROLS, 1010.0, |column| {
         let columns = Node { column_gap: px(16), justify_content: JustifyContent::SpaceBetween, ..default() };
         column.spawn(columns).with_children(|columns| {
             let half = Action::ALL.len().div_ceil(2);
             for (part, actions) in Action::ALL.chunks(half).enumerate() {
                 let rows = Node { width: px(470), ..widgets::column(px(0)) };
                 columns.spawn(rows).with_children(|rows| {
-                    for (at, &(action, label, _)) in actions.iter().enumerate() {
-                        rows.spawn(row(part * half + at, action, label)).observe(
+                    for (at, &(action, _)) in actions.iter().enumerate() {
+                        rows.spawn(row(part * half + at, action)).observe(
                             move |_: On<Activated>, mut commands: Commands| {
                                 commands.insert_resource(Waiting(action));
                                 commands.insert_resource(MenuInputDisabled);
@@ -62,23 +63,27 @@ fn open(mut commands: Commands) {
             }
         });
         let line = Node { height: px(20), margin: UiRect::axes(px(14), px(8)), ..default() };
-        let words = "choose an action, then press its new key or button";
-        column.spawn((Note, text(words, 15.0, GREY), line));
+        column.spawn((Note, text(texts::CHOOSE_ACTION, 15.0, GREY), line));
         let count = Action::ALL.len();
-        column
-            .spawn(widgets::button(count, "Reset", 950.0))
-            .observe(|_: On<Activated>, mut settings: ResMut<Settings>| settings.bindings = default());
-        column.spawn(widgets::button(count + 1, "Back", 950.0)).observe(go_to(MenuPage::Menu));
+        column.spawn(widgets::button(count, texts::RESET, 950.0)).observe(ask_to_reset);
+        spawn_back(column, count + 1, 950.0, MenuPage::Controls);
     });
 }
 
-fn row(position: usize, action: Action, label: &str) -> impl Bundle {
+fn ask_to_reset(_: On<Activated>, mut commands: Commands) {
+    let reset = |commands: &mut Commands| {
+        commands.queue(|world: &mut World| world.resource_mut::<Settings>().bindings = default());
+    };
+    question::ask(&mut commands, MenuPage::Controls, texts::RESET_CONTROLS, texts::RESET, reset);
+}
+
+fn row(position: usize, action: Action) -> impl Bundle {
     let node = Node {
         padding: UiRect::axes(px(12), px(3)),
         justify_content: JustifyContent::SpaceBetween,
         ..default()
     };
-    let texts = children![text(label, 16.0, WHITE), (BindingsText(action), text("", 16.0, GOLD))];
+    let texts = children![text(action.label(), 16.0, WHITE), (BindingsText(action), text("", 16.0, GOLD))];
     (Row(action), widgets::item(position, node), texts)
 }
 
@@ -110,14 +115,14 @@ fn bind(
     });
     let is_cancelled = binding == Binding::Key(KeyCode::Escape) && action != Action::Pause;
     let note = if other_item.is_some() || is_cancelled {
-        format!("{} keeps its keys", action.label())
+        texts::keeps_keys(action.label())
     } else if !binding.can_be_saved() {
-        format!("that key has no name and cannot be saved: {} keeps its keys", action.label())
+        texts::key_without_name(action.label())
     } else {
         let name = labels.of(binding);
         match settings.bindings.rebind(action, binding) {
-            Some(loser) => format!("{name} was taken from \"{}\"", loser.label()),
-            None => format!("{name} is now \"{}\"", action.label()),
+            Some(loser) => texts::key_moved(&name, loser.label(), action.label()),
+            None => texts::key_bound(&name, action.label()),
         }
     };
     for mut text in &mut notes {
@@ -138,7 +143,7 @@ fn show_bindings(
 ) {
     for (&BindingsText(action), mut text, mut color) in &mut texts {
         let (words, new_color) = if waiting.as_ref().is_some_and(|waiting| waiting.0 == action) {
-            ("press a key ...".into(), RED)
+            (texts::PRESS_KEY.into(), WHITE)
         } else {
             let bindings = settings.bindings.of(action).iter();
             (bindings.map(|&binding| labels.of(binding)).collect::<Vec<_>>().join("  "), GOLD)

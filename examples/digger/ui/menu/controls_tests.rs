@@ -89,6 +89,23 @@ fn escape_cancels_but_can_be_bound_to_the_pause() {
 }
 
 #[test]
+fn reset_asks_first() {
+    let mut app = app();
+    for answer in [0, 1] {
+        click_action(&mut app, Action::Undo);
+        tap_key(&mut app, KeyCode::KeyJ);
+        assert_ne!(app.world().resource::<Settings>().bindings, default());
+        click(&mut app, Action::ALL.len());
+        assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Question);
+        click(&mut app, answer);
+        assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Controls);
+        assert_eq!(app.world().resource::<Settings>().bindings == default(), answer == 1);
+        // What was said before the question is gone.
+        assert!(crate::ui::menu::words(&mut app).contains(&texts::CHOOSE_ACTION.into()));
+    }
+}
+
+#[test]
 fn the_wheel_can_be_bound() {
     let mut app = app();
     click_action(&mut app, Action::NextTool);
@@ -107,7 +124,7 @@ fn a_key_without_a_name_cannot_be_bound() {
     assert_eq!(waiting(&app), None);
     let mut notes = app.world_mut().query_filtered::<&Text, With<Note>>();
     let note = notes.single(app.world()).expect("one note").0.clone();
-    assert!(note.contains("undo keeps its keys"), "{note}");
+    assert!(note.contains("\"undo\" keeps its keys"), "{note}");
     // A button without a name has a number.
     click_action(&mut app, Action::Undo);
     send_button(&mut app, MouseButton::Other(9), ButtonState::Pressed);

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::go_to;
+use super::spawn_back;
 use crate::player::bindings::Bindings;
 use crate::player::game_state::MenuPage;
 use crate::player::input::Action;
@@ -10,6 +10,7 @@ use crate::tools::Tool;
 use crate::ui::images::Images;
 use crate::ui::labels::Labels;
 use crate::ui::settings::Settings;
+use crate::ui::texts;
 use crate::ui::widgets::{self, GOLD, GREY, WHITE, text};
 
 /// Width of the column with the keys, in pixels. The default bindings fit into it.
@@ -31,31 +32,32 @@ fn lines(bindings: &Bindings, labels: &Labels) -> [(String, &'static str); 14] {
         let keys = actions.iter().map(|action| bindings.first(*action, labels));
         keys.collect::<Vec<_>>().join(separator)
     };
-    [
-        (keys(&[A::Forward, A::Left, A::Back, A::Right], " "), "walk"),
-        (keys(&[A::Run], ""), "run"),
-        (keys(&[A::Jump], ""), "jump"),
-        (keys(&[A::Use], ""), "use the tool; hold to repeat"),
-        (keys(&[A::Build], ""), "build with the chosen material"),
-        (keys(&[A::Grow, A::Shrink], ", "), "size of the brush"),
-        (keys(&[A::PreviousMaterial, A::NextMaterial], ", "), "choose a material"),
-        (keys(&[A::BuildShape], ""), "shape of what is built"),
-        (keys(&[A::NextTool], ""), "next tool"),
-        (keys(&[A::PreviousTool], ""), "previous tool"),
-        (keys(&[A::Headlamp], ""), "headlamp"),
-        (keys(&[A::Undo, A::Redo], ", "), "undo, redo"),
-        (keys(&[A::FrameTimes, A::Panel], ", "), "frame times, panel"),
-        (keys(&[A::Pause], ""), "pause"),
-    ]
+    let all = [
+        keys(&[A::Forward, A::Left, A::Back, A::Right], " "),
+        keys(&[A::Run], ""),
+        keys(&[A::Jump], ""),
+        keys(&[A::Use], ""),
+        keys(&[A::Build], ""),
+        keys(&[A::Grow, A::Shrink], ", "),
+        keys(&[A::PreviousMaterial, A::NextMaterial], ", "),
+        keys(&[A::BuildShape], ""),
+        keys(&[A::NextTool], ""),
+        keys(&[A::PreviousTool], ""),
+        keys(&[A::Headlamp], ""),
+        keys(&[A::Undo, A::Redo], ", "),
+        keys(&[A::FrameTimes, A::Panel], ", "),
+        keys(&[A::Pause], ""),
+    ];
+    let mut words = texts::HELP_KEYS.into_iter();
+    all.map(|keys| (keys, words.next().unwrap_or_default()))
 }
 
 fn open(mut commands: Commands, settings: Res<Settings>, labels: Res<Labels>, images: Option<Res<Images>>) {
     let Some(images) = images else { return };
     let bindings = &settings.bindings;
-    super::spawn_page(&mut commands, MenuPage::Help, "Help", 1110.0, |column| {
+    super::spawn_page(&mut commands, MenuPage::Help, texts::HELP, 1110.0, |column| {
         let below = Node { margin: UiRect::bottom(px(14)), ..default() };
-        let words = "You can dig every hill, and build with what you dug.";
-        column.spawn((text(words, 17.0, WHITE), below));
+        column.spawn((text(texts::HELP_SUMMARY, 17.0, WHITE), below));
         column.spawn(Node { column_gap: px(28), ..default() }).with_children(|columns| {
             let rows = Node { width: px(514), ..widgets::column(px(7)) };
             columns.spawn(rows.clone()).with_children(|rows| {
@@ -87,11 +89,10 @@ fn open(mut commands: Commands, settings: Res<Settings>, labels: Res<Labels>, im
         });
         if cfg!(feature = "gamepad") {
             let above = Node { margin: UiRect::top(px(14)), ..default() };
-            let words = "A gamepad's left stick walks and selects menu items; its right stick looks around.";
-            column.spawn((text(words, 15.0, WHITE), above));
+            column.spawn((text(texts::HELP_GAMEPAD, 15.0, WHITE), above));
         }
         column.spawn(Node { height: px(14), ..default() });
-        column.spawn(widgets::button(0, "Back", 1050.0)).observe(go_to(MenuPage::Menu));
+        spawn_back(column, 0, 1050.0, MenuPage::Help);
     });
 }
 

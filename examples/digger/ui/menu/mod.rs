@@ -1,8 +1,10 @@
-//! The pages of the menu: title, worlds, playing together, pause, settings, controls and help.
+//! The pages of the menu: title, worlds, playing together, pause, settings, controls, help, and questions.
 
 mod controls;
+mod fields;
 mod help;
 mod pause;
+mod question;
 mod settings_page;
 mod title;
 mod together;
@@ -10,7 +12,10 @@ mod worlds;
 
 use bevy::prelude::*;
 
+#[cfg(test)]
+use crate::player::game_state::GameState;
 use crate::player::game_state::MenuPage;
+use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, GOLD};
 
 /// All pages.
@@ -24,9 +29,23 @@ impl Plugin for MenuPlugin {
             settings_page::SettingsPagePlugin,
             controls::ControlsPlugin,
             help::HelpPlugin,
+            fields::FieldsPlugin,
+            question::QuestionPlugin,
             worlds::WorldsPlugin,
             together::TogetherPagePlugin,
-        ));
+        ))
+        .add_systems(PreUpdate, show_pages);
+    }
+}
+
+/// A page that was just opened. It is shown in the next frame: this one's picture may become a world's.
+#[derive(Component)]
+struct NewPage;
+
+fn show_pages(mut commands: Commands, mut pages: Query<(Entity, &mut Visibility), With<NewPage>>) {
+    for (page, mut visibility) in &mut pages {
+        *visibility = Visibility::Inherited;
+        commands.entity(page).remove::<NewPage>();
     }
 }
 
@@ -41,7 +60,8 @@ fn spawn_page(
 ) {
     let column = Node { width: px(width), padding: UiRect::axes(px(26), px(22)), ..widgets::column(px(4)) };
     let shade = BackgroundColor(Color::srgba(0.0, 0.0, 0.02, 0.42));
-    commands.spawn((DespawnOnExit(page), widgets::centered(), shade)).with_children(|middle| {
+    let page = (DespawnOnExit(page), NewPage, Visibility::Hidden, widgets::centered(), shade);
+    commands.spawn(page).with_children(|middle| {
         middle.spawn(widgets::panel(column)).with_children(|column| {
             let below = Node { margin: UiRect::bottom(px(12)), ..default() };
             column.spawn((widgets::text(headline, 30.0, GOLD), below));
@@ -52,13 +72,22 @@ fn spawn_page(
 
 /// Spawns the buttons that lead to other pages, and "Quit". The menus of title and pause have them in common.
 fn spawn_common_buttons(column: &mut ChildSpawnerCommands, first: usize, width: f32) {
-    for (at, (words, page)) in
-        [("Settings", MenuPage::Settings), ("Controls", MenuPage::Controls), ("Help", MenuPage::Help)]
-            .into_iter()
-            .enumerate()
+    for (at, (words, page)) in [
+        (texts::SETTINGS, MenuPage::Settings),
+        (texts::CONTROLS, MenuPage::Controls),
+        (texts::HELP, MenuPage::Help),
+    ]
+    .into_iter()
+    .enumerate()
     {
         column.spawn(widgets::button(first + at, words, width)).observe(go_to(page));
     }
+}
+
+/// The item that leads back from a page to the one before it.
+fn spawn_back(column: &mut ChildSpawnerCommands, position: usize, width: f32, page: MenuPage) {
+    let to = page.parent().unwrap_or_default();
+    column.spawn(widgets::button(position, texts::BACK, width)).observe(go_to(to));
 }
 
 /// An observer for an item that leads to another page.
@@ -75,9 +104,10 @@ fn quit(_: On<Activated>, mut exit: MessageWriter<AppExit>) {
 fn app_with(plugin: impl Plugin, page: MenuPage) -> App {
     let mut app = crate::test_support::app_with_input();
     app.init_state::<MenuPage>()
+        .init_state::<GameState>()
         .init_resource::<crate::ui::settings::DefaultSettings>()
         .init_resource::<UiScale>()
-        .add_plugins((widgets::UiPlugin, plugin));
+        .add_plugins((widgets::UiPlugin, fields::FieldsPlugin, question::QuestionPlugin, plugin));
     crate::test_support::go_to(&mut app, page);
     app
 }
@@ -87,4 +117,11 @@ fn app_with(plugin: impl Plugin, page: MenuPage) -> App {
 fn item_at(app: &mut App, position: usize) -> Entity {
     let mut items = app.world_mut().query::<(Entity, &widgets::MenuItem)>();
     items.iter(app.world()).find(|(_, item)| item.0 == position).map(|(entity, _)| entity).expect("an item")
+}
+
+/// The items and texts of the open page, for tests.
+#[cfg(test)]
+fn words(app: &mut App) -> Vec<String> {
+    let mut texts = app.world_mut().query::<&Text>();
+    texts.iter(app.world()).map(|text| text.0.clone()).collect()
 }

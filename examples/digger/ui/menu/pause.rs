@@ -2,9 +2,11 @@
 
 use bevy::prelude::*;
 
+use super::question::Question;
 use super::{quit, spawn_common_buttons};
 use crate::player::game_state::{GameState, MenuPage};
 use crate::player::input::{Action, ActionSystems, Actions};
+use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, MenuInputDisabled};
 
 /// The pause menu, and the keys that lead back from every page.
@@ -24,11 +26,11 @@ impl Plugin for PausePlugin {
 
 fn open(mut commands: Commands) {
     const WIDTH: f32 = 276.0;
-    super::spawn_page(&mut commands, MenuPage::Menu, "Pause", 330.0, |column| {
-        column.spawn(widgets::button(0, "Continue", WIDTH)).observe(change_to(GameState::Playing));
+    super::spawn_page(&mut commands, MenuPage::Menu, texts::PAUSED, 330.0, |column| {
+        column.spawn(widgets::button(0, texts::RESUME, WIDTH)).observe(change_to(GameState::Playing));
         spawn_common_buttons(column, 1, WIDTH);
-        column.spawn(widgets::button(4, "To the title", WIDTH)).observe(change_to(GameState::Title));
-        column.spawn(widgets::button(5, "Quit", WIDTH)).observe(quit);
+        column.spawn(widgets::button(4, texts::MAIN_MENU, WIDTH)).observe(change_to(GameState::Title));
+        column.spawn(widgets::button(5, texts::SAVE_AND_QUIT, WIDTH)).observe(quit);
     });
 }
 
@@ -43,6 +45,7 @@ fn go_back(
     pads: Query<&Gamepad>,
     actions: Res<Actions>,
     now: (Res<State<GameState>>, Res<State<MenuPage>>),
+    question: Option<Res<Question>>,
     mut state: ResMut<NextState<GameState>>,
     mut page: ResMut<NextState<MenuPage>>,
 ) {
@@ -58,8 +61,13 @@ fn go_back(
     match (**now.0, **now.1) {
         (GameState::Paused, MenuPage::Menu) if back => state.set(GameState::Playing),
         (GameState::Paused, MenuPage::Help) if help => state.set(GameState::Playing),
-        (_, MenuPage::Settings | MenuPage::Controls | MenuPage::Help | MenuPage::Together) if back => {
-            page.set(MenuPage::Menu)
+        (_, MenuPage::Question) if back => {
+            page.set(question.map_or(MenuPage::Menu, |question| question.back))
+        }
+        (_, page_now) if back => {
+            if let Some(parent) = page_now.parent() {
+                page.set(parent);
+            }
         }
         _ => {}
     }
@@ -94,6 +102,33 @@ mod tests {
                     assert_eq!(now(&app), expected, "{key:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn escape_leads_back_from_every_page_to_where_one_was() {
+        use MenuPage as P;
+        let mut app = app();
+        app.add_plugins(widgets::UiPlugin).init_resource::<UiScale>();
+        go_to(&mut app, GameState::Title);
+        for page in
+            [P::Worlds, P::World, P::NewWorld, P::Together, P::Settings, P::Controls, P::Help, P::Question]
+        {
+            let parent = page.parent().unwrap_or(P::Menu);
+            go_to(&mut app, parent);
+            app.world_mut().resource_mut::<widgets::FocusedItem>().0 = 2;
+            if page == P::Question {
+                crate::ui::menu::question::ask(&mut app.world_mut().commands(), parent, "?", "yes", |_| {});
+                app.world_mut().flush();
+                app.update();
+            } else {
+                go_to(&mut app, page);
+            }
+            let focus = app.world().resource::<widgets::FocusedItem>().0;
+            assert_eq!(focus, 0, "{page:?} begins at its first item");
+            tap_key(&mut app, KeyCode::Escape);
+            assert_eq!(now(&app), (GameState::Title, parent), "{page:?}");
+            assert_eq!(app.world().resource::<widgets::FocusedItem>().0, 2, "{page:?}");
         }
     }
 

@@ -2,10 +2,11 @@
 
 use bevy::prelude::*;
 
-use super::go_to;
+use super::{question, spawn_back};
 use crate::player::game_state::MenuPage;
 use crate::ui::settings::{DefaultSettings, Quality, Settings};
-use crate::ui::widgets::{self, Activated, Adjusted, Arrow, GOLD, GREY, WHITE, text};
+use crate::ui::texts;
+use crate::ui::widgets::{self, Activated, Adjusted, Arrow, GOLD, GREY, WHITE, paragraph, text};
 
 /// The settings page.
 pub struct SettingsPagePlugin;
@@ -21,50 +22,55 @@ impl Plugin for SettingsPagePlugin {
 /// around.
 type Row = (&'static str, fn(&Settings) -> String, fn(&mut Settings, i32));
 
-const ROWS: [Row; 9] = [
+const ROWS: [Row; 10] = [
     (
-        "Mouse and stick speed",
+        texts::SETTING[0],
         |settings| format!("{:.1}", settings.sensitivity),
         |settings, by| step(&mut settings.sensitivity, by, 0.1, 0.1, 5.0),
     ),
     (
-        "Invert up and down",
-        |settings| yes_or_no(settings.invert_y),
+        texts::SETTING[1],
+        |settings| on_or_off(settings.invert_y),
         |settings, _| settings.invert_y = !settings.invert_y,
     ),
     (
-        "Field of view",
+        texts::SETTING[2],
         |settings| format!("{:.0} degrees", settings.field_of_view),
         |settings, by| step(&mut settings.field_of_view, by, 5.0, 40.0, 110.0),
     ),
     (
-        "View distance",
+        texts::SETTING[3],
         |settings| format!("{:.0} m", settings.view_distance),
         |settings, by| step(&mut settings.view_distance, by, 200.0, 200.0, 8000.0),
     ),
     (
-        "Quality",
-        |settings| format!("{:?}", settings.quality).to_lowercase(),
+        texts::SETTING[4],
+        |settings| texts::QUALITY[settings.quality as usize].into(),
         |settings, by| {
             let all = [Quality::Low, Quality::Medium, Quality::High];
             settings.quality = all[(settings.quality as i32 + by).rem_euclid(3) as usize];
         },
     ),
     (
-        "Length of a day",
+        texts::SETTING[5],
+        |settings| format!("{:.0} %", 100.0 * settings.ui_scale),
+        |settings, by| step(&mut settings.ui_scale, by, 0.1, 0.5, 1.5),
+    ),
+    (
+        texts::SETTING[6],
         |settings| match settings.day_minutes {
-            0.0 => "the sun stands still".into(),
+            0.0 => texts::OFF.into(),
             minutes => format!("{minutes:.0} min"),
         },
         |settings, by| step(&mut settings.day_minutes, by, 5.0, 0.0, 120.0),
     ),
     (
-        "Brush radius",
+        texts::SETTING[7],
         |settings| format!("{:.1} m", settings.radius),
         |settings, by| step(&mut settings.radius, by, 0.5, 1.0, 12.0),
     ),
     (
-        "Shape of what is built",
+        texts::SETTING[8],
         |settings| settings.shape.label().into(),
         |settings, by| {
             let next = settings.shape.next();
@@ -72,18 +78,14 @@ const ROWS: [Row; 9] = [
         },
     ),
     (
-        "Build only with what was dug",
-        |settings| yes_or_no(settings.survival),
+        texts::SETTING[9],
+        |settings| on_or_off(settings.survival),
         |settings, _| settings.survival = !settings.survival,
     ),
 ];
 
-/// What the labels do not say.
-const NOTES: &str = "View distance: what is farther fades into the sky. Far ground is drawn coarsely, so a long view costs \
-                     little.\nQuality: of shadows, textures and far ground.";
-
-fn yes_or_no(value: bool) -> String {
-    if value { "yes" } else { "no" }.into()
+fn on_or_off(value: bool) -> String {
+    if value { texts::ON } else { texts::OFF }.into()
 }
 
 /// Steps to a multiple of `width`, whatever number the file had.
@@ -96,7 +98,7 @@ fn step(number: &mut f32, by: i32, width: f32, low: f32, high: f32) {
 struct Value(usize);
 
 fn open(mut commands: Commands) {
-    super::spawn_page(&mut commands, MenuPage::Settings, "Settings", 600.0, |column| {
+    super::spawn_page(&mut commands, MenuPage::Settings, texts::SETTINGS, 600.0, |column| {
         for (at, (label, _, adjust)) in ROWS.into_iter().enumerate() {
             let row = Node {
                 padding: UiRect::axes(px(14), px(6)),
@@ -121,10 +123,10 @@ fn open(mut commands: Commands) {
                 // A click on the row does the same as its right arrow.
                 .observe(move |_: On<Activated>, mut settings: ResMut<Settings>| adjust(&mut settings, 1));
         }
-        let around = Node { margin: UiRect::axes(px(14), px(8)), ..default() };
-        column.spawn((text(NOTES, 13.0, GREY), around));
-        column.spawn(widgets::button(ROWS.len(), "Reset", 540.0)).observe(reset);
-        column.spawn(widgets::button(ROWS.len() + 1, "Back", 540.0)).observe(go_to(MenuPage::Menu));
+        let around = Node { width: px(516), margin: UiRect::axes(px(14), px(8)), ..default() };
+        column.spawn((paragraph(texts::SETTINGS_NOTES, 13.0, GREY), around));
+        column.spawn(widgets::button(ROWS.len(), texts::RESET, 540.0)).observe(ask_to_reset);
+        spawn_back(column, ROWS.len() + 1, 540.0, MenuPage::Settings);
     });
 }
 
@@ -134,8 +136,13 @@ fn arrow(sign: &str, by: i32) -> impl Bundle {
     (Arrow(by), node, BackgroundColor(Color::srgba(1.0, 1.0, 1.0, 0.08)), children![text(sign, 18.0, WHITE)])
 }
 
+fn ask_to_reset(_: On<Activated>, mut commands: Commands) {
+    let reset = |commands: &mut Commands| commands.run_system_cached(reset);
+    question::ask(&mut commands, MenuPage::Settings, texts::RESET_SETTINGS, texts::RESET, reset);
+}
+
 /// Resets everything but what has a page of its own.
-fn reset(_: On<Activated>, defaults: Res<DefaultSettings>, mut settings: ResMut<Settings>) {
+fn reset(defaults: Res<DefaultSettings>, mut settings: ResMut<Settings>) {
     let Settings { name, host_address, bindings, .. } = settings.clone();
     *settings = Settings { name, host_address, bindings, ..defaults.0.clone() };
 }
@@ -165,10 +172,10 @@ mod tests {
     fn numbers_stop_at_their_limits_and_other_values_wrap_around() {
         let mut app = app();
         for (label, expected) in [
-            ("Invert up and down", ["yes", "no", "yes"]),
-            ("Build only with what was dug", ["no", "yes", "no"]),
+            ("Invert look (Y axis)", ["on", "off", "on"]),
+            ("Limited materials", ["off", "on", "off"]),
             ("Quality", ["high", "low", "medium"]),
-            ("Shape of what is built", ["cube", "beam", "sphere"]),
+            ("Build shape", ["cube", "beam", "sphere"]),
             ("Field of view", ["105 degrees", "110 degrees", "110 degrees"]),
         ] {
             app.world_mut().resource_mut::<Settings>().field_of_view = 100.0;
@@ -184,12 +191,19 @@ mod tests {
     #[test]
     fn reset_restores_the_defaults_of_this_machine() {
         let mut app = app();
-        let entity = item_at(&mut app, ROWS.len());
+        let activate = |app: &mut App, at: usize| {
+            let entity = item_at(app, at);
+            app.world_mut().trigger(Activated { entity });
+            app.update();
+            app.update();
+        };
         for quality in [Quality::Low, Quality::Medium] {
             app.world_mut().resource_mut::<DefaultSettings>().0.quality = quality;
             let mut settings = app.world_mut().resource_mut::<Settings>();
             (settings.quality, settings.sensitivity) = (Quality::High, 3.0);
-            app.world_mut().trigger(Activated { entity });
+            activate(&mut app, ROWS.len());
+            assert_eq!(app.world().resource::<Settings>().sensitivity, 3.0, "it asks first");
+            activate(&mut app, 1);
             let settings = app.world().resource::<Settings>();
             assert_eq!((settings.quality, settings.sensitivity), (quality, 1.0));
         }
@@ -199,7 +213,7 @@ mod tests {
     fn rows_react_to_enter_and_to_clicks() {
         let mut app = app();
         let is_inverted = |app: &App| app.world().resource::<Settings>().invert_y;
-        let at = position("Invert up and down");
+        let at = position("Invert look (Y axis)");
         app.world_mut().resource_mut::<FocusedItem>().0 = at;
         tap_key(&mut app, KeyCode::Enter);
         assert!(is_inverted(&app));

@@ -7,13 +7,14 @@ use bevy_burrow::saves::OpeningWorld;
 use bevy_burrow::together::{GroundServer, SharedTerrain};
 use bevy_burrow::view::GroundLoading;
 
-use super::{quit, spawn_common_buttons};
+use super::{question, quit, spawn_common_buttons, worlds};
 use crate::film::places::{Places, flat};
 use crate::party::connection::Party;
 use crate::player::Player;
 use crate::player::camera::{DetachedCamera, PlayerCamera};
 use crate::player::game_state::{GameState, MenuPage};
 use crate::ui::images::Images;
+use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, GOLD, GREY};
 use crate::world::landscape::NewGame;
 use crate::world::saves::{self, PlayedWorld};
@@ -33,7 +34,7 @@ impl Plugin for TitlePlugin {
                 page.set(MenuPage::Menu);
             })
             .add_systems(OnEnter(MenuPage::Menu), open.run_if(in_state(GameState::Title)))
-            .add_systems(OnExit(GameState::Title), (attach_camera, note_start))
+            .add_systems(OnEnter(GameState::Playing), (attach_camera, note_start))
             .add_systems(
                 Update,
                 (
@@ -88,28 +89,31 @@ fn open(
         let logo = Node { width: px(424), height: px(88), margin: UiRect::bottom(px(4)), ..default() };
         left.spawn((ImageNode::new(images.logo.clone()), logo));
         let below = Node { margin: UiRect::bottom(px(34)), ..default() };
-        left.spawn((widgets::text("a real landscape that you can dig", 17.0, GREY), below));
-        let saved = played.0.as_deref().filter(|folder| folder.exists());
+        left.spawn((widgets::text(texts::TAGLINE, 17.0, GREY), below));
+        let saves_worlds = saves::new_name().is_some();
+        let saved = played.0.as_deref().filter(|_| !matches!(*party, Party::Guest(..)));
         let first = match saved {
-            _ if matches!(*party, Party::Guest(_)) => "Continue".into(),
-            Some(folder) => format!("Continue {}", saves::name(folder)),
-            None if game.has_begun => "Continue".into(),
-            None => "Dig".into(),
+            Some(folder) => texts::continue_world(&saves::name(folder)),
+            None if game.has_begun && (!saves_worlds || *party != Party::Alone) => texts::CONTINUE.into(),
+            None => texts::PLAY.into(),
         };
         left.spawn(widgets::button(0, &first, WIDTH)).observe(start);
-        let mut next = 1;
-        if game.has_begun || saved.is_some() {
-            left.spawn(widgets::button(next, "New game", WIDTH)).observe(start_new_game);
-            next += 1;
+        if saves_worlds {
+            for (at, (words, page)) in
+                [(texts::NEW_WORLD, MenuPage::NewWorld), (texts::WORLDS, MenuPage::Worlds)]
+                    .into_iter()
+                    .enumerate()
+            {
+                left.spawn(widgets::button(1 + at, words, WIDTH)).observe(super::go_to(page));
+            }
+        } else {
+            left.spawn(widgets::button(1, texts::NEW_WORLD, WIDTH)).observe(ask_for_new_game);
         }
-        if played.0.is_some() {
-            left.spawn(widgets::button(next, "Worlds", WIDTH)).observe(super::go_to(MenuPage::Worlds));
-            next += 1;
-        }
-        left.spawn(widgets::button(next, "Together", WIDTH)).observe(super::go_to(MenuPage::Together));
-        next += 1;
-        spawn_common_buttons(left, next, WIDTH);
-        left.spawn(widgets::button(next + 3, "Quit", WIDTH)).observe(quit);
+        let next = if saves_worlds { 3 } else { 2 };
+        left.spawn(widgets::button(next, texts::MULTIPLAYER, WIDTH))
+            .observe(super::go_to(MenuPage::Together));
+        spawn_common_buttons(left, next + 1, WIDTH);
+        left.spawn(widgets::button(next + 4, texts::QUIT, WIDTH)).observe(quit);
         left.spawn(progress());
     });
 }
@@ -122,24 +126,31 @@ fn progress() -> impl Bundle {
     (Progress, column, Visibility::Hidden, children![words, widgets::bar(WIDTH, ProgressBar)])
 }
 
-fn start(_: On<Activated>, mut game: ResMut<Start>) {
-    game.is_wanted = true;
-}
-
-fn start_new_game(
+/// Starts the game. The first world is made now, so that none is there that nobody played.
+fn start(
     _: On<Activated>,
     mut commands: Commands,
     mut game: ResMut<Start>,
     mut played: ResMut<PlayedWorld>,
-    mut party: ResMut<Party>,
+    party: Res<Party>,
 ) {
-    *party = Party::Alone;
-    // Where games are saved, each has a folder of its own.
-    if played.0.is_some() {
-        played.0 = saves::new_world();
-    }
-    commands.trigger(NewGame);
     game.is_wanted = true;
+    if played.0.is_none() && *party == Party::Alone {
+        played.0 = saves::new_name().and_then(|name| saves::create(&name, 0).ok());
+        if played.0.is_some() {
+            worlds::begin(&mut commands, &mut game);
+        }
+    }
+}
+
+/// Where nothing is saved, a new game loses the old one.
+fn ask_for_new_game(_: On<Activated>, mut commands: Commands) {
+    let begin = |commands: &mut Commands| {
+        commands.insert_resource(Party::Alone);
+        commands.trigger(NewGame);
+        commands.queue(|world: &mut World| world.resource_mut::<Start>().is_wanted = true);
+    };
+    question::ask(&mut commands, MenuPage::Menu, texts::NEW_UNSAVED, texts::NEW_WORLD, begin);
 }
 
 /// Does the window have the focus? The game captures the mouse, so it must not start while the player uses another
@@ -177,10 +188,10 @@ fn show_progress(
     let saved = saved.or_else(|| server.and_then(|server| server.opening()));
     let is_absent = shared.iter().any(|shared| !shared.is_playable());
     let (words, share) = match (textures.is_ready(), saved) {
-        (false, _) => (Some("creating textures"), textures.progress()),
-        (true, Some(share)) => (Some("reading the world"), share),
-        (true, None) if is_absent => (Some("joining"), 1.0),
-        (true, None) if players.is_empty() => (Some("loading the landscape"), 1.0),
+        (false, _) => (Some(texts::CREATING_TEXTURES), textures.progress()),
+        (true, Some(share)) => (Some(texts::READING_WORLD), share),
+        (true, None) if is_absent => (Some(texts::JOINING), 1.0),
+        (true, None) if players.is_empty() => (Some(texts::LOADING_LANDSCAPE), 1.0),
         (true, None) => (None, 1.0),
     };
     let done = 100.0 * share;
@@ -281,6 +292,6 @@ mod tests {
         app.update();
         assert_eq!(app.world().get::<Visibility>(column), Some(&Visibility::Inherited));
         let mut texts = app.world_mut().query_filtered::<&Text, With<ProgressText>>();
-        assert_eq!(texts.single(app.world()).expect("a text").0, "creating textures: 0 %");
+        assert_eq!(texts.single(app.world()).expect("a text").0, "Creating textures: 0 %");
     }
 }
