@@ -288,7 +288,9 @@ mod tests {
             let _ = gate.recv();
             let _ = done.send(1);
         });
-        threads().spawn_fifo(move || drop(later.send(2)));
+        threads().spawn_fifo(move || {
+            let _ = later.send(2);
+        });
         pool.resize(3);
         assert_eq!(threads().current_num_threads(), 3);
         assert!(is_done.try_recv().is_err());

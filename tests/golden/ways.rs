@@ -29,7 +29,8 @@ pub fn shoot_deferred(studio: &mut Studio, album: &mut Album) {
     album.compare("deferred", &picture);
     let apart = album.golden("ways").map_or(1.0, |forward| flip(&forward, &picture).0);
     println!("deferred: FLIP {apart:.5} from forward");
-    album.check(apart <= CLOSE.max(threshold()), || format!("deferred differs from forward: FLIP {apart:.5}"));
+    album
+        .check(apart <= CLOSE.max(threshold()), || format!("deferred differs from forward: FLIP {apart:.5}"));
 }
 
 fn set_up(studio: &mut Studio) {

@@ -239,9 +239,13 @@ impl Play {
 
     fn is_settled(&self) -> bool {
         let last = self.server.epoch().number;
+        // One that has not noticed yet that its server was replaced may be at the same number of the other order by chance: it has told
+        // this server nothing of it.
         self.server.applied() == last
             && self.players.iter().all(|player| {
-                player.client.has_joined() && player.client.number() == last && player.client.pending() == 0
+                let is_here = self.server.acknowledged(player.id) == Some(last);
+                let client = &player.client;
+                is_here && client.has_joined() && client.number() == last && client.pending() == 0
             })
     }
 
@@ -269,8 +273,11 @@ impl Play {
         }
         let hash = self.server.terrain().world().hash();
         for player in &self.players {
-            if player.client.world().hash() != hash || player.client.shown_hash() != hash {
+            if player.client.world().hash() != hash {
                 return Err(format!("{:?} has another world", player.id));
+            }
+            if player.client.shown_hash() != hash {
+                return Err(format!("{:?} shows another world than it has", player.id));
             }
             if player.kicked > 0 || player.client.figures().repairs > 0 {
                 return Err(format!("{:?} kicked or repaired: {:?}", player.id, player.client.figures()));

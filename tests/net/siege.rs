@@ -30,7 +30,8 @@ const EDIT: u64 = 12;
 const HOSTILE: u64 = 1000;
 
 fn random_dig(rng: &mut Rng, radius: f32) -> Edit {
-    let at = Vec3::new(8.0 + 240.0 * rng.f32(), 20.0, 8.0 + 240.0 * rng.f32());
+    // At many depths, so that most digs still find ground.
+    let at = Vec3::new(8.0 + 240.0 * rng.f32(), 20.0 - 40.0 * rng.f32(), 8.0 + 240.0 * rng.f32());
     Edit::quantize(&Brush::dig(Shape::sphere(at, radius))).expect("a valid brush")
 }
 
@@ -129,7 +130,7 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
     let ground = hills(SIDE as u32);
     let mut rng = Rng::with_seed(5);
     let mut dug = terrain(&ground);
-    (0..2500).for_each(|_| dug.submit_edit(&random_dig(&mut rng, 9.0)));
+    (0..1000).for_each(|_| dug.submit_edit(&random_dig(&mut rng, 9.0)));
     while let Some(transaction) = dug.begin() {
         dug.commit(transaction.run()).expect("it waits for it");
     }
@@ -205,6 +206,8 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
     took.sort_unstable();
     let reconnecting = edits.lock().expect("nobody panics").get(&ClientId(HOSTILE + 1)).copied();
     let figures = server.figures();
+    let world = server.terrain().world().memory();
+    println!("{world:?}");
     let memory = -measure(|| drop(server)).bytes_current;
     let outcome = Outcome {
         memory,

@@ -2,6 +2,8 @@
 //! `BURROW_LIFECYCLES` is the number of random stories.
 #![cfg(feature = "store")]
 
+use std::sync::Arc;
+
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_burrow::plugin::Held;

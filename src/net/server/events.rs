@@ -37,6 +37,8 @@ pub struct ServerFigures {
     pub voids: u64,
     /// Clients that were kicked.
     pub kicked: u64,
+    /// Clients that had to begin again, because a world was kept for them and they took nothing.
+    pub stuck: u64,
     /// Regions that clients fetched because they differed.
     pub repairs: u64,
     /// Bytes of the order lane to all clients.

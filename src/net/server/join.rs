@@ -6,12 +6,13 @@ use std::time::Duration;
 
 use glam::IVec3;
 
+use super::kept::Kept;
 use super::sender::{Snapshot, region_bytes};
 use super::session::{Fetch, Stage};
 use super::{Server, ServerEvent};
 use crate::lattice::RegionPos;
-use crate::net::message::{ClientId, Epoch, Hello, Join, Kick, Lane, Terms, ToClient, Welcome};
-use crate::net::regions::regions_of;
+use crate::net::message::{ClientId, Epoch, Hello, Join, Kick, Lane, RegionHashes, ToClient, Welcome};
+use crate::net::regions::{region_hash, regions_of};
 
 /// Regions that are encoded to estimate how many bytes all of them take.
 const MEASURED: usize = 16;
@@ -26,8 +27,8 @@ const ASK_INTERVAL: Duration = Duration::from_secs(1);
 enum Bulk {
     /// These messages.
     Messages(Vec<Arc<[u8]>>),
-    /// These regions of the world as it is.
-    Regions(Vec<RegionPos>),
+    /// These regions of a world.
+    Regions(Snapshot, Vec<RegionPos>),
 }
 
 impl Server {
@@ -65,6 +66,9 @@ impl Server {
                 // What it asked for before has to have a number, as the welcome tells that it was seen.
                 Stage::Greeted(hello)
                     if !self.later.iter().any(|later| later.is_of(*client))
+                        && self.kept.as_ref().is_none_or(|kept: &Kept| {
+                            kept.is_for(&hello, self.epoch.run, self.own_numbers.last_applied(*client))
+                        })
                         && self.players.player(*client).greetings.spend(now, 1) =>
                 {
                     greeted.push((*client, hello));
@@ -77,11 +81,8 @@ impl Server {
                 silent.push(*client);
             }
         }
-        let all = greeted.iter().any(|(_, hello)| hello.epoch.is_none());
-        let all: Vec<RegionPos> =
-            if all { regions_of(self.terrain.world()).into_iter().collect() } else { Vec::new() };
         for (client, hello) in greeted {
-            self.welcome(client, &hello, &all);
+            self.welcome(client, &hello);
         }
         silent.into_iter().for_each(|client| self.send(client, &ToClient::Greet));
         if now.saturating_sub(self.fetched) >= FETCH_INTERVAL {
@@ -89,25 +90,25 @@ impl Server {
         }
     }
 
-    /// `all` are the regions of the world.
-    fn welcome(&mut self, client: ClientId, hello: &Hello, all: &[RegionPos]) {
-        let (join, bulk) = match hello.epoch {
+    fn welcome(&mut self, client: ClientId, hello: &Hello) {
+        let log = match hello.epoch {
             Some(epoch)
                 if (epoch.world, epoch.run) == (self.epoch.world, self.epoch.run)
                     && epoch.number <= self.epoch.number =>
             {
-                self.entries_after(epoch.number).unwrap_or_else(|| self.compare(client))
+                self.entries_after(epoch.number)
             }
-            // Whatever it has, it needs what differs.
-            Some(_) => self.compare(client),
+            Some(_) => None,
             // It has the pristine world.
-            None => match self.entries_after(0).filter(|_| self.is_whole) {
-                Some(log) => log,
-                None => self.all_regions(hello.place, all),
-            },
+            None => self.entries_after(0).filter(|_| self.is_whole),
         };
-        // Old entries lead up to the last one, regions are those of the world as it is.
-        let number = if matches!(join, Join::Log { .. }) { self.epoch.number } else { self.applied };
+        // Old entries lead up to the last one, regions are those of a world that was kept.
+        let (number, (join, bulk)) = match (log, hello.epoch) {
+            (Some(log), _) => (self.epoch.number, log),
+            // Whatever it has, it needs what differs.
+            (None, Some(_)) => self.compare(client),
+            (None, None) => self.all_regions(hello.place),
+        };
         let now = self.now;
         let welcome = Welcome {
             client,
@@ -122,9 +123,7 @@ impl Server {
         session.order = super::sender::OrderSender::new(&self.settings, number);
         match bulk {
             Bulk::Messages(messages) => messages.into_iter().for_each(|message| session.bulk.push(message)),
-            Bulk::Regions(regions) => {
-                session.bulk.push_regions((self.applied, self.terrain.snapshot()), &regions);
-            }
+            Bulk::Regions(world, regions) => session.bulk.push_regions(world, &regions),
         }
         if let Some(stream) = session.stream {
             let mark = ToClient::Stream { stream };
@@ -152,44 +151,47 @@ impl Server {
     }
 
     /// All regions, nearest first.
-    fn all_regions(&self, place: IVec3, all: &[RegionPos]) -> (Join, Bulk) {
-        let mut regions = all.to_vec();
+    fn all_regions(&mut self, place: IVec3) -> (u64, (Join, Bulk)) {
+        let (world, terms) = self.keep();
+        let mut regions: Vec<RegionPos> = regions_of(&world.1).into_iter().collect();
         regions.sort_by_cached_key(|region| squared_distance(*region, place));
-        let terms = Box::new(self.terms());
-        (Join::Regions { regions: regions.len() as u32, terms }, Bulk::Regions(regions))
+        let join = Join::Regions { regions: regions.len() as u32, terms: Box::new(terms) };
+        (world.0, (join, Bulk::Regions(world, regions)))
     }
 
     /// The table of all regions. The world stays as it is for the client, until it goes on.
-    fn compare(&mut self, client: ClientId) -> (Join, Bulk) {
-        let (world, number) = (self.terrain.snapshot(), self.applied);
-        let regions: BTreeSet<RegionPos> = regions_of(&world);
-        let table = ToClient::Table { number, regions: self.hashes_of(regions) }.to_bytes();
+    fn compare(&mut self, client: ClientId) -> (u64, (Join, Bulk)) {
+        let ((number, world), terms) = self.keep();
+        let (new, same): (BTreeSet<RegionPos>, BTreeSet<RegionPos>) = regions_of(&world)
+            .into_iter()
+            .partition(|region| self.changed.get(region).is_some_and(|at| *at > number));
+        let new = new.into_iter().map(|region| (region, region_hash(&world, region)));
+        let mut regions: RegionHashes = self.hashes_of(same).into_iter().chain(new).collect();
+        regions.sort_unstable_by_key(|(region, _)| *region);
+        let table = ToClient::Table { number, regions }.to_bytes();
         if let Some(session) = self.sessions.get_mut(&client) {
             session.compared = Some((number, world));
         }
-        (Join::Compare { terms: Box::new(self.terms()) }, Bulk::Messages(vec![table.into()]))
-    }
-
-    fn terms(&self) -> Terms {
-        Terms {
-            rules: self.terrain.rules().cloned(),
-            loose: self.terrain.loose().copied(),
-            next_field: self.terrain.world().next_field(),
-        }
+        (number, (Join::Compare { terms: Box::new(terms) }, Bulk::Messages(vec![table.into()])))
     }
 
     /// Answers fetches, with one world for each client at a time: those of another one wait until its regions are sent.
     fn answer_fetches(&mut self, now: Duration) {
+        let is_repair = |session: &super::Session| {
+            session.fetches.front().is_some_and(|fetch| {
+                let number = fetch.number;
+                session.compared.as_ref().is_none_or(|(own, _)| *own != number) && number <= self.applied
+            })
+        };
+        let kept = self.sessions.values().any(is_repair).then(|| self.keep().0);
         let mut repaired = Vec::new();
         for (client, session) in &mut self.sessions {
             while let Some(Fetch { number, .. }) = session.fetches.front() {
                 let compared = session.compared.as_ref().filter(|(own, _)| own == number);
                 let is_repair = compared.is_none();
-                let snapshot = match compared {
-                    Some((number, world)) => (*number, Arc::clone(world)),
-                    None if *number <= self.applied => (self.applied, self.terrain.snapshot()),
-                    None => break,
-                };
+                // A repair waits for a world that has all that the client's has.
+                let kept = kept.as_ref().filter(|(kept, _)| number <= kept);
+                let Some(snapshot) = compared.or(kept).cloned() else { break };
                 if !session.bulk.takes(snapshot.0) {
                     break;
                 }

@@ -11,11 +11,13 @@
 //! | `apply` | entries become the world |
 //! | `strokes` | what may be taken back |
 //! | `join`, `sender` | clients that come, come back, or differ; the bulk lane |
+//! | `kept` | worlds that are kept as they were, for these |
 //! | `save` | a server that survives a restart |
 
 mod apply;
 mod events;
 mod join;
+mod kept;
 mod order_log;
 mod own_numbers;
 mod players;
@@ -45,6 +47,7 @@ use crate::store::{FormatError, WorldId};
 use crate::terrain::{LooseSettings, Terrain, WorldChange};
 use crate::volume::{DiggingRules, RulesError};
 pub use events::{ServerEvent, ServerFigures};
+use kept::Kept;
 use order_log::OrderLog;
 use own_numbers::OwnNumbers;
 use players::Players;
@@ -143,6 +146,8 @@ pub struct Server {
     sessions: BTreeMap<ClientId, Session>,
     players: Players,
     own_numbers: OwnNumbers,
+    /// The world that clients get who come now.
+    kept: Option<Kept>,
     /// When fetches were answered last.
     fetched: Duration,
     durable: u64,
@@ -209,6 +214,7 @@ impl Server {
             sessions: BTreeMap::new(),
             players: Players::new(settings),
             own_numbers: OwnNumbers::default(),
+            kept: None,
             fetched: Duration::ZERO,
             durable: number,
             saved: VecDeque::new(),
@@ -459,6 +465,8 @@ impl Server {
         self.apply();
         self.log.trim(self.applied);
         self.voids = self.voids.split_off(&self.log.first());
+        self.forget_kept(now);
+        self.drop_stuck(now);
         self.welcome_all(now);
         self.send_bulk(now);
     }

@@ -109,6 +109,11 @@ impl OwnNumbers {
         }
     }
 
+    /// The number in the order of a player's last edit that is applied; 0 where it is not known.
+    pub fn last_applied(&self, client: ClientId) -> u64 {
+        self.applied.get(&client).map_or(0, |last| last.number)
+    }
+
     /// Hands over to a store what it does not have yet.
     pub fn save(&mut self, store: &mut Store) {
         for client in std::mem::take(&mut self.changed) {

@@ -88,6 +88,9 @@ pub struct BulkSender {
     at: usize,
     sent: u64,
     acknowledged: u64,
+    /// What was acknowledged when it [went on](Self::goes_on) last, and how many bytes more are that again.
+    noted: u64,
+    least: u64,
     window: u64,
     piece: usize,
 }
@@ -102,6 +105,8 @@ impl BulkSender {
             at: 0,
             sent: 0,
             acknowledged: 0,
+            noted: 0,
+            least: (settings.window / 8).min(settings.bulk.per_second).max(1),
             window: settings.window,
             piece: (settings.piece as u64).min(settings.bulk.burst).min(settings.window).max(1) as usize,
         }
@@ -136,6 +141,22 @@ impl BulkSender {
     /// Messages and regions that wait.
     pub fn waiting(&self) -> usize {
         self.jobs.len()
+    }
+
+    /// The number of the world of regions that wait.
+    pub fn number(&self) -> Option<u64> {
+        self.world.as_ref().map(|(number, _)| *number)
+    }
+
+    /// Whether the client has taken much since it last went on, or everything, so that the next is for the server to send.
+    pub fn goes_on(&mut self) -> bool {
+        let is_waiting = !self.jobs.is_empty() || self.at < self.stream.len();
+        let has_all = self.acknowledged == self.sent && (is_waiting || self.acknowledged > self.noted);
+        let goes_on = has_all || self.acknowledged - self.noted >= self.least;
+        if goes_on {
+            self.noted = self.acknowledged;
+        }
+        goes_on
     }
 
     /// Notes that so many bytes have come. Returns `false` if that is impossible.

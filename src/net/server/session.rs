@@ -11,6 +11,9 @@ use crate::net::message::Hello;
 use crate::net::stamps::StampId;
 use crate::terrain::World;
 
+/// A client for which a world is kept begins again if it takes nothing for so long.
+const STUCK: Duration = Duration::from_secs(10);
+
 /// How far a client has come.
 pub enum Stage {
     /// It has said nothing yet, or has to begin again.
@@ -44,6 +47,8 @@ pub struct Session {
     pub images: BTreeSet<StampId>,
     /// The world that it compares its own with, and that one's number.
     pub compared: Option<(u64, Arc<World>)>,
+    /// When it last went on to take what a world is kept for.
+    went_on: Duration,
 }
 
 impl Session {
@@ -58,6 +63,7 @@ impl Session {
             fetches: VecDeque::new(),
             images: BTreeSet::new(),
             compared: None,
+            went_on: now,
         }
     }
 
@@ -69,6 +75,16 @@ impl Session {
 
     pub fn has_joined(&self) -> bool {
         matches!(self.stage, Stage::Joined)
+    }
+
+    /// Whether a world that has changed since is kept for it, and it has taken nothing for long. `applied` is the number of the world now.
+    pub fn is_stuck(&mut self, now: Duration, applied: u64) -> bool {
+        let compared = self.compared.as_ref().map(|(number, _)| *number);
+        let is_kept = self.bulk.number().into_iter().chain(compared).any(|number| number < applied);
+        if self.bulk.goes_on() || !is_kept {
+            self.went_on = now;
+        }
+        now.saturating_sub(self.went_on) >= STUCK
     }
 
     /// How many regions it waits for, with one more for each message in which it asked.
