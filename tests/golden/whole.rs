@@ -113,7 +113,7 @@ fn set_up(studio: &mut Studio, dress: Dress, has_levels: bool) {
     ]);
     // The other terrain hangs in the air, turned about all axes.
     let small = Ground::flat(32, 32, 8.0).expect("valid");
-    let settings = TerrainSettings { chunk_size: 16, voxel_size: 0.5, ..default() };
+    let settings = TerrainSettings { chunk_size: 16, voxel_size: 0.5 };
     let mut small = Terrain::new(small, &settings).expect("valid settings");
     small.apply([Brush::dig(Shape::sphere(Vec3::new(8.0, 4.0, 8.0), 3.0))]);
     let turned = Transform::from_translation(eye.lerp(pit, 0.6) + Vec3::new(-12.0, 4.0, 0.0))

@@ -259,7 +259,9 @@ impl Bot {
                     "durable"
                 }
                 ClientEvent::Undone(restored) => {
-                    self.undone.extend(restored);
+                    // The reference keeps no list of the pieces that games were told of.
+                    self.undone
+                        .extend(restored.map(|restored| Restored { returned: Vec::new(), ..restored }));
                     "undone"
                 }
                 ClientEvent::UndoRefused(_) => "not undone",

@@ -7,7 +7,7 @@ use allocation_counter::measure;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, Hello, Kick, Lane, MOST_OWN_JUMP, PROTOCOL, Reach, Refusal, Server,
+    Client, ClientEvent, ClientId, Hello, Kick, Lane, MOST_OWN_JUMP, PROTOCOL, Rate, Reach, Refusal, Server,
     ServerSettings, Stamps, ToClient, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
@@ -178,6 +178,69 @@ fn held(fetches: bool) -> i64 {
 fn fetches_that_nobody_takes_keep_one_world_in_memory() {
     let without = held(false);
     assert!(held(true) < without + (8 << 20));
+}
+
+/// What a server holds beside its world, all of which changes in a second: after so many clients have come in eight seconds that take
+/// nothing, and after so many frames more; and the size of the world. It is measured by what is freed in the end, on this thread.
+fn held_beside(clients: u64, frames: u32) -> (i64, i64) {
+    let ground = flat(128);
+    let settings = ServerSettings { log_bytes: 64 << 10, window: 32 << 10, ..ServerSettings::default() };
+    // No order leads to this world from the pristine one, so that regions are sent.
+    let mut dug = terrain(&ground);
+    dug.apply([ball(64.0, 64.0, 3.0)]);
+    let mut server = Server::new(dug, settings);
+    let mut now = BEGIN;
+    for turn in 0..360 + frames {
+        let (x, z) = (12.0 + (turn * 37 % 104) as f32, 12.0 + (turn * 53 % 104) as f32);
+        let shape = Shape::sphere(Vec3::new(x, 14.0, z), 14.0);
+        let brush = if turn % 3 == 0 { Brush::add(shape, MaterialId(1)) } else { Brush::dig(shape) };
+        server.edit(edit(&brush)).expect("no stamp");
+        now += FRAME;
+        server.advance(now);
+        drop(server.take_outgoing());
+        if (200..360).contains(&turn) && u64::from(turn - 200) < 4 * clients && turn % 4 == 0 {
+            let_in(&mut server, ClientId(u64::from(turn)), &ground, now);
+        }
+    }
+    let figures = server.figures();
+    assert_eq!(figures.kicked, 0);
+    assert!(frames < 200 || figures.stuck == clients, "{} of {clients}", figures.stuck);
+    let world = server.terrain().world().memory().edits() as i64;
+    (-measure(|| drop(server)).bytes_current - world, world)
+}
+
+#[test]
+fn clients_that_take_nothing_share_worlds_and_lose_them() {
+    let ((quiet, _), (kept, world), (left, _)) =
+        (held_beside(0, 0), held_beside(40, 0), held_beside(40, 200));
+    println!("{quiet} bytes, {kept} with 40 clients, {left} later, beside a world of {world}");
+    assert!(kept - quiet > world / 2, "no world was kept");
+    assert!(kept - quiet < 10 * world, "{kept} bytes for 40 clients instead of {quiet}");
+    assert!(left - quiet < world / 2, "{left} bytes are left instead of {quiet}");
+}
+
+#[test]
+fn who_stops_for_long_while_it_joins_begins_again_and_gets_the_world() {
+    let ground = flat(256);
+    let mut dug = terrain(&ground);
+    dug.apply((0..300).map(|at| ball(8.0 + (at * 37 % 240) as f32, 8.0 + (at * 53 % 240) as f32, 7.0)));
+    let bulk = Rate { per_second: 8 << 10, burst: 2 << 10 };
+    let server = Server::new(dug, ServerSettings { bulk, ..ServerSettings::default() });
+    let mut play = Play::of(&ground, server);
+    let at = play.join(1);
+    play.frames(10);
+    assert!(!play.players[at].client.has_joined());
+    play.players[at].is_connected = false;
+    for turn in 0..400 {
+        play.server.edit(edit(&ball(20.0 + (turn % 200) as f32, 100.0, 5.0))).expect("no stamp");
+        play.frames(1);
+    }
+    assert_eq!(play.server.figures().stuck, 1);
+    play.players[at].is_connected = true;
+    play.frames(1200);
+    let client = &play.players[at].client;
+    assert!(client.has_joined() && client.world().hash() == play.hash());
+    assert_eq!((play.players[at].kicked(), client.figures().repairs, play.server.figures().stuck), (0, 0, 1));
 }
 
 #[test]

@@ -2,8 +2,6 @@
 //! `BURROW_LIFECYCLES` is the number of random stories.
 #![cfg(feature = "store")]
 
-use std::sync::Arc;
-
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_burrow::plugin::Held;
@@ -197,7 +195,7 @@ impl Story {
         drop(game);
         for (kind, expected) in expected.into_iter().enumerate() {
             let Some(expected) = expected else { continue };
-            let ground = Arc::new(level(kind).world().ground().clone());
+            let ground = Ground::flat(96, 96, HEIGHTS[kind]).expect("valid");
             let options = StoreOptions { base_changed: BaseChanged::Refuse, ..StoreOptions::default() };
             let opened = Store::open(&folders[kind].0, ground, options);
             let (_, opened) = opened.unwrap_or_else(|why| panic!("{story}: {why}"));

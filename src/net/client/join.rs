@@ -164,7 +164,7 @@ impl Client {
     fn follow_from_now(&mut self) {
         self.stage = Stage::Following;
         self.is_part = false;
-        self.check_pieces(None);
+        self.check_pieces(None, &BTreeSet::new());
         if !self.is_playable {
             self.is_playable = true;
             self.events.push(ClientEvent::Playable);

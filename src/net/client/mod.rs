@@ -521,11 +521,13 @@ impl Client {
         }
     }
 
-    /// The next entries up to a number, at most so many. A mark ends them, and so do parts: what is ground again is looked for then.
+    /// The next entries up to a number, at most so many. A mark ends them, and parts come alone: what they make ground is looked for.
     fn next_batch(&mut self, end: u64, most: usize) -> Vec<Entry> {
         let (mut batch, mut number) = (Vec::new(), self.number());
+        let is_parts = |entry: Option<&Entry>| matches!(entry, Some(Entry::Parts { .. }));
         while number < end
             && batch.len() < most
+            && (batch.is_empty() || !is_parts(self.waiting.get(&(number + 1))))
             && let Some(entry) = self.waiting.remove(&(number + 1))
         {
             number += 1;
@@ -562,6 +564,12 @@ impl Client {
                 _ => {}
             }
         }
+        let ground = match batch.first() {
+            Some(Entry::Parts { change, .. }) => {
+                reach(change).map(|reach| self.ground_pieces(Some(reach))).unwrap_or_default()
+            }
+            _ => BTreeSet::new(),
+        };
         let applied = self.replica.apply(&batch, own);
         let (mut receipts, mut restored) = (applied.receipts.into_iter(), applied.restored.into_iter());
         for entry in &batch {
@@ -587,8 +595,9 @@ impl Client {
                 Entry::Parts { by, change } => {
                     let mut restored = restored.next().flatten();
                     let is_missing = restored.is_none();
-                    let reach = change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
-                    let returned = reach.map(|reach| self.check_pieces(Some(reach))).unwrap_or_default();
+                    let reach = reach(change);
+                    let returned =
+                        reach.map(|reach| self.check_pieces(Some(reach), &ground)).unwrap_or_default();
                     restored.iter_mut().for_each(|restored| restored.returned.clone_from(&returned));
                     if by.is_some_and(|(by, own)| Some(by) == id && self.undos.remove(&own)) {
                         self.events.push(ClientEvent::Undone(restored));
@@ -622,4 +631,9 @@ impl Client {
             self.outgoing.push(ToServer::Ack { bulk: new.0, number: new.1 }.to_bytes());
         }
     }
+}
+
+/// A box around all bricks of a change.
+fn reach(change: &WorldChange) -> Option<LatticeBox> {
+    change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union)
 }

@@ -1,9 +1,10 @@
 //! Loose pieces that are out of the ground that is shown, so that each is either there or with the game.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use glam::IVec3;
+use rustc_hash::FxHashSet;
 
 use super::{Client, ClientEvent};
 use crate::lattice::LatticeBox;
@@ -35,11 +36,13 @@ impl Gone {
         (fate != PieceFate::Left).then(|| Self { piece, bounds, runs: Arc::clone(runs) })
     }
 
+    fn samples(&self) -> impl Iterator<Item = IVec3> {
+        self.runs.iter().flat_map(|run| (0..run.len as i32).map(move |x| run.start + IVec3::X * x))
+    }
+
     /// Whether all of its samples are ground.
     fn is_ground(&self, is_solid: impl Fn(IVec3) -> bool) -> bool {
-        let mut samples =
-            self.runs.iter().flat_map(|run| (0..run.len as i32).map(move |x| run.start + IVec3::X * x));
-        samples.all(is_solid)
+        self.samples().all(is_solid)
     }
 }
 
@@ -61,16 +64,21 @@ impl Pieces {
         self.predicted = renumbered.collect();
     }
 
-    fn take_ground(
-        &mut self,
-        within: Option<LatticeBox>,
-        is_solid: impl Fn(IVec3) -> bool,
-    ) -> Vec<ReturnedPiece> {
+    /// The places in the list of those within a box, or of all, whose samples are ground.
+    fn ground(&self, within: Option<LatticeBox>, is_solid: impl Fn(IVec3) -> bool) -> BTreeSet<usize> {
         let is_near = |gone: &Gone| within.is_none_or(|within| within.intersection(gone.bounds).is_some());
-        let mut returned = Vec::new();
-        // The one that was cut off last comes back first.
-        for at in (0..self.gone.len()).rev() {
-            if is_near(&self.gone[at]) && self.gone[at].is_ground(&is_solid) {
+        let there = |(_, gone): &(usize, &Gone)| is_near(gone) && gone.is_ground(&is_solid);
+        self.gone.iter().enumerate().filter(there).map(|(at, _)| at).collect()
+    }
+
+    /// Takes out those that are ground now and were not before. Of those that have samples in common, the one that was cut off last
+    /// has come back.
+    fn take_ground(&mut self, now: &BTreeSet<usize>, before: &BTreeSet<usize>) -> Vec<ReturnedPiece> {
+        let (mut returned, mut taken) = (Vec::new(), FxHashSet::default());
+        for &at in now.iter().rev().filter(|at| !before.contains(at)) {
+            let Some(gone) = self.gone.get(at) else { continue };
+            if gone.samples().all(|sample| !taken.contains(&sample)) {
+                taken.extend(gone.samples());
                 returned.extend(self.gone.remove(at).map(|gone| gone.piece));
             }
         }
@@ -116,13 +124,23 @@ impl Client {
         self.pieces.add(predicted);
     }
 
-    /// Parts were put into the world: pieces within a box, or anywhere, may be ground again. Returns those that are.
-    pub(super) fn check_pieces(&mut self, within: Option<LatticeBox>) -> Vec<ReturnedPiece> {
+    /// Those of the pieces within a box, or of all, where there is ground: before parts are put, because somebody has built there.
+    pub(super) fn ground_pieces(&self, within: Option<LatticeBox>) -> BTreeSet<usize> {
         if self.pieces.gone.is_empty() {
-            return Vec::new();
+            return BTreeSet::new();
         }
         let view = self.replica.world().samples();
-        let returned = self.pieces.take_ground(within, |sample| view.is_solid(sample));
+        self.pieces.ground(within, |sample| view.is_solid(sample))
+    }
+
+    /// Parts were put into the world: pieces within a box, or anywhere, may be ground again. Returns those that are, but for those
+    /// that were it [before](Self::ground_pieces).
+    pub(super) fn check_pieces(
+        &mut self,
+        within: Option<LatticeBox>,
+        before: &BTreeSet<usize>,
+    ) -> Vec<ReturnedPiece> {
+        let returned = self.pieces.take_ground(&self.ground_pieces(within), before);
         self.tell_pieces(0, Vec::new(), returned.clone());
         returned
     }
@@ -131,5 +149,39 @@ impl Client {
         if !found.is_empty() || !returned.is_empty() {
             self.events.push(ClientEvent::PiecesChanged { tag, found, returned });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terrain::PieceId;
+
+    fn gone(id: u64, x: i32, len: u32) -> Gone {
+        let (fate, start) = (PieceFate::Removed, IVec3::X * x);
+        let piece = ReturnedPiece { id: PieceId(id), tag: 0, fate, materials: Default::default() };
+        let bounds = LatticeBox { min: start, max: start + IVec3::X * (len as i32 - 1) };
+        Gone { piece, bounds, runs: [Run { start, len }].into() }
+    }
+
+    fn ids(returned: &[ReturnedPiece]) -> Vec<u64> {
+        returned.iter().map(|piece| piece.id.0).collect()
+    }
+
+    #[test]
+    fn what_comes_back_is_what_was_cut_off_last_and_is_not_built_already() {
+        let mut pieces = Pieces::default();
+        pieces.add([gone(1, 0, 4), gone(2, 20, 3), gone(3, 2, 4), gone(4, 40, 2)]);
+        // Somebody has built where the second was.
+        let before = pieces.ground(None, |sample| (20..23).contains(&sample.x));
+        let now = pieces.ground(None, |sample| sample.x < 30);
+        assert_eq!((before.len(), now.len()), (1, 3));
+        assert_eq!(ids(&pieces.take_ground(&now, &before)), [3]);
+        let within = LatticeBox { min: IVec3::splat(-1), max: IVec3::splat(1) };
+        let now = pieces.ground(Some(within), |_| true);
+        assert_eq!(ids(&pieces.take_ground(&now, &BTreeSet::new())), [1]);
+        let now = pieces.ground(None, |_| true);
+        assert_eq!(ids(&pieces.take_ground(&now, &BTreeSet::new())), [4, 2]);
+        assert!(pieces.gone.is_empty());
     }
 }

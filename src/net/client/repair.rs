@@ -167,7 +167,9 @@ impl Client {
         };
         self.figures.repairs += repair.wanted.len() as u64;
         let next_field = repair.contents.values().map(|content| content.next_field).max();
+        let before = self.ground_pieces(None);
         repair.contents.into_values().for_each(|content| self.put_region(content));
+        self.check_pieces(None, &before);
         next_field.into_iter().for_each(|next_field| self.lower_names(next_field));
         self.marks.forget(&repair.wanted);
         self.events.push(ClientEvent::Repaired(repair.wanted.into_iter().collect()));

@@ -12,7 +12,7 @@ use crate::net::stamps::StampId;
 use crate::terrain::World;
 
 /// A client for which a world is kept begins again if it takes nothing for so long.
-const STUCK: Duration = Duration::from_secs(10);
+const STUCK: Duration = Duration::from_secs(5);
 
 /// How far a client has come.
 pub enum Stage {

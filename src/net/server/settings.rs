@@ -84,7 +84,8 @@ impl Default for ServerSettings {
             bulk: Rate { per_second: 256 << 10, burst: 32 << 10 },
             window: 512 << 10,
             piece: 1 << 10,
-            work: 100_000,
+            // Some 40 ms, however much comes at once; at 30 frames a second, all that 64 players may spend.
+            work: 10_000,
             waiting: 6_000_000,
             mark: Duration::from_secs(1),
         }

@@ -195,7 +195,7 @@ pub fn peek(bytes: &[u8]) -> Option<Peeked<'_>> {
     let (schema, rest) = split_schema(bytes).ok()?;
     let (parts, after) = (u32::from(schema) == SCHEMA).then(|| parts(rest))?.ok()?;
     let length = bytes.len() - after.len() + CHECKSUM;
-    (length <= bytes.len()).then(|| Peeked { world: parts.world, key: parts.key, length })
+    (length <= bytes.len()).then_some(Peeked { world: parts.world, key: parts.key, length })
 }
 
 /// Unwraps what [`seal`] wrapped.
