@@ -288,7 +288,7 @@ impl Crate {
                 let is_own = |path: &Segments| !matches!(path[0].as_str(), "crate" | "super" | "std");
                 let read = file.names[first..].iter().map(|(path, _)| path);
                 file.paths
-                    .extend(read.filter(|path| !path.is_empty() && !(is_public && is_own(path))).cloned());
+                    .extend(read.filter(|path| !(path.is_empty() || is_public && is_own(path))).cloned());
             } else if is_start && tokens.get(at + 1).is_some_and(|next| next == "::") {
                 let mut path = vec![tokens[at].clone()];
                 while tokens.get(at + 1).is_some_and(|next| next == "::") && at + 2 < tokens.len() {

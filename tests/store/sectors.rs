@@ -295,7 +295,7 @@ fn a_database_that_could_not_be_synced_is_written_anew() {
             assert!(matches!(store.checkpoint(), Err(StoreError::NotSaved(_))));
         }
         store.checkpoint().expect("the disk works");
-        let expected = 1 + (number + 1) / 2;
+        let expected = 1 + number.div_ceil(2);
         assert_eq!(files.new_databases.load(Ordering::SeqCst), expected);
     }
     let (_, opened) = Store::open_in(Arc::new(disk.image().lose_power(|| false)), ground(), options(9))

@@ -145,7 +145,7 @@ fn who_closes_a_store_without_waiting_learns_what_was_saved() {
         // In any case it can be opened again.
         game.gate.set(Gate::Open);
         let (_, opened) = open(&game.disk, &ground(2)).expect("it is closed");
-        assert!(opened.terrain.world().revision() >= 1 + u64::from(is_saved));
+        assert!(opened.terrain.world().revision() > u64::from(is_saved));
     }
 }
 

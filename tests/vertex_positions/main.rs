@@ -60,8 +60,7 @@ const DEFERRED: &[&str] = &[
 ];
 
 /// What a mesh or a camera adds to any pass.
-const CHOICES: [&str; 5] =
-    ["VERTEX_COLORS", "VISIBILITY_RANGE_DITHER", "GROUND_ATTRIBUTES", "GROUND_FINE", "WITHOUT_ANISOTROPY"];
+const CHOICES: [&str; 3] = ["VERTEX_COLORS", "VISIBILITY_RANGE_DITHER", "GROUND_ATTRIBUTES"];
 
 const PROJECTIONS: [&str; 3] =
     ["VIEW_PROJECTION_PERSPECTIVE", "VIEW_PROJECTION_ORTHOGRAPHIC", "VIEW_PROJECTION_NONSTANDARD"];
@@ -74,10 +73,6 @@ fn passes() -> (Vec<Vec<ShaderDefVal>>, Vec<Vec<ShaderDefVal>>) {
         let mut definitions: Vec<ShaderDefVal> = names.into_iter().map(ShaderDefVal::from).collect();
         definitions.extend(chosen.map(|(_, name)| ShaderDefVal::from(*name)));
         definitions.push(ShaderDefVal::UInt("MATERIAL_BIND_GROUP".into(), 3));
-        definitions.extend(
-            ["MAX_DIRECTIONAL_LIGHTS", "MAX_CASCADES_PER_LIGHT", "PER_OBJECT_BUFFER_BATCH_SIZE"]
-                .map(|name| ShaderDefVal::UInt(name.into(), 4)),
-        );
         definitions.push(ShaderDefVal::UInt("AVAILABLE_STORAGE_BUFFER_BINDINGS".into(), 8));
         definitions
     };
