@@ -122,7 +122,7 @@ impl Plugin for DebrisPlugin {
             (break_off, return_to_ground, become_body, crumble)
                 .chain()
                 .after(BurrowSystems::Commit)
-                .before(BurrowSystems::Propagate),
+                .before(BurrowSystems::Begin),
         );
     }
 }

@@ -83,7 +83,7 @@ use avian3d::physics_transform::PhysicsTransformSystems;
 use avian3d::prelude::{PhysicsSchedule, PhysicsStepSystems, PhysicsSystems};
 use bevy::prelude::*;
 
-use crate::plugin::{BurrowSystems, SurfaceProcessors};
+use crate::plugin::{BeforeLoad, BurrowSystems, SurfaceProcessors};
 
 /// Colliders for terrains. Requires avian's `PhysicsPlugins` and the crate's `BurrowPlugins`.
 ///
@@ -153,7 +153,7 @@ impl Plugin for TerrainPhysicsPlugin {
             .configure_sets(
                 Update,
                 (
-                    TerrainPhysicsSystems::Near.before(BurrowSystems::Load),
+                    TerrainPhysicsSystems::Near.in_set(BeforeLoad::Sources),
                     TerrainPhysicsSystems::Upkeep.after(BurrowSystems::Propagate),
                 ),
             )

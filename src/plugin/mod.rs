@@ -162,6 +162,16 @@ pub enum BurrowSystems {
     Propagate,
 }
 
+/// What is done in [`Update`] before [`BurrowSystems::Load`], in every frame.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(not(all(feature = "store", feature = "avian")), allow(dead_code, reason = "one for each feature"))]
+pub(crate) enum BeforeLoad {
+    /// Saved worlds are put in the place of their terrains.
+    Worlds,
+    /// Bodies near which colliders are wanted are found.
+    Sources,
+}
+
 /// Systems that look at what was just committed, still in [`BurrowSystems::Commit`].
 #[cfg(feature = "replicon")]
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -205,6 +215,8 @@ impl Plugin for TerrainPlugin {
             .configure_sets(
                 Update,
                 (
+                    BeforeLoad::Worlds,
+                    BeforeLoad::Sources,
                     BurrowSystems::Load,
                     BurrowSystems::Collect,
                     BurrowSystems::Commit,
@@ -240,7 +252,12 @@ impl Plugin for TerrainPlugin {
             Update,
             FollowCommits.in_set(BurrowSystems::Commit).after(commit::commit_transactions),
         );
-        app.add_systems(First, threads::resize_pools.run_if(resource_exists_and_changed::<ThreadSettings>));
+        app.add_systems(
+            First,
+            threads::resize_pools
+                .run_if(resource_exists_and_changed::<ThreadSettings>)
+                .after(bevy::ecs::message::MessageUpdateSystems),
+        );
         // In every frame, whatever the game gates.
         app.add_systems(Last, (inbox::keep_requests, places::find_external_places))
             // They read terrains, which systems in `Update` and `Last` change.

@@ -33,7 +33,7 @@ pub(crate) use opening::{ReadWorld, WorldReader};
 
 use bevy::prelude::*;
 
-use crate::plugin::BurrowSystems;
+use crate::plugin::{BeforeLoad, BurrowSystems};
 
 /// Commits are handed to the store, in `Update`. What a game [puts](WorldStore::put) before this is saved with the commits of this
 /// frame.
@@ -62,13 +62,13 @@ impl Plugin for SavePlugin {
             .add_observer(closing::close)
             .add_observer(closing::close_with_component)
             .add_observer(closing::follow_discarded)
-            .configure_sets(Update, SaveSystems.after(BurrowSystems::Begin))
+            .configure_sets(Update, SaveSystems.after(BurrowSystems::Begin).before(BurrowSystems::Propagate))
             .add_systems(
                 Update,
                 (
                     (level::start_levels, opening::finish_opening, opening::start_opening)
                         .chain()
-                        .before(BurrowSystems::Load),
+                        .in_set(BeforeLoad::Worlds),
                     (saving::save_commits, saving::save_now, saving::tell, closing::tell_closed)
                         .chain()
                         .in_set(SaveSystems),

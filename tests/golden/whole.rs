@@ -121,7 +121,10 @@ fn set_up(studio: &mut Studio, dress: Dress, has_levels: bool) {
     let small = spawn(studio, small, dress);
     let world = studio.app.world_mut();
     world.entity_mut(small).insert((turned, Extra));
-    // A block as a piece of the large terrain.
+    // A block as a piece of the large terrain. The map wants attributes that it lacks.
+    if dress == Dress::Map {
+        return studio.app.update();
+    }
     let mesh = Mesh::from(Cuboid::new(5.0, 5.0, 5.0));
     let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh);
     let at = Transform::from_translation(eye.lerp(pit, 0.5) + Vec3::new(8.0, -2.0, 0.0))

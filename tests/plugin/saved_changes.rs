@@ -280,7 +280,7 @@ fn a_level_that_is_taken_off_holds_no_terrain() {
 #[test]
 fn a_missing_level_beside_a_saved_world_costs_no_digs() {
     let folder = Folder::new("missing");
-    exit(app(&folder.0).0);
+    drop(Store::create(&folder.0, &mut terrain(), StoreOptions::default()).expect("a new world"));
     // Held open for half a second, in which the level fails.
     let holder = Store::open(&folder.0, crate::saved::ground(), StoreOptions::default()).expect("a world");
     let mut holder = Some(holder);

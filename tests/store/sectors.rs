@@ -287,7 +287,7 @@ fn a_database_that_could_not_be_synced_is_written_anew() {
     let created = Store::create_in(Arc::clone(&files) as Arc<dyn Files>, &mut world, options(u64::MAX));
     let mut store = created.expect("a new world");
     assert_eq!(files.new_databases.load(Ordering::SeqCst), 1);
-    for number in 0..6 {
+    for number in 0..6u64 {
         world.apply([Brush::dig(Shape::sphere(Vec3::splat(30.0 + 9.0 * number as f32), 6.0))]);
         save(&mut store, &mut world).expect("the thread runs");
         if number % 2 == 1 {

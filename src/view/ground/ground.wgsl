@@ -22,7 +22,8 @@
 #endif
 
 #ifdef VISIBILITY_RANGE_DITHER
-#import bevy_pbr::pbr_functions::visibility_range_dither;
+// By its module: an item of that name would hide the field of `Varying`.
+#import bevy_pbr::pbr_functions
 #endif
 
 struct Layer {
@@ -387,7 +388,7 @@ fn facing(normal: vec3<f32>, ground_normal: vec3<f32>, eye: vec3<f32>) -> vec3<f
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutput {
 #ifdef VISIBILITY_RANGE_DITHER
-    visibility_range_dither(in.position, in.visibility_range_dither);
+    pbr_functions::visibility_range_dither(in.position, in.visibility_range_dither);
 #endif
     var plain: VertexOutput;
     plain.position = in.position;
