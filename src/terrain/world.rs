@@ -159,7 +159,6 @@ impl World {
     }
 
     /// A shared handle to [`Self::ground`].
-    #[cfg(any(feature = "plugin", feature = "store"))]
     pub(crate) fn shared_ground(&self) -> Arc<Ground> {
         Arc::clone(&self.ground)
     }

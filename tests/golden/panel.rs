@@ -22,6 +22,12 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     *world.resource_mut::<BrushTool>() =
         BrushTool { operation: ToolOperation::Raise, shape: ToolShape::Cylinder, ..default() };
     studio.resize((1280, 1200));
+    // The studio's own picture is so narrow that a column was folded.
+    (0..2).for_each(|_| studio.app.update());
+    let world = studio.app.world_mut();
+    for mut context in world.query::<&mut EguiContext>().iter_mut(world) {
+        context.get_mut().data_mut(|data| data.insert_temp(Id::new(("burrow world", "open")), true));
+    }
     unfold(studio, &[("Diagnostics", true)]);
     // Terrain and engine figures are updated twice a second of app time (16 ms per frame), in tasks.
     let mut frames = 0;
