@@ -193,8 +193,7 @@ fn another_terrain_in_place_of_a_disabled_one_is_shown_once_it_is_enabled() {
     stage.app.world_mut().entity_mut(terrain).insert(level(0.5));
     stage.frames(4);
     stage.app.world_mut().entity_mut(terrain).remove::<Disabled>();
-    stage.frames(2);
-    stage.settle();
+    stage.settle_shown();
     stage.assert_whole(terrain, "another voxel size");
     assert_eq!(stage.tags(), [1], "rejected, as no terrain was there");
     let scale = stage.app.world().get::<Transform>(terrain).expect("a place").scale;

@@ -166,9 +166,9 @@ fn changes_that_a_game_commits_itself_are_shown_at_all_levels() {
         let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("the terrain");
         let height = model.world().height(x, z).expect("inside the world") as f32;
         model.apply([Brush::dig(Shape::sphere(Vec3::new(x as f32, height, z as f32), 9.0))]);
-        stage.settle();
+        stage.settle_shown();
         stage.frames(4);
-        stage.settle();
+        stage.settle_shown();
         stage.assert_whole(terrain, &format!("dug at {x}, {z}"));
     }
 }

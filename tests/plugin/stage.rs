@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use bevy::ecs::system::RunSystemOnce;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -209,6 +210,15 @@ impl Stage {
             let terrain = self.terrain(entity);
             ready.contains(&entity) && terrain.queued() == 0 && !terrain.is_busy()
         })
+    }
+
+    /// Waits until all ground is shown as it is, also after a terrain was replaced or changed by the game itself.
+    pub fn settle_shown(&mut self) {
+        self.frames_until("all ground is shown", |stage| {
+            let is_shown = |terrains: Terrains| terrains.is_ready(Vec3::NEG_INFINITY, Vec3::INFINITY);
+            let is_shown = stage.app.world_mut().run_system_once(is_shown).expect("terrains can be asked");
+            is_shown && stage.is_settled()
+        });
     }
 
     /// A terrain's model.
