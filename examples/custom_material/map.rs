@@ -5,7 +5,9 @@ use bevy::mesh::MeshVertexBufferLayoutRef;
 use bevy::pbr::{MaterialPipeline, MaterialPipelineKey};
 use bevy::prelude::*;
 use bevy::reflect::TypePath;
-use bevy::render::render_resource::{AsBindGroup, RenderPipelineDescriptor, SpecializedMeshPipelineError};
+use bevy::render::render_resource::{
+    AsBindGroup, Face, RenderPipelineDescriptor, SpecializedMeshPipelineError,
+};
 use bevy::shader::{ShaderDefVal, ShaderRef};
 use bevy_burrow::plugin::ATTRIBUTE_GROUND_DEPTH;
 use bevy_burrow::prelude::*;
@@ -70,6 +72,9 @@ impl Material for MapMaterial {
         layout: &MeshVertexBufferLayoutRef,
         _: MaterialPipelineKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
+        // Unless told, a prepass draws the backs of triangles too. The main pass does not, and nothing would be drawn
+        // wherever ground is seen from below.
+        descriptor.primitive.cull_mode = Some(Face::Back);
         // The prepass, which draws shadows too, wants no attributes of ours.
         if descriptor.vertex.shader_defs.contains(&ShaderDefVal::from("PREPASS_PIPELINE")) {
             return Ok(());

@@ -111,10 +111,6 @@ fn set_up(studio: &mut Studio, dress: Dress, has_levels: bool) {
         Brush::dig(Shape::capsule(pit - Vec3::Y * 4.0, pit + Vec3::new(-30.0, -6.0, 20.0), 4.0)),
         Brush::add(Shape::sphere(pit + Vec3::new(15.0, 1.0, 4.0), 4.0), MaterialId(11)),
     ]);
-    // The map wants attributes that a block lacks, and a second terrain with it is not drawn behind a prepass yet.
-    if dress == Dress::Map {
-        return studio.app.update();
-    }
     // The other terrain hangs in the air, turned about all axes.
     let small = Ground::flat(32, 32, 8.0).expect("valid");
     let settings = TerrainSettings { chunk_size: 16, voxel_size: 0.5 };
@@ -125,6 +121,10 @@ fn set_up(studio: &mut Studio, dress: Dress, has_levels: bool) {
     let small = spawn(studio, small, dress);
     let world = studio.app.world_mut();
     world.entity_mut(small).insert((turned, Extra));
+    // The map wants attributes that a block lacks.
+    if dress == Dress::Map {
+        return studio.app.update();
+    }
     // A block as a piece of the large terrain.
     let mesh = Mesh::from(Cuboid::new(5.0, 5.0, 5.0));
     let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh);
