@@ -1,5 +1,5 @@
 //! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT
-//! [horizon]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with levels of
+//! [horizon] [passes]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with levels of
 //! detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full detail.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
@@ -8,7 +8,8 @@
 //! timed from its start until the graphics card has drawn it, so unlike in a game, frames never overlap. The plugin's
 //! time on the main thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same
 //! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
-//! times the plain material's part of the frame the look takes. What is drawn is looked at too: the benchmark fails if ground
+//! times the plain material's part of the frame the look takes. With `passes`, the graphics card's own time of each render
+//! pass is printed for each of them, which costs time itself. What is drawn is looked at too: the benchmark fails if ground
 //! is missing where a ray meets it.
 
 #[path = "../examples/shared/capture.rs"]
@@ -25,8 +26,10 @@ use std::time::{Duration, Instant};
 use avian3d::prelude::*;
 use bevy::camera::RenderTarget;
 use bevy::core_pipeline::prepass::DepthPrepass;
+use bevy::diagnostic::DiagnosticsStore;
 use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
+use bevy::render::diagnostic::RenderDiagnosticsPlugin;
 use bevy::render::render_resource::{PollType, TextureFormat};
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 use bevy_burrow::backend::{Backend, Engine, EngineState};
@@ -58,7 +61,7 @@ const ROUND: Duration = Duration::from_secs(5);
 const WARM_UP: usize = 120;
 
 /// What is drawn to compare materials.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Part {
     Look(GroundQuality),
     Plain,
@@ -81,7 +84,7 @@ fn main() {
     }
     let frames = seconds as usize * 60;
     println!("{width} x {height}, {seconds} s each; us");
-    if std::env::args().any(|arg| arg == "horizon") {
+    if is_asked("horizon") {
         horizon((width, height), seconds as usize * 60);
         return;
     }
@@ -125,6 +128,11 @@ fn main() {
     }
 }
 
+/// Whether the command line has this word.
+fn is_asked(word: &str) -> bool {
+    std::env::args().any(|arg| arg == word)
+}
+
 /// Prints median and 99th percentile, and returns them.
 fn report(what: &str, mut times: Vec<Duration>) -> [f64; 2] {
     times.sort_unstable();
@@ -155,6 +163,9 @@ impl Walk {
         let mut app = offscreen::build(Some(renderer), |app| {
             app.add_plugins((BurrowPlugins, PhysicsPlugins::default(), TerrainPhysicsPlugin))
                 .insert_resource(BurrowEngine(engine));
+            if is_asked("passes") {
+                app.add_plugins(RenderDiagnosticsPlugin);
+            }
         });
         let ground = match scene {
             Scene::Horizon { .. } => mountains(),
@@ -237,6 +248,7 @@ impl Walk {
                     took.drain(..FIRST_FRAMES);
                     took.sort_unstable();
                     medians[round] = took[took.len() / 2].as_secs_f64() * 1e6;
+                    self.report_passes(&format!("{shadows}, {:?}", PARTS[part]));
                 }
             }
             let [high, low, plain, nothing] = rounds.map(|mut medians| {
@@ -250,6 +262,29 @@ impl Walk {
             );
         }
         self.is_far = false;
+    }
+
+    /// Prints what each pass took on the graphics card since the last call, if that is measured.
+    fn report_passes(&mut self, what: &str) {
+        let mut diagnostics = self.app.world_mut().resource_mut::<DiagnosticsStore>();
+        let mut passes = Vec::new();
+        for diagnostic in diagnostics.iter_mut() {
+            let path = diagnostic.path().as_str().to_string();
+            if let Some(pass) =
+                path.strip_prefix("render/").and_then(|path| path.strip_suffix("/elapsed_gpu"))
+            {
+                // In milliseconds.
+                let average = diagnostic.average().unwrap_or(0.0) * 1e3;
+                diagnostic.clear_history();
+                if average >= 1.0 {
+                    passes.push(format!("{pass} {average:.0}"));
+                }
+            }
+        }
+        if !passes.is_empty() {
+            passes.sort_unstable();
+            println!("    {what}: {}", passes.join(", "));
+        }
     }
 
     /// Looks at some frames of the walk.

@@ -154,15 +154,29 @@ impl Welded {
     /// The neighbours across each triangle's sides, and the normals across the border.
     fn neighbours(&self, vertices: &[Vector]) -> (Vec<[u32; 3]>, Vec<Vector>) {
         let sides = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
-        let mut owners: FxHashMap<(u32, u32), u32> = FxHashMap::default();
-        owners.reserve(self.triangles.len() * 3);
+        // All sides, sorted by the vertex they start from, with their triangles. Few start from the same one.
+        let mut first = vec![0; vertices.len() + 1];
+        self.triangles.iter().flatten().for_each(|&corner| first[corner as usize + 1] += 1);
+        first.iter_mut().fold(0, |sum, first| {
+            *first += sum;
+            *first
+        });
+        let mut next = first.clone();
+        let mut starting = vec![(0, 0); 3 * self.triangles.len()];
         for (number, triangle) in self.triangles.iter().enumerate() {
-            owners.extend(sides(triangle).map(|side| (side, number as u32)));
+            for (from, to) in sides(triangle) {
+                starting[next[from as usize]] = (to, number as u32);
+                next[from as usize] += 1;
+            }
         }
+        let owner = |(from, to): (u32, u32)| {
+            let of_vertex = &starting[first[from as usize]..first[from as usize + 1]];
+            of_vertex.iter().rev().find(|side| side.0 == to).map(|side| side.1)
+        };
         let mut beyond = Vec::new();
         let neighbours = self.triangles.iter().map(|triangle| {
             sides(triangle).map(|(from, to)| {
-                owners.get(&(to, from)).copied().unwrap_or_else(|| {
+                owner((to, from)).unwrap_or_else(|| {
                     beyond.push(self.across(vertices, triangle, from, to));
                     BORDER + (beyond.len() as u32 - 1)
                 })

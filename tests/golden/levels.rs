@@ -1,7 +1,5 @@
 //! Levels of detail: a far horizon, a far pit, edges coloured by level; and how much a change of levels shows.
 
-use bevy::camera::RenderTarget;
-use bevy::camera::visibility::RenderLayers;
 use bevy::prelude::*;
 use bevy_burrow::debug::BurrowDebug;
 use bevy_burrow::ground::NoiseSource;
@@ -60,10 +58,9 @@ pub fn watch_levels(studio: &mut Studio, view_distance: f32) {
     let far = Projection::from(PerspectiveProjection { far: 10_000.0, ..default() });
     let camera = studio.camera;
     let world = studio.app.world_mut();
-    world.entity_mut(camera).insert(far.clone());
-    // The studio turns its camera off while it waits. This one is always on, looks with it, and draws nothing.
-    let target = RenderTarget::None { size: UVec2::new(SIZE.0, SIZE.1) };
-    world.spawn((ChildOf(camera), Camera::default(), far, target, RenderLayers::none()));
+    world.entity_mut(camera).insert(far);
+    // The studio turns its camera off while it waits.
+    world.spawn((ChildOf(camera), DetailSource { picture_height: SIZE.1 as f32, ..default() }));
     let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
     world.entity_mut(terrain).insert(LevelsOfDetail { view_distance, ..default() });
 }

@@ -13,8 +13,6 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use avian3d::prelude::Position;
-use bevy::camera::RenderTarget;
-use bevy::camera::visibility::RenderLayers;
 use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
@@ -425,20 +423,13 @@ impl Studio {
     }
 }
 
-/// Levels of detail are chosen for cameras that are on. This one is always on, looks with the player's camera, and draws
-/// nothing.
+/// Levels of detail are chosen for cameras that are on, and the player's is off between pictures. This keeps them as it
+/// needs them.
 fn keep_levels(app: &mut App, eyes: Entity, size: UVec2) {
     let world = app.world_mut();
-    let Some(lens) = world.get::<Projection>(eyes).cloned() else { return };
-    let target = RenderTarget::None { size };
-    world.spawn((
-        Name::new("level camera"),
-        ChildOf(eyes),
-        Camera::default(),
-        lens,
-        target,
-        RenderLayers::none(),
-    ));
+    let Some(Projection::Perspective(lens)) = world.get::<Projection>(eyes) else { return };
+    let source = DetailSource { fov: lens.fov, picture_height: size.y as f32 };
+    world.spawn((Name::new("level source"), ChildOf(eyes), source));
 }
 
 fn draw(app: &mut App, drawn: &mut Durations) {
