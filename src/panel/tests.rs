@@ -496,7 +496,7 @@ fn a_closed_panel_is_nowhere() {
 #[test]
 fn a_terrain_without_colours_is_shown_like_any_other() {
     let (mut app, context) = app_and_context();
-    app.world_mut().spawn((flat(), GroundLook::default())).remove::<MaterialColors>().id();
+    app.world_mut().spawn((flat(), GroundLook::default())).remove::<MaterialColors>();
     assert!(places_in(&mut app, &context).0.contains_key("Look"));
 }
 
