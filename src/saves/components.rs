@@ -23,6 +23,7 @@ pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 /// | a `Terrain` over the same ground, of the same size | that is another state of the same world, and takes the place of what was saved |
 /// | a `SharedTerrain` | the world is closed, and this component removed: the server saves what players share |
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[component(on_insert = super::opening::hold)]
 #[reflect(Component)]
 pub struct SavedWorld {
     /// The folder, for this world alone. It is made if it is missing, with those around it.

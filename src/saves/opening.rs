@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::lifecycle::HookContext;
 use bevy::ecs::query::Allow;
+use bevy::ecs::world::DeferredWorld;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
@@ -29,6 +31,10 @@ const LOG_BYTES: usize = 64 << 20;
 /// A world that nobody has begun to read.
 #[derive(Component)]
 pub(super) struct Unopened;
+
+/// A terrain is [`Held`] by this module, and not by the game.
+#[derive(Component)]
+struct HeldHere;
 
 /// The world of a [`SavedWorld`] is being read; the plugin inserts it and takes it away.
 #[derive(Component)]
@@ -78,15 +84,6 @@ impl OpeningWorld {
             return None;
         }
         Some(outcome)
-    }
-
-    /// Reads again for a terrain that took the place of the one that it is read for. Another level is not saved in that world.
-    fn read_anew(&self, terrain: &Terrain, entity: Entity, commands: &mut Commands) {
-        if self.reader.is_for(terrain) {
-            commands.entity(entity).try_remove::<Self>().try_insert(Unopened);
-        } else {
-            detach(commands, entity, ClosedBecause::OtherTerrain);
-        }
     }
 
     /// Whether it should be told now that somebody else has the world open.
@@ -194,15 +191,27 @@ impl WorldReader {
 }
 
 /// Holds a terrain until its world is read. What is under way on it is done on the world that was read.
-pub(super) fn hold(
-    new: On<Insert, SavedWorld>,
-    mut commands: Commands,
-    mut terrains: Query<&mut Terrain, Allow<Disabled>>,
-) {
-    if let Ok(mut terrain) = terrains.get_mut(new.entity) {
+///
+/// This is a hook, so that it comes before whatever observers do with the component, and looks whether the component is still there.
+pub(super) fn hold(mut world: DeferredWorld, context: HookContext) {
+    super::warn_without_plugin(&world, "SavedWorld");
+    world.commands().queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(context.entity) else { return };
+        if entity.contains::<SavedWorld>() {
+            entity.remove::<OpeningWorld>().insert(Unopened);
+            hold_now(&mut entity);
+        }
+    });
+}
+
+/// Holds a terrain, with what is under way on it.
+pub(super) fn hold_now(entity: &mut EntityWorldMut) {
+    if let Some(mut terrain) = entity.get_mut::<Terrain>() {
         terrain.abandon();
     }
-    commands.entity(new.entity).try_remove::<OpeningWorld>().try_insert((Held, Unopened));
+    if !entity.contains::<Held>() {
+        entity.insert((Held, HeldHere));
+    }
 }
 
 /// A world is no longer wanted.
@@ -211,15 +220,16 @@ pub(super) fn give_up(gone: On<Remove, SavedWorld>, mut commands: Commands) {
     release(&mut commands, gone.entity);
 }
 
-/// Lets a terrain go on, unless its level or its saved world is still to come. Nothing else takes [`Held`] away in this module.
+/// Lets a terrain go on, unless its level or its saved world is still to come, or the game holds it. Nothing else takes [`Held`] away in
+/// this module.
 pub(super) fn release(commands: &mut Commands, entity: Entity) {
     commands.queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(entity) else { return };
-        let waits = entity.contains::<Unopened>()
-            || entity.contains::<OpeningWorld>()
-            || entity.contains::<Waiting>()
-            || entity.contains::<MakingLevel>();
-        if !waits {
+        let waits_for_world = entity.contains::<Unopened>() || entity.contains::<OpeningWorld>();
+        let waits_for_level = entity.contains::<Waiting>() || entity.contains::<MakingLevel>();
+        let waits = entity.contains::<SavedWorld>() && waits_for_world
+            || entity.contains::<StartLevel>() && waits_for_level;
+        if !waits && entity.take::<HeldHere>().is_some() {
             entity.remove::<Held>();
         }
     });
@@ -228,12 +238,28 @@ pub(super) fn release(commands: &mut Commands, entity: Entity) {
 /// Starts to read anew where another terrain takes the place of the one that a world was read for.
 pub(super) fn read_anew(
     new: On<Insert, Terrain>,
-    opening: Query<(&OpeningWorld, &Terrain), Allow<Disabled>>,
+    opening: Query<(), (With<OpeningWorld>, Allow<Disabled>)>,
     mut commands: Commands,
 ) {
-    if let Ok((opening, terrain)) = opening.get(new.entity) {
-        opening.read_anew(terrain, new.entity, &mut commands);
+    if opening.contains(new.entity) {
+        read_again(&mut commands, new.entity);
     }
+}
+
+/// Reads a world again for another terrain. Another level is not saved in that world.
+fn read_again(commands: &mut Commands, entity: Entity) {
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        // Another `SavedWorld` that came with the terrain is not being read yet, and stays.
+        let (Some(opening), Some(terrain)) = (entity.get::<OpeningWorld>(), entity.get::<Terrain>()) else {
+            return;
+        };
+        if opening.reader.is_for(terrain) {
+            entity.remove::<OpeningWorld>().insert(Unopened);
+        } else {
+            detach(&mut entity, ClosedBecause::OtherTerrain);
+        }
+    });
 }
 
 /// A terrain that is gone can't be read for.
@@ -242,9 +268,17 @@ pub(super) fn wait_for_terrain(
     opening: Query<(), (With<OpeningWorld>, Allow<Disabled>)>,
     mut commands: Commands,
 ) {
-    if opening.contains(gone.entity) {
-        commands.entity(gone.entity).try_remove::<OpeningWorld>().try_insert(Unopened);
+    let entity = gone.entity;
+    if !opening.contains(entity) {
+        return;
     }
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        // Its `SavedWorld` may have gone with it.
+        if entity.take::<OpeningWorld>().is_some() {
+            entity.insert(Unopened);
+        }
+    });
 }
 
 /// Starts to read the worlds of new terrains.
@@ -268,7 +302,15 @@ pub(super) fn start_opening(
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
         let opening = OpeningWorld::new(WorldReader::new(saved, terrain, level), terrain.world().version());
-        commands.entity(entity).try_remove::<Unopened>().try_insert(opening);
+        commands.queue(move |world: &mut World| {
+            let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+            // The game may have removed the component meanwhile, or inserted another one.
+            if entity.get::<SavedWorld>() == Some(&opening.reader.saved)
+                && entity.take::<Unopened>().is_some()
+            {
+                entity.insert(opening);
+            }
+        });
     }
 }
 
@@ -295,7 +337,7 @@ pub(super) fn finish_opening(
             if let Ok(read) = outcome {
                 closing.close(entity, saved.path.clone(), ClosedBecause::Removed, read.world().store);
             }
-            opening.read_anew(&terrain, entity, &mut commands);
+            read_again(&mut commands, entity);
             continue;
         }
         commands.entity(entity).try_remove::<OpeningWorld>();
@@ -317,7 +359,7 @@ pub(super) fn finish_opening(
                     store
                 }
             };
-            commands.entity(entity).try_insert(WorldStore::new(store, saved.path.clone()));
+            insert_store(&mut commands, entity, saved.clone(), store);
             terrain.world().revision()
         });
         if let Err(why) = &outcome {
@@ -326,4 +368,18 @@ pub(super) fn finish_opening(
         release(&mut commands, entity);
         opened.write(WorldOpened { terrain: entity, outcome: outcome.map_err(Arc::new) });
     }
+}
+
+/// Lets a store follow the terrain of its component, unless the game has removed that meanwhile.
+fn insert_store(commands: &mut Commands, entity: Entity, saved: SavedWorld, store: Store) {
+    commands.queue(move |world: &mut World| {
+        let path = saved.path.clone();
+        if let Ok(mut owner) = world.get_entity_mut(entity)
+            && owner.get::<SavedWorld>() == Some(&saved)
+        {
+            owner.insert(WorldStore::new(store, path));
+        } else {
+            world.resource_mut::<ClosingWorlds>().close(entity, path, ClosedBecause::Removed, store);
+        }
+    });
 }

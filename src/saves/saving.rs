@@ -38,9 +38,22 @@ pub(super) fn save_commits(
     for (entity, mut terrain, mut world) in &mut worlds {
         match world.store.as_ref().is_some_and(|store| store.is_of(&terrain)) {
             true => follow(&mut terrain, &mut world),
-            false => detach(&mut commands, entity, ClosedBecause::OtherTerrain),
+            false => detach_other(&mut commands, entity),
         }
     }
+}
+
+/// Closes a world whose terrain was replaced by another level.
+fn detach_other(commands: &mut Commands, entity: Entity) {
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        // The game may have inserted another component or terrain meanwhile.
+        if let (Some(world), Some(terrain)) = (entity.get::<WorldStore>(), entity.get::<Terrain>())
+            && world.store.as_ref().is_some_and(|store| !store.is_of(terrain))
+        {
+            detach(&mut entity, ClosedBecause::OtherTerrain);
+        }
+    });
 }
 
 /// Saves at once where that is asked for.

@@ -34,6 +34,7 @@ mod replacing;
 mod saved;
 mod saved_changes;
 mod saved_lifecycle;
+mod saved_moments;
 #[cfg(feature = "replicon")]
 mod saved_or_shared;
 mod saved_troubles;

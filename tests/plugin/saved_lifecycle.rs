@@ -81,7 +81,7 @@ impl Story {
 
     fn act(&mut self) -> u32 {
         self.note();
-        let what = self.rng.u32(0..20);
+        let what = self.rng.u32(0..22);
         let kind = self.rng.usize(0..2);
         match what {
             0 | 1 => {
@@ -142,6 +142,17 @@ impl Story {
             }
             10 => drop(self.game.world_mut().entity_mut(self.entity).remove::<StartLevel>()),
             11 => drop(self.game.world_mut().write_message(SaveNow::default())),
+            20 => {
+                // Several go at once.
+                let mut entity = self.game.world_mut().entity_mut(self.entity);
+                if self.rng.bool() {
+                    entity.remove::<(Terrain, SavedWorld, StartLevel)>();
+                    self.terrain = None;
+                } else {
+                    entity.remove::<(SavedWorld, StartLevel)>();
+                }
+                (self.saved, self.is_followed) = (None, false);
+            }
             12 | 13 => {
                 // Only a terrain that is not held: what a game does to one while its world is read is not in that.
                 let brush = ball(&mut self.rng);
@@ -207,7 +218,6 @@ impl Story {
 }
 
 #[test]
-#[ignore = "fails: in seed 1 a terrain is held for ever"]
 fn whatever_comes_and_goes_what_was_dug_in_a_world_is_in_its_folder() {
     let stories = std::env::var("BURROW_LIFECYCLES").ok().and_then(|count| count.parse().ok()).unwrap_or(6);
     for seed in 0..stories {

@@ -185,16 +185,21 @@ impl Stage {
     }
 
     /// Updates frames, at least one, until a condition holds. Panics if it never does.
-    pub fn frames_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
+    pub fn frames_until(&mut self, what: &str, is_so: impl FnMut(&mut Self) -> bool) {
+        assert!(self.frames_within(TIMEOUT, is_so), "timed out waiting until {what}");
+    }
+
+    /// Updates frames, at least one, until a condition holds. Returns `false` if it does not in this time.
+    pub fn frames_within(&mut self, time: Duration, mut is_so: impl FnMut(&mut Self) -> bool) -> bool {
         let start = Instant::now();
-        while start.elapsed() < TIMEOUT {
+        while start.elapsed() < time {
             self.frame();
             if is_so(self) {
-                return;
+                return true;
             }
             std::thread::sleep(FRAME_SLEEP);
         }
-        panic!("timed out waiting until {what}");
+        false
     }
 
     /// Updates frames until every terrain is shown and no brush is pending.
@@ -234,6 +239,12 @@ impl Stage {
     /// Every receipt so far.
     pub fn receipts(&self) -> &[BrushApplied] {
         &self.app.world().resource::<Receipts>().0
+    }
+
+    /// Forgets the receipts so far.
+    #[cfg(feature = "examples")]
+    pub fn forget_receipts(&mut self) {
+        self.app.world_mut().resource_mut::<Receipts>().0.clear();
     }
 
     /// The tags of all receipts so far.

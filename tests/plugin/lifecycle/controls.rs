@@ -1,0 +1,186 @@
+//! Negative controls: faults that were fixed are put back on purpose, built from public parts, and the laws of the matrix find each.
+
+use bevy::camera::visibility::VisibilityClass;
+use bevy::platform::collections::HashMap;
+
+use super::*;
+
+/// Whether a life with a fault breaks this law in one of these phases and events, and none without the fault.
+fn assert_found(load: Load, fault: fn(&mut App), phases: &[Phase], event: Event, law: &str) {
+    let live = |fault: fn(&mut App), phase: Phase, seed: u64| {
+        let mut life = Life::with(load, seed, fault);
+        life.patience = Duration::from_secs(20);
+        for _ in 0..3 {
+            life.reach(phase);
+            life.happen(event);
+            life.frames();
+            life.check(&(load, phase, event));
+        }
+        life.end();
+    };
+    let mut found = Vec::new();
+    for seed in 0..4 {
+        for &phase in phases {
+            let Err(why) = catch_unwind(AssertUnwindSafe(|| live(fault, phase, seed))) else { continue };
+            let why = why.downcast_ref::<String>().cloned().unwrap_or_default();
+            if why.contains(law) {
+                // The same without the fault breaks none.
+                live(|_| {}, phase, seed);
+                return;
+            }
+            found.push(why);
+        }
+    }
+    panic!("`{law}` was never broken, but {found:?}");
+}
+
+/// Bevy drops messages after two frames: brushes that were sent while the plugin's systems were gated were never answered.
+#[test]
+fn brushes_that_are_dropped_while_systems_are_gated_are_found() {
+    fn forget(runs: Res<Runs>, mut brushes: ResMut<Messages<TargetedBrush>>) {
+        if !runs.0 {
+            brushes.clear();
+        }
+    }
+    let fault = |app: &mut App| {
+        app.add_systems(PostUpdate, forget);
+    };
+    assert_found(Load::Nothing, fault, &[Phase::Idle], Event::Gate, "answers");
+}
+
+/// Tiles of a terrain that was removed stayed, and belonged to nobody.
+#[test]
+fn tiles_that_outlive_their_terrain_are_found() {
+    fn leave(gone: On<Remove, Terrain>, tiles: Query<(&Tile, &ChildOf)>, mut commands: Commands) {
+        for (tile, parent) in &tiles {
+            if parent.parent() == gone.entity {
+                commands.spawn(*tile);
+            }
+        }
+    }
+    let fault = |app: &mut App| {
+        app.add_observer(leave);
+    };
+    assert_found(Load::Nothing, fault, &[Phase::Idle], Event::RemoveAndInsert, "without a parent");
+}
+
+/// Chunks lost their mesh and kept their class, so each time that a mesh came back they were seen once more.
+#[test]
+fn chunks_that_are_seen_once_more_with_each_mesh_are_found() {
+    #[derive(Resource, Default)]
+    struct Had(HashMap<Entity, usize>);
+    fn keep(
+        new: On<Add, VisibilityClass>,
+        mut classes: Query<&mut VisibilityClass, With<Chunk>>,
+        mut had: ResMut<Had>,
+    ) {
+        let Ok(mut class) = classes.get_mut(new.entity) else { return };
+        let had = had.0.entry(new.entity).or_default();
+        let one = class[0];
+        (0..*had).for_each(|_| class.push(one));
+        *had += 1;
+    }
+    let fault = |app: &mut App| {
+        app.init_resource::<Had>().add_observer(keep);
+    };
+    assert_found(Load::Levels, fault, &[Phase::LevelChange], Event::Dig, "seen twice");
+}
+
+/// Tiles got their parent after observers had seen them.
+#[test]
+fn tiles_that_are_added_before_they_have_a_parent_are_found() {
+    fn early(new: On<Add, Tile>, mut done: Local<bool>, tiles: Query<&Tile>, mut commands: Commands) {
+        if !std::mem::replace(&mut *done, true)
+            && let Ok(tile) = tiles.get(new.entity)
+        {
+            let tile = commands.spawn(*tile).id();
+            commands.entity(tile).despawn();
+        }
+    }
+    let fault = |app: &mut App| {
+        app.add_observer(early);
+    };
+    assert_found(Load::Nothing, fault, &[Phase::Idle], Event::Dig, "when they were added");
+}
+
+#[cfg(feature = "store")]
+mod of_saved_worlds {
+    use bevy_burrow::store::{BaseChanged, Store, StoreOptions};
+
+    use super::*;
+
+    /// The ground of a terrain once more.
+    fn ground_of(terrain: &Terrain) -> Ground {
+        let ground = terrain.world().ground();
+        let height = |x: i32, z: i32| f64::from(ground.height(bevy_burrow::lattice::Column { x, z })) / 256.0;
+        Ground::from_fn(ground.width() as u32, ground.depth() as u32, height).expect("valid")
+    }
+
+    /// A component that came and went in one insertion held its terrain for ever.
+    #[test]
+    fn a_terrain_that_is_held_for_ever_is_found() {
+        fn hold(gone: On<Remove, SavedWorld>, mut commands: Commands) {
+            commands.entity(gone.entity).try_insert(Held);
+        }
+        let fault = |app: &mut App| {
+            app.add_observer(hold);
+        };
+        assert_found(Load::Saved, fault, &[Phase::Idle], Event::Replace, "nothing is under way");
+    }
+
+    /// A new world was made of a copy of the terrain, and took its place later: what was committed in between was lost.
+    #[test]
+    fn digs_that_are_lost_when_saving_begins_are_found() {
+        #[derive(Component)]
+        struct Copied(Option<Terrain>);
+
+        fn copy(new: On<Insert, SavedWorld>, terrains: Query<&Terrain>, mut commands: Commands) {
+            let Ok(terrain) = terrains.get(new.entity) else { return };
+            let settings = TerrainSettings {
+                chunk_size: terrain.world().grid().size() as u32,
+                voxel_size: terrain.voxel_size(),
+            };
+            let copied = Terrain::restore(ground_of(terrain), &settings, terrain.parts());
+            commands.entity(new.entity).insert(Copied(copied.ok()));
+        }
+        fn put(mut opened: MessageReader<WorldOpened>, mut terrains: Query<(&mut Terrain, &mut Copied)>) {
+            for opened in opened.read() {
+                if let Ok((mut terrain, mut copied)) = terrains.get_mut(opened.terrain)
+                    && let Some(copied) = copied.0.take()
+                    && copied.world().revision() + 1 < terrain.world().revision()
+                {
+                    *terrain = copied;
+                }
+            }
+        }
+        let fault = |app: &mut App| {
+            app.add_observer(copy).add_systems(Last, put);
+        };
+        assert_found(
+            Load::Saved,
+            fault,
+            &[Phase::Loading, Phase::Transaction, Phase::Idle],
+            Event::Dig,
+            "the world",
+        );
+    }
+
+    /// Another level on the entity was written into the save of the first.
+    #[test]
+    fn a_level_that_is_written_into_the_save_of_another_is_found() {
+        fn write(mut closed: MessageReader<WorldClosed>, terrains: Query<&Terrain>) {
+            for closed in closed.read() {
+                let Ok(terrain) = terrains.get(closed.terrain) else { continue };
+                let ground = ground_of(terrain);
+                let options = StoreOptions { base_changed: BaseChanged::Keep, ..StoreOptions::default() };
+                if let Ok((mut store, _)) = Store::open(&closed.path, ground, options) {
+                    drop(store.append_whole(terrain));
+                }
+            }
+        }
+        let fault = |app: &mut App| {
+            app.add_systems(Last, write);
+        };
+        assert_found(Load::Saved, fault, &[Phase::Idle], Event::Replace, "the folder");
+    }
+}
