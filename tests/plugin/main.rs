@@ -1,6 +1,8 @@
 //! The Bevy plugin from outside: brushes go in as messages; frames, messages and entities are checked frame by frame.
 #![cfg(feature = "plugin")]
 
+#[cfg(feature = "examples")]
+mod big_space;
 mod cameras;
 #[cfg(feature = "debug")]
 mod debug_views;
