@@ -17,7 +17,8 @@
 //!
 //! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights` and the
 //! options beside it name it as for the example `export`, `--side` as for the example `server`. `--level` names the level that it was
-//! begun on, if it was begun on one.
+//! begun on, if it was begun on one. `repair` and `compact` refuse another ground or level than the world's own, as one wrong number
+//! would move the world there for good; `--other-base keep` or `replay` does so on purpose.
 //!
 //! `info`, `check`, `replay` and `export` change nothing, so that they work on read-only media too. `repair` opens worlds that a game
 //! refuses to open, as a file can't be read or only regions are left; it replaces a file only once the new one is complete, and keeps the
@@ -43,7 +44,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use bevy_burrow::store::{self, Folder, Store, StoreOptions};
+use bevy_burrow::store::{self, Folder, Store, StoreError, StoreOptions};
 use bevy_burrow::terrain::World;
 use clap::{Parser, Subcommand};
 use serde_json::{Map, Value, json};
@@ -193,9 +194,15 @@ fn opened(
     work: impl FnOnce(&mut Store) -> Result<(), String>,
 ) -> Result<(Value, bool), String> {
     let ground = args.required()?;
-    let options = StoreOptions { level: args.level(&ground)?, salvage: true, ..StoreOptions::default() };
+    let (level, base_changed) = (args.level(&ground)?, args.base_changed());
+    let options = StoreOptions { level, base_changed, salvage: true, ..StoreOptions::default() };
     let opened = Store::open(world, ground, options);
-    let (mut store, opened) = opened.map_err(|why| why.to_string())?;
+    let (mut store, opened) = opened.map_err(|why| match why {
+        StoreError::BaseChanged { .. } | StoreError::LevelChanged { .. } => {
+            format!("{why}; nothing was changed, and --other-base keep does that")
+        }
+        why => why.to_string(),
+    })?;
     work(&mut store)?;
     store.checkpoint().map_err(|why| why.to_string())?;
     let troubles: Vec<String> =

@@ -60,7 +60,7 @@ pub(super) fn close(
     if let Some(mut terrain) = terrain {
         follow_same(&mut terrain, &mut world);
     }
-    let (path, because) = (std::mem::take(&mut world.path), world.closing);
+    let (path, because) = (std::mem::take(&mut world.saved.path), world.closing);
     if let Some(store) = world.store.take() {
         closing.close(gone.entity, path, because, store);
     }

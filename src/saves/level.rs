@@ -245,7 +245,7 @@ pub(super) fn start_levels(
         }
     }
     for (entity, mut terrain, mut level) in &mut making {
-        let Some(made) = level.0.finish() else { continue };
+        let Some(made) = level.0.check() else { continue };
         commands.entity(entity).try_remove::<MakingLevel>();
         if !terrain.world().version().is_same_world(level.1) {
             // The game assigned another one meanwhile.
@@ -253,11 +253,14 @@ pub(super) fn start_levels(
             continue;
         }
         match made {
-            Ok(mut made) => {
+            Ok(Ok(mut made)) => {
                 made.take_over(&mut terrain);
                 free_later(std::mem::replace(&mut *terrain, made));
             }
-            Err(why) => error!("the level of {entity} does not fit: {why}"),
+            Ok(Err(why)) => {
+                error!("the level of {entity} does not fit, so the terrain begins without it: {why}");
+            }
+            Err(_) => error!("making the level of {entity} panicked, so the terrain begins without it"),
         }
         // A saved world is read next.
         release(&mut commands, entity);

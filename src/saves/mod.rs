@@ -65,7 +65,13 @@ impl Plugin for SavePlugin {
             .add_systems(
                 Update,
                 (
-                    (level::start_levels, opening::finish_opening, opening::start_opening)
+                    (
+                        opening::follow_changed,
+                        level::start_levels,
+                        opening::finish_opening,
+                        opening::start_opening,
+                        opening::warn_of_no_terrain,
+                    )
                         .chain()
                         .in_set(BeforeLoad::Worlds),
                     (saving::save_commits, saving::save_now, saving::tell, closing::tell_closed)

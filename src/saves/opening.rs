@@ -28,9 +28,45 @@ const LOCK_TOLD: Duration = Duration::from_secs(2);
 /// Bytes of commits that wait at most until the store takes them, which it does each frame.
 const LOG_BYTES: usize = 64 << 20;
 
+/// How long a component waits for a terrain before that is logged.
+const TERRAIN_TOLD: Duration = Duration::from_secs(3);
+
 /// A world that nobody has begun to read.
 #[derive(Component)]
-pub(super) struct Unopened;
+pub(super) struct Unopened {
+    since: Instant,
+    /// Whether it was logged that there is no terrain.
+    told: bool,
+    /// What the world was to be read for before its terrain was removed.
+    level: Option<LevelId>,
+}
+
+impl Unopened {
+    fn new(level: Option<LevelId>) -> Self {
+        Self { since: Instant::now(), told: false, level }
+    }
+}
+
+/// What tells a level from others: its ground and its sizes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LevelId {
+    ground: u64,
+    size: (i32, i32),
+    chunk_size: u32,
+    voxel_size: f32,
+}
+
+impl LevelId {
+    fn of(terrain: &Terrain) -> Self {
+        let (ground, grid) = (terrain.world().ground(), terrain.world().grid());
+        Self {
+            ground: ground.hash(),
+            size: (ground.width(), ground.depth()),
+            chunk_size: grid.size().cast_unsigned(),
+            voxel_size: terrain.voxel_size(),
+        }
+    }
+}
 
 /// A terrain is [`Held`] by this module, and not by the game.
 #[derive(Component)]
@@ -93,6 +129,17 @@ impl OpeningWorld {
     }
 }
 
+/// What was read for nobody is neither closed nor freed by whoever drops this.
+impl Drop for OpeningWorld {
+    fn drop(&mut self) {
+        if let Some(Ok(Ok(found))) = self.task.take().and_then(|mut task| task.check()) {
+            let ReadWorld { store, terrain, .. } = found.world();
+            drop(store.close());
+            free_later(terrain);
+        }
+    }
+}
+
 /// A world that was read or made.
 pub(crate) struct ReadWorld {
     pub store: Store,
@@ -121,7 +168,7 @@ pub(crate) struct WorldReader {
     saved: SavedWorld,
     level: Option<(BurrowLevel, String)>,
     ground: Arc<Ground>,
-    settings: TerrainSettings,
+    id: LevelId,
     /// What is made where there is no world yet.
     parts: WorldParts,
     pub progress: Progress,
@@ -132,17 +179,8 @@ impl WorldReader {
     /// there is one. Rules and settings of loose pieces that the terrain has hold for a world that was saved as well.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
-        let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        Self { saved: saved.clone(), level, ground, settings, parts, progress: Progress::default() }
-    }
-
-    /// Whether this terrain has the ground and the size that the world is read for.
-    fn is_for(&self, terrain: &Terrain) -> bool {
-        let (world, settings) = (terrain.world(), &self.settings);
-        world.ground().hash() == self.ground.hash()
-            && (world.ground().width(), world.ground().depth()) == (self.ground.width(), self.ground.depth())
-            && world.grid().size().cast_unsigned() == settings.chunk_size
-            && terrain.voxel_size() == settings.voxel_size
+        let (saved, id) = (saved.clone(), LevelId::of(terrain));
+        Self { saved, level, ground, id, parts, progress: Progress::default() }
     }
 
     /// Reads the world, or makes one. Waits for whoever has it open.
@@ -158,14 +196,15 @@ impl WorldReader {
 
     /// Reads the world, or makes one, unless somebody has it open.
     fn try_read(&self) -> Result<Found, StoreError> {
-        let Self { saved, level, ground, settings, parts, progress } = self;
+        let Self { saved, level, ground, id, parts, progress } = self;
         // One that can't be read was told of when the terrain was made of it.
         let level = level.as_ref();
         let level =
             level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, ground).ok()?, path)));
         let options = StoreOptions { level, progress: Some(progress.clone()), ..saved.options() };
         if !Store::is_in(&saved.path) {
-            let mut terrain = Terrain::restore(Arc::clone(ground), settings, parts.clone())?;
+            let settings = TerrainSettings { chunk_size: id.chunk_size, voxel_size: id.voxel_size };
+            let mut terrain = Terrain::restore(Arc::clone(ground), &settings, parts.clone())?;
             match Store::create(&saved.path, &mut terrain, options.clone()) {
                 // Somebody made it in between.
                 Err(StoreError::Exists(_)) => {}
@@ -198,10 +237,26 @@ pub(super) fn hold(mut world: DeferredWorld, context: HookContext) {
     world.commands().queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(context.entity) else { return };
         if entity.contains::<SavedWorld>() {
-            entity.remove::<OpeningWorld>().insert(Unopened);
+            entity.remove::<OpeningWorld>().insert(Unopened::new(None));
             hold_now(&mut entity);
         }
     });
+}
+
+/// A component that the game has changed in its place is like another one that was inserted: what it named before is closed.
+pub(super) fn follow_changed(
+    mut commands: Commands,
+    changed: Query<
+        (Entity, &SavedWorld, Option<&WorldStore>, Option<&OpeningWorld>),
+        (Changed<SavedWorld>, Allow<Disabled>),
+    >,
+) {
+    for (entity, saved, store, opening) in &changed {
+        let before = store.map(|store| &store.saved).or(opening.map(|opening| &opening.reader.saved));
+        if before.is_some_and(|before| before != saved) {
+            commands.entity(entity).try_insert(saved.clone());
+        }
+    }
 }
 
 /// Holds a terrain, with what is under way on it.
@@ -254,8 +309,9 @@ fn read_again(commands: &mut Commands, entity: Entity) {
         let (Some(opening), Some(terrain)) = (entity.get::<OpeningWorld>(), entity.get::<Terrain>()) else {
             return;
         };
-        if opening.reader.is_for(terrain) {
-            entity.remove::<OpeningWorld>().insert(Unopened);
+        let id = opening.reader.id;
+        if id == LevelId::of(terrain) {
+            entity.remove::<OpeningWorld>().insert(Unopened::new(Some(id)));
         } else {
             detach(&mut entity, ClosedBecause::OtherTerrain);
         }
@@ -275,8 +331,8 @@ pub(super) fn wait_for_terrain(
     commands.queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(entity) else { return };
         // Its `SavedWorld` may have gone with it.
-        if entity.take::<OpeningWorld>().is_some() {
-            entity.insert(Unopened);
+        if let Some(opening) = entity.take::<OpeningWorld>() {
+            entity.insert(Unopened::new(Some(opening.reader.id)));
         }
     });
 }
@@ -286,11 +342,15 @@ pub(super) fn start_opening(
     mut commands: Commands,
     levels: FindLevel,
     mut worlds: Query<
-        (Entity, &SavedWorld, &mut Terrain, Option<&StartLevel>),
-        (With<Unopened>, Without<Waiting>, Without<MakingLevel>, Allow<Disabled>),
+        (Entity, &SavedWorld, &mut Terrain, &Unopened, Option<&StartLevel>),
+        (Without<Waiting>, Without<MakingLevel>, Allow<Disabled>),
     >,
 ) {
-    for (entity, saved, mut terrain, start) in &mut worlds {
+    for (entity, saved, mut terrain, unopened, start) in &mut worlds {
+        if unopened.level.is_some_and(|level| level != LevelId::of(&terrain)) {
+            detach_unless_replaced(&mut commands, entity, saved);
+            continue;
+        }
         let level = match start.map(|start| levels.find(start)) {
             None | Some(Err(_)) => None,
             Some(Ok(None)) => continue,
@@ -314,15 +374,42 @@ pub(super) fn start_opening(
     }
 }
 
+/// Another level took the place of one that was removed while its world was read.
+fn detach_unless_replaced(commands: &mut Commands, entity: Entity, saved: &SavedWorld) {
+    let saved = saved.clone();
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        if entity.get::<SavedWorld>() == Some(&saved) {
+            detach(&mut entity, ClosedBecause::OtherTerrain);
+        }
+    });
+}
+
+/// Logs that a component waits for a terrain.
+pub(super) fn warn_of_no_terrain(
+    mut worlds: Query<(Entity, &SavedWorld, &mut Unopened), (Without<Terrain>, Allow<Disabled>)>,
+) {
+    for (entity, saved, mut unopened) in &mut worlds {
+        if !unopened.told && unopened.since.elapsed() >= TERRAIN_TOLD {
+            unopened.told = true;
+            warn!(
+                "the SavedWorld of {entity} waits for a terrain, and saves nothing in {}: insert it on the entity of the Terrain",
+                saved.path.display()
+            );
+        }
+    }
+}
+
 /// Puts worlds that were read in place of their terrains.
 pub(super) fn finish_opening(
     mut commands: Commands,
-    mut worlds: Query<(Entity, &SavedWorld, &mut Terrain, &mut OpeningWorld), Allow<Disabled>>,
+    mut worlds: Query<(Entity, &mut Terrain, &mut OpeningWorld), (With<SavedWorld>, Allow<Disabled>)>,
     mut closing: ResMut<ClosingWorlds>,
     mut opened: MessageWriter<WorldOpened>,
     mut troubles: MessageWriter<StoreTroubleFound>,
 ) {
-    for (entity, saved, mut terrain, mut opening) in &mut worlds {
+    for (entity, mut terrain, mut opening) in &mut worlds {
+        let saved = &Arc::clone(&opening.reader).saved;
         let mut tell = |trouble| {
             warn!("the world in {}: {trouble}", saved.path.display());
             troubles.write(StoreTroubleFound { terrain: entity, trouble });
@@ -370,16 +457,21 @@ pub(super) fn finish_opening(
     }
 }
 
-/// Lets a store follow the terrain of its component, unless the game has removed that meanwhile.
+/// Lets a store follow the terrain of its component. If the game has removed or changed that meanwhile, the world is closed, and the one
+/// that the component names now is read.
 fn insert_store(commands: &mut Commands, entity: Entity, saved: SavedWorld, store: Store) {
     commands.queue(move |world: &mut World| {
         let path = saved.path.clone();
         if let Ok(mut owner) = world.get_entity_mut(entity)
-            && owner.get::<SavedWorld>() == Some(&saved)
+            && let Some(now) = owner.get::<SavedWorld>()
         {
-            owner.insert(WorldStore::new(store, path));
-        } else {
-            world.resource_mut::<ClosingWorlds>().close(entity, path, ClosedBecause::Removed, store);
+            if *now == saved {
+                owner.insert(WorldStore::new(store, saved));
+                return;
+            }
+            owner.insert(Unopened::new(None));
+            hold_now(&mut owner);
         }
+        world.resource_mut::<ClosingWorlds>().close(entity, path, ClosedBecause::Removed, store);
     });
 }

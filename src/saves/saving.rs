@@ -24,7 +24,7 @@ fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     let followed = store.follow(terrain.bypass_change_detection());
     match followed {
         Err(why) if !std::mem::replace(&mut world.has_failed, true) => {
-            error!("nothing is saved in {} any more: {why}", world.path.display());
+            error!("nothing is saved in {} any more: {why}", world.saved.path.display());
         }
         _ => {}
     }
@@ -92,7 +92,7 @@ pub(super) fn tell(
         let world = &mut *world;
         let Some(store) = &world.store else { continue };
         for trouble in store.take_troubles() {
-            warn!("the world in {}: {trouble}", world.path.display());
+            warn!("the world in {}: {trouble}", world.saved.path.display());
             troubles.write(StoreTroubleFound { terrain: entity, trouble });
         }
         let Some(durable) = store.durable_point() else { continue };
@@ -124,7 +124,7 @@ pub(super) fn finish_at_exit(
         }
         let Some(store) = &mut world.store else { continue };
         if let Err(why) = store.flush_within(end.saturating_duration_since(Instant::now())) {
-            error!("the last commits are not saved in {}: {why}", world.path.display());
+            error!("the last commits are not saved in {}: {why}", world.saved.path.display());
         }
     }
     closing.wait(end);

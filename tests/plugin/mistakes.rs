@@ -276,6 +276,27 @@ mod of_saved_worlds {
     }
 
     #[test]
+    fn a_saved_world_on_another_entity_than_its_terrain() {
+        let folder = Folder::new("mistake-entity");
+        let mut entity = Entity::PLACEHOLDER;
+        let (_, log) = logged(Stage::drawing(), |stage| {
+            stage.show(level(1.0));
+            entity = stage.app.world_mut().spawn(SavedWorld::new(&folder.0)).id();
+            let start = std::time::Instant::now();
+            while start.elapsed().as_secs() < 5 {
+                stage.frames(10);
+            }
+        });
+        assert_eq!(
+            log.count(&format!("the SavedWorld of {entity} waits for a terrain")),
+            1,
+            "{}",
+            log.text()
+        );
+        assert!(log.count("on the entity of the Terrain") > 0);
+    }
+
+    #[test]
     fn a_level_that_is_not_there() {
         let mut terrain = Entity::PLACEHOLDER;
         let (_, log) = logged(Stage::drawing(), |stage| {

@@ -194,6 +194,56 @@ fn a_world_that_is_named_anew_or_left_in_any_place_of_a_frame_is_saved_where_it_
 }
 
 #[test]
+fn a_component_that_is_changed_in_its_place_names_another_world() {
+    for is_open in [true, false] {
+        let folders = ["changed-a", "changed-b"].map(Folder::new);
+        let mut game = empty();
+        let entity = game.world_mut().spawn((terrain(), saved(&folders[0].0))).id();
+        if is_open {
+            run_until_opened(&mut game);
+            dig_now(&mut game, 30.0);
+        } else {
+            game.update();
+        }
+        let before = hash(&game, entity);
+        game.world_mut().get_mut::<SavedWorld>(entity).expect("a component").path = folders[1].0.clone();
+        run_until(&mut game, "the other one is open", |world| {
+            world.resource::<Heard>().opened.len() == 1 + usize::from(is_open)
+        });
+        dig_now(&mut game, 60.0);
+        let last = (model(&game, entity).world().revision(), hash(&game, entity));
+        exit(game);
+        assert_eq!(hash_in(&folders[1].0, terrain()), Ok(last));
+        if is_open {
+            assert_eq!(hash_in(&folders[0].0, terrain()), Ok((1, before)));
+        }
+    }
+}
+
+#[test]
+fn another_level_that_comes_after_a_terrain_went_is_not_put_into_the_world_of_that() {
+    let folder = Folder::new("other-later");
+    let mut first = terrain();
+    first.apply([Brush::dig(Shape::sphere(Vec3::new(60.0, 11.0, 20.0), 6.0))]);
+    let before = first.world().hash();
+    drop(Store::create(&folder.0, &mut first, StoreOptions::default()).expect("a new world"));
+    let holder = Store::open(&folder.0, ground(), StoreOptions::default()).expect("a world");
+    let mut game = empty();
+    let entity = game.world_mut().spawn((terrain(), saved(&folder.0))).id();
+    (0..20).for_each(|_| game.update());
+    game.world_mut().entity_mut(entity).remove::<Terrain>();
+    (0..20).for_each(|_| game.update());
+    game.world_mut().entity_mut(entity).insert(crate::saved::flat(96, 20.0, 32, 1.0));
+    drop(holder);
+    run_until_opened(&mut game);
+    assert!(heard(&game).opened[0].is_err(), "{:?}", heard(&game).opened);
+    assert!(game.world().get::<SavedWorld>(entity).is_none() && game.world().get::<Held>(entity).is_none());
+    dig_now(&mut game, 30.0);
+    exit(game);
+    assert_eq!(hash_in(&folder.0, terrain()), Ok((1, before)));
+}
+
+#[test]
 fn two_terrains_with_one_folder_do_not_write_into_each_other() {
     let folder = Folder::new("two");
     let (mut game, first) = app(&folder.0);
