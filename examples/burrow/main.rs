@@ -17,7 +17,7 @@
 //!
 //! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights` and the
 //! options beside it name it as for the example `export`, `--side` as for the example `server`. `--level` names the level that it was
-//! begun on, if it was begun on one. `repair` and `compact` refuse another ground or level than the world's own, as one wrong number
+//! begun on, if it was begun on one. `repair`, `compact` and `import` refuse another ground or level than the world's own, as one wrong number
 //! would move the world there for good; `--other-base keep` or `replay` does so on purpose.
 //!
 //! `info`, `check`, `replay` and `export` change nothing, so that they work on read-only media too. `repair` opens worlds that a game
@@ -44,7 +44,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use bevy_burrow::store::{self, Folder, Store, StoreError, StoreOptions};
+use bevy_burrow::store::{self, BaseChanged, Folder, Store, StoreError, StoreOptions};
 use bevy_burrow::terrain::World;
 use clap::{Parser, Subcommand};
 use serde_json::{Map, Value, json};
@@ -218,7 +218,10 @@ fn export(world: &Path, file: &Path, args: &GroundArgs) -> Result<(Value, bool),
     let level = args.level(&ground)?;
     let read = store::read_world(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
     let bytes = store::to_bytes(&read.terrain, read.world, &read.game).map_err(|why| why.to_string())?;
-    write_new(file, &bytes).map_err(|error| format!("{}: {error}", file.display()))?;
+    write_new(file, &bytes).map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => format!("{} is there already: give another name", file.display()),
+        _ => format!("{}: {error}", file.display()),
+    })?;
     let mut answer = state(read.terrain.world());
     answer.insert("bytes".into(), bytes.len().into());
     let is_sound = read.troubles.is_empty();
@@ -247,7 +250,14 @@ fn import(file: &Path, world: &Path, args: &GroundArgs) -> Result<(Value, bool),
     let bytes = fs::read(file).map_err(|error| at(&error))?;
     let ground = args.required()?;
     let level = args.level(&ground)?;
-    let imported = store::from_bytes(&bytes, ground).map_err(|error| at(&error))?;
+    let imported = store::from_bytes(&bytes, ground).map_err(|error| match error {
+        StoreError::Restore(_) => format!("{}: is it the ground that the world was saved with?", at(&error)),
+        error => at(&error),
+    })?;
+    if imported.is_base_changed && args.base_changed() == BaseChanged::Refuse {
+        let why = StoreError::BaseChanged { regions: 0 };
+        return Err(format!("{}; --other-base keep does that", at(&why)));
+    }
     let mut terrain = imported.terrain;
     let (files, options) = (Arc::new(Folder::new(world)), StoreOptions { level, ..StoreOptions::default() });
     let created = Store::create_with_data_in(files, &mut terrain, imported.game, options);

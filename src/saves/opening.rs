@@ -29,7 +29,7 @@ const LOCK_TOLD: Duration = Duration::from_secs(2);
 const LOG_BYTES: usize = 64 << 20;
 
 /// How long a component waits for a terrain before that is logged.
-const TERRAIN_TOLD: Duration = Duration::from_secs(3);
+const TERRAIN_TOLD: Duration = Duration::from_secs(10);
 
 /// A world that nobody has begun to read.
 #[derive(Component)]

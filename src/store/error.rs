@@ -102,6 +102,12 @@ pub enum StoreError {
     /// A log that is replayed does not lead to the world that it says.
     #[error("the log can't be replayed: {0}")]
     Replay(#[from] ReplayError),
+    /// The log can't be replayed from the first commit on, as its beginning is gone. The world itself may be whole.
+    #[error("the log does not reach back to the first commit, so the world can't be made of it alone")]
+    LogNotWhole,
+    /// The log does not lead to the world that it describes.
+    #[error("the log can't be replayed: {0}")]
+    LogRefused(String),
     /// Records do not follow those that were taken before.
     #[error("a record leads to revision {found}, but the store is at {at}")]
     Gap {

@@ -283,7 +283,7 @@ mod of_saved_worlds {
             stage.show(level(1.0));
             entity = stage.app.world_mut().spawn(SavedWorld::new(&folder.0)).id();
             let start = std::time::Instant::now();
-            while start.elapsed().as_secs() < 5 {
+            while start.elapsed().as_secs() < 12 {
                 stage.frames(10);
             }
         });
