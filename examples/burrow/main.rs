@@ -118,8 +118,29 @@ fn main() -> ExitCode {
     }
 }
 
+impl Command {
+    /// The folder of a world that should be there.
+    fn world(&self) -> Option<&Path> {
+        match self {
+            Self::Info { world }
+            | Self::Check { world }
+            | Self::Repair { world }
+            | Self::Compact { world }
+            | Self::Export { world, .. }
+            | Self::Replay { world } => Some(world),
+            Self::Import { .. } => None,
+        }
+    }
+}
+
 /// What to print, and whether all is well.
 fn run(args: &Args) -> Result<(Value, bool), String> {
+    if let Some(world) = args.command.world().filter(|world| world.is_file()) {
+        return Err(format!(
+            "{} is a file, and a world is a folder: `import` makes a world of an exported file",
+            world.display()
+        ));
+    }
     match &args.command {
         Command::Info { world } => info(world),
         Command::Check { world } => check(world, &args.ground),

@@ -271,7 +271,10 @@ pub enum StoreTrouble {
         commits: u64,
     },
     /// The ground or the level is another one than the world was saved with; edits were kept or replayed.
-    #[error("the ground or the level has changed below {regions} saved regions; the edits were {kept}")]
+    #[error(
+        "the ground or the level has changed, {} saved regions; the edits were {kept}",
+        if *.regions == 0 { "but not below any of the".into() } else { format!("below {regions}") }
+    )]
     BaseChanged {
         /// Regions with edits over changed ground; all of them, if it is the level.
         regions: usize,

@@ -661,9 +661,8 @@ impl Life {
                 // What waits in a terrain goes where the terrain goes, so all is answered first.
                 self.settle();
                 let model = self.renew(1.0);
-                let mut own = self.stage.app.world_mut().get_mut::<Terrain>(terrain).expect("it is settled");
-                drop(std::mem::replace(&mut *own, model));
-                drop(own);
+                let own = self.stage.app.world_mut().get_mut::<Terrain>(terrain);
+                drop(std::mem::replace(&mut *own.expect("it is settled"), model));
                 self.begin_again();
             }
             Event::RemoveAndInsert => {
