@@ -16,7 +16,7 @@ use super::level::{BurrowLevel, FindLevel, MakingLevel, StartLevel, Waiting};
 use super::messages::{ClosedBecause, StoreTroubleFound, WorldOpened};
 use crate::ground::Ground;
 use crate::plugin::{Held, ThreadTask, Threads, free_later};
-use crate::store::{BaseLevel, Progress, Store, StoreError, StoreOptions, StoreTrouble, read_level};
+use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble, read_level};
 use crate::terrain::{Terrain, TerrainSettings, Version, WorldParts};
 
 /// How long a world that is open elsewhere is waited for: longer than a server that ends takes to close it.
@@ -166,6 +166,8 @@ impl Found {
 /// Reads a world, on another thread.
 pub(crate) struct WorldReader {
     saved: SavedWorld,
+    /// The folder, wherever the process is by the time that it is read.
+    folder: Folder,
     level: Option<(BurrowLevel, String)>,
     ground: Arc<Ground>,
     id: LevelId,
@@ -179,8 +181,8 @@ impl WorldReader {
     /// there is one. Rules and settings of loose pieces that the terrain has hold for a world that was saved as well.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
-        let (saved, id) = (saved.clone(), LevelId::of(terrain));
-        Self { saved, level, ground, id, parts, progress: Progress::default() }
+        let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));
+        Self { saved, folder, level, ground, id, parts, progress: Progress::default() }
     }
 
     /// Reads the world, or makes one. Waits for whoever has it open.
@@ -196,16 +198,16 @@ impl WorldReader {
 
     /// Reads the world, or makes one, unless somebody has it open.
     fn try_read(&self) -> Result<Found, StoreError> {
-        let Self { saved, level, ground, id, parts, progress } = self;
+        let Self { saved, folder, level, ground, id, parts, progress } = self;
         // One that can't be read was told of when the terrain was made of it.
         let level = level.as_ref();
         let level =
             level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, ground).ok()?, path)));
         let options = StoreOptions { level, progress: Some(progress.clone()), ..saved.options() };
-        if !Store::is_in(&saved.path) {
+        if !Store::is_in(folder.path()) {
             let settings = TerrainSettings { chunk_size: id.chunk_size, voxel_size: id.voxel_size };
             let mut terrain = Terrain::restore(Arc::clone(ground), &settings, parts.clone())?;
-            match Store::create(&saved.path, &mut terrain, options.clone()) {
+            match Store::create(folder.path(), &mut terrain, options.clone()) {
                 // Somebody made it in between.
                 Err(StoreError::Exists(_)) => {}
                 created => {
@@ -214,7 +216,7 @@ impl WorldReader {
                 }
             }
         }
-        let (store, opened) = Store::open(&saved.path, Arc::clone(ground), options)?;
+        let (store, opened) = Store::open(folder.path(), Arc::clone(ground), options)?;
         let (mut terrain, troubles) = (opened.terrain, opened.troubles);
         // A new version of the game may have other rules than the one that saved the world.
         if let Some(rules) = parts.rules.clone().filter(|rules| terrain.rules() != Some(rules))
