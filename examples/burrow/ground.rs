@@ -4,8 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use bevy_burrow::ground::{GreyImage, Ground, GroundError, ImageLimits, ImageScale, Strata};
-use bevy_burrow::store::{BaseLevel, load_level};
-use clap::Args;
+use bevy_burrow::store::{BaseChanged, BaseLevel, load_level};
+use clap::{Args, ValueEnum};
 
 use crate::json;
 use crate::noise_ground::noise_ground;
@@ -32,9 +32,30 @@ pub struct GroundArgs {
     /// The level that the world was begun on: its folder, or the packed file
     #[arg(long, value_name = "PATH", global = true)]
     level: Option<PathBuf>,
+    /// What `repair`, `compact` and `import` do if the ground or the level is not the one that the world was saved with: refuse it, or move the
+    /// world onto it for good, with edited ground as it is or with all edits made again
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = OtherBase::Refuse, global = true)]
+    other_base: OtherBase,
+}
+
+/// What to do with another ground or level than the one that the world was saved with.
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum OtherBase {
+    Refuse,
+    Keep,
+    Replay,
 }
 
 impl GroundArgs {
+    /// What to do if the ground is another one.
+    pub fn base_changed(&self) -> BaseChanged {
+        match self.other_base {
+            OtherBase::Refuse => BaseChanged::Refuse,
+            OtherBase::Keep => BaseChanged::Keep,
+            OtherBase::Replay => BaseChanged::Replay,
+        }
+    }
+
     /// Builds the ground; `None` if no option names any.
     pub fn build(&self) -> Result<Option<Ground>, String> {
         let ground = match (&self.heights, self.side) {

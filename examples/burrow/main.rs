@@ -17,7 +17,8 @@
 //!
 //! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights` and the
 //! options beside it name it as for the example `export`, `--side` as for the example `server`. `--level` names the level that it was
-//! begun on, if it was begun on one.
+//! begun on, if it was begun on one. `repair`, `compact` and `import` refuse another ground or level than the world's own, as one wrong number
+//! would move the world there for good; `--other-base keep` or `replay` does so on purpose.
 //!
 //! `info`, `check`, `replay` and `export` change nothing, so that they work on read-only media too. `repair` opens worlds that a game
 //! refuses to open, as a file can't be read or only regions are left; it replaces a file only once the new one is complete, and keeps the
@@ -43,7 +44,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use bevy_burrow::store::{self, Folder, Store, StoreOptions};
+use bevy_burrow::store::{self, BaseChanged, Folder, Store, StoreError, StoreOptions};
 use bevy_burrow::terrain::World;
 use clap::{Parser, Subcommand};
 use serde_json::{Map, Value, json};
@@ -117,8 +118,29 @@ fn main() -> ExitCode {
     }
 }
 
+impl Command {
+    /// The folder of a world that should be there.
+    fn world(&self) -> Option<&Path> {
+        match self {
+            Self::Info { world }
+            | Self::Check { world }
+            | Self::Repair { world }
+            | Self::Compact { world }
+            | Self::Export { world, .. }
+            | Self::Replay { world } => Some(world),
+            Self::Import { .. } => None,
+        }
+    }
+}
+
 /// What to print, and whether all is well.
 fn run(args: &Args) -> Result<(Value, bool), String> {
+    if let Some(world) = args.command.world().filter(|world| world.is_file()) {
+        return Err(format!(
+            "{} is a file, and a world is a folder: `import` makes a world of an exported file",
+            world.display()
+        ));
+    }
     match &args.command {
         Command::Info { world } => info(world),
         Command::Check { world } => check(world, &args.ground),
@@ -193,9 +215,15 @@ fn opened(
     work: impl FnOnce(&mut Store) -> Result<(), String>,
 ) -> Result<(Value, bool), String> {
     let ground = args.required()?;
-    let options = StoreOptions { level: args.level(&ground)?, salvage: true, ..StoreOptions::default() };
+    let (level, base_changed) = (args.level(&ground)?, args.base_changed());
+    let options = StoreOptions { level, base_changed, salvage: true, ..StoreOptions::default() };
     let opened = Store::open(world, ground, options);
-    let (mut store, opened) = opened.map_err(|why| why.to_string())?;
+    let (mut store, opened) = opened.map_err(|why| match why {
+        StoreError::BaseChanged { .. } | StoreError::LevelChanged { .. } => {
+            format!("{why}; nothing was changed, and --other-base keep does that")
+        }
+        why => why.to_string(),
+    })?;
     work(&mut store)?;
     store.checkpoint().map_err(|why| why.to_string())?;
     let troubles: Vec<String> =
@@ -211,7 +239,10 @@ fn export(world: &Path, file: &Path, args: &GroundArgs) -> Result<(Value, bool),
     let level = args.level(&ground)?;
     let read = store::read_world(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
     let bytes = store::to_bytes(&read.terrain, read.world, &read.game).map_err(|why| why.to_string())?;
-    write_new(file, &bytes).map_err(|error| format!("{}: {error}", file.display()))?;
+    write_new(file, &bytes).map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => format!("{} is there already: give another name", file.display()),
+        _ => format!("{}: {error}", file.display()),
+    })?;
     let mut answer = state(read.terrain.world());
     answer.insert("bytes".into(), bytes.len().into());
     let is_sound = read.troubles.is_empty();
@@ -240,7 +271,14 @@ fn import(file: &Path, world: &Path, args: &GroundArgs) -> Result<(Value, bool),
     let bytes = fs::read(file).map_err(|error| at(&error))?;
     let ground = args.required()?;
     let level = args.level(&ground)?;
-    let imported = store::from_bytes(&bytes, ground).map_err(|error| at(&error))?;
+    let imported = store::from_bytes(&bytes, ground).map_err(|error| match error {
+        StoreError::Restore(_) => format!("{}: is it the ground that the world was saved with?", at(&error)),
+        error => at(&error),
+    })?;
+    if imported.is_base_changed && args.base_changed() == BaseChanged::Refuse {
+        let why = StoreError::BaseChanged { regions: 0 };
+        return Err(format!("{}; --other-base keep does that", at(&why)));
+    }
     let mut terrain = imported.terrain;
     let (files, options) = (Arc::new(Folder::new(world)), StoreOptions { level, ..StoreOptions::default() });
     let created = Store::create_with_data_in(files, &mut terrain, imported.game, options);

@@ -173,7 +173,8 @@ impl From<&volume::Field> for Field {
 }
 
 /// A terrain that waits: it is not loaded, and begins no transaction; what is sent to it stays queued. Say because the world that
-/// it is to show is still on its way. A `SavedWorld` brings it until its world is read.
+/// it is to show is still on its way. A `SavedWorld` or `StartLevel` brings it until its world is read; one that the game has inserted before
+/// stays until the game removes it.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct Held;

@@ -60,7 +60,7 @@ pub(super) fn close(
     if let Some(mut terrain) = terrain {
         follow_same(&mut terrain, &mut world);
     }
-    let (path, because) = (std::mem::take(&mut world.path), world.closing);
+    let (path, because) = (std::mem::take(&mut world.saved.path), world.closing);
     if let Some(store) = world.store.take() {
         closing.close(gone.entity, path, because, store);
     }
@@ -89,24 +89,22 @@ pub(super) fn follow_discarded(
 }
 
 /// Takes the [`SavedWorld`] off an entity, and says why.
-pub(crate) fn detach(commands: &mut Commands, entity: Entity, because: ClosedBecause) {
-    commands.queue(move |world: &mut World| {
-        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
-        let Some(saved) = entity.get::<SavedWorld>().cloned() else { return };
-        let path = saved.path.display();
-        warn!("{} is no longer saved in {path}, since {because}", entity.id());
-        if let Some(mut store) = entity.get_mut::<WorldStore>() {
-            store.closing = because;
-        }
-        let was_opening = entity.contains::<Unopened>() || entity.contains::<OpeningWorld>();
-        let terrain = entity.id();
-        entity.remove::<SavedWorld>();
-        if was_opening {
-            let why =
-                if because == ClosedBecause::Shared { StoreError::Shared } else { StoreError::OtherTerrain };
-            world.write_message(WorldOpened { terrain, outcome: Err(Arc::new(why)) });
-        }
-    });
+pub(crate) fn detach(entity: &mut EntityWorldMut, because: ClosedBecause) {
+    let Some(saved) = entity.get::<SavedWorld>() else { return };
+    warn!("{} is no longer saved in {}, since {because}", entity.id(), saved.path.display());
+    if let Some(mut store) = entity.get_mut::<WorldStore>() {
+        store.closing = because;
+    }
+    let was_opening = entity.contains::<Unopened>() || entity.contains::<OpeningWorld>();
+    entity.remove::<SavedWorld>();
+    if was_opening {
+        let why =
+            if because == ClosedBecause::Shared { StoreError::Shared } else { StoreError::OtherTerrain };
+        let (terrain, outcome) = (entity.id(), Err(Arc::new(why)));
+        entity.world_scope(|world| {
+            world.write_message(WorldOpened { terrain, outcome });
+        });
+    }
 }
 
 /// Tells of worlds that are closed.

@@ -14,7 +14,8 @@ pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
 /// it; the terrain itself they leave out.
 ///
-/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed) says so.
+/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed) says so. Changing it
+/// in its place is like inserting another one.
 ///
 /// | inserted beside it | what happens |
 /// | --- | --- |
@@ -23,6 +24,7 @@ pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 /// | a `Terrain` over the same ground, of the same size | that is another state of the same world, and takes the place of what was saved |
 /// | a `SharedTerrain` | the world is closed, and this component removed: the server saves what players share |
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[component(on_insert = super::opening::hold)]
 #[reflect(Component)]
 pub struct SavedWorld {
     /// The folder, for this world alone. It is made if it is missing, with those around it.
@@ -52,7 +54,8 @@ impl SavedWorld {
 pub struct WorldStore {
     /// `None` once it is being closed.
     pub(super) store: Option<Store>,
-    pub(super) path: PathBuf,
+    /// The component that it was opened for.
+    pub(super) saved: SavedWorld,
     /// The last point that was told as durable.
     pub(super) told: Option<SavePoint>,
     /// What [`SaveNow`](super::SaveNow) waits for, and whether it was sent again since.
@@ -65,10 +68,10 @@ pub struct WorldStore {
 }
 
 impl WorldStore {
-    pub(super) fn new(store: Store, path: PathBuf) -> Self {
+    pub(super) fn new(store: Store, saved: SavedWorld) -> Self {
         Self {
             store: Some(store),
-            path,
+            saved,
             told: None,
             asked: None,
             asked_again: false,

@@ -7,14 +7,16 @@ use bevy::asset::io::{Reader, Writer};
 use bevy::asset::saver::{AssetSaver, SavedAsset};
 use bevy::asset::{AssetLoader, AssetPath, AsyncWriteExt, LoadContext, LoadState};
 use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::lifecycle::HookContext;
 use bevy::ecs::query::Allow;
 use bevy::ecs::system::SystemParam;
+use bevy::ecs::world::DeferredWorld;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::components::WorldStore;
-use super::opening::release;
-use crate::plugin::{Held, ThreadTask, Threads, free_later};
+use super::opening::{hold_now, release};
+use crate::plugin::{ThreadTask, Threads, free_later};
 use crate::store::{FormatError, Level, LevelFiles, RestoreLevelError, pack_level, read_level, unpack_level};
 use crate::terrain::{Terrain, Version};
 
@@ -105,13 +107,14 @@ impl AssetSaver for LevelSaver {
 }
 
 /// The terrain of this entity begins as a level. Insert it with a terrain without edits, which gives the ground; the terrain is
-/// [`Held`] until the level is loaded, and begins without it where it can't be, which is logged as an error.
+/// [`Held`](crate::plugin::Held) until the level is loaded, and begins without it where it can't be, which is logged as an error.
 ///
 /// With a [`SavedWorld`](super::SavedWorld) beside it, a world that was saved goes on, and only a new one begins as the level. That world
 /// saves only what differs from the level, and needs a level to go on: where it is another one, say a new version of it,
 /// [`SavedWorld::base_changed`](super::SavedWorld::base_changed) says what happens. Inserted beside a world that is open already, it does
 /// nothing: what was dug there stays.
 #[derive(Component, Clone, Debug, PartialEq)]
+#[component(on_insert = hold)]
 pub struct StartLevel(pub Handle<BurrowLevel>);
 
 /// A level that a terrain is made of.
@@ -167,19 +170,20 @@ impl FindLevel<'_> {
 }
 
 /// Holds a terrain until its level is loaded.
-pub(super) fn hold(new: On<Insert, StartLevel>, mut commands: Commands) {
-    let entity = new.entity;
+pub(super) fn hold(mut world: DeferredWorld, context: HookContext) {
+    super::warn_without_plugin(&world, "StartLevel");
     // A world that is closed with the same insertion is closed by then.
-    commands.queue(move |world: &mut World| {
-        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+    world.commands().queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(context.entity) else { return };
+        if !entity.contains::<StartLevel>() {
+            return;
+        }
         if entity.contains::<WorldStore>() {
             warn!("a level for {} changes nothing: its saved world goes on", entity.id());
             return;
         }
-        if let Some(mut terrain) = entity.get_mut::<Terrain>() {
-            terrain.abandon();
-        }
-        entity.remove::<MakingLevel>().insert((Held, Waiting::new()));
+        entity.remove::<MakingLevel>().insert(Waiting::new());
+        hold_now(&mut entity);
     });
 }
 
@@ -205,7 +209,10 @@ pub(super) fn start_levels(
     mut commands: Commands,
     levels: FindLevel,
     mut waiting: Query<(Entity, &StartLevel, &Terrain, &mut Waiting), Allow<Disabled>>,
-    mut making: Query<(Entity, &mut Terrain, &mut MakingLevel), (Without<Waiting>, Allow<Disabled>)>,
+    mut making: Query<
+        (Entity, &mut Terrain, &mut MakingLevel),
+        (With<StartLevel>, Without<Waiting>, Allow<Disabled>),
+    >,
 ) {
     for (entity, start, terrain, mut wait) in &mut waiting {
         match levels.find(start) {
@@ -213,8 +220,14 @@ pub(super) fn start_levels(
                 let world = terrain.world();
                 let (level, ground) = (level.clone(), world.shared_ground());
                 let task = ThreadTask::start(Threads::Background, move || level.terrain(ground));
-                let making = MakingLevel(task, world.version());
-                commands.entity(entity).try_remove::<Waiting>().try_insert(making);
+                let (making, start) = (MakingLevel(task, world.version()), start.clone());
+                commands.queue(move |world: &mut World| {
+                    let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+                    // The game may have removed the component meanwhile, or inserted another one.
+                    if entity.get::<StartLevel>() == Some(&start) && entity.take::<Waiting>().is_some() {
+                        entity.insert(making);
+                    }
+                });
             }
             Ok(None) if !wait.told && wait.since.elapsed() >= TOLD => {
                 wait.told = true;
@@ -232,7 +245,7 @@ pub(super) fn start_levels(
         }
     }
     for (entity, mut terrain, mut level) in &mut making {
-        let Some(made) = level.0.finish() else { continue };
+        let Some(made) = level.0.check() else { continue };
         commands.entity(entity).try_remove::<MakingLevel>();
         if !terrain.world().version().is_same_world(level.1) {
             // The game assigned another one meanwhile.
@@ -240,11 +253,14 @@ pub(super) fn start_levels(
             continue;
         }
         match made {
-            Ok(mut made) => {
+            Ok(Ok(mut made)) => {
                 made.take_over(&mut terrain);
                 free_later(std::mem::replace(&mut *terrain, made));
             }
-            Err(why) => error!("the level of {entity} does not fit: {why}"),
+            Ok(Err(why)) => {
+                error!("the level of {entity} does not fit, so the terrain begins without it: {why}");
+            }
+            Err(_) => error!("making the level of {entity} panicked, so the terrain begins without it"),
         }
         // A saved world is read next.
         release(&mut commands, entity);

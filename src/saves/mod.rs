@@ -31,6 +31,7 @@ pub use messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldClosed, World
 pub use opening::OpeningWorld;
 pub(crate) use opening::{ReadWorld, WorldReader};
 
+use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
 
 use crate::plugin::{BeforeLoad, BurrowSystems};
@@ -52,11 +53,9 @@ impl Plugin for SavePlugin {
             .add_message::<WorldClosed>()
             .add_message::<StoreTroubleFound>()
             .init_resource::<closing::ClosingWorlds>()
-            .add_observer(opening::hold)
             .add_observer(opening::give_up)
             .add_observer(opening::read_anew)
             .add_observer(opening::wait_for_terrain)
-            .add_observer(level::hold)
             .add_observer(level::give_up)
             .add_observer(level::make_anew)
             .add_observer(closing::close)
@@ -66,7 +65,13 @@ impl Plugin for SavePlugin {
             .add_systems(
                 Update,
                 (
-                    (level::start_levels, opening::finish_opening, opening::start_opening)
+                    (
+                        opening::follow_changed,
+                        level::start_levels,
+                        opening::finish_opening,
+                        opening::start_opening,
+                        opening::warn_of_no_terrain,
+                    )
                         .chain()
                         .in_set(BeforeLoad::Worlds),
                     (saving::save_commits, saving::save_now, saving::tell, closing::tell_closed)
@@ -78,5 +83,12 @@ impl Plugin for SavePlugin {
         if app.world().contains_resource::<AssetServer>() {
             app.init_asset::<BurrowLevel>().init_asset_loader::<LevelLoader>();
         }
+    }
+}
+
+/// Without the plugin a terrain would be held for ever, and nothing would say why.
+fn warn_without_plugin(world: &DeferredWorld, component: &str) {
+    if world.get_resource::<closing::ClosingWorlds>().is_none() {
+        error!("a {component} holds its terrain until there is a SavePlugin: add BurrowPlugins");
     }
 }

@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::lifecycle::HookContext;
 use bevy::ecs::query::Allow;
+use bevy::ecs::world::DeferredWorld;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
@@ -14,7 +16,7 @@ use super::level::{BurrowLevel, FindLevel, MakingLevel, StartLevel, Waiting};
 use super::messages::{ClosedBecause, StoreTroubleFound, WorldOpened};
 use crate::ground::Ground;
 use crate::plugin::{Held, ThreadTask, Threads, free_later};
-use crate::store::{BaseLevel, Progress, Store, StoreError, StoreOptions, StoreTrouble, read_level};
+use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble, read_level};
 use crate::terrain::{Terrain, TerrainSettings, Version, WorldParts};
 
 /// How long a world that is open elsewhere is waited for: longer than a server that ends takes to close it.
@@ -26,9 +28,49 @@ const LOCK_TOLD: Duration = Duration::from_secs(2);
 /// Bytes of commits that wait at most until the store takes them, which it does each frame.
 const LOG_BYTES: usize = 64 << 20;
 
+/// How long a component waits for a terrain before that is logged.
+const TERRAIN_TOLD: Duration = Duration::from_secs(10);
+
 /// A world that nobody has begun to read.
 #[derive(Component)]
-pub(super) struct Unopened;
+pub(super) struct Unopened {
+    since: Instant,
+    /// Whether it was logged that there is no terrain.
+    told: bool,
+    /// What the world was to be read for before its terrain was removed.
+    level: Option<LevelId>,
+}
+
+impl Unopened {
+    fn new(level: Option<LevelId>) -> Self {
+        Self { since: Instant::now(), told: false, level }
+    }
+}
+
+/// What tells a level from others: its ground and its sizes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LevelId {
+    ground: u64,
+    size: (i32, i32),
+    chunk_size: u32,
+    voxel_size: f32,
+}
+
+impl LevelId {
+    fn of(terrain: &Terrain) -> Self {
+        let (ground, grid) = (terrain.world().ground(), terrain.world().grid());
+        Self {
+            ground: ground.hash(),
+            size: (ground.width(), ground.depth()),
+            chunk_size: grid.size().cast_unsigned(),
+            voxel_size: terrain.voxel_size(),
+        }
+    }
+}
+
+/// A terrain is [`Held`] by this module, and not by the game.
+#[derive(Component)]
+struct HeldHere;
 
 /// The world of a [`SavedWorld`] is being read; the plugin inserts it and takes it away.
 #[derive(Component)]
@@ -80,19 +122,21 @@ impl OpeningWorld {
         Some(outcome)
     }
 
-    /// Reads again for a terrain that took the place of the one that it is read for. Another level is not saved in that world.
-    fn read_anew(&self, terrain: &Terrain, entity: Entity, commands: &mut Commands) {
-        if self.reader.is_for(terrain) {
-            commands.entity(entity).try_remove::<Self>().try_insert(Unopened);
-        } else {
-            detach(commands, entity, ClosedBecause::OtherTerrain);
-        }
-    }
-
     /// Whether it should be told now that somebody else has the world open.
     fn tells_of_lock(&mut self) -> bool {
         let is_late = self.task.is_none() && self.since.elapsed() >= LOCK_TOLD;
         is_late && !std::mem::replace(&mut self.told, true)
+    }
+}
+
+/// What was read for nobody is neither closed nor freed by whoever drops this.
+impl Drop for OpeningWorld {
+    fn drop(&mut self) {
+        if let Some(Ok(Ok(found))) = self.task.take().and_then(|mut task| task.check()) {
+            let ReadWorld { store, terrain, .. } = found.world();
+            drop(store.close());
+            free_later(terrain);
+        }
     }
 }
 
@@ -122,9 +166,11 @@ impl Found {
 /// Reads a world, on another thread.
 pub(crate) struct WorldReader {
     saved: SavedWorld,
+    /// The folder, wherever the process is by the time that it is read.
+    folder: Folder,
     level: Option<(BurrowLevel, String)>,
     ground: Arc<Ground>,
-    settings: TerrainSettings,
+    id: LevelId,
     /// What is made where there is no world yet.
     parts: WorldParts,
     pub progress: Progress,
@@ -135,17 +181,8 @@ impl WorldReader {
     /// there is one. Rules and settings of loose pieces that the terrain has hold for a world that was saved as well.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
-        let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        Self { saved: saved.clone(), level, ground, settings, parts, progress: Progress::default() }
-    }
-
-    /// Whether this terrain has the ground and the size that the world is read for.
-    fn is_for(&self, terrain: &Terrain) -> bool {
-        let (world, settings) = (terrain.world(), &self.settings);
-        world.ground().hash() == self.ground.hash()
-            && (world.ground().width(), world.ground().depth()) == (self.ground.width(), self.ground.depth())
-            && world.grid().size().cast_unsigned() == settings.chunk_size
-            && terrain.voxel_size() == settings.voxel_size
+        let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));
+        Self { saved, folder, level, ground, id, parts, progress: Progress::default() }
     }
 
     /// Reads the world, or makes one. Waits for whoever has it open.
@@ -161,15 +198,16 @@ impl WorldReader {
 
     /// Reads the world, or makes one, unless somebody has it open.
     fn try_read(&self) -> Result<Found, StoreError> {
-        let Self { saved, level, ground, settings, parts, progress } = self;
+        let Self { saved, folder, level, ground, id, parts, progress } = self;
         // One that can't be read was told of when the terrain was made of it.
         let level = level.as_ref();
         let level =
             level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, ground).ok()?, path)));
         let options = StoreOptions { level, progress: Some(progress.clone()), ..saved.options() };
-        if !Store::is_in(&saved.path) {
-            let mut terrain = Terrain::restore(Arc::clone(ground), settings, parts.clone())?;
-            match Store::create(&saved.path, &mut terrain, options.clone()) {
+        if !Store::is_in(folder.path()) {
+            let settings = TerrainSettings { chunk_size: id.chunk_size, voxel_size: id.voxel_size };
+            let mut terrain = Terrain::restore(Arc::clone(ground), &settings, parts.clone())?;
+            match Store::create(folder.path(), &mut terrain, options.clone()) {
                 // Somebody made it in between.
                 Err(StoreError::Exists(_)) => {}
                 created => {
@@ -178,7 +216,7 @@ impl WorldReader {
                 }
             }
         }
-        let (store, opened) = Store::open(&saved.path, Arc::clone(ground), options)?;
+        let (store, opened) = Store::open(folder.path(), Arc::clone(ground), options)?;
         let (mut terrain, troubles) = (opened.terrain, opened.troubles);
         // A new version of the game may have other rules than the one that saved the world.
         if let Some(rules) = parts.rules.clone().filter(|rules| terrain.rules() != Some(rules))
@@ -194,15 +232,43 @@ impl WorldReader {
 }
 
 /// Holds a terrain until its world is read. What is under way on it is done on the world that was read.
-pub(super) fn hold(
-    new: On<Insert, SavedWorld>,
+///
+/// This is a hook, so that it comes before whatever observers do with the component, and looks whether the component is still there.
+pub(super) fn hold(mut world: DeferredWorld, context: HookContext) {
+    super::warn_without_plugin(&world, "SavedWorld");
+    world.commands().queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(context.entity) else { return };
+        if entity.contains::<SavedWorld>() {
+            entity.remove::<OpeningWorld>().insert(Unopened::new(None));
+            hold_now(&mut entity);
+        }
+    });
+}
+
+/// A component that the game has changed in its place is like another one that was inserted: what it named before is closed.
+pub(super) fn follow_changed(
     mut commands: Commands,
-    mut terrains: Query<&mut Terrain, Allow<Disabled>>,
+    changed: Query<
+        (Entity, &SavedWorld, Option<&WorldStore>, Option<&OpeningWorld>),
+        (Changed<SavedWorld>, Allow<Disabled>),
+    >,
 ) {
-    if let Ok(mut terrain) = terrains.get_mut(new.entity) {
+    for (entity, saved, store, opening) in &changed {
+        let before = store.map(|store| &store.saved).or(opening.map(|opening| &opening.reader.saved));
+        if before.is_some_and(|before| before != saved) {
+            commands.entity(entity).try_insert(saved.clone());
+        }
+    }
+}
+
+/// Holds a terrain, with what is under way on it.
+pub(super) fn hold_now(entity: &mut EntityWorldMut) {
+    if let Some(mut terrain) = entity.get_mut::<Terrain>() {
         terrain.abandon();
     }
-    commands.entity(new.entity).try_remove::<OpeningWorld>().try_insert((Held, Unopened));
+    if !entity.contains::<Held>() {
+        entity.insert((Held, HeldHere));
+    }
 }
 
 /// A world is no longer wanted.
@@ -211,15 +277,16 @@ pub(super) fn give_up(gone: On<Remove, SavedWorld>, mut commands: Commands) {
     release(&mut commands, gone.entity);
 }
 
-/// Lets a terrain go on, unless its level or its saved world is still to come. Nothing else takes [`Held`] away in this module.
+/// Lets a terrain go on, unless its level or its saved world is still to come, or the game holds it. Nothing else takes [`Held`] away in
+/// this module.
 pub(super) fn release(commands: &mut Commands, entity: Entity) {
     commands.queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(entity) else { return };
-        let waits = entity.contains::<Unopened>()
-            || entity.contains::<OpeningWorld>()
-            || entity.contains::<Waiting>()
-            || entity.contains::<MakingLevel>();
-        if !waits {
+        let waits_for_world = entity.contains::<Unopened>() || entity.contains::<OpeningWorld>();
+        let waits_for_level = entity.contains::<Waiting>() || entity.contains::<MakingLevel>();
+        let waits = entity.contains::<SavedWorld>() && waits_for_world
+            || entity.contains::<StartLevel>() && waits_for_level;
+        if !waits && entity.take::<HeldHere>().is_some() {
             entity.remove::<Held>();
         }
     });
@@ -228,12 +295,29 @@ pub(super) fn release(commands: &mut Commands, entity: Entity) {
 /// Starts to read anew where another terrain takes the place of the one that a world was read for.
 pub(super) fn read_anew(
     new: On<Insert, Terrain>,
-    opening: Query<(&OpeningWorld, &Terrain), Allow<Disabled>>,
+    opening: Query<(), (With<OpeningWorld>, Allow<Disabled>)>,
     mut commands: Commands,
 ) {
-    if let Ok((opening, terrain)) = opening.get(new.entity) {
-        opening.read_anew(terrain, new.entity, &mut commands);
+    if opening.contains(new.entity) {
+        read_again(&mut commands, new.entity);
     }
+}
+
+/// Reads a world again for another terrain. Another level is not saved in that world.
+fn read_again(commands: &mut Commands, entity: Entity) {
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        // Another `SavedWorld` that came with the terrain is not being read yet, and stays.
+        let (Some(opening), Some(terrain)) = (entity.get::<OpeningWorld>(), entity.get::<Terrain>()) else {
+            return;
+        };
+        let id = opening.reader.id;
+        if id == LevelId::of(terrain) {
+            entity.remove::<OpeningWorld>().insert(Unopened::new(Some(id)));
+        } else {
+            detach(&mut entity, ClosedBecause::OtherTerrain);
+        }
+    });
 }
 
 /// A terrain that is gone can't be read for.
@@ -242,9 +326,17 @@ pub(super) fn wait_for_terrain(
     opening: Query<(), (With<OpeningWorld>, Allow<Disabled>)>,
     mut commands: Commands,
 ) {
-    if opening.contains(gone.entity) {
-        commands.entity(gone.entity).try_remove::<OpeningWorld>().try_insert(Unopened);
+    let entity = gone.entity;
+    if !opening.contains(entity) {
+        return;
     }
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        // Its `SavedWorld` may have gone with it.
+        if let Some(opening) = entity.take::<OpeningWorld>() {
+            entity.insert(Unopened::new(Some(opening.reader.id)));
+        }
+    });
 }
 
 /// Starts to read the worlds of new terrains.
@@ -252,11 +344,15 @@ pub(super) fn start_opening(
     mut commands: Commands,
     levels: FindLevel,
     mut worlds: Query<
-        (Entity, &SavedWorld, &mut Terrain, Option<&StartLevel>),
-        (With<Unopened>, Without<Waiting>, Without<MakingLevel>, Allow<Disabled>),
+        (Entity, &SavedWorld, &mut Terrain, &Unopened, Option<&StartLevel>),
+        (Without<Waiting>, Without<MakingLevel>, Allow<Disabled>),
     >,
 ) {
-    for (entity, saved, mut terrain, start) in &mut worlds {
+    for (entity, saved, mut terrain, unopened, start) in &mut worlds {
+        if unopened.level.is_some_and(|level| level != LevelId::of(&terrain)) {
+            detach_unless_replaced(&mut commands, entity, saved);
+            continue;
+        }
         let level = match start.map(|start| levels.find(start)) {
             None | Some(Err(_)) => None,
             Some(Ok(None)) => continue,
@@ -268,19 +364,54 @@ pub(super) fn start_opening(
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
         let opening = OpeningWorld::new(WorldReader::new(saved, terrain, level), terrain.world().version());
-        commands.entity(entity).try_remove::<Unopened>().try_insert(opening);
+        commands.queue(move |world: &mut World| {
+            let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+            // The game may have removed the component meanwhile, or inserted another one.
+            if entity.get::<SavedWorld>() == Some(&opening.reader.saved)
+                && entity.take::<Unopened>().is_some()
+            {
+                entity.insert(opening);
+            }
+        });
+    }
+}
+
+/// Another level took the place of one that was removed while its world was read.
+fn detach_unless_replaced(commands: &mut Commands, entity: Entity, saved: &SavedWorld) {
+    let saved = saved.clone();
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        if entity.get::<SavedWorld>() == Some(&saved) {
+            detach(&mut entity, ClosedBecause::OtherTerrain);
+        }
+    });
+}
+
+/// Logs that a component waits for a terrain.
+pub(super) fn warn_of_no_terrain(
+    mut worlds: Query<(Entity, &SavedWorld, &mut Unopened), (Without<Terrain>, Allow<Disabled>)>,
+) {
+    for (entity, saved, mut unopened) in &mut worlds {
+        if !unopened.told && unopened.since.elapsed() >= TERRAIN_TOLD {
+            unopened.told = true;
+            warn!(
+                "the SavedWorld of {entity} waits for a terrain, and saves nothing in {}: insert it on the entity of the Terrain",
+                saved.path.display()
+            );
+        }
     }
 }
 
 /// Puts worlds that were read in place of their terrains.
 pub(super) fn finish_opening(
     mut commands: Commands,
-    mut worlds: Query<(Entity, &SavedWorld, &mut Terrain, &mut OpeningWorld), Allow<Disabled>>,
+    mut worlds: Query<(Entity, &mut Terrain, &mut OpeningWorld), (With<SavedWorld>, Allow<Disabled>)>,
     mut closing: ResMut<ClosingWorlds>,
     mut opened: MessageWriter<WorldOpened>,
     mut troubles: MessageWriter<StoreTroubleFound>,
 ) {
-    for (entity, saved, mut terrain, mut opening) in &mut worlds {
+    for (entity, mut terrain, mut opening) in &mut worlds {
+        let saved = &Arc::clone(&opening.reader).saved;
         let mut tell = |trouble| {
             warn!("the world in {}: {trouble}", saved.path.display());
             troubles.write(StoreTroubleFound { terrain: entity, trouble });
@@ -295,7 +426,7 @@ pub(super) fn finish_opening(
             if let Ok(read) = outcome {
                 closing.close(entity, saved.path.clone(), ClosedBecause::Removed, read.world().store);
             }
-            opening.read_anew(&terrain, entity, &mut commands);
+            read_again(&mut commands, entity);
             continue;
         }
         commands.entity(entity).try_remove::<OpeningWorld>();
@@ -317,7 +448,7 @@ pub(super) fn finish_opening(
                     store
                 }
             };
-            commands.entity(entity).try_insert(WorldStore::new(store, saved.path.clone()));
+            insert_store(&mut commands, entity, saved.clone(), store);
             terrain.world().revision()
         });
         if let Err(why) = &outcome {
@@ -326,4 +457,23 @@ pub(super) fn finish_opening(
         release(&mut commands, entity);
         opened.write(WorldOpened { terrain: entity, outcome: outcome.map_err(Arc::new) });
     }
+}
+
+/// Lets a store follow the terrain of its component. If the game has removed or changed that meanwhile, the world is closed, and the one
+/// that the component names now is read.
+fn insert_store(commands: &mut Commands, entity: Entity, saved: SavedWorld, store: Store) {
+    commands.queue(move |world: &mut World| {
+        let path = saved.path.clone();
+        if let Ok(mut owner) = world.get_entity_mut(entity)
+            && let Some(now) = owner.get::<SavedWorld>()
+        {
+            if *now == saved {
+                owner.insert(WorldStore::new(store, saved));
+                return;
+            }
+            owner.insert(Unopened::new(None));
+            hold_now(&mut owner);
+        }
+        world.resource_mut::<ClosingWorlds>().close(entity, path, ClosedBecause::Removed, store);
+    });
 }

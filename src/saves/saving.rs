@@ -24,7 +24,7 @@ fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     let followed = store.follow(terrain.bypass_change_detection());
     match followed {
         Err(why) if !std::mem::replace(&mut world.has_failed, true) => {
-            error!("nothing is saved in {} any more: {why}", world.path.display());
+            error!("nothing is saved in {} any more: {why}", world.saved.path.display());
         }
         _ => {}
     }
@@ -38,9 +38,22 @@ pub(super) fn save_commits(
     for (entity, mut terrain, mut world) in &mut worlds {
         match world.store.as_ref().is_some_and(|store| store.is_of(&terrain)) {
             true => follow(&mut terrain, &mut world),
-            false => detach(&mut commands, entity, ClosedBecause::OtherTerrain),
+            false => detach_other(&mut commands, entity),
         }
     }
+}
+
+/// Closes a world whose terrain was replaced by another level.
+fn detach_other(commands: &mut Commands, entity: Entity) {
+    commands.queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(entity) else { return };
+        // The game may have inserted another component or terrain meanwhile.
+        if let (Some(world), Some(terrain)) = (entity.get::<WorldStore>(), entity.get::<Terrain>())
+            && world.store.as_ref().is_some_and(|store| !store.is_of(terrain))
+        {
+            detach(&mut entity, ClosedBecause::OtherTerrain);
+        }
+    });
 }
 
 /// Saves at once where that is asked for.
@@ -79,7 +92,7 @@ pub(super) fn tell(
         let world = &mut *world;
         let Some(store) = &world.store else { continue };
         for trouble in store.take_troubles() {
-            warn!("the world in {}: {trouble}", world.path.display());
+            warn!("the world in {}: {trouble}", world.saved.path.display());
             troubles.write(StoreTroubleFound { terrain: entity, trouble });
         }
         let Some(durable) = store.durable_point() else { continue };
@@ -111,7 +124,7 @@ pub(super) fn finish_at_exit(
         }
         let Some(store) = &mut world.store else { continue };
         if let Err(why) = store.flush_within(end.saturating_duration_since(Instant::now())) {
-            error!("the last commits are not saved in {}: {why}", world.path.display());
+            error!("the last commits are not saved in {}: {why}", world.saved.path.display());
         }
     }
     closing.wait(end);

@@ -5,6 +5,7 @@ use std::io;
 use super::files::{Files, Opening};
 use super::format::FormatError;
 use super::format::frame::{self, Kind, WorldId};
+use super::quarantine;
 use super::segment::{FOLDER, FRAME_LIMIT};
 
 /// The file, and its name while it is not complete.
@@ -26,9 +27,14 @@ pub(super) fn write(files: &dyn Files, world: WorldId, revision: u64, checkpoint
     files.sync_folder(FOLDER)
 }
 
+/// Removes a file. A folder that somebody made in its place is moved aside, as nothing could ever be saved otherwise.
 fn remove(files: &dyn Files, path: &str) -> io::Result<()> {
+    use io::ErrorKind::{IsADirectory, NotFound, PermissionDenied};
     match files.remove(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        Err(error) if matches!(error.kind(), IsADirectory | PermissionDenied) => {
+            quarantine::file(files, path).map(drop).map_err(|_| error)
+        }
+        Err(error) if error.kind() != NotFound => Err(error),
         _ => Ok(()),
     }
 }

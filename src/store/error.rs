@@ -19,7 +19,7 @@ pub enum StoreError {
     Locked(String),
     /// A newer version of the crate wrote it.
     #[error(
-        "the world was saved by a newer version: it has schema {found}, and this version reads up to {known}"
+        "the world was saved by a newer version, with schema {found}, and this version reads up to {known}: use that version, or a newer one"
     )]
     Newer {
         /// The schema of what was read.
@@ -29,7 +29,8 @@ pub enum StoreError {
     },
     /// A newer version of the database wrote its file. Nothing was changed.
     #[error(
-        "the world was saved by a newer version: the file regions.redb has the format {found}, and this version reads up to {known}"
+        "the world was saved by a newer version: the file regions.redb has the format {found}, and this version reads up to {known}; use \
+         that version, or a newer one"
     )]
     NewerDatabase {
         /// The format of the file.
@@ -48,13 +49,16 @@ pub enum StoreError {
         why: &'static str,
     },
     /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
-    #[error("the ground has changed{}", if *.regions == 0 { String::new() } else { format!(" below {regions} saved regions") })]
+    #[error(
+        "the ground is not the one that the world was saved with{}: give that one, or allow `base_changed`, which moves the world",
+        if *.regions == 0 { String::new() } else { format!(", and differs below {regions} saved regions") }
+    )]
     BaseChanged {
         /// Regions with edits over changed ground; 0 if only materials or places without edits changed.
         regions: usize,
     },
     /// The world was begun on a level, which is not given. Nothing is lost.
-    #[error("the world was begun on the level `{label}`, without which it can't be opened")]
+    #[error("the world was begun on the level `{label}`, without which it can't be opened: give that level")]
     LevelMissing {
         /// What the game called the level.
         label: String,
@@ -62,7 +66,8 @@ pub enum StoreError {
     /// The world was begun on another level than the one that is given, or the level has changed since, and
     /// [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds. Nothing is lost.
     #[error(
-        "the world was begun on the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}"
+        "the world was begun on the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}: give that \
+         level, or allow `base_changed`, which moves the world"
     )]
     LevelChanged {
         /// What the game called the level.
@@ -97,6 +102,12 @@ pub enum StoreError {
     /// A log that is replayed does not lead to the world that it says.
     #[error("the log can't be replayed: {0}")]
     Replay(#[from] ReplayError),
+    /// The log can't be replayed from the first commit on, as its beginning is gone. The world itself may be whole.
+    #[error("the log does not reach back to the first commit, so the world can't be made of it alone")]
+    LogNotWhole,
+    /// The log does not lead to the world that it describes.
+    #[error("the log can't be replayed: {0}")]
+    LogRefused(String),
     /// Records do not follow those that were taken before.
     #[error("a record leads to revision {found}, but the store is at {at}")]
     Gap {
@@ -260,7 +271,10 @@ pub enum StoreTrouble {
         commits: u64,
     },
     /// The ground or the level is another one than the world was saved with; edits were kept or replayed.
-    #[error("the ground or the level has changed below {regions} saved regions; the edits were {kept}")]
+    #[error(
+        "the ground or the level has changed, {} saved regions; the edits were {kept}",
+        if *.regions == 0 { "but not below any of the".into() } else { format!("below {regions}") }
+    )]
     BaseChanged {
         /// Regions with edits over changed ground; all of them, if it is the level.
         regions: usize,

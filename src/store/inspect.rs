@@ -222,7 +222,7 @@ fn look(
     contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
     // Nothing was copied, as nothing was changed.
     let told = recovered.findings.troubles(&BTreeMap::new(), contents.damaged.as_deref(), None);
-    let mut troubles: Vec<String> = told.iter().map(ToString::to_string).collect();
+    let mut troubles: Vec<String> = told.iter().map(as_found).collect();
     troubles.extend(recovered.refused.iter().map(|why| format!("the log can't be replayed: {why}")));
     troubles.extend(journal_troubles(&contents, recovered.frame, recovered.mirror.revision));
     let is_asked = replays && recovered.is_log_whole;
@@ -252,11 +252,22 @@ fn look(
     Ok(WorldCheck { world, terrain: recovered.terrain, game, troubles, replays })
 }
 
+/// A trouble in words that say that nothing was changed.
+fn as_found(trouble: &StoreTrouble) -> String {
+    match trouble {
+        StoreTrouble::Rebuilt { what, .. } => {
+            format!("{what}; nothing is lost, and it is rebuilt when the world is opened")
+        }
+        other => other.to_string(),
+    }
+}
+
 /// Replays the log of the world in a folder from the first commit on, over this ground and its level if it has one, and verifies
 /// each commit. Returns the terrain.
 ///
 /// # Errors
-/// When there is none, when it is open, and when the log does not reach back to the first commit or can't be replayed.
+/// When there is none, when it is open, when its ground is another one, and when the log does not reach back to the first commit or can't
+/// be replayed.
 pub fn replay(
     folder: impl AsRef<Path>,
     ground: impl Into<Arc<Ground>>,
@@ -264,10 +275,14 @@ pub fn replay(
 ) -> Result<Terrain, StoreError> {
     let files = Folder::new(folder.as_ref());
     let (_lock, contents) = read(&files)?;
+    let ground = ground.into();
     let checkpoint = contents.choose_checkpoint();
+    if checkpoint.as_ref().is_some_and(|own| own.metadata.ground != ground.hash()) {
+        return Err(StoreError::BaseChanged { regions: 0 });
+    }
     let name = checkpoint.as_ref().and_then(|own| own.level.as_ref());
     let level = BaseLevel::needed(name, level)?;
     BaseLevel::expect(level, name)?;
     let settings = checkpoint.as_ref().map_or_else(TerrainSettings::default, |own| own.metadata.settings);
-    recover::replay_all(&contents, &ground.into(), settings, level)
+    recover::replay_all(&contents, &ground, settings, level)
 }

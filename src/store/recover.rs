@@ -279,12 +279,12 @@ pub(super) fn replay_all(
     let whole = contents.frames_from(1);
     let last = contents.choose_checkpoint().map_or(0, |checkpoint| checkpoint.frame);
     if whole.last().map_or(0, |last| last.number) < contents.greatest_frame().max(last) {
-        return Err(StoreError::Unreadable("the log does not reach back to the first commit".into()));
+        return Err(StoreError::LogNotWhole);
     }
     let empty = BaseLevel::first(level, ground, &settings)?;
     let replayed = replay(empty, GameData::new(), &whole, true, &Work::until(None, 1.0, 0))?;
     match replayed.refused {
-        Some(why) => Err(StoreError::Unreadable(format!("the log can't be replayed: {why}"))),
+        Some(why) => Err(StoreError::LogRefused(why)),
         None => Ok(replayed.terrain),
     }
 }

@@ -6,23 +6,21 @@ use super::SharedTerrain;
 use crate::saves::{ClosedBecause, SavedWorld, detach};
 
 /// A terrain that becomes shared is no longer saved here: its own world is closed with all that was dug in it.
-pub(super) fn close_own_world(
-    new: On<Insert, SharedTerrain>,
-    saved: Query<(), With<SavedWorld>>,
-    mut commands: Commands,
-) {
-    if saved.contains(new.entity) {
-        detach(&mut commands, new.entity, ClosedBecause::Shared);
-    }
+pub(super) fn close_own_world(new: On<Insert, SharedTerrain>, mut commands: Commands) {
+    close_if_shared(&mut commands, new.entity);
 }
 
 /// A terrain that is shared can't be saved here.
-pub(super) fn refuse_own_world(
-    new: On<Insert, SavedWorld>,
-    shared: Query<(), With<SharedTerrain>>,
-    mut commands: Commands,
-) {
-    if shared.contains(new.entity) {
-        detach(&mut commands, new.entity, ClosedBecause::Shared);
-    }
+pub(super) fn refuse_own_world(new: On<Insert, SavedWorld>, mut commands: Commands) {
+    close_if_shared(&mut commands, new.entity);
+}
+
+fn close_if_shared(commands: &mut Commands, entity: Entity) {
+    commands.queue(move |world: &mut World| {
+        if let Ok(mut entity) = world.get_entity_mut(entity)
+            && entity.contains::<SharedTerrain>()
+        {
+            detach(&mut entity, ClosedBecause::Shared);
+        }
+    });
 }

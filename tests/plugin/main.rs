@@ -1,6 +1,8 @@
 //! The Bevy plugin from outside: brushes go in as messages; frames, messages and entities are checked frame by frame.
 #![cfg(feature = "plugin")]
 
+#[cfg(feature = "examples")]
+mod big_space;
 mod cameras;
 #[cfg(feature = "debug")]
 mod debug_views;
@@ -34,6 +36,7 @@ mod replacing;
 mod saved;
 mod saved_changes;
 mod saved_lifecycle;
+mod saved_moments;
 #[cfg(feature = "replicon")]
 mod saved_or_shared;
 mod saved_troubles;

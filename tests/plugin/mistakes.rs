@@ -237,9 +237,96 @@ fn a_surface_processor_that_panics() {
     assert_eq!(stage.count::<Tile>(), 16, "the ground is shown without its data");
 }
 
+/// Each mistake of the guide's table has a test here that looks for what the table quotes.
+#[test]
+fn every_mistake_in_the_guide_is_tested() {
+    let (guide, tests) =
+        (include_str!("../../docs/guide/src/troubleshooting.md"), include_str!("mistakes.rs"));
+    let table = guide.split("## What is logged").nth(1).and_then(|rest| rest.split("\n## ").next());
+    let rows = table.expect("the table").lines().filter(|line| line.ends_with("` |"));
+    let mut count = 0;
+    for row in rows {
+        let test = row.rsplit('`').nth(1).expect("a test");
+        let quoted = row.split('*').nth(1).expect("what is logged");
+        let body = tests.split(&format!("fn {test}(")).nth(1).unwrap_or_else(|| panic!("no test {test}"));
+        let body = body.split("#[test]").next().unwrap_or_default();
+        assert!(body.contains(quoted), "{test} looks for something else than `{quoted}`");
+        count += 1;
+    }
+    assert!(count >= 10, "{count}");
+}
+
+#[cfg(feature = "store")]
+mod of_saved_worlds {
+    use super::*;
+    use crate::saved::Folder;
+
+    #[test]
+    fn a_saved_world_without_its_plugin() {
+        let folder = Folder::new("mistake-plugin");
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, bevy_burrow::plugin::TerrainPlugin));
+        let (_, log) = logged(Stage::of(app), |stage| {
+            stage.app.world_mut().spawn((level(1.0), SavedWorld::new(&folder.0)));
+            stage.app.world_mut().spawn((level(1.0), StartLevel(Handle::default())));
+        });
+        let text = "holds its terrain until there is a SavePlugin";
+        assert_eq!((log.count(&format!("a SavedWorld {text}")), log.count("add BurrowPlugins")), (1, 2));
+        assert_eq!(log.count(&format!("a StartLevel {text}")), 1);
+    }
+
+    #[test]
+    fn a_saved_world_on_another_entity_than_its_terrain() {
+        let folder = Folder::new("mistake-entity");
+        let mut entity = Entity::PLACEHOLDER;
+        let (_, log) = logged(Stage::drawing(), |stage| {
+            stage.show(level(1.0));
+            entity = stage.app.world_mut().spawn(SavedWorld::new(&folder.0)).id();
+            let start = std::time::Instant::now();
+            while start.elapsed().as_secs() < 12 {
+                stage.frames(10);
+            }
+        });
+        assert_eq!(
+            log.count(&format!("the SavedWorld of {entity} waits for a terrain")),
+            1,
+            "{}",
+            log.text()
+        );
+        assert!(log.count("on the entity of the Terrain") > 0);
+    }
+
+    #[test]
+    fn a_level_that_is_not_there() {
+        let mut terrain = Entity::PLACEHOLDER;
+        let (_, log) = logged(Stage::drawing(), |stage| {
+            let level = stage.app.world().resource::<AssetServer>().load("burrow-none.burrow_level");
+            terrain = stage.app.world_mut().spawn((crate::stage::level(1.0), StartLevel(level))).id();
+            stage.settle();
+        });
+        assert_eq!(log.count(&format!("the level of {terrain} can't be loaded")), 1, "{}", log.text());
+        assert!(log.count("begins without it") > 0);
+    }
+
+    #[test]
+    fn a_world_that_can_not_be_opened() {
+        // A file is where the folder should be.
+        let folder = Folder::new("mistake-file");
+        std::fs::write(&folder.0, b"in the way").expect("a new file");
+        let mut terrain = Entity::PLACEHOLDER;
+        let (_, log) = logged(Stage::drawing(), |stage| {
+            terrain = stage.app.world_mut().spawn((level(1.0), SavedWorld::new(&folder.0))).id();
+            stage.settle();
+        });
+        drop(std::fs::remove_file(&folder.0));
+        assert_eq!(log.count(&format!("the world of {terrain} is not saved")), 1, "{}", log.text());
+    }
+}
+
 #[cfg(feature = "examples")]
 mod of_looks {
     use super::*;
+    use crate::stage::{bevys_plugins, finish_plugins};
 
     fn stage() -> Stage {
         let mut stage = Stage::windowless();
@@ -269,6 +356,22 @@ mod of_looks {
             stage.frames(4);
         });
         assert_eq!(log.count("nothing of it is drawn"), 0, "{}", log.text());
+    }
+
+    #[test]
+    fn burrow_plugins_before_those_of_bevy() {
+        for is_before in [true, false] {
+            let mut app = App::new();
+            if is_before {
+                app.add_plugins(BurrowPlugins).add_plugins(bevys_plugins());
+            } else {
+                app.add_plugins(bevys_plugins()).add_plugins(BurrowPlugins);
+            }
+            let (_, log) = logged(Stage::of(app), |stage| finish_plugins(&mut stage.app));
+            let text = "no terrain with a GroundLook will be drawn";
+            assert_eq!(log.count(text), usize::from(is_before), "{}", log.text());
+            assert_eq!(log.count("Add DefaultPlugins first"), usize::from(is_before));
+        }
     }
 
     #[test]

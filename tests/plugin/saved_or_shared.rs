@@ -93,7 +93,6 @@ fn a_terrain_that_becomes_shared_is_not_written_into_the_players_own_world() {
 }
 
 #[test]
-#[ignore = "fails: the player's own world is not opened again"]
 fn a_shared_terrain_is_not_saved_by_its_player() {
     let folder = Folder::new("guest");
     for is_spawned_with_it in [true, false] {

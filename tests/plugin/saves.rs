@@ -20,13 +20,14 @@ fn what_was_dug_is_there_in_the_next_app() {
     // Sent before the world is there.
     dig(&mut first, 20.0);
     run_until_applied(&mut first, 1);
-    dig(&mut first, 30.0);
-    run_until_applied(&mut first, 2);
+    // With the second commit or before it, so that it is durable once that is.
     let mut worlds = first.world_mut().query::<&mut WorldStore>();
     worlds.single_mut(first.world_mut()).expect("it is open").put("coal", *b"7");
+    dig(&mut first, 30.0);
+    run_until_applied(&mut first, 2);
     run_until_saved(&mut first, 2);
     let before = hash(&first, entity);
-    // As if the process had been killed: nothing is told to end.
+    // As if the process had been killed: nothing is told to end. Nothing is left to be written either.
     std::mem::forget(first);
 
     // The lock belongs to the process that is gone; here it is the same one.

@@ -84,28 +84,9 @@ impl Stage {
     /// The same with more plugins.
     #[cfg(feature = "examples")]
     pub fn windowless_with<M>(after: impl bevy::app::Plugins<M>) -> Self {
-        use bevy::app::PluginsState;
-        use bevy::log::LogPlugin;
-        use bevy::render::RenderPlugin;
-        use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
-        use bevy::render::settings::WgpuSettings;
-        use bevy::window::ExitCondition;
-        use bevy::winit::WinitPlugin;
-
-        let settings = WgpuSettings { backends: None, ..default() };
-        let plugins = DefaultPlugins
-            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
-            .set(RenderPlugin { render_creation: settings.into(), ..default() })
-            .disable::<LogPlugin>()
-            .disable::<WinitPlugin>()
-            .disable::<PipelinedRenderingPlugin>();
         let mut app = App::new();
-        app.add_plugins(plugins).add_plugins(BurrowPlugins).add_plugins(after);
-        while app.plugins_state() == PluginsState::Adding {
-            bevy::tasks::tick_global_task_pools_on_main_thread();
-        }
-        app.finish();
-        app.cleanup();
+        app.add_plugins(bevys_plugins()).add_plugins(BurrowPlugins).add_plugins(after);
+        finish_plugins(&mut app);
         Self::of(app)
     }
 
@@ -185,16 +166,21 @@ impl Stage {
     }
 
     /// Updates frames, at least one, until a condition holds. Panics if it never does.
-    pub fn frames_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
+    pub fn frames_until(&mut self, what: &str, is_so: impl FnMut(&mut Self) -> bool) {
+        assert!(self.frames_within(TIMEOUT, is_so), "timed out waiting until {what}");
+    }
+
+    /// Updates frames, at least one, until a condition holds. Returns `false` if it does not in this time.
+    pub fn frames_within(&mut self, time: Duration, mut is_so: impl FnMut(&mut Self) -> bool) -> bool {
         let start = Instant::now();
-        while start.elapsed() < TIMEOUT {
+        while start.elapsed() < time {
             self.frame();
             if is_so(self) {
-                return;
+                return true;
             }
             std::thread::sleep(FRAME_SLEEP);
         }
-        panic!("timed out waiting until {what}");
+        false
     }
 
     /// Updates frames until every terrain is shown and no brush is pending.
@@ -236,6 +222,12 @@ impl Stage {
         &self.app.world().resource::<Receipts>().0
     }
 
+    /// Forgets the receipts so far.
+    #[cfg(feature = "examples")]
+    pub fn forget_receipts(&mut self) {
+        self.app.world_mut().resource_mut::<Receipts>().0.clear();
+    }
+
     /// The tags of all receipts so far.
     pub fn tags(&self) -> Vec<u64> {
         self.receipts().iter().map(|applied| applied.receipt.tag).collect()
@@ -261,6 +253,35 @@ impl Stage {
     pub fn meshes(&self) -> usize {
         self.app.world().resource::<Assets<Mesh>>().len()
     }
+}
+
+/// Bevy's own plugins, without a window and without a renderer.
+#[cfg(feature = "examples")]
+pub fn bevys_plugins() -> bevy::app::PluginGroupBuilder {
+    use bevy::log::LogPlugin;
+    use bevy::render::RenderPlugin;
+    use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+    use bevy::render::settings::WgpuSettings;
+    use bevy::window::ExitCondition;
+    use bevy::winit::WinitPlugin;
+
+    let settings = WgpuSettings { backends: None, ..default() };
+    DefaultPlugins
+        .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+        .set(RenderPlugin { render_creation: settings.into(), ..default() })
+        .disable::<LogPlugin>()
+        .disable::<WinitPlugin>()
+        .disable::<PipelinedRenderingPlugin>()
+}
+
+/// Lets plugins finish what they have begun.
+#[cfg(feature = "examples")]
+pub fn finish_plugins(app: &mut App) {
+    while app.plugins_state() == bevy::app::PluginsState::Adding {
+        bevy::tasks::tick_global_task_pools_on_main_thread();
+    }
+    app.finish();
+    app.cleanup();
 }
 
 /// Steep hills of 64 x 64 voxels.

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    DiskFault, Files, SimulatedDisk, Store, StoreOptions, StoreTrouble, check_in, inspect_in, replay,
+    DiskFault, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble, check_in, inspect_in,
+    replay,
 };
 use fastrand::Rng;
 use glam::Vec3;
@@ -182,7 +183,47 @@ fn an_imported_world_has_no_log_to_replay() {
     (0..12).for_each(|_| act(&mut world, &mut rng));
     drop(Store::create(&place.0, &mut world, options(9)).expect("a new world"));
     let refused = replay(&place.0, Arc::clone(&ground), None).expect_err("it has no log");
-    assert!(refused.to_string().contains("first commit"), "{refused}");
+    assert!(matches!(refused, StoreError::LogNotWhole), "{refused}");
+    let other = replay(&place.0, crate::play::ground(3), None).expect_err("it is another ground");
+    assert!(matches!(other, StoreError::BaseChanged { .. }), "{other}");
+}
+
+#[test]
+fn what_is_only_looked_at_is_not_said_to_be_rebuilt() {
+    let ground = ground(2);
+    let (disk, mut world, mut rng) = (SimulatedDisk::new(), terrain(&ground), Rng::with_seed(1));
+    let mut store = Store::create_in(Arc::new(disk.clone()), &mut world, options(4)).expect("a new world");
+    play(&mut store, &mut world, &mut rng, 20);
+    drop(store);
+    disk.damage("regions.redb", |bytes| bytes[0] ^= 1);
+    for _ in 0..2 {
+        let looked = check_in(&disk, Arc::clone(&ground), None).expect("its log is whole");
+        assert_eq!(samples(&looked.terrain), samples(&world));
+        let [trouble] = &looked.troubles[..] else { panic!("{:?}", looked.troubles) };
+        assert!(trouble.contains("when the world is opened") && !trouble.contains("has been"), "{trouble}");
+    }
+    let (_, opened) = open(&disk, &ground).expect("its log is whole");
+    assert!(matches!(opened.troubles[..], [StoreTrouble::Rebuilt { .. }]), "{:?}", opened.troubles);
+}
+
+#[test]
+fn a_folder_in_the_place_of_the_copy_of_the_checkpoint_is_moved_aside() {
+    let (place, ground) = (Place::new("in-the-way"), ground(2));
+    let (mut world, mut rng) = (terrain(&ground), Rng::with_seed(1));
+    let mut store = Store::create(&place.0, &mut world, options(4)).expect("a new world");
+    play(&mut store, &mut world, &mut rng, 20);
+    drop(store);
+    let copy = place.0.join("journal/checkpoint");
+    std::fs::remove_file(&copy).expect("it is there");
+    std::fs::create_dir(&copy).expect("a new folder");
+    std::fs::write(copy.join("notes.txt"), b"of somebody").expect("a new file");
+    let (mut store, opened) =
+        Store::open(&place.0, Arc::clone(&ground), options(4)).expect("all that it needs is there");
+    assert_eq!(samples(&opened.terrain), samples(&world));
+    store.checkpoint().expect("it can be saved");
+    drop(store);
+    assert!(copy.is_file());
+    assert!(place.0.join("quarantine/checkpoint.1/notes.txt").is_file(), "nothing of anybody's is removed");
 }
 
 #[test]
