@@ -46,6 +46,7 @@ mod record;
 mod redraw;
 mod regions;
 mod replay;
+mod reset;
 mod restore;
 mod run;
 mod settings;
