@@ -96,7 +96,7 @@ fn a_reset_of_everything_leaves_the_pristine_world() {
 
 #[test]
 fn a_reset_returns_the_samples_in_its_reach_and_no_others() {
-    for index in 0..world_count(40) {
+    for index in 0..world_count(10) {
         let mut rng = Rng::with_seed(index + 900);
         let (ground, chunk_size) = ground(&mut rng, index);
         let mut terrain = terrain(&ground, chunk_size);

@@ -25,6 +25,7 @@ mod field_log;
 mod for_plugin;
 mod ground;
 mod groups;
+mod heights;
 mod history;
 mod inspect;
 mod known_nodes;

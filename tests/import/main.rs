@@ -1,6 +1,7 @@
 //! Heights from files of every format, whole, odd and broken.
 
 mod damage;
+mod export;
 mod repairs;
 mod sizes;
 mod table;

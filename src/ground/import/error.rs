@@ -104,6 +104,14 @@ pub enum ImportError {
         /// What is wrong with it.
         problem: String,
     },
+    /// Heights cannot be written in a format.
+    #[error("heights cannot be written as {format} ({reason}): choose another format, or fewer samples")]
+    Encode {
+        /// The format.
+        format: HeightFormat,
+        /// The encoder's own words.
+        reason: String,
+    },
     /// No sample has a value.
     #[error(
         "none of the {samples} samples has a value: look at the void value and the valid range of `ImportOptions`"

@@ -45,6 +45,7 @@ mod repair;
 mod report;
 #[cfg(feature = "import")]
 mod tiff;
+mod write;
 
 pub use error::ImportError;
 pub use grid::ElevationGrid;

@@ -228,7 +228,8 @@ fn repair_outliers(decoded: &mut Decoded, options: &ImportOptions) -> Result<u64
     Ok(total)
 }
 
-/// Returns `true` if a sample lies more than a distance above all samples around it but one, or below them.
+/// Returns `true` if a sample lies more than a distance above all samples around it, or below them. Of eight, one may
+/// be like it, so that pairs are found; at the rim and beside voids none.
 fn is_outlier(samples: &[f32], index: usize, width: usize, distance: f64) -> bool {
     let value = f64::from(samples[index]);
     let (mut above, mut below, mut known) = (0, 0, 0);
@@ -238,7 +239,7 @@ fn is_outlier(samples: &[f32], index: usize, width: usize, distance: f64) -> boo
         above += i32::from(value - other > distance);
         below += i32::from(other - value > distance);
     }
-    known >= 3 && above.max(below) >= known - 1
+    known >= 3 && above.max(below) >= known - i32::from(known == 8)
 }
 
 /// An outlier's value, moved to the nearest value around it; all but one of which lie on one side of it.
