@@ -111,6 +111,7 @@ impl Submission {
 }
 
 /// Requests that wait for their transaction.
+#[expect(clippy::large_enum_variant, reason = "almost all are edits")]
 pub(super) enum Request {
     Edit(Submission),
     Step(HistoryStep),

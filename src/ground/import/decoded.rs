@@ -34,7 +34,7 @@ impl Decoded {
 
 /// Memory for this many samples.
 pub(super) fn reserve(samples: u64) -> Result<Vec<f32>, ImportError> {
-    let refused = || ImportError::Limit(crate::ground::ImageError::Memory { bytes: samples * 4, limit: 0 });
+    let refused = || ImportError::Memory { bytes: samples.saturating_mul(4) };
     let mut memory = Vec::new();
     memory.try_reserve_exact(usize::try_from(samples).map_err(|_| refused())?).map_err(|_| refused())?;
     Ok(memory)

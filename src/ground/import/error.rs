@@ -32,6 +32,14 @@ pub enum ImportError {
     /// The file is larger than the limits allow, or empty.
     #[error("{0}: raise `ImportOptions::limits`, or cut the file into tiles")]
     Limit(ImageError),
+    /// The machine has too little memory for the samples.
+    #[error(
+        "the machine cannot allocate {bytes} bytes for the samples: cut the file into tiles, or make it coarser"
+    )]
+    Memory {
+        /// Bytes asked for.
+        bytes: u64,
+    },
     /// The file has no samples.
     #[error("the file has no samples: it is empty, or was not written to its end; export it again")]
     Empty,
