@@ -352,3 +352,23 @@ fn every_point_shows_what_a_dig_there_yields() {
     assert!(points.iter().all(|&count| count > 500_000), "{points:?}");
     assert!(far < points.iter().sum::<u32>() / 2000, "{far} of {points:?}");
 }
+
+/// Vertices of all that is drawn of a plain with one hole of a column's width, so many voxels deep.
+fn vertices_around_a_hole(depth: f64, strata: bool) -> usize {
+    let height = |x: i32, z: i32| if (x, z) == (16, 16) { 2000.0 - depth } else { 2000.0 };
+    let ground = Ground::from_fn(32, 32, height).expect("valid heights");
+    let ground = if strata { ground.with_strata(&Strata::alpine()).expect("valid strata") } else { ground };
+    terrain(&Arc::new(ground), 32).world().drawn().map(|(_, mesh)| mesh.vertices.len()).sum()
+}
+
+#[test]
+fn a_face_of_any_height_costs_a_bounded_number_of_vertices() {
+    let plain = vertices_around_a_hole(0.0, true);
+    for depth in [1.0, 10.0, 64.0, 65.0, 300.0, 4000.0, 30_000.0] {
+        assert_eq!(vertices_around_a_hole(depth, false), plain);
+        let cost = vertices_around_a_hole(depth, true) - plain;
+        assert!(cost <= 12 * 64, "a hole {depth} voxels deep costs {cost} vertices");
+    }
+    // Up to the bound, beds show.
+    assert!(vertices_around_a_hole(60.0, true) > plain + 300);
+}

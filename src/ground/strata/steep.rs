@@ -6,10 +6,17 @@ use crate::ground::GroundError;
 use crate::ground::world::Ground;
 use crate::lattice::{Column, ceil};
 
+/// Most lattice levels on a line between two columns of a steep cell.
+///
+/// Each level is a vertex on every line, and a voxel whose material is computed. Faces of one cell's width that are
+/// higher are no cliffs but errors in the data, such as a void of a survey, whose height has no bound.
+pub(in crate::ground) const MAX_FACE_LEVELS: u32 = 64;
+
 /// The steep cells of a ground, one bit each.
 ///
 /// A cell is steep if two lattice levels or more separate the ends of one of its sides or of its diagonal, and not all
-/// voxels along these lines, its columns' tops included, are of the same material.
+/// voxels along these lines, its columns' tops included, are of the same material. A cell with more than
+/// [`MAX_FACE_LEVELS`] on such a line is not: it shows its corners' materials, as a ground without strata does.
 #[derive(Clone, PartialEq)]
 pub(crate) struct SteepCells {
     /// Words along x.
@@ -81,7 +88,8 @@ pub(in crate::ground) fn steep_word(ground: &Ground, low: Column) -> u64 {
         let corners = at.corners();
         let levels = corners.map(|corner| levels[corner.z as usize][corner.x as usize]);
         let lines = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)];
-        if lines.iter().all(|&(from, to)| levels[from].abs_diff(levels[to]) < 2) {
+        let highest = lines.iter().map(|&(from, to)| levels[from].abs_diff(levels[to])).max();
+        if !highest.is_some_and(|highest| (2..=MAX_FACE_LEVELS).contains(&highest)) {
             return false;
         }
         // How far down each column is seen.
@@ -141,6 +149,14 @@ mod tests {
                 let expected = x == 9 && (0..12).contains(&z);
                 assert_eq!(cells.contains(Column::new(x, z)), expected, "({x}, {z}) at a rise of {rise}");
             }
+        }
+    }
+
+    #[test]
+    fn faces_above_the_bound_are_not_steep() {
+        let bound = MAX_FACE_LEVELS as i32;
+        for (rise, is_steep) in [(bound, true), (bound + 1, false), (-bound, true), (-bound - 1, false)] {
+            assert_eq!(covered_step(rise * ONE, 1).steep_cells().is_some(), is_steep, "a rise of {rise}");
         }
     }
 
