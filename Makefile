@@ -76,7 +76,6 @@ test-examples:
 	@cargo run $(WITH_BEVY) --example server -- --brushes 2000 2>'$(PROOF)/server.txt' | head -n 1 && \
 		! grep panicked '$(PROOF)/server.txt' && echo 'server: ends where nobody reads on'
 	cargo run $(WITH_BEVY) --example together -- loopback --count 4 --seconds 5
-	cargo run $(WITH_BEVY) --example digger -- --together --out '$(PROOF)/together'
 	cargo run $(WITHOUT_BEVY) --example export -- --heights assets/jacksboro_fault.png --voxels-per-sample 3 \
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'

@@ -4,7 +4,7 @@
 #   tools/setup.sh build          compiler, linker, Rust
 #   tools/setup.sh run            the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
 #   tools/setup.sh test           the same as run, and a C++ compiler, with which CUDA kernels are tested without a GPU
-#   tools/setup.sh drive          the same as run, and what plays the examples: Python, Xvfb, xdotool, ImageMagick
+#   tools/setup.sh drive          the same as run, and what plays the examples: Python, Xvfb, xdotool
 #   tools/setup.sh lint           the same as build, and rustfmt and clippy
 #   tools/setup.sh peers          the same as build, and Python for the meshers that ours is compared with
 #   tools/setup.sh ptx            Python, whose package index has the compiler of the CUDA kernels
@@ -137,7 +137,6 @@ if [ "$goal" = drive ]; then
     has python3 || want python3
     has Xvfb || want xvfb
     has xdotool || want xdotool
-    has import || want imagemagick
     goal=run
 fi
 if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then
