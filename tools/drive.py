@@ -368,7 +368,8 @@ def digger(stage):
 
     def restart(left):
         """Quits, and starts again: settings and the game are as they were left."""
-        menu.choose("Quit")
+        menu.select("Quit")
+        stage.xdo("key", "--delay", 0, "Return")
         stage.wait_for_end()
         settings = json.loads((stage.out / "config" / "bevy_burrow" / "digger.json").read_text())
         if abs(settings["sensitivity"] - 1.3) > 0.01:
@@ -494,10 +495,38 @@ def sculpt(stage):
     for key, operation in zip(["1", "2", "3", "4", "5", "6", "7", "8", "9", "0", "minus"], operations):
         if operation != "Dig":
             press_key(key, rf"^tool operation={operation} ")
+        if operation == "Paint":
+            stage.rest()
+            since = stage.mark()
+            stage.click(*stage.middle("Clay"))
+            stage.wait(r"^tool .*material=4", since)
+        before = hash_now()
         dig(*middle)
-    stage.say("each operation is chosen by its key, and works")
+        if hash_now() == before:
+            raise Failed(f"{operation} changes nothing")
+    stage.say("each operation is chosen by its key, and changes the ground")
     picture(stage, "operations", see=(40, 40, 20, 40))
     press_key("1", r"^tool operation=Dig ")
+
+    def click_with(modifier, pattern, right=0):
+        """A click while a key is held."""
+        stage.xdo("keydown", modifier)
+        stage.rest()
+        since = stage.mark()
+        stage.click(middle[0] + right, middle[1])
+        found = stage.wait(pattern, since)
+        stage.xdo("keyup", modifier)
+        stage.rest()
+        return found
+
+    click_with("shift", r"^stroke .*removed=0 added=[1-9]")
+    click_with("ctrl", strokes)
+    tag = int(stage.last(strokes).group(1))
+    click_with("l", rf"^stroke tag={tag + 3} ", right=60)
+    settle()
+    click_with("alt", r"^tool .*material=[^4]", right=-70)
+    stage.place("Under the pointer")
+    stage.say("Shift inverts, Ctrl smooths, L draws a line, Alt picks the material, and the pointer's place is shown")
     for shape in ("Box", "Cylinder", "Capsule", "Cone", "Torus"):
         since = stage.mark()
         stage.click(*stage.middle(shape))

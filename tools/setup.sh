@@ -11,7 +11,7 @@
 #   tools/setup.sh instructions   the same as build, and valgrind, which counts instructions
 #   tools/setup.sh skipped        nothing: says which tests find nothing to run on here, and pass for that
 #
-# With MORE=gamepad in the environment, also what the feature of that name is compiled with.
+# With MORE=gamepad or MORE=sound in the environment, also what the feature of that name is compiled with.
 #
 # Debian and its kin: uses apt-get, as root or with sudo, and the official Rust installer. Elsewhere it says what to
 # install. Else compiling needs no -dev packages.
@@ -105,6 +105,9 @@ tell_skipped() {
     if [ "$(uname -s)" = Linux ] && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && ! has_vulkan_driver; then
         say '*** SKIPPED: no picture was compared: no Vulkan driver (mesa-vulkan-drivers) ***'
     fi
+    for program in Xvfb xdotool; do
+        has "$program" || say "*** SKIPPED: the examples were not played by mouse and keys: no $program ***"
+    done
 }
 
 case $goal in
@@ -156,6 +159,11 @@ fi
 case ${MORE:-} in *gamepad*)
     has pkg-config || want pkg-config
     [ -e /usr/include/libudev.h ] || want libudev-dev
+    ;;
+esac
+case ${MORE:-} in *sound*)
+    has pkg-config || want pkg-config
+    pkg-config --exists alsa 2>/dev/null || want libasound2-dev
     ;;
 esac
 if [ "$goal" = peers ]; then
