@@ -287,6 +287,22 @@ def digger(stage):
         tap(stage, "F1")
         picture(stage, "play", see=(30, 25, 30, 30))
 
+    def display():
+        """Pictures of the display, the panel, the pause, and of pages with a world."""
+        picture(stage, "play")
+        player.turn(0, -700)
+        player.use(r"^hint Too far away")
+        stage.shoot("hint")
+        tap(stage, "F1")
+        picture(stage, "panel")
+        tap(stage, "F1")
+        to_title()
+        for name, page_name, key in (("Worlds", "Worlds", "Return"), ("world 1", "World", "Right")):
+            stage.page_mark = stage.mark()
+            menu.select(name)
+            menu.turn_to(f"Title {page_name}", key)
+            fits(stage)
+
     def pause():
         stage.page_mark = stage.mark()
         menu.turn_to("Paused Menu", "Escape")
@@ -430,6 +446,9 @@ def digger(stage):
     page("Playing None", since)
     if world() != "world 1":
         raise Failed(f"the first world is {world()!r}")
+    if stage.takes_all:
+        display()
+        return
     tools()
     left = worlds()
     restart(left)
@@ -469,10 +488,21 @@ def sculpt(stage):
     shutil.rmtree(stage.out / "level", ignore_errors=True)
     stage.focus("sculpt")
     pristine = stage.wait(r"^ready hash=(\w+)").group(1)
-    stage.wait(r'^place "Radius"')
+    stage.wait(r'^place "Dig"')
     stage.wait(r"^dressed")
     picture(stage, "start", see=(40, 40, 20, 40))
 
+    if stage.takes_all:
+        for key in ("0", "F1"):
+            tap(stage, key)
+            stage.move(*middle)
+            picture(stage, key)
+        tap(stage, "F1")
+        dig(*middle)
+        settle()
+        tap(stage, "Escape")
+        picture(stage, "question")
+        return
     stage.move(*middle)
     stage.press()
     stage.wait(r"^stroke tag=3 ", 0)
@@ -610,7 +640,7 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/drive"), help="folder for pictures and log")
     parser.add_argument("--size", help="of the window, in pixels; each play has its own")
     parser.add_argument("--patience", type=float, default=300, help="seconds to wait for each thing")
-    parser.add_argument("--pictures", action="store_true", help="take a picture of every page of the menu")
+    parser.add_argument("--pictures", action="store_true", help="take a picture of every page, and play no further")
     parser.add_argument("arguments", nargs="*", help="for the program, after --")
     args = parser.parse_args()
     if args.list:
