@@ -98,6 +98,8 @@ class Stage:
                 except subprocess.TimeoutExpired:
                     process.kill()
                     process.wait()
+        if self.read:
+            self.lines()
         for file in (self.written, self.read):
             if file:
                 file.close()
@@ -106,7 +108,8 @@ class Stage:
 
     def lines(self):
         """All that was said, frames left out."""
-        *whole, self.unread = (self.unread + self.read.read()).split(b"\n")
+        new = b"" if self.read.closed else self.read.read()
+        *whole, self.unread = (self.unread + new).split(b"\n")
         for line in whole:
             if line == b"frame":
                 self.frame_count += 1
