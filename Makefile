@@ -14,9 +14,11 @@ WITHOUT_BEVY := --no-default-features --features cuda,net,import
 comma := ,
 # What somebody may choose besides. Each set with Bevy has other features of Bevy's crates, so that much is checked anew.
 SETS_WITHOUT_BEVY := '' store net import cuda,net,import
-SETS_WITH_BEVY := default plugin replicon render avian egui debug examples,gamepad
-# Features besides: `make run MORE=gamepad` compiles some crates more.
+SETS_WITH_BEVY := default plugin replicon render avian egui debug examples,gamepad examples,sound
+# Features besides: `make run MORE=gamepad` or MORE=gamepad,sound compiles some crates more.
 WITH_BEVY := --release --features examples$(MORE:%=$(comma)%)
+# `make run` has sound where it compiles: on Linux that takes ALSA's headers.
+SOUND = $(shell { [ "$$(uname -s)" != Linux ] || pkg-config --exists alsa 2>/dev/null; } && echo $(comma)sound)
 
 # Tests of the plugin open with #![cfg(feature = ...)]; the others test the model, and need not run twice.
 PLUGIN_TESTS := $(patsubst tests/%,--test %,$(patsubst %/main,%,$(basename \
@@ -46,7 +48,7 @@ help: ## List the targets
 
 run: ## Install what is missing, then dig: first person on a real landscape (ARGS="--headless" for pictures only, MORE=gamepad)
 	@tools/setup.sh run
-	cargo run $(WITH_BEVY) --example digger -- $(ARGS)
+	cargo run $(WITH_BEVY)$(if $(findstring sound,$(MORE)),,$(SOUND)) --example digger -- $(ARGS)
 
 example: ## Run another example (NAME=sculpt ARGS="--headless")
 	@tools/setup.sh run
@@ -76,10 +78,10 @@ test-examples:
 	@cargo run $(WITH_BEVY) --example server -- --brushes 2000 2>'$(PROOF)/server.txt' | head -n 1 && \
 		! grep panicked '$(PROOF)/server.txt' && echo 'server: ends where nobody reads on'
 	cargo run $(WITH_BEVY) --example together -- loopback --count 4 --seconds 5
-	cargo run $(WITH_BEVY) --example digger -- --together --out '$(PROOF)/together'
 	cargo run $(WITHOUT_BEVY) --example export -- --heights assets/jacksboro_fault.png --voxels-per-sample 3 \
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
+	@$(MAKE) --no-print-directory drive
 
 features: features-model features-plugin ## Lint every set of features that can be chosen (features-model: those without Bevy)
 
@@ -91,7 +93,7 @@ features-model:
 	done
 
 features-plugin:
-	@MORE=gamepad tools/setup.sh lint
+	@MORE=gamepad,sound tools/setup.sh lint
 	@set -e; for set in $(SETS_WITH_BEVY); do \
 		echo "features: $$set"; \
 		cargo clippy --release --no-default-features --features "$$set" --all-targets -- -D warnings; \

@@ -317,6 +317,7 @@
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
+//! | `sound` | sound for the digger; needs ALSA's headers on Linux | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
 //! Without any feature only the model is built, without Bevy. Where threads are available, transactions, loads and

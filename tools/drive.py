@@ -40,7 +40,7 @@ def play(size):
 
 def told(stage):
     """What the program has said, without what it says whenever somebody moves."""
-    return [line for line in stage.lines() if not line.startswith(("aim ", "game ", "eyes "))]
+    return [line for line in stage.lines() if not line.startswith(("aim ", "game ", "eyes ", "ground "))]
 
 
 def picture(stage, name, see=None):
@@ -59,18 +59,8 @@ def picture(stage, name, see=None):
         if time.monotonic() > deadline:
             raise Failed(f"the program does not come to rest for {name}")
     stage.shoot(name)
-    if see and contrast(stage.shots[-1], stage.size, see) < 0.01:
+    if see and stage.contrast(see) < 0.01:
         raise Failed(f"nothing is to be seen in {stage.shots[-1]}")
-
-
-def contrast(path, size, part):
-    """The standard deviation of a picture's greys, from 0 to 1; 1 where ImageMagick is not there to tell."""
-    if not shutil.which("convert"):
-        return 1.0
-    left, top, width, height = (hundredths * size[i % 2] // 100 for i, hundredths in enumerate(part))
-    command = ["convert", path, "-crop", f"{width}x{height}+{left}+{top}", "-colorspace", "Gray"]
-    command += ["-format", "%[fx:standard_deviation]", "info:"]
-    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
 def tap(stage, key):
@@ -97,31 +87,36 @@ class Menu:
         down = (names.index(name) - at) % len(names)
         key, times = ("Down", down) if down <= len(names) // 2 else ("Up", len(names) - down)
         for _ in range(times):
-            tap(self.stage, key)
+            since = self.stage.mark()
+            self.stage.xdo("key", "--delay", 0, key)
+            self.stage.wait(r"^items ", since)
         if self.items()[0] != names.index(name):
             raise Failed(f"the arrow keys don't lead to {name!r}: {self.items()}")
 
     def choose(self, name, page=None):
         """Activates an item, and waits for the page that it leads to."""
         self.select(name)
-        since = self.stage.mark()
-        tap(self.stage, "Return")
         if page:
-            self.stage.wait(r"^page " + page, since)
-            self.rest()
+            self.turn_to(page, "Return")
+        else:
+            tap(self.stage, "Return")
+
+    def turn_to(self, page, key):
+        """Presses a key, and waits for the page that it leads to and its items."""
+        since = self.stage.mark()
+        self.stage.xdo("key", "--delay", 0, key)
+        self.stage.wait(r"^page " + page, since)
+        self.stage.wait(r"^items ", since)
+        self.stage.rest()
 
     def back(self, page, selected):
         """Escape, which leads to the page before this one, where the item is selected that led here."""
-        since = self.stage.mark()
-        tap(self.stage, "Escape")
-        self.stage.wait(r"^page " + page, since)
-        self.rest()
+        self.turn_to(page, "Escape")
         at, names = self.items()
         if names[at] != selected:
             raise Failed(f"back on {page}, {names[at]!r} is selected, and not {selected!r}")
 
     def rest(self):
-        self.stage.rest()
         self.stage.rest()
         self.stage.rest()
 
@@ -135,8 +130,45 @@ class Menu:
         tap(self.stage, "Return")
 
 
+class Player:
+    """Looks around in the digger, and uses tools."""
+
+    def __init__(self, stage):
+        self.stage = stage
+
+    def turn(self, right, down):
+        self.stage.xdo("mousemove_relative", "--", right, down)
+        self.stage.rest()
+
+    def aim(self):
+        return float(self.stage.last(r"^aim ([\d.]+|none)").group(1).replace("none", "inf"))
+
+    def look_down(self, to):
+        """Until what is aimed at is no farther away: the ground before the feet, but not that below them."""
+        for _ in range(40):
+            if self.aim() <= to:
+                return
+            self.turn(0, 30 if self.aim() < 3 * to else 90)
+        raise Failed(f"the ground is {self.aim()} m away, however far one looks down")
+
+    def use(self, pattern):
+        """Holds the button until the program says so."""
+        since = self.stage.mark()
+        self.stage.xdo("mousedown", 1)
+        found = self.stage.wait(pattern, since)
+        self.stage.xdo("mouseup", 1)
+        self.stage.rest()
+        self.stage.rest()
+        return found
+
+    def take(self, key, tool):
+        since = self.stage.mark()
+        tap(self.stage, key)
+        self.stage.wait(r"^tool " + tool, since)
+
+
 def fits(stage):
-    """All texts of the page that opened last are within the window, and none is over another."""
+    """All texts of the page that opened last are within the window, and none is over another. With --pictures, it is shot too."""
     stage.wait(r"^texts end", stage.page_mark)
     lines = stage.lines()
     end = max(at for at, line in enumerate(lines) if line == "texts end")
@@ -156,47 +188,21 @@ def fits(stage):
                 raise Failed(f"{one!r} is over {other!r}: {a} {b}")
     if not found:
         raise Failed("no text is to be seen")
+    if stage.takes_all:
+        stage.rest()
+        page = stage.last(r"^page (\w+) (\w+)")
+        stage.shoot(f"{len(stage.shots):02}_{page.group(1)}_{page.group(2)}")
 
 
 @play("480x270")
 def digger(stage):
     """Every menu page, every tool, saved worlds, settings that survive, and a guest on the same machine."""
-    menu = Menu(stage)
+    menu, player = Menu(stage), Player(stage)
     blows = r"^edit tag=\d+ removed=([1-9]\d*)"
     game = r"^game headlamp=(\w+) lamps=(\d+) players=(\d+) place=(\S+ \S+ \S+|none) world=(.*)$"
 
     def page(name, since):
         stage.wait(r"^page " + name, since)
-
-    def turn(right, down):
-        stage.xdo("mousemove_relative", "--", right, down)
-        stage.rest()
-
-    def aim():
-        return float(stage.last(r"^aim ([\d.]+|none)").group(1).replace("none", "inf"))
-
-    def look_down(to):
-        """Until what is aimed at is no farther away: the ground before the feet, but not that below them."""
-        for _ in range(40):
-            if aim() <= to:
-                return
-            turn(0, 30)
-        raise Failed(f"the ground is {aim()} m away, however far one looks down")
-
-    def use(pattern, button=1):
-        """Holds a button until the program says so."""
-        since = stage.mark()
-        stage.xdo("mousedown", button)
-        found = stage.wait(pattern, since)
-        stage.xdo("mouseup", button)
-        stage.rest()
-        stage.rest()
-        return found
-
-    def take(key, tool):
-        since = stage.mark()
-        tap(stage, key)
-        stage.wait(r"^tool " + tool, since)
 
     def begin():
         """The program is there, with its title."""
@@ -235,56 +241,71 @@ def digger(stage):
     def tools():
         """Each tool does its work, or says why it does not."""
         since = stage.mark()
-        for _ in range(6):
-            turn(0, -120)
-        use(r"^hint Too far away", 1)
-        turn(0, 200)
-        look_down(5.4)
-        taken = int(use(blows).group(1))
+        player.turn(0, -700)
+        player.use(r"^hint Too far away")
+        player.turn(0, 800)
+        player.look_down(5.4)
+        taken = int(player.use(blows).group(1))
         stage.say(f"out of reach there is a hint; the pickaxe dug {taken} voxels")
-        take("5", "painter")
+        player.take("5", "painter")
         tap(stage, "e")
         tap(stage, "e")
-        use(r"^hint Not enough sand")
+        player.use(r"^hint Not enough sand")
         tap(stage, "q")
         tap(stage, "q")
-        take("2", "shovel")
-        use(r"^edit ")
-        take("3", "drill")
-        use(blows)
-        take("4", "builder")
+        player.take("2", "shovel")
+        player.look_down(7)
+        player.use(r"^edit ")
+        player.take("3", "drill")
+        player.look_down(6)
+        player.use(blows)
+        player.take("4", "builder")
         for _ in range(5):
             tap(stage, "e")
-        turn(150, -60)
-        look_down(12)
-        use(r"^edit tag=\d+ removed=0 added=[1-9]")
+        player.turn(150, -60)
+        player.look_down(12)
+        player.use(r"^edit tag=\d+ removed=0 added=[1-9]")
         since = stage.mark()
         tap(stage, "z")
         stage.wait(r"^history Undo", since)
-        take("6", "bomb")
-        stage.say(f"a bomb dug {use(blows).group(1)} voxels")
-        take("7", "lamp")
-        turn(400, 0)
-        look_down(9)
-        use(r"^game .*lamps=1")
-        take("8", "ball")
+        player.take("6", "bomb")
+        stage.say(f"a bomb dug {player.use(blows).group(1)} voxels")
+        player.take("7", "lamp")
+        player.turn(400, 0)
+        player.look_down(9)
+        player.use(r"^game .*lamps=1")
+        player.take("8", "ball")
         stage.xdo("click", "--delay", 0, 1)
         stage.rest()
         since = stage.mark()
         tap(stage, "f")
         stage.wait(r"^game headlamp=true", since)
         stage.say("all tools worked")
-        take("4", "builder")
-        tap(stage, "F3")
+        player.take("4", "builder")
         tap(stage, "F1")
         picture(stage, "panel")
         tap(stage, "F1")
         picture(stage, "play", see=(30, 25, 30, 30))
 
+    def display():
+        """Pictures of the display, the panel, the pause, and of pages with a world."""
+        picture(stage, "play")
+        player.turn(0, -700)
+        player.use(r"^hint Too far away")
+        stage.shoot("hint")
+        tap(stage, "F1")
+        picture(stage, "panel")
+        tap(stage, "F1")
+        to_title()
+        for name, page_name, key in (("Worlds", "Worlds", "Return"), ("world 1", "World", "Right")):
+            stage.page_mark = stage.mark()
+            menu.select(name)
+            menu.turn_to(f"Title {page_name}", key)
+            fits(stage)
+
     def pause():
-        since, stage.page_mark = stage.mark(), stage.mark()
-        tap(stage, "Escape")
-        page("Paused Menu", since)
+        stage.page_mark = stage.mark()
+        menu.turn_to("Paused Menu", "Escape")
         fits(stage)
 
     def to_title():
@@ -336,26 +357,19 @@ def digger(stage):
         to_title()
         menu.choose("Worlds", "Title Worlds")
         menu.select("Hill")
-        stage.page_mark = since = stage.mark()
-        tap(stage, "Right")
-        page("Title World", since)
+        stage.page_mark = stage.mark()
+        menu.turn_to("Title World", "Right")
         fits(stage)
         menu.type("Name", "Mound")
         menu.back("Title Worlds", "Mound")
         menu.select("Mound")
-        since = stage.mark()
-        tap(stage, "Right")
-        page("Title World", since)
-        menu.rest()
+        menu.turn_to("Title World", "Right")
         menu.choose("Duplicate", "Title Worlds")
         names = menu.items()[1]
         if "Mound copy" not in names or "Mound" not in names:
             raise Failed(f"after a copy, the worlds are {names}")
         menu.select("Mound copy")
-        since = stage.mark()
-        tap(stage, "Right")
-        page("Title World", since)
-        menu.rest()
+        menu.turn_to("Title World", "Right")
         stage.page_mark = stage.mark()
         menu.choose("Delete", "Title Question")
         fits(stage)
@@ -365,15 +379,13 @@ def digger(stage):
         if "Mound copy" in menu.items()[1]:
             raise Failed("a world that was deleted is listed")
         stage.say("worlds are renamed, copied, and deleted after a question")
-        since = stage.mark()
-        tap(stage, "Escape")
-        page("Title Menu", since)
-        menu.rest()
+        menu.turn_to("Title Menu", "Escape")
         return left
 
     def restart(left):
         """Quits, and starts again: settings and the game are as they were left."""
-        menu.choose("Quit")
+        menu.select("Quit")
+        stage.xdo("key", "--delay", 0, "Return")
         stage.wait_for_end()
         settings = json.loads((stage.out / "config" / "bevy_burrow" / "digger.json").read_text())
         if abs(settings["sensitivity"] - 1.3) > 0.01:
@@ -409,9 +421,18 @@ def digger(stage):
             guest.wait(r"^game .*players=2")
             stage.wait(r"^game .*players=2")
             stage.wait(r"^hint Ann has joined")
+            digger = Player(guest)
+            digger.turn(0, 800)
+            digger.look_down(5.4)
+            digger.use(blows)
+            deadline = time.monotonic() + stage.patience
+            while stage.last(r"^ground .*").group(0) != guest.last(r"^ground .*").group(0):
+                if time.monotonic() > deadline:
+                    raise Failed("host and guest see different ground")
+                time.sleep(0.1)
         finally:
             guest.close()
-        stage.say("a guest joined from the menu, and both see two players")
+        stage.say("a guest joined from the menu and dug, and both see the same")
 
     stage.wait(r"^painted")
     stage.say(f"the land is painted {stage.since_start():.1f} s after the start")
@@ -425,6 +446,9 @@ def digger(stage):
     page("Playing None", since)
     if world() != "world 1":
         raise Failed(f"the first world is {world()!r}")
+    if stage.takes_all:
+        display()
+        return
     tools()
     left = worlds()
     restart(left)
@@ -464,10 +488,21 @@ def sculpt(stage):
     shutil.rmtree(stage.out / "level", ignore_errors=True)
     stage.focus("sculpt")
     pristine = stage.wait(r"^ready hash=(\w+)").group(1)
-    stage.wait(r'^place "Radius"')
+    stage.wait(r'^place "Dig"')
     stage.wait(r"^dressed")
     picture(stage, "start", see=(40, 40, 20, 40))
 
+    if stage.takes_all:
+        for key in ("0", "F1"):
+            tap(stage, key)
+            stage.move(*middle)
+            picture(stage, key)
+        tap(stage, "F1")
+        dig(*middle)
+        settle()
+        tap(stage, "Escape")
+        picture(stage, "question")
+        return
     stage.move(*middle)
     stage.press()
     stage.wait(r"^stroke tag=3 ", 0)
@@ -490,10 +525,38 @@ def sculpt(stage):
     for key, operation in zip(["1", "2", "3", "4", "5", "6", "7", "8", "9", "0", "minus"], operations):
         if operation != "Dig":
             press_key(key, rf"^tool operation={operation} ")
+        if operation == "Paint":
+            stage.rest()
+            since = stage.mark()
+            stage.click(*stage.middle("Clay"))
+            stage.wait(r"^tool .*material=4", since)
+        before = hash_now()
         dig(*middle)
-    stage.say("each operation is chosen by its key, and works")
+        if hash_now() == before:
+            raise Failed(f"{operation} changes nothing")
+    stage.say("each operation is chosen by its key, and changes the ground")
     picture(stage, "operations", see=(40, 40, 20, 40))
     press_key("1", r"^tool operation=Dig ")
+
+    def click_with(modifier, pattern, right=0):
+        """A click while a key is held."""
+        stage.xdo("keydown", modifier)
+        stage.rest()
+        since = stage.mark()
+        stage.click(middle[0] + right, middle[1])
+        found = stage.wait(pattern, since)
+        stage.xdo("keyup", modifier)
+        stage.rest()
+        return found
+
+    click_with("shift", r"^stroke .*removed=0 added=[1-9]")
+    click_with("ctrl", strokes)
+    tag = int(stage.last(strokes).group(1))
+    click_with("l", rf"^stroke tag={tag + 3} ", right=60)
+    settle()
+    click_with("alt", r"^tool .*material=[^4]", right=-70)
+    stage.place("Under the pointer")
+    stage.say("Shift inverts, Ctrl smooths, L draws a line, Alt picks the material, and the pointer's place is shown")
     for shape in ("Box", "Cylinder", "Capsule", "Cone", "Torus"):
         since = stage.mark()
         stage.click(*stage.middle(shape))
@@ -577,6 +640,7 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/drive"), help="folder for pictures and log")
     parser.add_argument("--size", help="of the window, in pixels; each play has its own")
     parser.add_argument("--patience", type=float, default=300, help="seconds to wait for each thing")
+    parser.add_argument("--pictures", action="store_true", help="take a picture of every page, and play no further")
     parser.add_argument("arguments", nargs="*", help="for the program, after --")
     args = parser.parse_args()
     if args.list:
@@ -606,6 +670,7 @@ def main():
     except (Failed, OSError) as error:
         print(f"FAILED: {error}", file=sys.stderr)
         return 1
+    stage.takes_all = args.pictures
     try:
         act(stage)
     except (Failed, subprocess.SubprocessError) as error:

@@ -4,8 +4,11 @@ import os
 import re
 import shutil
 import signal
+import statistics
+import struct
 import subprocess
 import time
+import zlib
 
 
 class Failed(Exception):
@@ -19,8 +22,9 @@ class Stage:
         """`beside` another stage, a second program has a window on the same display, and settings and worlds of its own."""
         self.out, self.size, self.patience = out, size, patience
         self.shots = []
+        self.said, self.frame_count, self.unread = [], 0, b""
         self.log = out / "log.txt"
-        self.server = self.program = self.written = None
+        self.server = self.program = self.written = self.read = None
         try:
             self.start(command, beside)
         except BaseException:
@@ -32,6 +36,7 @@ class Stage:
         out = self.out
         out.mkdir(parents=True, exist_ok=True)
         display = beside.env["DISPLAY"][1:] if beside else self.open_display()
+        self.screen = beside.screen if beside else out / "Xvfb_screen0"
         self.env = dict(os.environ, DISPLAY=f":{display}", WINIT_UNIX_BACKEND="x11", WINIT_X11_SCALE_FACTOR="1")
         self.env.pop("WAYLAND_DISPLAY", None)
         # Settings and worlds of whoever plays here by hand stay as they are.
@@ -41,7 +46,7 @@ class Stage:
             self.env[variable] = str(folder)
         self.command = command
         self.prepare()
-        self.written = open(self.log, "wb")
+        self.written, self.read = open(self.log, "wb"), open(self.log, "rb")
         self.started = time.monotonic()
         self.run()
 
@@ -70,7 +75,9 @@ class Stage:
         read, write = os.pipe()
         # Xvfb itself picks a display that is free, and tells when it is ready.
         self.server = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{size[0]}x{size[1]}x24", "-nolisten", "tcp"],
+            ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{size[0]}x{size[1]}x24", "-nolisten", "tcp",
+             # Xvfb keeps what it shows in a file there.
+             "-fbdir", str(self.out)],
             pass_fds=[write],
             stderr=subprocess.DEVNULL,
         )
@@ -91,18 +98,29 @@ class Stage:
                 except subprocess.TimeoutExpired:
                     process.kill()
                     process.wait()
-        if self.written:
-            self.written.close()
+        if self.read:
+            self.lines()
+        for file in (self.written, self.read):
+            if file:
+                file.close()
 
     # What the program says
 
     def lines(self):
         """All that was said, frames left out."""
-        return [line for line in self.log.read_text(errors="replace").splitlines() if line != "frame"]
+        new = b"" if self.read.closed else self.read.read()
+        *whole, self.unread = (self.unread + new).split(b"\n")
+        for line in whole:
+            if line == b"frame":
+                self.frame_count += 1
+            else:
+                self.said.append(line.decode(errors="replace"))
+        return self.said
 
     def frames(self):
         """Frames so far, of a program that tells of each."""
-        return self.log.read_text(errors="replace").splitlines().count("frame")
+        self.lines()
+        return self.frame_count
 
     def mark(self):
         """The end of what was said so far."""
@@ -117,7 +135,7 @@ class Stage:
                     return found
             if self.program.poll() is not None:
                 raise Failed(f"the program ended with {self.program.returncode}, before it said {pattern!r}")
-            time.sleep(0.1)
+            time.sleep(0.02)
         raise Failed(f"the program did not say {pattern!r}")
 
     def last(self, pattern):
@@ -196,17 +214,39 @@ class Stage:
 
     # Eyes
 
+    def pixels(self):
+        """What the screen shows: its width, its height, and its rows of red, green and blue."""
+        dump = self.screen.read_bytes()
+        header = struct.unpack(">25I", dump[:100])
+        width, height, stride, start = header[4], header[5], header[12], header[0] + 12 * header[19]
+        rows = []
+        for y in range(height):
+            line = dump[start + y * stride:start + y * stride + 4 * width]
+            row = bytearray(3 * width)
+            row[0::3], row[1::3], row[2::3] = line[2::4], line[1::4], line[0::4]
+            rows.append(bytes(row))
+        return width, height, rows
+
     def shoot(self, name):
         """A picture of the whole screen."""
         path = self.out / f"{name}.png"
-        if shutil.which("import"):
-            subprocess.run(["import", "-window", "root", str(path)], env=self.env, check=True)
-        else:
-            path = path.with_suffix(".xwd")
-            with open(path, "wb") as file:
-                subprocess.run(["xwd", "-root", "-silent"], env=self.env, check=True, stdout=file)
+        width, height, rows = self.pixels()
+
+        def chunk(kind, data):
+            return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+        data = zlib.compress(b"".join(b"\0" + row for row in rows))
+        header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+        path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b""))
         self.shots.append(path)
-        print(f"  picture {path}")
+        print(f"  picture {path}", flush=True)
+
+    def contrast(self, part):
+        """The standard deviation of the greens, from 0 to 1, in a part of the screen: left, top, width, height in hundredths."""
+        width, height, rows = self.pixels()
+        left, top, wide, high = (value * side // 100 for value, side in zip(part, (width, height) * 2))
+        greens = [green for row in rows[top:top + high] for green in row[3 * left + 1:3 * (left + wide):3]]
+        return statistics.pstdev(greens) / 255
 
     def place(self, name):
         """Left, top, right, bottom of a widget of the panel, as the program told last."""

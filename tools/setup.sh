@@ -4,14 +4,14 @@
 #   tools/setup.sh build          compiler, linker, Rust
 #   tools/setup.sh run            the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
 #   tools/setup.sh test           the same as run, and a C++ compiler, with which CUDA kernels are tested without a GPU
-#   tools/setup.sh drive          the same as run, and what plays the examples: Python, Xvfb, xdotool, ImageMagick
+#   tools/setup.sh drive          the same as run, and what plays the examples: Python, Xvfb, xdotool
 #   tools/setup.sh lint           the same as build, and rustfmt and clippy
 #   tools/setup.sh peers          the same as build, and Python for the meshers that ours is compared with
 #   tools/setup.sh ptx            Python, whose package index has the compiler of the CUDA kernels
 #   tools/setup.sh instructions   the same as build, and valgrind, which counts instructions
 #   tools/setup.sh skipped        nothing: says which tests find nothing to run on here, and pass for that
 #
-# With MORE=gamepad in the environment, also what the feature of that name is compiled with.
+# With MORE=gamepad or MORE=sound in the environment, also what the feature of that name is compiled with.
 #
 # Debian and its kin: uses apt-get, as root or with sudo, and the official Rust installer. Elsewhere it says what to
 # install. Else compiling needs no -dev packages.
@@ -105,6 +105,9 @@ tell_skipped() {
     if [ "$(uname -s)" = Linux ] && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && ! has_vulkan_driver; then
         say '*** SKIPPED: no picture was compared: no Vulkan driver (mesa-vulkan-drivers) ***'
     fi
+    for program in Xvfb xdotool; do
+        has "$program" || say "*** SKIPPED: the examples were not played by mouse and keys: no $program ***"
+    done
 }
 
 case $goal in
@@ -137,7 +140,6 @@ if [ "$goal" = drive ]; then
     has python3 || want python3
     has Xvfb || want xvfb
     has xdotool || want xdotool
-    has import || want imagemagick
     goal=run
 fi
 if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then
@@ -157,6 +159,11 @@ fi
 case ${MORE:-} in *gamepad*)
     has pkg-config || want pkg-config
     [ -e /usr/include/libudev.h ] || want libudev-dev
+    ;;
+esac
+case ${MORE:-} in *sound*)
+    has pkg-config || want pkg-config
+    pkg-config --exists alsa 2>/dev/null || want libasound2-dev
     ;;
 esac
 if [ "$goal" = peers ]; then

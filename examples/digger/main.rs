@@ -17,7 +17,7 @@
 //! | `1` to `8` | pickaxe, shovel, drill, builder, painter, bomb, lamp, ball |
 //! | `Q` `E`, `C` | material, shape of what is built |
 //! | `F`, `Z` `Y` | headlamp; undo, redo |
-//! | `F1` `F3` | the plugin's panel, frame times |
+//! | `F1` | the plugin's panel, with frame times |
 //! | `H`, `Esc` | help, pause |
 //!
 //! Keys are bound by their position on an American keyboard. The menus show the letters of the player's own layout.
@@ -31,9 +31,9 @@
 //! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows into
 //! mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
 //!
-//! `--together` plays a script of a host and a guest.
+//! With `--features examples,sound`, digging, steps, bombs and falling ground are heard. Linux needs the headers of ALSA.
 //!
-//! With `--features examples,gamepad`, a gamepad does all of this except for the panel and the frame times. Its sticks
+//! With `--features examples,gamepad`, a gamepad does all of this except for the panel. Its sticks
 //! walk and look, its shoulder buttons change the tool, and its left stick or D-pad selects menu items.
 //!
 //! Without a display or a graphics adapter, or with `--headless`, a script plays the game: it walks to a hillside, digs
@@ -44,7 +44,7 @@
 //! | --- | --- |
 //! | `player` | input and bindings, the character, the camera, the headlamp, the game's states |
 //! | `tools` | what the player holds: digging, building, bombs, balls and lamps, and the inventory |
-//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, particles and debris |
+//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, particles, debris and sounds |
 //! | `ui` | menus, settings, and the heads-up display |
 //! | `party` | playing together: hosting, joining, and what other players look like |
 //! | `film` | scripts that play the game for pictures and films |
@@ -83,9 +83,6 @@ pub struct Options {
     /// Record a minute of play, frame by frame.
     #[arg(long)]
     tour: bool,
-    /// Play the script of two players, a host and a guest, and write a picture.
-    #[arg(long, conflicts_with_all = ["tour", "headless", "join"])]
-    together: bool,
     /// Number of frames to draw, evenly spread over the tour. All by default.
     #[arg(long, requires = "tour", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=7200))]
     frames: Option<u32>,
@@ -165,9 +162,6 @@ fn main() -> ExitCode {
         }
         return film::tour::run(&options, renderer);
     }
-    if options.together {
-        return film::together::run(&options, renderer);
-    }
     if options.headless || !display::has_display() || renderer.is_none() {
         return film::script::run(&options, renderer);
     }
@@ -230,10 +224,11 @@ pub fn game(
             ui::widgets::UiPlugin,
             ui::menu::MenuPlugin,
             ui::hud::HudPlugin,
-            ui::frame_times::FrameTimesPlugin,
             ui::panel::PanelPlugin,
             film::report::EditLogPlugin,
         ));
+    #[cfg(feature = "sound")]
+    app.add_plugins(world::sounds::SoundPlugin);
 }
 
 fn open_window(options: &Options) -> App {
@@ -277,8 +272,6 @@ mod tests {
             ("digger --join ann", false),
             ("digger --join 192.168.0.7 --host", false),
             ("digger --tour --host", false),
-            ("digger --together --world mine", true),
-            ("digger --together --headless", false),
         ] {
             assert_eq!(Options::try_parse_from(line.split(' ')).is_ok(), is_understood, "{line}");
         }

@@ -19,6 +19,8 @@ pub struct BurrowPanel {
     pub shows_brush: bool,
     /// Whether the right column, terrain and statistics, is shown.
     pub shows_world: bool,
+    /// Whether that column has buttons for files. A game that saves its worlds itself hides them: they replace the terrain.
+    pub shows_files: bool,
     /// The terrain that the right column shows. Without one, or if it is gone, that is the first terrain.
     pub terrain: Option<Entity>,
     /// Names of the materials by id. The panel offers these materials; the terrain's
@@ -47,6 +49,7 @@ impl Default for BurrowPanel {
             is_open: true,
             shows_brush: true,
             shows_world: true,
+            shows_files: true,
             terrain: None,
             materials: texts::MATERIALS.map(String::from).to_vec(),
             pictures: PathBuf::from("pictures"),

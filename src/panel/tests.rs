@@ -685,6 +685,17 @@ fn keys_of_the_game_and_the_pointer_are_shown() {
 }
 
 #[test]
+fn a_game_that_saves_its_worlds_itself_hides_the_files() {
+    let mut screen = Screen::new(1280.0, 720.0, 1);
+    for shows_files in [true, false] {
+        screen.panel.shows_files = shows_files;
+        (0..2).for_each(|_| screen.frame(Vec::new()));
+        assert!(["New", "Open", "Save"].iter().all(|name| screen.places.0.contains_key(*name) == shows_files));
+        assert!(screen.places.0.contains_key("Undo"));
+    }
+}
+
+#[test]
 fn good_news_is_not_shown_for_ever() {
     let mut app = App::new();
     app.insert_resource(Time::<Real>::default())

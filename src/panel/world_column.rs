@@ -36,7 +36,9 @@ pub struct Content<'a> {
 /// Draws what is always in sight: files, history, pictures, and the current message.
 pub fn head(ui: &mut Ui, panel: &mut BurrowPanel, files: &Files, content: &mut Content) {
     let chosen = content.terrains.iter().find(|line| Some(line.entity) == content.chosen);
-    files::bar(ui, panel, files, content.actions, chosen.is_some());
+    if panel.shows_files {
+        files::bar(ui, panel, files, content.actions, chosen.is_some());
+    }
     buttons(ui, panel, content.actions, chosen);
     note(ui, panel, chosen);
 }

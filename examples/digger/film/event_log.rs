@@ -28,7 +28,7 @@ impl Plugin for EventLogPlugin {
             Last,
             (
                 (log_page, log_ready, log_textures, log_tool, log_aim, log_edits, log_history, log_camera),
-                (log_items, log_texts, log_hints, log_game),
+                (log_items, log_texts, log_hints, log_game, log_ground),
                 frame_log::tell_frame,
             )
                 .chain(),
@@ -103,6 +103,13 @@ fn log_game(
     let line =
         format!("game headlamp={} lamps={lamps} players={players} place={place} world={world}", headlamp.0);
     log_change(line, &mut last);
+}
+
+/// Logs the ground's hash: who plays together sees the same ground.
+fn log_ground(terrains: Query<&Terrain, Changed<Terrain>>, mut last: Local<String>) {
+    for terrain in &terrains {
+        log_change(format!("ground {:016x}", terrain.world().hash()), &mut last);
+    }
 }
 
 fn log_ready(players: Query<(), Added<Player>>) {

@@ -7,5 +7,4 @@ pub mod report;
 pub mod script;
 pub mod scripted_brushes;
 pub mod studio;
-pub mod together;
 pub mod tour;

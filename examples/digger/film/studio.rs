@@ -85,18 +85,6 @@ impl Studio {
     /// # Errors
     /// If the folder cannot be created or the landscape does not load.
     pub fn open(options: &Options, renderer: Option<RenderResources>) -> Result<Self> {
-        Self::open_while(options, renderer, || {})
-    }
-
-    /// The same, while something else goes on in each frame.
-    ///
-    /// # Errors
-    /// As for [`open`](Self::open).
-    pub fn open_while(
-        options: &Options,
-        renderer: Option<RenderResources>,
-        meanwhile: impl FnMut(),
-    ) -> Result<Self> {
         std::fs::create_dir_all(&options.out)
             .map_err(|error| format!("{}: {error}", options.out.display()))?;
         let renders = renderer.is_some();
@@ -114,7 +102,7 @@ impl Studio {
         let size = (options.width, options.height);
         let mut photographer = Photographer::new(&mut app, eyes, size);
         keep_levels(&mut app, eyes, size.into());
-        let player = wait_for_player(&mut app, renders, meanwhile)?;
+        let player = wait_for_player(&mut app, renders)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
         world.resource_mut::<UiScale>().0 = scale_for(options.width as f32, options.height as f32, 1.0, true);
@@ -438,10 +426,9 @@ fn draw(app: &mut App, drawn: &mut Durations) {
     drawn.push(start.elapsed());
 }
 
-fn wait_for_player(app: &mut App, renders: bool, mut meanwhile: impl FnMut()) -> Result<Entity> {
+fn wait_for_player(app: &mut App, renders: bool) -> Result<Entity> {
     let start = Instant::now();
     while start.elapsed() < PATIENCE {
-        meanwhile();
         app.update();
         let player = app.world_mut().query_filtered::<Entity, With<Player>>().single(app.world());
         // The ground is not drawn before its textures are there.

@@ -21,12 +21,12 @@ use crate::ui::texts;
 pub enum Action {
     Forward, Back, Left, Right, Run, Jump, Use, Build, Slot1, Slot2, Slot3, Slot4, Slot5, Slot6, Slot7,
     Slot8, NextTool, PreviousTool, NextMaterial, PreviousMaterial, Grow, Shrink, BuildShape, Headlamp, Undo,
-    Redo, Help, FrameTimes, Panel, Pause,
+    Redo, Help, Panel, Pause,
 }
 
 impl Action {
     /// All actions with their default bindings, in the order of the controls page.
-    pub const ALL: [(Self, &[Binding]); 30] = {
+    pub const ALL: [(Self, &[Binding]); 29] = {
         use Binding::{Key, Mouse, Pad, WheelDown, WheelUp};
         use GamepadButton as G;
         use KeyCode as K;
@@ -58,7 +58,6 @@ impl Action {
             (Self::Undo, &[Key(K::KeyZ), Pad(G::East)]),
             (Self::Redo, &[Key(K::KeyY), Pad(G::RightThumb)]),
             (Self::Help, &[Key(K::KeyH), Pad(G::Select)]),
-            (Self::FrameTimes, &[Key(K::F3)]),
             (Self::Panel, &[Key(K::F1)]),
             (Self::Pause, &[Key(K::Escape), Pad(G::Start)]),
         ]

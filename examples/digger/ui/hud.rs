@@ -16,7 +16,6 @@ use crate::player::input::{Action, Actions};
 use crate::tools::hardness;
 use crate::tools::inventory::{AmountChanged, Inventory};
 use crate::tools::{Hand, Tool};
-use crate::ui::frame_times;
 use crate::ui::images::Images;
 use crate::ui::labels::Labels;
 use crate::ui::settings::Settings;
@@ -113,57 +112,38 @@ struct Find(usize);
 struct KeyList;
 
 fn spawn_hud(mut commands: Commands, images: Res<Images>) {
-    let absolute = || Node { position_type: PositionType::Absolute, ..default() };
+    let place = |node: Node| Node { position_type: PositionType::Absolute, ..node };
+    let padded = || Node { padding: UiRect::axes(px(9), px(6)), ..column(px(0)) };
     commands.spawn((Hud, widgets::full(), Visibility::Hidden)).with_children(|hud| {
+        let side = px(6);
         let dot = Node {
-            width: px(6),
-            height: px(6),
+            width: side,
+            height: side,
             border: UiRect::all(px(1)),
             border_radius: BorderRadius::all(px(3)),
             ..default()
         };
         let colors = (BackgroundColor(WHITE), BorderColor::all(Color::srgba(0.0, 0.0, 0.0, 0.6)));
         hud.spawn((widgets::centered(), children![(Crosshair, dot, colors)]));
-        let left = Node {
-            position_type: PositionType::Absolute,
-            left: px(14),
-            top: px(12),
-            align_items: AlignItems::Start,
-            ..column(px(6))
-        };
-        let padded = || Node { padding: UiRect::axes(px(9), px(6)), ..default() };
-        hud.spawn(left).with_children(|left| {
-            left.spawn((widgets::panel(padded()), children![(CoreSample, text("", 14.0, WHITE))]));
-            left.spawn(frame_times::panel(padded()));
-        });
-        let corner = Node { right: px(14), top: px(12), align_items: AlignItems::End, ..padded() };
-        let corner =
-            Node { position_type: PositionType::Absolute, flex_direction: FlexDirection::Column, ..corner };
+        let upper_left = place(Node { left: px(14), top: px(12), ..padded() });
+        hud.spawn((widgets::panel(upper_left), children![(CoreSample, text("", 14.0, WHITE))]));
+        let upper_right =
+            place(Node { right: px(14), top: px(12), align_items: AlignItems::End, ..padded() });
         let lines = children![(TimeOfDay, text("", 16.0, WHITE)), (Whereabouts, text("", 14.0, GREY))];
-        hud.spawn((widgets::panel(corner), lines));
+        hud.spawn((widgets::panel(upper_right), lines));
         let top =
-            Node { width: percent(100), top: px(92), justify_content: JustifyContent::Center, ..absolute() };
+            Node { width: percent(100), top: px(92), justify_content: JustifyContent::Center, ..default() };
         let hint = Node { max_width: percent(46), ..padded() };
         let hint = (HintBox, widgets::panel(hint), Visibility::Hidden);
-        hud.spawn((top, children![(hint, children![(Hints, widgets::paragraph("", 18.0, GOLD))])]));
-        let keys = Node { left: px(14), bottom: px(12), padding: UiRect::axes(px(9), px(6)), ..absolute() };
-        hud.spawn((widgets::panel(keys), children![(KeyList, text("", 13.0, GREY))]));
-        let bottom = Node {
-            position_type: PositionType::Absolute,
-            width: percent(100),
-            bottom: px(12),
-            align_items: AlignItems::Center,
-            ..column(px(6))
-        };
-        hud.spawn(bottom).with_children(|bottom| spawn_slots(bottom, &images));
-        let right = Node {
-            position_type: PositionType::Absolute,
-            right: px(14),
-            bottom: px(12),
-            align_items: AlignItems::End,
-            ..column(px(3))
-        };
-        hud.spawn(right).with_children(spawn_materials);
+        hud.spawn((place(top), children![(hint, children![(Hints, widgets::paragraph("", 18.0, GOLD))])]));
+        let lower_left = place(Node { left: px(14), bottom: px(12), ..padded() });
+        hud.spawn((widgets::panel(lower_left), children![(KeyList, text("", 13.0, GREY))]));
+        let bottom =
+            Node { width: percent(100), bottom: px(12), align_items: AlignItems::Center, ..column(px(6)) };
+        hud.spawn(place(bottom)).with_children(|bottom| spawn_slots(bottom, &images));
+        let lower_right =
+            Node { right: px(14), bottom: px(12), align_items: AlignItems::End, ..column(px(3)) };
+        hud.spawn(place(lower_right)).with_children(spawn_materials);
     });
 }
 

@@ -1,6 +1,5 @@
 //! Menus, settings, and what is shown over the game.
 
-pub mod frame_times;
 pub mod hud;
 pub mod images;
 pub mod labels;

@@ -16,8 +16,8 @@ pub struct PanelPlugin;
 impl Plugin for PanelPlugin {
     fn build(&self, app: &mut App) {
         let mut panel = BurrowPanel::default();
-        // The game has its own tools, so the panel's brush is hidden.
-        (panel.is_open, panel.shows_brush) = (false, false);
+        // The game has tools of its own, and saves its worlds itself.
+        (panel.is_open, panel.shows_brush, panel.shows_files) = (false, false, false);
         app.insert_resource(panel).add_plugins((BurrowPanelPlugin, BurrowDebugPlugin));
         add_systems(app);
     }

@@ -27,6 +27,8 @@ pub struct Settings {
     pub quality: Quality,
     /// Factor for the size of menus and the heads-up display, as far as there is room.
     pub ui_scale: f32,
+    /// Of all sounds, with the feature `sound`.
+    pub volume: f32,
     /// Minutes from sunrise to sunrise; 0 stops the sun.
     pub day_minutes: f32,
     /// The radius of pickaxe and builder in metres.
@@ -61,6 +63,7 @@ impl Default for Settings {
             view_distance: 6000.0,
             quality: Quality::default(),
             ui_scale: 1.0,
+            volume: 0.7,
             day_minutes: 20.0,
             radius: 2.0,
             shape: BuildShape::default(),
@@ -126,6 +129,7 @@ impl Settings {
             (&mut self.day_minutes, 0.0, 120.0),
             (&mut self.radius, 1.0, 12.0),
             (&mut self.ui_scale, 0.5, 1.5),
+            (&mut self.volume, 0.0, 1.0),
         ] {
             *number = number.clamp(low, high);
         }

@@ -29,9 +29,9 @@ texts! {
 }
 /// The rows of the settings page.
 #[rustfmt::skip]
-pub const SETTING: [&str; 10] = [
+pub const SETTING: [&str; 11] = [
     "Look sensitivity", "Invert look (Y axis)", "Field of view", "View distance", "Quality", "Interface size",
-    "Day length", "Brush radius", "Build shape", "Limited materials",
+    "Day length", "Brush radius", "Build shape", "Limited materials", "Volume",
 ];
 pub const QUALITY: [&str; 3] = ["low", "medium", "high"];
 pub const SHAPES: [&str; 3] = ["sphere", "cube", "beam"];
@@ -45,16 +45,16 @@ pub const HELP_GAMEPAD: &str =
 pub const HELP_KEYS: [&str; 14] = [
     "walk", "run", "jump", "use the tool; hold to repeat", "build with the chosen material", "brush size",
     "choose a material", "build shape", "next tool", "previous tool", "headlamp", "undo, redo",
-    "frame times, terrain panel", "pause",
+    "terrain panel: frame times, debug views", "pause",
 ];
 
 /// The actions, in the order of `Action`.
 #[rustfmt::skip]
-pub const ACTIONS: [&str; 30] = [
+pub const ACTIONS: [&str; 29] = [
     "walk forward", "walk back", "walk left", "walk right", "run", "jump", "use tool", "build", "pickaxe",
     "shovel", "drill", "builder", "painter", "bomb", "lamp", "ball", "next tool", "previous tool",
     "next material", "previous material", "larger brush", "smaller brush", "build shape", "headlamp", "undo",
-    "redo", "help", "frame times", "terrain panel", "pause",
+    "redo", "help", "terrain panel", "pause",
 ];
 
 /// The tools and what they are for, in the order of `Tool`.

@@ -197,8 +197,9 @@ fn point(
             commands.trigger(Activated { entity });
         }
     }
-    // When a page opens under a resting cursor, its first item keeps the focus.
-    if moves.read().count() > 0
+    // When a page opens under a resting cursor, the focus stays where it is.
+    let has_moved = moves.read().count() > 0;
+    if has_moved
         && let Some((item, _)) = items.iter().find(|(_, interaction)| **interaction == Interaction::Hovered)
     {
         focus.0 = item.0;
@@ -207,10 +208,12 @@ fn point(
         let Some(owner) = parents.iter_ancestors(entity).find(|owner| items.contains(*owner)) else {
             continue;
         };
-        if let (true, Ok((item, _))) = (*interaction != Interaction::None, items.get(owner)) {
+        let is_pressed = *interaction == Interaction::Pressed;
+        let is_meant = is_pressed || has_moved && *interaction == Interaction::Hovered;
+        if let (true, Ok((item, _))) = (is_meant, items.get(owner)) {
             focus.0 = item.0;
         }
-        if *interaction == Interaction::Pressed && is_enabled {
+        if is_pressed && is_enabled {
             commands.trigger(Adjusted { entity: owner, by: arrow.0 });
         }
     }

@@ -7,5 +7,7 @@ pub mod light;
 pub mod particles;
 pub mod saves;
 pub mod sky;
+#[cfg(any(feature = "sound", test))]
+pub mod sounds;
 pub mod strata;
 pub mod thumbnails;

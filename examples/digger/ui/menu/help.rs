@@ -45,7 +45,7 @@ fn lines(bindings: &Bindings, labels: &Labels) -> [(String, &'static str); 14] {
         keys(&[A::PreviousTool], ""),
         keys(&[A::Headlamp], ""),
         keys(&[A::Undo, A::Redo], ", "),
-        keys(&[A::FrameTimes, A::Panel], ", "),
+        keys(&[A::Panel], ""),
         keys(&[A::Pause], ""),
     ];
     let mut words = texts::HELP_KEYS.into_iter();

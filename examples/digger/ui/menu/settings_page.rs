@@ -22,7 +22,7 @@ impl Plugin for SettingsPagePlugin {
 /// around.
 type Row = (&'static str, fn(&Settings) -> String, fn(&mut Settings, i32));
 
-const ROWS: [Row; 10] = [
+const ROWS: &[Row] = &[
     (
         texts::SETTING[0],
         |settings| format!("{:.1}", settings.sensitivity),
@@ -82,6 +82,12 @@ const ROWS: [Row; 10] = [
         |settings| on_or_off(settings.survival),
         |settings, _| settings.survival = !settings.survival,
     ),
+    #[cfg(feature = "sound")]
+    (
+        texts::SETTING[10],
+        |settings| format!("{:.0} %", 100.0 * settings.volume),
+        |settings, by| step(&mut settings.volume, by, 0.1, 0.0, 1.0),
+    ),
 ];
 
 fn on_or_off(value: bool) -> String {
@@ -99,7 +105,7 @@ struct Value(usize);
 
 fn open(mut commands: Commands) {
     super::spawn_page(&mut commands, MenuPage::Settings, texts::SETTINGS, 600.0, |column| {
-        for (at, (label, _, adjust)) in ROWS.into_iter().enumerate() {
+        for (at, &(label, _, adjust)) in ROWS.iter().enumerate() {
             let row = Node {
                 padding: UiRect::axes(px(14), px(6)),
                 justify_content: JustifyContent::SpaceBetween,
@@ -206,6 +212,22 @@ mod tests {
             activate(&mut app, 1);
             let settings = app.world().resource::<Settings>();
             assert_eq!((settings.quality, settings.sensitivity), (quality, 1.0));
+        }
+    }
+
+    #[test]
+    fn a_resting_mouse_moves_no_focus() {
+        let mut app = app();
+        let mut arrows = app.world_mut().query_filtered::<Entity, With<Arrow>>();
+        let arrow = arrows.iter(app.world()).last().expect("an arrow");
+        for (moves, focus) in [(false, 0), (true, ROWS.len() - 1)] {
+            app.world_mut().entity_mut(arrow).insert(Interaction::Hovered);
+            if moves {
+                let (window, position) = (Entity::PLACEHOLDER, Vec2::ZERO);
+                app.world_mut().write_message(CursorMoved { window, position, delta: None });
+            }
+            app.update();
+            assert_eq!(app.world().resource::<FocusedItem>().0, focus);
         }
     }
 
