@@ -70,7 +70,7 @@ const REFUSALS: [Refusal; 10] = [
     Refusal::UnknownStamp,
 ];
 
-const KICKS: [Kick; 7] = [
+const KICKS: [Kick; 8] = [
     Kick::Protocol,
     Kick::Simulation,
     Kick::Ground,
@@ -78,6 +78,7 @@ const KICKS: [Kick; 7] = [
     Kick::Malformed,
     Kick::Flood,
     Kick::ByGame,
+    Kick::ConnectedAgain,
 ];
 /// Before the number of a game's own reason.
 const REFUSED_BY_GAME: u8 = 255;

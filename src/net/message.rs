@@ -380,6 +380,9 @@ pub enum Kick {
     /// The game wants it.
     #[error("kicked")]
     ByGame,
+    /// The same player has connected again, and plays over that connection.
+    #[error("the player has connected again")]
+    ConnectedAgain,
     /// The game [does not admit](super::Server::set_admission) the player. The number is the game's own, say of a text that it shows.
     #[error("refused by the game, reason {0}")]
     Refused(u32),

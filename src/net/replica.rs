@@ -178,10 +178,10 @@ impl Replica {
         self.pending.iter().map(|pending| (pending.own, &pending.edit))
     }
 
-    /// Numbers the own edits beyond a number anew, from the one after it on; returns the next number.
-    pub fn renumber(&mut self, own: u64) -> u64 {
-        let mut next = own + 1;
-        for pending in self.pending.iter_mut().filter(|pending| pending.own > own) {
+    /// Numbers the own edits beyond `seen` anew, from the one after `last` on; returns the next number. `last` is not less than `seen`.
+    pub fn renumber(&mut self, seen: u64, last: u64) -> u64 {
+        let mut next = last + 1;
+        for pending in self.pending.iter_mut().filter(|pending| pending.own > seen) {
             pending.own = next;
             next += 1;
         }
@@ -524,7 +524,7 @@ impl Replica {
         (!is_empty).then_some(ShownChange { change, hash })
     }
 
-    /// All that is to be put into a world, whatever it holds, so that it is what is to be shown.
+    /// What is to be put into a world, whatever it holds, so that it is what is to be shown.
     pub fn whole(&self, shown: &World) -> ShownChange {
         let world = self.confirmed.world();
         let own = |pos: BrickPos| self.bricks.get(&pos).map_or_else(|| world.brick(pos), Option::as_ref);
@@ -542,11 +542,16 @@ impl Replica {
             .collect();
         let fields =
             |chunk: ChunkPos| self.fields.get(&chunk).cloned().unwrap_or_else(|| fields_of(world, chunk));
-        let change = WorldChange {
-            bricks: places.into_iter().map(|pos| (pos, own(pos).cloned())).collect(),
-            fields: chunks.into_iter().map(|chunk| (chunk, fields(chunk))).collect(),
-            next_field: world.next_field(),
-        };
+        let bricks = places.into_iter().filter_map(|pos| {
+            let own = own(pos);
+            (!Brick::is_same(own, shown.brick(pos))).then(|| (pos, own.cloned()))
+        });
+        let fields = chunks.into_iter().filter_map(|chunk| {
+            let own = fields(chunk);
+            (own != fields_of(shown, chunk)).then_some((chunk, own))
+        });
+        let next_field = self.next_field.max(world.next_field());
+        let change = WorldChange { bricks: bricks.collect(), fields: fields.collect(), next_field };
         ShownChange { change, hash: self.shown_hash() }
     }
 }

@@ -50,6 +50,13 @@ impl Terrain {
         in_flight.chain(queued)
     }
 
+    /// How many [changes](Terrain::submit_change) have no receipt yet.
+    #[cfg(feature = "replicon")]
+    pub(crate) fn waiting_changes(&self) -> usize {
+        let in_flight = self.in_flight.iter().filter(|waiting| matches!(waiting.work, Work::Put(_)));
+        in_flight.count() + self.queue.iter().filter(|request| matches!(request, Request::Put(_))).count()
+    }
+
     /// From now on the plugin shows this world, and wants to know what else is committed to it.
     pub(crate) fn watch(&mut self) {
         self.unseen = Some(Unseen::nothing(self.world.version()));

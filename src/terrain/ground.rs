@@ -91,7 +91,7 @@ pub(crate) fn brick_over(ground: &Ground, pos: BrickPos, brick: Arc<Brick>) -> A
 
 impl World {
     /// All bricks and fields, in order.
-    pub(super) fn all_parts(&self) -> WorldChange {
+    pub(crate) fn all_parts(&self) -> WorldChange {
         let mut bricks: Vec<(BrickPos, Option<Arc<Brick>>)> =
             self.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))).collect();
         bricks.sort_unstable_by_key(|(pos, _)| *pos);

@@ -8,14 +8,14 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy_replicon::prelude::{ClientId, FromClient};
 
-use super::link::{Ask, Link, MOST_PENDING, PieceMessage, Standing};
+use super::link::{Ask, Link, MOST_PENDING, PieceMessage, Standing, Worked};
 use super::messages::{BulkLane, FromPlayer, OrderLane};
 use super::service::Service;
 use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 use super::trouble::{SharingTrouble, SharingTroubleFound};
 use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
 use crate::plugin::{
-    BrushApplied, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads,
+    BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads,
     free_later,
 };
 use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain};
@@ -94,16 +94,20 @@ pub(super) fn release_pieces(
 pub(super) fn send(
     service: Res<Service>,
     mut sharing: ResMut<Sharing>,
-    mut shared: Query<(Entity, &mut SharedTerrain, Option<&mut EditOutbox>, Option<&mut Terrain>)>,
+    mut shared: Query<(Entity, &mut SharedTerrain, Option<&mut EditOutbox>, Option<&mut Terrain>, Has<Held>)>,
     mut answers: Answers,
     mut messages: MessageWriter<FromPlayer>,
 ) {
-    let with_terrain = shared.iter().filter(|(_, _, _, terrain)| terrain.is_some());
+    let with_terrain = shared.iter().filter(|(_, _, _, terrain, _)| terrain.is_some());
     sharing.choose(with_terrain.map(|(entity, shared, ..)| (entity, shared.order)));
     let active = sharing.active;
-    for (entity, mut shared, outbox, terrain) in &mut shared {
+    for (entity, mut shared, outbox, terrain, is_held) in &mut shared {
         let is_changed = shared.is_changed();
         let shared = shared.bypass_change_detection();
+        if is_held && shared.link.is_none() && active == Some(entity) {
+            // It begins with the level that the terrain waits for.
+            continue;
+        }
         let asks = outbox.map(take_asks).unwrap_or_default();
         let trouble = match (terrain, active) {
             (Some(mut terrain), Some(active)) if active == entity => {
@@ -171,8 +175,9 @@ impl Turn<'_, '_> {
             link.rules = terrain.rules().cloned();
             self.answers.warn(self.entity, SharingTrouble::RulesIgnored);
         }
-        if let Some(client) = link.task.as_mut().and_then(ThreadTask::finish) {
+        if let Some(Worked { client, whole }) = link.task.as_mut().and_then(ThreadTask::finish) {
             (link.client, link.task) = (Some(client), None);
+            link.display.whole = whole;
         }
         let standing = link.standing(service);
         let follows = match standing {
@@ -256,28 +261,31 @@ pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>
     for (entity, mut shared, mut terrain) in &mut shared {
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
         let Some(mut client) = link.client.take() else { continue };
-        let mut changes = client.take_shown();
+        let terrain = terrain.bypass_change_detection();
         let display = &mut link.display;
-        if display.is_broken {
+        let mut changes = client.take_shown();
+        if let Some(whole) = display.whole.take() {
+            display.is_broken = false;
+            changes.push(whole);
+        } else if display.is_broken {
             // All of it comes once those that wait are answered.
             changes.clear();
-            if display.is_idle() {
-                display.is_broken = false;
-                changes.push(client.show_whole(terrain.world()));
-            }
         }
         for ShownChange { change, hash } in changes {
             // One that finds no room comes again with all others.
-            match terrain.bypass_change_detection().submit_change(change, Some(hash)) {
+            match terrain.submit_change(change, Some(hash)) {
                 Ok(()) => display.submitted += 1,
                 Err(_) => display.is_broken = true,
             }
         }
+        display.compare(terrain.world(), client.shown_hash());
+        let broken = (display.is_broken && display.is_idle()).then(|| terrain.snapshot());
         client.take_events().into_iter().for_each(|event| answers.tell(entity, link, event));
         let now = link.start.elapsed();
         link.task = Some(ThreadTask::start(Threads::Transactions, move || {
             client.advance(now);
-            client
+            let whole = broken.map(|shown| client.show_whole(&shown));
+            Worked { client, whole }
         }));
     }
 }
@@ -406,7 +414,7 @@ pub(super) fn send_last(
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
         let start = Instant::now();
         while link.client.is_none() && link.task.is_some() && start.elapsed() < LAST_FRAME {
-            link.client = link.task.as_mut().and_then(ThreadTask::finish);
+            link.client = link.task.as_mut().and_then(ThreadTask::finish).map(|worked| worked.client);
             std::thread::sleep(Duration::from_millis(1));
         }
         let Some(client) = link.client.as_mut().filter(|_| link.greeted.is_some()) else { continue };

@@ -1,6 +1,7 @@
 //! What a shared terrain knows of its server: the client, the invitation that it follows, and what waits.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use bevy::platform::time::Instant;
 
@@ -8,9 +9,9 @@ use super::messages::GroundId;
 use super::service::Service;
 use super::trouble::SharingTrouble;
 use crate::brush::Edit;
-use crate::net::{self, Client, Kick, Lane, Stamps};
-use crate::plugin::{LoosePieceFound, LoosePieceReturned, ThreadTask};
-use crate::terrain::{HistoryStep, Terrain, TerrainError, TerrainSettings, Version};
+use crate::net::{self, Client, Kick, Lane, ShownChange, Stamps};
+use crate::plugin::{LoosePieceFound, LoosePieceReturned, ThreadTask, Threads};
+use crate::terrain::{HistoryStep, Terrain, TerrainError, TerrainSettings, Version, World};
 use crate::volume::DiggingRules;
 
 /// Most edits that wait for the server's answer.
@@ -26,7 +27,7 @@ pub(super) enum Ask {
 pub(super) struct Link {
     /// `None` while a task works with it.
     pub client: Option<Client>,
-    pub task: Option<ThreadTask<Client>>,
+    pub task: Option<ThreadTask<Worked>>,
     /// The ground that the client was made for.
     pub ground: GroundId,
     /// The invitation of the server that the client has greeted; `None` while there is none to greet.
@@ -52,6 +53,13 @@ pub(super) struct Link {
     pub rules: Option<DiggingRules>,
 }
 
+/// A client that a task has worked with.
+pub(super) struct Worked {
+    pub client: Client,
+    /// All that has to be put into the shown terrain, if that was asked for.
+    pub whole: Option<ShownChange>,
+}
+
 /// What the client said last.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Facts {
@@ -69,6 +77,8 @@ pub(super) struct Display {
     pub answered: u64,
     /// What is shown is not what should be: all of it has to be put.
     pub is_broken: bool,
+    /// All of it, to be put next.
+    pub whole: Option<ShownChange>,
     /// What happens to pieces once so many changes are answered: the ground changes with these.
     pub pieces: VecDeque<(u64, PieceMessage)>,
 }
@@ -85,7 +95,7 @@ pub(super) enum PieceMessage {
 pub(super) enum Standing {
     /// It follows the server that has sent this invitation.
     Follows(u64),
-    /// There was no server yet. Edits wait for it.
+    /// No server has said yet that it serves a ground. Edits wait for that.
     Waits,
     /// There is no connection. Edits are shown, and wait for another one.
     Lost,
@@ -94,18 +104,36 @@ pub(super) enum Standing {
 }
 
 impl Link {
+    /// The client begins with what the terrain holds, such as the level that the game ships, so only regions that differ from the
+    /// server's have to come.
+    ///
     /// # Errors
     /// When the terrain's settings are those of no terrain.
-    pub fn new(terrain: &Terrain, stamps: &Stamps) -> Result<Self, TerrainError> {
-        let world = terrain.world();
-        let ground = GroundId::of(world);
+    pub fn new(terrain: &mut Terrain, stamps: &Stamps) -> Result<Self, TerrainError> {
+        let world = terrain.snapshot();
+        let ground = GroundId::of(&world);
         let settings =
             TerrainSettings { chunk_size: ground.chunk_size as u32, voxel_size: terrain.voxel_size() };
         let mut client = Client::new(world.shared_ground(), &settings)?;
         client.stamps_mut().add_all(stamps);
+        let is_pristine = world.bricks().next().is_none() && world.fields().next().is_none();
+        let (client, task) = if is_pristine {
+            (Some(client), None)
+        } else {
+            let task = ThreadTask::start(Threads::Transactions, move || {
+                // Parts of a world of the same ground and chunk size fit. Without them, everything would come.
+                if client.begin_with(world.all_parts()).is_ok() {
+                    client.advance(Duration::ZERO);
+                    // The terrain shows it already.
+                    drop(client.take_shown());
+                }
+                Worked { client, whole: None }
+            });
+            (None, Some(task))
+        };
         Ok(Self {
-            client: Some(client),
-            task: None,
+            client,
+            task,
             ground,
             greeted: None,
             was_served: false,
@@ -162,6 +190,7 @@ impl Link {
                 theirs: served.ground.hash,
                 their_chunks: served.ground.chunk_size,
             }),
+            Service::Silent => Standing::Waits,
             _ if !self.was_served => Standing::Waits,
             Service::Apart => Standing::Lost,
             Service::Unserved => Standing::Refuses(SharingTrouble::NotServed),
@@ -180,14 +209,15 @@ impl Standing {
 }
 
 impl Display {
-    /// Of a terrain in which nothing was put yet.
-    fn of(terrain: &Terrain) -> Self {
-        let world = terrain.world();
+    /// Of a terrain, in which changes of an earlier link may still wait.
+    fn of(terrain: &mut Terrain) -> Self {
+        drop(terrain.take_change_receipts());
         Self {
-            version: world.version(),
-            submitted: 0,
+            version: terrain.world().version(),
+            submitted: terrain.waiting_changes() as u64,
             answered: 0,
-            is_broken: world.revision() != 0,
+            is_broken: false,
+            whole: None,
             pieces: VecDeque::new(),
         }
     }
@@ -211,6 +241,15 @@ impl Display {
         let is_shown = |(due, _): &(u64, PieceMessage)| *due <= self.answered;
         let count = self.pieces.iter().take_while(|piece| is_shown(piece)).count();
         self.pieces.drain(..count).map(|(_, piece)| piece).collect()
+    }
+
+    /// Compares what is shown with what should be, which has this hash, once nothing waits for the terrain. They differ where somebody
+    /// else has changed the terrain, for example with brushes that were under way when it became shared.
+    pub fn compare(&mut self, shown: &World, hash: u64) {
+        if self.is_idle() && !self.is_broken && shown.hash() != hash {
+            self.is_broken = true;
+            self.hold_pieces();
+        }
     }
 
     /// Lets the pieces wait until all that should be shown is put.

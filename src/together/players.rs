@@ -22,6 +22,8 @@ pub(super) struct Players {
     clients: HashMap<net::ClientId, ClientId>,
     /// Clients that were sent away: nothing is taken from them on the same connection.
     kicked: HashSet<Entity>,
+    /// Those among them whose player has spoken over another connection since, and who were not told so.
+    replaced: Vec<Entity>,
     /// Bytes that wait for the server.
     waiting: HashMap<net::ClientId, usize>,
 }
@@ -69,7 +71,13 @@ impl Players {
             FromPlayer::Left => return Said::Nothing,
             // One that was too long is counted as an invalid message.
             FromPlayer::Bytes(_) | FromPlayer::TooLong => {
-                let begins = self.clients.insert(player, client) != Some(client);
+                let earlier = self.clients.insert(player, client);
+                let begins = earlier != Some(client);
+                if let Some(earlier) = earlier.filter(|_| begins).and_then(|earlier| earlier.entity()) {
+                    // Otherwise the two would take the place of each other for ever.
+                    self.kicked.insert(earlier);
+                    self.replaced.push(earlier);
+                }
                 let bytes = if let FromPlayer::Bytes(bytes) = message { bytes.clone() } else { Vec::new() };
                 Said::Bytes { begins, bytes }
             }
@@ -100,6 +108,11 @@ impl Players {
         let client = self.clients.remove(&player)?.entity()?;
         self.kicked.insert(client);
         Some(client)
+    }
+
+    /// Returns the clients that are still connected, and whose player has spoken over another connection since.
+    pub fn take_replaced(&mut self, clients: &Query<Option<&NetworkId>, Authorised>) -> Vec<Entity> {
+        self.replaced.drain(..).filter(|client| clients.contains(*client)).collect()
     }
 
     /// Forgets players whose clients are gone, or are no longer authorised; returns their numbers.

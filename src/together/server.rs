@@ -13,7 +13,7 @@ use bevy_replicon::shared::backend::connected_client::NetworkId;
 use super::messages::{BulkLane, FromPlayer, OrderLane, Served};
 use super::players::{Players, Said};
 use super::service::Authorised;
-use crate::net::{self, Kick, Lane, Server, ServerEvent, ServerSettings};
+use crate::net::{self, Kick, Lane, Server, ServerEvent, ServerSettings, ToClient};
 use crate::plugin::{ThreadTask, Threads};
 use crate::saves::{ReadWorld, SavedWorld, WorldReader};
 use crate::store::{Progress, Store, StoreError, StoreTrouble};
@@ -274,6 +274,12 @@ pub(super) fn serve(
 ) {
     let ground = &mut *ground;
     ground.receive(&messages, &clients);
+    for client in ground.players.take_replaced(&clients) {
+        let targets = SendTargets::Single(client.into());
+        let message = OrderLane(ToClient::Kicked(Kick::ConnectedAgain).to_bytes());
+        order.write(ToClients { targets, message });
+        leave.write(DisconnectRequest { client });
+    }
     let parts = ground.take_parts(|event| {
         events.write(event);
     });

@@ -13,7 +13,9 @@ pub(super) enum Service {
     /// There is no connection, and no server in this app.
     #[default]
     Apart,
-    /// There is a connection, or was a server in this app, and no ground is served.
+    /// There is a connection, and the server has not said yet that it serves a ground.
+    Silent,
+    /// No ground is served any more, by the server of this connection or by the one that was in this app.
     Unserved,
     /// A ground is served. The number is that of the invitation: each is greeted once.
     Served(Served, u64),
@@ -54,8 +56,10 @@ pub(super) fn find_service(
         return;
     }
     let is_connected = *state.get() == ClientState::Connected;
-    if before.is_some() || (is_connected && *service == Service::Apart) {
+    if before.is_some() {
         *service = Service::Unserved;
+    } else if is_connected && *service == Service::Apart {
+        *service = Service::Silent;
     }
     if is_connected {
         for Invitation(served) in messages.read() {

@@ -8,8 +8,10 @@ use crate::net::{self, ClientEvent, Refusal, Stamps};
 use crate::plugin::EditOutbox;
 use crate::terrain::Receipt;
 
-/// Insert it with a pristine [`Terrain`](crate::terrain::Terrain) of the same ground and chunk size as the server's: the world that
-/// players share takes its place, and brushes for it go to the server.
+/// Insert it with a [`Terrain`](crate::terrain::Terrain) of the same ground and chunk size as the server's: the world that players
+/// share takes its place, and brushes for it go to the server. A terrain that has edits already, such as those of a level, keeps what
+/// is the same on the server, and only regions that differ are sent. While the terrain is [`Held`](crate::plugin::Held), because its
+/// `StartLevel` is still loaded for example, it does not join yet.
 ///
 /// It joins as soon as a server that this app is connected to, or this app itself, has a [`GroundServer`](super::GroundServer), and
 /// again whenever there is a new connection or another server. It may be despawned, removed and inserted again at any time, and another
@@ -58,7 +60,7 @@ impl SharedTerrain {
         self.link.as_ref().is_some_and(|link| link.facts.has_joined)
     }
 
-    /// What keeps it from following a server; `None` while it follows one, joins it, or waits for the first one.
+    /// What keeps it from following a server; `None` while it follows one, joins it, or waits for one.
     pub fn trouble(&self) -> Option<SharingTrouble> {
         self.trouble
     }
@@ -78,7 +80,8 @@ fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lif
 pub enum WhatBecame {
     /// It is shown, as far as the player's machine can tell now.
     Predicted(Receipt),
-    /// The server has ordered it; this is what it came to for all. `None` where the player was away when that happened.
+    /// The server has ordered it; this is what it came to for all. `None` where the player was away when that happened: then there is no
+    /// [`BrushApplied`](crate::plugin::BrushApplied) either.
     Confirmed(Option<Receipt>),
     /// It is not done, and no longer shown. `None` where it could not be sent, or the player was away when that was told.
     Refused(Option<Refusal>),

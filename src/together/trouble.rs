@@ -31,7 +31,8 @@ pub enum SharingTrouble {
         /// The server's chunk size.
         their_chunks: i32,
     },
-    /// The server has sent the player away. Digs are refused until there is another connection.
+    /// The server has sent the player away. Digs are refused until there is another connection. After [`Kick::ConnectedAgain`] there
+    /// should be none, as it would end the one that took its place.
     #[error("the server has sent this player away: {0}")]
     Kicked(Kick),
     /// Another terrain of this app is shared already, and a connection carries one ground. Digs on this one are refused until that one

@@ -1,7 +1,7 @@
 //! A session can begin again at any moment: whatever happens to connections, clients and servers, everybody ends with the server's
 //! world.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -26,6 +26,29 @@ struct Player {
     up: VecDeque<Vec<u8>>,
     down: [VecDeque<Vec<u8>>; 2],
     kicked: usize,
+    /// Edits of this client that are not answered, by tag.
+    asked: BTreeSet<u64>,
+    /// Answers to edits that were answered before.
+    twice: usize,
+}
+
+impl Player {
+    fn new(id: ClientId, client: Client) -> Self {
+        let (up, down, asked) = Default::default();
+        Self { id, client, is_connected: false, up, down, kicked: 0, asked, twice: 0 }
+    }
+
+    fn take_events(&mut self) {
+        for event in self.client.take_events() {
+            match event {
+                ClientEvent::Kicked(_) => self.kicked += 1,
+                ClientEvent::Confirmed { tag, .. } | ClientEvent::Refused { tag, .. } => {
+                    self.twice += usize::from(!self.asked.remove(&tag));
+                }
+                _ => {}
+            }
+        }
+    }
 }
 
 struct Play {
@@ -85,10 +108,7 @@ impl Play {
             rng,
         };
         for id in 1..=play.rng.u64(1..4) {
-            let client = play.client();
-            let (up, down) = Default::default();
-            let id = ClientId(id);
-            play.players.push(Player { id, client, is_connected: false, up, down, kicked: 0 });
+            play.players.push(Player::new(ClientId(id), play.client()));
         }
         play
     }
@@ -123,8 +143,7 @@ impl Play {
             }
             while player.client.advance(self.now) {}
             drop(player.client.take_shown());
-            let kicks = |event: &ClientEvent| matches!(event, ClientEvent::Kicked(_));
-            player.kicked += player.client.take_events().iter().filter(|event| kicks(event)).count();
+            player.take_events();
             let messages = player.client.take_outgoing();
             if player.is_connected {
                 player.up.extend(messages);
@@ -215,6 +234,7 @@ impl Play {
             5 | 6 => self.players[at].client.connect(self.now),
             7 | 8 => {
                 self.players[at].client = self.client();
+                self.players[at].asked.clear();
                 self.players[at].client.connect(self.now);
             }
             9 => {
@@ -230,8 +250,9 @@ impl Play {
             12 => self.players[at].client.undo(None),
             _ => {
                 for _ in 0..self.rng.u32(1..8) {
-                    let edit = random_dig(&mut self.rng);
-                    self.players[at].client.dig(edit);
+                    let (tag, edit) = (self.rng.u64(..), random_dig(&mut self.rng));
+                    self.players[at].asked.insert(tag);
+                    self.players[at].client.dig(edit.clone().with_labels(tag, edit.stroke()));
                 }
             }
         }
@@ -278,6 +299,10 @@ impl Play {
             }
             if player.client.shown_hash() != hash {
                 return Err(format!("{:?} shows another world than it has", player.id));
+            }
+            if player.twice > 0 || !player.asked.is_empty() {
+                let (id, left) = (player.id, player.asked.len());
+                return Err(format!("{id:?}: {} answers too many, {left} missing", player.twice));
             }
             if player.kicked > 0 || player.client.figures().repairs > 0 {
                 return Err(format!("{:?} kicked or repaired: {:?}", player.id, player.client.figures()));
@@ -392,6 +417,53 @@ fn a_greeting_that_nobody_heard_is_repeated() {
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
     assert_eq!(client.world().hash(), server.terrain().world().hash());
     assert_eq!(server.figures().malformed, 0);
+}
+
+/// A player digs without a connection on one machine, and meanwhile plays on another one.
+#[test]
+fn what_was_dug_without_a_connection_is_done_though_the_player_dug_elsewhere() {
+    for (dug_before, dug_elsewhere) in [(0, 5), (3, 1), (3, 5), (30, 2)] {
+        let ((mut server, ground), mut now) = (quick(128, 0), Duration::from_secs(1));
+        let (mut first, mut done) = (new_client(&ground, now), BTreeSet::new());
+        let mut rng = Rng::with_seed(3);
+        let mut dig = |client: &mut Client, tag: u64| {
+            client.dig(random_dig(&mut rng).with_labels(tag, None));
+        };
+        let mut play = |server: &mut Server, client: &mut Client, now: &mut Duration| {
+            for _ in 0..100 {
+                *now += TICK;
+                client.take_outgoing().iter().for_each(|message| server.receive(ID, message, *now));
+                server.advance(*now);
+                server
+                    .take_outgoing()
+                    .into_iter()
+                    .for_each(|(_, lane, message)| client.receive(lane, message));
+                client.advance(*now);
+                done.extend(client.take_events().into_iter().filter_map(|event| match event {
+                    ClientEvent::Confirmed { tag, receipt: Some(_) } => Some(tag),
+                    _ => None,
+                }));
+            }
+        };
+        server.connect(ID, now);
+        play(&mut server, &mut first, &mut now);
+        (0..dug_before).for_each(|tag| dig(&mut first, tag));
+        play(&mut server, &mut first, &mut now);
+        first.disconnect();
+        (100..104).for_each(|tag| dig(&mut first, tag));
+        server.connect(ID, now);
+        let mut second = new_client(&ground, now);
+        play(&mut server, &mut second, &mut now);
+        (200..200 + dug_elsewhere).for_each(|tag| dig(&mut second, tag));
+        play(&mut server, &mut second, &mut now);
+        server.connect(ID, now);
+        first.connect(now);
+        play(&mut server, &mut first, &mut now);
+        let expected = (0..dug_before).chain(100..104).chain(200..200 + dug_elsewhere);
+        assert_eq!(done, expected.collect::<BTreeSet<u64>>());
+        assert_eq!(server.figures().ordered, 4 + dug_before + dug_elsewhere, "each is done once");
+        assert_eq!(first.world().hash(), server.terrain().world().hash());
+    }
 }
 
 #[test]

@@ -11,6 +11,8 @@ mod layers;
 mod levels;
 mod matter;
 mod placement;
+#[cfg(feature = "replicon")]
+mod shared;
 mod sources;
 mod stage;
 mod waiting;

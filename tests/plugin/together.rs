@@ -4,6 +4,7 @@ mod access;
 #[cfg(feature = "avian")]
 mod debris;
 mod digging;
+mod joints;
 mod scripts;
 mod sessions;
 mod troubles;

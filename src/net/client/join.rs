@@ -48,6 +48,15 @@ impl Client {
         self.id = Some(client);
         self.received = epoch.number;
         self.next_own = self.next_own.max(own.saturating_add(1));
+        // Another world's server has seen nothing of this client, although it may know its player.
+        let is_known = self.epoch.is_some_and(|known| known.world == epoch.world);
+        let seen = if is_known { own.min(self.sent) } else { 0 };
+        self.sent = seen;
+        self.renumber(own, seen);
+        // Undos are not sent again: by now they would be of other strokes.
+        for _ in self.undos.split_off(&seen.saturating_add(1)) {
+            self.events.push(ClientEvent::UndoRefused(None));
+        }
         let to = epoch.number;
         self.is_part = !matches!(join, Join::Log { .. });
         self.voids.clear();
@@ -73,11 +82,6 @@ impl Client {
             }
         }
         self.events.push(ClientEvent::Welcomed { client, reach });
-        self.renumber(own);
-        // Undos are not sent again: by now they would be of other strokes.
-        for _ in self.undos.split_off(&own.saturating_add(1)) {
-            self.events.push(ClientEvent::UndoRefused(None));
-        }
         self.send_again(own);
         self.finish_log();
         self.finish_regions();
@@ -118,22 +122,25 @@ impl Client {
         std::mem::take(&mut self.early).into_iter().for_each(|edit| self.dig(edit));
     }
 
-    /// Lets own edits that the server has not seen have numbers that it accepts, if theirs are too far from the last one that it has
-    /// seen: so it is where a server was replaced by one that knows less.
-    fn renumber(&mut self, own: u64) {
+    /// Lets own edits that the server has not seen have numbers that it accepts. It has seen none beyond `seen`, although it may have
+    /// seen greater numbers of the same player: of another client. And it may know less than a server before it, so that numbers are too
+    /// far from the last one that it has seen.
+    fn renumber(&mut self, own: u64, seen: u64) {
         let mut last = own;
-        let unseen = self.replica.pending().map(|(number, _)| number).filter(|number| *number > own);
+        let mut unseen =
+            self.replica.pending().map(|(number, _)| number).filter(|number| *number > seen).peekable();
+        let is_taken = unseen.peek().is_some_and(|number| *number <= own);
         let is_far = unseen.chain([self.next_own]).any(|number| {
             let jump = number.saturating_sub(last);
             last = number;
             jump > MOST_OWN_JUMP / 2
         });
-        if is_far {
+        if is_taken || is_far {
             let told =
-                self.replica.pending().filter(|(number, _)| (own + 1..=self.told).contains(number)).count();
+                self.replica.pending().filter(|(number, _)| (seen + 1..=self.told).contains(number)).count();
             self.told = own + told as u64;
             let before: Vec<u64> = self.replica.pending().map(|(number, _)| number).collect();
-            self.next_own = self.replica.renumber(own);
+            self.next_own = self.replica.renumber(seen, own);
             let after = self.replica.pending().map(|(number, _)| number);
             self.pieces.renumber(before.into_iter().zip(after));
         }

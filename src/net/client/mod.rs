@@ -102,6 +102,8 @@ pub struct Client {
     is_playable: bool,
     /// The number of the next own edit.
     next_own: u64,
+    /// The greatest own number that the server of this world can have seen of this client.
+    sent: u64,
     /// The last own edit whose prediction was told.
     told: u64,
     /// Edits from before the first welcome.
@@ -153,6 +155,7 @@ impl Client {
             doubtful: BTreeSet::new(),
             is_playable: false,
             next_own: 1,
+            sent: 0,
             told: 0,
             early,
             outbox: Outbox::new([0; 2], 0, Duration::ZERO),
@@ -263,8 +266,12 @@ impl Client {
         self.replica.shown_hash()
     }
 
-    /// All that is to be put into a terrain that does not hold what it should, say because a change was refused there.
-    pub fn show_whole(&self, shown: &World) -> ShownChange {
+    /// All that is to be put into a terrain that does not hold what it should, for example because a change was refused there. It takes the
+    /// place of everything that [`take_shown`](Self::take_shown) would return now.
+    pub fn show_whole(&mut self, shown: &World) -> ShownChange {
+        let (_, receipts) = self.replica.update();
+        self.shown.clear();
+        self.tell_predictions(receipts.unwrap_or_default());
         self.replica.whole(shown)
     }
 
@@ -323,6 +330,7 @@ impl Client {
     pub fn take_outgoing(&mut self) -> Vec<Vec<u8>> {
         if self.is_welcome() {
             self.outgoing.extend(self.outbox.take(self.now));
+            self.sent = self.sent.max(self.outbox.sent());
         }
         std::mem::take(&mut self.outgoing)
     }

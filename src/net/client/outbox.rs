@@ -38,6 +38,8 @@ pub struct Outbox {
     on_the_way: BTreeMap<u64, Cost>,
     /// What is on its way costs so much, but for what undos restore.
     cost: u64,
+    /// The greatest own number that was handed over to be sent.
+    sent: u64,
 }
 
 impl Outbox {
@@ -49,7 +51,7 @@ impl Outbox {
         let mut bucket = Bucket::new(rate, now);
         bucket.charge(now, burst.saturating_sub(left));
         let (waiting, on_the_way) = Default::default();
-        Self { waiting, bucket, burst, mirrored, on_the_way, cost: 0 }
+        Self { waiting, bucket, burst, mirrored, on_the_way, cost: 0, sent: 0 }
     }
 
     /// Adds an edit that costs so much.
@@ -75,6 +77,11 @@ impl Outbox {
         }
     }
 
+    /// The greatest own number that was handed over to be sent; 0 before the first one.
+    pub fn sent(&self) -> u64 {
+        self.sent
+    }
+
     /// Messages that may be sent now.
     pub fn take(&mut self, now: Duration) -> Vec<Vec<u8>> {
         let (mut messages, mut first, mut edits) = (Vec::new(), 0, Vec::new());
@@ -83,6 +90,7 @@ impl Outbox {
         {
             self.bucket.charge(now, cost.most);
             self.on_the_way.insert(own, cost);
+            self.sent = self.sent.max(own);
             self.cost += cost.known;
             if edits.len() == MOST_EDITS || own != first + edits.len() as u64 || matches!(what, Own::Undo(_))
             {

@@ -36,7 +36,6 @@ fn a_server_that_is_removed_is_reported_and_digs_are_answered() {
 }
 
 #[test]
-#[ignore = "fails: after a reconnect, what was dug meanwhile is not done"]
 fn a_lost_connection_is_reported_and_digs_wait_for_the_next_one() {
     let mut party = Party::new(2);
     party.all_join();

@@ -138,7 +138,6 @@ fn the_key_of_a_file_is_made_once() {
 }
 
 #[test]
-#[ignore = "fails: after a reconnect, what was dug meanwhile is not done"]
 fn players_come_back_by_themselves() {
     let folder = std::env::temp_dir().join(format!("burrow-come-back-{}", std::process::id()));
     drop(std::fs::remove_dir_all(&folder));
