@@ -18,7 +18,7 @@ use crate::terrain::{PieceFate, PieceId, Terrain};
 /// Lets ground that broke off fall as a rigid body. Put a [`LooseGround`](crate::plugin::LooseGround) on the terrain; its
 /// `debris` is the largest piece that falls, in voxels. If the app has `Assets<Mesh>`, a piece is drawn from the frame in
 /// which the ground loses it. It becomes a body as soon as a task has built its collider. Its mesh is built with the
-/// transaction; only if a game commits by itself is it built on the main thread.
+/// transaction; it is built on the main thread only if the game commits transactions itself.
 ///
 /// Matter is neither doubled nor lost: when a piece becomes ground again, by an undo of any player or because a server refused
 /// the dig, its debris is despawned wherever it has rolled, and no other is. A redo lets it fall again.

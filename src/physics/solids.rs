@@ -111,7 +111,7 @@ fn meets(collider: &SolidColliderItem, ground: CollisionLayers) -> bool {
     !collider.is_sensor && !collider.is_disabled && ground.interacts_with(collider.layers())
 }
 
-/// The same for a character, which finds ground by casting its own collider with its own filters.
+/// Whether ground carries a character, which finds ground by casting its own collider with its own filters.
 fn carries(walker: &SolidColliderItem, ground: CollisionLayers) -> bool {
     (walker.layers().filters & ground.memberships) != LayerMask::NONE
 }

@@ -212,7 +212,7 @@ mod tests {
     use crate::plugin::BurrowPlugins;
     use crate::terrain::TerrainSettings;
 
-    /// An app with level ground of four tiles, where building so many colliders panics.
+    /// An app with level ground of four tiles, where building the first `panics` colliders panics.
     fn app(panics: u32) -> App {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, PhysicsPlugins::default(), BurrowPlugins, TerrainPhysicsPlugin))

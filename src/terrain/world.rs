@@ -112,7 +112,7 @@ pub struct Version {
 }
 
 impl Version {
-    /// Is it the same world, whatever was committed to it in between?
+    /// Whether both are versions of one world, whatever was committed in between.
     #[cfg(any(feature = "plugin", feature = "store"))]
     pub(crate) fn is_same_world(self, other: Self) -> bool {
         self.lineage == other.lineage
