@@ -5,11 +5,11 @@
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
 //! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
 //! dug ground without digging. Colliders are made near a body that moves along, and balls lie about there. A frame is
-//! timed from its start until the graphics card has drawn it, so unlike in a game, frames never overlap. The plugin's
+//! timed from its start until the GPU has drawn it, so unlike in a game, frames never overlap. The plugin's
 //! time on the main thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same
 //! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
-//! times the plain material's part of the frame the look takes. What is drawn is looked at too: the benchmark fails if ground
-//! is missing where a ray meets it.
+//! times the plain material's part of the frame the look takes. The pictures are checked too: the benchmark fails if
+//! ground is missing where a ray meets it.
 
 #[path = "../examples/shared/capture.rs"]
 mod capture;

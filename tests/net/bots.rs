@@ -1,4 +1,4 @@
-//! A server, players who dig at random, and the lines between them; what everybody has is checked in every frame.
+//! A server, players that dig at random, and the lines between them; all worlds are checked in every frame.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -27,7 +27,7 @@ pub const TICK: Duration = Duration::from_micros(2 * 16_667);
 /// Frames between two edits of a player.
 const EDIT: u64 = 12;
 
-/// The world as the order says, one entry after the other, and the hash at every number.
+/// The world that results from the order, entry by entry, and its hash at every number.
 pub struct Reference {
     terrain: Terrain,
     ground: Arc<Ground>,
@@ -35,9 +35,9 @@ pub struct Reference {
     pub number: u64,
     pub hashes: BTreeMap<u64, u64>,
     pub loose: usize,
-    /// The edits of players with their numbers in the order, whose they are, and their numbers there.
+    /// Edits of players: the number in the order, the player, and the player's number.
     pub done: Vec<(u64, ClientId, u64)>,
-    /// What undos put back, by who asked for them.
+    /// Restored parts, by the player that asked for the undo.
     pub undone: BTreeMap<ClientId, Vec<Restored>>,
     pub terms: usize,
 }
@@ -51,7 +51,7 @@ impl Reference {
         Self { terrain, ground, stamps, number: 0, hashes, loose: 0, done: Vec::new(), undone, terms: 0 }
     }
 
-    /// Goes back to what a server has that was restarted.
+    /// Returns to the state of a restarted server.
     pub fn begin_again(&mut self, terrain: Terrain, number: u64) {
         self.terrain = terrain;
         self.number = number;
@@ -60,7 +60,7 @@ impl Reference {
         self.hashes.insert(number, self.terrain.world().hash());
     }
 
-    /// Obeys what is new in a message.
+    /// Applies the new entries of a message.
     fn obey(&mut self, message: &[u8]) {
         let message = ToClient::from_bytes(message, &self.ground, &self.stamps).expect("a message");
         let ToClient::Entries(Entries { first, entries }) = message else { return };
@@ -132,11 +132,11 @@ pub struct Bot {
     pub joined_at: Option<Duration>,
     pub durable: u64,
     pub bytes: [u64; 2],
-    /// Undos that were asked for.
+    /// Undos that were requested.
     pub undos: u64,
-    /// What undos put back.
+    /// Restored parts.
     pub undone: Vec<Restored>,
-    /// Numbers of tags that came to an end.
+    /// How many tags were answered.
     pub answered: u64,
     /// Tags of edits that are not answered.
     pub open: BTreeSet<u64>,
@@ -259,7 +259,7 @@ impl Bot {
                     "durable"
                 }
                 ClientEvent::Undone(restored) => {
-                    // The reference keeps no list of the pieces that games were told of.
+                    // The reference keeps no list of the pieces that games were notified of.
                     self.undone
                         .extend(restored.map(|restored| Restored { returned: Vec::new(), ..restored }));
                     "undone"
@@ -290,7 +290,7 @@ pub struct Play {
     frame: u64,
     rng: Rng,
     pub tamper: Option<Tamper>,
-    /// Does the server change rules and settings?
+    /// Whether the server changes rules and settings.
     pub changes_terms: bool,
     /// When edits came to the server that have no number yet.
     pub up_lag: Duration,

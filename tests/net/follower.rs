@@ -1,4 +1,5 @@
-//! The plainest client: it obeys the order, predicts nothing, and fetches what differs. What the server says is tested with it.
+//! The simplest client: it applies the order, predicts nothing, and fetches regions that differ. Tests of the server
+//! use it.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -29,7 +30,7 @@ pub fn hills(side: u32) -> Arc<Ground> {
     Arc::new(Ground::from_fn(side, side, height).expect("valid heights"))
 }
 
-/// A terrain that nobody looks at.
+/// A terrain without meshes.
 pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
     terrain.set_meshing(Meshing::Never);
@@ -37,7 +38,7 @@ pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
-/// A client that obeys the order.
+/// A client that applies the order.
 pub struct Follower {
     pub id: ClientId,
     ground: Arc<Ground>,
@@ -48,19 +49,19 @@ pub struct Follower {
     pub number: u64,
     pub last_own: u64,
     pub place: IVec3,
-    /// What is to be sent.
+    /// Messages to send.
     pub out: Vec<ToServer>,
-    /// Entries that came and can't be applied yet.
+    /// Received entries that can't be applied yet.
     waiting: VecDeque<(u64, Entry)>,
     /// Regions that are awaited; nothing is applied meanwhile.
     awaited: BTreeSet<RegionPos>,
-    /// Are the awaited ones those of a join?
+    /// Whether the awaited regions are those of a join.
     is_joining: bool,
     /// Regions that came for a number that is not reached yet.
     regions: Vec<RegionContent>,
     table: Option<Box<Terms>>,
     touched: BTreeSet<RegionPos>,
-    /// Hashes of what was touched before each mark whose hashes have not come.
+    /// Hashes of the regions touched before each mark, until the server's hashes arrive.
     marks: BTreeMap<u64, BTreeMap<RegionPos, u64>>,
     hashes: VecDeque<(u64, RegionHashes)>,
     bulk: BulkReader,
@@ -69,13 +70,13 @@ pub struct Follower {
     pub voids: Vec<u64>,
     pub durable: u64,
     pub kicked: Option<Kick>,
-    /// How it was let in, each time.
+    /// How it joined, each time.
     pub joins: Vec<&'static str>,
     /// Regions that differed and were fetched.
     pub repairs: usize,
-    /// Numbers of its own edits and undos that came back.
+    /// Numbers of its own edits and undos that were confirmed.
     pub confirmed: Vec<u64>,
-    /// Bytes that came, by lane.
+    /// Received bytes, by lane.
     pub bytes: [u64; 2],
 }
 
@@ -316,7 +317,8 @@ impl Follower {
             let noted = self.marks.remove(number).unwrap_or_default();
             let told: BTreeMap<RegionPos, u64> = hashes.iter().copied().collect();
             let world = self.terrain.world();
-            // What was touched before it came and again since the mark is told with the next mark.
+            // A region that was touched before the hashes arrived and again since the mark is compared at the next
+            // mark.
             let later: BTreeSet<RegionPos> =
                 self.marks.values().flat_map(BTreeMap::keys).chain(&self.touched).copied().collect();
             let own = |at: &RegionPos| match noted.get(at) {
@@ -373,7 +375,7 @@ impl Follower {
     }
 }
 
-/// Carries messages at once, for so many frames.
+/// Delivers messages without delay for a number of frames.
 pub fn play(server: &mut Server, followers: &mut [&mut Follower], now: &mut Duration, frames: u32) {
     for _ in 0..frames {
         *now += FRAME;

@@ -22,7 +22,7 @@ use crate::worlds::any_random_brush;
 const ANYWAY: u64 = 1 << 20;
 /// Bytes that a message to the server may take for each of its bytes: an edit is some 200 bytes, and at least 4 in a message.
 const TO_SERVER: u64 = 400;
-/// The same for a message to a client: a brick of few bits takes a thousand bytes.
+/// Bytes that a message to a client may take for each of its bytes: a brick of few bits takes a thousand bytes.
 const TO_CLIENT: u64 = 800;
 
 /// Changes bytes somehow; they may stay the same.
@@ -322,7 +322,7 @@ fn a_server_takes_any_messages() {
                 {
                     kicks[usize::from(why == Kick::Flood)] += 1;
                     begun += 1;
-                    // Whoever comes back does so as somebody else.
+                    // A kicked client reconnects under a new number.
                     let again = ClientId(1000 + begun);
                     attackers.iter_mut().filter(|own| own.0 == to).for_each(|own| *own = (again, 1));
                     begin(&mut server, again, now);
@@ -391,7 +391,7 @@ fn a_flooder_is_kicked_and_nobody_else_notices() {
     assert!(kicked_at.is_some_and(|after| after < Duration::from_secs(10)), "{kicked_at:?}");
     assert!(honest.refused.is_empty());
     assert!(flooder.refused.iter().all(|(_, why)| *why == Refusal::Cost));
-    // Not three times the rate is not flooding: what is too much is refused.
+    // Less than three times the rate is not flooding: excess edits are refused.
     let mut eager = Follower::new(3, &ground);
     eager.connect(&mut server, now);
     play(&mut server, &mut [&mut eager], &mut now, 3);

@@ -21,7 +21,7 @@ fn settings() -> ServerSettings {
     ServerSettings { undo: UndoPolicy::Own, ..ServerSettings::default() }
 }
 
-/// Digs until so many edits were ordered.
+/// Digs until this many edits were ordered.
 fn dig(play: &mut Play, edits: u64) {
     let end = play.server.figures().ordered + edits;
     while play.server.figures().ordered < end {
@@ -114,7 +114,7 @@ fn a_lost_message_is_noticed_and_what_it_held_comes_again() {
     assert_eq!(play.bots[1].client.figures().gaps, 0);
 }
 
-/// Only the first player has something to mend, and has mended it once.
+/// Only the first player has something to repair, and has repaired it once.
 fn check_mended(play: &Play) {
     let repairs: Vec<u64> = play.bots.iter().map(|bot| bot.client.figures().repairs).collect();
     assert!(repairs[0] > 0, "nothing was noticed");
@@ -130,7 +130,7 @@ fn quiet_play() -> Play {
     play
 }
 
-/// The server puts a hole, and one bot is told of another one.
+/// The server changes parts of the world, and one bot receives different parts.
 fn lie_about_parts(play: &mut Play, mut damage: impl FnMut(&mut WorldChange) + 'static) {
     let mut other = terrain(&play.ground);
     other.apply([sphere(40.0, 40.0)]);
@@ -199,7 +199,7 @@ fn wait_until_joined(play: &mut Play, at: usize) {
     wait_until(play, at, |bot| bot.client.has_joined());
 }
 
-/// Has so many edits ordered by the server itself.
+/// Lets the server itself order this many edits.
 fn dig_before(play: &mut Play, edits: u64) {
     let mut rng = Rng::with_seed(3);
     for done in 0..edits {
@@ -253,7 +253,7 @@ fn who_comes_late_plays_soon() {
     let late = &play.bots[8];
     assert!(late.client.has_joined(), "all of the log is there");
     assert!(late.client.figures().applied > count("BURROW_EDITS", 1000) * 3 / 4, "it got regions");
-    assert!(late.event("others") < 500, "what was long ago is told");
+    assert!(late.event("others") < 500, "old edits are reported one by one");
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
@@ -358,7 +358,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
         for at in 0..3 {
             if run > 0 {
                 let bot = &play.bots[at];
-                assert!(bot.durable <= play.server.epoch().number, "what is durable is there");
+                assert!(bot.durable <= play.server.epoch().number, "durable edits are lost");
             }
             play.cut(at);
         }
@@ -390,7 +390,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
 
-/// The order goes on where a server does that was opened.
+/// The reference continues from the state of a server that was opened again.
 fn begin_again(play: &mut Play) {
     let number = play.server.epoch().number;
     let world = play.server.terrain().world();
@@ -416,7 +416,7 @@ fn each_edit_is_done_once_though_the_server_is_killed() {
         play.cut(at);
         play.reconnect(at);
     });
-    // Edits that were told to their players, and were not saved when the server was killed.
+    // Edits that were confirmed to their players but not saved when the server was killed.
     let (mut lost, mut unseen, mut rng) = (BTreeSet::new(), 0, Rng::with_seed(4));
     let kills = count("BURROW_KILLS", 5);
     for kill in 0..kills {

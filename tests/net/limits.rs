@@ -180,8 +180,9 @@ fn fetches_that_nobody_takes_keep_one_world_in_memory() {
     assert!(held(true) < without + (8 << 20));
 }
 
-/// What a server holds beside its world, all of which changes in a second: after so many clients have come in eight seconds that take
-/// nothing, and after so many frames more; and the size of the world. It is measured by what is freed in the end, on this thread.
+/// Bytes that a server holds in addition to its world, all of which changes in a second: after `clients` clients that
+/// acknowledge nothing have connected within eight seconds, and after `frames` more frames; and the size of the world.
+/// Measured as bytes freed at the end, on this thread.
 fn held_beside(clients: u64, frames: u32) -> (i64, i64) {
     let ground = flat(128);
     let settings = ServerSettings { log_bytes: 64 << 10, window: 32 << 10, ..ServerSettings::default() };
@@ -213,7 +214,7 @@ fn held_beside(clients: u64, frames: u32) -> (i64, i64) {
 fn clients_that_take_nothing_share_worlds_and_lose_them() {
     let ((quiet, _), (kept, world), (left, _)) =
         (held_beside(0, 0), held_beside(40, 0), held_beside(40, 200));
-    println!("{quiet} bytes, {kept} with 40 clients, {left} later, beside a world of {world}");
+    println!("{quiet} bytes, {kept} with 40 clients, {left} later, in addition to a world of {world}");
     assert!(kept - quiet > world / 2, "no world was kept");
     assert!(kept - quiet < 10 * world, "{kept} bytes for 40 clients instead of {quiet}");
     assert!(left - quiet < world / 2, "{left} bytes are left instead of {quiet}");
@@ -328,7 +329,7 @@ fn numbers_at_the_end_of_their_range_are_counted() {
     }
 }
 
-/// A server that was replaced by one that knows nothing does not refuse the numbers of those who have dug for long.
+/// A new server that replaces another one does not refuse the numbers of players that have dug for a long time.
 #[test]
 fn who_has_dug_for_long_goes_on_at_a_server_that_knows_less() {
     let ground = flat(64);
@@ -374,7 +375,7 @@ fn nobody_digs_beyond_the_reach() {
     assert_eq!(is_left(Shape::capsule(at(4.0), at(124.0), 2.0)), [true, true]);
     assert_eq!(is_left(Shape::cuboid(at(64.0), Vec3::new(60.0, 2.0, 2.0))), [true, true]);
     assert_eq!(is_left(Shape::sphere(at(10.0), 2.0)), [true, true]);
-    assert_eq!(is_left(Shape::sphere(at(66.0), 4.0)), [true, false], "what is near is dug");
+    assert_eq!(is_left(Shape::sphere(at(66.0), 4.0)), [true, false], "near ground is dug");
 }
 
 #[test]
@@ -608,7 +609,7 @@ fn who_lacks_the_image_of_a_stamp_gets_it() {
     assert_eq!(play.server.figures().malformed, 0);
 }
 
-/// An image that the server lacks: the edit is refused, and those beside it are done.
+/// An image that the server lacks: the edit is refused, and the others in the message are applied.
 #[test]
 fn a_stamp_that_the_server_does_not_know_is_refused() {
     let ground = flat(128);

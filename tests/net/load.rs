@@ -58,7 +58,7 @@ struct Load {
     longest: Duration,
 }
 
-/// So many players dig for so many seconds.
+/// `clients` players dig for `seconds` seconds.
 fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) -> Load {
     let mut rng = Rng::with_seed(clients);
     let side = ground.width() as f32;

@@ -262,7 +262,7 @@ fn what_others_touched_is_not_undone() {
     scene.play(&mut [&mut a, &mut b], 1);
     a.edit([dig(60.0, 30.0)]);
     scene.play(&mut [&mut a, &mut b], 1);
-    // Beside both, and into the second.
+    // One next to both holes, and one into the second.
     b.edit([dig(90.0, 90.0), dig(62.0, 30.0)]);
     scene.play(&mut [&mut a, &mut b], 1);
     let before = agreed(&scene.server, &[&a, &b]);

@@ -173,7 +173,7 @@ impl Play {
         self.server.disconnect(player.id);
     }
 
-    /// Another server takes the place of this one, over connections that go on, with messages to the old one on their way.
+    /// Replaces the server while connections persist and messages to the old one are in transit.
     fn replace(&mut self, server: Server) {
         self.server = server;
         for player in self.players.iter().filter(|player| player.is_connected) {
@@ -225,7 +225,7 @@ impl Play {
                 self.replace(Server::new(terrain, settings));
             }
             10 => self.restart(),
-            // The server begins a session anew, and nobody tells the client.
+            // The server starts a new session without a message to the client.
             11 if self.players[at].is_connected => self.server.connect(self.players[at].id, self.now),
             12 => self.players[at].client.undo(None),
             _ => {
@@ -305,7 +305,7 @@ fn whatever_happens_everybody_ends_with_the_world() {
     assert!(failed.is_empty(), "failing seeds: {failed:?}");
 }
 
-/// A quick server, a world of so many rough digs, and one player with lanes that deliver everything at once.
+/// A fast server, a world of `digs` rough digs, and one player with lanes that deliver everything at once.
 fn quick(side: u32, digs: u32) -> (Server, Arc<Ground>) {
     let ground = Arc::new(Ground::flat(side, side, 0.0).expect("valid"));
     let mut dug = terrain(&ground);
@@ -377,7 +377,7 @@ fn a_client_that_comes_after_more_than_a_window_was_sent_joins() {
 fn a_greeting_that_nobody_heard_is_repeated() {
     let ((mut server, ground), mut now) = (quick(128, 20), Duration::from_secs(1));
     let mut client = new_client(&ground, now);
-    // There is no server yet: what is said is lost.
+    // There is no server yet, so messages are lost.
     for _ in 0..100 {
         now += TICK;
         drop(client.take_outgoing());

@@ -1,5 +1,5 @@
-//! Eight hostile clients, one for each attack, beside eight honest ones: what the server holds in memory, how long honest edits take, and
-//! what is gained by connecting anew, with the attackers and without.
+//! Eight hostile clients, one for each attack, together with eight honest ones: the server's memory, the time of honest
+//! edits, and the gain from reconnecting, with the attackers and without.
 //!
 //! ```text
 //! BURROW_SIEGE=300 cargo test --release --no-default-features --features net --test net siege -- --nocapture
@@ -49,15 +49,15 @@ struct Honest {
 /// What came of a run.
 #[derive(Debug)]
 struct Outcome {
-    /// What the server's world took at its end, without the ground, which clients here share.
+    /// Bytes of the server's world at its end, without the ground, which clients here share.
     world: i64,
-    /// What the server held beside it.
+    /// Bytes that the server held in addition to it.
     beside: i64,
-    /// Ticks from an edit to its confirmation, of the slowest of a hundred.
+    /// Ticks from an edit to its confirmation, 99th percentile.
     ticks: u64,
-    /// How long the server took for a tick, of the slowest of a hundred.
+    /// The server's time for a tick, 99th percentile.
     took: Duration,
-    /// The edits that the one who always connects anew got through.
+    /// The edits that the constantly reconnecting client got accepted.
     reconnecting: u64,
 }
 
@@ -74,7 +74,7 @@ impl Attackers {
         server.receive(ClientId(HOSTILE + at as u64), &ToServer::Hello(hello).to_bytes(), now);
     }
 
-    /// What all of them send in a tick. Whoever was kicked is there again at once.
+    /// Sends the messages of all of them for a tick. Kicked clients reconnect at once.
     fn act(&mut self, server: &mut Server, tick: u64, now: Duration) {
         for at in 0..8 {
             let id = ClientId(HOSTILE + at as u64);
@@ -93,7 +93,7 @@ impl Attackers {
                     send(ToServer::Edits { first: *own, edits });
                     send(ToServer::Fetch { number: 0, regions: vec![RegionPos(IVec3::ZERO); 8] });
                 }
-                // Connects anew all the time, and digs as much as it can.
+                // Reconnects all the time, and digs as much as it can.
                 1 => {
                     let edits = (0..20).map(|_| random_dig(&mut self.rng, 2.0)).collect();
                     send(ToServer::Edits { first: *own + 1, edits });
@@ -230,10 +230,10 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
 fn eight_attackers_cost_honest_players_little() {
     let seconds = count("BURROW_SIEGE", 10);
     let (quiet, attacked) = (run(seconds, false), run(seconds, true));
-    // What attackers dig is the world's, as with any player. What is kept for them besides is less than half of that: not a world for
-    // each of them, nor an index, which is a twentieth.
+    // Edits of attackers are part of the world, as for any player. Other memory for them is less than half of that:
+    // there is no copy of the world for each of them, nor of its index, which is a twentieth.
     let more = attacked.beside - quiet.beside;
-    assert!(2 * more <= attacked.world, "{more} bytes more, beside a world of {}", attacked.world);
+    assert!(2 * more <= attacked.world, "{more} bytes more, in addition to a world of {}", attacked.world);
     // 50 ms.
     assert!(attacked.ticks <= quiet.ticks + 3, "{} ticks instead of {}", attacked.ticks, quiet.ticks);
     if seconds >= 60 {

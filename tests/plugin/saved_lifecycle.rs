@@ -1,5 +1,5 @@
-//! Components of a saved world come and go in any order: what was dug in a world is in its folder, and nothing is held for ever.
-//! `BURROW_LIFECYCLES` is the number of random stories.
+//! Components of a saved world are inserted and removed in any order: its folder has all edits, and nothing is held for
+//! ever. `BURROW_LIFECYCLES` is the number of random stories.
 #![cfg(feature = "store")]
 
 use bevy::ecs::entity_disabling::Disabled;
@@ -68,7 +68,7 @@ impl Story {
         self.is_followed = self.has::<WorldStore>() && self.has::<Terrain>();
     }
 
-    /// Notes what was committed so far to a world that is open: all of it has to be in its folder.
+    /// Records the present state of a world that is open: its folder must contain it later.
     fn note(&mut self) {
         if !self.has::<SavedWorld>() {
             self.saved = None;
@@ -164,7 +164,7 @@ impl Story {
         what
     }
 
-    /// Everything comes to rest, and a dig is answered.
+    /// Waits until nothing changes any more, and checks that a dig is answered.
     fn settle(&mut self, story: &str) {
         self.note();
         if self.terrain.is_none() {

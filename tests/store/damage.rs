@@ -19,7 +19,7 @@ const DATABASE: &str = "regions.redb";
 /// A world of several regions, as it was at some time of its life.
 struct Saved {
     image: DiskImage,
-    /// The same at an earlier time.
+    /// The image at an earlier time.
     earlier: DiskImage,
     ground: Arc<Ground>,
     states: BTreeMap<u64, Vec<State>>,
@@ -135,7 +135,7 @@ fn with_a_whole_log_everything_is_rebuilt() {
                 u32::from(opened.troubles.iter().any(|own| matches!(own, StoreTrouble::Rebuilt { .. })));
             if revision < latest {
                 cut += 1;
-                // Only what ends earlier by whole frames can't be told from a log that never was longer.
+                // Only a log that is shorter by whole frames can't be distinguished from one that never was longer.
                 let is_told = !opened.troubles.is_empty();
                 let is_shorter = ["cut to", "kind 4", "kind 5"].iter().any(|kind| what.contains(kind));
                 assert!(what.starts_with("journal"), "{what}: {revision} of {latest}");

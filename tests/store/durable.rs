@@ -1,5 +1,5 @@
-//! What is reported as durable survives, whatever was given to the store in between: other terrains, other grounds, gaps, data alone.
-//! `BURROW_DURABLE` is the number of random stories.
+//! Anything reported as durable survives, whatever the store was given in between: other terrains, other grounds, gaps,
+//! data alone. `BURROW_DURABLE` is the number of random stories.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,7 +63,7 @@ fn of_another_terrain_only_what_was_written_is_durable() {
     let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("a saved world");
     assert_eq!(opened.terrain.world().revision(), 1);
     store.flush().expect("the disk works");
-    assert_eq!((store.durable(), store.is_durable(point)), (2, true), "what was durable stays so");
+    assert_eq!((store.durable(), store.is_durable(point)), (2, true), "durable commits stay durable");
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn a_terrain_of_another_size_is_refused_before_anything_is_written() {
         }
         store.flush().expect("the disk works");
         assert_eq!(disk.operations(), before, "nothing was written");
-        // The first one goes on.
+        // The first one continues.
         first.apply([dig(3)]);
         store.follow(&mut first).expect("the thread runs");
         drop(store);
@@ -182,7 +182,7 @@ impl Story {
         let what = self.rng.u32(0..16);
         match what {
             0 => {
-                // Another terrain, now and then one that was dug before.
+                // Another terrain, sometimes one that was already dug.
                 self.terrain = terrain(&self.grounds[self.ground]);
                 for _ in 0..self.rng.u32(0..3) {
                     act(&mut self.terrain, &mut self.rng);
@@ -230,7 +230,7 @@ impl Story {
         format!("{what}")
     }
 
-    /// Loses the power, and compares what is there with what was reported.
+    /// Loses the power, and compares the saved world with the reports.
     fn check(&mut self, story: &str) {
         let durable = self.store().durable_point();
         let reported = self.past.iter().filter(|past| self.store.as_ref().unwrap().is_durable(past.point));
@@ -250,7 +250,7 @@ impl Story {
             }
             seen.push((past.point, opened.troubles));
         }
-        panic!("{story}: {first:?} is durable, and what is there was never given after that: {seen:?}");
+        panic!("{story}: {first:?} is durable, but the saved world is none of the later ones: {seen:?}");
     }
 }
 

@@ -12,7 +12,7 @@ use bevy_burrow::store::{
 use crate::opening::Place;
 use crate::play::{State, act, ground, options, save, state, terrain};
 
-/// A world with so many commits, and none but the first checkpoint.
+/// A world with `commits` commits and only the first checkpoint.
 fn create(path: &Path, ground: &Arc<Ground>, commits: u64) -> (Store, Terrain) {
     let (mut world, mut rng) = (terrain(ground), fastrand::Rng::with_seed(8));
     let mut store = Store::create(path, &mut world, options(u64::MAX)).expect("a new world");
@@ -84,7 +84,7 @@ fn stray_files_are_left_alone() {
             );
         }
         assert!(path.exists());
-        // It goes on behind it.
+        // Saving continues next to the stray file.
         let (mut store, own) = Store::open(&place.0, Arc::clone(&ground), options(99)).expect("it is whole");
         let mut world = own.terrain;
         act(&mut world, &mut fastrand::Rng::with_seed(3));

@@ -23,7 +23,7 @@ fn drawn(terrain: &Terrain) -> BTreeMap<Drawn, SurfaceMesh> {
     terrain.world().drawn().filter(|(_, mesh)| !mesh.indices.is_empty()).collect()
 }
 
-/// The same world, written and read over a ground.
+/// The world, written and read again over a ground.
 fn read_over(ground: &Arc<Ground>, terrain: &Terrain) -> Terrain {
     let bytes = to_bytes(terrain, WorldId(1), &BTreeMap::new()).expect("it is small");
     let mut read = from_bytes(&bytes, Arc::clone(ground)).expect("its own bytes").terrain;
@@ -53,7 +53,7 @@ fn a_world_on_another_ground_is_as_if_it_was_read_there() {
         assert_eq!(world.history(), History::default());
         assert!(world.world().check_seams().is_flawless(), "seed {seed}");
 
-        // It goes on like any other, and its log leads there too.
+        // It continues like any other world, and replaying its log gives the same state.
         let mut follower = read_over(&before, &first);
         for _ in 0..5 {
             let brush = any_random_brush(&mut rng, &after);

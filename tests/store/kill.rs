@@ -26,7 +26,7 @@ fn options(log_bytes: u64) -> StoreOptions {
 
 fn say(line: std::fmt::Arguments) {
     let mut out = std::io::stdout().lock();
-    // Whoever listened may be gone.
+    // The reader may be gone.
     drop(out.write_fmt(format_args!("{line}\n")).and_then(|()| out.flush()));
 }
 
@@ -69,7 +69,7 @@ fn child() {
     }
 }
 
-/// What is known of a world whose process is killed.
+/// The known states of a world whose process is killed.
 #[derive(Default)]
 struct Known {
     hashes: BTreeMap<u64, Vec<u64>>,
@@ -103,7 +103,7 @@ fn hear(lines: &Receiver<String>, known: &mut Known, until: Instant, stop: &str)
                 }
             }
             Err(RecvTimeoutError::Timeout) => return,
-            Err(RecvTimeoutError::Disconnected) => panic!("the process ended by itself"),
+            Err(RecvTimeoutError::Disconnected) => panic!("the process ended without being killed"),
         }
     }
 }

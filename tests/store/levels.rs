@@ -126,7 +126,7 @@ fn only_what_differs_is_stored() {
     assert_eq!(none, (0, 0));
     assert!(few.0 > 0 && few.0 < 2_000 && many.0 > few.0 && many.0 < 8_000, "{few:?} {many:?}");
     assert!(whole > 10 * few.0, "{whole} bytes without a level, {few:?} with it");
-    assert_eq!((few.1, many.1), (0, 0), "what is undone is as in the level again");
+    assert_eq!((few.1, many.1), (0, 0), "undone edits leave nothing that differs from the level");
 }
 
 #[test]
@@ -147,7 +147,7 @@ fn a_level_that_is_missing_or_has_changed_is_told_and_loses_nothing() {
     assert!(matches!(&missing, StoreError::LevelMissing { label } if label == "levels/5"), "{missing}");
     let changed = open(Some(&other)).expect_err("it has another level");
     assert!(matches!(&changed, StoreError::LevelChanged { .. }), "{changed}");
-    // The same level under another name will do.
+    // An equal level under another name is accepted.
     let renamed = BaseLevel::new(level.level().clone(), "elsewhere");
     let (store, opened) = open(Some(&renamed)).expect("it is the same level");
     assert_eq!((state(&opened.terrain), opened.troubles), (state(&world), vec![]));

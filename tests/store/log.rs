@@ -1,4 +1,4 @@
-//! How long the log lasts: what it costs beside commits.
+//! How long the log lasts: its cost in addition to commits.
 
 use std::sync::Arc;
 use std::time::Duration;

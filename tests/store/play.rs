@@ -1,4 +1,4 @@
-//! A player who digs, undoes and changes rules at random, and what every revision of the world was.
+//! A player that digs, undoes and changes rules at random, and the states of all revisions of the world.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
-/// Saves at once, and makes checkpoints after so many commits.
+/// Saves at once, and makes a checkpoint after this many commits.
 pub fn options(checkpoint_commits: u64) -> StoreOptions {
     StoreOptions { loss_window: Duration::ZERO, checkpoint_commits, ..StoreOptions::default() }
 }
@@ -90,7 +90,7 @@ pub fn act(terrain: &mut Terrain, rng: &mut Rng) {
 /// The key under which the revision is put, so that game data and ground can be compared.
 pub const TURN: &str = "turn";
 
-/// Puts the revision beside the commits that lead to it, and hands both over.
+/// Stores the revision together with the commits that lead to it.
 pub fn save(store: &mut Store, terrain: &mut Terrain) -> Result<(), StoreError> {
     store.put(TURN, terrain.world().revision().to_le_bytes());
     store.follow(terrain)

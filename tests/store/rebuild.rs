@@ -81,11 +81,11 @@ fn played(before: Before, is_whole: bool) -> Played {
 enum Doing {
     Playing,
     Compacting,
-    /// It is opened over another ground, which is the only one for which the states of before do not hold.
+    /// It is opened over another ground; only then do the old states no longer apply.
     Replacing,
 }
 
-/// What is known of a world while something is done to it.
+/// The known states of a world during an operation.
 struct Known {
     states: Mutex<BTreeMap<u64, Vec<State>>>,
     acknowledged: AtomicU64,
@@ -172,7 +172,7 @@ fn check(disk: &SimulatedDisk, played: &Played, known: &Known, what: &str) {
     }
 }
 
-/// So many numbers of a list, spread evenly.
+/// At most `BURROW_MATRIX` items of a list, spread evenly.
 fn some<T>(all: Vec<T>) -> Vec<T> {
     let most = usize::try_from(count("BURROW_MATRIX", 8)).unwrap_or(usize::MAX).max(1);
     let step = all.len().div_ceil(most).max(1);
@@ -312,5 +312,5 @@ fn what_an_old_replacement_left_is_not_the_world_of_now() {
     let file = Files::open(&disk, "regions.new", Opening::New).expect("a new file");
     file.write_at(0, &old).expect("the disk works");
     disk.damage(DATABASE, |bytes| bytes[0] ^= 1);
-    check(&disk, &played, &known, "damaged, beside an old one");
+    check(&disk, &played, &known, "damaged, next to an old one");
 }

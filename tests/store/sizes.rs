@@ -1,4 +1,4 @@
-//! Grounds of another size: what was dug is there on it, or the world is refused in one sentence and stays as it is.
+//! Grounds of another size: all edits are kept on them, or the world is refused in one sentence and not changed.
 
 use std::sync::Arc;
 
@@ -90,7 +90,7 @@ fn a_larger_map_keeps_what_was_dug_at_the_old_rim() {
     let (mut moved, _) = open(&disk, &flat(128, 128), BaseChanged::Keep).expect("it is larger");
     assert_eq!(moved.world().revision(), world.world().revision());
     assert!(moved.world().check_seams().is_flawless());
-    // It goes on there.
+    // It can be edited there.
     moved.apply([Brush::dig(Shape::sphere(Vec3::new(66.0, 0.0, 30.0), 5.0))]);
     assert!(moved.world().check_seams().is_flawless());
 }

@@ -157,7 +157,7 @@ fn a_thread_that_panics_is_reported_and_lets_the_world_go() {
     game.gate.set(Gate::Panics);
     game.dig();
     assert!(matches!(game.store.flush(), Err(StoreError::Ended)));
-    // It may be told a moment after its channel is gone.
+    // It may be reported a moment after its channel is gone.
     let start = Instant::now();
     let mut told = game.store.take_troubles();
     while told.is_empty() && start.elapsed() < Duration::from_secs(60) {
