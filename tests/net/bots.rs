@@ -106,7 +106,7 @@ impl Reference {
 pub struct Bot {
     pub id: ClientId,
     pub client: Client,
-    /// What the player sees. It is only put.
+    /// The world that the player sees. It changes only by shown changes.
     pub shown: Terrain,
     up: Way,
     pub order: Way,
@@ -116,12 +116,12 @@ pub struct Bot {
     pub is_digging: bool,
     pub is_undoing: bool,
     pub is_connected: bool,
-    /// May its world differ from the others'? So it is where it is lied to.
+    /// Whether its world may differ from the others', because its messages are tampered with.
     pub may_differ: bool,
     edits: u64,
-    /// When edits were dug that are not shown yet, by tag.
+    /// The frames of edits that are not shown yet, by tag.
     dug: BTreeMap<u64, u64>,
-    /// When the last entry of messages came that are not applied yet.
+    /// The arrival times of messages that are not applied yet.
     arrived: VecDeque<(Duration, u64)>,
     /// The most frames until an own edit was shown.
     pub own_frames: u64,
@@ -292,7 +292,7 @@ pub struct Play {
     pub tamper: Option<Tamper>,
     /// Whether the server changes rules and settings.
     pub changes_terms: bool,
-    /// When edits came to the server that have no number yet.
+    /// The longest time from an edit's arrival at the server until the server ordered it.
     pub up_lag: Duration,
 }
 
@@ -323,14 +323,14 @@ impl Play {
         play
     }
 
-    /// One player more.
+    /// Adds a player.
     pub fn join(&mut self) {
         let bot = Bot::new(self.bots.len() as u64 + 1, &self.ground, &self.image, self.now);
         self.server.connect(bot.id, self.now);
         self.bots.push(bot);
     }
 
-    /// The connection of a player breaks.
+    /// Breaks a player's connection.
     pub fn cut(&mut self, at: usize) {
         let bot = &mut self.bots[at];
         bot.client.disconnect();
@@ -340,7 +340,7 @@ impl Play {
         self.server.disconnect(bot.id);
     }
 
-    /// It is there again.
+    /// Restores a player's connection.
     pub fn reconnect(&mut self, at: usize) {
         let bot = &mut self.bots[at];
         bot.is_connected = true;
@@ -349,7 +349,7 @@ impl Play {
         self.server.connect(bot.id, self.now);
     }
 
-    /// Sends what the server says.
+    /// Sends the server's messages.
     pub fn send(&mut self) {
         for (to, lane, message) in self.server.take_outgoing() {
             if lane == Lane::Order {
@@ -396,7 +396,7 @@ impl Play {
         assert_eq!(self.reference.hashes[&applied], self.server.terrain().world().hash(), "at {applied}");
     }
 
-    /// A frame of everybody's.
+    /// Runs a frame of the server and all players.
     pub fn step(&mut self) {
         self.now += FRAME;
         self.frame += 1;
@@ -443,7 +443,7 @@ impl Play {
         (0..(seconds / FRAME.as_secs_f64()) as u64).for_each(|_| self.step());
     }
 
-    /// Nobody digs any more: until everybody has the same.
+    /// Stops digging and waits until all worlds are equal.
     pub fn settle(&mut self) {
         self.bots.iter_mut().for_each(|bot| bot.is_digging = false);
         self.changes_terms = false;
@@ -455,7 +455,7 @@ impl Play {
                 break;
             }
         }
-        // Marks come and are compared.
+        // Waits until marks have arrived and are compared.
         self.seconds(3.0);
         let hash = self.server.terrain().world().hash();
         for bot in self.bots.iter().filter(|bot| bot.is_connected) {
@@ -471,7 +471,7 @@ impl Play {
     }
 }
 
-/// The names of all fields, and the greatest that there was.
+/// The names of all fields, and the greatest name ever used.
 fn names(world: &World) -> (BTreeMap<ChunkPos, Vec<FieldId>>, u64) {
     let names = |fields: &Fields| fields.iter().map(|field| field.id).collect();
     (world.fields().map(|(chunk, fields)| (chunk, names(fields))).collect(), world.next_field())

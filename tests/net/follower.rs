@@ -45,7 +45,7 @@ pub struct Follower {
     pub stamps: Stamps,
     pub terrain: Terrain,
     pub epoch: Option<Epoch>,
-    /// The number that the terrain is at.
+    /// The number of the last applied entry.
     pub number: u64,
     pub last_own: u64,
     pub place: IVec3,
@@ -57,7 +57,7 @@ pub struct Follower {
     awaited: BTreeSet<RegionPos>,
     /// Whether the awaited regions are those of a join.
     is_joining: bool,
-    /// Regions that came for a number that is not reached yet.
+    /// Regions that arrived for a number that is not reached yet.
     regions: Vec<RegionContent>,
     table: Option<Box<Terms>>,
     touched: BTreeSet<RegionPos>,
@@ -145,7 +145,7 @@ impl Follower {
         self.last_own
     }
 
-    /// Sends what it has to say.
+    /// Sends its messages.
     pub fn send(&mut self, server: &mut Server, now: Duration) {
         if self.bulk.received() != self.bulk_told {
             self.bulk_told = self.bulk.received();
@@ -173,7 +173,7 @@ impl Follower {
             ToClient::Kicked(why) => self.kicked = Some(why),
             ToClient::Entries(Entries { first, entries }) => {
                 self.waiting.extend((first..).zip(entries));
-                // Old ones come in the other lane.
+                // Old entries arrive in the other lane.
                 self.waiting.make_contiguous().sort_by_key(|(number, _)| *number);
             }
             ToClient::Void { number } => self.voids.push(number),
@@ -237,7 +237,7 @@ impl Follower {
     fn go_on(&mut self) {
         loop {
             if self.is_joining {
-                // In the order in which they come, the last one ends it.
+                // Regions arrive in order; the last one ends the join.
                 for content in std::mem::take(&mut self.regions) {
                     self.is_joining &= content.left > 0;
                     self.put(&content);
@@ -308,7 +308,7 @@ impl Follower {
         }
     }
 
-    /// Compares what it noted at marks with what the server says.
+    /// Compares the hashes that it recorded at marks with those of the server.
     fn check_hashes(&mut self) {
         while let Some((number, hashes)) = self.hashes.front() {
             if *number > self.number {
@@ -338,7 +338,7 @@ impl Follower {
         }
     }
 
-    /// Puts a region in place as a whole.
+    /// Replaces a whole region.
     fn put(&mut self, content: &RegionContent) {
         let world = self.terrain.world();
         let mut bricks: BTreeMap<_, _> = world.bricks_in(content.pos).map(|(pos, _)| (pos, None)).collect();
@@ -356,7 +356,7 @@ impl Follower {
         self.terrain.apply_change(change, None).expect("a valid region");
     }
 
-    /// Lets fields to come have the names that they have on the server.
+    /// Makes later fields have the same names as on the server.
     fn lower_names(&mut self, next_field: u64) {
         if self.terrain.world().next_field() > next_field {
             let mut parts = self.terrain.parts();
@@ -369,7 +369,7 @@ impl Follower {
         }
     }
 
-    /// Breaks its world, as a bug would.
+    /// Corrupts its world, as a bug would.
     pub fn spoil(&mut self, at: glam::Vec3) {
         self.terrain.apply([Brush::dig(Shape::sphere(at, 3.0))]);
     }

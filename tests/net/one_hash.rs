@@ -16,7 +16,7 @@ use glam::{Vec2, Vec3};
 use crate::follower::{count, hills, terrain};
 use crate::worlds::{any_random_brush, random_rules};
 
-/// What is asked for, one after the other.
+/// The requests, in order.
 enum Turn {
     Edit(Edit),
     Rules(DiggingRules),

@@ -23,7 +23,8 @@ use glam::{IVec3, Vec3};
 use crate::follower::{count, hills, terrain};
 
 const TICK: Duration = Duration::from_micros(16_667);
-/// What all dig in a few seconds has to be little of the world: for so long, the world is kept as it was for clients that take nothing.
+/// The size of the world. All edits within a few seconds must be a small part of it, because the old world is kept that
+/// long for clients that acknowledge nothing.
 const SIDE: f32 = 512.0;
 /// Ticks between two edits of an honest player.
 const EDIT: u64 = 12;
@@ -46,7 +47,7 @@ struct Honest {
     refused: u64,
 }
 
-/// What came of a run.
+/// The results of a run.
 #[derive(Debug)]
 struct Outcome {
     /// Bytes of the server's world at its end, without the ground, which clients here share.
@@ -86,7 +87,7 @@ impl Attackers {
             let mut send = |message: ToServer| server.receive(id, &message.to_bytes(), now);
             let own = &mut self.own[at];
             match at {
-                // Fetches of worlds that change, and takes nothing.
+                // Fetches regions of a changing world, and acknowledges nothing.
                 0 => {
                     *own += 1;
                     let edits = vec![random_dig(&mut self.rng, 2.0)];
@@ -119,7 +120,7 @@ impl Attackers {
                     send(ToServer::Edits { first: *own + 1, edits });
                     *own += 100;
                 }
-                // Takes nothing of what it joins with, again and again.
+                // Joins again and again, and acknowledges nothing.
                 6 if tick.is_multiple_of(60) => self.greet(server, at, now),
                 6 => {}
                 _ => {
@@ -139,9 +140,9 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
     while let Some(transaction) = dug.begin() {
         dug.commit(transaction.run()).expect("it waits for it");
     }
-    // What may be undone has a limit of its own, which a busy player fills in any case.
+    // Undo has its own limit, which a busy player fills in any case.
     let undo_bytes = 1 << 20;
-    // Honest players are to be there soon.
+    // Honest players should join quickly.
     let bulk = Rate { per_second: 2 << 20, burst: 64 << 10 };
     let settings = ServerSettings { undo: UndoPolicy::Own, undo_bytes, bulk, ..ServerSettings::default() };
     let mut server = Server::new(dug, settings);
@@ -243,5 +244,5 @@ fn eight_attackers_cost_honest_players_little() {
     let cost = ServerSettings::default().cost;
     let most = (cost.burst + cost.per_second * seconds) / 28;
     assert!(attacked.reconnecting <= most, "{} instead of {most}", attacked.reconnecting);
-    assert!(attacked.reconnecting > most / 4, "it did not get through");
+    assert!(attacked.reconnecting > most / 4, "too few of its edits were accepted");
 }

@@ -32,7 +32,7 @@ fn dig(number: u32) -> Brush {
     Brush::dig(Shape::sphere(Vec3::new(x, 8.0, z), 4.0))
 }
 
-/// Nothing is written before it is asked for.
+/// Options with which nothing is written until it is requested.
 fn lazy() -> StoreOptions {
     let loss_window = Duration::MAX;
     StoreOptions { loss_window, checkpoint_after: Duration::MAX, ..options(u64::MAX) }
@@ -59,7 +59,7 @@ fn of_another_terrain_only_what_was_written_is_durable() {
     assert_eq!((store.durable(), store.revision()), (1, 1));
     second.apply([dig(9)]);
     store.follow(&mut second).expect("the thread runs");
-    assert_eq!((store.durable(), store.is_durable(store.point())), (1, false), "nobody wrote the second");
+    assert_eq!((store.durable(), store.is_durable(store.point())), (1, false), "the second was not written");
     let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("a saved world");
     assert_eq!(opened.terrain.world().revision(), 1);
     store.flush().expect("the disk works");
@@ -135,7 +135,7 @@ fn a_terrain_of_another_size_is_refused_before_anything_is_written() {
     }
 }
 
-/// What was given to the store by a point.
+/// The state that the store was given at a point.
 struct Past {
     point: SavePoint,
     state: State,
@@ -193,7 +193,7 @@ impl Story {
                 let ground = Arc::clone(&self.grounds[self.ground]);
                 self.terrain.set_ground(ground).expect("it has the same size");
             }
-            // Records are gone.
+            // Records are lost.
             2 => {
                 act(&mut self.terrain, &mut self.rng);
                 drop(self.terrain.take_log());

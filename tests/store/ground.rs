@@ -1,4 +1,4 @@
-//! A world that is played gets another ground below its edits: the holes stay, in memory and on the disk.
+//! A running world gets another ground below its edits: the holes stay, in memory and on the disk.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ fn read_over(ground: &Arc<Ground>, terrain: &Terrain) -> Terrain {
 
 fn assert_same(one: &Terrain, other: &Terrain, seed: u64) {
     assert_eq!(state(one), state(other), "seed {seed}");
-    assert!(drawn(one) == drawn(other), "seed {seed}: it is drawn otherwise");
+    assert!(drawn(one) == drawn(other), "seed {seed}: it is drawn differently");
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn a_world_on_another_ground_is_as_if_it_was_read_there() {
         }
         assert_same(&follower, &world, seed);
 
-        // The old ground brings the old world back.
+        // The old ground restores the old world.
         let mut there = first;
         let hash = there.world().hash();
         let old = drawn(&there);

@@ -30,7 +30,7 @@ fn say(line: std::fmt::Arguments) {
     drop(out.write_fmt(format_args!("{line}\n")).and_then(|()| out.flush()));
 }
 
-/// What the killed process does; run by the other test only.
+/// The process that is killed; run by the other test only.
 #[test]
 #[ignore = "it is run by another test, and killed"]
 fn child() {
@@ -92,7 +92,7 @@ impl Known {
     }
 }
 
-/// Hears a process until something else is to be done, or a time is over.
+/// Reads the output of a process until it should be stopped, or a time has passed.
 fn hear(lines: &Receiver<String>, known: &mut Known, until: Instant, stop: &str) {
     loop {
         match lines.recv_timeout(until.saturating_duration_since(Instant::now())) {

@@ -1,4 +1,4 @@
-//! A world on a level holds only what differs from it, and is lost with neither the level nor the edits.
+//! A world on a level stores only its differences from the level, and neither level nor edits are lost.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use glam::Vec3;
 
 use crate::play::{act, check_opened, count, ground, options, save, state, terrain};
 
-/// A level that somebody sculpted.
+/// A sculpted level.
 pub fn level(ground: &Arc<Ground>, seed: u64, acts: u32) -> BaseLevel {
     let (mut sculpted, mut rng) = (terrain(ground), Rng::with_seed(seed));
     (0..acts).for_each(|_| act(&mut sculpted, &mut rng));
@@ -79,7 +79,7 @@ fn a_world_on_a_level_comes_back_whatever_happens() {
         drop(store);
         let check = check_in(&disk, Arc::clone(&ground), Some(&level)).expect("it can be read");
         assert_eq!((check.troubles, check.replays), (vec![], Some(true)), "seed {seed}");
-        // Without its regions, the log leads there from the level.
+        // Without its regions, replaying the log on the level gives the same world.
         let damaged = disk.image().lose_process();
         damaged.remove("regions.redb").expect("it is there");
         let (_, opened) = open(&damaged).expect("it can be rebuilt");
@@ -171,7 +171,7 @@ fn a_world_on_a_level_keeps_its_edits_on_another_ground() {
         (0..20).for_each(|_| act(&mut world, &mut rng));
         restore_brick(&mut world, &mut rng);
         save(&mut store, &mut world).expect("the thread runs");
-        // While it is played, too.
+        // While it is running, too.
         let image = disk.image();
         world.set_ground(Arc::clone(&after)).expect("it has the same size");
         store.checkpoint().expect("the disk works");

@@ -40,7 +40,7 @@ fn own_bricks(world: &Terrain, level: &BaseLevel) -> WorldChange {
     WorldChange { bricks: own.collect(), ..WorldChange::default() }
 }
 
-/// What a world should be on another level, made by hand: that level, then the world's own bricks on it.
+/// The expected world on another level: that level with the world's own bricks on it.
 fn by_hand(world: &Terrain, ground: &Arc<Ground>, from: &BaseLevel, to: &BaseLevel) -> Terrain {
     let mut moved = to.level().terrain(Arc::clone(ground)).expect("its own ground");
     moved.set_meshing(Meshing::Never);
@@ -48,7 +48,7 @@ fn by_hand(world: &Terrain, ground: &Arc<Ground>, from: &BaseLevel, to: &BaseLev
     moved
 }
 
-/// Another version of a level, or at times another level.
+/// Another version of a level, or sometimes another level.
 fn version(before: &BaseLevel, ground: &Arc<Ground>, seed: u64) -> BaseLevel {
     match seed % 5 {
         3 => level(ground, seed + 1000, 25),
@@ -74,7 +74,7 @@ fn open(
     Store::open_in(Arc::new(disk.clone()), Arc::clone(ground), options)
 }
 
-/// Fields hold all edited samples of their chunks, and each has a name of its own that was given.
+/// Fields contain all edited samples of their chunks, and each has a unique name that was assigned.
 fn assert_fields(terrain: &Terrain) {
     let (world, change) = (terrain.world(), terrain.parts().change);
     let mut names = BTreeSet::new();
@@ -96,7 +96,7 @@ fn was_kept(troubles: &[StoreTrouble]) -> bool {
     matches!(troubles, [StoreTrouble::BaseChanged { kept: "kept", .. }])
 }
 
-/// A world that was played on a level and closed, or killed.
+/// A world that was edited on a level and closed, or whose process was killed.
 fn played(level: &BaseLevel, ground: &Arc<Ground>, seed: u64) -> (SimulatedDisk, Terrain) {
     let (disk, mut rng) = (SimulatedDisk::new(), Rng::with_seed(seed));
     let (mut store, mut world) = begin(&disk, level, ground, options(rng.u64(3..30)));

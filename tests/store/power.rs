@@ -70,7 +70,7 @@ fn no_loss_of_power_loses_what_was_acknowledged() {
                 let seen = after.operations();
                 drop(opened);
                 for second in again.lock().expect("no panic").iter() {
-                    // What a player has seen after the first recovery is there after the second.
+                    // The world after the first recovery is there after the second.
                     let least = if second.operations() >= seen { revision } else { least };
                     for keep in losses(second.operations()) {
                         so_far.fetch_add(1, Ordering::SeqCst);

@@ -13,7 +13,7 @@ fn flat(width: u32, depth: u32) -> Arc<Ground> {
     Arc::new(Ground::flat(width, depth, 0.0).expect("valid heights"))
 }
 
-/// A world on a ground of this size that was dug at these places, closed or killed.
+/// A world on a ground of this size with digs at these places; closed, or its process was killed.
 fn dug(side: u32, places: &[(f32, f32)], is_closed: bool) -> (SimulatedDisk, Terrain) {
     let disk = SimulatedDisk::new();
     let mut world = Terrain::new(flat(side, side), &TerrainSettings::default()).expect("valid settings");
@@ -75,7 +75,7 @@ fn another_size_and_back_changes_nothing_or_is_refused() {
                     assert!(sizes.iter().all(|size| text.contains(size)), "{what}: {text}");
                 }
             }
-            // Larger and back: fields at the rim have grown into what is no chunk here, and shrink again.
+            // Larger and back: fields at the rim have grown beyond the chunks here, and shrink again.
             match open(&disk, &own, BaseChanged::Keep) {
                 Ok((back, _)) => assert_eq!(back.world().hash(), world.world().hash(), "{what}"),
                 Err(why) => panic!("{what}: back: {why}"),
