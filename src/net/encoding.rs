@@ -450,7 +450,7 @@ fn put_entry(to: &mut Vec<u8>, entry: &Entry, sequence: &mut EditSequence) {
     }
 }
 
-/// Bytes of an entry by itself.
+/// The encoded size of a single entry.
 pub(super) fn entry_bytes(entry: &Entry) -> usize {
     let mut bytes = Vec::new();
     put_entry(&mut bytes, entry, &mut EditSequence::default());
@@ -471,12 +471,12 @@ impl OrderWriter {
         self.count += 1;
     }
 
-    /// Entries so far.
+    /// The number of entries.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Bytes so far.
+    /// The number of bytes.
     pub fn len(&self) -> usize {
         self.bytes.len()
     }
@@ -629,7 +629,7 @@ fn read_terms(reader: &mut Reader) -> Result<Box<Terms>, FormatError> {
     Ok(Box::new(Terms { rules, loose, next_field: reader.number()? }))
 }
 
-/// Appends regions, each as the step from the one before, and something beside each.
+/// Appends regions, each as the difference from the previous one, and a value for each.
 fn put_regions(
     to: &mut Vec<u8>,
     regions: impl ExactSizeIterator<Item = RegionPos>,
@@ -678,7 +678,7 @@ mod tests {
     use super::*;
     use crate::store::FormatError;
 
-    /// A message of so many marks.
+    /// A message of `count` marks.
     fn marks(count: usize) -> Vec<u8> {
         ToClient::Entries(Entries { first: 1, entries: vec![Entry::Mark; count] }).to_bytes()
     }

@@ -1,4 +1,4 @@
-//! What client and server tell each other.
+//! Messages between client and server.
 //!
 //! ```text
 //! client                                   server
@@ -22,7 +22,7 @@
 //! is answered, and a server that does not know a connected client asks it to [greet](ToClient::Greet).
 //!
 //! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the pristine world
-//! after the entries 1 to n. Whoever has applied them in order has the same world.
+//! after the entries 1 to n. All clients that have applied them in order have the same world.
 
 use std::sync::Arc;
 
@@ -49,27 +49,27 @@ pub const MOST_EDITS: usize = 256;
 pub const MOST_REGIONS: usize = 4096;
 /// Most images that a message asks for.
 pub const MOST_IMAGES: usize = 64;
-/// The most by which the number of a client's own edit may exceed the one before. Larger jumps are invalid, so nobody can use up the
-/// numbers of a player.
+/// The most by which the number of a client's edit may exceed the previous one. Larger jumps are invalid, so no client
+/// can use up the numbers of a player.
 pub const MOST_OWN_JUMP: u64 = 1 << 16;
 
-/// Names a player. The caller gives these numbers: whoever comes back with the same one is the same player, and small ones are
-/// short in messages. Limits, undo and administrators go by them, so the caller has to check who a client is: whoever comes under
-/// another player's number is that player.
+/// Identifies a player. The caller assigns these numbers: a client that reconnects with the same number is the same
+/// player. Small numbers take fewer bytes. Limits, undo and administrators depend on them, so the caller has to
+/// authenticate clients: a client with another player's number acts as that player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ClientId(pub u64);
 
 impl ClientId {
-    /// The author of what the server does of its own.
+    /// The author of the server's own edits.
     pub const SERVER: Self = Self(u64::MAX);
 }
 
-/// What a message is sent in. The transport delivers each lane completely and in order; between them there is no order.
+/// A channel for messages. The transport delivers each lane completely and in order; between lanes there is no order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lane {
-    /// What has to come soon.
+    /// Urgent messages.
     Order,
-    /// What takes long, paced by the server.
+    /// Large data, at a rate that the server limits.
     Bulk,
 }
 
@@ -90,7 +90,7 @@ pub enum Entry {
     Rules(Option<Arc<DiggingRules>>),
     /// From here on loose pieces are searched for like this.
     Loose(Option<LooseSettings>),
-    /// Parts take the place of others: what an undo put back, or what the game's server put.
+    /// Parts that replace others: restored by an undo, or set by the game's server.
     Parts {
         /// The client that asked for it, and the number that it had there.
         by: Option<(ClientId, u64)>,
@@ -110,8 +110,8 @@ pub struct Entries {
     pub entries: Vec<Entry>,
 }
 
-/// A place in an order: of a world, as one run of a server continued it. Entries after a server's restart may differ from those
-/// that it had sent before, as what was not saved is lost.
+/// A position in the order of one run of a server. After a restart, entries may differ from those that were sent
+/// before, because unsaved entries are lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Epoch {
     /// The world.
@@ -122,7 +122,7 @@ pub struct Epoch {
     pub number: u64,
 }
 
-/// How a client begins, and begins again after a gap.
+/// The greeting of a client that joins, or joins again after a gap.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
     /// [`PROTOCOL`].
@@ -133,7 +133,7 @@ pub struct Hello {
     pub ground: u64,
     /// Cells along the side of a chunk.
     pub chunk_size: u32,
-    /// What it has, if it was here before.
+    /// The position that it has reached, if it has joined before.
     pub epoch: Option<Epoch>,
     /// Where its player is, in voxels: regions come from there outwards.
     pub place: IVec3,
@@ -160,7 +160,7 @@ pub enum ToServer {
         /// At most [`MOST_EDITS`].
         edits: Vec<Edit>,
     },
-    /// Takes back the last stroke of a client, as of this place among its edits.
+    /// Undoes the last stroke of a client before this position among its edits.
     Undo {
         /// Its number among the client's edits and undos.
         own: u64,
@@ -212,7 +212,7 @@ pub enum Join {
     },
 }
 
-/// What holds at a number beside bricks and fields.
+/// The state at a number in addition to bricks and fields.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Terms {
     /// The rules.
@@ -269,7 +269,7 @@ pub struct RegionContent {
 pub enum ToClient {
     /// The client may begin.
     Welcome(Welcome),
-    /// The client has to go.
+    /// The server has removed the client.
     Kicked(Kick),
     /// Entries of the order.
     Entries(Entries),
@@ -341,10 +341,10 @@ pub enum Refusal {
     /// There is nothing to undo.
     #[error("nothing to undo")]
     Nothing,
-    /// Others have changed since what would be undone.
+    /// Other players have changed the same parts since.
     #[error("others have dug there since")]
     Touched,
-    /// What it would put back is too much for a message.
+    /// The parts that it would restore are too large for a message.
     #[error("too large")]
     TooLarge,
     /// The edit came before the client had begun.
@@ -355,7 +355,7 @@ pub enum Refusal {
     UnknownStamp,
 }
 
-/// Why a client has to go.
+/// The reason why a server removes a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Kick {
@@ -380,7 +380,8 @@ pub enum Kick {
     /// The game wants it.
     #[error("kicked")]
     ByGame,
-    /// The game [does not admit](super::Server::set_admission) the player. The number is the game's own, say of a text that it shows.
+    /// The game [does not admit](super::Server::set_admission) the player. The meaning of the number is up to the game,
+    /// for example a text to show.
     #[error("refused by the game, reason {0}")]
     Refused(u32),
 }

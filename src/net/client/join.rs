@@ -1,4 +1,4 @@
-//! Getting to where the server is.
+//! Joining: catching up with the server.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,7 @@ use crate::brush::Edit;
 use crate::lattice::RegionPos;
 use crate::terrain::WorldChange;
 
-/// How far a client has come.
+/// The progress of a join.
 pub(super) enum Stage {
     /// There is no connection.
     Apart,
@@ -22,7 +22,7 @@ pub(super) enum Stage {
     Greeting,
     /// Old entries come, up to a number. The server has seen own edits up to `own`.
     ByLog { to: u64, own: u64 },
-    /// Regions at a number come, so many more.
+    /// Regions at the number `to` arrive; `left` more are missing.
     ByRegions { to: u64, left: usize },
     /// The table of regions at a number comes.
     ByTable { to: u64 },
@@ -83,12 +83,13 @@ impl Client {
         self.finish_regions();
     }
 
-    /// Goes on from another place of the order.
+    /// Continues from another position of the order.
     fn restart(&mut self, terms: &Terms, keeps_world: bool, own: u64) {
         if self.replica.restart(terms, keeps_world).is_err() {
             self.figures.malformed += 1;
         }
-        // What became of these was told while the client was away; if they were done, the world holds them.
+        // The answers to these were sent while the client was disconnected; if they were applied, the world contains
+        // them.
         for tag in self.take_answered(own) {
             self.events.push(ClientEvent::Confirmed { tag, receipt: None });
         }
@@ -139,7 +140,7 @@ impl Client {
         }
     }
 
-    /// Has it come to the end of old entries?
+    /// Finishes the join if all old entries are applied.
     pub(super) fn finish_log(&mut self) {
         if let Stage::ByLog { to, own } = self.stage
             && self.number() >= to
@@ -154,7 +155,7 @@ impl Client {
         }
     }
 
-    /// Have all regions come?
+    /// Finishes the join if all regions have arrived.
     fn finish_regions(&mut self) {
         if let Stage::ByRegions { left: 0, .. } = self.stage {
             self.follow_from_now();

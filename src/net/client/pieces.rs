@@ -1,4 +1,4 @@
-//! Loose pieces that are out of the ground that is shown, so that each is either there or with the game.
+//! Loose pieces that are not part of the shown ground, so that each piece is either ground or debris of the game.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -96,7 +96,7 @@ impl Client {
         self.tell_pieces(receipt.tag, all(receipt).cloned().collect(), Vec::new());
     }
 
-    /// The order has an edit, an own one with this number. What was predicted otherwise is put right.
+    /// The server has ordered an edit, `own` if it is one of this client. Corrects wrong predictions.
     pub(super) fn confirm_pieces(&mut self, own: Option<u64>, receipt: &Receipt) {
         let mut predicted = own.and_then(|own| self.pieces.predicted.remove(&own)).unwrap_or_default();
         let mut found = Vec::new();

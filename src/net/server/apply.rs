@@ -184,7 +184,7 @@ impl Server {
         }
     }
 
-    /// Orders what came after an undo that is answered, up to the next one.
+    /// Orders the entries that waited for an undo, up to the next undo.
     fn release(&mut self) {
         while let Some(Later::Entry(ordered)) =
             self.later.pop_front_if(|later| matches!(later, Later::Entry(_)))
@@ -194,7 +194,7 @@ impl Server {
     }
 }
 
-/// Does the receipt tell of what may be otherwise on another machine?
+/// Whether the edit failed for a reason that other machines may not have.
 fn is_void(receipt: &Receipt) -> bool {
     matches!(receipt.outcome, Err(Rejection::Panicked | Rejection::Overloaded | Rejection::TerrainGone))
 }

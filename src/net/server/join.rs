@@ -63,7 +63,7 @@ impl Server {
         let (mut greeted, mut silent) = (Vec::new(), Vec::new());
         for (client, session) in &mut self.sessions {
             match std::mem::replace(&mut session.stage, Stage::Joined) {
-                // What it asked for before has to have a number, as the welcome tells that it was seen.
+                // Its earlier edits must have numbers, because the welcome acknowledges them.
                 Stage::Greeted(hello)
                     if !self.later.iter().any(|later| later.is_of(*client))
                         && self.kept.as_ref().is_none_or(|kept: &Kept| {
@@ -159,7 +159,7 @@ impl Server {
         (world.0, (join, Bulk::Regions(world, regions)))
     }
 
-    /// The table of all regions. The world stays as it is for the client, until it goes on.
+    /// The table of all regions. The world is kept for the client until it continues.
     fn compare(&mut self, client: ClientId) -> (u64, (Join, Bulk)) {
         let ((number, world), terms) = self.keep();
         let (new, same): (BTreeSet<RegionPos>, BTreeSet<RegionPos>) = regions_of(&world)

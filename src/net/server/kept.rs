@@ -1,7 +1,8 @@
 //! Worlds that are kept as they were, for clients to get them bit by bit.
 //!
 //! Once the server's world changes, each that is kept takes as much memory as its index and what has changed since. So clients that come
-//! at about the same time share one, and those that do not go on lose theirs: however many clients take nothing, few worlds are kept.
+//! at about the same time share one, and clients that make no progress lose theirs, so few worlds are kept for any
+//! number of clients.
 
 use std::time::Duration;
 
@@ -13,7 +14,7 @@ use crate::net::message::{Hello, Lane, Terms, ToClient};
 /// Clients get a world that is so old, and entries after it.
 const SHARED: Duration = Duration::from_secs(1);
 
-/// The world that clients get who come now.
+/// The world that new clients get.
 pub struct Kept {
     pub world: Snapshot,
     pub terms: Terms,

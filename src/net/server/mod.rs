@@ -1,17 +1,17 @@
-//! The server: it owns the order. It numbers what clients ask for, sends it on, and applies it to its own terrain, which nobody
-//! looks at.
+//! The server: it owns the order. It numbers the edits of clients, sends them on, and applies them to its own terrain,
+//! which has no meshes.
 //!
 //! | file | what it does |
 //! | --- | --- |
-//! | `settings`, `events` | what it allows, what it tells and counts |
-//! | `session`, `players` | a client that is connected, what is remembered of its player |
-//! | `receive`, `validation` | messages that come, and what is refused |
+//! | `settings`, `events` | its limits, its events and statistics |
+//! | `session`, `players` | a connected client, data that is kept for its player |
+//! | `receive`, `validation` | received messages, and the reasons to refuse edits |
 //! | `order_log` | the latest entries, in long messages |
 //! | `own_numbers` | the last numbers of players' own edits |
-//! | `apply` | entries become the world |
-//! | `strokes` | what may be taken back |
-//! | `join`, `sender` | clients that come, come back, or differ; the bulk lane |
-//! | `kept` | worlds that are kept as they were, for these |
+//! | `apply` | applies entries to the world |
+//! | `strokes` | strokes that can be undone |
+//! | `join`, `sender` | clients that join, reconnect, or differ; the bulk lane |
+//! | `kept` | older states of the world that are kept for joining clients |
 //! | `save` | a server that survives a restart |
 
 mod apply;
@@ -64,7 +64,7 @@ pub type Admission = Box<dyn Fn(ClientId) -> Result<(), u32> + Send + Sync>;
 /// The most events that wait to be taken.
 const MOST_EVENTS: usize = 4096;
 
-/// A message with entries is sent once it has so many bytes, even if more are ordered at the same time.
+/// A message with entries is sent once it has this many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
 
 /// The image of a stamp is not among those that both sides have.
@@ -129,9 +129,9 @@ pub struct Server {
     log: OrderLog,
     /// Entries of the log that could not be applied.
     voids: BTreeSet<u64>,
-    /// Does the order lead from the pristine world to this one?
+    /// Whether the order leads from the pristine world to this one.
     is_whole: bool,
-    /// An undo, and all that came after it: it gets numbers once the undo has one, so an undo is of what came before it.
+    /// An undo and all later entries, which get numbers after the undo has one, so it applies to everything before it.
     later: VecDeque<Later>,
     strokes: Strokes,
     /// Regions that were touched since the last mark.
@@ -146,7 +146,7 @@ pub struct Server {
     sessions: BTreeMap<ClientId, Session>,
     players: Players,
     own_numbers: OwnNumbers,
-    /// The world that clients get who come now.
+    /// The world that new clients get.
     kept: Option<Kept>,
     /// When fetches were answered last.
     fetched: Duration,
@@ -254,7 +254,7 @@ impl Server {
         self.durable
     }
 
-    /// What was counted so far.
+    /// Its statistics.
     pub fn figures(&self) -> ServerFigures {
         self.figures
     }
@@ -269,19 +269,20 @@ impl Server {
         &mut self.stamps
     }
 
-    /// Sets who may do which edit; asked for each, after all other checks. By default everybody may do everything.
+    /// Sets a function that decides about each edit, after all other checks. By default every edit is allowed.
     pub fn set_permission(&mut self, permission: impl Fn(ClientId, &Edit) -> bool + Send + Sync + 'static) {
         self.permission = Box::new(permission);
     }
 
-    /// Sets who may take part; asked at each greeting. `Err` sends a player away with [`Kick::Refused`] and a number of the game's
-    /// own. By default everybody may. For those who are here already, see [`kick_for`](Self::kick_for).
+    /// Sets a function that decides at each greeting whether a player may join. `Err` rejects the player with
+    /// [`Kick::Refused`] and a number chosen by the game. By default all players may join. To remove a player that has
+    /// joined already, see [`kick_for`](Self::kick_for).
     pub fn set_admission(&mut self, admission: impl Fn(ClientId) -> Result<(), u32> + Send + Sync + 'static) {
         self.admission = Box::new(admission);
     }
 
-    /// Enters that a client is connected. If it was so already, it begins anew. What it may spend is what its player has left from
-    /// connections before.
+    /// Adds a connected client. If it was connected already, its session starts again. Its player keeps the budget left
+    /// from earlier connections.
     pub fn connect(&mut self, client: ClientId, now: Duration) {
         self.now = self.now.max(now);
         self.disconnect(client);
@@ -291,18 +292,18 @@ impl Server {
         self.own_numbers.trim(|client| self.sessions.contains_key(&client));
     }
 
-    /// Enters that a client is gone. What was to be sent to it is dropped.
+    /// Removes a disconnected client. Messages that wait for it are dropped.
     pub fn disconnect(&mut self, client: ClientId) {
         self.sessions.remove(&client);
         self.outgoing.retain(|(to, ..)| *to != client);
     }
 
-    /// Sends a client away. It is told so; close its connection then.
+    /// Removes a client. It is notified; close its connection then.
     pub fn kick(&mut self, client: ClientId) {
         self.kick_for(client, Kick::ByGame);
     }
 
-    /// Sends a client away for a reason that it is told; close its connection then.
+    /// Removes a client and sends it the reason; close its connection then.
     pub fn kick_for(&mut self, client: ClientId, why: Kick) {
         if self.sessions.remove(&client).is_some() {
             self.figures.kicked += 1;
@@ -323,8 +324,8 @@ impl Server {
         session.map(|session| session.acknowledged)
     }
 
-    /// Says where a client's player is, in voxels: from there its [reach](ServerSettings::reach) counts. `None`: nowhere. It holds
-    /// until it is set again: before the client connects, and over its connections.
+    /// Sets the position of a client's player, in voxels, from which its [reach](ServerSettings::reach) is measured;
+    /// `None` if it is unknown. It can be set before the client connects, and persists over its connections.
     pub fn set_place(&mut self, client: ClientId, place: Option<IVec3>) {
         if place.is_some() || self.players.get(client).is_some() {
             self.players.player(client).place = place;
@@ -332,8 +333,8 @@ impl Server {
         }
     }
 
-    /// Says whether a client may take back what others did: see [`UndoPolicy`]. It holds until it is set again: before the client
-    /// connects, and over its connections. It is not saved.
+    /// Sets whether a client may undo strokes of others: see [`UndoPolicy`]. It can be set before the client connects,
+    /// and persists over its connections. It is not saved.
     pub fn set_administrator(&mut self, client: ClientId, is_one: bool) {
         if is_one || self.players.get(client).is_some() {
             self.players.player(client).is_administrator = is_one;

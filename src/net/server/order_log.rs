@@ -1,4 +1,4 @@
-//! The latest entries in long messages, for clients that come, or come back.
+//! The latest entries in long messages, for clients that join or reconnect.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub struct OrderLog {
 }
 
 impl OrderLog {
-    /// Of an order that goes on after a number.
+    /// The log of an order that continues after a number.
     pub fn new(limit: usize, number: u64) -> Self {
         let (blocks, writer) = Default::default();
         Self { first: number + 1, blocks, bytes: 0, limit, writer, last: number }

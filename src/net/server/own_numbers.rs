@@ -1,4 +1,4 @@
-//! The last numbers of players' own edits: what a client sends again after a gap is not done twice.
+//! The last numbers of players' own edits, so that edits which a client sends again are not applied twice.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,13 +9,13 @@ use crate::store::Store;
 /// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its world holds.
 const KEY: &str = "own/";
 
-/// Players whose numbers are remembered, at most, beside those that are connected.
+/// The most players whose numbers are remembered, in addition to those that are connected.
 const MOST_SEEN: usize = 1 << 16;
 
 /// No player has numbers beyond this one, so that counting on can never overflow.
 const MOST_OWN: u64 = u64::MAX / 2;
 
-/// Players whose numbers are saved, at most: those who dug last.
+/// The most players whose numbers are saved: the most recent ones.
 const MOST_SAVED: usize = 1024;
 
 /// The last edit of a player that the world holds.
@@ -27,7 +27,7 @@ struct Applied {
     number: u64,
 }
 
-/// What a number of a player's is.
+/// How a player's number relates to earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OwnNumber {
     New,

@@ -60,7 +60,7 @@ pub enum Job {
     Message(Arc<[u8]>),
     /// An image.
     Image(Arc<GreyImage>),
-    /// A region of the lane's world, with so many others to follow. It is made into bytes when its turn comes.
+    /// A region of the lane's world, followed by `left` others. It is encoded when its turn comes.
     Region { pos: RegionPos, left: u32 },
 }
 
@@ -76,7 +76,7 @@ pub fn region_bytes((number, world): &Snapshot, pos: RegionPos, left: u32) -> Ve
     ToClient::Region(RegionContent { number: *number, pos, left, next_field, bricks, fields }).to_bytes()
 }
 
-/// The bulk lane of a client: so many bytes a second, and never more on their way than the window.
+/// The bulk lane of a client: limited in bytes a second, and in unacknowledged bytes by the window.
 pub struct BulkSender {
     jobs: VecDeque<Job>,
     /// Regions among these.
@@ -159,7 +159,7 @@ impl BulkSender {
         goes_on
     }
 
-    /// Notes that so many bytes have come. Returns `false` if that is impossible.
+    /// Records the number of bytes that have arrived. Returns `false` if it is impossible.
     pub fn acknowledge(&mut self, bytes: u64) -> bool {
         self.acknowledged = self.acknowledged.max(bytes.min(self.sent));
         bytes <= self.sent

@@ -1,4 +1,4 @@
-//! Strokes that may be taken back: what each replaced, and what it led to.
+//! Strokes that can be undone: the parts that each replaced, and their new content.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -18,19 +18,19 @@ struct Replaced<T> {
     after: T,
 }
 
-/// Edits of a player that are taken back together.
+/// Edits of a player that are undone together.
 struct Stroke {
     /// Counts strokes of all players.
     number: u64,
     label: Option<u64>,
     bricks: BTreeMap<BrickPos, Replaced<Stored>>,
     fields: BTreeMap<ChunkPos, Replaced<Fields>>,
-    /// Did somebody else change what it had led to, between its edits?
+    /// Whether another player changed its result between its edits.
     is_touched: bool,
     bytes: usize,
 }
 
-/// Why a stroke is not taken back.
+/// The reason why a stroke is not undone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoUndo {
     Nothing,
@@ -87,7 +87,7 @@ impl Strokes {
         }
     }
 
-    /// Takes the last stroke of a player out, and tells what takes it back in this world.
+    /// Removes the last stroke of a player, and returns the change that undoes it in this world.
     pub fn undo(&mut self, player: ClientId, world: &World) -> Result<WorldChange, NoUndo> {
         let strokes = self.players.get_mut(&player).ok_or(NoUndo::Nothing)?;
         let stroke = strokes.pop_back().ok_or(NoUndo::Nothing)?;
@@ -127,8 +127,8 @@ impl Stroke {
         }
     }
 
-    /// What takes it back, if all that it led to is still there. Fields that others have changed since stay: they hold what it
-    /// replaced too.
+    /// The change that undoes it, if its result is still unchanged. Fields that others have changed since stay: they
+    /// also contain the replaced parts.
     fn undone(&self, world: &World) -> Option<WorldChange> {
         let is_there = |(pos, own): (&BrickPos, &Replaced<Stored>)| {
             Brick::is_same(own.after.as_ref(), world.brick(*pos))
