@@ -15,9 +15,9 @@
 //! | `export` | writes the world to one file | yes |
 //! | `import` | makes a world of such a file | yes |
 //!
-//! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights` and the
-//! options beside it name it as for the example `export`, `--side` as for the example `server`. `--level` names the level that it was
-//! begun on, if it was begun on one.
+//! Each prints one JSON object with `revision` and `hash`. A world holds only its differences from the ground:
+//! `--heights` and the options next to it name the ground as for the example `export`, `--side` as for the example
+//! `server`. `--level` names the level that it was begun on, if it was begun on one.
 //!
 //! `info`, `check`, `replay` and `export` change nothing, so that they work on read-only media too. `repair` opens worlds that a game
 //! refuses to open, as a file can't be read or only regions are left; it replaces a file only once the new one is complete, and keeps the
@@ -26,7 +26,7 @@
 //! | exit code | when |
 //! | --- | --- |
 //! | 0 | all is well |
-//! | 1 | the world is damaged, or was; what was found is in `troubles` |
+//! | 1 | the world is damaged, or was; `troubles` lists the damage |
 //! | 2 | it could not be done: the reason goes to stderr |
 
 mod ground;

@@ -33,7 +33,7 @@ fn config(world: &World) -> ConnectionConfig {
     }
 }
 
-/// Listens for players who need no token, at most so many. Everything that is replicated has to be registered.
+/// Listens for players that need no token, up to a limit. All replicated types have to be registered before.
 ///
 /// # Errors
 /// When the address is taken.

@@ -63,7 +63,7 @@ impl Key {
         }
         let mut options = OpenOptions::new();
         options.write(true).create_new(true);
-        // Nobody else on this machine may read it.
+        // No other user of this machine may read it.
         #[cfg(unix)]
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
         let digits: String = self.0.iter().map(|byte| format!("{byte:02x}")).collect();

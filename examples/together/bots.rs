@@ -76,7 +76,7 @@ impl Bots {
         }
     }
 
-    /// Have all joined, with everything confirmed, and do they see the same?
+    /// Whether all have joined, everything is confirmed, and all see the same world.
     fn agree(&self) -> bool {
         let is_settled = |bot: &Bot| bot.shared().has_joined() && bot.shared().pending() == 0;
         let first = self.all.first().map(Bot::state);

@@ -348,7 +348,7 @@ pub enum Refusal {
     #[error("too large")]
     TooLarge,
     /// The edit came before the client had begun.
-    #[error("the client has not joined")]
+    #[error("the client has not joined yet")]
     NotJoined,
     /// The server does not have the image of the stamp.
     #[error("the server does not have the image of the stamp")]
@@ -360,24 +360,24 @@ pub enum Refusal {
 #[non_exhaustive]
 pub enum Kick {
     /// It speaks another [`PROTOCOL`].
-    #[error("another version of the protocol")]
+    #[error("client and server have different versions of the protocol")]
     Protocol,
     /// It has another [`SIMULATION`](crate::terrain::SIMULATION).
-    #[error("another version of the simulation")]
+    #[error("client and server have different versions of the simulation")]
     Simulation,
     /// It has another ground.
-    #[error("another ground")]
+    #[error("client and server have different grounds")]
     Ground,
     /// It has another chunk size.
-    #[error("another chunk size")]
+    #[error("client and server have different chunk sizes")]
     ChunkSize,
-    /// It sent too many messages that mean nothing.
+    /// It sent too many invalid messages.
     #[error("too many invalid messages")]
     Malformed,
-    /// It sent far more than it may.
+    /// It sent far more than its budget.
     #[error("flooding")]
     Flood,
-    /// The game wants it.
+    /// The game removed it.
     #[error("kicked")]
     ByGame,
     /// The game [does not admit](super::Server::set_admission) the player. The meaning of the number is up to the game,

@@ -234,7 +234,7 @@ fn commit(
 }
 
 /// What is committed instead if a task panicked: the rejection of its transaction. `None` if it was not a transaction, or
-/// the terrain no longer waits for it; the terrain is loaded anew then.
+/// the terrain no longer waits for it; the terrain is then loaded again.
 fn output_of_panicked(
     (entity, terrain): (Entity, &mut Mut<Terrain>),
     ticket: Option<u64>,

@@ -12,11 +12,11 @@ use super::Times;
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct BurrowFigures {
-    /// Commits so far.
+    /// Commits since the start.
     pub commits: u64,
     /// Brushes in these commits.
     pub brushes: u64,
-    /// Meshes swapped so far.
+    /// Meshes swapped since the start.
     pub swaps: u64,
     /// How long the last transaction took in its task.
     pub last_transaction: Duration,

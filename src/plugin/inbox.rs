@@ -1,7 +1,7 @@
 //! Brushes, undos and redos until they are queued.
 //!
 //! Bevy drops messages after two frames. Games that run the plugin's sets in one state only still get an answer to each
-//! message: what is written meanwhile is kept here.
+//! message: messages that are written meanwhile are kept here.
 
 use bevy::ecs::message::MessageCursor;
 use bevy::ecs::system::SystemParam;

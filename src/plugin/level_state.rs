@@ -21,7 +21,7 @@ use crate::terrain::{KnownNodes, Version};
 /// | --- | --- |
 /// | any perspective, custom and off-axis ones included | by distance. Where it looks does not matter, so turning changes nothing |
 /// | orthographic | by size on the screen in what is in view, coarser around it |
-/// | inactive, or with a picture of no size, say of a minimised window | none |
+/// | inactive, or with a picture of no size, as of a minimised window | none |
 /// | whose `RenderLayers` do not meet the terrain's | none |
 /// | a `Camera2d` | none |
 /// | none, but a [`DetailSource`] | as for a camera at its place |
@@ -29,7 +29,7 @@ use crate::terrain::{KnownNodes, Version};
 /// All that count decide together. While none does, all stays as it is for those that looked last. Distances and speeds are
 /// measured in the terrain's own space and in real time: shifted origins and slow motion change nothing.
 ///
-/// The defaults need no change. A terrain that gets or loses this component loads anew.
+/// The defaults need no change. A terrain that gets or loses this component is loaded again.
 ///
 /// With it, a [`Tile`](super::Tile) has an entity while it is drawn, and of level 0 also while something else needs it, like a
 /// collider. [`SurfaceProcessor`](super::SurfaceProcessor)s are called for tiles and chunks of level 0 only, when they come
@@ -163,11 +163,11 @@ pub(super) struct LevelState {
     pub eyes: Vec<Eye>,
     pub settings: Option<LevelsOfDetail>,
     pub shown: Option<Version>,
-    /// Is all drawn as it should be for these?
+    /// Whether everything is drawn at its chosen level.
     pub is_settled: bool,
     /// Transactions with edits since the cut was last chosen.
     pub edits: u32,
-    /// Were all nodes drawn once?
+    /// Whether all nodes have been drawn once.
     pub is_complete: bool,
 }
 
@@ -202,7 +202,7 @@ impl LevelState {
         self.edits = self.edits.saturating_add(1);
     }
 
-    /// Is the choice for these outdated?
+    /// Whether the choice for these inputs is outdated.
     pub(super) fn is_outdated(&self, eyes: &[Eye], settings: &LevelsOfDetail, shown: Version) -> bool {
         let is_near = |(a, b): (&Eye, &Eye)| {
             a.position.distance(b.position) < NEAR

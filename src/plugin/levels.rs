@@ -22,7 +22,7 @@ use super::{BurrowEngine, BurrowFigures, Held, MaterialColors, SlimVertices};
 use crate::levels::{Eye, View};
 use crate::terrain::{ChooseCut, Terrain};
 
-/// Faster cameras were moved, and do not go on: metres a second.
+/// Faster cameras were teleported, and will not continue like this: metres a second.
 const FASTEST: f32 = 2000.0;
 
 /// A new terrain's cut is reached in steps of this many meshes.

@@ -45,7 +45,7 @@ struct BuiltLevels {
 }
 
 impl Loading {
-    /// Are these surfaces of this terrain, even if the game changed it since?
+    /// Whether these are surfaces of this terrain, even if the game has changed it since.
     fn is_of(&self, terrain: &Terrain) -> bool {
         self.world.version().is_same_world(terrain.world().version())
     }
@@ -231,7 +231,7 @@ pub(super) fn start_loading(
         // For the game this is no change.
         let model = terrain.bypass_change_detection();
         let unseen = entities_of_kind.and_then(|entities| model.take_unseen(entities.shown));
-        // If more has changed than a frame may swap, the terrain is loaded anew over several frames.
+        // If more has changed than a frame may swap, the terrain is loaded again over several frames.
         if let Some(unseen) = unseen.filter(|unseen| unseen.len() <= settings.swaps_per_frame) {
             let task = InFlight::unseen(counter.next(), model, unseen, builder);
             commands.entity(entity).try_insert(task);
@@ -301,7 +301,7 @@ fn loaded(
             failures.remove(&entity);
             let why = panic_message(panic.as_ref());
             error!(
-                "loading the terrain {entity} panicked {ATTEMPTS} times; only what is dug from now on is shown: {why}"
+                "loading the terrain {entity} panicked {ATTEMPTS} times; only later edits are shown: {why}"
             );
             Some((Vec::new(), None))
         }

@@ -129,7 +129,7 @@ impl PluginGroup for BurrowPlugins {
 /// What the plugin does each frame in `Update`, in this order.
 ///
 /// A game may run them in some states only. Nothing is lost meanwhile: brushes, undos and redos are kept and answered
-/// afterwards, and what was put on a terrain, changed or removed is caught up with. Despawned terrains answer at once.
+/// afterwards, and changes of a terrain's components take effect then. Despawned terrains answer at once.
 ///
 /// ```
 /// # use bevy::prelude::*;

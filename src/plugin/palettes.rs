@@ -45,7 +45,7 @@ fn weighted(mix: MaterialMix) -> impl Iterator<Item = (u8, u8)> {
     mix.ids.into_iter().zip(mix.weights).filter(|&(_, weight)| weight > 0)
 }
 
-/// The same mix with its weights in the order of a list. Those of materials that the list lacks go to the heaviest one.
+/// The mix with its weights in the order of a list. Those of materials that the list lacks go to the heaviest one.
 fn in_order(mix: MaterialMix, list: [u8; 4]) -> MaterialMix {
     let (mut weights, mut rest) = ([0u8; 4], 0u8);
     for (id, weight) in weighted(mix) {

@@ -106,7 +106,7 @@ impl SurfaceProcessors {
         self.processors.push(Arc::new(processor));
     }
 
-    /// Are there no processors?
+    /// Whether there are no processors.
     pub fn is_empty(&self) -> bool {
         self.processors.is_empty()
     }
@@ -220,7 +220,7 @@ impl SurfaceBuilder {
         }
     }
 
-    /// Is there nothing to build?
+    /// Whether there is nothing to build.
     pub fn is_idle(&self) -> bool {
         self.mesh_builder.is_none() && self.processors.is_empty()
     }

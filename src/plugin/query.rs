@@ -140,7 +140,7 @@ impl Terrains<'_, '_> {
         nearest.map(|(_, _, terrain, space)| (terrain, space))
     }
 
-    /// Is the place inside the ground?
+    /// Whether the position is inside the ground.
     pub fn is_solid(&self, place: Vec3) -> bool {
         self.terrains.iter().any(|(_, terrain, at, _)| {
             let local = Space::of(at).map(|space| space.inverse.transform_point3(place.as_dvec3()));

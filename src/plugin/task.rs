@@ -107,7 +107,7 @@ impl InFlight {
         })
     }
 
-    /// Is the task done?
+    /// Whether the task is done.
     pub fn is_done(&mut self) -> bool {
         if self.done.is_none() {
             self.done = self.task.check().map(|done| done.map_err(|_| TaskPanicked));

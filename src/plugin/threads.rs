@@ -40,7 +40,7 @@ pub struct ThreadSettings {
 }
 
 impl ThreadSettings {
-    /// The default on a machine with so many cores.
+    /// The default on a machine with this number of cores.
     ///
     /// Transactions use all cores, as their work is short. Background work leaves a core to the frame, since it takes
     /// seconds. Colliders need few: the batches are small.
@@ -96,7 +96,7 @@ impl Pool {
         Self { name, state: RwLock::new(PoolState { count: None, threads: None }) }
     }
 
-    /// Sets how many threads it has. What was given to it before is still done, by the threads of before.
+    /// Sets the number of threads. Earlier work is still done, by the earlier threads.
     fn resize(&self, count: usize) {
         let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
         if state.count != Some(count) {

@@ -1,4 +1,4 @@
-//! Closing worlds: what is left is saved on the store's own thread, and nobody waits for it but an app that ends.
+//! Closing worlds: remaining data is saved on the store's thread, and only an exiting app waits for it.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -109,7 +109,7 @@ pub(crate) fn detach(commands: &mut Commands, entity: Entity, because: ClosedBec
     });
 }
 
-/// Tells of worlds that are closed.
+/// Reports worlds that are closed.
 pub(super) fn tell_closed(
     mut closing: ResMut<ClosingWorlds>,
     mut closed: MessageWriter<WorldClosed>,

@@ -14,9 +14,10 @@ pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
 /// it; the terrain itself they leave out.
 ///
-/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed) says so.
+/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed)
+/// reports it.
 ///
-/// | inserted beside it | what happens |
+/// | inserted on the same entity | what happens |
 /// | --- | --- |
 /// | a `SavedWorld` with another path | the first world is closed, and the second takes the terrain's place, or is made of it |
 /// | a [`Terrain`](crate::terrain::Terrain) over another ground, or of another size | that is another level: the world is closed, and this component removed |
@@ -53,9 +54,9 @@ pub struct WorldStore {
     /// `None` once it is being closed.
     pub(super) store: Option<Store>,
     pub(super) path: PathBuf,
-    /// The last point that was told as durable.
+    /// The last point that was reported as durable.
     pub(super) told: Option<SavePoint>,
-    /// What [`SaveNow`](super::SaveNow) waits for, and whether it was sent again since.
+    /// The point that [`SaveNow`](super::SaveNow) waits for; `asked_again` if another was sent since.
     pub(super) asked: Option<SavePoint>,
     pub(super) asked_again: bool,
     /// Why it is closed, if it is.
@@ -82,9 +83,9 @@ impl WorldStore {
         self.store.as_ref().map_or(0, Store::durable)
     }
 
-    /// Keeps data of the game beside the world: an inventory, the time of day. It is saved in one piece with the commits of this
-    /// frame, so that after a crash nothing that was dug is missing in one and there in the other. What is put again unchanged costs
-    /// nothing, and of what changes in each frame the last value in each [loss window](SavedWorld::loss_window) is saved.
+    /// Stores data of the game with the world: an inventory, the time of day. It is saved together with the commits of
+    /// this frame, so that after a crash data and ground match. An unchanged value is not written again; of a value
+    /// that changes in each frame, the last one in each [loss window](SavedWorld::loss_window) is saved.
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         if let Some(store) = &mut self.store {
             store.put(key, bytes);

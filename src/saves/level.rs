@@ -82,7 +82,7 @@ impl AssetLoader for LevelLoader {
     }
 }
 
-/// Writes packed levels, say in an asset processor.
+/// Writes packed levels, for example in an asset processor.
 #[derive(Default, TypePath)]
 pub struct LevelSaver;
 
@@ -104,13 +104,14 @@ impl AssetSaver for LevelSaver {
     }
 }
 
-/// The terrain of this entity begins as a level. Insert it with a terrain without edits, which gives the ground; the terrain is
-/// [`Held`] until the level is loaded, and begins without it where it can't be, which is logged as an error.
+/// Makes the terrain of this entity start from a level. Insert it with a terrain without edits, which provides the
+/// ground; the terrain is [`Held`] until the level is loaded. If it can't be loaded, an error is logged and the terrain
+/// starts without it.
 ///
-/// With a [`SavedWorld`](super::SavedWorld) beside it, a world that was saved goes on, and only a new one begins as the level. That world
-/// saves only what differs from the level, and needs a level to go on: where it is another one, say a new version of it,
-/// [`SavedWorld::base_changed`](super::SavedWorld::base_changed) says what happens. Inserted beside a world that is open already, it does
-/// nothing: what was dug there stays.
+/// With a [`SavedWorld`](super::SavedWorld) on the same entity, an existing world is continued, and only a new one
+/// starts from the level. That world saves only its differences from the level, and needs a level to be opened: if that
+/// is another one, for example a new version, [`SavedWorld::base_changed`](super::SavedWorld::base_changed) decides
+/// what happens. If a world is open already, inserting it has no effect.
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct StartLevel(pub Handle<BurrowLevel>);
 
@@ -131,7 +132,7 @@ impl Waiting {
     }
 }
 
-/// How long a level is waited for before that is told.
+/// How long a level is waited for before that is logged.
 const TOLD: Duration = Duration::from_secs(10);
 
 /// The levels that are loaded, and those that can't be.
@@ -173,7 +174,7 @@ pub(super) fn hold(new: On<Insert, StartLevel>, mut commands: Commands) {
     commands.queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(entity) else { return };
         if entity.contains::<WorldStore>() {
-            warn!("a level for {} changes nothing: its saved world goes on", entity.id());
+            warn!("a level for {} has no effect: its saved world continues", entity.id());
             return;
         }
         if let Some(mut terrain) = entity.get_mut::<Terrain>() {
@@ -189,7 +190,7 @@ pub(super) fn give_up(gone: On<Remove, StartLevel>, mut commands: Commands) {
     release(&mut commands, gone.entity);
 }
 
-/// Makes a terrain anew where another one takes the place of the one that a level was to be.
+/// Starts again to make a terrain from the level if another terrain replaces the first one.
 pub(super) fn make_anew(
     new: On<Insert, Terrain>,
     making: Query<(), (With<MakingLevel>, Allow<Disabled>)>,

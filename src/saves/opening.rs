@@ -17,9 +17,9 @@ use crate::plugin::{Held, ThreadTask, Threads, free_later};
 use crate::store::{BaseLevel, Progress, Store, StoreError, StoreOptions, StoreTrouble, read_level};
 use crate::terrain::{Terrain, TerrainSettings, Version, WorldParts};
 
-/// How long a world that is open elsewhere is waited for: longer than a server that ends takes to close it.
+/// How long to wait for a world that is open elsewhere: longer than an exiting server takes to close it.
 const LOCK_WAIT: Duration = Duration::from_secs(15);
-/// How often it is tried to open it, and when it is told that somebody has to close it.
+/// The interval of attempts to open it, and the time after which a trouble is reported.
 const LOCK_TRY: Duration = Duration::from_millis(50);
 const LOCK_TOLD: Duration = Duration::from_secs(2);
 
@@ -89,7 +89,7 @@ impl OpeningWorld {
         }
     }
 
-    /// Whether it should be told now that somebody else has the world open.
+    /// Whether to report now that another process has the world open.
     fn tells_of_lock(&mut self) -> bool {
         let is_late = self.task.is_none() && self.since.elapsed() >= LOCK_TOLD;
         is_late && !std::mem::replace(&mut self.told, true)
@@ -125,7 +125,7 @@ pub(crate) struct WorldReader {
     level: Option<(BurrowLevel, String)>,
     ground: Arc<Ground>,
     settings: TerrainSettings,
-    /// What is made where there is no world yet.
+    /// The parts of a new world, if there is none yet.
     parts: WorldParts,
     pub progress: Progress,
 }
@@ -148,7 +148,7 @@ impl WorldReader {
             && terrain.voxel_size() == settings.voxel_size
     }
 
-    /// Reads the world, or makes one. Waits for whoever has it open.
+    /// Reads the world, or creates it. Waits while another process has it open.
     pub fn read(self) -> Result<ReadWorld, StoreError> {
         let start = Instant::now();
         loop {
@@ -162,7 +162,7 @@ impl WorldReader {
     /// Reads the world, or makes one, unless somebody has it open.
     fn try_read(&self) -> Result<Found, StoreError> {
         let Self { saved, level, ground, settings, parts, progress } = self;
-        // One that can't be read was told of when the terrain was made of it.
+        // A level that can't be read was reported when the terrain was made from it.
         let level = level.as_ref();
         let level =
             level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, ground).ok()?, path)));
@@ -193,7 +193,7 @@ impl WorldReader {
     }
 }
 
-/// Holds a terrain until its world is read. What is under way on it is done on the world that was read.
+/// Holds a terrain until its world is read. Running edits are applied to the world that was read.
 pub(super) fn hold(
     new: On<Insert, SavedWorld>,
     mut commands: Commands,
@@ -211,7 +211,8 @@ pub(super) fn give_up(gone: On<Remove, SavedWorld>, mut commands: Commands) {
     release(&mut commands, gone.entity);
 }
 
-/// Lets a terrain go on, unless its level or its saved world is still to come. Nothing else takes [`Held`] away in this module.
+/// Removes [`Held`] from a terrain, unless its level or its saved world is still missing. Nothing else in this module
+/// removes it.
 pub(super) fn release(commands: &mut Commands, entity: Entity) {
     commands.queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(entity) else { return };
@@ -225,7 +226,7 @@ pub(super) fn release(commands: &mut Commands, entity: Entity) {
     });
 }
 
-/// Starts to read anew where another terrain takes the place of the one that a world was read for.
+/// Starts to read again if another terrain replaces the one that a world was read for.
 pub(super) fn read_anew(
     new: On<Insert, Terrain>,
     opening: Query<(&OpeningWorld, &Terrain), Allow<Disabled>>,
@@ -301,7 +302,7 @@ pub(super) fn finish_opening(
         commands.entity(entity).try_remove::<OpeningWorld>();
         let outcome = outcome.map(|found| {
             let store = match found {
-                // The terrain goes on as it is, and so does its history.
+                // The terrain and its history stay as they are.
                 Found::New(ReadWorld { mut store, terrain: copy, .. }) => {
                     free_later(copy);
                     store.adopt(&terrain);

@@ -26,7 +26,7 @@ pub struct BaseLevel {
 /// Which level a world was begun on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LevelName {
-    /// What the game calls it: a path, say. It is only told, never compared.
+    /// The game's name for it, such as a path. It is only used in messages, never compared.
     pub label: String,
     /// Hash of the level's bricks and fields.
     pub hash: u64,
@@ -82,7 +82,7 @@ impl BaseLevel {
         }
     }
 
-    /// Is it the level that a world was begun on?
+    /// Checks that this is the level that a world is based on.
     pub(super) fn expect(level: Option<&Self>, name: Option<&LevelName>) -> Result<(), StoreError> {
         match (level, name) {
             (Some(level), Some(name)) if level.name.hash != name.hash => Err(StoreError::LevelChanged {
@@ -120,7 +120,7 @@ impl BaseLevel {
         self.level.regions.keys().copied()
     }
 
-    /// Does the level hold anything in a region?
+    /// Whether the level holds anything in a region.
     pub(super) fn holds(&self, at: RegionPos) -> bool {
         self.level.regions.contains_key(&at)
     }

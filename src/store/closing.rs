@@ -41,8 +41,8 @@ fn message_of(panic: &(dyn Any + Send)) -> String {
     text.unwrap_or("no reason is known").to_owned()
 }
 
-/// A [`Store`](super::Store) that is being [closed](super::Store::close). Its thread goes on if this is dropped, and the world is
-/// locked until it is done.
+/// A [`Store`](super::Store) that is being [closed](super::Store::close). If this is dropped, its thread still
+/// finishes, and the world stays locked until then.
 #[derive(Debug)]
 pub struct ClosingStore {
     shared: Arc<Shared>,
@@ -97,7 +97,7 @@ impl ClosingStore {
         }
     }
 
-    /// What happened since the last call that a player or an operator should be told of.
+    /// Troubles since the last call, to show to a player or an operator.
     pub fn take_troubles(&self) -> Vec<StoreTrouble> {
         self.shared.take_troubles()
     }

@@ -55,7 +55,7 @@ impl DatabaseError {
     }
 }
 
-/// Does the error say that a file holds something else than it should?
+/// Whether the error means that the content of a file is invalid.
 fn is_about_content(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof)
 }

@@ -113,7 +113,7 @@ impl fmt::Debug for SimulatedDisk {
     }
 }
 
-/// A disk at one moment, from which it can go on after a loss of power.
+/// The state of a disk at one moment, from which it can restart after a loss of power.
 #[derive(Clone)]
 pub struct DiskImage(State);
 
@@ -124,13 +124,13 @@ impl fmt::Debug for DiskImage {
 }
 
 impl DiskImage {
-    /// Operations on the disk so far.
+    /// The number of operations on the disk.
     pub fn operations(&self) -> u64 {
         self.0.operations
     }
 
-    /// The disk after a loss of power. What was synced is there. Of what was not, each sector is there if `keep` says so; of
-    /// changes to folders there are the first ones, up to one for which it says no.
+    /// The disk after a loss of power. Synced data is there. An unsynced sector is there if `keep` returns `true`;
+    /// changes to folders are there up to the first one for which it returns `false`.
     pub fn lose_power(&self, mut keep: impl FnMut() -> bool) -> SimulatedDisk {
         let before = &self.0;
         let mut names = before.synced_names.clone();
@@ -222,7 +222,7 @@ impl SimulatedDisk {
         self.state().fault_at = Some((operation, fault));
     }
 
-    /// Operations so far.
+    /// The number of operations.
     pub fn operations(&self) -> u64 {
         self.state().operations
     }

@@ -26,7 +26,7 @@ pub trait Files: fmt::Debug + Send + Sync + 'static {
     /// When there is no such file, and when the system refuses.
     fn read(&self, path: &str) -> io::Result<Vec<u8>>;
 
-    /// Is there such a file?
+    /// Whether the file exists.
     ///
     /// # Errors
     /// When the system refuses.
@@ -109,10 +109,10 @@ pub trait OpenFile: fmt::Debug + Send + Sync {
     /// When the system refuses.
     fn set_length(&self, length: u64) -> io::Result<()>;
 
-    /// Makes sure that what was written is there after a loss of power too.
+    /// Makes all written data durable, so that it survives a loss of power.
     ///
     /// # Errors
-    /// When the system refuses; then nothing is known of what was written since the last time that it did not.
+    /// When the system refuses. Data written since the last success may then be lost.
     fn sync(&self) -> io::Result<()>;
 }
 

@@ -35,7 +35,7 @@ pub(super) struct RegionRecord {
     world: WorldId,
     /// Its bytes. Unpacked they may be far more.
     sealed: Box<[u8]>,
-    /// Does it say how the region differs from the level below, instead of all that it holds?
+    /// Whether it holds the differences from the level below instead of the whole region.
     is_change: bool,
 }
 
@@ -91,7 +91,7 @@ pub(super) struct Contents {
     error: Option<io::Error>,
     /// The checkpoints that the file of regions holds: two alike, but for damage.
     checkpoints: Vec<Checkpoint>,
-    /// The copies beside the journal.
+    /// The copies next to the journal.
     copies: Vec<Checkpoint>,
     /// Those of other files that may hold regions.
     other_checkpoints: Vec<Checkpoint>,
@@ -278,7 +278,8 @@ impl Contents {
             let run = runs.range(..=from.saturating_add(1)).next_back();
             run.map_or(from, |(_, last)| from.max(*last))
         };
-        // Those that lie beside their regions come first: over another ground, regions have the same revisions and other content.
+        // Those in a file with their regions come first: over another ground, regions have equal revisions and
+        // different content.
         let all = self.checkpoints.iter().chain(others).chain(&heads);
         // Among equals the newest, after which least has to be replayed.
         let rank = |checkpoint: &&Checkpoint| {
@@ -303,8 +304,8 @@ impl Contents {
         runs
     }
 
-    /// A checkpoint of all regions that were found, where none is left: rules, data of the game's and what was where nothing is
-    /// left are unknown.
+    /// A checkpoint of all regions that were found, if no checkpoint is left: rules, the game's data and missing
+    /// regions are unknown.
     pub fn assume_checkpoint(&self) -> Checkpoint {
         let mut regions = BTreeMap::new();
         for (at, records) in self.regions.iter().chain(&self.other_regions) {
@@ -446,7 +447,7 @@ mod tests {
     use crate::store::SimulatedDisk;
     use crate::terrain::{Terrain, TerrainSettings};
 
-    /// The same frame as a newer version would write it.
+    /// The frame as a newer version would write it.
     fn newer(frame: &mut [u8]) {
         let body = frame.len() - 8;
         frame[4] = 9;

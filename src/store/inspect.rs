@@ -50,7 +50,7 @@ pub struct WorldInfo {
     pub segments: usize,
     /// Bytes of the log.
     pub log_bytes: u64,
-    /// Does the log reach from the first commit to the last?
+    /// Whether the log reaches from the first commit to the last.
     pub is_log_whole: bool,
     /// Keys of the game's data, and how many bytes each has.
     pub game: Vec<(String, usize)>,
@@ -66,7 +66,7 @@ pub fn inspect(folder: impl AsRef<Path>) -> Result<WorldInfo, StoreError> {
     inspect_in(&Folder::new(folder.as_ref()))
 }
 
-/// The same in other [files](Files).
+/// Inspects a world in other [files](Files).
 ///
 /// # Errors
 /// As for a folder.
@@ -166,8 +166,8 @@ pub struct WorldCheck {
     pub game: BTreeMap<String, Vec<u8>>,
     /// What opening it would tell.
     pub troubles: Vec<String>,
-    /// Was the whole log replayed from the first commit, and did it lead to the same world? `None` if it was not replayed, or does
-    /// not reach back so far.
+    /// Whether replaying the whole log from the first commit gave the same world. `None` if it was not replayed, or
+    /// does not reach back to the first commit.
     pub replays: Option<bool>,
 }
 
@@ -184,7 +184,7 @@ pub fn check(
     check_in(&Folder::new(folder.as_ref()), ground, level)
 }
 
-/// The same in other [files](Files).
+/// Checks a world in other [files](Files).
 ///
 /// # Errors
 /// As for a folder.

@@ -28,7 +28,7 @@ struct Current {
     number: u64,
     file: Box<dyn OpenFile>,
     end: u64,
-    /// Is no frame in it durable yet?
+    /// Whether no frame in it is durable yet.
     is_fresh: bool,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct Journal {
 }
 
 impl Journal {
-    /// Goes on behind these segments with this frame. The next segment begins with a checkpoint.
+    /// Continues after these segments with this frame. The next segment begins with a checkpoint.
     pub fn new(
         files: Arc<dyn Files>,
         world: WorldId,
@@ -140,7 +140,7 @@ impl Journal {
         !self.segments.is_empty()
     }
 
-    /// Whether the segment that is written is as long as one should be in a log of so many bytes.
+    /// Whether the present segment has reached its full length in a log limited to `log_bytes`.
     pub fn is_long(&self, log_bytes: u64) -> bool {
         let most = SEGMENT_BYTES.min(log_bytes / LEAST_SEGMENTS);
         self.current.as_ref().is_some_and(|current| current.end >= most)
@@ -186,7 +186,8 @@ impl Journal {
         self.head = (revision, checkpoint);
     }
 
-    /// Removes the oldest segments until the rest takes no more than so many bytes on the disk, but none with frames after `needed`.
+    /// Removes the oldest segments until the rest takes at most `bytes` on the disk, but none with frames after
+    /// `needed`.
     pub fn trim(&mut self, bytes: u64, needed: u64) -> io::Result<()> {
         let mut total: u64 = self.segments.iter().map(|segment| segment::on_disk(segment.bytes)).sum();
         let own = self.current.as_ref().map(|current| current.number);

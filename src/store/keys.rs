@@ -4,7 +4,8 @@ use glam::IVec3;
 
 use crate::lattice::RegionPos;
 
-/// The keys of the checkpoint, which is stored twice: without it, intact regions could not be told from older ones.
+/// The keys of the checkpoint, which is stored twice: without it, intact regions could not be distinguished from older
+/// ones.
 pub(super) const CHECKPOINTS: [&[u8]; 2] = [b"c", b"d"];
 
 /// What a record holds.

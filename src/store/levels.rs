@@ -48,7 +48,7 @@ const PENDING: &str = "level.pending";
 /// What of a level is put in place: all new files are there, and durable.
 #[derive(Default, Serialize, Deserialize)]
 struct Pending {
-    /// Files that have new ones beside them, unless these were put in place already.
+    /// Files with a new version next to them that may not have replaced them yet.
     changed: BTreeSet<String>,
     /// Files of regions that hold nothing any more.
     removed: BTreeSet<String>,
@@ -69,7 +69,7 @@ impl Pending {
         }
     }
 
-    /// Writes new files beside the old ones, and what is to be done then.
+    /// Writes new files next to the old ones, and a list of the remaining steps.
     fn prepare(folder: &Path, files: &LevelFiles) -> Result<(), StoreError> {
         let mut pending = Self::default();
         for (name, bytes) in files {
@@ -251,7 +251,7 @@ mod tests {
         assert!(seen[1..].iter().all(|own| *own == after));
         let left = fs::read_dir(&folder).unwrap().flatten().count();
         assert_eq!(left, after.len(), "nothing is left over");
-        // What was not finished is finished by the next one.
+        // The next save finishes an interrupted one.
         Pending::prepare(&folder, &before).unwrap();
         save_level(&folder, &new).unwrap();
         assert_eq!(read_level_files(&folder).unwrap(), after);

@@ -122,7 +122,7 @@ impl Mirror {
         }
     }
 
-    /// Is all as in the level below, or pristine without one?
+    /// Whether everything equals the level below, or is pristine if there is none.
     pub fn is_as_level(&self) -> bool {
         let next_field = self.level.as_ref().map_or(0, |level| level.level().next_field);
         self.next_field == next_field && self.regions.values().all(|region| !region.is_stored)

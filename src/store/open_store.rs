@@ -37,11 +37,11 @@ const LOG_BYTES: usize = 256 << 20;
 /// Bytes that may wait for the thread, whatever the options say.
 const LEAST_QUEUED: usize = 1 << 20;
 
-/// A world in a folder. Commits go to a thread of its own, which makes them durable within the
-/// [loss window](StoreOptions::loss_window); whoever digs never waits for the disk.
+/// A world in a folder. Commits are sent to a separate thread, which makes them durable within the
+/// [loss window](StoreOptions::loss_window); the caller never waits for the disk.
 ///
-/// Dropping it saves what is left, makes a checkpoint, and waits for both, [as long as it may](StoreOptions::close_timeout).
-/// [`close`](Self::close) does so without waiting.
+/// Dropping it saves the remaining commits, makes a checkpoint, and waits for both, [for a limited
+/// time](StoreOptions::close_timeout). [`close`](Self::close) does so without waiting.
 pub struct Store {
     shared: Arc<Shared>,
     /// `None` once it is closed.
@@ -81,14 +81,14 @@ pub struct Opened {
     pub terrain: Terrain,
     /// Commits after the last checkpoint, which were replayed.
     pub replayed: u64,
-    /// Can damaged regions be rebuilt from the log?
+    /// Whether damaged regions can be rebuilt from the log.
     pub is_log_whole: bool,
-    /// What should be told.
+    /// Troubles to show to a player or an operator.
     pub troubles: Vec<StoreTrouble>,
 }
 
 impl Store {
-    /// Is there a world in this folder?
+    /// Whether there is a world in this folder.
     pub fn is_in(folder: impl AsRef<Path>) -> bool {
         let files = Folder::new(folder.as_ref());
         has_world(&files).unwrap_or(false)
@@ -107,7 +107,7 @@ impl Store {
         Self::create_in(Arc::new(Folder::new(folder.as_ref())), terrain, options)
     }
 
-    /// The same in other [files](Files).
+    /// Creates a world in other [files](Files).
     ///
     /// # Errors
     /// When there is a world already, and when the files can't be written.
@@ -185,9 +185,9 @@ impl Store {
     /// # Errors
     /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below has changed
     /// and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing, and when
-    /// nothing of it can be read. So is a world of which a file can't be read at the moment that holds something that no other file
-    /// does, and one whose ground had a size in which this one has no room for what was dug. Nothing is changed then. Whatever else
-    /// is wrong is told in [`Opened::troubles`].
+    /// nothing of it can be read. Also when a file that can't be read at the moment holds something that no other file
+    /// has, and when this ground has no room for edits that were made on a ground of another size. Nothing is changed
+    /// then. All other problems are reported in [`Opened::troubles`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -196,7 +196,7 @@ impl Store {
         Self::open_in(Arc::new(Folder::new(folder.as_ref())), ground, options)
     }
 
-    /// The same from other [files](Files).
+    /// Opens a world in other [files](Files).
     ///
     /// # Errors
     /// As for a folder.
@@ -302,11 +302,11 @@ impl Store {
     /// microseconds, and does nothing where nothing was committed. Where it is another terrain than before, of the same size, all of
     /// that takes the place of what was saved.
     ///
-    /// While so much waits for a disk that does not answer that no more is kept, nothing is taken, and [all of the
-    /// terrain](Self::append_whole) once there is room.
+    /// While the limit on data that waits for a disk is reached, nothing is taken. Once there is room, the [whole
+    /// terrain](Self::append_whole) is saved.
     ///
     /// # Errors
-    /// [`StoreError::OtherSize`] where the terrain has another size than what is saved, and nothing is taken then;
+    /// [`StoreError::OtherSize`] if the terrain has another size than the saved world; then nothing is taken;
     /// [`StoreError::Ended`] when the store's thread has panicked.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
         let is_next = self.follows(terrain) && !self.has_gap;
@@ -355,7 +355,7 @@ impl Store {
         if saved == given { Ok(()) } else { Err(StoreError::OtherSize { saved, given }) }
     }
 
-    /// Whether so much waits for the thread that it should take that first.
+    /// Whether more data waits for the thread than allowed.
     fn is_full(&self) -> bool {
         self.shared.queued() > self.most_queued
     }
@@ -365,7 +365,7 @@ impl Store {
         if is_running { Ok(()) } else { Err(StoreError::Ended) }
     }
 
-    /// Does every record follow the one before?
+    /// Whether every record follows the previous one.
     fn continues(&self, records: &[CommitRecord]) -> bool {
         let mut at = self.point.revision;
         records.iter().all(|record| {
@@ -486,8 +486,8 @@ impl Store {
         self.ask(wait, Message::Flush)
     }
 
-    /// Waits until a checkpoint is made of all that was taken, so that nothing has to be replayed. It is made by itself now and
-    /// then, and when the store is dropped.
+    /// Waits for a checkpoint of everything that was taken, so that nothing has to be replayed. Checkpoints are also
+    /// made regularly, and when the store is dropped.
     ///
     /// # Errors
     /// When it can't be saved for now.
@@ -505,7 +505,7 @@ impl Store {
         self.send(Message::Checkpoint(channel().0))
     }
 
-    /// The same, and makes the file of regions as small as it can be.
+    /// Makes a checkpoint, and makes the file of regions as small as possible.
     ///
     /// # Errors
     /// When it can't be saved for now.
@@ -513,8 +513,9 @@ impl Store {
         self.ask(Duration::MAX, Message::Compact)
     }
 
-    /// Keeps data of the game's under a key, say an inventory or the time of day. It becomes durable together with the commits
-    /// of the next [`append`](Self::append) or [`follow`](Self::follow): after a crash both are there, or neither.
+    /// Stores data of the game under a key, such as an inventory or the time of day. It becomes durable together with
+    /// the commits of the next [`append`](Self::append) or [`follow`](Self::follow): after a crash both are there, or
+    /// neither.
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         let (key, bytes) = (key.into(), bytes.into());
         // Games put the same again and again, which takes no room in the log.
@@ -543,7 +544,8 @@ impl Store {
         &self.game
     }
 
-    /// What happened since the last call that a player or an operator should be told of; if nobody asks, the latest 256 are kept.
+    /// Troubles since the last call, to show to a player or an operator. If they are not taken, the latest 256 are
+    /// kept.
     pub fn take_troubles(&self) -> Vec<StoreTrouble> {
         self.shared.take_troubles()
     }
@@ -570,7 +572,7 @@ impl Store {
 impl Drop for Store {
     fn drop(&mut self) {
         if self.open.is_some() {
-            // If the thread panicked, what is durable stays so.
+            // If the thread panicked, durable commits stay durable.
             drop(self.begin_closing().wait(self.close_timeout));
         }
     }

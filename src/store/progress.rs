@@ -42,13 +42,13 @@ pub(super) struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    /// So many units from the share of now to another.
+    /// Work of `total` units that advances the progress from its present share to `to`.
     pub fn until(progress: Option<&'a Progress>, to: f32, total: u64) -> Self {
         let from = progress.map_or(0.0, Progress::share);
         Self { progress, from, to, total, done: AtomicU64::new(0) }
     }
 
-    /// So many more units are done.
+    /// Adds finished units.
     pub fn advance(&self, units: u64) {
         let Some(progress) = self.progress else { return };
         let done = self.done.fetch_add(units, Ordering::Relaxed).saturating_add(units);

@@ -46,11 +46,11 @@ pub(super) struct Recovered {
     pub checkpoint: u64,
     /// Commits that were replayed.
     pub replayed: u64,
-    /// Can damaged regions be rebuilt from the log?
+    /// Whether damaged regions can be rebuilt from the log.
     pub is_log_whole: bool,
     /// Whether the log reaches from the first commit to the checkpoint, and leads elsewhere.
     pub has_other_log: bool,
-    /// Are its records, or its log, those of another world than it is now?
+    /// Whether its records or its log belong to another world than the present one.
     pub is_new: bool,
     pub findings: Findings,
     /// Why the frame after the last one was refused.
@@ -63,7 +63,7 @@ pub(super) struct Findings {
     /// Damaged regions that were rebuilt or lost, and whether they are lost.
     pub damaged: Vec<RegionPos>,
     pub is_lossy: bool,
-    /// Regions over another ground than they were saved with, if the ground is another one, and whether edits were made anew.
+    /// Set if the ground changed since the save: the number of affected regions, and how they were converted.
     pub base_changed: Option<(usize, &'static str)>,
     /// Commits that another [`SIMULATION`](crate::terrain::SIMULATION) made, and that were made again.
     pub remade: Option<u64>,
@@ -368,8 +368,8 @@ fn load_regions(
         fit_fields(&mut change, grid);
     }
     if !is_same_level || checkpoint.metadata.ground != ground.hash() {
-        // Fields of two levels may overlap, and have one name: the new one's go on, and grow. Beyond the rim of a smaller ground, edits
-        // reach into more chunks.
+        // Fields of two levels may overlap and have one name: those of the new level continue, and grow. Beyond the rim
+        // of a smaller ground, edits reach into more chunks.
         change.cover(grid);
     }
     let parts = WorldParts {
@@ -514,7 +514,7 @@ fn reach(change: &WorldChange) -> Option<GroundSize> {
 }
 
 impl Findings {
-    /// What to report, given where copies of damaged records are, what is wrong with the file of regions, and where that is kept.
+    /// The troubles to report, given the copies of damaged records, the damage of the file of regions, and its copy.
     pub fn troubles(
         &self,
         copies: &BTreeMap<RegionPos, String>,
@@ -554,8 +554,8 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::store::format::frame::WorldId;
 
-    /// Writes the frames of a journal anew, as a version with another simulation would have written them: on another base, and with
-    /// other hashes.
+    /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,
+    /// and with other hashes.
     fn by_another_simulation(disk: &SimulatedDisk, world: WorldId, ground: &Ground) {
         for number in segment::list(disk).unwrap() {
             let found = segment::read(disk, Some(world), number).unwrap();

@@ -1,4 +1,4 @@
-//! A part of a world that is saved by itself.
+//! Regions: the parts of a world that are saved separately.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ pub(super) struct Region {
 }
 
 impl Region {
-    /// Does it hold neither bricks nor fields?
+    /// Whether it holds neither bricks nor fields.
     pub fn is_empty(&self) -> bool {
         self.bricks.is_empty() && self.fields.is_empty()
     }

@@ -94,7 +94,7 @@ impl RegionFile {
                 if open.has_failed() {
                     self.next = Next::Whole(Old::Removed);
                 }
-                // It takes nothing more after an error, and has to be opened anew.
+                // After an error it accepts no writes, and has to be opened again.
                 self.open = None;
             }
             return written;

@@ -1,6 +1,6 @@
-//! How a file takes the place of another: the only way in which one is ever replaced.
+//! Replacing a file by another one: the only way in which files are ever replaced.
 //!
-//! 1. The new file is written beside the old one, whole, and made durable.
+//! 1. The complete new file is written next to the old one, and made durable.
 //! 2. The old one is moved to quarantine, or removed where the new one holds all that it held.
 //! 3. The new one gets its name.
 //!
@@ -45,7 +45,7 @@ impl Replaced<'_> {
         if files.exists(self.unfinished)? {
             if is_complete() {
                 kept = self.put_in_place(files, old)?;
-                // What is there now is complete.
+                // The present file is complete.
                 old = Old::Removed;
             } else if files.exists(self.path)? {
                 files.remove(self.unfinished)?;
@@ -54,7 +54,7 @@ impl Replaced<'_> {
             }
         }
         if let Err(error) = build(self.unfinished) {
-            // What is left of it takes space, and is removed at the next try at the latest.
+            // The unfinished file takes space, and is removed at the next try at the latest.
             drop(files.remove(self.unfinished));
             return Err(error);
         }
@@ -65,7 +65,7 @@ impl Replaced<'_> {
     /// Lets the unfinished file, which is complete, take the place of the old one.
     fn put_in_place(self, files: &dyn Files, old: Old) -> io::Result<Option<String>> {
         let folder = self.path.rsplit_once('/').map_or("", |(folder, _)| folder);
-        // A process that was killed may not have come so far.
+        // A killed process may not have synced it.
         files.open(self.unfinished, Opening::Existing)?.sync()?;
         files.sync_folder(folder)?;
         let mut kept = None;

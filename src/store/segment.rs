@@ -39,7 +39,8 @@ pub(super) fn path(segment: u64) -> String {
     format!("{FOLDER}/{segment:08}.log")
 }
 
-/// The greatest number of a segment, a frame or a revision that is read: others follow without an overflow. Nobody gets so far.
+/// The greatest number of a segment, a frame or a revision that is read, so that counting cannot overflow. No real
+/// world reaches it.
 pub(super) const MOST_NUMBER: u64 = 1 << 60;
 
 /// The segment with this file name. Files that somebody else put there have other names.

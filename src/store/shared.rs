@@ -87,7 +87,7 @@ impl Shared {
         self.report().durable
     }
 
-    /// Enters that everything up to a point is durable. What is durable stays so: an earlier point changes nothing.
+    /// Records that everything up to a point is durable. An earlier point changes nothing.
     pub fn set_durable(&self, point: SavePoint) {
         let mut report = self.report();
         report.durable = report.durable.max(Some(point));

@@ -32,15 +32,15 @@ pub(super) const CHECKPOINT_TIME: Duration = Duration::from_secs(30);
 /// Where the answer to a request goes: the revision that is durable then.
 pub(super) type Answer = Sender<Result<u64, StoreError>>;
 
-/// What the thread is told.
+/// A message to the thread.
 pub(super) enum Message {
-    /// What has to be saved.
+    /// Saves this.
     Save(Given),
-    /// Makes all that was told so far durable.
+    /// Makes all earlier messages durable.
     Flush(Answer),
-    /// Makes a checkpoint of all that was told so far.
+    /// Makes a checkpoint of all earlier messages.
     Checkpoint(Answer),
-    /// The same, and makes the database as small as it can be.
+    /// Makes a checkpoint, and makes the database as small as possible.
     Compact(Answer),
 }
 
@@ -49,7 +49,7 @@ pub(super) struct Given {
     /// Where this leads to.
     pub point: SavePoint,
     pub content: Content,
-    /// What the game put beside it.
+    /// The game's data for it.
     pub game: Vec<GameChange>,
 }
 
@@ -145,9 +145,10 @@ pub(super) struct State {
     /// Commits since the last checkpoint, and when the first of them came.
     pub commits: u64,
     pub changed: Option<Instant>,
-    /// Are commits missing in the journal since the last checkpoint, so that only a checkpoint makes them durable?
+    /// Whether commits since the last checkpoint are missing in the journal, so that only a checkpoint makes them
+    /// durable.
     pub has_gap: bool,
-    /// Is a checkpoint being made that ends a gap? Frames are durable with it only.
+    /// Whether a checkpoint is being made that ends a gap. Frames become durable only with it.
     pub after_gap: bool,
     /// Up to where frames were written since the last checkpoint was begun.
     pub written: Option<SavePoint>,
@@ -198,7 +199,7 @@ impl Writer {
         self.checkpoint(None)
     }
 
-    /// The same, or else as soon as it can be done.
+    /// Saves the whole world now, or as soon as possible.
     pub fn save_all_or_later(&mut self) {
         self.mirror.mark_all();
         if self.checkpoint(None).is_err() {
@@ -206,8 +207,8 @@ impl Writer {
         }
     }
 
-    /// Lets the journal go on in a new segment. The first one of all begins with the state of now, so that a world can be made of
-    /// the log alone; in others that would only take room away from commits.
+    /// Continues the journal in a new segment. The very first segment begins with the present state, so that a world
+    /// can be made from the log alone; in others this would only reduce the room for commits.
     pub fn begin_segment(&mut self) {
         let mut checkpoint = Vec::new();
         if !self.journal.has_segments() {
@@ -221,7 +222,7 @@ impl Writer {
         self.journal.begin_segment(self.mirror.revision, checkpoint);
     }
 
-    /// Does what it is told until nobody can tell it anything any more, and then makes a last checkpoint.
+    /// Handles messages until the channel is closed, and then makes a last checkpoint.
     pub fn run(mut self, messages: &Receiver<Message>) {
         loop {
             let message = match self.state.later.pop_front() {
@@ -238,7 +239,7 @@ impl Writer {
             }
             self.tick(messages);
         }
-        // What can't be saved now is lost with the process; the game was told.
+        // Data that can't be saved now is lost with the process; the game was notified.
         let mut is_saved = self.flush().is_ok();
         if is_saved && self.is_changed() {
             is_saved = self.checkpoint(None).is_ok();
@@ -249,7 +250,7 @@ impl Writer {
         }
     }
 
-    /// Is there anything that the database does not hold?
+    /// Whether the database lacks any changes.
     fn is_changed(&self) -> bool {
         self.mirror.is_dirty() || self.state.has_gap || self.journal.last_frame() > self.checkpoints[1]
     }
@@ -315,7 +316,7 @@ impl Writer {
         drop(answer.send(done.map(|()| revision())));
     }
 
-    /// Makes all that came so far durable, by the log if that has no gap.
+    /// Makes everything received durable, through the log if that has no gap.
     fn make_durable(&mut self, messages: &Receiver<Message>) -> Result<(), StoreError> {
         if !self.state.has_gap {
             self.flush()?;
@@ -432,7 +433,7 @@ impl Writer {
                 Ok(())
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                // What was durable is gone with the file.
+                // Durable commits are lost with the file.
                 self.leave_gap();
                 Err(self.fail(&error.to_string()))
             }
@@ -457,7 +458,7 @@ impl Writer {
         }
     }
 
-    /// Tells of a failure once, and waits longer each time.
+    /// Reports a failure once, and waits longer each time.
     pub(super) fn fail(&mut self, why: &str) -> StoreError {
         let wait = match &self.state.failing {
             Some(failing) => (failing.wait * 2).min(RETRY.1),

@@ -89,8 +89,8 @@ pub(super) fn release_pieces(
     }
 }
 
-/// Takes what the player asked for, follows the server that there is, and sends what is to be sent as soon as the client is not at
-/// work.
+/// Takes the player's requests, follows the present server, and sends messages as soon as the client is not
+/// busy.
 pub(super) fn send(
     service: Res<Service>,
     mut sharing: ResMut<Sharing>,

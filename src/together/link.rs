@@ -37,7 +37,7 @@ pub(super) struct Link {
     pub kicked: Option<(Kick, u64)>,
     pub inbox: Vec<(Lane, Vec<u8>)>,
     pub asks: Vec<Ask>,
-    /// So many edits wait that no more are taken.
+    /// Whether the limit of waiting edits is reached, so that no more are taken.
     pub is_full: bool,
     /// Tags of edits, and the number of undos, that are asked for and not answered.
     pub tags: VecDeque<u64>,
@@ -67,9 +67,10 @@ pub(super) struct Display {
     /// Changes that were submitted, and those that were answered.
     pub submitted: u64,
     pub answered: u64,
-    /// What is shown is not what should be: all of it has to be put.
+    /// Whether the shown world is wrong, so that all of it has to be replaced.
     pub is_broken: bool,
-    /// What happens to pieces once so many changes are answered: the ground changes with these.
+    /// Messages about pieces, each with the number of answered changes after which it is sent, together with the
+    /// ground's change.
     pub pieces: VecDeque<(u64, PieceMessage)>,
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::net::{MOST_TO_SERVER, Server};
 use crate::terrain::World;
 
-/// Bytes of a [`FromPlayer`] beside those that it carries, at most.
+/// The most bytes of a [`FromPlayer`] in addition to its content.
 const OVERHEAD: usize = 16;
 
 /// From a client to the server.

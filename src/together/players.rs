@@ -12,21 +12,21 @@ use crate::net;
 /// Bytes of a player's messages that wait for the server while it is at work. Who sends more is kicked.
 const MOST_WAITING_BYTES: usize = 1 << 20;
 
-/// Bytes that a message takes beside its own, about.
+/// The approximate overhead of a message in bytes.
 const MESSAGE_BYTES: usize = 128;
 
 /// The players of a ground server.
 #[derive(Default)]
 pub(super) struct Players {
-    /// Those who have spoken.
+    /// Clients that have sent a message.
     clients: HashMap<net::ClientId, ClientId>,
-    /// Clients that were sent away: nothing is taken from them on the same connection.
+    /// Removed clients: messages from them on the same connection are ignored.
     kicked: HashSet<Entity>,
     /// Bytes that wait for the server.
     waiting: HashMap<net::ClientId, usize>,
 }
 
-/// What a message comes to.
+/// The meaning of a message.
 pub(super) enum Said {
     /// The client says this, for the first time if it `begins`.
     Bytes {

@@ -24,7 +24,7 @@ use crate::terrain::Terrain;
 #[derive(Resource)]
 pub struct GroundServer {
     work: Work,
-    /// What is served; `None` until it is there.
+    /// The served world; `None` until it is there.
     served: Option<Served>,
     waiting: Vec<Request>,
     start: Instant,
@@ -50,7 +50,7 @@ struct Parts {
     store: Option<Store>,
 }
 
-/// Most requests of the game that wait until a world is read; what comes then is dropped.
+/// The most requests of the game that wait until a world is read; further ones are dropped.
 const MOST_WAITING: usize = 1 << 14;
 
 /// What waits for the server to come back.
@@ -59,11 +59,11 @@ type Request = Box<dyn FnOnce(&mut Parts, Duration) + Send + Sync>;
 /// Something happened on the ground's server.
 #[derive(Message, Clone, Debug)]
 pub enum GroundServerEvent {
-    /// Its world was read, or can't be: then nothing is served.
+    /// Its world was read; or can't be read, and nothing is served.
     Opened(Result<(), Arc<StoreError>>),
-    /// Something about its players.
+    /// An event about its players.
     Players(ServerEvent),
-    /// Something is wrong with its saved world; the game goes on.
+    /// A problem with its saved world; play continues.
     Trouble(StoreTrouble),
 }
 
@@ -74,7 +74,7 @@ impl GroundServer {
     }
 
     /// Serves a saved world: the one in this folder on the ground of this terrain, or where there is none, the terrain, which is
-    /// saved there from now on. It is read on another thread, and [told](GroundServerEvent::Opened).
+    /// saved there from now on. It is read on another thread; [`GroundServerEvent::Opened`] reports the result.
     pub fn saved(world: &SavedWorld, terrain: &Terrain, settings: ServerSettings) -> Self {
         let reader = WorldReader::new(world, terrain, None);
         let progress = reader.progress.clone();
@@ -111,13 +111,13 @@ impl GroundServer {
         }
     }
 
-    /// What is served; `None` while its world is read, and if it can't be.
+    /// The served world; `None` while it is being read, and if it can't be read.
     pub(super) fn served(&self) -> Option<Served> {
         self.served
     }
 
-    /// Does something with the server as soon as it is not at work, in the order of these calls: sets where a player is, changes
-    /// the rules.
+    /// Calls a function with the server as soon as it is not busy, in the order of these calls: for example to set a
+    /// player's position or the rules.
     pub fn with(&mut self, work: impl FnOnce(&mut Server) + Send + Sync + 'static) {
         self.ask(move |parts, _| work(&mut parts.server));
     }
@@ -129,7 +129,8 @@ impl GroundServer {
         }
     }
 
-    /// Serves this world where the saved one [can't be read](GroundServerEvent::Opened). Players who have come meanwhile join it.
+    /// Serves this world if the saved one [can't be read](GroundServerEvent::Opened). Players that have connected
+    /// meanwhile join it.
     pub fn serve_instead(&mut self, server: Server) {
         if let Work::Gone = self.work {
             self.served = Some(Served::by(&server));
@@ -137,7 +138,7 @@ impl GroundServer {
         }
     }
 
-    /// Keeps data of the game beside a saved world, as a [`WorldStore`](crate::saves::WorldStore) does.
+    /// Stores data of the game with a saved world, like a [`WorldStore`](crate::saves::WorldStore).
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         let (key, bytes) = (key.into(), bytes.into());
         self.data.insert(key.clone(), bytes.clone());
@@ -157,13 +158,14 @@ impl GroundServer {
     /// player on the server's own machine has the number 0.
     ///
     /// The two greatest network ids have no number: [`net::ClientId::SERVER`] is returned, and such clients are not served. A transport
-    /// without network ids gives a new number to each connection, so a player who comes back is somebody else to the server.
+    /// without network ids gives a new number to each connection, so a returning player counts as a new one.
     pub fn player(client: ClientId, ids: &Query<&NetworkId>) -> net::ClientId {
         let id = client.entity().and_then(|entity| ids.get(entity).ok());
         super::players::number(client, id).unwrap_or(net::ClientId::SERVER)
     }
 
-    /// Waits until all that was asked for is done and saved: before the app ends. A world that is still read has nothing to save.
+    /// Waits until all requests are done and saved, before the app ends. A world that is still being read has nothing
+    /// to save.
     pub fn finish(&mut self) {
         let deadline = Instant::now() + Duration::from_secs(10);
         while let Work::UnderWay(_) = self.work {
@@ -199,7 +201,7 @@ impl GroundServer {
             Work::Opening(mut task, progress) => match task.finish() {
                 None => self.work = Work::Opening(task, progress),
                 Some(Ok((parts, troubles))) => {
-                    // What was put meanwhile is newer.
+                    // Values that were put meanwhile are newer.
                     let newer = std::mem::take(&mut self.data);
                     self.data.extend(parts.store.iter().flat_map(|store| store.game_data().clone()));
                     self.data.extend(newer);
@@ -230,7 +232,7 @@ impl Parts {
 }
 
 impl GroundServer {
-    /// Reads what players sent. What comes while no world is there is dropped: nobody was invited.
+    /// Reads messages of players. Without a world they are dropped: no player was invited.
     fn receive(
         &mut self,
         messages: &Messages<FromClient<FromPlayer>>,

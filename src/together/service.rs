@@ -19,10 +19,10 @@ pub(super) enum Service {
     Served(Served, u64),
 }
 
-/// What [`find_service`] has seen so far.
+/// The state of [`find_service`].
 #[derive(Default)]
 pub(super) struct Seen {
-    /// Invitations so far.
+    /// The number of invitations.
     count: u64,
     /// Whether a server was in this app in the last frame, and what it served.
     local: Option<Option<Served>>,
@@ -102,7 +102,7 @@ pub(super) fn invite(
     }
 }
 
-/// Drops what was to be sent to a client that is gone, or no longer authorised. A backend may panic otherwise.
+/// Drops messages to a client that is gone or no longer authorised. A backend may panic otherwise.
 pub(super) fn drop_messages(
     gone: On<Remove, AuthorizedClient>,
     mut invitations: ResMut<Messages<ToClients<Invitation>>>,

@@ -90,7 +90,7 @@ impl Studio {
         Self::open_while(options, renderer, || {})
     }
 
-    /// The same, while something else goes on in each frame.
+    /// Opens it, and calls a function in each frame meanwhile.
     ///
     /// # Errors
     /// As for [`open`](Self::open).
@@ -103,7 +103,7 @@ impl Studio {
             .map_err(|error| format!("{}: {error}", options.out.display()))?;
         let renders = renderer.is_some();
         let engine = options.backend.engine();
-        // Without this, a short script could end before a graphics card is found.
+        // Without this, a short script could end before a GPU is found.
         engine.wait(PATIENCE);
         let mut app = offscreen::build(renderer, |app| {
             app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
@@ -237,7 +237,7 @@ impl Studio {
         Ok(Stance { feet: character.feet(middle), eye: character.eyes(middle) })
     }
 
-    /// Does the player wait for colliders?
+    /// Whether the player waits for colliders.
     fn is_held(&self) -> bool {
         self.app.world().get::<HeldByGround>(self.player).is_some()
     }

@@ -112,7 +112,7 @@ impl Two {
         Ok(())
     }
 
-    /// Has everything been confirmed, and do both show the same?
+    /// Whether everything is confirmed and both show the same world.
     fn agree(&mut self) -> Result<bool> {
         let is_settled = self.host.shared()?.pending() == 0 && self.guest.shared()?.pending() == 0;
         Ok(is_settled && self.host.state()? == self.guest.state()?)
@@ -128,7 +128,7 @@ impl Two {
         Ok(())
     }
 
-    /// The host begins the game anew, in a world that is not saved, and the guest comes back by itself.
+    /// The host starts the game again, in a world that is not saved, and the guest returns automatically.
     fn host_begins_anew(&mut self) -> Result {
         let before = self.guest.state()?;
         *self.host.world().resource_mut::<PlayedWorld>() = PlayedWorld(None);
@@ -138,7 +138,7 @@ impl Two {
         self.until("both see the new world", |two| {
             Ok(two.guest.shared()?.has_joined() && two.guest.state()?.1 != before.1 && two.agree()?)
         })?;
-        println!("the host began anew, and both see the world {:#018x}", self.guest.state()?.1);
+        println!("the host started again, and both see the world {:#018x}", self.guest.state()?.1);
         Ok(())
     }
 
@@ -153,7 +153,7 @@ impl Two {
         self.edit(|two| &mut two.guest, brushes)
     }
 
-    /// The host builds a pillar beside it, and looks at the guest.
+    /// The host builds a pillar next to it, and looks at the guest.
     fn host_builds(&mut self, hillside: &Hillside) -> Result {
         let Hillside { mouth, inward, .. } = *hillside;
         let aside = inward.perp();

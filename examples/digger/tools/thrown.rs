@@ -9,7 +9,7 @@ use crate::world::landscape::DespawnOnNewGame;
 
 /// Nearer to the camera than this many metres, a thrown thing is hidden, because it would fill the view.
 const VISIBLE_DISTANCE: f32 = 0.7;
-/// After so many seconds it is visible wherever it is: it may have bounced back from a wall.
+/// After this many seconds it is visible everywhere: it may have bounced back from a wall.
 const MAX_HIDDEN_TIME: f32 = 0.1;
 
 /// Shows things some time after they were thrown.

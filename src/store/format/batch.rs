@@ -31,7 +31,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Does it hold nothing?
+    /// Whether it holds nothing.
     pub fn is_empty(&self) -> bool {
         self.commits.is_empty() && self.game.is_empty()
     }

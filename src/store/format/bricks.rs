@@ -45,7 +45,7 @@ pub fn position(region: RegionPos, place: usize) -> BrickPos {
     BrickPos(region.first_brick().0 + IVec3::new(place >> 6, place & 7, place >> 3 & 7))
 }
 
-/// The densities of bricks of a region that are known so far, by place.
+/// The already known densities of the bricks of a region, by position.
 struct Region {
     slots: [u16; MOST],
     bricks: Vec<[i16; 512]>,
@@ -261,7 +261,7 @@ fn runs(
     if left == 0 { Ok(materials) } else { Err(FormatError::Invalid("run of materials")) }
 }
 
-/// May a region lie there at all?
+/// Whether a region can be at this position.
 pub fn is_possible(region: RegionPos) -> bool {
     const MOST: i32 = REACH / RegionPos::VOXELS + 1;
     region.0.max_element() <= MOST && region.0.min_element() >= -MOST

@@ -1,4 +1,4 @@
-//! Frames: what every part of a saved world is wrapped in, so that damage, swaps and newer versions are told.
+//! Frames: the envelope of every part of a saved world, which detects damage, swapped parts and newer versions.
 //!
 //! | bytes | |
 //! | --- | --- |
@@ -119,7 +119,7 @@ pub fn seal(
     sealed(kind, world, key, revision, ground_hash, payload, packed)
 }
 
-/// The same without packing, for what is packed or compared by others.
+/// Seals a payload without compression, for payloads that are compressed or compared elsewhere.
 pub fn seal_unpacked(kind: Kind, world: WorldId, key: &[u8], ground_hash: u64, payload: &[u8]) -> Vec<u8> {
     sealed(kind, world, key, 0, ground_hash, payload, None)
 }
@@ -217,7 +217,7 @@ pub fn open(
     Ok(rest.1)
 }
 
-/// The same, of whatever world.
+/// Opens a frame of any world.
 pub fn open_any_world(
     bytes: &[u8],
     kind: Kind,

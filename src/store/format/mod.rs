@@ -11,8 +11,8 @@
 //! | [`level`] | a designer's level: a folder of files, or one packed file |
 //! | [`container`], [`bytes`], [`plain`], [`limits`] | what these share |
 //!
-//! Whatever bytes are read, the result is what was written or a [`FormatError`]: nothing panics, and memory is taken by the length of
-//! the input and by limits that the caller names. The same content always gives the same bytes.
+//! Reading any bytes gives the written content or a [`FormatError`]: nothing panics, and memory is bounded by the
+//! length of the input and by limits that the caller sets. Equal content always gives equal bytes.
 
 pub mod batch;
 pub mod bricks;

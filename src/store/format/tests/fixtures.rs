@@ -57,7 +57,7 @@ fn written() -> (PortableWorld, Vec<u8>, LevelFiles) {
     (portable, file, write_level(&level).expect("a valid level"))
 }
 
-/// Writes the files anew: only when a schema is not released yet.
+/// Writes the files again: only while a schema is not released yet.
 #[test]
 #[ignore = "writes the fixtures"]
 fn write_fixtures() {
