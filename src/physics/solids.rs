@@ -14,7 +14,7 @@ pub(super) const FARTHEST: Vec3 = Vec3::splat(8.0);
 /// How far inside a collider a ray through it starts, in metres; less than any body's thickness.
 const SKIN: f32 = 1e-3;
 
-/// What decides whether a collider collides with ground.
+/// The components that decide whether a collider collides with ground.
 #[derive(QueryData)]
 pub(super) struct SolidCollider {
     bounds: Ref<'static, ColliderAabb>,

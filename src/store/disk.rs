@@ -232,7 +232,8 @@ impl SimulatedDisk {
         self.state().names.keys().cloned().collect()
     }
 
-    /// Changes a file behind everybody's back, as damage would; does nothing where there is no such file.
+    /// Changes a file without going through the disk's interface, as damage would. Does nothing if there is no such
+    /// file.
     pub fn damage(&self, path: &str, change: impl FnOnce(&mut Vec<u8>)) {
         let mut state = self.state();
         if let Some(content) = state.names.get(path).copied().and_then(|file| state.files.get_mut(&file)) {

@@ -1,6 +1,6 @@
-//! What is drawn of a world with levels of detail, and what a commit changes of it.
+//! The drawn nodes of a world with levels of detail, and the updates by a commit.
 //!
-//! A node of a coarser level has a mesh of its own. One of level 0 is drawn by its tile and chunks, as without levels, or
+//! A node of a coarser level has one mesh. A node of level 0 is drawn by its tile and chunks, as without levels, or
 //! where the seam towards a coarser node needs it, by one mesh that holds all of them.
 
 use std::borrow::Cow;
@@ -15,7 +15,7 @@ use crate::lattice::TilePos;
 use crate::levels::{Cut, Node};
 use crate::surface::SurfaceMesh;
 
-/// What is drawn of a world: the nodes of a cut.
+/// The drawn part of a world: the nodes of a cut.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DrawnCut {
     pub(super) cut: Cut,
@@ -35,7 +35,7 @@ impl DrawnCut {
     }
 }
 
-/// What a node is drawn with after a commit.
+/// The meshes of a node after a commit.
 #[derive(Clone)]
 pub struct NodeUpdate {
     /// The node.

@@ -168,14 +168,14 @@ impl Queue {
         self.requests.push_back(Request::Step(step));
     }
 
-    /// Queues parts that are put in place. Edits after them begin a new group.
+    /// Queues replacement parts. Edits after them begin a new group.
     pub fn push_put(&mut self, put: Put) {
         self.close_group();
         self.work += STEP;
         self.requests.push_back(Request::Put(Arc::new(put)));
     }
 
-    /// Lets the next edit begin a new group.
+    /// Makes the next edit begin a new group.
     pub fn close_group(&mut self) {
         self.open = None;
     }
@@ -246,7 +246,7 @@ impl Queue {
         *self = Self { limits: other.limits, ..std::mem::take(other) };
     }
 
-    /// Lets edits that wait under these rules and settings of loose pieces obey others.
+    /// Replaces the rules and loose settings of waiting edits that have these ones.
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub fn change_terms(
         &mut self,

@@ -127,7 +127,7 @@ fn mesh_blocks(
             order();
         })
     });
-    // The backend hands parts out in the middle of its own time.
+    // The backend returns parts while it is still running.
     *meshing = meshing.saturating_sub(own);
     *assembly += own;
     chunks
@@ -198,7 +198,7 @@ fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn Mes
     let update = |chunk: ChunkPos, numbers: &[u32]| {
         let nothing = ChunkSurface::default();
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
-        // That nothing is drawn is news of a chunk whose surface was not kept.
+        // For a chunk without a kept surface, an empty surface counts as a change.
         let empty = || world.unmeshed.contains_key(&chunk).then(ChunkSurface::default);
         Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh)).or_else(empty)?)))
     };
