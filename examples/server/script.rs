@@ -1,4 +1,4 @@
-//! Where brushes come from: a file, standard input, or nowhere.
+//! The source of brushes: a file, standard input, or none.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};

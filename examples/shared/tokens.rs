@@ -1,4 +1,4 @@
-//! Connect tokens: who holds the key of a server decides who may connect, and under which number.
+//! Connect tokens: the holder of a server's key decides which players may connect, and under which numbers.
 //!
 //! A login service and the server have the key. The service checks who a player is, by a password or an account of a shop, and sends
 //! a token over HTTPS. It names the player's number, the server and a time, and holds keys for one encrypted connection. Nobody can

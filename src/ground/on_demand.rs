@@ -1,4 +1,4 @@
-//! Grounds with a source: what [`Ground`] answers from memory, answered from pages.
+//! Grounds with a source: the queries of [`Ground`], answered from pages instead of memory.
 
 use glam::Vec3;
 

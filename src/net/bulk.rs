@@ -1,4 +1,5 @@
-//! The bulk lane: messages one after the other as one stream of bytes, which the server cuts into pieces as it may send them.
+//! The bulk lane: a sequence of messages as one stream of bytes, which the server cuts into pieces according to its
+//! limits.
 
 use super::message::{MOST_TO_CLIENT, ToClient};
 use super::stamps::Stamps;

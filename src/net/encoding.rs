@@ -1,5 +1,5 @@
-//! Messages in bytes: a tag, then integers of [variable length](crate::store::format::bytes), edits as differences to the one before
-//! in the same message, bricks as saves have them.
+//! The encoding of messages: a tag, then integers of [variable length](crate::store::format::bytes), edits as
+//! differences from the previous one in the message, bricks as in saves.
 //!
 //! Whatever bytes are read, the result is a message or a [`FormatError`]: nothing panics, and memory is taken by the length of
 //! the input, which has limits of its own.

@@ -1,4 +1,5 @@
-//! What edits and undos cost, on both sides: servers refuse what costs too much, and clients send no more than that.
+//! The costs of edits and undos, used on both sides: servers refuse edits beyond the budget, and clients do not send
+//! them.
 
 use crate::brush::Edit;
 use crate::edits::reach;

@@ -1,4 +1,4 @@
-//! What the plugin measures.
+//! Statistics of the plugin.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Levels of detail as components: a game's settings, what is shown, and what the plugin knows of a terrain's nodes.
+//! Levels of detail as components: a game's settings, the shown levels, and the plugin's state for a terrain's nodes.
 
 use std::sync::Arc;
 

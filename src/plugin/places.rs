@@ -1,4 +1,4 @@
-//! Where entities are in this frame, before Bevy propagates transforms at its end.
+//! Global transforms of entities in this frame, before Bevy propagates transforms at its end.
 //!
 //! A place is computed from the `Transform`s of an entity and its ancestors, as Bevy will do. Plugins for floating origins keep
 //! places in another way: the root of a `big_space` has no `Transform`, and its children are in cells that a `Transform` knows

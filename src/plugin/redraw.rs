@@ -1,4 +1,4 @@
-//! Builds everything that is drawn once more.
+//! Rebuilds all meshes on request.
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;

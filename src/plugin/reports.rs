@@ -1,4 +1,4 @@
-//! What was logged of each terrain, so that each message names its terrain and comes once.
+//! Logs each problem of a terrain once, with the terrain's name.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

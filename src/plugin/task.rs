@@ -1,4 +1,4 @@
-//! The task that a terrain waits for: it runs a transaction, and builds the surfaces that the next commit shows.
+//! The background task of a terrain: it runs a transaction, and builds the surfaces that the next commit shows.
 
 use std::sync::Arc;
 

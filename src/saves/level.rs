@@ -1,4 +1,4 @@
-//! Levels as assets: what a designer sculpted is loaded with the ground's other assets.
+//! Sculpted levels as Bevy assets.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! Reads a world from its folder while its terrain is held, and puts it in the terrain's place.
+//! Reads a world from its folder while its terrain is held, and then replaces the terrain by it.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! A disk in memory that loses power and fails as real ones do. Tests put it in the place of a folder.
+//! A simulated disk in memory that loses power and fails like real ones. Tests use it instead of a folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

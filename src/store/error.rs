@@ -1,4 +1,4 @@
-//! What may be wrong with a stored world, in one message each.
+//! Errors and troubles of saved worlds, each with a message of one sentence.
 
 use std::{fmt, io};
 

@@ -1,4 +1,4 @@
-//! What the store needs of files, so that tests can put a simulated disk in their place.
+//! The store's interface to files, so that tests can use a simulated disk instead.
 
 use std::fmt;
 use std::fs::{self, File, OpenOptions, TryLockError};

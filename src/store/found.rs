@@ -1,4 +1,4 @@
-//! What of a world is found in its files, before anything is made of it.
+//! Reads everything that the files of a world contain, before recovery chooses from it.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,4 +1,4 @@
-//! Looking at a world without playing it: what tools print, check and replay.
+//! Inspects, checks and replays a saved world for tools, without changing it.
 
 use std::collections::BTreeMap;
 use std::path::Path;

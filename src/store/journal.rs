@@ -1,4 +1,4 @@
-//! Writing the journal: frames that wait until they are durable, in segments that are kept up to a cap.
+//! Writes the journal: frames in segments, of which the oldest are removed beyond a limit of bytes.
 
 use std::collections::VecDeque;
 use std::io;

@@ -1,4 +1,4 @@
-//! Levels in folders and packed files: what designers sculpt, and games ship.
+//! Saves and loads levels, in folders and packed files.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,4 +1,5 @@
-//! The world as the store knows it from records: the same bricks, shared, so that no checkpoint needs the world itself.
+//! The store's view of the world, built from records. It shares the bricks, so that a checkpoint does not need the
+//! world itself.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! A world in a folder, as a game or server holds it open.
+//! The store: a saved world that a game or server has open.
 
 use std::collections::BTreeMap;
 use std::fmt;

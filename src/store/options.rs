@@ -1,4 +1,4 @@
-//! How a store saves, and what it does where the ground has changed.
+//! Settings of a store, including its policy for a changed ground.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! A world in one piece: to share it as a `.burrow` file, and to keep it where there are no files.
+//! Converts a world to a single `.burrow` file or to bytes, and back.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

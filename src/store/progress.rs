@@ -1,4 +1,4 @@
-//! How far the opening of a world is, for a bar on a title page.
+//! The progress of opening a world, for a progress bar.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};

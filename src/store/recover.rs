@@ -1,4 +1,4 @@
-//! A world from what was found of it: regions of the last checkpoint, then the journal's tail, verified frame by frame.
+//! Recovers a world from its files: regions of the last checkpoint, then the journal's tail, verified frame by frame.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! The file of regions as the store's thread writes it: changed in place by transactions, or replaced as a whole.
+//! Writes the file of regions: by transactions in place, or by replacing the whole file.
 
 use std::io;
 

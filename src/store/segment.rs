@@ -1,4 +1,4 @@
-//! Segments of the journal: files of frames, one after the other. Frames are numbered from 1 on through all segments.
+//! Segments of the journal: files with sequences of frames. Frames are numbered from 1 through all segments.
 //!
 //! | bytes | of each entry |
 //! | --- | --- |

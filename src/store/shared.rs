@@ -1,4 +1,4 @@
-//! What the store's thread reports, and data of the game's.
+//! State that the store shares with its thread: reports, and the game's data.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -1,4 +1,4 @@
-//! A file that says that commits are in the journal only, so that a journal that somebody removed is missed.
+//! A marker file for commits that are in the journal only, so that a removed journal is noticed.
 //!
 //! It is there from the first frame that is durable after a world is opened until the world is closed with all of it in a
 //! checkpoint, and holds the number of the segment of that frame, twice.

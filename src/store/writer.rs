@@ -1,4 +1,4 @@
-//! The store's thread: collects records, writes frames and checkpoints, and tries again what fails.
+//! The store's thread: collects records, writes frames and checkpoints, and retries failed writes.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

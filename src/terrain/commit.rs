@@ -1,4 +1,4 @@
-//! The result of a transaction, and how it becomes the world.
+//! The result of a transaction, and its installation into the world.
 
 use std::fmt;
 use std::sync::Arc;

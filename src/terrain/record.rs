@@ -1,4 +1,4 @@
-//! The commit log: what each commit was asked for, and what it made of the world.
+//! Records of the commit log: the requests of each commit, and its changes of the world.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! A terrain from what was saved of it: from parts, or by replaying records.
+//! Creates a terrain from saved data: from parts, or by replaying records.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

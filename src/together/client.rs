@@ -1,4 +1,4 @@
-//! What a player's app does with its shared terrain in each frame.
+//! Updates a player's shared terrain in each frame.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! What a shared terrain knows of its server: the client, the invitation that it follows, and what waits.
+//! The link of a shared terrain to its server: the client, the invitation that it follows, and waiting requests.
 
 use std::collections::VecDeque;
 

@@ -1,4 +1,5 @@
-//! The messages that carry the bytes of clients and server. Replicon sends each kind in a channel of its own, reliably and in order.
+//! The messages that carry the bytes of clients and server. Replicon sends each type in a separate channel, reliably
+//! and in order.
 
 use bevy::prelude::*;
 use bevy_replicon::bytes::Bytes;

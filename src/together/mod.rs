@@ -1,4 +1,4 @@
-//! Digging together in Bevy: [`net`](crate::net) over [bevy_replicon], which brings players, transport and replication.
+//! Multiplayer in Bevy: [`net`](crate::net) over [bevy_replicon], which provides clients, transport and replication.
 //!
 //! The server inserts a [`GroundServer`]. Each player has a terrain with a [`SharedTerrain`], made from the same ground; a player who
 //! is the host has one too. Write `Brush` messages as in single-player: edits show at once, are sent to the server, and

@@ -1,4 +1,4 @@
-//! The players of a ground server: who they are, and which clients are theirs.
+//! The players of a ground server: their numbers and their clients.
 
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;

@@ -1,4 +1,4 @@
-//! Who serves the ground: the server invites clients, and each app knows whether somebody serves it.
+//! Finds the server of an app: servers invite clients, and each app tracks whether it has been invited.
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;

@@ -1,4 +1,4 @@
-//! Hosting and joining: what the terrain's `SharedTerrain` needs around it comes and goes with it.
+//! Hosting and joining: sets up and removes connections together with the terrain's `SharedTerrain`.
 
 use std::fmt;
 use std::net::{AddrParseError, IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};

@@ -1,4 +1,4 @@
-//! Brings the player back who got out of the world or deep into rock.
+//! Brings a player back that left the world or is deep inside rock.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! What bombs and balls have in common when they are thrown.
+//! Code that bombs and balls share: throwing.
 
 use avian3d::prelude::*;
 use bevy::prelude::*;

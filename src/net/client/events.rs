@@ -1,4 +1,4 @@
-//! What a client tells the game, and what it counts.
+//! Events and statistics of a client.
 
 use super::super::message::{ClientId, Kick, Refusal};
 use crate::lattice::RegionPos;

@@ -1,4 +1,4 @@
-//! Giving up what the server has not answered.
+//! Gives up edits and undos that the server has not answered.
 
 use super::outbox::Outbox;
 use super::{Client, ClientEvent};

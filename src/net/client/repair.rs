@@ -1,4 +1,4 @@
-//! Marks: places of the order at which the hashes of regions are compared, and the repair of those that differ.
+//! Marks: positions of the order at which hashes of regions are compared; and the repair of regions that differ.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Entries become the world.
+//! Applies entries of the order to the server's world.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Clients that come, come back, or have another world.
+//! Clients that join, reconnect, or have a different world.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Messages that come from clients.
+//! Handles messages from clients.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! A server that survives a restart.
+//! Saves a server's world, so that a restarted server continues from it.
 
 use super::own_numbers::OwnNumbers;
 use super::{Server, ServerSettings, ToClient};

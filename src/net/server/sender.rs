@@ -1,4 +1,4 @@
-//! What is sent to a client, and what waits until it has acknowledged what came before.
+//! Sends data to a client, within a window of bytes that it has not acknowledged.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What a server knows of a client that is connected.
+//! The session of a connected client.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What is checked of an edit before it gets into the order.
+//! Checks of an edit before it is ordered.
 
 use std::time::Duration;
 

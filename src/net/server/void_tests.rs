@@ -1,4 +1,4 @@
-//! Entries that the server could not apply, for a reason that other machines do not have: everybody is without them.
+//! Entries that fail on the server for a reason that other machines do not have: no client applies them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Commits in bytes: what a frame of the journal holds.
+//! The encoding of commits: the content of a frame of the journal.
 //!
 //! Most commits are one edit, and lead to the next revision: these begin with an odd byte, whose other bits are the head of the
 //! [edit](super::edits). Others begin with 0. Each has the hash of the world that it leads to. What the game put up to the last

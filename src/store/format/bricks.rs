@@ -1,4 +1,4 @@
-//! The bricks of a region in bytes.
+//! The encoding of a region's bricks.
 //!
 //! | part | holds |
 //! | --- | --- |

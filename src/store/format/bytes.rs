@@ -1,4 +1,4 @@
-//! Numbers in bytes: integers of variable length, and a reader that never reads beyond its end.
+//! The encoding of numbers: integers of variable length, and a reader that never reads beyond its end.
 
 use super::error::FormatError;
 

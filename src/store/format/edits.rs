@@ -1,4 +1,4 @@
-//! Edits in bytes, each as the difference from the one before: players move by little between digs.
+//! The encoding of edits, each as the difference from the previous one, because players move little between digs.
 //!
 //! The serialised form of an [`Edit`] is cut into shape, middle, what lies between, tag and stroke. Bits of a head say which of
 //! them are as before; it is below 128. Reading joins them again and deserialises the result, which checks it.

@@ -1,4 +1,4 @@
-//! A designer's level: a folder of files that version control compares well, and the same packed into one file to ship.
+//! The format of levels: a folder of files for version control, or one packed file to ship.
 //!
 //! - `level.json` says what the level is, and names its regions.
 //! - `r.X.Y.Z.region` holds a region's bricks and fields. It has neither revision nor time, so it changes only with its content,

@@ -1,4 +1,4 @@
-//! How much the parts of files may hold once they are unpacked. What is written keeps to it, so that it can be read again.
+//! Limits on the unpacked size of parts of files. Writers obey them too, so that every written file can be read again.
 
 use super::error::FormatError;
 

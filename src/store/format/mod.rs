@@ -1,4 +1,4 @@
-//! The bytes of saved worlds, and worlds from bytes: no files, no threads, no clocks.
+//! The formats of saved worlds, as pure conversions to and from bytes: no files, no threads, no clocks.
 //!
 //! | file | turns into bytes |
 //! | --- | --- |

@@ -1,4 +1,4 @@
-//! Small integers in few bits: Rice codes that adapt to what came before.
+//! Small integers in few bits: Rice codes that adapt to earlier values.
 //!
 //! A number u is written as `u >> k` ones, a zero, and the low k bits of u. Each [`Context`](super::predict::Context) has its own
 //! k, which follows the mean of its last numbers. R. F. Rice, *Some Practical Universal Noiseless Coding Techniques*, 1979.

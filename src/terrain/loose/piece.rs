@@ -1,4 +1,4 @@
-//! Loose pieces as receipts list them, and what names them.
+//! Loose pieces as receipts list them, and their names.
 
 use std::sync::Arc;
 

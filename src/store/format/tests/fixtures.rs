@@ -1,4 +1,4 @@
-//! Files of each schema that were written once: they can be read for good, and are written like that today.
+//! Stored files of each schema: they can still be read, and are still written with the same bytes.
 
 use std::path::PathBuf;
 use std::sync::Arc;

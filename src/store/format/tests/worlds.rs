@@ -1,4 +1,4 @@
-//! Worlds to save.
+//! Test worlds to save.
 
 use std::sync::Arc;
 
