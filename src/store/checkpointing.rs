@@ -23,7 +23,7 @@ use crate::terrain::SIMULATION;
 const SAVED: f32 = 0.97;
 
 impl Writer {
-    /// Makes a checkpoint; takes in what comes meanwhile.
+    /// Makes a checkpoint, and accepts messages meanwhile.
     pub(super) fn checkpoint(&mut self, messages: Option<&Receiver<Message>>) -> Result<(), StoreError> {
         if !self.state.has_gap {
             self.flush()?;

@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use super::error::{StoreError, StoreTrouble};
 use super::shared::{SavePoint, Shared};
 
-/// How often a store that is being closed is looked at while somebody waits for it.
+/// The interval at which waiting for a closing store checks its state.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// The thread of a store. It ends once nobody can send it anything any more.
+/// The thread of a store. It ends once all senders are gone.
 #[derive(Debug)]
 pub(super) struct StoreThread(JoinHandle<()>);
 
@@ -35,7 +35,7 @@ impl StoreThread {
     }
 }
 
-/// What a panic says.
+/// The message of a panic.
 fn message_of(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
     text.unwrap_or("no reason is known").to_owned()
@@ -49,7 +49,7 @@ pub struct ClosingStore {
     thread: Option<StoreThread>,
     /// Up to where everything should be durable.
     point: SavePoint,
-    /// Whether everything was handed to the thread.
+    /// Whether everything was sent to the thread.
     is_given: bool,
 }
 

@@ -10,15 +10,15 @@ use super::files::{Files, Lock, OpenFile, Opening, named};
 /// Bytes of a sector: a write is cut into these when power is lost.
 const SECTOR: u64 = 512;
 
-/// What a simulated disk refuses.
+/// A fault of a simulated disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum DiskFault {
     /// Nothing.
     #[default]
     None,
-    /// Whatever writes fails: there is no space left.
+    /// Writing fails: there is no space left.
     Full,
-    /// Whatever writes fails: the disk is read-only.
+    /// Writing fails: the disk is read-only.
     ReadOnly,
     /// Everything fails.
     Broken,
@@ -177,7 +177,7 @@ impl DiskImage {
         SimulatedDisk { state: Arc::new(Mutex::new(state)), watch: Arc::default() }
     }
 
-    /// The disk after the process was killed: all that was written is there.
+    /// The disk after the process was killed: everything written is there.
     pub fn lose_process(&self) -> SimulatedDisk {
         let mut state = self.0.clone();
         state.locks.clear();
@@ -200,24 +200,25 @@ impl SimulatedDisk {
         Self::default()
     }
 
-    /// The disk as it is now.
+    /// The present state of the disk.
     pub fn image(&self) -> DiskImage {
         DiskImage(self.state().clone())
     }
 
-    /// Calls this before each operation with the disk as it is then; `None` ends that. It must not use this disk.
+    /// Sets a function that is called before each operation with the state of the disk; `None` removes it. It must not
+    /// use this disk.
     pub fn watch(&self, watch: Option<impl Fn(&DiskImage) + Send + Sync + 'static>) {
         let watch = watch.map(|watch| Arc::new(watch) as Watch);
         *self.watch.lock().unwrap_or_else(PoisonError::into_inner) = watch;
     }
 
-    /// What it refuses from now on. A fault that was to [begin later](Self::fail_at) does not come any more.
+    /// Sets the present fault, and cancels one that was to [begin later](Self::fail_at).
     pub fn set_fault(&self, fault: DiskFault) {
         let mut state = self.state();
         (state.fault, state.fault_at) = (fault, None);
     }
 
-    /// Lets a fault begin with a later operation, counted like [`operations`](Self::operations).
+    /// Makes a fault begin with a later operation, counted like [`operations`](Self::operations).
     pub fn fail_at(&self, operation: u64, fault: DiskFault) {
         self.state().fault_at = Some((operation, fault));
     }

@@ -47,7 +47,8 @@ pub enum StoreError {
         /// The reason why it can't continue on this ground, and what to do.
         why: &'static str,
     },
-    /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
+    /// The ground differs from the one that the world was saved with, and
+    /// [`BaseChanged::Refuse`](super::BaseChanged::Refuse) is set.
     #[error("the ground has changed{}", if *.regions == 0 { String::new() } else { format!(" below {regions} saved regions") })]
     BaseChanged {
         /// Regions with edits over changed ground; 0 if only materials or places without edits changed.
@@ -67,9 +68,9 @@ pub enum StoreError {
     LevelChanged {
         /// What the game called the level.
         label: String,
-        /// The [hash](super::LevelName::hash) of the level of then.
+        /// The [hash](super::LevelName::hash) of the world's level.
         expected: u64,
-        /// That of the level that is given.
+        /// The hash of the given level.
         found: u64,
     },
     /// Nothing of it can be read, and there is no log from which to rebuild it.
@@ -86,7 +87,7 @@ pub enum StoreError {
     /// The files can't be read or written.
     #[error("{doing}: {error}")]
     Files {
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
         /// The system's error.
         error: io::Error,
@@ -116,7 +117,7 @@ pub enum StoreError {
     /// A server keeps the world of this terrain, and saves it.
     #[error("the terrain is shared, so its server saves it: remove SharedTerrain to save it here")]
     Shared,
-    /// A terrain over another ground, or of another size, was put in the place of the one that the world was to be read for.
+    /// A terrain over another ground, or of another size, replaced the one that the world was being read for.
     #[error("another level has replaced the terrain that the world was read for, so it is not saved there")]
     OtherTerrain,
     /// The store's thread is gone.
@@ -217,7 +218,7 @@ pub enum StoreTrouble {
     LogRefused {
         /// The last revision that was replayed.
         revision: u64,
-        /// What does not fit.
+        /// The mismatch.
         why: String,
         /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
@@ -225,7 +226,7 @@ pub enum StoreTrouble {
     /// A damaged part was rebuilt, from the log or from other files; nothing is lost.
     #[error("{what}; it has been rebuilt, and nothing is lost{}", copy(quarantine))]
     Rebuilt {
-        /// What was wrong, in words.
+        /// The damage, in words.
         what: String,
         /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
@@ -263,12 +264,12 @@ pub enum StoreTrouble {
     BaseChanged {
         /// Regions with edits over changed ground; all of them, if it is the level.
         regions: usize,
-        /// What became of the edits: "kept" or "replayed".
+        /// Whether the edits were "kept" or "replayed".
         kept: &'static str,
     },
 }
 
-/// Says where a copy is, if there is one.
+/// Text that names the copy, if there is one.
 fn copy(quarantine: &str) -> String {
     if quarantine.is_empty() { String::new() } else { format!("; a copy is in {quarantine}") }
 }

@@ -59,7 +59,7 @@ impl RegionRecord {
         self.sealed.len()
     }
 
-    /// What it holds, over a ground.
+    /// Its content, over a ground.
     pub fn decode(&self, at: RegionPos, ground: &Ground) -> Result<WorldChange, FormatError> {
         let kind = if self.is_change { Kind::RegionChange } else { Kind::Region };
         let payload = frame::open(&self.sealed, kind, self.world, &keys::region(at), FRAME_LIMIT)?.payload;
@@ -79,13 +79,13 @@ impl RegionRecord {
 pub(super) struct Contents {
     pub world: WorldId,
     pub segments: Vec<Found>,
-    /// What is wrong with the file of regions, if it can't be used.
+    /// The fault of the file of regions, if it can't be used.
     pub damaged: Option<String>,
     /// Whether there is a file of regions, so that a copy of what is damaged can be kept.
     pub has_database: bool,
     /// Whether the process that wrote the world last put all of it into a checkpoint.
     is_closed: bool,
-    /// Whether the journal has gone in which there were commits.
+    /// Whether a journal with commits is missing.
     pub has_lost_journal: bool,
     /// Why the file of regions can't be read at the moment.
     error: Option<io::Error>,
@@ -93,11 +93,11 @@ pub(super) struct Contents {
     checkpoints: Vec<Checkpoint>,
     /// The copies next to the journal.
     copies: Vec<Checkpoint>,
-    /// Those of other files that may hold regions.
+    /// The checkpoints of other files that may hold regions.
     other_checkpoints: Vec<Checkpoint>,
     /// Valid records of each region: one, but for what was salvaged from a damaged file.
     regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
-    /// Those of other files.
+    /// The records of other files.
     other_regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
     /// Records that are not valid, by region.
     pub invalid: BTreeMap<RegionPos, Vec<u8>>,
@@ -190,7 +190,7 @@ impl Contents {
         Ok(contents)
     }
 
-    /// Nothing says which world it is.
+    /// The error if the world can't be identified.
     fn no_world(&mut self, raw: &[(Vec<u8>, Vec<u8>)]) -> Result<StoreError, StoreError> {
         let newer = |(key, record): &(Vec<u8>, Vec<u8>)| sources::check(key, record).err()?.newer_schema();
         refuse_newer(raw.iter().find_map(newer))?;
@@ -222,7 +222,7 @@ impl Contents {
         Ok(())
     }
 
-    /// Enters what another file holds than the one in place.
+    /// Adds the records of a file other than the current one.
     fn enter_others(&mut self, source: Source) {
         let (Source::Whole(records) | Source::Damaged { records, .. }) = source else { return };
         for (key, record) in records {
@@ -426,7 +426,7 @@ fn decode_checkpoint(payload: &[u8]) -> Option<Checkpoint> {
     (numbers.max() <= Some(MOST_NUMBER / 2)).then_some(checkpoint)
 }
 
-/// A world that a newer version wrote to is left alone, whole: what this version can't read is no damage.
+/// Refuses a world that a newer version wrote to, because data that this version can't read is not damage.
 fn refuse_newer(schema: Option<u32>) -> Result<(), StoreError> {
     match schema {
         Some(found) => Err(StoreError::Newer { found, known: frame::SCHEMA }),

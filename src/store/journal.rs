@@ -12,7 +12,7 @@ use super::unsaved;
 /// The most bytes of a segment. Whole segments are removed, so the log is cut in steps of this.
 const SEGMENT_BYTES: u64 = 1 << 20;
 
-/// How many segments a log has at least when it is as long as it may be.
+/// The least number of segments of a log of full length.
 const LEAST_SEGMENTS: u64 = 16;
 
 /// A frame that is not durable yet.
@@ -56,7 +56,7 @@ pub(super) struct Journal {
     next_segment: u64,
     /// The head of the next segment: a revision and its checkpoint.
     head: (u64, Vec<u8>),
-    /// Whether it was entered that there are commits.
+    /// Whether the marker of unsaved commits was written.
     is_entered: bool,
 }
 
@@ -102,7 +102,7 @@ impl Journal {
         self.waiting_bytes
     }
 
-    /// Enters a frame; it is durable after the next [`write`](Self::write) that succeeds.
+    /// Adds a frame; it is durable after the next successful [`write`](Self::write).
     pub fn push(&mut self, revision: u64, payload: &[u8]) {
         let frame = self.next_frame;
         self.next_frame += 1;
@@ -180,7 +180,7 @@ impl Journal {
         Ok(())
     }
 
-    /// Lets the next frame begin a segment, whose head is this checkpoint of a revision.
+    /// Makes the next frame begin a segment, whose head is this checkpoint of a revision.
     pub fn begin_segment(&mut self, revision: u64, checkpoint: Vec<u8>) {
         self.current = None;
         self.head = (revision, checkpoint);

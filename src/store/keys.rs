@@ -8,14 +8,14 @@ use crate::lattice::RegionPos;
 /// ones.
 pub(super) const CHECKPOINTS: [&[u8]; 2] = [b"c", b"d"];
 
-/// What a record holds.
+/// The content of a record.
 pub(super) enum Key {
     Checkpoint,
     Region(RegionPos),
 }
 
 impl Key {
-    /// What the record with this key holds.
+    /// The content of the record with this key.
     pub fn of(key: &[u8]) -> Option<Self> {
         if CHECKPOINTS.contains(&key) {
             return Some(Self::Checkpoint);

@@ -34,7 +34,7 @@ const LOCK: &str = "lock";
 /// Bytes of records that a terrain keeps until its store takes them.
 const LOG_BYTES: usize = 256 << 20;
 
-/// Bytes that may wait for the thread, whatever the options say.
+/// Bytes that may wait for the thread, regardless of the options.
 const LEAST_QUEUED: usize = 1 << 20;
 
 /// A world in a folder. Commits are sent to a separate thread, which makes them durable within the
@@ -46,17 +46,17 @@ pub struct Store {
     shared: Arc<Shared>,
     /// `None` once it is closed.
     open: Option<(Sender<Message>, StoreThread)>,
-    /// Where the last of what was given leads to.
+    /// The point that the last given commits lead to.
     point: SavePoint,
-    /// The terrain that was given last.
+    /// The version of the last given terrain.
     version: Version,
     size: WorldSize,
     /// The hash of its ground.
     ground: u64,
-    /// Something was left out, since too much waited: all of the world comes next.
+    /// Whether commits were skipped because too much waited; the whole world is saved next.
     has_gap: bool,
     game: GameData,
-    /// What the game put since the last commits, the last value of each key.
+    /// The game's data since the last commits, the last value of each key.
     unsent: BTreeMap<String, Option<Vec<u8>>>,
     world: WorldId,
     /// Bytes that may wait for the thread.
@@ -94,8 +94,8 @@ impl Store {
         has_world(&files).unwrap_or(false)
     }
 
-    /// Saves a terrain as a new world in a folder, on its [level](StoreOptions::level) if that is given, and lets the terrain
-    /// [log](Terrain::keep_log) its commits from now on.
+    /// Saves a terrain as a new world in a folder, on its [level](StoreOptions::level) if that is given, and makes the
+    /// terrain [log](Terrain::keep_log) its later commits.
     ///
     /// # Errors
     /// When there is a world already, and when the folder can't be written.
@@ -119,7 +119,7 @@ impl Store {
         Self::create_with_data_in(files, terrain, BTreeMap::new(), options)
     }
 
-    /// Saves a terrain as a new world in [files](Files), together with data of the game's: both are there, or neither.
+    /// Saves a terrain as a new world in [files](Files), together with the game's data: both are created, or neither.
     ///
     /// # Errors
     /// When there is a world already, and when the files can't be written.
@@ -134,7 +134,7 @@ impl Store {
         if has_world(&*files).map_err(StoreError::files("reading the world's folder"))? {
             return Err(StoreError::Exists(name(&*files)));
         }
-        // That of a world which somebody removed.
+        // The marker of a world that was removed.
         unsaved::clear(&*files).map_err(StoreError::files("creating the world"))?;
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
@@ -299,8 +299,8 @@ impl Store {
     }
 
     /// Takes the records of a terrain's commits, so that they become durable. Call it as often as you like: it takes
-    /// microseconds, and does nothing where nothing was committed. Where it is another terrain than before, of the same size, all of
-    /// that takes the place of what was saved.
+    /// microseconds, and does nothing if there are no new commits. If it is another terrain of the same size, the whole
+    /// terrain replaces the saved one.
     ///
     /// While the limit on data that waits for a disk is reached, nothing is taken. Once there is room, the [whole
     /// terrain](Self::append_whole) is saved.
@@ -331,13 +331,13 @@ impl Store {
         self.append_whole(terrain)
     }
 
-    /// Whether this terrain is the one that was given last, whatever was committed to it since.
+    /// Whether this is the last given terrain, with or without later commits.
     pub(crate) fn follows(&self, terrain: &Terrain) -> bool {
         terrain.world().version().is_same_world(self.version)
             || terrain.log_sets_ground_after(self.point.revision)
     }
 
-    /// Lets a terrain that was made of the same parts take the place of the one that was given last.
+    /// Replaces the last given terrain by one that was made from the same parts.
     #[cfg(feature = "plugin")]
     pub(crate) fn adopt(&mut self, terrain: &Terrain) {
         self.version = terrain.world().version();
@@ -375,7 +375,8 @@ impl Store {
         })
     }
 
-    /// Takes records of commits, so that they become durable, together with all that was [put](Self::put) since the last ones.
+    /// Takes records of commits, so that they become durable, together with everything that was [put](Self::put) since
+    /// the last ones.
     ///
     /// # Errors
     /// [`StoreError::Gap`] when they do not follow those that were taken before; [`StoreError::Full`] when too much waits for a disk
@@ -389,12 +390,13 @@ impl Store {
         self.give(SavePoint { revision, ..self.point }, Content::Commits(records))
     }
 
-    /// Takes all of a terrain, where records are missing or another terrain takes the place of the one before. It is durable with the
+    /// Takes the whole terrain, if records are missing or another terrain replaces the last one. It is durable with the
     /// next checkpoint, which is made at once.
     ///
     /// # Errors
-    /// [`StoreError::OtherSize`] when the terrain has another size than what is saved; [`StoreError::Full`] when too much waits for
-    /// a disk that does not answer. Nothing is taken then. [`StoreError::Ended`] when the store's thread has panicked.
+    /// [`StoreError::OtherSize`] when the terrain has another size than the saved world; [`StoreError::Full`] when too
+    /// much waits for a disk that does not answer. Nothing is taken then. [`StoreError::Ended`] when the store's thread
+    /// has panicked.
     pub fn append_whole(&mut self, terrain: &Terrain) -> Result<(), StoreError> {
         self.check_size(terrain)?;
         let world = terrain.world();
@@ -410,7 +412,7 @@ impl Store {
         Ok(())
     }
 
-    /// Hands something over that leads to a point, with what the game put since the last time.
+    /// Sends content that leads to a point, with the game's data since the last time.
     fn give(&mut self, point: SavePoint, content: Content) -> Result<(), StoreError> {
         if self.is_full() {
             return Err(StoreError::Full);
@@ -424,7 +426,7 @@ impl Store {
         Ok(())
     }
 
-    /// Hands over what the game put. While commits are missing, it waits for the world with them.
+    /// Sends the game's data. While commits are missing, it waits for the world with them.
     fn send_game(&mut self) -> Result<(), StoreError> {
         if self.unsent.is_empty() || self.has_gap { Ok(()) } else { self.append(Vec::new()) }
     }
@@ -434,13 +436,14 @@ impl Store {
         sent.and_then(Result::ok).ok_or(StoreError::Ended)
     }
 
-    /// The terrain that was given last is durable up to this revision, with what the game had put by then: it would survive a loss of
-    /// power. 0 where nothing of it is durable yet; [`durable_point`](Self::durable_point) tells these apart.
+    /// The revision up to which the last given terrain is durable, together with the game's data at that time: it would
+    /// survive a loss of power. 0 also if nothing of it is durable yet; [`durable_point`](Self::durable_point)
+    /// distinguishes the two.
     pub fn durable(&self) -> u64 {
         self.durable_point().map_or(0, SavePoint::revision)
     }
 
-    /// The last point up to which everything is durable; `None` where nothing of the terrain that was given last is.
+    /// The last point up to which everything is durable; `None` if nothing of the last given terrain is.
     pub fn durable_point(&self) -> Option<SavePoint> {
         self.shared.durable().filter(|durable| durable.is_same_terrain(self.point))
     }
@@ -470,7 +473,7 @@ impl Store {
         })?
     }
 
-    /// Waits until all that was taken is durable, and returns its revision.
+    /// Waits until everything taken is durable, and returns its revision.
     ///
     /// # Errors
     /// When it can't be saved for now.
@@ -478,7 +481,7 @@ impl Store {
         self.flush_within(Duration::MAX)
     }
 
-    /// Waits until all that was taken is durable, but no longer than this, and returns its revision.
+    /// Waits until everything taken is durable, but no longer than this, and returns its revision.
     ///
     /// # Errors
     /// When it can't be saved for now; [`StoreError::TimedOut`] when the disk does not answer in time.
@@ -518,13 +521,13 @@ impl Store {
     /// neither.
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         let (key, bytes) = (key.into(), bytes.into());
-        // Games put the same again and again, which takes no room in the log.
+        // An unchanged value takes no room in the log.
         if self.get(&key) != Some(&bytes[..]) {
             self.change_game((key, Some(bytes)));
         }
     }
 
-    /// Removes data of the game's.
+    /// Removes data of the game.
     pub fn remove(&mut self, key: impl Into<String>) {
         self.change_game((key.into(), None));
     }
@@ -534,12 +537,12 @@ impl Store {
         self.unsent.insert(change.0, change.1);
     }
 
-    /// Data of the game's.
+    /// Data of the game.
     pub fn get(&self, key: &str) -> Option<&[u8]> {
         self.game.get(key).map(Vec::as_slice)
     }
 
-    /// All data of the game's, by key.
+    /// All data of the game, by key.
     pub fn game_data(&self) -> &BTreeMap<String, Vec<u8>> {
         &self.game
     }
@@ -550,12 +553,12 @@ impl Store {
         self.shared.take_troubles()
     }
 
-    /// The world's name, which no other world has.
+    /// The unique id of the world.
     pub fn world_id(&self) -> WorldId {
         self.world
     }
 
-    /// Saves what is left and makes a last checkpoint, on the store's own thread.
+    /// Saves the remaining commits and makes a last checkpoint, on the store's thread.
     pub fn close(mut self) -> ClosingStore {
         self.begin_closing()
     }

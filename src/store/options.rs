@@ -28,15 +28,15 @@ pub struct StoreOptions {
     /// Commits are durable this long after they were appended, and a little more for the disk: the most that is lost
     /// when the power fails. 0 writes each batch at once.
     pub loss_window: Duration,
-    /// Bytes that the log may take on the disk; then the oldest part of it goes. Without a whole log, a damaged region can't be
-    /// rebuilt. What the last two checkpoints need stays in any case.
+    /// Bytes that the log may take on the disk; then the oldest part of it is removed. Without a complete log, a
+    /// damaged region can't be rebuilt. The part that the last two checkpoints need is kept in any case.
     pub log_bytes: u64,
     /// Commits after which a checkpoint is made.
     pub checkpoint_commits: u64,
     /// Time after which a checkpoint is made, if anything changed.
     pub checkpoint_after: Duration,
     /// Bytes of records that wait in memory while saving fails, and once more while the disk does not answer; beyond it they are
-    /// dropped, and the world is saved whole once that works.
+    /// dropped, and the whole world is saved once that works.
     pub waiting_bytes: usize,
     /// Bytes that a frame of the log may hold, 256 MiB at most. Commits and game data of more that come at once are saved by a
     /// checkpoint instead, which leaves a gap in the log.

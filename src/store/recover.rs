@@ -35,10 +35,10 @@ const DECODE: u64 = 1;
 const RESTORE: u64 = 2;
 const REPLAY: u64 = 32;
 
-/// A world as it was recovered.
+/// A recovered world.
 pub(super) struct Recovered {
     pub terrain: Terrain,
-    /// Says which regions differ from their records.
+    /// Its mirror, which knows the regions that differ from their records.
     pub mirror: Mirror,
     /// The last frame that it contains.
     pub frame: u64,
@@ -57,7 +57,7 @@ pub(super) struct Recovered {
     pub refused: Option<String>,
 }
 
-/// What a recovery found that should be reported.
+/// Findings of a recovery that should be reported.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Findings {
     /// Damaged regions that were rebuilt or lost, and whether they are lost.
@@ -65,13 +65,13 @@ pub(super) struct Findings {
     pub is_lossy: bool,
     /// Set if the ground changed since the save: the number of affected regions, and how they were converted.
     pub base_changed: Option<(usize, &'static str)>,
-    /// Commits that another [`SIMULATION`](crate::terrain::SIMULATION) made, and that were made again.
+    /// Commits of another [`SIMULATION`](crate::terrain::SIMULATION) that were replayed.
     pub remade: Option<u64>,
     /// Whether everything but the regions is lost.
     pub has_lost_rest: bool,
 }
 
-/// How far a world is replayed, and whether it is compared with the log.
+/// The end of a replay, and whether the world is compared with the log.
 struct Replayed {
     terrain: Terrain,
     game: GameData,
@@ -81,7 +81,7 @@ struct Replayed {
     refused: Option<String>,
 }
 
-/// Makes a world of what was found.
+/// Recovers a world from its files.
 pub(super) fn recover(
     contents: &Contents,
     ground: &Arc<Ground>,
@@ -121,7 +121,7 @@ pub(super) fn recover(
     let is_same_ground = checkpoint.metadata.ground == ground.hash() || has_lost_rest;
     let other_level = BaseLevel::expect(level, checkpoint.level.as_ref());
     let is_same_base = is_same_ground && other_level.is_ok();
-    // What follows the checkpoint was made by other rules of how edits change the ground: it can be made again, but not verified.
+    // Commits after the checkpoint were made by another simulation: they can be replayed, but not verified.
     let is_remade = is_same_base && tail.iter().any(|frame| frame.base != base);
     let size = GroundSize::of(ground);
     let other_size = checkpoint.cells.filter(|saved| *saved != size);
@@ -483,7 +483,7 @@ fn replay(
     Ok(Replayed { terrain, game, records, frame: last, commits, refused })
 }
 
-/// Does again what a record was asked for, on a world that is not the one it was made on.
+/// Replays a record on a world that differs from the one it was made on.
 fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), ReplayError> {
     for entry in &record.entries {
         match entry {

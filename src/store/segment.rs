@@ -114,7 +114,7 @@ impl Frame {
     }
 }
 
-/// A part of a segment that is no entry.
+/// A part of a segment that is not an entry.
 #[derive(Clone, Debug)]
 pub(super) struct Bad {
     pub range: Range<usize>,
@@ -131,7 +131,7 @@ pub(super) struct Found {
     /// Its head as it is stored.
     head: Option<Box<[u8]>>,
     pub frames: Vec<Frame>,
-    /// What is no entry.
+    /// Parts that are not entries.
     pub bad: Vec<Bad>,
     pub length: usize,
     /// The schema of a frame that is newer than what can be read.

@@ -84,7 +84,7 @@ fn salvage(bytes: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
     records
 }
 
-/// Whether a record is what its key says; the world that it belongs to.
+/// Whether a record matches its key; and the world that it belongs to.
 pub(super) fn check(key: &[u8], record: &[u8]) -> Result<WorldId, FormatError> {
     let world = frame::peek(record).map(|peeked| peeked.world).unwrap_or_default();
     let open = |kind| frame::open(record, kind, world, key, FRAME_LIMIT).map(drop);

@@ -29,7 +29,7 @@ const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_
 const FRAME_TIME: Duration = Duration::from_secs(3);
 pub(super) const CHECKPOINT_TIME: Duration = Duration::from_secs(30);
 
-/// Where the answer to a request goes: the revision that is durable then.
+/// The channel for the answer to a request: the durable revision.
 pub(super) type Answer = Sender<Result<u64, StoreError>>;
 
 /// A message to the thread.
@@ -44,19 +44,19 @@ pub(super) enum Message {
     Compact(Answer),
 }
 
-/// Something that has to be saved, in one piece.
+/// Data that has to be saved together.
 pub(super) struct Given {
-    /// Where this leads to.
+    /// The point that it leads to.
     pub point: SavePoint,
     pub content: Content,
     /// The game's data for it.
     pub game: Vec<GameChange>,
 }
 
-/// What was given of the world.
+/// The given content of the world.
 pub(super) enum Content {
     Commits(Vec<CommitRecord>),
-    /// All of the world, since records are missing, its ground, and its hash.
+    /// The whole world, because records are missing, its ground, and its hash.
     Whole(Box<WorldParts>, Arc<Ground>, u64),
 }
 
@@ -84,7 +84,7 @@ fn game_bytes((key, value): &GameChange) -> usize {
     key.len() + value.as_ref().map_or(0, Vec::len)
 }
 
-/// What fails, and when it is tried again.
+/// The present failure, and the time of the next try.
 struct Failing {
     wait: Duration,
     again: Instant,
@@ -138,7 +138,7 @@ pub(super) struct Writer {
     _lock: Box<dyn Lock>,
 }
 
-/// What changes while the thread runs.
+/// The state of the thread.
 #[derive(Default)]
 pub(super) struct State {
     pending: Pending,
@@ -255,7 +255,7 @@ impl Writer {
         self.mirror.is_dirty() || self.state.has_gap || self.journal.last_frame() > self.checkpoints[1]
     }
 
-    /// When there is something to do.
+    /// The time of the next work.
     fn next_time(&self) -> Option<Instant> {
         if let Some(failing) = &self.state.failing {
             return Some(failing.again);
@@ -263,17 +263,17 @@ impl Writer {
         [self.frame_due(), self.checkpoint_due()].into_iter().flatten().min()
     }
 
-    /// When what waits has to be written.
+    /// The time at which waiting records have to be written.
     fn frame_due(&self) -> Option<Instant> {
         self.state.pending.since?.checked_add(self.options.loss_window)
     }
 
-    /// When a checkpoint has to be made.
+    /// The time at which a checkpoint has to be made.
     fn checkpoint_due(&self) -> Option<Instant> {
         self.state.changed?.checked_add(self.options.checkpoint_after)
     }
 
-    /// Does what is due.
+    /// Does the work that is due.
     fn tick(&mut self, messages: &Receiver<Message>) {
         let now = Instant::now();
         if let Some(failing) = &self.state.failing {
@@ -324,7 +324,7 @@ impl Writer {
         if self.state.has_gap { self.checkpoint(Some(messages)) } else { Ok(()) }
     }
 
-    /// Takes in what has to be saved.
+    /// Accepts data that has to be saved.
     fn enter(&mut self, given: Given) {
         self.shared.remove_queued(given.bytes());
         let Given { point, content, game } = given;
@@ -372,7 +372,7 @@ impl Writer {
         self.state.pending.push(record);
     }
 
-    /// Gives up what waits for the journal: only a checkpoint makes it durable now.
+    /// Drops the records that wait for the journal: now only a checkpoint makes them durable.
     fn leave_gap(&mut self) {
         if !self.state.has_gap {
             let revision = self.shared.durable().map_or(0, SavePoint::revision);
@@ -382,7 +382,7 @@ impl Writer {
         self.checkpoint_soon();
     }
 
-    /// Lets the next tick make a checkpoint, since only that makes durable what came.
+    /// Makes the next tick write a checkpoint, because only that makes received data durable.
     fn checkpoint_soon(&mut self) {
         self.state.changed.get_or_insert_with(Instant::now);
         if self.state.failing.is_none() {
@@ -391,7 +391,7 @@ impl Writer {
         }
     }
 
-    /// Lets the world stand on another ground from now on.
+    /// Changes the ground of the world.
     fn take_ground(&mut self, ground: Arc<Ground>) {
         if ground.hash() != self.ground.hash() {
             self.journal.set_base(base(&ground, self.mirror.level.as_ref()));
@@ -407,7 +407,8 @@ impl Writer {
         self.state.has_gap = true;
     }
 
-    /// Puts what waits into a frame, and makes all frames durable; or leaves a gap, if it is too much for a frame.
+    /// Writes waiting records to a frame, and makes all frames durable; or leaves a gap, if they are too large for a
+    /// frame.
     pub(super) fn flush(&mut self) -> Result<(), StoreError> {
         let pending = std::mem::take(&mut self.state.pending);
         if !pending.batch.is_empty() {
@@ -441,7 +442,7 @@ impl Writer {
         }
     }
 
-    /// Takes in what came during a checkpoint, and writes it in time.
+    /// Accepts messages during a checkpoint, and writes their data in time.
     pub(super) fn listen(&mut self, messages: &Receiver<Message>) {
         loop {
             match messages.try_recv() {

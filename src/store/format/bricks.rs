@@ -31,7 +31,7 @@ const WHOLE: u8 = 1;
 const FLAT: u8 = 2;
 /// Materials are stored.
 const MATERIALS: u8 = 4;
-/// What a head may say.
+/// The flags of a head.
 const KNOWN: u8 = WHOLE | FLAT | MATERIALS;
 
 /// The place of a brick in its region: bricks in order have rising places.
@@ -61,7 +61,7 @@ impl Region {
         self.bricks.push(densities);
     }
 
-    /// What is known around a brick.
+    /// The known densities around a brick.
     fn around(&self, place: usize) -> Known {
         let steps = [64, 8, 1];
         let neighbours = std::array::from_fn(|number| {
@@ -76,7 +76,7 @@ impl Region {
     }
 }
 
-/// A flag that is set if something is so.
+/// A flag that is set if a condition holds.
 fn flag(is_so: bool, flag: u8) -> u8 {
     if is_so { flag } else { 0 }
 }

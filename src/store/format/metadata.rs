@@ -26,7 +26,7 @@ pub struct Metadata {
     pub simulation: u32,
     /// The hash of the whole ground, as [`Ground::hash`](crate::ground::Ground::hash) gives it.
     pub ground: u64,
-    /// What the game put, by key.
+    /// The game's data, by key.
     pub game: Vec<(String, Vec<u8>)>,
 }
 
