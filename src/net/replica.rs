@@ -48,7 +48,7 @@ struct Pending {
 pub(super) struct Applied {
     /// A receipt for each edit among them, in order.
     pub receipts: Vec<Receipt>,
-    /// What parts among them changed, in order; `None` for those that are not in place.
+    /// The changes by replaced parts among them, in order; `None` for those that could not be replaced.
     pub restored: Vec<Option<Restored>>,
     /// The regions that changed.
     pub regions: BTreeSet<RegionPos>,
@@ -83,7 +83,7 @@ pub(super) struct Replica {
     appended: usize,
     /// The shown world, while many edits are pending.
     shown: Option<Terrain>,
-    /// Times that pending edits were worked out.
+    /// How often pending edits were predicted.
     drafts: u64,
     /// Edits that were worked out, each time.
     drafted: u64,
@@ -97,7 +97,7 @@ struct Before {
 }
 
 impl Before {
-    /// Notes how those parts are in this world that will change; those that are noted already stay as they are.
+    /// Records the present content of parts that will change, unless they are recorded already.
     fn note(&mut self, world: &World, change: &WorldChange) {
         for (pos, _) in &change.bricks {
             self.bricks.entry(*pos).or_insert_with(|| world.brick(*pos).cloned());
@@ -198,7 +198,7 @@ impl Replica {
         self.pending.remove(at).map(|pending| pending.edit)
     }
 
-    /// Applies entries of the order. Own edits among them are no longer pending; `own` tells their numbers.
+    /// Applies entries of the order. Own edits among them are no longer pending; `own` returns their numbers.
     pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
         // Those may be among them.
         self.is_outdated |= self.appended > 0;
@@ -269,7 +269,7 @@ impl Replica {
         applied
     }
 
-    /// Lets the confirmed world have the bricks that are shown, where they are equal, and forgets these differences.
+    /// Shares the shown bricks with the confirmed world where they are equal, and forgets these differences.
     fn share(&mut self) {
         let shown = |pos: &BrickPos| self.bricks.get(pos).and_then(Option::as_ref);
         let changed = self.before.bricks.keys().filter_map(|pos| Some((*pos, Arc::clone(shown(pos)?))));
@@ -296,7 +296,7 @@ impl Replica {
         }
     }
 
-    /// Puts parts into the confirmed world, as another machine has them.
+    /// Replaces parts of the confirmed world by those of another machine.
     ///
     /// # Errors
     /// When they do not fit.
@@ -330,7 +330,7 @@ impl Replica {
         Ok(())
     }
 
-    /// All of a region of the confirmed world as it is to be, where these are its bricks and fields.
+    /// The change that gives a whole region of the confirmed world these bricks and fields.
     pub fn region_change(
         &self,
         region: RegionPos,
@@ -350,7 +350,8 @@ impl Replica {
         WorldChange { bricks: all.into_iter().collect(), fields: chunks.into_iter().collect(), next_field }
     }
 
-    /// Do the pending edits come to the same as before, whatever has changed of the confirmed world? `next_field` is what it had.
+    /// Whether the pending edits have the same results as before, despite the changes of the confirmed world.
+    /// `next_field` is its old value.
     fn reads_nothing_of_before(&self, next_field: u64) -> bool {
         if self.pending.is_empty() {
             return self.bricks.is_empty() && self.fields.is_empty();
@@ -395,12 +396,12 @@ impl Replica {
         updated
     }
 
-    /// Whether the last pending edits can be worked out alone, as long as no entries are applied.
+    /// Whether the last pending edits can be predicted alone, as long as no entries are applied.
     pub fn can_append(&self) -> bool {
         self.appended > 0 && !self.is_outdated && !self.is_apart
     }
 
-    /// Works out the last pending edits over what is shown. `None` where that can't be held.
+    /// Predicts the last pending edits over the shown world. `None` if that world can't be built.
     fn append(&mut self) -> Option<(Option<ShownChange>, Vec<Receipt>)> {
         if self.shown.is_none() {
             self.shown = self.fork_shown();
@@ -445,7 +446,7 @@ impl Replica {
         Some(((!is_empty).then_some(ShownChange { change, hash }), receipts))
     }
 
-    /// What is shown, as a terrain.
+    /// The shown world, as a terrain.
     fn fork_shown(&self) -> Option<Terrain> {
         let mut shown = self.confirmed.fork().ok()?;
         never_shown(&mut shown);
@@ -507,7 +508,8 @@ impl Replica {
         (shown, Some(draft.receipts))
     }
 
-    /// What is to be put where the confirmed world has changed apart from the pending edits, which stay as they are shown.
+    /// The change of the shown world if the confirmed world has changed apart from the pending edits, whose results
+    /// stay.
     fn follow_apart(&mut self) -> Option<ShownChange> {
         let Before { bricks, fields } = std::mem::take(&mut self.before);
         self.samples = self.world().regions_hash().wrapping_add(self.more);
@@ -527,7 +529,7 @@ impl Replica {
         (!is_empty).then_some(ShownChange { change, hash })
     }
 
-    /// All that is to be put into a world, whatever it holds, so that it is what is to be shown.
+    /// The change that turns any world into the one that should be shown.
     pub fn whole(&self, shown: &World) -> ShownChange {
         let world = self.confirmed.world();
         let own = |pos: BrickPos| self.bricks.get(&pos).map_or_else(|| world.brick(pos), Option::as_ref);

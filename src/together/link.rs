@@ -74,14 +74,14 @@ pub(super) struct Display {
     pub pieces: VecDeque<(u64, PieceMessage)>,
 }
 
-/// What happens to a piece.
+/// A message about a piece.
 #[derive(Clone, Debug)]
 pub(super) enum PieceMessage {
     Found(LoosePieceFound),
     Returned(LoosePieceReturned),
 }
 
-/// What a shared terrain does now.
+/// The state of a shared terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Standing {
     /// It follows the server that has sent this invitation.
@@ -96,7 +96,7 @@ pub(super) enum Standing {
 
 impl Link {
     /// # Errors
-    /// When the terrain's settings are those of no terrain.
+    /// When the terrain's settings are out of range.
     pub fn new(terrain: &Terrain, stamps: &Stamps) -> Result<Self, TerrainError> {
         let world = terrain.world();
         let ground = GroundId::of(world);
@@ -130,7 +130,7 @@ impl Link {
         self.tags.len()
     }
 
-    /// Notes what a player asks for.
+    /// Records a request of the player.
     pub fn ask(&mut self, ask: Ask) {
         match &ask {
             Ask::Edit(edit) => self.tags.push_back(edit.tag()),
@@ -139,14 +139,14 @@ impl Link {
         self.asks.push(ask);
     }
 
-    /// Notes that an edit with this tag was answered.
+    /// Records that an edit with this tag was answered.
     pub fn answer(&mut self, tag: u64) {
         if let Some(at) = self.tags.iter().position(|asked| *asked == tag) {
             self.tags.remove(at);
         }
     }
 
-    /// What it does, given who serves.
+    /// The state, given the present server.
     pub fn standing(&self, service: Service) -> Standing {
         if let Some((kick, at)) = self.kicked
             && !matches!(service, Service::Served(_, invitation) if invitation != at)
@@ -181,7 +181,7 @@ impl Standing {
 }
 
 impl Display {
-    /// Of a terrain in which nothing was put yet.
+    /// The state for a terrain without changes.
     fn of(terrain: &Terrain) -> Self {
         let world = terrain.world();
         Self {
@@ -193,11 +193,11 @@ impl Display {
         }
     }
 
-    /// Looks at what became of changes in the terrain, and returns what happens to pieces with those.
+    /// Reads the results of changes in the terrain, and returns the messages about pieces that belong to them.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Vec<PieceMessage> {
         let version = terrain.world().version();
         if !version.is_same_world(self.version) {
-            // Another terrain took its place, and what waited there is gone.
+            // Another terrain replaced it, and waiting changes are lost.
             let pieces = std::mem::take(&mut self.pieces);
             *self = Self { is_broken: true, pieces, ..Self::of(terrain) };
             self.hold_pieces();
@@ -214,7 +214,7 @@ impl Display {
         self.pieces.drain(..count).map(|(_, piece)| piece).collect()
     }
 
-    /// Lets the pieces wait until all that should be shown is put.
+    /// Delays the messages about pieces until all changes are shown.
     fn hold_pieces(&mut self) {
         let due = self.submitted + 1;
         self.pieces.iter_mut().for_each(|(at, _)| *at = due);
@@ -225,7 +225,7 @@ impl Display {
         self.answered >= self.submitted
     }
 
-    /// Holds what happens to pieces with what was submitted last.
+    /// Attaches messages about pieces to the change that was submitted last.
     pub fn add_pieces(&mut self, pieces: impl IntoIterator<Item = PieceMessage>) {
         let due = self.submitted + u64::from(self.is_broken);
         self.pieces.extend(pieces.into_iter().map(|piece| (due, piece)));

@@ -2,8 +2,8 @@
 //!
 //! The server inserts a [`GroundServer`]. Each player has a terrain with a [`SharedTerrain`], made from the same ground; a player who
 //! is the host has one too. Write `Brush` messages as in single-player: edits show at once, are sent to the server, and
-//! are [confirmed](GroundEdited) once it has ordered them. [`Undo`](crate::plugin::Undo) asks the server to take back
-//! the player's last stroke, if it lets players do so.
+//! are [confirmed](GroundEdited) once it has ordered them. [`Undo`](crate::plugin::Undo) asks the server to undo
+//! the player's last stroke, if `UndoPolicy` allows it.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -52,8 +52,8 @@ use crate::plugin::{
     TerrainPlugin,
 };
 
-/// Digging together: add it after `RepliconPlugins` and [`BurrowPlugins`](crate::plugin::BurrowPlugins), on the server and on all
-/// clients, in the same place among all that registers something with replicon.
+/// The multiplayer plugin. Add it after `RepliconPlugins` and [`BurrowPlugins`](crate::plugin::BurrowPlugins), on the
+/// server and on all clients, in the same position among all plugins that register something with replicon.
 ///
 /// A server of `MinimalPlugins` needs `StatesPlugin` for `RepliconPlugins`, and a transport:
 ///

@@ -9,7 +9,7 @@ use super::messages::FromPlayer;
 use super::service::Authorised;
 use crate::net;
 
-/// Bytes of a player's messages that wait for the server while it is at work. Who sends more is kicked.
+/// The most bytes of a player's messages that wait while the server is busy. A player that sends more is kicked.
 const MOST_WAITING_BYTES: usize = 1 << 20;
 
 /// The approximate overhead of a message in bytes.
@@ -28,14 +28,14 @@ pub(super) struct Players {
 
 /// The meaning of a message.
 pub(super) enum Said {
-    /// The client says this, for the first time if it `begins`.
+    /// A message of the client, the first one if it `begins`.
     Bytes {
         begins: bool,
         bytes: Vec<u8>,
     },
     /// The player has left.
     Leaves,
-    /// The player has sent far more than the server could take by now.
+    /// The player has sent more than the server could handle.
     TooMuch,
     Nothing,
 }
@@ -62,7 +62,7 @@ impl Players {
         number(client, id).filter(|_| !self.kicked.contains(&entity))
     }
 
-    /// Takes a message of a player's.
+    /// Handles a message of a player.
     pub fn hear(&mut self, player: net::ClientId, client: ClientId, message: &FromPlayer) -> Said {
         let said = match message {
             FromPlayer::Left if self.clients.remove(&player).is_some() => Said::Leaves,
@@ -85,12 +85,12 @@ impl Players {
         }
     }
 
-    /// Enters that the server has taken all that waited.
+    /// Records that the server has taken all waiting messages.
     pub fn forget_waiting(&mut self) {
         self.waiting.clear();
     }
 
-    /// Where to send what the server has for a player.
+    /// The client to which messages for a player are sent.
     pub fn client(&self, player: net::ClientId) -> Option<ClientId> {
         self.clients.get(&player).copied()
     }

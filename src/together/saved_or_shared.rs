@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use super::SharedTerrain;
 use crate::saves::{ClosedBecause, SavedWorld, detach};
 
-/// A terrain that becomes shared is no longer saved here: its own world is closed with all that was dug in it.
+/// A terrain that becomes shared is no longer saved here: its own world is saved and closed.
 pub(super) fn close_own_world(
     new: On<Insert, SharedTerrain>,
     saved: Query<(), With<SavedWorld>>,

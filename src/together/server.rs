@@ -19,8 +19,8 @@ use crate::saves::{ReadWorld, SavedWorld, WorldReader};
 use crate::store::{Progress, Store, StoreError, StoreTrouble};
 use crate::terrain::Terrain;
 
-/// The ground that players dig together: insert it in the app that is the server. Its [`Server`] owns a terrain that nobody looks
-/// at; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like everybody else.
+/// The server of a shared world: insert it in the server's app. Its [`Server`] owns a terrain that is not
+/// drawn; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like all other players.
 #[derive(Resource)]
 pub struct GroundServer {
     work: Work,
@@ -34,9 +34,9 @@ pub struct GroundServer {
     data: BTreeMap<String, Vec<u8>>,
 }
 
-/// Where the server is.
+/// The state of the server.
 enum Work {
-    /// Its world is read.
+    /// Its world is being read.
     Opening(ThreadTask<Result<(Box<Parts>, Vec<StoreTrouble>), StoreError>>, Progress),
     Here(Box<Parts>),
     UnderWay(ThreadTask<Box<Parts>>),
@@ -44,7 +44,7 @@ enum Work {
     Gone,
 }
 
-/// What goes to a thread and comes back.
+/// The data that is sent to a thread and returned.
 struct Parts {
     server: Server,
     store: Option<Store>,
@@ -53,10 +53,10 @@ struct Parts {
 /// The most requests of the game that wait until a world is read; further ones are dropped.
 const MOST_WAITING: usize = 1 << 14;
 
-/// What waits for the server to come back.
+/// A request that waits until the server is not busy.
 type Request = Box<dyn FnOnce(&mut Parts, Duration) + Send + Sync>;
 
-/// Something happened on the ground's server.
+/// An event of the ground's server.
 #[derive(Message, Clone, Debug)]
 pub enum GroundServerEvent {
     /// Its world was read; or can't be read, and nothing is served.
@@ -91,8 +91,8 @@ impl GroundServer {
         if let Work::Opening(_, progress) = &self.work { Some(progress.share()) } else { None }
     }
 
-    /// Serves the world of a store that is open, on a [level](crate::store::StoreOptions::level) say: [`Server::open`] made the
-    /// server of it.
+    /// Serves the world of an open store, for example on a [level](crate::store::StoreOptions::level). Use
+    /// [`Server::open`] to make the server.
     pub fn with_store(server: Server, store: Store) -> Self {
         let data = store.game_data().clone();
         Self { data, ..Self::working(Work::Here(Box::new(Parts { server, store: Some(store) }))) }
@@ -172,7 +172,7 @@ impl GroundServer {
             if let Some(parts) = self.take_parts(|_| {}) {
                 self.work = Work::Here(parts);
             } else if Instant::now() > deadline {
-                error!("the last edits are not saved: the server is still at work");
+                error!("the last edits are not saved: the server is still busy");
                 return;
             } else {
                 std::thread::sleep(Duration::from_millis(1));
@@ -189,7 +189,7 @@ impl GroundServer {
         }
     }
 
-    /// Takes the server out, if it is not at work.
+    /// Takes the server, if it is not busy.
     fn take_parts(&mut self, mut tell: impl FnMut(GroundServerEvent)) -> Option<Box<Parts>> {
         match std::mem::replace(&mut self.work, Work::Gone) {
             Work::Here(parts) => return Some(parts),
@@ -264,7 +264,7 @@ impl GroundServer {
     }
 }
 
-/// Hands messages of players to the server, and sends what it has for them.
+/// Passes messages of players to the server, and sends its messages to them.
 pub(super) fn serve(
     mut ground: ResMut<GroundServer>,
     messages: Res<Messages<FromClient<FromPlayer>>>,
@@ -312,7 +312,7 @@ pub(super) fn serve(
     }));
 }
 
-/// Does what players asked for in the last frame, and saves everything before the app ends.
+/// Handles the requests of the last frame, and saves everything before the app ends.
 pub(super) fn finish_at_exit(
     mut ground: ResMut<GroundServer>,
     messages: Res<Messages<FromClient<FromPlayer>>>,

@@ -7,7 +7,7 @@ use bevy_replicon::prelude::*;
 use super::messages::{BulkLane, Invitation, OrderLane, Served};
 use super::server::GroundServer;
 
-/// Who serves the ground that is shared in this app.
+/// The server of the ground that is shared in this app.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Service {
     /// There is no connection, and no server in this app.
@@ -36,7 +36,7 @@ impl Seen {
     }
 }
 
-/// Finds out who serves the ground: the server in this app, or else the one that this app is connected to.
+/// Finds the server of the ground: in this app, or the one that this app is connected to.
 pub(super) fn find_service(
     mut service: ResMut<Service>,
     ground: Option<Res<GroundServer>>,
@@ -64,7 +64,7 @@ pub(super) fn find_service(
     }
 }
 
-/// Forgets what came over a connection that has ended.
+/// Drops messages of a connection that has ended.
 pub(super) fn forget_connection(
     mut service: ResMut<Service>,
     mut invitations: ResMut<Messages<Invitation>>,
@@ -80,7 +80,7 @@ pub(super) fn forget_connection(
 /// A client that takes part in the game: replicon has authorised it.
 pub(super) type Authorised = (With<ConnectedClient>, With<AuthorizedClient>);
 
-/// Invites authorised clients to the ground that is served, and tells those who were invited when it is no longer.
+/// Invites authorised clients to the served ground, and notifies invited clients when it is no longer served.
 pub(super) fn invite(
     ground: Option<Res<GroundServer>>,
     clients: Query<(Entity, Has<AuthorizedClient>), With<ConnectedClient>>,

@@ -19,12 +19,12 @@ use crate::terrain::Receipt;
 #[derive(Component, Default)]
 #[component(on_add = warn_without_plugin)]
 pub struct SharedTerrain {
-    /// Images that the player may stamp with. The server needs them too; players who lack one get it from there.
+    /// Images that the player may stamp with. The server needs them too; players that lack one get it from there.
     pub stamps: Stamps,
     /// The player's position, in voxels of the terrain: missing ground is fetched from there outwards.
     pub place: IVec3,
     pub(super) link: Option<Link>,
-    /// The place among all shared terrains, in the order in which they were inserted.
+    /// The position among all shared terrains, in the order of insertion.
     pub(super) order: u64,
     /// Whether it has greeted a server, with this ground or another.
     pub(super) was_served: bool,
@@ -64,7 +64,7 @@ impl SharedTerrain {
     }
 }
 
-/// Without the plugin nothing would happen, and nothing would say so.
+/// Logs an error if the plugin is missing, because nothing else would show it.
 fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lifecycle::HookContext) {
     if world.get_resource::<super::client::Sharing>().is_none() {
         error!(
@@ -73,7 +73,7 @@ fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lif
     }
 }
 
-/// What became of an edit.
+/// The outcome of an edit.
 #[derive(Clone, Debug, PartialEq)]
 pub enum WhatBecame {
     /// It is shown as the player's machine predicts it.
@@ -94,7 +94,7 @@ pub struct GroundEdited {
     pub terrain: Entity,
     /// The tag of the brush.
     pub tag: u64,
-    /// What became of it.
+    /// The outcome.
     pub outcome: WhatBecame,
 }
 
@@ -107,7 +107,7 @@ pub struct GroundJoined {
     pub event: ClientEvent,
 }
 
-/// Gives a shared terrain the list that its edits go to.
+/// Inserts the outbox for edits into a shared terrain.
 pub(super) fn begin(
     new: On<Insert, SharedTerrain>,
     mut commands: Commands,
@@ -120,7 +120,7 @@ pub(super) fn begin(
     commands.entity(new.entity).try_insert_if_new(EditOutbox::default());
 }
 
-/// Brushes on a terrain that is no longer shared are its own again.
+/// Removes the outbox from a terrain that is no longer shared, so that brushes apply directly again.
 pub(super) fn end(gone: On<Remove, SharedTerrain>, mut commands: Commands) {
     commands.entity(gone.entity).try_remove::<EditOutbox>();
 }

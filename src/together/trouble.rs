@@ -58,7 +58,7 @@ pub enum SharingTrouble {
     TooManyPending(usize),
 }
 
-/// A [`SharedTerrain`](super::SharedTerrain) follows no server, or something that was asked of it is not done. It is logged as a
+/// A [`SharedTerrain`](super::SharedTerrain) follows no server, or refuses a request. It is logged as a
 /// warning as well.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SharingTroubleFound {

@@ -20,11 +20,11 @@ pub(super) enum Stage {
     Apart,
     /// It waits for its welcome.
     Greeting,
-    /// Old entries come, up to a number. The server has seen own edits up to `own`.
+    /// Old entries arrive, up to the number `to`. The server has seen own edits up to `own`.
     ByLog { to: u64, own: u64 },
     /// Regions at the number `to` arrive; `left` more are missing.
     ByRegions { to: u64, left: usize },
-    /// The table of regions at a number comes.
+    /// The table of regions at a number arrives.
     ByTable { to: u64 },
     /// It follows the order.
     Following,
@@ -51,7 +51,7 @@ impl Client {
         let to = epoch.number;
         self.is_part = !matches!(join, Join::Log { .. });
         self.voids.clear();
-        // Until it is there, it has what it had.
+        // Until the join is finished, it keeps its old world.
         let known = self.epoch.map_or(0, |known| known.number);
         match join {
             Join::Log { voids } => {
@@ -74,7 +74,7 @@ impl Client {
         }
         self.events.push(ClientEvent::Welcomed { client, reach });
         self.renumber(own);
-        // Undos are not sent again: by now they would be of other strokes.
+        // Undos are not sent again: by now they would undo other strokes.
         for _ in self.undos.split_off(&own.saturating_add(1)) {
             self.events.push(ClientEvent::UndoRefused(None));
         }
@@ -97,7 +97,7 @@ impl Client {
         self.events.extend(undone);
     }
 
-    /// Takes back own edits up to a number; returns their tags.
+    /// Removes pending edits up to a number; returns their tags.
     fn take_answered(&mut self, own: u64) -> Vec<u64> {
         let answered: Vec<u64> =
             self.replica.pending().map(|(number, _)| number).filter(|number| *number <= own).collect();
@@ -119,8 +119,8 @@ impl Client {
         std::mem::take(&mut self.early).into_iter().for_each(|edit| self.dig(edit));
     }
 
-    /// Lets own edits that the server has not seen have numbers that it accepts, if theirs are too far from the last one that it has
-    /// seen: so it is where a server was replaced by one that knows less.
+    /// Renumbers own edits that the server has not seen, if their numbers are too far from the last one that it has
+    /// seen, as after a server was replaced by one with an older state.
     fn renumber(&mut self, own: u64) {
         let mut last = own;
         let unseen = self.replica.pending().map(|(number, _)| number).filter(|number| *number > own);
@@ -173,7 +173,8 @@ impl Client {
         self.events.push(ClientEvent::Joined);
     }
 
-    /// The table of all regions: those that differ are fetched, and what the server has not is pristine.
+    /// Handles the table of all regions: regions that differ are fetched, and regions that the server lacks become
+    /// pristine.
     pub(super) fn take_table(&mut self, number: u64, regions: &RegionHashes) {
         let Stage::ByTable { to } = self.stage else { return };
         if number != to {
@@ -194,7 +195,7 @@ impl Client {
         self.finish_regions();
     }
 
-    /// Asks for more of the regions that differ, once most of those have come that were asked for.
+    /// Requests more of the regions that differ, once most of the requested ones have arrived.
     fn fetch_more(&mut self) {
         let Stage::ByRegions { to, left } = self.stage else { return };
         let awaited = left.saturating_sub(self.wanted.len());
@@ -211,7 +212,7 @@ impl Client {
         }
     }
 
-    /// A region that it waits for.
+    /// Handles a region that it waits for.
     pub(super) fn take_region(&mut self, content: RegionContent) {
         if let Some(repair) = &mut self.repair {
             repair.add(content);
@@ -235,7 +236,7 @@ impl Client {
         self.finish_regions();
     }
 
-    /// Lets fields to come have the names that they have on the server: what was put can only have raised them.
+    /// Makes later fields have the same names as on the server.
     pub(super) fn lower_names(&mut self, next_field: u64) {
         if self.replica.world().next_field() > next_field {
             let terms = Terms { next_field, ..self.replica.terms() };
@@ -250,7 +251,7 @@ impl Client {
     }
 }
 
-/// From a place to a region along the axis on which it is farthest, in voxels.
+/// The distance from a position to a region along the axis on which it is farthest, in voxels.
 fn distance(region: RegionPos, place: IVec3) -> i64 {
     let samples = region.samples();
     let (low, high) = (samples.min.as_i64vec3(), samples.max.as_i64vec3());

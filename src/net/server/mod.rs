@@ -55,10 +55,10 @@ use session::Session;
 pub use settings::{Reach, ServerSettings, UndoPolicy};
 use strokes::Strokes;
 
-/// Says whether a client may do an edit.
+/// Decides whether a client may make an edit.
 pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
 
-/// Says whether a player may take part, or for which reason not.
+/// Decides whether a player may join; otherwise the reason.
 pub type Admission = Box<dyn Fn(ClientId) -> Result<(), u32> + Send + Sync>;
 
 /// The most events that wait to be taken.
@@ -84,14 +84,14 @@ struct Ordered {
     cost: u64,
 }
 
-/// An undo that waits until all entries before it are applied: what it restores is known only then.
+/// An undo that waits until all entries before it are applied, because only then its result is known.
 struct UndoRequest {
     by: ClientId,
     own: u64,
     of: ClientId,
 }
 
-/// What came after an undo that waits, or that undo.
+/// A waiting undo, or an entry after it.
 enum Later {
     Undo(UndoRequest),
     Entry(Ordered),
@@ -109,8 +109,9 @@ impl Later {
 
 /// The server of a world: bytes in, bytes out.
 ///
-/// In each frame: [`receive`](Self::receive) every message that came, send what [`take_outgoing`](Self::take_outgoing) returns, then
-/// [`advance`](Self::advance), which takes as long as edits take, and send again. Times count from any start and never run back.
+/// In each frame, pass every received message to [`receive`](Self::receive), send the messages of
+/// [`take_outgoing`](Self::take_outgoing), call [`advance`](Self::advance), which takes as long as its edits take, and
+/// send again. Times count from any start and never decrease.
 pub struct Server {
     terrain: Terrain,
     settings: ServerSettings,
@@ -264,7 +265,7 @@ impl Server {
         &self.settings
     }
 
-    /// The images that stamps may have. Clients that lack one get it when it is used first.
+    /// The images that stamps may have. A client that lacks an image gets it at its first use.
     pub fn stamps_mut(&mut self) -> &mut Stamps {
         &mut self.stamps
     }
@@ -341,7 +342,7 @@ impl Server {
         }
     }
 
-    /// Sets the rules for edits that come later.
+    /// Sets the rules of later edits.
     ///
     /// # Errors
     /// When they are for a material that nothing has.
@@ -352,12 +353,12 @@ impl Server {
         Ok(())
     }
 
-    /// Sets how edits that come later search for loose pieces.
+    /// Sets the loose settings of later edits.
     pub fn set_loose(&mut self, loose: Option<LooseSettings>) {
         self.order(Entry::Loose(loose));
     }
 
-    /// Orders an edit of the game's own, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
+    /// Orders an edit of the game, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
     ///
     /// # Errors
     /// When it is a stamp whose image is not among the [stamps](Self::stamps_mut): no client could read it.
@@ -369,10 +370,10 @@ impl Server {
         Ok(())
     }
 
-    /// Orders that parts take the place of others.
+    /// Orders the replacement of parts.
     ///
     /// # Errors
-    /// When they take more bytes than a message may; put them in smaller parts then.
+    /// When they take more bytes than a message may; split them then.
     pub fn put(&mut self, change: WorldChange) -> Result<(), FormatError> {
         let entry = Entry::Parts { by: None, change: Arc::new(change) };
         let (length, limit) = (entry_bytes(&entry) as u64, MOST_TO_CLIENT as u64 / 2);
@@ -414,7 +415,7 @@ impl Server {
         }
     }
 
-    /// Sends what was ordered to all clients that have everything before it, and room for it.
+    /// Sends ordered entries to all clients that have everything before them, and room for them.
     fn flush(&mut self) {
         let (last, writer) = (self.epoch.number, std::mem::take(&mut self.writer));
         let Some(message) = writer.message(last) else { return };
@@ -436,7 +437,7 @@ impl Server {
         self.outgoing.push((client, Lane::Order, bytes));
     }
 
-    /// Sends a message to all clients that have joined, after what was ordered.
+    /// Sends a message to all clients that have joined, after all ordered entries.
     fn send_to_all(&mut self, message: &ToClient) {
         self.flush();
         let bytes = message.to_bytes();
@@ -455,7 +456,7 @@ impl Server {
         self.events.push_back(event);
     }
 
-    /// Applies what was ordered, welcomes clients that have come, and sends what takes long, as much as may be sent by now.
+    /// Applies ordered entries, welcomes new clients, and sends bulk data within its limits.
     pub fn advance(&mut self, now: Duration) {
         self.now = self.now.max(now);
         let is_due = now.saturating_sub(self.last_mark) >= self.settings.mark;
@@ -472,15 +473,15 @@ impl Server {
         self.send_bulk(now);
     }
 
-    /// Messages that are to be sent, in order; each is returned once. Each lane of each client has to deliver all of them in
-    /// order.
+    /// Messages to send, in order; each is returned once. Each lane of each client has to deliver all of its messages
+    /// in order.
     pub fn take_outgoing(&mut self) -> Vec<Outgoing> {
         self.flush();
         self.catch_up();
         std::mem::take(&mut self.outgoing)
     }
 
-    /// What happened since the last call; if nobody asks, the latest 4096 are kept.
+    /// Events since the last call. If they are not taken, the latest 4096 are kept.
     pub fn take_events(&mut self) -> Vec<ServerEvent> {
         std::mem::take(&mut self.events).into()
     }

@@ -14,7 +14,7 @@ use crate::net::message::ClientId;
 /// starts with full buckets.
 const MOST_PLAYERS: usize = 1 << 14;
 
-/// Greetings that are answered; others wait.
+/// The rate of answered greetings; others wait.
 const GREETINGS: Rate = Rate { per_second: 1, burst: 8 };
 
 /// The data of a player.
@@ -72,7 +72,7 @@ impl Players {
         self.players.get(&client)
     }
 
-    /// Forgets those who were away for the longest time, where there are too many.
+    /// Forgets the players that have been away for the longest time, if there are too many.
     pub fn trim(&mut self, is_connected: impl Fn(ClientId) -> bool) {
         if self.players.len() <= MOST_PLAYERS {
             return;

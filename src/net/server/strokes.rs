@@ -12,7 +12,7 @@ use crate::volume::{Brick, Fields};
 
 type Stored = Option<Arc<Brick>>;
 
-/// What was there, and what came in its place.
+/// The old and the new content of a part.
 struct Replaced<T> {
     before: T,
     after: T,
@@ -40,7 +40,7 @@ pub enum NoUndo {
 /// The strokes of all players, within a limit of bytes.
 pub struct Strokes {
     players: FxHashMap<ClientId, VecDeque<Stroke>>,
-    /// Whose the strokes are, by number from the oldest that is kept.
+    /// The players of the strokes, by number from the oldest that is kept.
     order: VecDeque<(u64, ClientId)>,
     next: u64,
     bytes: usize,
@@ -53,7 +53,7 @@ impl Strokes {
         Self { players, order, next: 0, bytes: 0, limit }
     }
 
-    /// Notes that an edit changes this world so. Edits with the same label that follow each other are one stroke.
+    /// Records an edit's changes of this world. Consecutive edits with equal labels are one stroke.
     pub fn record(&mut self, player: ClientId, label: Option<u64>, world: &World, change: &WorldChange) {
         let strokes = self.players.entry(player).or_default();
         let goes_on = label.is_some() && strokes.back().is_some_and(|stroke| stroke.label == label);
