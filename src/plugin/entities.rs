@@ -73,7 +73,7 @@ impl TerrainEntities {
                 commands.entity(child).try_despawn();
             }
         }
-        // Those that a game moved to another parent.
+        // Entities that a game moved to another parent.
         own.into_iter().for_each(|entity| commands.entity(entity).try_despawn());
     }
 

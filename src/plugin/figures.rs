@@ -7,8 +7,8 @@ use bevy::prelude::*;
 
 use super::Times;
 
-/// What the plugin did lately. It counts as changed in frames with a commit; [`main_thread`](Self::main_thread) alone, which is
-/// measured in every frame, does not count.
+/// Recent statistics of the plugin. It counts as changed in frames with a commit; [`main_thread`](Self::main_thread)
+/// alone, which is measured in every frame, does not count.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct BurrowFigures {
@@ -31,7 +31,7 @@ pub struct BurrowFigures {
     pub main_thread: Duration,
 }
 
-/// How long the parts of a transaction took in its task.
+/// The durations of the parts of a transaction in its task.
 #[derive(Clone, Copy, Default)]
 pub(super) struct TaskTimes {
     pub edit: Duration,

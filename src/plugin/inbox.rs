@@ -42,7 +42,7 @@ pub(super) struct Inbox {
     redos: Unread<Redo>,
 }
 
-/// What the game asks of terrains, in the order in which it is queued.
+/// The game's requests to terrains, in the order in which they are queued.
 #[derive(SystemParam)]
 pub(super) struct Requests<'w> {
     inbox: ResMut<'w, Inbox>,
@@ -64,7 +64,7 @@ impl Requests<'_> {
     }
 }
 
-/// Keeps what was written in this frame, in every frame and whatever the game gates.
+/// Stores messages of this frame. Runs in every frame, regardless of the game's run conditions.
 pub(super) fn keep_requests(mut requests: Requests) {
     let Requests { inbox, brushes, targeted, undos, redos } = &mut requests;
     // For other systems this is no change.

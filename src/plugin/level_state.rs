@@ -48,7 +48,7 @@ pub struct LevelsOfDetail {
     pub edited_pixels: f32,
     /// Levels are chosen for where cameras will be in this many seconds, too.
     pub look_ahead: f32,
-    /// The most squares that are drawn, about; where more would be needed, all ground is drawn coarser.
+    /// The approximate maximum of drawn squares; if more would be needed, all ground is drawn coarser.
     pub most_nodes: usize,
     /// Meshes made for one change of levels, unless a single square needs more.
     pub meshes_per_change: usize,
@@ -85,7 +85,7 @@ impl LevelsOfDetail {
     }
 }
 
-/// What is drawn of a terrain with [`LevelsOfDetail`]; the plugin writes it.
+/// The drawn levels of a terrain with [`LevelsOfDetail`]; the plugin updates it.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct ShownLevels {
@@ -96,7 +96,7 @@ pub struct ShownLevels {
 }
 
 impl ShownLevels {
-    /// The share of squares that are drawn as they should be, 0..=1.
+    /// The share of squares that are drawn at their chosen level, 0..=1.
     pub fn progress(&self) -> f32 {
         let nodes = self.nodes.iter().sum::<usize>();
         if nodes == 0 { 0.0 } else { nodes as f32 / (nodes + self.waiting) as f32 }
@@ -129,7 +129,7 @@ impl Default for DetailSource {
     }
 }
 
-/// Who looks at a terrain, in its voxels; while nobody does, those who looked last.
+/// The viewpoints of a terrain, in its voxels; without any, the last ones.
 #[derive(Component, Default)]
 pub(super) struct Watchers {
     pub eyes: Vec<(Entity, Eye)>,
@@ -156,7 +156,7 @@ impl WantedTiles {
     }
 }
 
-/// What a terrain's levels were last chosen for.
+/// The inputs of the last choice of a terrain's levels.
 #[derive(Component, Default)]
 pub(super) struct LevelState {
     pub known: Arc<KnownNodes>,
@@ -190,14 +190,14 @@ impl LevelState {
         Self { known, ..Self::default() }
     }
 
-    /// Notes that a change of levels was shown, after which none is left if it changed nothing.
+    /// Records that a change of levels was shown; the choice is settled if it changed nothing.
     pub(super) fn count(&mut self, changed: usize) -> usize {
         self.is_settled = changed == 0;
         self.is_complete |= self.is_settled;
         if self.is_settled { 0 } else { self.known.waiting() }
     }
 
-    /// Notes a transaction with edits.
+    /// Records a transaction with edits.
     pub(super) fn count_edit(&mut self) {
         self.edits = self.edits.saturating_add(1);
     }

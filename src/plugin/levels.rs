@@ -179,7 +179,7 @@ fn voxel_metres(place: &GlobalTransform) -> f32 {
     sides.into_iter().fold(f32::MIN_POSITIVE, f32::max)
 }
 
-/// The velocity of an eye that was elsewhere in the last frame, or before a pause in which nobody looked.
+/// The velocity of an eye from its previous position, also across a pause without cameras.
 fn velocity(before: &Eye, now: &Eye, seconds: f32, metres: f32, is_after_pause: bool) -> Vec3 {
     let way = now.position - before.position;
     if is_after_pause {

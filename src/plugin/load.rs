@@ -177,7 +177,7 @@ pub(super) fn remove_with_terrain(
     commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight, LevelState)>();
 }
 
-/// A terrain that gets slim vertices need not wait for others.
+/// Cancels a load without slim vertices when a terrain gets them; it is then loaded again with them.
 pub(super) fn drop_other_vertices(
     new: On<Insert, SlimVertices>,
     mut commands: Commands,
@@ -188,7 +188,7 @@ pub(super) fn drop_other_vertices(
     }
 }
 
-/// A terrain that loses slim vertices need not wait for them.
+/// Cancels a load with slim vertices when a terrain loses the marker; it is then loaded again without them.
 pub(super) fn drop_slim_vertices(
     gone: On<Remove, SlimVertices>,
     mut commands: Commands,
@@ -273,7 +273,7 @@ fn build_levels(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
     (chunks, Some(BuiltLevels { drawn, nodes: builder.build_nodes(updates), known }))
 }
 
-/// How often a terrain is loaded whose load panics.
+/// The number of attempts to load a terrain whose load panics.
 const ATTEMPTS: u32 = 3;
 
 /// What a load built; `None` if it panicked and is to be tried again. After some attempts the terrain is shown without

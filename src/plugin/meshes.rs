@@ -48,7 +48,7 @@ pub(crate) struct VertexExtras {
 }
 
 impl VertexExtras {
-    /// Those of a terrain with these components.
+    /// The extras of a terrain with these components.
     pub(crate) fn of(colors: Option<&MaterialColors>, is_slim: bool) -> Self {
         if is_slim {
             return Self::default();
@@ -122,7 +122,7 @@ impl MeshBuilder {
 /// The attributes of a mesh while it is built.
 struct Arrays<'a> {
     mesh_builder: &'a MeshBuilder,
-    /// How the pristine surface is asked for.
+    /// The query of the pristine surface.
     height: fn(&Ground, Column) -> i32,
     positions: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,

@@ -51,7 +51,7 @@ impl<C: Component + Clone> Plugin for TerrainPropagatePlugin<C> {
 /// The steps of [`BurrowSystems::Propagate`], in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum PropagateSteps {
-    /// Notes which materials terrains have, and chooses one of several.
+    /// Records the materials of terrains, and chooses one of several.
     Choose,
     /// Propagates components.
     Propagate,

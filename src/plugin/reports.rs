@@ -44,7 +44,7 @@ pub(crate) enum Report {
     Textures,
 }
 
-/// What was logged. It is locked and not borrowed mutably, so that systems which log need no order.
+/// The logged problems. It is locked and not borrowed mutably, so that logging systems need no order.
 #[derive(Resource, Default)]
 pub(crate) struct Reported(Mutex<HashSet<(Entity, Report)>>);
 

@@ -13,7 +13,7 @@ use super::threads::{ThreadTask, Threads};
 use crate::backend::Engine;
 use crate::terrain::{Commit, Drawn, SurfaceDraft, Terrain, Transaction, Unseen};
 
-/// The task that a terrain waits for.
+/// The running task of a terrain.
 #[derive(Component)]
 pub(super) struct InFlight {
     /// Counts tasks over all terrains.
@@ -45,7 +45,7 @@ impl TaskOutput {
     }
 }
 
-/// What changed the ground.
+/// The source of a change of the ground.
 pub(super) enum Change {
     /// A transaction, not committed yet.
     Transaction(Box<Commit>),

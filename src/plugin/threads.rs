@@ -17,8 +17,8 @@ use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// How many threads each of the plugin's pools has, besides those of Bevy. Insert it before the plugins, or change it at any
-/// time: work under way ends on the threads that it began on.
+/// The number of threads of each of the plugin's pools, in addition to Bevy's. Insert it before the plugins, or change
+/// it at any time: work under way ends on the threads that it began on.
 ///
 /// The pools belong to the process. If several apps run in one, the settings that changed last hold for all of them.
 ///
@@ -122,7 +122,7 @@ impl Pool {
             .stack_size(STACK)
             .num_threads(count)
             .thread_name(move |number| format!("{name} {number}"))
-            // Of work that nobody waits for, such as freeing memory. Otherwise it would end the process.
+            // A panic in work without a waiting caller, such as freeing memory, would otherwise end the process.
             .panic_handler(|panic| error!("background work panicked: {}", panic_message(panic.as_ref())));
         builder.build().ok().map(Arc::new)
     }
@@ -167,7 +167,7 @@ pub(crate) fn free_later(waste: impl Send + 'static) {
     Threads::Background.spawn(move || drop(waste));
 }
 
-/// What a panic said.
+/// The message of a panic.
 pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic without a message")
@@ -228,7 +228,7 @@ mod tests {
         }
     }
 
-    /// Keeps the threads of the background busy until what it returns is dropped.
+    /// Keeps the background threads busy until the returned value is dropped.
     fn block_background() -> impl Sized {
         let many = Threads::Background.pool().map_or(0, |pool| pool.current_num_threads());
         let (mut gate, (begun, begins)) = (Vec::new(), channel());

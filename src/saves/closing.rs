@@ -66,7 +66,7 @@ pub(super) fn close(
     }
 }
 
-/// A world is closed with its component. A terrain that was put in the place of its own in this frame is not written into it.
+/// Closes a world when its component is removed. A terrain that replaced its own in this frame is not written into it.
 pub(super) fn close_with_component(
     gone: On<Discard, SavedWorld>,
     mut worlds: Query<(&mut WorldStore, &mut Terrain), Allow<Disabled>>,
@@ -78,7 +78,7 @@ pub(super) fn close_with_component(
     commands.entity(gone.entity).try_remove::<WorldStore>();
 }
 
-/// Hands over the last commits of a terrain that another one replaces, or that goes.
+/// Sends the last commits of a terrain that is replaced or removed.
 pub(super) fn follow_discarded(
     gone: On<Discard, Terrain>,
     mut worlds: Query<(&mut WorldStore, &mut Terrain), Allow<Disabled>>,
@@ -88,7 +88,7 @@ pub(super) fn follow_discarded(
     }
 }
 
-/// Takes the [`SavedWorld`] off an entity, and says why.
+/// Removes the [`SavedWorld`] of an entity for a reason.
 pub(crate) fn detach(commands: &mut Commands, entity: Entity, because: ClosedBecause) {
     commands.queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(entity) else { return };

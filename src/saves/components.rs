@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use super::messages::ClosedBecause;
 use crate::store::{BaseChanged, SavePoint, Store, StoreOptions};
 
-/// How long an app that ends waits for the disk.
+/// The longest time that an exiting app waits for the disk.
 pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
@@ -28,9 +28,9 @@ pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 pub struct SavedWorld {
     /// The folder, for this world alone. It is made if it is missing, with those around it.
     pub path: PathBuf,
-    /// What may be lost at most if the machine loses power: commits of this long, and a little more for the disk.
+    /// The longest time whose commits may be lost if the machine loses power, plus a little for the disk.
     pub loss_window: Duration,
-    /// What to do with edits where the ground or the [level](super::StartLevel) is another one than they were made on.
+    /// How edits are kept if the ground or the [level](super::StartLevel) differs from the one that they were made on.
     #[reflect(ignore)]
     pub base_changed: BaseChanged,
 }

@@ -18,8 +18,8 @@ use crate::plugin::{Held, ThreadTask, Threads, free_later};
 use crate::store::{FormatError, Level, LevelFiles, RestoreLevelError, pack_level, read_level, unpack_level};
 use crate::terrain::{Terrain, Version};
 
-/// A level, packed in one file with the extension `burrow_level`. What it holds is checked when it is loaded; that it fits its ground,
-/// when a terrain is made of it.
+/// A level, packed in one file with the extension `burrow_level`. Its content is checked when it is loaded; that it
+/// fits its ground, when a terrain is made of it.
 #[derive(Asset, TypePath, Clone, Debug, Default, PartialEq)]
 pub struct BurrowLevel(pub LevelFiles);
 
@@ -45,7 +45,7 @@ impl BurrowLevel {
     }
 }
 
-/// Why a level can't be loaded or written.
+/// The reason why a level can't be loaded or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LevelError {
@@ -115,11 +115,11 @@ impl AssetSaver for LevelSaver {
 #[derive(Component, Clone, Debug, PartialEq)]
 pub struct StartLevel(pub Handle<BurrowLevel>);
 
-/// A level that a terrain is made of.
+/// A level that is being made into a terrain.
 #[derive(Component)]
 pub(super) struct MakingLevel(ThreadTask<Result<Terrain, RestoreLevelError>>, Version);
 
-/// A level that nobody has begun to make a terrain of.
+/// A level that waits to be made into a terrain.
 #[derive(Component)]
 pub(super) struct Waiting {
     since: Instant,
@@ -161,7 +161,7 @@ impl FindLevel<'_> {
         }
     }
 
-    /// What the game calls a level.
+    /// The game's name for a level.
     pub fn path_of(&self, start: Option<&StartLevel>) -> String {
         start.and_then(|start| start.0.path()).map(ToString::to_string).unwrap_or_default()
     }

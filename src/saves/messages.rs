@@ -43,7 +43,7 @@ pub struct WorldSaved {
 pub struct StoreTroubleFound {
     /// The terrain's entity.
     pub terrain: Entity,
-    /// What it is.
+    /// The trouble.
     pub trouble: StoreTrouble,
 }
 
@@ -56,11 +56,11 @@ pub struct WorldClosed {
     pub path: PathBuf,
     /// Why it was closed.
     pub because: ClosedBecause,
-    /// The revision that was saved last; or why not everything was.
+    /// The last saved revision; or the reason why not everything was saved.
     pub outcome: Result<u64, Arc<StoreError>>,
 }
 
-/// Why a saved world was closed.
+/// The reason why a saved world was closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ClosedBecause {

@@ -26,7 +26,7 @@ const LOCK_TOLD: Duration = Duration::from_secs(2);
 /// Bytes of commits that wait at most until the store takes them, which it does each frame.
 const LOG_BYTES: usize = 64 << 20;
 
-/// A world that nobody has begun to read.
+/// A world whose reading has not started.
 #[derive(Component)]
 pub(super) struct Unopened;
 
@@ -36,7 +36,7 @@ pub struct OpeningWorld {
     reader: Arc<WorldReader>,
     /// `None` between two tries.
     task: Option<ThreadTask<Result<Found, StoreError>>>,
-    /// The terrain that the world takes the place of.
+    /// The version of the terrain that the world replaces.
     version: Version,
     since: Instant,
     tried: Instant,
@@ -44,7 +44,7 @@ pub struct OpeningWorld {
 }
 
 impl OpeningWorld {
-    /// How much of it is read, 0 to 1, for a bar on the screen.
+    /// The progress of reading, 0 to 1, for a progress bar.
     pub fn progress(&self) -> f32 {
         self.reader.progress.share()
     }
@@ -63,7 +63,8 @@ impl OpeningWorld {
         self.task = Some(ThreadTask::start(Threads::Background, move || reader.try_read()));
     }
 
-    /// The world once it is read, or why it can't be. One that is open elsewhere is tried again, without a thread that waits.
+    /// The world once it is read, or the error. A world that is open elsewhere is tried again, without a waiting
+    /// thread.
     fn poll(&mut self) -> Option<Result<Found, StoreError>> {
         let Some(task) = &mut self.task else {
             if self.tried.elapsed() >= LOCK_TRY {
@@ -103,9 +104,9 @@ pub(crate) struct ReadWorld {
     pub troubles: Vec<StoreTrouble>,
 }
 
-/// What came of reading.
+/// The result of reading.
 enum Found {
-    /// The world that was there.
+    /// An existing world.
     Old(ReadWorld),
     /// There was none, and it was made of the terrain.
     New(ReadWorld),
@@ -237,7 +238,7 @@ pub(super) fn read_anew(
     }
 }
 
-/// A terrain that is gone can't be read for.
+/// Stops reading for a removed terrain.
 pub(super) fn wait_for_terrain(
     gone: On<Remove, Terrain>,
     opening: Query<(), (With<OpeningWorld>, Allow<Disabled>)>,
@@ -273,7 +274,7 @@ pub(super) fn start_opening(
     }
 }
 
-/// Puts worlds that were read in place of their terrains.
+/// Replaces terrains by the worlds that were read.
 pub(super) fn finish_opening(
     mut commands: Commands,
     mut worlds: Query<(Entity, &SavedWorld, &mut Terrain, &mut OpeningWorld), Allow<Disabled>>,

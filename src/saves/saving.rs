@@ -30,7 +30,8 @@ fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     }
 }
 
-/// Hands over what was committed. A terrain that is no state of the saved world is not written into it: the world is closed.
+/// Sends new commits to stores. A terrain that is not a state of the saved world is not written into it: the world is
+/// closed.
 pub(super) fn save_commits(
     mut commands: Commands,
     mut worlds: Query<(Entity, &mut Terrain, &mut WorldStore), Allow<Disabled>>,
