@@ -57,7 +57,7 @@ const ROUND: Duration = Duration::from_secs(5);
 /// Frames before timing begins.
 const WARM_UP: usize = 120;
 
-/// What is drawn to compare materials.
+/// The drawn content, to compare materials.
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
     Look(GroundQuality),
@@ -169,7 +169,7 @@ impl Walk {
         world.resource_mut::<ClearColor>().0 = Color::linear_rgb(1.0, 0.0, 1.0);
         let fog =
             DistanceFog { falloff: FogFalloff::from_visibility_squared(900.0), ..DistanceFog::default() };
-        // What hills cover is not shaded, as in the digger.
+        // Hidden ground is not shaded, as in the digger.
         let camera =
             (Camera3d::default(), DepthPrepass, RenderTarget::from(film.clone()), fog, Transform::default());
         // All scenes are seen as far.
@@ -349,7 +349,7 @@ impl Walk {
     }
 }
 
-/// What is walked over.
+/// The ground of the walk.
 #[derive(Clone, Copy)]
 enum Scene {
     /// The real landscape with a look.

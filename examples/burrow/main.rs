@@ -117,7 +117,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What to print, and whether all is well.
+/// The output, and whether the world is undamaged.
 fn run(args: &Args) -> Result<(Value, bool), String> {
     match &args.command {
         Command::Info { world } => info(world),

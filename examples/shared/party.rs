@@ -1,7 +1,7 @@
 //! Connections over UDP, for programs whose players dig together.
 //!
 //! How players prove who they are is in [`ServerAuthentication`] and [`ClientAuthentication`]. `Unsecure` connections are not
-//! encrypted, and anybody may join under any number: they are for machines of friends. `Secure` ones need a token for each
+//! encrypted, and anyone may join under any number: they are for friends. `Secure` ones need a token for each
 //! connection, as `tokens.rs` issues them.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};

@@ -71,7 +71,7 @@ impl Key {
         Ok(())
     }
 
-    /// What the server asks for.
+    /// The server's authentication.
     pub fn server(&self) -> ServerAuthentication {
         ServerAuthentication::Secure { private_key: self.0 }
     }

@@ -25,7 +25,7 @@ const RETRY: Duration = Duration::from_secs(1);
 /// How long bots wait at the end until all that they did is confirmed, and all of them see the same.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// What a bot has seen of its edits.
+/// The results that a bot has received for its edits.
 #[derive(Resource, Default)]
 struct Seen {
     predicted: usize,

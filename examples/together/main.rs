@@ -100,7 +100,7 @@ enum Options {
     },
 }
 
-/// What bots do.
+/// The options of bots.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct Digging {
     /// How many there are.

@@ -452,7 +452,7 @@ fn each_edit_is_done_once_though_the_server_is_killed() {
     let mut done: Vec<(ClientId, u64)> =
         play.reference.done.iter().map(|(_, author, own)| (*author, *own)).collect();
     done.sort_unstable();
-    println!("{kills} kills, {} edits, {unseen} saved and not told, {} lost", done.len(), lost.len());
+    println!("{kills} kills, {} edits, {unseen} saved and not confirmed, {} lost", done.len(), lost.len());
     assert!(unseen > 0, "no saved edit was unconfirmed");
     assert!(done.windows(2).all(|pair| pair[0] != pair[1]), "an edit was applied twice");
     for bot in &play.bots {
