@@ -90,7 +90,7 @@ pub struct DebrisOf(pub Entity);
 #[relationship_target(relationship = DebrisOf, linked_spawn)]
 pub struct TerrainDebris(Vec<Entity>);
 
-/// A piece's time is over. It is despawned right after this event.
+/// A piece crumbles: it is despawned right after this event.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DebrisCrumbled {
     /// The piece's entity.
