@@ -4,7 +4,7 @@
 #   without Bevy   cargo ... --no-default-features --features cuda,net,import   the model: tests, soak
 #   with Bevy      cargo ... --release --features examples           the plugin and the examples
 #
-# What is built goes to CARGO_TARGET_DIR, outside the clone unless set otherwise.
+# Builds are in CARGO_TARGET_DIR, outside the clone unless set otherwise.
 
 SHELL := /bin/sh
 export PATH := $(HOME)/.cargo/bin:$(PATH)
@@ -34,7 +34,7 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-# Where nobody looks on, a test that finds neither GPU, compiler nor renderer fails, and is not skipped. Only Linux can
+# In CI, a test without a GPU, compiler or renderer fails instead of being skipped. Only Linux can
 # have all of them.
 ifeq ($(CI) $(shell uname -s),true Linux)
 export BURROW_REQUIRE ?= 1
@@ -69,7 +69,7 @@ test-plugin:
 	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example physics --example sculpt --example server --example together
 	cargo test $(WITH_BEVY) --doc
 
-# The examples as a user starts them. Those that draw are looked at by a test: do pictures come in time, and show ground?
+# The examples as a user starts them. For those that draw, a test checks that pictures are made in time and show ground.
 test-examples:
 	cargo build $(WITH_BEVY) $(DRAWING:%=--example %)
 	cargo test $(WITH_BEVY) --test pictures -- --ignored --nocapture
@@ -99,8 +99,8 @@ features-plugin:
 		cargo clippy --release --no-default-features --features "$$set" --all-targets -- -D warnings; \
 	done
 
-# They are drawn on a display of their own, which needs the libraries of any other.
-drive: ## Play sculpt and the digger by real mouse and keys under Xvfb; skips where it can't be installed
+# They are drawn on a separate display, which needs the same libraries as any other.
+drive: ## Play sculpt and the digger with real mouse and keyboard input under Xvfb; skipped where it can't be installed
 	@DISPLAY=$${DISPLAY:-:0} tools/setup.sh drive
 	cargo build $(WITH_BEVY) --example sculpt --example digger
 	@for play in sculpt digger; do \
@@ -108,7 +108,7 @@ drive: ## Play sculpt and the digger by real mouse and keys under Xvfb; skips wh
 		[ $$status -eq 0 ] || [ $$status -eq 77 ] || exit $$status; \
 	done
 
-soak: ## Dig WORLDS (10000) random worlds; look at every seam, and compare every mesh with the plain mesher
+soak: ## Dig WORLDS (10000) random worlds; check every seam, and compare every mesh with the reference mesher
 	@tools/setup.sh build
 	BURROW_WORLDS=$(WORLDS) cargo test --release $(WITHOUT_BEVY) --test seams --test plain --test increments -- --nocapture
 
@@ -116,11 +116,11 @@ crowd: ## 1,000 balls and 100 walkers for a minute, on ground that is dug ten ti
 	@tools/setup.sh test
 	BURROW_CROWD=1000 cargo test $(WITH_BEVY) --test physics crowd -- --nocapture
 
-paper: ## Do the paper's experiment again; overwrites docs/RESULTS.md and docs/plots, whose GPU columns go where there is no GPU (REPEATS=10)
+paper: ## Repeat the paper's experiment; overwrites docs/RESULTS.md and docs/plots, without GPU columns if there is no GPU (REPEATS=10)
 	@tools/setup.sh build
 	RUSTC_VERSION="$$(rustc --version)" cargo run --release $(WITHOUT_BEVY) --example paper -- --out out/paper --results docs/RESULTS.md --repeats $(REPEATS)
 
-bench: ## Time the dense mesher beside public crates (ARGS="--quick" for a short look)
+bench: ## Compare the dense mesher with public crates (ARGS="--quick" for a short look)
 	@tools/setup.sh build
 	cargo bench $(WITHOUT_BEVY) --bench meshers -- $(ARGS)
 
@@ -136,16 +136,16 @@ ptx: ## Compile the CUDA kernels to PTX again; needs no GPU (ARGS=--check to com
 	@tools/setup.sh ptx
 	@python3 tools/ptx.py $(ARGS)
 
-peers: ## Time the dense mesher beside VTK, scikit-image and PyMCubes, installed outside the clone (ARGS=--gpu: GPU meshers)
+peers: ## Compare the dense mesher with VTK, scikit-image and PyMCubes, installed outside the clone (ARGS=--gpu: GPU meshers)
 	@tools/peers.sh $(ARGS)
 
 instructions: ## Count the instructions of fixed workloads; fails where they grew (ARGS=--update for a new baseline)
 	@tools/instructions.sh $(ARGS)
 
-figures: ## Draw the figures of the guide again
+figures: ## Draw the figures of the guide
 	cargo run $(WITHOUT_BEVY) --example figures
 
-pictures: ## Make the still pictures of the README again
+pictures: ## Render the still pictures of the README
 	@tools/setup.sh run
 	cargo run $(WITH_BEVY) --example digger -- --headless --width 960 --height 540 --out out/pictures
 	cargo run $(WITH_BEVY) --example sculpt -- --headless --width 960 --height 540 --out out/pictures/sculpt

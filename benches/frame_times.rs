@@ -5,7 +5,7 @@
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
 //! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
 //! dug ground without digging. Colliders are made near a body that moves along, and balls lie about there. A frame is
-//! timed from its start until the graphics card has drawn it, so unlike in a game, frames never overlap. The plugin's
+//! timed from its start until the GPU has drawn it, so unlike in a game, frames never overlap. The plugin's
 //! time on the main thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same
 //! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
 //! times the plain material's part of the frame the look takes. With `passes`, the graphics card's own time of each render
@@ -180,7 +180,7 @@ impl Walk {
         world.resource_mut::<ClearColor>().0 = Color::linear_rgb(1.0, 0.0, 1.0);
         let fog =
             DistanceFog { falloff: FogFalloff::from_visibility_squared(900.0), ..DistanceFog::default() };
-        // What hills cover is not shaded, as in the digger.
+        // Hidden ground is not shaded, as in the digger.
         let camera =
             (Camera3d::default(), DepthPrepass, RenderTarget::from(film.clone()), fog, Transform::default());
         // All scenes are seen as far.
@@ -384,7 +384,7 @@ impl Walk {
     }
 }
 
-/// What is walked over.
+/// The ground of the walk.
 #[derive(Clone, Copy)]
 enum Scene {
     /// The real landscape with a look.

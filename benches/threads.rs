@@ -31,7 +31,7 @@ fn calibrate() -> Third {
     Third((FRAME.as_secs_f64() / 3.0 / of_round) as u64)
 }
 
-/// What a game does in a frame.
+/// The work of a game in a frame.
 fn play(third: Res<Third>) {
     let rounds = third.0;
     std::hint::black_box(work(rounds));

@@ -162,7 +162,7 @@
 //! # }
 //! ```
 //!
-//! **Loose pieces**: ground that a dig cuts off falls, comes to rest and crumbles (feature `avian`); without that
+//! **Loose pieces**: ground that a dig cuts off falls, lies still and crumbles (feature `avian`); without that
 //! feature it is reported as a message. `DebrisPlugin` needs the `PhysicsPlugins`, the `TerrainPhysicsPlugin` and a
 //! `ColliderSource`, which the next part shows.
 //!
@@ -290,12 +290,12 @@
 //!
 //! # What an edit costs
 //!
-//! The cost depends on the region that its brush reaches, not on the chunk size. Bricks of 8x8x8 samples are copied, changed and shared; each keeps
-//! a bit per sample for solid and for edited, so that [`block`](surface::block) finds the cubes to draw by a few
-//! operations on whole layers and looks at samples only around them. Parts of a chunk's mesh that did not change are
-//! copied from its last one, and so are rings of a tile. Nothing is allocated while meshing. Bricks, blocks and chunks
-//! of a large transaction are spread over rayon's threads; the result does not depend on how many there are.
-//! [`Commit::stages`](terrain::Commit::stages) reports where the time went.
+//! The cost depends on the region that its brush reaches, not on the chunk size. Bricks of 8x8x8 samples are copied,
+//! changed and shared; each keeps a bit per sample for solid and for edited, so that [`block`](surface::block) finds
+//! the cubes to draw by a few operations on whole layers and looks at samples only around them. Parts of a chunk's mesh
+//! that did not change are copied from its last one, and so are rings of a tile. Nothing is allocated while meshing.
+//! Bricks, blocks and chunks of a large transaction are spread over rayon's threads; the result does not depend on how
+//! many there are. [`Commit::stages`](terrain::Commit::stages) reports where the time went.
 //!
 //! # System sets
 //!

@@ -678,10 +678,10 @@ fn what_an_edit_costs_bounds_what_its_search_finds() {
     let voxels: u64 = applied.loose.iter().map(|piece| piece.voxels).sum();
     assert!(voxels <= 4 * u64::from(settings.largest) && runs <= voxels as usize);
     let left = in_air(&tall);
-    assert!(left > 0, "what is beyond the budget stays as ground");
+    assert!(left > 0, "pieces beyond the budget stay as ground");
     assert!(tall.world().check_seams().is_flawless());
 
-    // The same everywhere, however it is batched; and it is undone as a whole.
+    // The result does not depend on how edits are batched, and it is undone as a whole.
     let mut other = comb(900);
     let before = other.world().hash();
     other.set_loose(Some(settings));
@@ -691,7 +691,7 @@ fn what_an_edit_costs_bounds_what_its_search_finds() {
     assert!(other.undo().outcome.is_ok());
     assert_eq!(other.world().hash(), before);
 
-    // Later digs beside them find the others.
+    // Later digs next to the other pieces find them.
     let mut turns = 0;
     while in_air(&tall) > 0 {
         tall.apply([Brush::dig(Shape::cuboid(

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Looks at what a graphics card draws, on a machine that need not have Rust.
+# Checks what a GPU draws, on a machine without Rust.
 #
 #   tools/card.sh pack [DIR]    builds the pictures' test, the digger and the benchmark of frames, plays the digger on this machine's
-#                               renderer, and packs all that into DIR (out/card): copy it to a machine with a Vulkan driver
+#                               renderer, and packs everything into DIR (out/card): copy it to a machine with a Vulkan driver
 #   DIR/run.sh [OUT]            there: golden scenes, every way to draw the ground, and the digger's script, all searched for
 #                               holes, and compared with the pictures of the machine that packed; OUT/report.txt has the rest
-#   FRAMES=1 DIR/run.sh [OUT]   the same, and the times of frames
+#   FRAMES=1 DIR/run.sh [OUT]   also measures the times of frames
 #
 # It fails if ground is missing in any picture, or if a picture differs by more than 0.03 FLIP.
 set -euo pipefail

@@ -44,9 +44,9 @@ def told(stage):
 
 
 def picture(stage, name, see=None):
-    """Shoots when what was said last is on the screen: no pipeline waits, and four frames have passed in silence.
+    """Takes a picture when the last report is on the screen: no pipeline waits, and four frames have passed in silence.
 
-    A frame is told when the program is done with it; it is drawn while the next one is made, and shown after that.
+    The program reports a frame when it is done with it; it is drawn while the next one is made, and shown after that.
     With `see`, left, top, width and height in hundredths of the window, that part must not be of one colour.
     """
     deadline = time.monotonic() + stage.patience
@@ -662,7 +662,7 @@ def main():
         return 1
     command = [str(binary), "--width", str(size[0]), "--height", str(size[1]), "--out", str(args.out), "--tell"]
     print(f"{args.play}: {binary}", flush=True)
-    # Whoever is told to stop takes the program and the display along.
+    # A signal to stop also ends the program and the display.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     start = time.monotonic()
     try:

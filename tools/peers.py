@@ -1,4 +1,4 @@
-"""Our dense mesher beside VTK, scikit-image and PyMCubes: the same grids, one thread, in turns.
+"""Compares our dense mesher with VTK, scikit-image and PyMCubes: the same grids, one thread, in turns.
 
 tools/peers.sh installs what this needs and calls it. The bench binary writes the grids, so that every program meshes
 the very same samples, and then answers one request at a time (`--serve`), so that the rounds can be paired: in each

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Times our dense mesher beside VTK, scikit-image and PyMCubes: installs them outside the clone, builds, measures.
-# With --gpu: beside cupmb and isoext on an NVIDIA GPU, and scikit-image for scale.
+# Compares our dense mesher with VTK, scikit-image and PyMCubes: installs them outside the clone, builds, measures.
+# With --gpu: with cupmb and isoext on an NVIDIA GPU, and scikit-image for scale.
 #
 #   tools/peers.sh [--gpu] [--quick] [--fields sphere,caves] [--sizes 64,128] [--json FILE]
 set -eu

@@ -1,15 +1,15 @@
-"""Our dense mesher beside public GPU meshers: cupmb and isoext, on the grids of tools/peers.py.
+"""Compares our dense mesher with public GPU meshers: cupmb and isoext, on the grids of tools/peers.py.
 
 tools/peers.sh --gpu installs what this needs and calls it. The rounds and checks are those of tools/peers.py, but this
-compares unlike things: ours is one thread of the processor, with samples and mesh in the host's memory, and a peer has
-a whole card. So each peer is timed three ways, always until the card has finished:
+compares unlike things: ours is one thread of the CPU, with samples and mesh in the host's memory, and a peer has
+a whole GPU. So each peer is timed three ways, always until the GPU has finished:
 
-    on the card     the samples lie on the card, and the mesh is left there
-    to the host     the same, and vertices and triangles are copied to the host
-    host to host    the samples are copied to the card before, and the mesh back: where ours starts and ends
+    on the card     the samples are on the GPU, and the mesh stays there
+    to the host     as above, and vertices and triangles are copied to the host
+    host to host    the samples are first copied to the GPU, and the mesh back: as for ours
 
 Peers are called from Python, which takes them some microseconds; ours times itself. Meshes have no normals, but for
-scikit-image's and the one of ours beside it. What our own CUDA backend does with a terrain's transactions is another
+scikit-image's and the one of ours next to it. What our own CUDA backend does with a terrain's transactions is another
 comparison: `cargo bench --no-default-features --features cuda --bench backends`.
 """
 

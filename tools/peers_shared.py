@@ -124,7 +124,7 @@ def exported_grids(bench, fields, sizes):
 
 
 def topology(faces, written=None):
-    """What `TOPOLOGY` names, of triangles that share vertices; all that are written are used, unless told otherwise."""
+    """The values that `TOPOLOGY` names, for triangles that share vertices; `written` is the number of vertices, all used by default."""
     faces = np.asarray(faces, dtype=np.int64)
     vertices = np.unique(faces)
     written = len(vertices) if written is None else written

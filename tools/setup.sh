@@ -37,7 +37,7 @@ has_vulkan_driver() {
     return 1
 }
 
-# Where programs find whom to trust on the network; elsewhere than on Linux the system knows.
+# Whether certificates are installed; only Linux keeps them in files.
 has_certificates() {
     [ "$(uname -s)" = Linux ] || return 0
     for bundle in /etc/ssl/certs/ca-certificates.crt /etc/pki/tls/certs/ca-bundle.crt /etc/ssl/cert.pem; do
@@ -46,7 +46,7 @@ has_certificates() {
     return 1
 }
 
-# Where it may not install, it says what is missing and goes on: the machine may have it under another name.
+# Without permission to install, it lists what is missing and continues: the machine may have it under another name.
 install_packages() {
     [ -n "$packages" ] || return 0
     root=
@@ -97,7 +97,7 @@ add_component() {
     case $1 in fmt) rustup component add rustfmt ;; *) rustup component add "$1" ;; esac
 }
 
-# What is told at the end of many tests, of which some had nothing to run on.
+# Reports skipped tests at the end of a run.
 tell_skipped() {
     if ! nvidia-smi -L >/dev/null 2>&1 && { [ "$(uname -s)" != Linux ] || ! { has "${CXX:-c++}" || has g++ || has clang++; }; }; then
         say '*** SKIPPED: CUDA kernels were not tested: neither a GPU nor, on Linux, a C++ compiler (g++) for the emulator ***'

@@ -110,7 +110,7 @@ fn undo_dig(terrain: &mut Terrain, hash: u64) {
     assert_eq!(terrain.world().hash(), hash, "an undone dig leaves no trace");
 }
 
-/// Does the same digs with every setting in turns, and prints the time of each and the cost of the search.
+/// Makes the same digs with every setting in turns, and prints the time of each and the cost of the search.
 fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
     let (searches, before) = (searches(), terrain.world().hash());
     let mut played = searches.map(|_| Played::default());

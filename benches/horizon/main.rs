@@ -204,7 +204,7 @@ fn load(terrain: Terrain, summit: Vec3) {
     );
 }
 
-/// What a node takes in a task: its facts and its mesh, one thread.
+/// The time of a node in a task: its facts and its mesh, one thread.
 fn nodes(world: &World, summit: Vec3) {
     let image = {
         let samples = (0..2048u32 * 2048).map(|at| {

@@ -62,7 +62,7 @@ pub enum Part {
 pub trait Contender {
     /// Name and version.
     fn name(&self) -> &'static str;
-    /// What its meshes hold.
+    /// The content of its meshes.
     fn class(&self) -> Class;
     /// Copies the grid if the mesher needs its own copy. Not timed.
     fn load(&mut self, _grid: &Grid) {}

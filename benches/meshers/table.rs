@@ -28,7 +28,7 @@ pub struct Row {
     pub input: Input,
     /// The contender.
     pub name: &'static str,
-    /// What its meshes hold.
+    /// The content of its meshes.
     pub class: Class,
     /// Triangles that are timed in one round of a grid, or in the whole stream.
     pub triangles: usize,

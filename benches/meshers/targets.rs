@@ -12,7 +12,7 @@ use crate::{fast_surface_nets, ours};
 /// One target: our median paired ratio to fast-surface-nets.
 #[derive(Debug, Serialize)]
 pub struct Target {
-    /// What is compared.
+    /// The compared meshers.
     pub what: String,
     /// The ratio that was measured.
     pub ratio: Spread,

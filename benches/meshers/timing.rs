@@ -12,7 +12,7 @@ use crate::fields::{Field, Grid};
 pub struct Times {
     /// The contender.
     pub name: &'static str,
-    /// What its meshes hold.
+    /// The content of its meshes.
     pub class: Class,
     /// Triangles of all meshes that were timed together.
     pub triangles: usize,

@@ -32,7 +32,7 @@ struct Arguments {
 /// Something large to do to a landscape.
 struct Scene {
     name: &'static str,
-    /// What was done to it before.
+    /// Earlier edits.
     before: fn(&Ground, &mut Rng) -> Vec<Brush>,
     brushes: fn(&Ground, &mut Rng) -> Vec<Brush>,
 }
@@ -45,7 +45,7 @@ const SCENES: [Scene; 5] = [
     Scene { name: "800 strokes that sculpt", before: replay, brushes: strokes },
 ];
 
-/// A landscape that nobody has touched.
+/// An unedited landscape.
 fn nothing(_: &Ground, _: &mut Rng) -> Vec<Brush> {
     Vec::new()
 }
@@ -104,7 +104,7 @@ fn smooth(ground: &Ground, _: &mut Rng) -> Vec<Brush> {
     colours.into_iter().flat_map(of_colour).collect()
 }
 
-/// What an editor's strokes do to a landscape: every operation that sculpts, anywhere, in any order.
+/// Strokes of an editor: every operation that sculpts, anywhere, in any order.
 fn strokes(ground: &Ground, rng: &mut Rng) -> Vec<Brush> {
     let bumps = (0..64).map(|i| 2700 * (i % 8 * (7 - i % 8) + i / 8 * (7 - i / 8))).collect();
     let image = Arc::new(GreyImage::from_samples(8, 8, bumps).expect("as many samples as it has"));
@@ -124,7 +124,7 @@ fn strokes(ground: &Ground, rng: &mut Rng) -> Vec<Brush> {
     (0..800).map(stroke).collect()
 }
 
-/// What players may have left behind: holes, tunnels, walls, heaps.
+/// Typical edits of players: holes, tunnels, walls, heaps.
 fn replay(ground: &Ground, rng: &mut Rng) -> Vec<Brush> {
     let edit = |i: u32| {
         let (at, radius) = (place(ground, rng), 2.0 + 4.0 * rng.f32());
@@ -170,7 +170,7 @@ fn compare_ground(side: u32, repeats: u16, engines: &[(Backend, Engine); 3]) {
     );
 }
 
-/// What one engine made of a scene, and how long it took.
+/// The result of one engine for a scene, and its time.
 struct Outcome {
     commit: Commit,
     hash: u64,

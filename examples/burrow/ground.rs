@@ -26,7 +26,7 @@ pub struct GroundArgs {
     /// Strata of the ground: alpine, desert or mine, or a JSON file
     #[arg(long, value_name = "PRESET|FILE.json", global = true)]
     strata: Option<PathBuf>,
-    /// The hills of the example `server`, of so many cells along each side
+    /// The hills of the example `server`, with this many cells along each side
     #[arg(long, value_name = "N", conflicts_with = "heights", global = true)]
     side: Option<u32>,
     /// The level that the world was begun on: its folder, or the packed file

@@ -27,7 +27,7 @@
 //! | exit code | when |
 //! | --- | --- |
 //! | 0 | all is well |
-//! | 1 | the world is damaged, or was; what was found is in `troubles` |
+//! | 1 | the world is damaged, or was; `troubles` lists the damage |
 //! | 2 | it could not be done: the reason goes to stderr |
 
 mod ground;

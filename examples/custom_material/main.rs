@@ -1,4 +1,4 @@
-//! A look of one's own: the ground as a map, with contour lines, and what was dug in warm colours by its depth.
+//! `custom_material`: draws the ground as a map with contour lines, and dug ground in warm colours by its depth.
 //!
 //! ```text
 //! cargo run --release --features examples --example custom_material

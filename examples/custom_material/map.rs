@@ -30,7 +30,7 @@ impl Plugin for MapPlugin {
 /// A map.
 #[derive(Asset, AsBindGroup, TypePath, Clone, Debug)]
 pub struct MapMaterial {
-    /// What was dug away, near the surface and deep below.
+    /// Colours of dug ground, near the surface and deep below.
     #[uniform(0)]
     shallow: LinearRgba,
     #[uniform(0)]

@@ -52,7 +52,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let light = dot(normalize(in.normal), normalize(vec3(-0.6, 0.8, -0.5)));
     let dug = smoothstep(0.3, 1.0, in.depth);
     let warm = mix(map.shallow.rgb, map.deep.rgb, saturate(in.depth / 16.0));
-    // What was built has a blue tint.
+    // Built ground has a blue tint.
     let built = smoothstep(0.3, 1.0, -in.depth);
     var color = mix(mix(in.color, warm, dug), vec3(0.35, 0.55, 0.75), 0.7 * built);
     color *= 0.35 + 0.75 * max(light, 0.0);

@@ -22,9 +22,9 @@
 //!
 //! Keys are bound by their position on an American keyboard. The menus show the letters of the player's own layout.
 //!
-//! What is dug is saved as it is dug, with the inventory, the tools, the lamps and the player's place: the title continues the
-//! world that was played last, "Worlds" lists all, and `--world NAME` plays one, or a new one of that name. Scripts save only
-//! with `--world`.
+//! The world is saved while you dig, with the inventory, the tools, the lamps and the player's place: the title
+//! continues the world that was played last, "Worlds" lists all, and `--world NAME` plays one, or a new one of that
+//! name. Scripts save only with `--world`.
 //!
 //! Others can join: choose "Multiplayer" on the title, or start with `--host`, and with `--join ADDRESS` on their machines.
 //!
@@ -128,7 +128,7 @@ impl Options {
         self.world.as_deref().and_then(PlayedWorld::named)
     }
 
-    /// Who plays in it.
+    /// The players in it.
     fn party(&self) -> Party {
         let guest = self.join.map(|Address(host, seed)| Party::Guest(host, seed));
         guest.or(self.host.map(Party::Host)).unwrap_or_default()

@@ -23,7 +23,7 @@ pub struct Levels {
     pub nodes: Vec<(Node, SurfaceMesh)>,
 }
 
-/// What is drawn at one level.
+/// Figures of the drawn mesh at one level.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct LevelFigures {
     pub level: u8,

@@ -19,7 +19,7 @@ pub struct Report {
     /// Hash of the ground and every edited sample, in hexadecimal.
     pub hash: String,
     pub world: WorldFigures,
-    /// What each edit did, in order.
+    /// The outcome of each edit, in order.
     pub edits: Vec<EditFigures>,
     pub totals: Totals,
     /// How often each of the paper's five scenarios occurred.
@@ -36,7 +36,7 @@ pub struct Report {
     pub volumetric_cells: usize,
     pub bytes: ByteFigures,
     pub seams: SeamFigures,
-    /// What is drawn at each level, if levels of detail were asked for.
+    /// Figures of the drawn mesh at each level, if levels of detail were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub levels: Option<Vec<LevelFigures>>,
     pub timings: Timings,

@@ -44,7 +44,7 @@ enum Modifier {
     Line,
 }
 
-/// Strokes so far.
+/// The strokes that were made.
 #[derive(Resource, Default)]
 struct Strokes {
     /// Brushes that were sent.
@@ -222,7 +222,7 @@ fn stroke(
     strokes.rest = Timer::new(Duration::from_secs_f32(1.0 / tool.rate.max(0.1)), TimerMode::Once);
 }
 
-/// Places along a straight line, at most so far apart, up to its end. Without a start, only the end.
+/// Positions along a straight line, at most `apart` from each other, up to its end. Without a start, only the end.
 fn line(from: Option<Vec3>, to: Vec3, apart: f32) -> impl Iterator<Item = Vec3> {
     let steps = from.map_or(0, |from| (from.distance(to) / apart.max(0.25)).ceil().min(400.0) as u32);
     let start = from.unwrap_or(to);

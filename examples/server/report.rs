@@ -1,4 +1,4 @@
-//! What is printed: a line for each receipt, and a summary at the end.
+//! Prints a line for each receipt, and a summary at the end.
 
 #[path = "../shared/steps.rs"]
 mod steps;

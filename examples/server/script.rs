@@ -1,4 +1,4 @@
-//! Where brushes come from: a file, standard input, or nowhere.
+//! The source of brushes: a file, standard input, or none.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -29,13 +29,13 @@ type Entry = Result<Line, String>;
 enum Feed {
     /// Made up, or read from a file, only when their turn comes.
     Ready(Box<dyn Iterator<Item = Entry> + Send + Sync>),
-    /// Read by a thread of its own, so that a silent player holds nobody up.
+    /// Read by a separate thread, so that the server does not wait for input.
     Coming(Mutex<Receiver<Entry>>),
     /// There are none.
     Over,
 }
 
-/// What is sent, line by line.
+/// The requests, line by line.
 #[derive(Resource)]
 pub struct Source {
     feed: Feed,
@@ -65,13 +65,13 @@ pub fn open(options: &Options) -> Result<Source> {
     Ok(Source { feed, next: None, per_tick: options.per_tick, sent: 0 })
 }
 
-/// What a script says, as it is asked for.
+/// Lines of a script, read on request.
 fn entries(script: impl Read, name: String) -> impl Iterator<Item = Entry> {
     let lines = Lines::new(BufReader::new(script));
     lines.map(move |line| line.map(|(_, line)| line).map_err(|fault| format!("{name}: {fault}")))
 }
 
-/// What somebody says who may be silent for a while. Who says more than is sent has to wait.
+/// Lines of interactive input, which may pause. Input that arrives faster than it is sent has to wait.
 fn listen(script: impl Read + Send + 'static, name: String) -> Feed {
     let (sender, receiver) = sync_channel(MOST_WAITING);
     std::thread::spawn(move || {

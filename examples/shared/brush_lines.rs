@@ -21,7 +21,7 @@ pub enum Line {
     Redo,
 }
 
-/// What is wrong with a script.
+/// Errors of a script.
 #[derive(Debug)]
 pub enum Fault {
     /// A line is invalid. Others may follow.

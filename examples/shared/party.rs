@@ -1,7 +1,7 @@
 //! Connections over UDP, for programs whose players dig together.
 //!
 //! How players prove who they are is in [`ServerAuthentication`] and [`ClientAuthentication`]. `Unsecure` connections are not
-//! encrypted, and anybody may join under any number: they are for machines of friends. `Secure` ones need a token for each
+//! encrypted, and anyone may join under any number: they are for friends. `Secure` ones need a token for each
 //! connection, as `tokens.rs` issues them.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
@@ -33,7 +33,7 @@ fn config(world: &World) -> ConnectionConfig {
     }
 }
 
-/// Listens for players who need no token, at most so many. Everything that is replicated has to be registered.
+/// Listens for players that need no token, up to a limit. All replicated types have to be registered before.
 ///
 /// # Errors
 /// When the address is taken.

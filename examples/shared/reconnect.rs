@@ -1,4 +1,4 @@
-//! Players come back by themselves: an app that has no connection makes another one, again and again.
+//! Reconnects players automatically: an app without a connection keeps trying to connect.
 
 use std::time::{Duration, Instant};
 

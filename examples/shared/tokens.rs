@@ -1,4 +1,4 @@
-//! Connect tokens: who holds the key of a server decides who may connect, and under which number.
+//! Connect tokens: the holder of a server's key decides which players may connect, and under which numbers.
 //!
 //! A login service and the server have the key. The service checks who a player is, by a password or an account of a shop, and sends
 //! a token over HTTPS. It names the player's number, the server and a time, and holds keys for one encrypted connection. Nobody can
@@ -63,7 +63,7 @@ impl Key {
         }
         let mut options = OpenOptions::new();
         options.write(true).create_new(true);
-        // Nobody else on this machine may read it.
+        // No other user of this machine may read it.
         #[cfg(unix)]
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
         let digits: String = self.0.iter().map(|byte| format!("{byte:02x}")).collect();
@@ -71,7 +71,7 @@ impl Key {
         Ok(())
     }
 
-    /// What the server asks for.
+    /// The server's authentication.
     pub fn server(&self) -> ServerAuthentication {
         ServerAuthentication::Secure { private_key: self.0 }
     }

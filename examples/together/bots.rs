@@ -25,7 +25,7 @@ const RETRY: Duration = Duration::from_secs(1);
 /// How long bots wait at the end until all that they did is confirmed, and all of them see the same.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// What a bot has seen of its edits.
+/// The results that a bot has received for its edits.
 #[derive(Resource, Default)]
 struct Seen {
     predicted: usize,
@@ -76,7 +76,7 @@ impl Bots {
         }
     }
 
-    /// Have all joined, with everything confirmed, and do they see the same?
+    /// Whether all have joined, everything is confirmed, and all see the same world.
     fn agree(&self) -> bool {
         let is_settled = |bot: &Bot| bot.shared().has_joined() && bot.shared().pending() == 0;
         let first = self.all.first().map(Bot::state);

@@ -6,13 +6,15 @@
 //! cargo run --release --features examples --example together -- loopback --seconds 60 --loss 0.05 --latency 200 --jitter 50
 //! ```
 //!
-//! The server meshes nothing and draws nothing. With `--world DIR` it saves what is dug, and goes on with it when it is started
-//! again: bots connect again by themselves, and what they dug meanwhile is done then. Each second it prints a line of JSON with the number of the last edit, the hash
-//! of the world and what was sent. Bots print what their edits came to; in the end all of them say which world they see: `loopback`
-//! compares these, and fails if they differ, or if anything had to be repaired.
+//! The server meshes nothing and draws nothing. With `--world DIR` it saves the world, and continues it when it is
+//! started again: bots reconnect automatically, and their edits are applied then. Each second it prints a line of JSON
+//! with the number of the last edit, the hash of the world and the bytes that were sent. Bots print the results of
+//! their edits; in the end all of them print the hash of their world: `loopback` compares these, and fails if they
+//! differ, or if anything had to be repaired.
 //!
-//! Who connects to the server needs a token, which nobody makes without the server's key. It is made when the server starts for the first
-//! time, in `out/together.key`; bots read it there, in the place of a login service that a game has. Connections are encrypted.
+//! A client needs a token to connect to the server, and a token can be made only with the server's key. It is made when
+//! the server starts for the first time, in `out/together.key`; bots read it there, in the place of a login service
+//! that a game has. Connections are encrypted.
 //!
 //! | file | subject |
 //! | --- | --- |
@@ -67,7 +69,7 @@ enum Options {
         /// The folder that keeps the world.
         #[arg(long, value_name = "DIR")]
         world: Option<PathBuf>,
-        /// It ends after so many seconds; otherwise it goes on.
+        /// Ends after this many seconds; otherwise it keeps running.
         #[arg(long)]
         seconds: Option<f64>,
     },
@@ -98,7 +100,7 @@ enum Options {
     },
 }
 
-/// What bots do.
+/// The options of bots.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct Digging {
     /// How many there are.

@@ -23,7 +23,7 @@ const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 /// Most players.
 const PLAYERS: usize = 64;
 
-/// Who may connect.
+/// The key and addresses of tokens that clients need to connect.
 pub struct Access {
     pub key: Key,
     /// The address that tokens name, if it is another one than the server listens at.

@@ -35,7 +35,7 @@ use crate::surface::block::Block;
 use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
 
-/// What an [`Engine`] may run on.
+/// The devices that an [`Engine`] may run on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Backend {
     /// The backend that was recently faster for such a stage of a transaction; occasionally the other one, to

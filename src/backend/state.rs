@@ -1,6 +1,6 @@
 //! The state of an engine.
 
-/// What an engine runs on.
+/// The device that an engine runs on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum EngineState {
     /// The CPU.

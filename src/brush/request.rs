@@ -1,4 +1,4 @@
-//! The brush: what a game asks for.
+//! The brush: an edit that a game requests, in floats.
 
 #[cfg(feature = "plugin")]
 use bevy::reflect::{ReflectDeserialize, ReflectSerialize};

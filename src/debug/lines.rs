@@ -17,7 +17,7 @@ pub struct LineBuffer {
 }
 
 impl LineBuffer {
-    /// A buffer for at most so many lines.
+    /// A buffer for at most `most_lines` lines.
     pub fn new(most_lines: usize) -> Self {
         Self { layers: Vec::new(), room: most_lines }
     }

@@ -99,7 +99,7 @@ impl DebugView {
 }
 
 impl BurrowDebug {
-    /// Is a view on?
+    /// Whether a view is on.
     pub fn shows(&self, view: DebugView) -> bool {
         match view {
             DebugView::Chunks => self.chunks,

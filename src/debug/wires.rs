@@ -56,7 +56,7 @@ impl SeamWires {
             edges.sort_unstable_by_key(|edge| edge.map(|end| end.to_array()));
             edges
         };
-        // What is shared is what one looks for: it is drawn first, should there not be room for all.
+        // Shared edges matter most: they are drawn first, in case there is not room for all.
         let layers = [
             (sorted(&mut self.tiles.intersection(&self.chunks)), LinearRgba::WHITE, 4.0),
             (sorted(&mut self.tiles.difference(&self.chunks)), GOLD, 1.6),

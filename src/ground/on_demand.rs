@@ -1,4 +1,4 @@
-//! Grounds with a source: what [`Ground`] answers from memory, answered from pages.
+//! Grounds with a source: the queries of [`Ground`], answered from pages instead of memory.
 
 use glam::Vec3;
 
@@ -18,8 +18,8 @@ impl Ground {
     ///
     /// Memory depends on the columns in use: pages of 64 x 64 columns are computed, with about 18 kB for
     /// their heights and up to 4 bytes a column for materials and strata, and kept [within a
-    /// budget](Self::with_page_budget). All else is as if the same heights were in memory, but for
-    /// [`Self::hash`] and [`Self::height_range`], which say what the source promised.
+    /// budget](Self::with_page_budget). Everything else works as with equal heights in memory, except for
+    /// [`Self::hash`] and [`Self::height_range`], which depend on the source's promises.
     ///
     /// # Errors
     /// [`GroundError::SourceSize`] unless width and depth are 1 to [`MAX_SOURCE_SIZE`](super::MAX_SOURCE_SIZE).
@@ -93,7 +93,7 @@ impl Ground {
         [rise(x, run(column.x, self.width())), rise(z, run(column.z, self.depth()))]
     }
 
-    /// What the world's column nearest to another is made of.
+    /// The materials of the world's column nearest to another.
     #[inline(never)]
     pub(super) fn material_on_demand(
         &self,

@@ -36,11 +36,11 @@ pub struct Eye {
 /// How sizes on the screen change with distance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum View {
-    /// What is twice as far away is half as large.
+    /// Objects at twice the distance have half the size.
     #[default]
     Perspective,
-    /// Everything in view has the same size, as in an orthographic projection. What is out of view counts as smaller, by how
-    /// many radii it is away from the axis.
+    /// Everything in view has the same size, as in an orthographic projection. Objects out of view count as smaller, by
+    /// how many radii it is away from the axis.
     Parallel {
         /// From the eye to the far end of the view, in voxels.
         axis: Vec3,

@@ -1,4 +1,4 @@
-//! Cuts: which nodes are drawn.
+//! Cuts: sets of nodes that are drawn together.
 
 use rustc_hash::FxHashSet;
 

@@ -1,4 +1,4 @@
-//! Token buckets: how much may be spent at once, and how much comes back.
+//! Token buckets: how much may be spent at once, and how fast they refill.
 
 use std::time::Duration;
 
@@ -7,14 +7,14 @@ const SECOND: i128 = 1_000_000_000;
 /// How much may be spent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rate {
-    /// What comes back in a second.
+    /// The refill in a second.
     pub per_second: u64,
     /// The most that may be spent at once.
     pub burst: u64,
 }
 
 impl Rate {
-    /// So many times as much.
+    /// This rate and burst multiplied by `factor`.
     #[must_use]
     pub fn times(self, factor: u64) -> Self {
         Self { per_second: self.per_second.saturating_mul(factor), burst: self.burst.saturating_mul(factor) }
@@ -36,7 +36,7 @@ impl Bucket {
         Self { rate, left: i128::from(rate.burst) * SECOND, at: now }
     }
 
-    /// What may be spent now. Time does not run back: an earlier one counts as the latest.
+    /// The amount that may be spent now. Times before the latest one count as the latest.
     pub fn left(&mut self, now: Duration) -> u64 {
         let passed = now.saturating_sub(self.at).as_nanos();
         self.at = self.at.max(now);
@@ -45,7 +45,7 @@ impl Bucket {
         (self.left / SECOND).max(0) as u64
     }
 
-    /// Spends so much, if it is there.
+    /// Spends `amount` if the bucket holds it. Returns whether it did.
     pub fn spend(&mut self, now: Duration, amount: u64) -> bool {
         let is_there = amount <= self.left(now);
         if is_there {
@@ -54,13 +54,13 @@ impl Bucket {
         is_there
     }
 
-    /// Puts back what was spent and not needed.
+    /// Returns an amount that was spent but not needed.
     pub fn refund(&mut self, now: Duration, amount: u64) {
         self.left = self.left.saturating_add(i128::from(amount) * SECOND);
         self.left(now);
     }
 
-    /// Takes so much out, even if it is not there: then nothing may be spent until it has come back.
+    /// Removes `amount` even if the bucket holds less: then nothing can be spent until it has refilled.
     pub fn charge(&mut self, now: Duration, amount: u64) {
         self.left(now);
         self.left -= i128::from(amount) * SECOND;

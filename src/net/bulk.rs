@@ -1,4 +1,5 @@
-//! The bulk lane: messages one after the other as one stream of bytes, which the server cuts into pieces as it may send them.
+//! The bulk lane: a sequence of messages as one stream of bytes, which the server cuts into pieces according to its
+//! limits.
 
 use super::message::{MOST_TO_CLIENT, ToClient};
 use super::stamps::Stamps;
@@ -11,7 +12,7 @@ pub(super) fn put_message(to: &mut Vec<u8>, message: &[u8]) {
     put_bytes(to, message);
 }
 
-/// Puts pieces together.
+/// Joins pieces to messages.
 #[derive(Clone, Debug, Default)]
 pub struct BulkReader {
     bytes: Vec<u8>,
@@ -25,16 +26,16 @@ impl BulkReader {
         self.received += piece.len() as u64;
     }
 
-    /// Bytes that have come, as they are [acknowledged](super::ToServer::Ack).
+    /// Received bytes, as they are [acknowledged](super::ToServer::Ack).
     pub fn received(&self) -> u64 {
         self.received
     }
 
-    /// The next message that is there as a whole. It is never a piece itself.
+    /// The next complete message. It is never a piece itself.
     ///
     /// # Errors
-    /// When it is invalid: the next call looks at the message after it. Or when it is longer than a message may be: nothing more can
-    /// be read then.
+    /// When it is invalid: the next call reads the message after it. Or when it is longer than a message may be: then
+    /// nothing more can be read.
     pub fn next(&mut self, ground: &Ground, stamps: &Stamps) -> Result<Option<ToClient>, FormatError> {
         let Some(message) = self.next_bytes()? else { return Ok(None) };
         match ToClient::from_bytes(&message, ground, stamps)? {
@@ -43,7 +44,7 @@ impl BulkReader {
         }
     }
 
-    /// The bytes of the next message that is there as a whole.
+    /// The bytes of the next complete message.
     pub(super) fn next_bytes(&mut self) -> Result<Option<Vec<u8>>, FormatError> {
         let mut reader = Reader(&self.bytes);
         let length = match reader.number() {

@@ -1,8 +1,8 @@
-//! Messages in bytes: a tag, then integers of [variable length](crate::store::format::bytes), edits as differences to the one before
-//! in the same message, bricks as saves have them.
+//! The encoding of messages: a tag, then integers of [variable length](crate::store::format::bytes), edits as
+//! differences from the previous one in the message, bricks as in saves.
 //!
-//! Whatever bytes are read, the result is a message or a [`FormatError`]: nothing panics, and memory is taken by the length of
-//! the input, which has limits of its own.
+//! Reading any bytes gives a message or a [`FormatError`]: nothing panics, and memory is bounded by the length of
+//! the input, which has its own limits.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -38,9 +38,9 @@ const TABLE: u8 = 6;
 const REGION: u8 = 7;
 const DURABLE: u8 = 8;
 pub(super) const PIECE: u8 = 9;
-/// Before a message that is packed.
+/// The tag of a compressed message.
 const PACKED: u8 = 10;
-/// Most bytes of a message that is packed: bytes that say much would take much memory.
+/// Most bytes of a compressed message after decompression, so that few bytes can't take much memory.
 const MOST_PACKED: usize = 64 << 10;
 const STREAM: u8 = 11;
 const GREET: u8 = 12;
@@ -80,7 +80,7 @@ const KICKS: [Kick; 8] = [
     Kick::ByGame,
     Kick::ConnectedAgain,
 ];
-/// Before the number of a game's own reason.
+/// The tag of a reason chosen by the game.
 const REFUSED_BY_GAME: u8 = 255;
 
 impl ToServer {
@@ -139,8 +139,8 @@ impl ToServer {
         }
     }
 
-    /// Reads a message from a client. Edits whose stamps have images that the list lacks get another image; their places in the
-    /// message are returned too.
+    /// Reads a message from a client. Edits whose stamps have images that the list lacks get another image; their
+    /// positions in the message are returned too.
     pub(super) fn read(bytes: &[u8], stamps: &Stamps) -> Result<(Self, Vec<usize>), FormatError> {
         within(bytes.len(), MOST_TO_SERVER)?;
         let (mut reader, mut unknown) = (Reader(bytes), Vec::new());
@@ -390,7 +390,7 @@ fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, sequence: &mut EditSe
 
 /// An edit as it was read.
 struct ReadEdit<T> {
-    /// What stood between.
+    /// The data in between.
     before: T,
     edit: Edit,
     /// The image of its stamp, if it is missing: the edit has another one then.
@@ -423,7 +423,7 @@ fn read_edit<T>(
     Ok(ReadEdit { before, edit, missing })
 }
 
-/// What stands for an image that is named.
+/// The placeholder of a named image.
 fn no_image() -> Option<Arc<GreyImage>> {
     GreyImage::from_samples(2, 2, vec![0; 4]).ok().map(Arc::new)
 }
@@ -451,7 +451,7 @@ fn put_entry(to: &mut Vec<u8>, entry: &Entry, sequence: &mut EditSequence) {
     }
 }
 
-/// Bytes of an entry by itself.
+/// The encoded size of a single entry.
 pub(super) fn entry_bytes(entry: &Entry) -> usize {
     let mut bytes = Vec::new();
     put_entry(&mut bytes, entry, &mut EditSequence::default());
@@ -472,12 +472,12 @@ impl OrderWriter {
         self.count += 1;
     }
 
-    /// Entries so far.
+    /// The number of entries.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Bytes so far.
+    /// The number of bytes.
     pub fn len(&self) -> usize {
         self.bytes.len()
     }
@@ -493,7 +493,7 @@ impl OrderWriter {
     }
 }
 
-/// A message to a client in fewer bytes, if it can be had in fewer.
+/// Compresses a message to a client, if that makes it shorter.
 pub(super) fn pack(message: &[u8]) -> Vec<u8> {
     if message.len() > MOST_PACKED {
         return message.to_vec();
@@ -504,7 +504,7 @@ pub(super) fn pack(message: &[u8]) -> Vec<u8> {
     if packed.len() < message.len() { packed } else { message.to_vec() }
 }
 
-/// The message that was packed.
+/// Decompresses a message.
 fn unpack(reader: &mut Reader) -> Result<Vec<u8>, FormatError> {
     let length = reader.number()?;
     let packed = std::mem::take(&mut reader.0);
@@ -630,7 +630,7 @@ fn read_terms(reader: &mut Reader) -> Result<Box<Terms>, FormatError> {
     Ok(Box::new(Terms { rules, loose, next_field: reader.number()? }))
 }
 
-/// Appends regions, each as the step from the one before, and something beside each.
+/// Appends regions, each as the difference from the previous one, and a value for each.
 fn put_regions(
     to: &mut Vec<u8>,
     regions: impl ExactSizeIterator<Item = RegionPos>,
@@ -679,7 +679,7 @@ mod tests {
     use super::*;
     use crate::store::FormatError;
 
-    /// A message of so many marks.
+    /// A message of `count` marks.
     fn marks(count: usize) -> Vec<u8> {
         ToClient::Entries(Entries { first: 1, entries: vec![Entry::Mark; count] }).to_bytes()
     }

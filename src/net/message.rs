@@ -1,4 +1,4 @@
-//! What client and server tell each other.
+//! Messages between client and server.
 //!
 //! ```text
 //! client                                   server
@@ -6,8 +6,8 @@
 //!                                     <-   Stream: what follows in this lane answers that greeting (in both lanes)
 //!                                     <-   Welcome: the number n that it starts from, and what comes in the bulk lane
 //!                                     <-   Piece ...      (bulk) regions or old entries, up to n
-//!                                     <-   Entries ...    (order) all that is ordered after n
-//!   Ack                               ->                  what has come
+//!                                     <-   Entries ...    (order) everything that is ordered after n
+//!   Ack                               ->                  what has arrived
 //!   Edits, Undo                       ->
 //!                                     <-   Entries with these, or Refused
 //!                                     <-   Hashes after a mark
@@ -17,12 +17,13 @@
 //!                                     <-   Piece ...      (bulk) these images
 //! ```
 //!
-//! A session can begin again at any moment, over the same connection or a new one. Each greeting names a new **stream**; whatever
-//! comes in a lane before the mark of that stream belongs to an earlier one and is dropped. A client repeats its greeting until it
-//! is answered, and a server that does not know a connected client asks it to [greet](ToClient::Greet).
+//! A session can start again at any moment, over the same connection or a new one. Each greeting names a new
+//! **stream**; messages that arrive in a lane before the mark of that stream belong to an earlier one and are dropped.
+//! A client repeats its greeting until it is answered, and a server that does not know a connected client asks it to
+//! [greet](ToClient::Greet).
 //!
 //! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the pristine world
-//! after the entries 1 to n. Whoever has applied them in order has the same world.
+//! after the entries 1 to n. All clients that have applied them in order have the same world.
 
 use std::sync::Arc;
 
@@ -36,7 +37,7 @@ use crate::store::WorldId;
 use crate::terrain::{LooseSettings, WorldChange};
 use crate::volume::{Brick, DiggingRules, Fields};
 
-/// Changes when messages are no longer what they were.
+/// The version of the protocol. It changes whenever the encoding of messages does.
 pub const PROTOCOL: u32 = 3;
 
 /// Most bytes of a message to a server.
@@ -49,27 +50,27 @@ pub const MOST_EDITS: usize = 256;
 pub const MOST_REGIONS: usize = 4096;
 /// Most images that a message asks for.
 pub const MOST_IMAGES: usize = 64;
-/// The most by which the number of a client's own edit may exceed the one before. Larger jumps are invalid, so nobody can use up the
-/// numbers of a player.
+/// The most by which the number of a client's edit may exceed the previous one. Larger jumps are invalid, so no client
+/// can use up the numbers of a player.
 pub const MOST_OWN_JUMP: u64 = 1 << 16;
 
-/// Names a player. The caller gives these numbers: whoever comes back with the same one is the same player, and small ones are
-/// short in messages. Limits, undo and administrators go by them, so the caller has to check who a client is: whoever comes under
-/// another player's number is that player.
+/// Identifies a player. The caller assigns these numbers: a client that reconnects with the same number is the same
+/// player. Small numbers take fewer bytes. Limits, undo and administrators depend on them, so the caller has to
+/// authenticate clients: a client with another player's number acts as that player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ClientId(pub u64);
 
 impl ClientId {
-    /// The author of what the server does of its own.
+    /// The author of the server's own edits.
     pub const SERVER: Self = Self(u64::MAX);
 }
 
-/// What a message is sent in. The transport delivers each lane completely and in order; between them there is no order.
+/// A channel for messages. The transport delivers each lane completely and in order; between lanes there is no order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lane {
-    /// What has to come soon.
+    /// Urgent messages.
     Order,
-    /// What takes long, paced by the server.
+    /// Large data, at a rate that the server limits.
     Bulk,
 }
 
@@ -77,27 +78,27 @@ pub enum Lane {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Entry {
-    /// An edit of a client's, under the rules and settings of the entries before.
+    /// An edit of a client, under the rules and settings of earlier entries.
     Edit {
-        /// Who sent it.
+        /// The client that sent it.
         author: ClientId,
         /// The number that it had there.
         own: u64,
         /// The edit. Its tag is 0 and it has no stroke: these concern its author and the server.
         edit: Edit,
     },
-    /// From here on edits obey these rules.
+    /// Later edits obey these rules.
     Rules(Option<Arc<DiggingRules>>),
-    /// From here on loose pieces are searched for like this.
+    /// Later edits search for loose pieces with these settings.
     Loose(Option<LooseSettings>),
-    /// Parts take the place of others: what an undo put back, or what the game's server put.
+    /// Parts that replace others: restored by an undo, or set by the game's server.
     Parts {
         /// The client that asked for it, and the number that it had there.
         by: Option<(ClientId, u64)>,
         /// The parts.
         change: Arc<WorldChange>,
     },
-    /// Changes nothing. The hashes of regions that were touched since the mark before are compared here.
+    /// Changes nothing. The hashes of regions that were touched since the previous mark are compared here.
     Mark,
 }
 
@@ -110,8 +111,8 @@ pub struct Entries {
     pub entries: Vec<Entry>,
 }
 
-/// A place in an order: of a world, as one run of a server continued it. Entries after a server's restart may differ from those
-/// that it had sent before, as what was not saved is lost.
+/// A position in the order of one run of a server. After a restart, entries may differ from those that were sent
+/// before, because unsaved entries are lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Epoch {
     /// The world.
@@ -122,7 +123,7 @@ pub struct Epoch {
     pub number: u64,
 }
 
-/// How a client begins, and begins again after a gap.
+/// The greeting of a client that joins, or joins again after a gap.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
     /// [`PROTOCOL`].
@@ -133,7 +134,7 @@ pub struct Hello {
     pub ground: u64,
     /// Cells along the side of a chunk.
     pub chunk_size: u32,
-    /// What it has, if it was here before.
+    /// The position that it has reached, if it has joined before.
     pub epoch: Option<Epoch>,
     /// Where its player is, in voxels: regions come from there outwards.
     pub place: IVec3,
@@ -143,28 +144,28 @@ pub struct Hello {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ToServer {
-    /// The client begins, once on this connection: the answer has no [stream](ToClient::Stream) marks.
+    /// Starts the only session of this connection: the answer has no [stream](ToClient::Stream) marks.
     Hello(Hello),
-    /// The client begins, or begins again. Both lanes of the answer begin with a [`ToClient::Stream`] of this number.
+    /// Starts a session, or starts it again. Both lanes of the answer begin with a [`ToClient::Stream`] of this number.
     Greeting {
-        /// The stream that the client wants to begin; it has not used this number before. The same number again is the same greeting:
-        /// one that was answered already is ignored.
+        /// The stream that the client wants to begin, with a number that it has not used before. A repeated number is a
+        /// repeated greeting, which is ignored if it was answered already.
         stream: u64,
-        /// How the client begins.
+        /// The state of the client.
         hello: Hello,
     },
-    /// Edits, numbered on from `first`. A client numbers its edits and undos together, from 1, one after the other.
+    /// Edits, numbered consecutively from `first`. A client numbers its edits and undos together, from 1.
     Edits {
         /// The number of the first.
         first: u64,
         /// At most [`MOST_EDITS`].
         edits: Vec<Edit>,
     },
-    /// Takes back the last stroke of a client, as of this place among its edits.
+    /// Undoes the last stroke of a client before this position among its edits.
     Undo {
         /// Its number among the client's edits and undos.
         own: u64,
-        /// Whose stroke.
+        /// The player whose stroke is undone.
         of: ClientId,
     },
     /// Asks for regions, because they differ.
@@ -174,7 +175,7 @@ pub enum ToServer {
         /// At most [`MOST_REGIONS`].
         regions: Vec<RegionPos>,
     },
-    /// What has come.
+    /// Acknowledges received data.
     Ack {
         /// Bytes of the bulk lane's stream, since it began.
         bulk: u64,
@@ -188,36 +189,36 @@ pub enum ToServer {
     },
 }
 
-/// How a client gets from what it has to the number that it [starts](Welcome::epoch) from.
+/// How a client gets from its present state to the number that it [starts](Welcome::epoch) from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Join {
-    /// [Entries](ToClient::Entries) come in the bulk lane, from its own number on or earlier, up to the start. One without an
-    /// [epoch](Hello::epoch) has the number 0: the pristine world, which rules nothing.
+    /// [Entries](ToClient::Entries) follow in the bulk lane, from its own number or an earlier one up to the start. A
+    /// client without an [epoch](Hello::epoch) has the number 0: the pristine world, without rules.
     Log {
         /// The numbers of entries among them that the server could not apply: they do nothing.
         voids: Vec<u64>,
     },
-    /// All regions come in the bulk lane, as many as said. What else it has is pristine.
+    /// All regions follow in the bulk lane. All others are pristine.
     Regions {
         /// How many.
         regions: u32,
         /// Rules, settings, names at the start.
         terms: Box<Terms>,
     },
-    /// The [table](ToClient::Table) of all regions comes in the bulk lane. It fetches those that differ, all others that it has
-    /// are pristine.
+    /// The [table](ToClient::Table) of all regions follows in the bulk lane. The client fetches those that differ;
+    /// regions that the table lacks are pristine.
     Compare {
         /// Rules, settings, names at the start.
         terms: Box<Terms>,
     },
 }
 
-/// What holds at a number beside bricks and fields.
+/// The state at a number in addition to bricks and fields.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Terms {
     /// The rules.
     pub rules: Option<DiggingRules>,
-    /// How loose pieces are searched for.
+    /// The settings of loose pieces.
     pub loose: Option<LooseSettings>,
     /// The greatest name that a field has had.
     pub next_field: u64,
@@ -228,25 +229,26 @@ pub struct Terms {
 pub struct Welcome {
     /// Who the client is.
     pub client: ClientId,
-    /// The world, the server's run, and the number n that the client starts from: entries after it come in the order lane.
+    /// The world, the server's run, and the number n that the client starts from: entries after it follow in the order
+    /// lane.
     pub epoch: Epoch,
     /// The last number of the client's own edits that the server has seen. Those up to it have an entry, or were refused.
     pub own: u64,
     /// How far from its player a client may dig, in voxels; `None` if that is not checked.
     pub reach: Option<u32>,
-    /// The client's cost bucket: what comes back each second, and the most that it holds. An edit costs 20, and 1 for
+    /// The client's cost bucket: its refill each second, and the most that it holds. An edit costs 20, and 1 for
     /// each brick that it reaches, or 4 if it sculpts.
     pub cost: [u64; 2],
-    /// What is left in that bucket now.
+    /// The present content of that bucket.
     pub left: u64,
-    /// What comes in the bulk lane.
+    /// The data that follows in the bulk lane.
     pub join: Join,
 }
 
 /// [Hashes](super::region_hash) of regions; 0 is a pristine one.
 pub type RegionHashes = Vec<(RegionPos, u64)>;
 
-/// A region at a number: whatever it does not name is pristine.
+/// A region at a number. Bricks and fields that it does not name are pristine.
 #[derive(Clone, Debug)]
 pub struct RegionContent {
     /// The number that the world is at.
@@ -267,9 +269,9 @@ pub struct RegionContent {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum ToClient {
-    /// The client may begin.
+    /// The client is admitted.
     Welcome(Welcome),
-    /// The client has to go.
+    /// The server has removed the client.
     Kicked(Kick),
     /// Entries of the order.
     Entries(Entries),
@@ -278,14 +280,14 @@ pub enum ToClient {
         /// The entry's number.
         number: u64,
     },
-    /// An edit or undo of the client's that does not get into the order.
+    /// An edit or undo of the client that was refused.
     Refused {
         /// Its number there.
         own: u64,
         /// Why.
         why: Refusal,
     },
-    /// At this mark the regions that were touched since the mark before have these hashes, by region.
+    /// The hashes at this mark of regions that were touched since the previous mark.
     Hashes {
         /// The number of the mark.
         number: u64,
@@ -308,18 +310,19 @@ pub enum ToClient {
     },
     /// Bytes of the bulk lane's stream: see [`BulkReader`](super::BulkReader).
     Piece(Vec<u8>),
-    /// What follows in this lane answers the [greeting](ToServer::Greeting) with this number.
+    /// Further messages in this lane answer the [greeting](ToServer::Greeting) with this number.
     Stream {
         /// The number.
         stream: u64,
     },
-    /// The server does not know the client, which is connected: it has to greet. One that has greeted waits for the answer.
+    /// The server has no session for the connected client, which has to greet. A client that has greeted already waits
+    /// for the answer.
     Greet,
     /// An image that the client asked for.
     Image(Arc<GreyImage>),
 }
 
-/// Why an edit or an undo was refused.
+/// The reason why an edit or an undo was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -341,43 +344,43 @@ pub enum Refusal {
     /// There is nothing to undo.
     #[error("nothing to undo")]
     Nothing,
-    /// Others have changed since what would be undone.
+    /// Other players have changed the same parts since.
     #[error("others have dug there since")]
     Touched,
-    /// What it would put back is too much for a message.
+    /// The parts that it would restore are too large for a message.
     #[error("too large")]
     TooLarge,
-    /// The edit came before the client had begun.
-    #[error("the client has not joined")]
+    /// The edit arrived before the client had joined.
+    #[error("the client has not joined yet")]
     NotJoined,
     /// The server does not have the image of the stamp.
     #[error("the server does not have the image of the stamp")]
     UnknownStamp,
 }
 
-/// Why a client has to go.
+/// The reason why a server removes a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Kick {
     /// It speaks another [`PROTOCOL`].
-    #[error("another version of the protocol")]
+    #[error("client and server have different versions of the protocol")]
     Protocol,
     /// It has another [`SIMULATION`](crate::terrain::SIMULATION).
-    #[error("another version of the simulation")]
+    #[error("client and server have different versions of the simulation")]
     Simulation,
     /// It has another ground.
-    #[error("another ground")]
+    #[error("client and server have different grounds")]
     Ground,
     /// It has another chunk size.
-    #[error("another chunk size")]
+    #[error("client and server have different chunk sizes")]
     ChunkSize,
-    /// It sent too many messages that mean nothing.
+    /// It sent too many invalid messages.
     #[error("too many invalid messages")]
     Malformed,
-    /// It sent far more than it may.
+    /// It sent far more than its budget.
     #[error("flooding")]
     Flood,
-    /// The game wants it.
+    /// The game removed it.
     #[error("kicked")]
     ByGame,
     /// The same player has connected again, and plays over that connection.

@@ -1,19 +1,19 @@
-//! Digging together: one server owns the order of all edits, and clients see their own at once. Without Bevy and without
-//! transport: bytes in, bytes out, and a clock that the caller gives.
+//! Multiplayer: one server owns the order of all edits, and clients show their own edits at once. Without Bevy and
+//! without a transport: bytes in, bytes out, and a clock that the caller provides.
 //!
 //! Edits are integers and their results are equal on every machine, so the order of edits is all that has to be sent. The
-//! [`Server`] numbers what clients ask for and sends it on before it has applied it itself.
+//! [`Server`] numbers the edits of clients and sends them on before it has applied them itself.
 //!
 //! | file | what it holds |
 //! | --- | --- |
-//! | [`message`] | what client and server tell each other |
-//! | `encoding` | these in bytes |
+//! | [`message`] | messages between client and server |
+//! | `encoding` | the binary encoding of messages |
 //! | `stamps` | images of stamps, which are named, and sent to clients that lack them |
-//! | `bulk` | the lane of what takes long: regions and old entries, as one stream that is cut into pieces |
+//! | `bulk` | the bulk lane: regions and old entries, as one stream that is cut into pieces |
 //! | `regions` | regions as they are compared and sent |
-//! | `price`, `bucket` | what edits cost, and how much may be spent |
+//! | `price`, `bucket` | the costs of edits, and their budget |
 //! | `client` | the client: prediction, joins, repair |
-//! | `replica` | the world of the order, and what is shown of it |
+//! | `replica` | the confirmed world and the shown world |
 //! | `server` | the server: order, validation, undo, joins |
 //!
 //! A server that lets one client in and orders its dig:
@@ -82,7 +82,7 @@ pub use server::{
 };
 pub use stamps::{StampId, Stamps};
 
-/// Prepares a terrain that nobody looks at: it meshes nothing, keeps no history, and takes all work.
+/// Prepares a terrain that is never shown: it builds no meshes, keeps no history, and accepts all work.
 fn never_shown(terrain: &mut Terrain) {
     terrain.set_meshing(Meshing::Never);
     terrain.set_undo_budget(0);

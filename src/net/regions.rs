@@ -7,8 +7,8 @@ use xxhash_rust::xxh3::Xxh3Default;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{World, WorldChange};
 
-/// The hash of a region as marks and tables tell it: that of its [samples](World::region_hash), and of the names of the fields in
-/// all chunks that reach into it. 0 for a pristine one.
+/// The hash of a region in marks and tables: of its [samples](World::region_hash), and of the names of the fields in
+/// all chunks that reach into it. 0 for a pristine region.
 pub fn region_hash(world: &World, region: RegionPos) -> u64 {
     let samples = world.region_hash(region);
     let (mut names, mut is_empty) = (Xxh3Default::new(), true);

@@ -1,7 +1,7 @@
-//! A world that follows the order, and beside it what is shown: the same with the own edits that have no number yet.
+//! The confirmed world, which follows the order, and the shown world, which also contains the client's pending edits.
 //!
-//! Both share their bricks. What is shown is never edited, only put: whatever the order brings, the difference to what is shown
-//! goes there in one piece.
+//! Both share their bricks. The shown world is never edited: after each update, its difference from the expected state
+//! is applied as one change.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -20,14 +20,14 @@ use crate::volume::{Brick, Fields};
 
 type Stored = Option<Arc<Brick>>;
 
-/// So far beyond what it may change an edit reads at most, in voxels: a neighbouring sample, and more than that.
+/// An edit reads at most this many voxels beyond the samples that it may change.
 const MARGIN: i32 = 8;
 
-/// From so many pending edits on, what is shown is held as a terrain of its own: then a further edit is worked out alone, and not with
-/// all before it.
+/// With at least this many pending edits, the shown world is kept as a separate terrain. A further edit is then
+/// predicted alone, and not together with all previous ones.
 const MANY: usize = 16;
 
-/// What is to be put into the world that is shown.
+/// A change of the shown world.
 #[derive(Clone, Debug)]
 pub struct ShownChange {
     /// Bricks and fields.
@@ -43,45 +43,47 @@ struct Pending {
     edit: Edit,
 }
 
-/// What the order's entries came to.
+/// The results of applied entries.
 #[derive(Debug, Default)]
 pub(super) struct Applied {
     /// A receipt for each edit among them, in order.
     pub receipts: Vec<Receipt>,
-    /// What parts among them changed, in order; `None` for those that are not in place.
+    /// The changes by replaced parts among them, in order; `None` for those that could not be replaced.
     pub restored: Vec<Option<Restored>>,
     /// The regions that changed.
     pub regions: BTreeSet<RegionPos>,
-    /// Was anything not applied that may be applied elsewhere?
+    /// Whether an entry failed here that may succeed on other machines.
     pub is_void: bool,
 }
 
-/// A world that follows the order, and what is shown of it.
+/// The confirmed and the shown world.
 pub(super) struct Replica {
     /// The world after the order's entries. It is never meshed.
     confirmed: Terrain,
     pending: VecDeque<Pending>,
-    /// Bricks that are shown otherwise than confirmed.
+    /// Bricks whose shown content differs from the confirmed one.
     bricks: BTreeMap<BrickPos, Stored>,
-    /// Fields of chunks that are shown otherwise than confirmed.
+    /// Fields of chunks that differ between the shown and the confirmed world.
     fields: BTreeMap<ChunkPos, Fields>,
-    /// The sum of the hashes of all regions of what is shown.
+    /// The sum of the hashes of all regions of the shown world.
     samples: u64,
-    /// What that has more than the confirmed world's when they were compared.
+    /// Difference from the confirmed world's hash at the last comparison.
     more: u64,
     /// The greatest name that a field of what is shown has had.
     next_field: u64,
-    /// What has changed of the confirmed world since it was compared with what is shown, as it was then.
+    /// The old content of those parts of the confirmed world that changed since the last comparison with the shown
+    /// world.
     before: Before,
-    /// May what is shown differ from the confirmed world with the pending edits?
+    /// Whether the shown world may differ from the confirmed world with the pending edits.
     is_outdated: bool,
-    /// Has the confirmed world changed only where pending edits read nothing, since it was compared with what is shown?
+    /// Whether all changes of the confirmed world since the last comparison are outside the samples that pending edits
+    /// read.
     is_apart: bool,
-    /// How many pending edits at the end were not worked out yet.
+    /// The number of last pending edits without a prediction.
     appended: usize,
-    /// What is shown, as long as many edits are pending.
+    /// The shown world, while many edits are pending.
     shown: Option<Terrain>,
-    /// Times that pending edits were worked out.
+    /// How often pending edits were predicted.
     drafts: u64,
     /// Edits that were worked out, each time.
     drafted: u64,
@@ -95,7 +97,7 @@ struct Before {
 }
 
 impl Before {
-    /// Notes how those parts are in this world that will change; those that are noted already stay as they are.
+    /// Records the present content of parts that will change, unless they are recorded already.
     fn note(&mut self, world: &World, change: &WorldChange) {
         for (pos, _) in &change.bricks {
             self.bricks.entry(*pos).or_insert_with(|| world.brick(*pos).cloned());
@@ -136,7 +138,7 @@ impl Replica {
         self.confirmed.world()
     }
 
-    /// What holds now beside bricks and fields.
+    /// The present state in addition to bricks and fields.
     pub fn terms(&self) -> Terms {
         Terms {
             rules: self.confirmed.rules().cloned(),
@@ -145,7 +147,7 @@ impl Replica {
         }
     }
 
-    /// The hash of what is shown, once all that was returned is put.
+    /// The hash of the shown world after all returned changes.
     pub fn shown_hash(&self) -> u64 {
         World::hash_of(self.world().ground().hash(), self.samples)
     }
@@ -188,7 +190,7 @@ impl Replica {
         next
     }
 
-    /// Takes an own edit back, say because it was refused; returns it if it was pending.
+    /// Removes an own edit, for example after a refusal; returns it if it was pending.
     pub fn take_back(&mut self, own: u64) -> Option<Edit> {
         let at = self.pending.iter().position(|pending| pending.own == own)?;
         self.is_outdated = true;
@@ -196,7 +198,7 @@ impl Replica {
         self.pending.remove(at).map(|pending| pending.edit)
     }
 
-    /// Applies entries of the order. Own edits among them are no longer pending; `own` tells their numbers.
+    /// Applies entries of the order. Own edits among them are no longer pending; `own` returns their numbers.
     pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
         // Those may be among them.
         self.is_outdated |= self.appended > 0;
@@ -243,7 +245,7 @@ impl Replica {
             applied.is_void |= matches!(restored, Err(ChangeError::Panicked | ChangeError::Overloaded));
             applied.restored.push(restored.ok());
         }
-        // What is deterministic fails everywhere; with it, what is shown is drafted anew.
+        // A deterministic failure happens on all machines; the pending edits are predicted again.
         self.is_outdated |= applied.receipts.iter().any(|receipt| receipt.outcome.is_err());
         if is_foreign && !self.is_outdated {
             self.is_apart = !is_own && self.reads_nothing_of_before(next_field);
@@ -267,7 +269,7 @@ impl Replica {
         applied
     }
 
-    /// Lets the confirmed world have the bricks that are shown, where they are equal, and forgets these differences.
+    /// Shares the shown bricks with the confirmed world where they are equal, and forgets these differences.
     fn share(&mut self) {
         let shown = |pos: &BrickPos| self.bricks.get(pos).and_then(Option::as_ref);
         let changed = self.before.bricks.keys().filter_map(|pos| Some((*pos, Arc::clone(shown(pos)?))));
@@ -276,7 +278,7 @@ impl Replica {
         if self.is_outdated || self.is_apart {
             return;
         }
-        // What is shown stays as it is: all that changed was shown before.
+        // The shown world does not change: all changes were shown before.
         self.more = self.samples.wrapping_sub(self.world().regions_hash());
         let before = std::mem::take(&mut self.before);
         let world = self.confirmed.world();
@@ -294,7 +296,7 @@ impl Replica {
         }
     }
 
-    /// Puts parts into the confirmed world, as another machine has them.
+    /// Replaces parts of the confirmed world by those of another machine.
     ///
     /// # Errors
     /// When they do not fit.
@@ -306,7 +308,8 @@ impl Replica {
         self.confirmed.take_change_receipts().pop().unwrap_or(Err(ChangeError::Panicked)).map(|_| applied)
     }
 
-    /// Goes on from another place of an order, under the terms that hold there: with the world as it is, or from the pristine one.
+    /// Continues from another position of an order with the terms there, either with the present world or from the
+    /// pristine one.
     ///
     /// # Errors
     /// When the terms are invalid.
@@ -327,7 +330,7 @@ impl Replica {
         Ok(())
     }
 
-    /// All of a region of the confirmed world as it is to be, where these are its bricks and fields.
+    /// The change that gives a whole region of the confirmed world these bricks and fields.
     pub fn region_change(
         &self,
         region: RegionPos,
@@ -347,7 +350,8 @@ impl Replica {
         WorldChange { bricks: all.into_iter().collect(), fields: chunks.into_iter().collect(), next_field }
     }
 
-    /// Do the pending edits come to the same as before, whatever has changed of the confirmed world? `next_field` is what it had.
+    /// Whether the pending edits have the same results as before, despite the changes of the confirmed world.
+    /// `next_field` is its old value.
     fn reads_nothing_of_before(&self, next_field: u64) -> bool {
         if self.pending.is_empty() {
             return self.bricks.is_empty() && self.fields.is_empty();
@@ -368,8 +372,8 @@ impl Replica {
             && self.before.bricks.keys().all(|pos| !is_read(pos) && !self.bricks.contains_key(pos))
     }
 
-    /// Brings what is shown up to date: the change that is to be put there, if there is one, and the receipts of the last pending edits
-    /// that were worked out, in order.
+    /// Updates the shown world. Returns its change, if there is one, and the receipts of the pending edits that were
+    /// predicted last, in order.
     pub fn update(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
         // Names of fields may differ that were drafted one after the other.
         self.is_outdated |= self.pending.is_empty() && !(self.bricks.is_empty() && self.fields.is_empty());
@@ -392,12 +396,12 @@ impl Replica {
         updated
     }
 
-    /// Whether the last pending edits can be worked out alone, as long as no entries are applied.
+    /// Whether the last pending edits can be predicted alone, as long as no entries are applied.
     pub fn can_append(&self) -> bool {
         self.appended > 0 && !self.is_outdated && !self.is_apart
     }
 
-    /// Works out the last pending edits over what is shown. `None` where that can't be held.
+    /// Predicts the last pending edits over the shown world. `None` if that world can't be built.
     fn append(&mut self) -> Option<(Option<ShownChange>, Vec<Receipt>)> {
         if self.shown.is_none() {
             self.shown = self.fork_shown();
@@ -442,7 +446,7 @@ impl Replica {
         Some(((!is_empty).then_some(ShownChange { change, hash }), receipts))
     }
 
-    /// What is shown, as a terrain.
+    /// The shown world, as a terrain.
     fn fork_shown(&self) -> Option<Terrain> {
         let mut shown = self.confirmed.fork().ok()?;
         never_shown(&mut shown);
@@ -504,7 +508,8 @@ impl Replica {
         (shown, Some(draft.receipts))
     }
 
-    /// What is to be put where the confirmed world has changed apart from the pending edits, which stay as they are shown.
+    /// The change of the shown world if the confirmed world has changed apart from the pending edits, whose results
+    /// stay.
     fn follow_apart(&mut self) -> Option<ShownChange> {
         let Before { bricks, fields } = std::mem::take(&mut self.before);
         self.samples = self.world().regions_hash().wrapping_add(self.more);

@@ -1,4 +1,4 @@
-//! A replica against a world that obeys the order one entry at a time, with the pending edits on top.
+//! Compares a replica with a world that applies the order entry by entry, with the pending edits on top.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;

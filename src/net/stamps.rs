@@ -8,7 +8,7 @@ use xxhash_rust::xxh3::Xxh3Default;
 use crate::brush::Edit;
 use crate::ground::GreyImage;
 
-/// Names an image by its content.
+/// Identifies an image by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct StampId(pub u64);
 
@@ -28,7 +28,7 @@ impl StampId {
 }
 
 /// The images that stamps may have. A client sends no edits with other images, and a server refuses them. Clients that lack an image
-/// of the server's get it when it is used first, so only players who stamp need images of their own.
+/// of the server get it at its first use, so only players that use stamps need their own images.
 #[derive(Clone, Debug, Default)]
 pub struct Stamps(FxHashMap<StampId, Arc<GreyImage>>);
 
@@ -51,7 +51,7 @@ impl Stamps {
         self.0.get(&id)
     }
 
-    /// Can the edit be sent? It can unless it is a stamp whose image is not here.
+    /// Whether the edit can be sent: it is no stamp, or its image is in the list.
     pub fn can_send(&self, edit: &Edit) -> bool {
         edit.stamp_image().is_none_or(|image| self.0.contains_key(&StampId::of(image)))
     }

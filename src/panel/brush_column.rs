@@ -9,7 +9,7 @@ use super::theme::{ACCENT, BAD, FAINT};
 use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
 use super::{BrushTool, BurrowPanel, ToolAlign, ToolOperation, ToolShape, texts};
 
-/// Draws what is always in sight: where the pointer is.
+/// Draws the part that is always in sight: the pointer's position.
 pub fn head(ui: &mut Ui, panel: &BurrowPanel) {
     if let Some(Vec3 { x, y, z }) = panel.pointer {
         figure(ui, texts::POINTER, format!("{x:.1}  {y:.1}  {z:.1} m"));

@@ -12,7 +12,7 @@ use super::{level, survey, texts};
 use crate::terrain::Terrain;
 use crate::volume::DiggingRules;
 
-/// What is known of the level that is edited.
+/// The state of the level that is edited.
 #[derive(Resource, Default)]
 pub struct Files {
     /// Where it was opened from, or saved last.
@@ -24,7 +24,7 @@ pub struct Files {
     /// What is asked now.
     question: Option<Question>,
     answer: Option<Answer>,
-    /// What is done once the level is saved.
+    /// The action that follows once the level is saved.
     then: Option<PanelAction>,
 }
 

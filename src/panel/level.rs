@@ -61,7 +61,7 @@ pub(super) fn renew(commands: &mut Commands, panel: &mut BurrowPanel, (entity, t
     commands.insert_resource(LevelTask::New(ThreadTask::start(Threads::Background, make), entity));
 }
 
-/// Puts a level that was loaded in place, and tells what came of it.
+/// Installs a loaded level, and reports the result.
 pub(super) fn finish(
     mut commands: Commands,
     task: Option<ResMut<LevelTask>>,

@@ -179,7 +179,7 @@ fn note_rejection(
 /// Seconds after which a message about something that went well is gone.
 const NOTE_SHOWN: f32 = 12.0;
 
-/// Removes messages that are old, except for errors and what still goes on.
+/// Removes old messages, except for errors and running work.
 fn forget_note(
     time: Option<Res<Time<Real>>>,
     mut panel: ResMut<BurrowPanel>,

@@ -27,7 +27,7 @@ pub struct Counts {
     pub hash: u64,
 }
 
-/// Meshes that are on the card.
+/// Meshes that are on the GPU.
 type Drawn<'w, 's> = Query<'w, 's, (&'static MeshBytes, &'static ChildOf), With<Mesh3d>>;
 
 /// All statistics on the panel.
@@ -38,7 +38,7 @@ pub struct Survey {
     counting: Option<(Entity, Version, ThreadTask<Counts>)>,
     since: Duration,
     pub counts: Option<Counts>,
-    /// Bytes of the chosen terrain's meshes on the card.
+    /// Bytes of the chosen terrain's meshes on the GPU.
     pub mesh_bytes: usize,
     /// The engine's state, its stages on CPU and GPU, and its last choice.
     pub engine: Option<(EngineState, [u64; 2], Option<Choice>)>,

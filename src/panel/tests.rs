@@ -526,7 +526,7 @@ fn what_a_seam_check_found_is_said_of_the_ground_that_was_checked() {
             _ => None,
         }
     });
-    let verdict = verdict.expect("the check comes to its end");
+    let verdict = verdict.expect("the check ends");
     let said = |app: &App, of: Entity| {
         let terrain = app.world().get::<Terrain>(of).expect("it is there");
         verdict.about(of, terrain.world())
@@ -566,7 +566,7 @@ fn editor(name: &str) -> (App, Entity, std::path::PathBuf) {
     (app, terrain, folder)
 }
 
-/// Performs an action, answers what is asked if there is an answer, and waits until nothing goes on any more.
+/// Performs an action, answers its question if there is an answer, and waits until nothing is running.
 fn act(app: &mut App, action: PanelAction, answer: Option<&str>) -> bool {
     app.world_mut().write_message(action);
     app.update();

@@ -210,7 +210,7 @@ pub fn figure(ui: &mut Ui, name: &str, value: impl Into<String>) {
     figure_in(ui, name, value, BRIGHT);
 }
 
-/// The same in this colour.
+/// A figure in this colour.
 pub fn figure_in(ui: &mut Ui, name: &str, value: impl Into<String>, color: Color32) {
     let line = ui.horizontal(|ui| {
         ui.label(RichText::new(name).color(FAINT).size(12.0));

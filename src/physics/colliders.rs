@@ -209,8 +209,8 @@ pub(super) fn detach(mut part: EntityWorldMut) {
     }
 }
 
-/// Drops the shape of a body that was removed, whoever did that, and unmarks its tile or chunk. Unless the plugin itself
-/// [detached](detach) it, ground is gone, so bodies that sleep on it have to wake.
+/// Drops the shape of a body that was removed by the plugin or by the game, and unmarks its tile or chunk. Unless the
+/// plugin itself [detached](detach) it, ground is gone, so bodies that sleep on it have to wake.
 pub(super) fn forget(
     gone: On<Remove, GroundBody>,
     bodies: Query<(&GroundBody, &ChildOf, Option<&ColliderAabb>)>,

@@ -15,10 +15,10 @@ use crate::plugin::{
 use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, PieceId, Terrain};
 
-/// Lets ground that broke off fall as a rigid body. Put a [`LooseGround`](crate::plugin::LooseGround) on the terrain; its
-/// `debris` is the largest piece that falls, in voxels. If the app has `Assets<Mesh>`, a piece is drawn from the frame in
-/// which the ground loses it. It becomes a body as soon as a task has built its collider. Its mesh is built with the
-/// transaction; only if a game commits by itself is it built on the main thread.
+/// Makes ground that broke off fall as a rigid body. Put a [`LooseGround`](crate::plugin::LooseGround) on the terrain;
+/// its `debris` is the largest piece that falls, in voxels. If the app has `Assets<Mesh>`, a piece is drawn from the
+/// frame in which the ground loses it. It becomes a body as soon as a task has built its collider. Its mesh is built
+/// with the transaction; it is built on the main thread only if the game commits transactions itself.
 ///
 /// Matter is neither doubled nor lost: when a piece becomes ground again, by an undo of any player or because a server refused
 /// the dig, its debris is despawned wherever it has rolled, and no other is. A redo lets it fall again.
@@ -90,14 +90,14 @@ pub struct DebrisOf(pub Entity);
 #[relationship_target(relationship = DebrisOf, linked_spawn)]
 pub struct TerrainDebris(Vec<Entity>);
 
-/// A piece's time is over. It is despawned right after this event.
+/// A piece crumbles: it is despawned right after this event.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DebrisCrumbled {
     /// The piece's entity.
     pub entity: Entity,
 }
 
-/// Tells debris of pieces with the same name apart: the piece that was cut off last is the first to return.
+/// Distinguishes debris of pieces with equal names: the piece that was cut off last is the first to return.
 #[derive(Component, Clone, Copy, Debug)]
 struct Origin {
     id: PieceId,
@@ -221,7 +221,7 @@ fn take_back(world: &mut World, terrain: Entity, id: PieceId) {
     }
 }
 
-/// Enters that a piece has no debris any more, although it is not ground again.
+/// Records that a piece has no debris any more, although it is not ground again.
 fn forget(world: &mut World, terrain: Entity, gone: Origin) {
     let earlier = latest(world, terrain, gone.id, gone.number);
     if let Some(mut origin) = earlier.and_then(|piece| world.get_mut::<Origin>(piece)) {
@@ -269,7 +269,7 @@ fn become_body(
     }
 }
 
-/// Lets pieces age by the time that physics has advanced.
+/// Ages pieces by the time that physics has advanced.
 fn crumble(
     mut commands: Commands,
     time: Res<Time<Physics>>,

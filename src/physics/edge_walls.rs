@@ -29,7 +29,7 @@ use crate::terrain::Terrain;
 #[reflect(Component, Default)]
 pub struct EdgeWalls {
     /// How far the walls reach above the highest ground and below the lowest, in voxels. The ground is that of the heightmap;
-    /// what is dug and built may be deeper and higher, by so much.
+    /// pits may be deeper and buildings higher by this value.
     pub height: f32,
     /// How thick the walls are, in voxels. They stand outside the terrain. Fast bodies need thick walls.
     pub thickness: f32,

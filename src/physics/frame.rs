@@ -91,7 +91,7 @@ impl<'a> TerrainFrame<'a> {
             Column::new(first.x.max(0), first.z.max(0)),
             Column::new(last.x.min(grid.width() - 1), last.z.min(grid.depth() - 1)),
         );
-        // Beside the terrain there is nothing to wait for.
+        // Outside the terrain there is nothing to wait for.
         let is_over = first.x <= last.x && first.z <= last.z;
         let tiles = is_over.then(|| (grid.tile_of_cell(first), grid.tile_of_cell(last)));
         let tiles = tiles.into_iter().flat_map(|(first, last)| {

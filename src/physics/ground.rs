@@ -56,7 +56,7 @@ pub struct GroundContact {
 pub struct TerrainContact(pub GroundContact);
 
 /// Leaves a terrain out of physics: it gets no colliders and loses those that it has, and no body is held or lifted by it.
-/// For a backdrop, say. Put it on the terrain's entity; its [`EdgeWalls`](super::EdgeWalls) stay.
+/// Useful for a backdrop. Put it on the terrain's entity; its [`EdgeWalls`](super::EdgeWalls) stay.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct TerrainPhysicsDisabled;

@@ -117,21 +117,21 @@ pub struct PhysicsFigures {
     pub colliders: usize,
     /// Tiles and chunks that still need one.
     pub missing: usize,
-    /// Colliders swapped in so far.
+    /// Colliders swapped in since the start.
     pub swaps: u64,
     /// Colliders dropped because their surface had changed again.
     pub stale: u64,
     /// Colliders that could not be made: each is tried again, and then its tile or chunk keeps what it has.
     pub failed: u64,
-    /// Tiles and chunks checked so far, because they changed or a source arrived or left.
+    /// Tiles and chunks checked since the start, because they changed or a source arrived or left.
     pub looked_at: u64,
     /// Tiles and chunks that changed since bodies were last woken.
     pub changes: usize,
     /// Bodies being held.
     pub held: usize,
-    /// Bodies woken so far.
+    /// Bodies woken since the start.
     pub woken: u64,
-    /// Bodies lifted out of the ground so far.
+    /// Bodies lifted out of the ground since the start.
     pub lifted: u64,
     /// Time spent on the main thread in this frame. Colliders that are swapped in with commits count as part of those.
     pub main_thread: Duration,

@@ -1,4 +1,4 @@
-//! Where colliders are wanted.
+//! The places that need colliders.
 
 use std::sync::Arc;
 

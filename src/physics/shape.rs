@@ -327,7 +327,7 @@ mod tests {
             let slope = Vector::new(PITCH as f32 * face.x.signum(), 1.0, 0.0).normalize();
             assert!(face.abs_diff_eq(slope, 1e-5), "{face} is no slope of the roof");
             let other = Vector::new(-slope.x, slope.y, 0.0);
-            assert!(beyond.abs_diff_eq(other, 1e-5), "{beyond} beside {face}");
+            assert!(beyond.abs_diff_eq(other, 1e-5), "{beyond} next to {face}");
         }
     }
 

@@ -14,7 +14,7 @@ pub(super) const FARTHEST: Vec3 = Vec3::splat(8.0);
 /// How far inside a collider a ray through it starts, in metres; less than any body's thickness.
 const SKIN: f32 = 1e-3;
 
-/// What decides whether a collider collides with ground.
+/// The components that decide whether a collider collides with ground.
 #[derive(QueryData)]
 pub(super) struct SolidCollider {
     bounds: Ref<'static, ColliderAabb>,
@@ -111,7 +111,7 @@ fn meets(collider: &SolidColliderItem, ground: CollisionLayers) -> bool {
     !collider.is_sensor && !collider.is_disabled && ground.interacts_with(collider.layers())
 }
 
-/// The same for a character, which finds ground by casting its own collider with its own filters.
+/// Whether ground carries a character, which finds ground by casting its own collider with its own filters.
 fn carries(walker: &SolidColliderItem, ground: CollisionLayers) -> bool {
     (walker.layers().filters & ground.memberships) != LayerMask::NONE
 }

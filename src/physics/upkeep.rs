@@ -27,7 +27,7 @@ const FRAME_TIME: Duration = Duration::from_micros(150);
 /// How often a collider is built that panics.
 const ATTEMPTS: u32 = 3;
 
-/// What a task made for a tile or chunk: its collider, or if that panicked, what the panic said.
+/// The result of a task for a tile or chunk: its collider, or the message of a panic.
 type Built = (Entity, Result<BuiltCollider, Failure>);
 
 /// Building the collider of a part panicked.
@@ -212,7 +212,7 @@ mod tests {
     use crate::plugin::BurrowPlugins;
     use crate::terrain::TerrainSettings;
 
-    /// An app with level ground of four tiles, where building so many colliders panics.
+    /// An app with level ground of four tiles, where building the first `panics` colliders panics.
     fn app(panics: u32) -> App {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, PhysicsPlugins::default(), BurrowPlugins, TerrainPhysicsPlugin))

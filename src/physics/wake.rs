@@ -230,7 +230,7 @@ impl BodyLifter<'_, '_> {
             return;
         }
         let start = Instant::now();
-        // A world that is not shown yet brings new colliders, so its bodies will be watched anew.
+        // A world that is not shown yet brings new colliders, so its bodies will be watched again.
         let terrains: Vec<_> = terrains
             .iter()
             .filter(|(_, terrain, _, entities)| entities.show(terrain.world()))

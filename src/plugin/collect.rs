@@ -247,7 +247,7 @@ pub(super) fn disable_loose_search(
     }
 }
 
-/// The messages that tell of undo and redo steps.
+/// The messages that report undo and redo steps.
 #[derive(SystemParam)]
 pub(super) struct HistoryMessages<'w> {
     pub moved: MessageWriter<'w, HistoryMoved>,

@@ -69,7 +69,7 @@ pub(super) fn begin_transactions(
     figures.measure(start.elapsed());
 }
 
-/// What commits change: entities, meshes and figures.
+/// The parameters of systems that commit: entities, meshes and figures.
 #[derive(SystemParam)]
 pub(super) struct Display<'w, 's> {
     commands: Commands<'w, 's>,
@@ -233,8 +233,8 @@ fn commit(
     true
 }
 
-/// What is committed instead if a task panicked: the rejection of its transaction. `None` if it was not a transaction, or
-/// the terrain no longer waits for it; the terrain is loaded anew then.
+/// The commit after a task panicked: the rejection of its transaction. `None` if it was not a transaction, or
+/// the terrain no longer waits for it; the terrain is then loaded again.
 fn output_of_panicked(
     (entity, terrain): (Entity, &mut Mut<Terrain>),
     ticket: Option<u64>,
@@ -356,8 +356,8 @@ impl Display<'_, '_> {
     }
 }
 
-/// What an entity loses when it draws nothing. Bevy adds to the list of visibility classes with each `Mesh3d` that is inserted
-/// and never takes anything from it: the entity would be seen twice after the next one.
+/// The components that an entity loses when it draws nothing. Bevy adds to the list of visibility classes with each
+/// `Mesh3d` that is inserted and never takes anything from it: the entity would be seen twice after the next one.
 type Drawing = (Mesh3d, VisibilityClass);
 
 /// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes into
@@ -368,7 +368,7 @@ fn refresh_material(mut child: EntityWorldMut) {
     }
 }
 
-/// Puts a mesh in place of an entity's old one, under the same handle.
+/// Replaces an entity's mesh under the same handle.
 fn swap(
     commands: &mut Commands,
     assets: &mut Assets<Mesh>,

@@ -65,11 +65,11 @@ pub struct Chunk {
 pub struct ShownSurface {
     /// The revision of the world that the surface belongs to; it stays while other parts change.
     pub revision: u64,
-    /// Is it known to have no triangles?
+    /// Whether it is known to have no triangles.
     pub is_empty: bool,
 }
 
-/// How many bytes the vertices and indices of a tile's or chunk's mesh take on the card, while it has a `Mesh3d`.
+/// The bytes of the vertices and indices of a tile's or chunk's mesh on the GPU, while it has a `Mesh3d`.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct MeshBytes(pub usize);
@@ -88,10 +88,11 @@ pub struct Field {
     pub revision: u64,
 }
 
-/// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them: a
-/// relationship to that terrain, which lists its pieces in [`GroundPieces`]. A piece inherits the terrain's material, layers
-/// and shadows as a [`Tile`] does, unless it is spawned with its own of the same type. It follows when they change or are
-/// removed. With a `GroundLook`, the texture on a piece stays where it was in the ground, wherever the piece goes.
+/// A mesh that was part of a terrain and now moves independently, as [`LoosePieceFound`](super::LoosePieceFound) has
+/// them: a relationship to that terrain, which lists its pieces in [`GroundPieces`]. A piece inherits the terrain's
+/// material, layers and shadows as a [`Tile`] does, unless it is spawned with its own of the same type. It follows when
+/// they change or are removed. With a `GroundLook`, the texture on a piece stays where it was in the ground, wherever
+/// the piece goes.
 ///
 /// When the terrain is despawned, its pieces stay as they are, and lose this component.
 ///
@@ -179,9 +180,9 @@ impl From<&volume::Field> for Field {
 #[reflect(Component, Default)]
 pub struct Held;
 
-/// What brushes, undos and redos ask of this terrain is put here and not done: somebody else decides about it, say a server, and
-/// puts what came of it in the terrain with [`Terrain::submit_change`]. Whoever inserts this takes the lists and answers what is
-/// in them.
+/// Collects the edits, undos and redos of this terrain instead of applying them, so that for example a server can
+/// decide about them. The system that inserts this takes the lists, answers their items, and applies the results with
+/// [`Terrain::submit_change`].
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct EditOutbox {
     /// Edits, in the order in which they were asked for.
@@ -193,7 +194,7 @@ pub struct EditOutbox {
 /// The meshes of this terrain have vertices of 32 bytes: positions, normals, materials; no colours and no depth in the ground,
 /// which take 20 more. A `GroundLook` brings it and takes it away again; insert it for materials of your own that need neither.
 ///
-/// A terrain that gets or loses it loads anew, and its former tiles and chunks stay until then.
+/// A terrain that gets or loses it is loaded again, and its former tiles and chunks stay until then.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct SlimVertices;

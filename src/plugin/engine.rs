@@ -32,7 +32,7 @@ pub(super) fn trim_engines(
     }
 }
 
-/// Suggests the card that draws, if there are several.
+/// Suggests the GPU that renders, if there are several.
 #[cfg(feature = "render")]
 pub(super) fn suggest_renderers_card(world: &World) {
     use bevy::render::renderer::RenderAdapterInfo;

@@ -19,11 +19,11 @@ pub struct TerrainEntities {
     pub(super) shown: Version,
     /// Metres along the side of the voxels that they were built for.
     pub(super) voxel_size: f32,
-    /// Were they built with [`SlimVertices`](super::SlimVertices)?
+    /// Whether they were built with [`SlimVertices`](super::SlimVertices).
     pub(super) is_slim: bool,
-    /// Were they built with [`LevelsOfDetail`](super::LevelsOfDetail)?
+    /// Whether they were built with [`LevelsOfDetail`](super::LevelsOfDetail).
     pub(super) has_levels: bool,
-    /// Must all of them be built anew?
+    /// Whether all of them have to be rebuilt.
     pub(super) is_outdated: bool,
     drawn: HashMap<Drawn, Entity>,
     /// Nodes of level 1 and above.
@@ -31,7 +31,7 @@ pub struct TerrainEntities {
     fields: HashMap<FieldId, Entity>,
     /// Tiles that have an entity whether they are drawn or not.
     kept: HashSet<TilePos>,
-    /// Was [`TerrainReady`] triggered?
+    /// Whether [`TerrainReady`] was triggered.
     is_ready_sent: bool,
 }
 
@@ -73,7 +73,7 @@ impl TerrainEntities {
                 commands.entity(child).try_despawn();
             }
         }
-        // Those that a game moved to another parent.
+        // Entities that a game moved to another parent.
         own.into_iter().for_each(|entity| commands.entity(entity).try_despawn());
     }
 
@@ -274,7 +274,7 @@ pub(crate) fn trigger_if_alive<'a, E: EntityEvent<Trigger<'a>: Default>>(command
     });
 }
 
-/// Does a chunk have no field, and draw nothing?
+/// Whether a chunk has no field and draws nothing.
 pub(super) fn is_empty(world: &World, chunk: ChunkPos) -> bool {
     world.fields_of(chunk).is_none() && !world.may_draw(chunk)
 }

@@ -1,4 +1,4 @@
-//! What the plugin measures.
+//! Statistics of the plugin.
 
 use std::time::Duration;
 
@@ -7,16 +7,16 @@ use bevy::prelude::*;
 
 use super::Times;
 
-/// What the plugin did lately. It counts as changed in frames with a commit; [`main_thread`](Self::main_thread) alone, which is
-/// measured in every frame, does not count.
+/// Recent statistics of the plugin. It counts as changed in frames with a commit; [`main_thread`](Self::main_thread)
+/// alone, which is measured in every frame, does not count.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct BurrowFigures {
-    /// Commits so far.
+    /// Commits since the start.
     pub commits: u64,
     /// Brushes in these commits.
     pub brushes: u64,
-    /// Meshes swapped so far.
+    /// Meshes swapped since the start.
     pub swaps: u64,
     /// How long the last transaction took in its task.
     pub last_transaction: Duration,
@@ -31,7 +31,7 @@ pub struct BurrowFigures {
     pub main_thread: Duration,
 }
 
-/// How long the parts of a transaction took in its task.
+/// The durations of the parts of a transaction in its task.
 #[derive(Clone, Copy, Default)]
 pub(super) struct TaskTimes {
     pub edit: Duration,

@@ -17,7 +17,7 @@ pub struct HeightmapImage(pub GreyImage);
 pub struct HeightmapSettings {
     /// For RAW files: width, height and byte order, which the file does not contain.
     pub raw: Option<RawHeightmap>,
-    /// What a file may cost.
+    /// Limits of decoding a file.
     pub limits: ImageLimits,
 }
 
@@ -32,7 +32,7 @@ pub struct RawHeightmap {
     pub format: RawFormat,
 }
 
-/// Why a heightmap asset cannot be loaded.
+/// The reason why a heightmap asset cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum HeightmapError {

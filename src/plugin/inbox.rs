@@ -1,7 +1,7 @@
 //! Brushes, undos and redos until they are queued.
 //!
 //! Bevy drops messages after two frames. Games that run the plugin's sets in one state only still get an answer to each
-//! message: what is written meanwhile is kept here.
+//! message: messages that are written meanwhile are kept here.
 
 use bevy::ecs::message::MessageCursor;
 use bevy::ecs::system::SystemParam;
@@ -42,7 +42,7 @@ pub(super) struct Inbox {
     redos: Unread<Redo>,
 }
 
-/// What the game asks of terrains, in the order in which it is queued.
+/// The game's requests to terrains, in the order in which they are queued.
 #[derive(SystemParam)]
 pub(super) struct Requests<'w> {
     inbox: ResMut<'w, Inbox>,
@@ -64,7 +64,7 @@ impl Requests<'_> {
     }
 }
 
-/// Keeps what was written in this frame, in every frame and whatever the game gates.
+/// Stores messages of this frame. Runs in every frame, regardless of the game's run conditions.
 pub(super) fn keep_requests(mut requests: Requests) {
     let Requests { inbox, brushes, targeted, undos, redos } = &mut requests;
     // For other systems this is no change.

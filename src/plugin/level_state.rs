@@ -1,4 +1,4 @@
-//! Levels of detail as components: a game's settings, what is shown, and what the plugin knows of a terrain's nodes.
+//! Levels of detail as components: a game's settings, the shown levels, and the plugin's state for a terrain's nodes.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ use crate::terrain::{KnownNodes, Version};
 /// | --- | --- |
 /// | any perspective, custom and off-axis ones included | by distance. Where it looks does not matter, so turning changes nothing |
 /// | orthographic | by size on the screen in what is in view, coarser around it |
-/// | inactive, or with a picture of no size, say of a minimised window | none |
+/// | inactive, or with a picture of no size, as of a minimised window | none |
 /// | whose `RenderLayers` do not meet the terrain's | none |
 /// | a `Camera2d` | none |
 /// | none, but a [`DetailSource`] | as for a camera at its place |
@@ -29,7 +29,7 @@ use crate::terrain::{KnownNodes, Version};
 /// All that count decide together. While none does, all stays as it is for those that looked last. Distances and speeds are
 /// measured in the terrain's own space and in real time: shifted origins and slow motion change nothing.
 ///
-/// The defaults need no change. A terrain that gets or loses this component loads anew.
+/// The defaults need no change. A terrain that gets or loses this component is loaded again.
 ///
 /// With it, a [`Tile`](super::Tile) has an entity while it is drawn, and of level 0 also while something else needs it, like a
 /// collider. [`SurfaceProcessor`](super::SurfaceProcessor)s are called for tiles and chunks of level 0 only, when they come
@@ -48,7 +48,7 @@ pub struct LevelsOfDetail {
     pub edited_pixels: f32,
     /// Levels are chosen for where cameras will be in this many seconds, too.
     pub look_ahead: f32,
-    /// The most squares that are drawn, about; where more would be needed, all ground is drawn coarser.
+    /// The approximate maximum of drawn squares; if more would be needed, all ground is drawn coarser.
     pub most_nodes: usize,
     /// Meshes made for one change of levels, unless a single square needs more.
     pub meshes_per_change: usize,
@@ -85,7 +85,7 @@ impl LevelsOfDetail {
     }
 }
 
-/// What is drawn of a terrain with [`LevelsOfDetail`]; the plugin writes it.
+/// The drawn levels of a terrain with [`LevelsOfDetail`]; the plugin updates it.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct ShownLevels {
@@ -96,7 +96,7 @@ pub struct ShownLevels {
 }
 
 impl ShownLevels {
-    /// The share of squares that are drawn as they should be, 0..=1.
+    /// The share of squares that are drawn at their chosen level, 0..=1.
     pub fn progress(&self) -> f32 {
         let nodes = self.nodes.iter().sum::<usize>();
         if nodes == 0 { 0.0 } else { nodes as f32 / (nodes + self.waiting) as f32 }
@@ -129,7 +129,7 @@ impl Default for DetailSource {
     }
 }
 
-/// Who looks at a terrain, in its voxels; while nobody does, those who looked last.
+/// The viewpoints of a terrain, in its voxels; without any, the last ones.
 #[derive(Component, Default)]
 pub(super) struct Watchers {
     pub eyes: Vec<(Entity, Eye)>,
@@ -156,18 +156,18 @@ impl WantedTiles {
     }
 }
 
-/// What a terrain's levels were last chosen for.
+/// The inputs of the last choice of a terrain's levels.
 #[derive(Component, Default)]
 pub(super) struct LevelState {
     pub known: Arc<KnownNodes>,
     pub eyes: Vec<Eye>,
     pub settings: Option<LevelsOfDetail>,
     pub shown: Option<Version>,
-    /// Is all drawn as it should be for these?
+    /// Whether everything is drawn at its chosen level.
     pub is_settled: bool,
     /// Transactions with edits since the cut was last chosen.
     pub edits: u32,
-    /// Were all nodes drawn once?
+    /// Whether all nodes have been drawn once.
     pub is_complete: bool,
 }
 
@@ -190,19 +190,19 @@ impl LevelState {
         Self { known, ..Self::default() }
     }
 
-    /// Notes that a change of levels was shown, after which none is left if it changed nothing.
+    /// Records that a change of levels was shown; the choice is settled if it changed nothing.
     pub(super) fn count(&mut self, changed: usize) -> usize {
         self.is_settled = changed == 0;
         self.is_complete |= self.is_settled;
         if self.is_settled { 0 } else { self.known.waiting() }
     }
 
-    /// Notes a transaction with edits.
+    /// Records a transaction with edits.
     pub(super) fn count_edit(&mut self) {
         self.edits = self.edits.saturating_add(1);
     }
 
-    /// Is the choice for these outdated?
+    /// Whether the choice for these inputs is outdated.
     pub(super) fn is_outdated(&self, eyes: &[Eye], settings: &LevelsOfDetail, shown: Version) -> bool {
         let is_near = |(a, b): (&Eye, &Eye)| {
             a.position.distance(b.position) < NEAR

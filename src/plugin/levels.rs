@@ -1,5 +1,5 @@
-//! Systems of levels of detail: find the cameras, choose what each terrain draws for all of them together, and keep tiles that
-//! something else needs.
+//! Systems of levels of detail: find the cameras, choose the nodes that each terrain draws for all of them together,
+//! and keep tiles that something else needs.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use super::{BurrowEngine, BurrowFigures, Held, MaterialColors, SlimVertices};
 use crate::levels::{Eye, View};
 use crate::terrain::{ChooseCut, Terrain};
 
-/// Faster cameras were moved, and do not go on: metres a second.
+/// Faster cameras were teleported, and will not continue like this: metres a second.
 const FASTEST: f32 = 2000.0;
 
 /// A new terrain's cut is reached in steps of this many meshes.
@@ -115,9 +115,9 @@ impl Lens {
     }
 }
 
-/// Finds who looks at each terrain, from where, and where they go.
+/// Finds the viewpoints of each terrain, with their velocities.
 ///
-/// Places of cameras and terrains are found at once, so that no system of the game can move both in between.
+/// Positions of cameras and terrains are read together, so that no system of the game can move both in between.
 pub(super) fn find_eyes(
     cameras: Query<(Entity, &Camera, &Projection, Option<&RenderLayers>), Without<Camera2d>>,
     sources: Query<(Entity, &DetailSource)>,
@@ -165,7 +165,7 @@ pub(super) fn find_eyes(
             seen.push((*viewer, eye));
         }
         watchers.is_current = !seen.is_empty();
-        // While nobody looks, nothing is merged.
+        // Without viewpoints, nothing is merged.
         if watchers.is_current {
             watchers.eyes = seen;
         }
@@ -179,7 +179,7 @@ fn voxel_metres(place: &GlobalTransform) -> f32 {
     sides.into_iter().fold(f32::MIN_POSITIVE, f32::max)
 }
 
-/// The velocity of an eye that was elsewhere in the last frame, or before a pause in which nobody looked.
+/// The velocity of an eye from its previous position, also across a pause without cameras.
 fn velocity(before: &Eye, now: &Eye, seconds: f32, metres: f32, is_after_pause: bool) -> Vec3 {
     let way = now.position - before.position;
     if is_after_pause {
@@ -193,7 +193,7 @@ fn velocity(before: &Eye, now: &Eye, seconds: f32, metres: f32, is_after_pause: 
     if way.length() * metres / seconds < FASTEST { mean } else { Vec3::ZERO }
 }
 
-/// Starts a change of levels on each terrain that needs one and has no other transaction under way.
+/// Starts a change of levels on each terrain that needs one and has no running transaction.
 pub(super) fn begin_level_changes(
     mut commands: Commands,
     mut terrains: Query<
@@ -247,7 +247,7 @@ pub(super) fn begin_level_changes(
     figures.measure(start.elapsed());
 }
 
-/// Gives wanted tiles an entity, and takes it from those that are neither wanted nor drawn any more.
+/// Spawns entities of wanted tiles, and despawns those of tiles that are neither wanted nor drawn any more.
 pub(super) fn keep_wanted_tiles(
     mut commands: Commands,
     wanted: Res<WantedTiles>,

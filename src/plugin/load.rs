@@ -45,7 +45,7 @@ struct BuiltLevels {
 }
 
 impl Loading {
-    /// Are these surfaces of this terrain, even if the game changed it since?
+    /// Whether these are surfaces of this terrain, even if the game has changed it since.
     fn is_of(&self, terrain: &Terrain) -> bool {
         self.world.version().is_same_world(terrain.world().version())
     }
@@ -177,7 +177,7 @@ pub(super) fn remove_with_terrain(
     commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight, LevelState)>();
 }
 
-/// A terrain that gets slim vertices need not wait for others.
+/// Cancels a load without slim vertices when a terrain gets them; it is then loaded again with them.
 pub(super) fn drop_other_vertices(
     new: On<Insert, SlimVertices>,
     mut commands: Commands,
@@ -188,7 +188,7 @@ pub(super) fn drop_other_vertices(
     }
 }
 
-/// A terrain that loses slim vertices need not wait for them.
+/// Cancels a load with slim vertices when a terrain loses the marker; it is then loaded again without them.
 pub(super) fn drop_slim_vertices(
     gone: On<Remove, SlimVertices>,
     mut commands: Commands,
@@ -231,7 +231,7 @@ pub(super) fn start_loading(
         // For the game this is no change.
         let model = terrain.bypass_change_detection();
         let unseen = entities_of_kind.and_then(|entities| model.take_unseen(entities.shown));
-        // If more has changed than a frame may swap, the terrain is loaded anew over several frames.
+        // If more has changed than a frame may swap, the terrain is loaded again over several frames.
         if let Some(unseen) = unseen.filter(|unseen| unseen.len() <= settings.swaps_per_frame) {
             let task = InFlight::unseen(counter.next(), model, unseen, builder);
             commands.entity(entity).try_insert(task);
@@ -273,7 +273,7 @@ fn build_levels(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
     (chunks, Some(BuiltLevels { drawn, nodes: builder.build_nodes(updates), known }))
 }
 
-/// How often a terrain is loaded whose load panics.
+/// The number of attempts to load a terrain whose load panics.
 const ATTEMPTS: u32 = 3;
 
 /// What a load built; `None` if it panicked and is to be tried again. After some attempts the terrain is shown without
@@ -301,7 +301,7 @@ fn loaded(
             failures.remove(&entity);
             let why = panic_message(panic.as_ref());
             error!(
-                "loading the terrain {entity} panicked {ATTEMPTS} times; only what is dug from now on is shown: {why}"
+                "loading the terrain {entity} panicked {ATTEMPTS} times; only later edits are shown: {why}"
             );
             Some((Vec::new(), None))
         }

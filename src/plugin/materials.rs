@@ -18,11 +18,11 @@ const LOOK: usize = 63;
 #[derive(Resource, Default)]
 struct MaterialTypes(Vec<(usize, &'static str)>);
 
-/// Notes which materials terrains have, each type its own bit.
+/// Records the materials of terrains, one bit for each type.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct NoteMaterials;
 
-/// A terrain that was just shown, and may have nothing to be drawn with.
+/// A terrain that was just shown, and may have no material.
 #[derive(Component, Default)]
 struct JustReady;
 

@@ -32,13 +32,13 @@ pub const ATTRIBUTE_MATERIAL_WEIGHTS: MeshVertexAttribute =
 pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
 
-/// What an entity has beside its mesh: bounds that Bevy need not compute, and bytes.
+/// The components of an entity in addition to its mesh: bounds that Bevy need not compute, and bytes.
 pub(crate) type MeshFacts = (Aabb, NoAutoAabb, MeshBytes);
 
 /// A mesh ready to be swapped in; `None` where nothing is to be drawn.
 pub(crate) type BuiltMesh = Option<(Mesh, MeshFacts)>;
 
-/// What the vertices of a terrain's meshes have beside positions, normals and materials.
+/// The attributes of a terrain's vertices in addition to positions, normals and materials.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct VertexExtras {
     /// The depth in the ground.
@@ -48,7 +48,7 @@ pub(crate) struct VertexExtras {
 }
 
 impl VertexExtras {
-    /// Those of a terrain with these components.
+    /// The extras of a terrain with these components.
     pub(crate) fn of(colors: Option<&MaterialColors>, is_slim: bool) -> Self {
         if is_slim {
             return Self::default();
@@ -122,7 +122,7 @@ impl MeshBuilder {
 /// The attributes of a mesh while it is built.
 struct Arrays<'a> {
     mesh_builder: &'a MeshBuilder,
-    /// How the pristine surface is asked for.
+    /// The query of the pristine surface.
     height: fn(&Ground, Column) -> i32,
     positions: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,

@@ -81,7 +81,7 @@ pub struct Redo {
 pub struct HistoryMoved {
     /// The terrain; `None` if there is none at all.
     pub terrain: Option<Entity>,
-    /// What was undone or redone, and what it changed; bounds are in voxels of the terrain.
+    /// The undone or redone step and its changes; bounds are in voxels of the terrain.
     pub receipt: HistoryReceipt,
 }
 
@@ -153,9 +153,9 @@ impl LoosePieceFound {
 /// material. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look nor a
 /// `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` propagates becomes ready too, and is never drawn.
 ///
-/// The event comes again whenever a terrain has loaded anew, because another terrain took its place, or because the game
-/// itself changed more of it than a frame [swaps](super::BurrowSettings::swaps_per_frame). An observer that spawns something
-/// should check whether it is there already.
+/// The event is triggered again whenever a terrain has been loaded again, because another terrain replaced it, or
+/// because the game changed more of it through the model than a frame [swaps](super::BurrowSettings::swaps_per_frame).
+/// An observer that spawns something should check whether it is there already.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TerrainReady {
     /// The terrain's entity.

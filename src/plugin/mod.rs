@@ -126,10 +126,10 @@ impl PluginGroup for BurrowPlugins {
     }
 }
 
-/// What the plugin does each frame in `Update`, in this order.
+/// The plugin's system sets in `Update`, in this order.
 ///
 /// A game may run them in some states only. Nothing is lost meanwhile: brushes, undos and redos are kept and answered
-/// afterwards, and what was put on a terrain, changed or removed is caught up with. Despawned terrains answer at once.
+/// afterwards, and changes of a terrain's components take effect then. Despawned terrains answer at once.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -162,7 +162,7 @@ pub enum BurrowSystems {
     Propagate,
 }
 
-/// What is done in [`Update`] before [`BurrowSystems::Load`], in every frame.
+/// Systems in [`Update`] before [`BurrowSystems::Load`], which run in every frame.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(not(all(feature = "store", feature = "avian")), allow(dead_code, reason = "one for each feature"))]
 pub(crate) enum BeforeLoad {

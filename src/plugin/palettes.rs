@@ -45,7 +45,7 @@ fn weighted(mix: MaterialMix) -> impl Iterator<Item = (u8, u8)> {
     mix.ids.into_iter().zip(mix.weights).filter(|&(_, weight)| weight > 0)
 }
 
-/// The same mix with its weights in the order of a list. Those of materials that the list lacks go to the heaviest one.
+/// The mix with its weights in the order of a list. Those of materials that the list lacks go to the heaviest one.
 fn in_order(mix: MaterialMix, list: [u8; 4]) -> MaterialMix {
     let (mut weights, mut rest) = ([0u8; 4], 0u8);
     for (id, weight) in weighted(mix) {
@@ -88,7 +88,7 @@ impl Palettes {
         self.mixes.push(mix);
     }
 
-    /// Has all corners of each triangle list the same materials.
+    /// Makes all corners of each triangle list the same materials.
     pub fn arrange(mut self, indices: &Indices) -> Arranged {
         let (copies, indices) = if self.all.len() <= 4 {
             let list = self.all.list();
@@ -181,7 +181,7 @@ mod tests {
         MaterialMix { ids: [first, second, 0, 0], weights: [weight, 255 - weight, 0, 0] }
     }
 
-    /// What a mix says, whatever the order.
+    /// The weights of a mix, independent of the order.
     fn said(mix: MaterialMix) -> Vec<(u8, u8)> {
         let mut said: Vec<_> = weighted(mix).collect();
         said.sort_unstable();

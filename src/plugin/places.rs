@@ -1,4 +1,4 @@
-//! Where entities are in this frame, before Bevy propagates transforms at its end.
+//! Global transforms of entities in this frame, before Bevy propagates transforms at its end.
 //!
 //! A place is computed from the `Transform`s of an entity and its ancestors, as Bevy will do. Plugins for floating origins keep
 //! places in another way: the root of a `big_space` has no `Transform`, and its children are in cells that a `Transform` knows
@@ -13,7 +13,7 @@ use bevy::transform::helper::ComputeGlobalTransformError;
 use super::reports::{Report, Reports};
 use crate::terrain::Terrain;
 
-/// What the plugin knows of a terrain's place.
+/// The plugin's state for a terrain's position.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TerrainPlace {
     /// The global transform that the plugin wrote last.
@@ -62,7 +62,7 @@ impl LocalPlaces<'_, '_> {
     }
 }
 
-/// Where entities are in this frame.
+/// The positions of entities in this frame.
 #[derive(SystemParam)]
 pub(crate) struct Places<'w, 's> {
     locals: LocalPlaces<'w, 's>,
@@ -127,7 +127,7 @@ pub(super) fn find_external_places(
 ) {
     for (entity, global, mut place) in &mut terrains {
         let is_elsewhere = |now: GlobalTransform| {
-            // A place that is no place is nobody's.
+            // An invalid position is not maintained by anything.
             global.affine().is_finite()
                 && !is_same_place(&now, global)
                 && !is_same_place(&place.written, global)

@@ -106,7 +106,7 @@ impl SurfaceProcessors {
         self.processors.push(Arc::new(processor));
     }
 
-    /// Are there no processors?
+    /// Whether there are no processors.
     pub fn is_empty(&self) -> bool {
         self.processors.is_empty()
     }
@@ -140,7 +140,7 @@ pub(super) struct BuiltSurface {
     pub is_drawn: bool,
 }
 
-/// What a node is drawn with from now on.
+/// The new mesh of a node.
 pub(super) struct BuiltNode {
     pub node: Node,
     /// Its own mesh; `None` if it is drawn by its tile and chunks, or not at all.
@@ -172,7 +172,7 @@ pub(super) fn node_origin(grid: ChunkGrid, node: Node) -> IVec3 {
     IVec3::new(x * grid.size(), 0, z * grid.size())
 }
 
-/// What the app says about surfaces: whether there are meshes, who reads them, and what else is built.
+/// The app's use of surfaces: whether there are meshes, where they are kept, and which other data is built.
 #[derive(SystemParam)]
 pub(super) struct BuildSettings<'w> {
     assets: Option<Res<'w, Assets<Mesh>>>,
@@ -220,7 +220,7 @@ impl SurfaceBuilder {
         }
     }
 
-    /// Is there nothing to build?
+    /// Whether there is nothing to build.
     pub fn is_idle(&self) -> bool {
         self.mesh_builder.is_none() && self.processors.is_empty()
     }

@@ -4,8 +4,8 @@
 //! Bevy's `HierarchyPropagatePlugin` does not fit: games would have to wrap each component in a `Propagate`, and a piece that
 //! is spawned with its own component would lose it.
 //!
-//! What was propagated is kept as [`Source`]s on the terrain and [`Inherited`] on the parts. So nothing is missed while a game
-//! does not run these systems.
+//! Propagated values are recorded as [`Source`]s on the terrain and [`Inherited`] on the parts, so nothing is missed
+//! while a game does not run these systems.
 
 use std::marker::PhantomData;
 
@@ -51,7 +51,7 @@ impl<C: Component + Clone> Plugin for TerrainPropagatePlugin<C> {
 /// The steps of [`BurrowSystems::Propagate`], in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum PropagateSteps {
-    /// Notes which materials terrains have, and chooses one of several.
+    /// Records the materials of terrains, and chooses one of several.
     Choose,
     /// Propagates components.
     Propagate,

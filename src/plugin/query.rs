@@ -44,7 +44,7 @@ pub struct TerrainHit {
     pub position: Vec3,
     /// Unit normal of the drawn triangle, towards the air.
     pub normal: Vec3,
-    /// What the ground is made of there.
+    /// The material of the ground there.
     pub material: MaterialId,
     /// Did the ray come from inside the ground?
     pub from_inside: bool,
@@ -114,8 +114,8 @@ impl Terrains<'_, '_> {
         Some(space.normal(normal))
     }
 
-    /// What the ground is made of at a place on or in it; `None` if there is no terrain. Where terrains overlap, the one
-    /// whose surface is nearest along its y counts.
+    /// The material of the ground at a position on or in it; `None` if there is no terrain. Where terrains overlap, the
+    /// one whose surface is nearest along its y counts.
     pub fn material(&self, place: Vec3) -> Option<MaterialId> {
         let (terrain, space) = self.nearest(place)?;
         let local = space.inverse.transform_point3(place.as_dvec3());
@@ -140,7 +140,7 @@ impl Terrains<'_, '_> {
         nearest.map(|(_, _, terrain, space)| (terrain, space))
     }
 
-    /// Is the place inside the ground?
+    /// Whether the position is inside the ground.
     pub fn is_solid(&self, place: Vec3) -> bool {
         self.terrains.iter().any(|(_, terrain, at, _)| {
             let local = Space::of(at).map(|space| space.inverse.transform_point3(place.as_dvec3()));

@@ -1,4 +1,4 @@
-//! Builds everything that is drawn once more.
+//! Rebuilds all meshes on request.
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
@@ -7,9 +7,9 @@ use super::entities::TerrainEntities;
 use super::load::Loading;
 use crate::terrain::Terrain;
 
-/// Builds all meshes of terrains anew: trigger it after the graphics device was lost, as meshes are kept in the render world
-/// only, or after a change of [`BurrowSettings::mesh_usages`](super::BurrowSettings::mesh_usages) or of
-/// [`MaterialColors`](super::MaterialColors). Edits go on, what is drawn stays until the new meshes are there, and
+/// Rebuilds all meshes of terrains: trigger it after the graphics device was lost, as meshes are kept in the render
+/// world only, or after a change of [`BurrowSettings::mesh_usages`](super::BurrowSettings::mesh_usages) or of
+/// [`MaterialColors`](super::MaterialColors). Edits continue, old meshes stay until the new ones are there, and
 /// [`TerrainReady`](super::TerrainReady) follows.
 ///
 /// ```
@@ -25,7 +25,7 @@ pub struct Redraw {
     pub terrain: Option<Entity>,
 }
 
-/// Has terrains loaded anew.
+/// Makes terrains load again.
 pub(super) fn redraw(
     asked: On<Redraw>,
     mut commands: Commands,

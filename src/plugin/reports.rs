@@ -1,4 +1,4 @@
-//! What was logged of each terrain, so that each message names its terrain and comes once.
+//! Logs each problem of a terrain once, with the terrain's name.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -35,16 +35,16 @@ pub(crate) enum Report {
     BrushInvalid,
     /// The first brushes reach no terrain.
     BrushBeside,
-    /// It is so far from the origin that numbers are coarse.
+    /// It is too far from the origin, where numbers are coarse.
     Far,
-    /// It has levels of detail, and nobody looks.
+    /// It has levels of detail, and no camera looks at it.
     NobodyLooks,
     /// It has a material with textures, and no texture coordinates.
     #[cfg(feature = "render")]
     Textures,
 }
 
-/// What was logged. It is locked and not borrowed mutably, so that systems which log need no order.
+/// The logged problems. It is locked and not borrowed mutably, so that logging systems need no order.
 #[derive(Resource, Default)]
 pub(crate) struct Reported(Mutex<HashSet<(Entity, Report)>>);
 
@@ -65,7 +65,7 @@ impl Reports<'_> {
     }
 }
 
-/// Forgets what was logged of a terrain that is gone.
+/// Forgets the logs of a terrain that is gone.
 pub(super) fn forget_reports(gone: On<Remove, Terrain>, reported: Res<Reported>) {
     reported.lock().retain(|(entity, _)| *entity != gone.entity);
 }

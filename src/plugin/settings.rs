@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use crate::backend::{Backend, Engine};
 use crate::terrain::LooseSettings;
 
-/// What terrains without an engine of their own run their transactions on. [`Backend::Auto`] unless the game inserts
+/// The engine of terrains without their own engine. [`Backend::Auto`] unless the game inserts
 /// another one, best before the plugins; [`Engine::state`] and [`Engine::figures`] show what it does.
 ///
 /// ```

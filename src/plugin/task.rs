@@ -1,4 +1,4 @@
-//! The task that a terrain waits for: it runs a transaction, and builds the surfaces that the next commit shows.
+//! The background task of a terrain: it runs a transaction, and builds the surfaces that the next commit shows.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use super::threads::{ThreadTask, Threads};
 use crate::backend::Engine;
 use crate::terrain::{Commit, Drawn, SurfaceDraft, Terrain, Transaction, Unseen};
 
-/// The task that a terrain waits for.
+/// The running task of a terrain.
 #[derive(Component)]
 pub(super) struct InFlight {
     /// Counts tasks over all terrains.
@@ -45,7 +45,7 @@ impl TaskOutput {
     }
 }
 
-/// What changed the ground.
+/// The source of a change of the ground.
 pub(super) enum Change {
     /// A transaction, not committed yet.
     Transaction(Box<Commit>),
@@ -107,7 +107,7 @@ impl InFlight {
         })
     }
 
-    /// Is the task done?
+    /// Whether the task is done.
     pub fn is_done(&mut self) -> bool {
         if self.done.is_none() {
             self.done = self.task.check().map(|done| done.map_err(|_| TaskPanicked));

@@ -17,8 +17,8 @@ use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// How many threads each of the plugin's pools has, besides those of Bevy. Insert it before the plugins, or change it at any
-/// time: work under way ends on the threads that it began on.
+/// The number of threads of each of the plugin's pools, in addition to Bevy's. Insert it before the plugins, or change
+/// it at any time: work under way ends on the threads that it began on.
 ///
 /// The pools belong to the process. If several apps run in one, the settings that changed last hold for all of them.
 ///
@@ -40,7 +40,7 @@ pub struct ThreadSettings {
 }
 
 impl ThreadSettings {
-    /// The default on a machine with so many cores.
+    /// The default on a machine with this number of cores.
     ///
     /// Transactions use all cores, as their work is short. Background work leaves a core to the frame, since it takes
     /// seconds. Colliders need few: the batches are small.
@@ -96,7 +96,7 @@ impl Pool {
         Self { name, state: RwLock::new(PoolState { count: None, threads: None }) }
     }
 
-    /// Sets how many threads it has. What was given to it before is still done, by the threads of before.
+    /// Sets the number of threads. Earlier work is still done, by the earlier threads.
     fn resize(&self, count: usize) {
         let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
         if state.count != Some(count) {
@@ -122,7 +122,7 @@ impl Pool {
             .stack_size(STACK)
             .num_threads(count)
             .thread_name(move |number| format!("{name} {number}"))
-            // Of work that nobody waits for, such as freeing memory. Otherwise it would end the process.
+            // A panic in work without a waiting caller, such as freeing memory, would otherwise end the process.
             .panic_handler(|panic| error!("background work panicked: {}", panic_message(panic.as_ref())));
         builder.build().ok().map(Arc::new)
     }
@@ -167,7 +167,7 @@ pub(crate) fn free_later(waste: impl Send + 'static) {
     Threads::Background.spawn(move || drop(waste));
 }
 
-/// What a panic said.
+/// The message of a panic.
 pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic without a message")
@@ -228,7 +228,7 @@ mod tests {
         }
     }
 
-    /// Keeps the threads of the background busy until what it returns is dropped.
+    /// Keeps the background threads busy until the returned value is dropped.
     fn block_background() -> impl Sized {
         let many = Threads::Background.pool().map_or(0, |pool| pool.current_num_threads());
         let (mut gate, (begun, begins)) = (Vec::new(), channel());

@@ -34,7 +34,7 @@ impl Times {
         self.latest.len()
     }
 
-    /// Was nothing measured yet?
+    /// Whether nothing was measured yet.
     pub fn is_empty(&self) -> bool {
         self.latest.is_empty()
     }

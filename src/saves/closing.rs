@@ -1,4 +1,4 @@
-//! Closing worlds: what is left is saved on the store's own thread, and nobody waits for it but an app that ends.
+//! Closing worlds: remaining data is saved on the store's thread, and only an exiting app waits for it.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -66,7 +66,7 @@ pub(super) fn close(
     }
 }
 
-/// A world is closed with its component. A terrain that was put in the place of its own in this frame is not written into it.
+/// Closes a world when its component is removed. A terrain that replaced its own in this frame is not written into it.
 pub(super) fn close_with_component(
     gone: On<Discard, SavedWorld>,
     mut worlds: Query<(&mut WorldStore, &mut Terrain), Allow<Disabled>>,
@@ -78,7 +78,7 @@ pub(super) fn close_with_component(
     commands.entity(gone.entity).try_remove::<WorldStore>();
 }
 
-/// Hands over the last commits of a terrain that another one replaces, or that goes.
+/// Sends the last commits of a terrain that is replaced or removed.
 pub(super) fn follow_discarded(
     gone: On<Discard, Terrain>,
     mut worlds: Query<(&mut WorldStore, &mut Terrain), Allow<Disabled>>,
@@ -107,7 +107,7 @@ pub(crate) fn detach(entity: &mut EntityWorldMut, because: ClosedBecause) {
     }
 }
 
-/// Tells of worlds that are closed.
+/// Reports worlds that are closed.
 pub(super) fn tell_closed(
     mut closing: ResMut<ClosingWorlds>,
     mut closed: MessageWriter<WorldClosed>,

@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use super::messages::ClosedBecause;
 use crate::store::{BaseChanged, SavePoint, Store, StoreOptions};
 
-/// How long an app that ends waits for the disk.
+/// The longest time that an exiting app waits for the disk.
 pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
@@ -17,7 +17,7 @@ pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 /// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed) says so. Changing it
 /// in its place is like inserting another one.
 ///
-/// | inserted beside it | what happens |
+/// | inserted on the same entity | what happens |
 /// | --- | --- |
 /// | a `SavedWorld` with another path | the first world is closed, and the second takes the terrain's place, or is made of it |
 /// | a [`Terrain`](crate::terrain::Terrain) over another ground, or of another size | that is another level: the world is closed, and this component removed |
@@ -29,9 +29,9 @@ pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 pub struct SavedWorld {
     /// The folder, for this world alone. It is made if it is missing, with those around it.
     pub path: PathBuf,
-    /// What may be lost at most if the machine loses power: commits of this long, and a little more for the disk.
+    /// The longest time whose commits may be lost if the machine loses power, plus a little for the disk.
     pub loss_window: Duration,
-    /// What to do with edits where the ground or the [level](super::StartLevel) is another one than they were made on.
+    /// How edits are kept if the ground or the [level](super::StartLevel) differs from the one that they were made on.
     #[reflect(ignore)]
     pub base_changed: BaseChanged,
 }
@@ -58,7 +58,7 @@ pub struct WorldStore {
     pub(super) saved: SavedWorld,
     /// The last point that was told as durable.
     pub(super) told: Option<SavePoint>,
-    /// What [`SaveNow`](super::SaveNow) waits for, and whether it was sent again since.
+    /// The point that [`SaveNow`](super::SaveNow) waits for; `asked_again` if another was sent since.
     pub(super) asked: Option<SavePoint>,
     pub(super) asked_again: bool,
     /// Why it is closed, if it is.
@@ -85,9 +85,9 @@ impl WorldStore {
         self.store.as_ref().map_or(0, Store::durable)
     }
 
-    /// Keeps data of the game beside the world: an inventory, the time of day. It is saved in one piece with the commits of this
-    /// frame, so that after a crash nothing that was dug is missing in one and there in the other. What is put again unchanged costs
-    /// nothing, and of what changes in each frame the last value in each [loss window](SavedWorld::loss_window) is saved.
+    /// Stores data of the game with the world: an inventory, the time of day. It is saved together with the commits of
+    /// this frame, so that after a crash data and ground match. An unchanged value is not written again; of a value
+    /// that changes in each frame, the last one in each [loss window](SavedWorld::loss_window) is saved.
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         if let Some(store) = &mut self.store {
             store.put(key, bytes);

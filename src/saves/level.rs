@@ -1,4 +1,4 @@
-//! Levels as assets: what a designer sculpted is loaded with the ground's other assets.
+//! Sculpted levels as Bevy assets.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,8 +20,8 @@ use crate::plugin::{ThreadTask, Threads, free_later};
 use crate::store::{FormatError, Level, LevelFiles, RestoreLevelError, pack_level, read_level, unpack_level};
 use crate::terrain::{Terrain, Version};
 
-/// A level, packed in one file with the extension `burrow_level`. What it holds is checked when it is loaded; that it fits its ground,
-/// when a terrain is made of it.
+/// A level, packed in one file with the extension `burrow_level`. Its content is checked when it is loaded; that it
+/// fits its ground, when a terrain is made of it.
 #[derive(Asset, TypePath, Clone, Debug, Default, PartialEq)]
 pub struct BurrowLevel(pub LevelFiles);
 
@@ -47,7 +47,7 @@ impl BurrowLevel {
     }
 }
 
-/// Why a level can't be loaded or written.
+/// The reason why a level can't be loaded or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LevelError {
@@ -84,7 +84,7 @@ impl AssetLoader for LevelLoader {
     }
 }
 
-/// Writes packed levels, say in an asset processor.
+/// Writes packed levels, for example in an asset processor.
 #[derive(Default, TypePath)]
 pub struct LevelSaver;
 
@@ -109,19 +109,19 @@ impl AssetSaver for LevelSaver {
 /// The terrain of this entity begins as a level. Insert it with a terrain without edits, which gives the ground; the terrain is
 /// [`Held`](crate::plugin::Held) until the level is loaded, and begins without it where it can't be, which is logged as an error.
 ///
-/// With a [`SavedWorld`](super::SavedWorld) beside it, a world that was saved goes on, and only a new one begins as the level. That world
-/// saves only what differs from the level, and needs a level to go on: where it is another one, say a new version of it,
-/// [`SavedWorld::base_changed`](super::SavedWorld::base_changed) says what happens. Inserted beside a world that is open already, it does
-/// nothing: what was dug there stays.
+/// With a [`SavedWorld`](super::SavedWorld) on the same entity, an existing world is continued, and only a new one
+/// starts from the level. That world saves only its differences from the level, and needs a level to be opened: if that
+/// is another one, for example a new version, [`SavedWorld::base_changed`](super::SavedWorld::base_changed) decides
+/// what happens. If a world is open already, inserting it has no effect.
 #[derive(Component, Clone, Debug, PartialEq)]
 #[component(on_insert = hold)]
 pub struct StartLevel(pub Handle<BurrowLevel>);
 
-/// A level that a terrain is made of.
+/// A level that is being made into a terrain.
 #[derive(Component)]
 pub(super) struct MakingLevel(ThreadTask<Result<Terrain, RestoreLevelError>>, Version);
 
-/// A level that nobody has begun to make a terrain of.
+/// A level that waits to be made into a terrain.
 #[derive(Component)]
 pub(super) struct Waiting {
     since: Instant,
@@ -134,7 +134,7 @@ impl Waiting {
     }
 }
 
-/// How long a level is waited for before that is told.
+/// How long a level is waited for before that is logged.
 const TOLD: Duration = Duration::from_secs(10);
 
 /// The levels that are loaded, and those that can't be.
@@ -163,7 +163,7 @@ impl FindLevel<'_> {
         }
     }
 
-    /// What the game calls a level.
+    /// The game's name for a level.
     pub fn path_of(&self, start: Option<&StartLevel>) -> String {
         start.and_then(|start| start.0.path()).map(ToString::to_string).unwrap_or_default()
     }
@@ -179,7 +179,7 @@ pub(super) fn hold(mut world: DeferredWorld, context: HookContext) {
             return;
         }
         if entity.contains::<WorldStore>() {
-            warn!("a level for {} changes nothing: its saved world goes on", entity.id());
+            warn!("a level for {} has no effect: its saved world continues", entity.id());
             return;
         }
         entity.remove::<MakingLevel>().insert(Waiting::new());
@@ -193,7 +193,7 @@ pub(super) fn give_up(gone: On<Remove, StartLevel>, mut commands: Commands) {
     release(&mut commands, gone.entity);
 }
 
-/// Makes a terrain anew where another one takes the place of the one that a level was to be.
+/// Starts again to make a terrain from the level if another terrain replaces the first one.
 pub(super) fn make_anew(
     new: On<Insert, Terrain>,
     making: Query<(), (With<MakingLevel>, Allow<Disabled>)>,

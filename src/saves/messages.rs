@@ -8,15 +8,17 @@ use bevy::prelude::*;
 
 use crate::store::{StoreError, StoreTrouble};
 
-/// Saves at once, and makes a checkpoint: say when a level ends, or before a menu closes the game. Without it, everything is
-/// saved too, within the loss window. A [`WorldSaved`] follows once all that was committed and put by then is durable.
+/// Saves at once, and makes a checkpoint: for example when a level ends, or before a menu closes the game. Without it,
+/// everything is saved too, within the loss window. A [`WorldSaved`] follows once everything that was committed or put
+/// before is durable.
 #[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SaveNow {
     /// The terrain's entity; `None` for every saved world.
     pub terrain: Option<Entity>,
 }
 
-/// A saved world was read, or created; or why it could not be. Then the terrain stays as it is, and nothing of it is saved.
+/// A saved world was read or created; or the reason why it could not be: then the terrain stays as it is, and is not
+/// saved.
 #[derive(Message, Clone, Debug)]
 pub struct WorldOpened {
     /// The terrain's entity.
@@ -25,8 +27,8 @@ pub struct WorldOpened {
     pub outcome: Result<u64, Arc<StoreError>>,
 }
 
-/// The terrain would be there after a crash, up to a revision. Comes whenever more has become durable, also while each frame commits
-/// more, and where another terrain has taken the place of the one that was saved before.
+/// The terrain would survive a crash, up to a revision. It is sent whenever a later revision has become durable, also
+/// while each frame commits more, and after another terrain has replaced the saved one.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WorldSaved {
     /// The terrain's entity.
@@ -35,13 +37,13 @@ pub struct WorldSaved {
     pub revision: u64,
 }
 
-/// Something that the player or operator should be told of a saved world: the disk is full, a region was damaged. Play goes on,
-/// and saving is tried again.
+/// A problem with a saved world to show to the player or operator: the disk is full, a region was damaged. Play
+/// continues, and saving is retried.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct StoreTroubleFound {
     /// The terrain's entity.
     pub terrain: Entity,
-    /// What it is.
+    /// The trouble.
     pub trouble: StoreTrouble,
 }
 
@@ -54,11 +56,11 @@ pub struct WorldClosed {
     pub path: PathBuf,
     /// Why it was closed.
     pub because: ClosedBecause,
-    /// The revision that was saved last; or why not everything was.
+    /// The last saved revision; or the reason why not everything was saved.
     pub outcome: Result<u64, Arc<StoreError>>,
 }
 
-/// Why a saved world was closed.
+/// The reason why a saved world was closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ClosedBecause {

@@ -1,9 +1,9 @@
-//! Saved worlds in Bevy: a component names the folder, everything else happens by itself.
+//! Saved worlds in Bevy: a component names the folder, everything else is automatic.
 //!
-//! Put a [`SavedWorld`] beside a [`Terrain`](crate::terrain::Terrain). The world in its folder, if there is one, takes the place
-//! of that terrain; else it is created. From then on each commit is handed to the store's own thread, and is durable after the
-//! [loss window](SavedWorld::loss_window) at the latest. Until the world is read, the terrain is [`Held`](crate::plugin::Held):
-//! brushes that are sent meanwhile wait, and apply to the world that was read.
+//! Add a [`SavedWorld`] to the entity of a [`Terrain`](crate::terrain::Terrain). The world in its folder, if there is
+//! one, replaces that terrain; otherwise it is created. Then each commit is sent to the store's thread, and is durable
+//! after the [loss window](SavedWorld::loss_window) at the latest. Until the world is read, the terrain is
+//! [`Held`](crate::plugin::Held): brushes that are sent meanwhile wait, and apply to the world that was read.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;

@@ -1,4 +1,4 @@
-//! Reads a world from its folder while its terrain is held, and puts it in the terrain's place.
+//! Reads a world from its folder while its terrain is held, and then replaces the terrain by it.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,9 +19,9 @@ use crate::plugin::{Held, ThreadTask, Threads, free_later};
 use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble, read_level};
 use crate::terrain::{Terrain, TerrainSettings, Version, WorldParts};
 
-/// How long a world that is open elsewhere is waited for: longer than a server that ends takes to close it.
+/// How long to wait for a world that is open elsewhere: longer than an exiting server takes to close it.
 const LOCK_WAIT: Duration = Duration::from_secs(15);
-/// How often it is tried to open it, and when it is told that somebody has to close it.
+/// The interval of attempts to open it, and the time after which a trouble is reported.
 const LOCK_TRY: Duration = Duration::from_millis(50);
 const LOCK_TOLD: Duration = Duration::from_secs(2);
 
@@ -78,7 +78,7 @@ pub struct OpeningWorld {
     reader: Arc<WorldReader>,
     /// `None` between two tries.
     task: Option<ThreadTask<Result<Found, StoreError>>>,
-    /// The terrain that the world takes the place of.
+    /// The version of the terrain that the world replaces.
     version: Version,
     since: Instant,
     tried: Instant,
@@ -86,7 +86,7 @@ pub struct OpeningWorld {
 }
 
 impl OpeningWorld {
-    /// How much of it is read, 0 to 1, for a bar on the screen.
+    /// The progress of reading, 0 to 1, for a progress bar.
     pub fn progress(&self) -> f32 {
         self.reader.progress.share()
     }
@@ -105,7 +105,8 @@ impl OpeningWorld {
         self.task = Some(ThreadTask::start(Threads::Background, move || reader.try_read()));
     }
 
-    /// The world once it is read, or why it can't be. One that is open elsewhere is tried again, without a thread that waits.
+    /// The world once it is read, or the error. A world that is open elsewhere is tried again, without a waiting
+    /// thread.
     fn poll(&mut self) -> Option<Result<Found, StoreError>> {
         let Some(task) = &mut self.task else {
             if self.tried.elapsed() >= LOCK_TRY {
@@ -147,9 +148,9 @@ pub(crate) struct ReadWorld {
     pub troubles: Vec<StoreTrouble>,
 }
 
-/// What came of reading.
+/// The result of reading.
 enum Found {
-    /// The world that was there.
+    /// An existing world.
     Old(ReadWorld),
     /// There was none, and it was made of the terrain.
     New(ReadWorld),
@@ -185,7 +186,7 @@ impl WorldReader {
         Self { saved, folder, level, ground, id, parts, progress: Progress::default() }
     }
 
-    /// Reads the world, or makes one. Waits for whoever has it open.
+    /// Reads the world, or creates it. Waits while another process has it open.
     pub fn read(self) -> Result<ReadWorld, StoreError> {
         let start = Instant::now();
         loop {
@@ -292,7 +293,7 @@ pub(super) fn release(commands: &mut Commands, entity: Entity) {
     });
 }
 
-/// Starts to read anew where another terrain takes the place of the one that a world was read for.
+/// Starts to read again if another terrain replaces the one that a world was read for.
 pub(super) fn read_anew(
     new: On<Insert, Terrain>,
     opening: Query<(), (With<OpeningWorld>, Allow<Disabled>)>,
@@ -402,7 +403,7 @@ pub(super) fn warn_of_no_terrain(
     }
 }
 
-/// Puts worlds that were read in place of their terrains.
+/// Replaces terrains by the worlds that were read.
 pub(super) fn finish_opening(
     mut commands: Commands,
     mut worlds: Query<(Entity, &mut Terrain, &mut OpeningWorld), (With<SavedWorld>, Allow<Disabled>)>,
@@ -432,7 +433,7 @@ pub(super) fn finish_opening(
         commands.entity(entity).try_remove::<OpeningWorld>();
         let outcome = outcome.map(|found| {
             let store = match found {
-                // The terrain goes on as it is, and so does its history.
+                // The terrain and its history stay as they are.
                 Found::New(ReadWorld { mut store, terrain: copy, .. }) => {
                     free_later(copy);
                     store.adopt(&terrain);

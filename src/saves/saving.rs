@@ -1,4 +1,4 @@
-//! Hands commits to stores, and tells what they say.
+//! Sends commits to stores, and reports their results.
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::Allow;
@@ -10,14 +10,14 @@ use super::components::{EXIT_WAIT, WorldStore};
 use super::messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldSaved};
 use crate::terrain::Terrain;
 
-/// Hands over what was committed to a terrain, if the store follows it: one that was put in its place is left alone.
+/// Sends new commits of a terrain to the store, if the store follows it. A terrain that replaced it is ignored.
 pub(super) fn follow_same(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     if world.store.as_ref().is_some_and(|store| store.follows(terrain)) {
         follow(terrain, world);
     }
 }
 
-/// Hands over what was committed to a terrain, or all of it where it is another one.
+/// Sends new commits of a terrain to the store, or the whole terrain if it is another one.
 fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     let Some(store) = &mut world.store else { return };
     // For the game this is no change of the terrain.
@@ -30,7 +30,8 @@ fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     }
 }
 
-/// Hands over what was committed. A terrain that is no state of the saved world is not written into it: the world is closed.
+/// Sends new commits to stores. A terrain that is not a state of the saved world is not written into it: the world is
+/// closed.
 pub(super) fn save_commits(
     mut commands: Commands,
     mut worlds: Query<(Entity, &mut Terrain, &mut WorldStore), Allow<Disabled>>,
@@ -74,7 +75,7 @@ pub(super) fn save_now(
             let world = &mut *world;
             let Some(store) = &mut world.store else { continue };
             world.asked_again = false;
-            // If its thread is gone, that is told as a trouble.
+            // If its thread is gone, that is reported as a trouble.
             if store.request_checkpoint().is_ok() {
                 world.asked = Some(store.point());
             }
@@ -82,7 +83,7 @@ pub(super) fn save_now(
     }
 }
 
-/// Tells what became durable, and what went wrong.
+/// Reports what has become durable, and troubles.
 pub(super) fn tell(
     mut worlds: Query<(Entity, &mut WorldStore), Allow<Disabled>>,
     mut saved: MessageWriter<WorldSaved>,

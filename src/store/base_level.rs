@@ -1,4 +1,4 @@
-//! A level below a world: the world begins as the level, and saves only what differs from it.
+//! The level below a world: the world starts from the level, and saves only its differences.
 
 use std::fmt;
 use std::sync::Arc;
@@ -23,10 +23,10 @@ pub struct BaseLevel {
     level: Arc<Level>,
 }
 
-/// Which level a world was begun on.
+/// The identity of the level that a world is based on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LevelName {
-    /// What the game calls it: a path, say. It is only told, never compared.
+    /// The game's name for it, such as a path. It is only used in messages, never compared.
     pub label: String,
     /// Hash of the level's bricks and fields.
     pub hash: u64,
@@ -46,7 +46,7 @@ impl PartialEq for BaseLevel {
 }
 
 impl BaseLevel {
-    /// A level, and what the game calls it. Encodes all of the level for its hash.
+    /// A level with the game's name for it. Encodes the whole level for its hash.
     pub fn new(level: impl Into<Arc<Level>>, label: impl Into<String>) -> Self {
         let (level, mut hash): (Arc<Level>, Xxh3) = (level.into(), Xxh3::new());
         hash.update(&level.settings.chunk_size.to_le_bytes());
@@ -70,7 +70,7 @@ impl BaseLevel {
         &self.level
     }
 
-    /// The level for a world that was begun on one, or on none.
+    /// The level of a world, if it is based on one.
     pub(super) fn needed<'a>(
         name: Option<&LevelName>,
         given: Option<&'a Self>,
@@ -82,7 +82,7 @@ impl BaseLevel {
         }
     }
 
-    /// Is it the level that a world was begun on?
+    /// Checks that this is the level that a world is based on.
     pub(super) fn expect(level: Option<&Self>, name: Option<&LevelName>) -> Result<(), StoreError> {
         match (level, name) {
             (Some(level), Some(name)) if level.name.hash != name.hash => Err(StoreError::LevelChanged {
@@ -106,7 +106,7 @@ impl BaseLevel {
         }
     }
 
-    /// The level's bricks and fields on a ground, which may be another one than it was read on.
+    /// The level's bricks and fields on a ground, which may differ from the one it was read on.
     pub(super) fn parts(&self, ground: &Ground) -> WorldParts {
         let mut parts = WorldParts { rules: None, loose: None, ..self.level.parts() };
         for (pos, brick) in &mut parts.change.bricks {
@@ -120,12 +120,13 @@ impl BaseLevel {
         self.level.regions.keys().copied()
     }
 
-    /// Does the level hold anything in a region?
+    /// Whether the level holds anything in a region.
     pub(super) fn holds(&self, at: RegionPos) -> bool {
         self.level.regions.contains_key(&at)
     }
 
-    /// What a region of a world with such chunks holds otherwise than the level; `None` stands for bricks that are pristine again.
+    /// The differences of a region from the level, for chunks of this size; `None` stands for bricks that are pristine
+    /// again.
     pub(super) fn difference(&self, at: RegionPos, now: &Region, chunk_size: u32) -> WorldChange {
         let nothing = SavedRegion::default();
         let below = self.level.regions.get(&at).unwrap_or(&nothing);

@@ -1,4 +1,4 @@
-//! Checkpoints: what a world is at one frame of the journal, but for its regions, which have records of their own.
+//! Checkpoints: the state of a world at one frame of the journal, except for its regions, which have separate records.
 
 use std::collections::BTreeMap;
 

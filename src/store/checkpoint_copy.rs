@@ -1,4 +1,4 @@
-//! A copy of the last checkpoint in a file of its own, since both copies in the database may be in one sector.
+//! A copy of the last checkpoint in a separate file, because both copies in the database may be in one sector.
 
 use std::io;
 

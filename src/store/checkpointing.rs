@@ -1,4 +1,4 @@
-//! Making checkpoints: changed regions, in one transaction of the database, while commits go on.
+//! Making checkpoints: changed regions are written in one transaction of the database, while commits continue.
 
 use std::sync::mpsc::Receiver;
 use std::time::Instant;
@@ -23,7 +23,7 @@ use crate::terrain::SIMULATION;
 const SAVED: f32 = 0.97;
 
 impl Writer {
-    /// Makes a checkpoint; takes in what comes meanwhile.
+    /// Makes a checkpoint, and accepts messages meanwhile.
     pub(super) fn checkpoint(&mut self, messages: Option<&Receiver<Message>>) -> Result<(), StoreError> {
         if !self.state.has_gap {
             self.flush()?;
@@ -42,7 +42,7 @@ impl Writer {
         }
         let dirty = self.mirror.take_dirty();
         let positions: Vec<RegionPos> = dirty.iter().map(|(at, _)| *at).collect();
-        // What comes from now on is in frames again.
+        // Later commits are in frames again.
         let had_gap = std::mem::take(&mut self.state.has_gap);
         self.state.after_gap = had_gap;
         self.state.written = None;

@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use super::error::{StoreError, StoreTrouble};
 use super::shared::{SavePoint, Shared};
 
-/// How often a store that is being closed is looked at while somebody waits for it.
+/// The interval at which waiting for a closing store checks its state.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// The thread of a store. It ends once nobody can send it anything any more.
+/// The thread of a store. It ends once all senders are gone.
 #[derive(Debug)]
 pub(super) struct StoreThread(JoinHandle<()>);
 
@@ -35,21 +35,21 @@ impl StoreThread {
     }
 }
 
-/// What a panic says.
+/// The message of a panic.
 fn message_of(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
     text.unwrap_or("no reason is known").to_owned()
 }
 
-/// A [`Store`](super::Store) that is being [closed](super::Store::close). Its thread goes on if this is dropped, and the world is
-/// locked until it is done.
+/// A [`Store`](super::Store) that is being [closed](super::Store::close). If this is dropped, its thread still
+/// finishes, and the world stays locked until then.
 #[derive(Debug)]
 pub struct ClosingStore {
     shared: Arc<Shared>,
     thread: Option<StoreThread>,
     /// Up to where everything should be durable.
     point: SavePoint,
-    /// Whether everything was handed to the thread.
+    /// Whether everything was sent to the thread.
     is_given: bool,
 }
 
@@ -97,7 +97,7 @@ impl ClosingStore {
         }
     }
 
-    /// What happened since the last call that a player or an operator should be told of.
+    /// Troubles since the last call, to show to a player or an operator.
     pub fn take_troubles(&self) -> Vec<StoreTrouble> {
         self.shared.take_troubles()
     }

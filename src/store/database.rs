@@ -16,7 +16,7 @@ pub(super) const UNFINISHED: &str = "regions.new";
 
 const RECORDS: TableDefinition<&[u8], &[u8]> = TableDefinition::new("records");
 
-/// Bytes of pages that are kept in memory: each is read once, and written once.
+/// Bytes of the page cache, which is small because each page is read once and written once.
 const CACHE: usize = 8 << 20;
 
 /// The format of database files that is written. The number stands in both commit slots of the header.
@@ -28,7 +28,7 @@ const SLOTS: [usize; 2] = [64, 192];
 /// A record that takes the place of another, or its removal.
 pub(super) type Change = (Vec<u8>, Option<Vec<u8>>);
 
-/// What is wrong with a database.
+/// Why a database can't be used.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum DatabaseError {
     /// There is none.
@@ -55,7 +55,7 @@ impl DatabaseError {
     }
 }
 
-/// Does the error say that a file holds something else than it should?
+/// Whether the error means that the content of a file is invalid.
 fn is_about_content(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof)
 }

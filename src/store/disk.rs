@@ -1,4 +1,4 @@
-//! A disk in memory that loses power and fails as real ones do. Tests put it in the place of a folder.
+//! A simulated disk in memory that loses power and fails like real ones. Tests use it instead of a folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -10,15 +10,15 @@ use super::files::{Files, Lock, OpenFile, Opening, named};
 /// Bytes of a sector: a write is cut into these when power is lost.
 const SECTOR: u64 = 512;
 
-/// What a simulated disk refuses.
+/// A fault of a simulated disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum DiskFault {
     /// Nothing.
     #[default]
     None,
-    /// Whatever writes fails: there is no space left.
+    /// Writing fails: there is no space left.
     Full,
-    /// Whatever writes fails: the disk is read-only.
+    /// Writing fails: the disk is read-only.
     ReadOnly,
     /// Everything fails.
     Broken,
@@ -113,7 +113,7 @@ impl fmt::Debug for SimulatedDisk {
     }
 }
 
-/// A disk at one moment, from which it can go on after a loss of power.
+/// The state of a disk at one moment, from which it can restart after a loss of power.
 #[derive(Clone)]
 pub struct DiskImage(State);
 
@@ -124,13 +124,13 @@ impl fmt::Debug for DiskImage {
 }
 
 impl DiskImage {
-    /// Operations on the disk so far.
+    /// The number of operations on the disk.
     pub fn operations(&self) -> u64 {
         self.0.operations
     }
 
-    /// The disk after a loss of power. What was synced is there. Of what was not, each sector is there if `keep` says so; of
-    /// changes to folders there are the first ones, up to one for which it says no.
+    /// The disk after a loss of power. Synced data is there. An unsynced sector is there if `keep` returns `true`;
+    /// changes to folders are there up to the first one for which it returns `false`.
     pub fn lose_power(&self, mut keep: impl FnMut() -> bool) -> SimulatedDisk {
         let before = &self.0;
         let mut names = before.synced_names.clone();
@@ -177,7 +177,7 @@ impl DiskImage {
         SimulatedDisk { state: Arc::new(Mutex::new(state)), watch: Arc::default() }
     }
 
-    /// The disk after the process was killed: all that was written is there.
+    /// The disk after the process was killed: everything written is there.
     pub fn lose_process(&self) -> SimulatedDisk {
         let mut state = self.0.clone();
         state.locks.clear();
@@ -200,29 +200,30 @@ impl SimulatedDisk {
         Self::default()
     }
 
-    /// The disk as it is now.
+    /// The present state of the disk.
     pub fn image(&self) -> DiskImage {
         DiskImage(self.state().clone())
     }
 
-    /// Calls this before each operation with the disk as it is then; `None` ends that. It must not use this disk.
+    /// Sets a function that is called before each operation with the state of the disk; `None` removes it. It must not
+    /// use this disk.
     pub fn watch(&self, watch: Option<impl Fn(&DiskImage) + Send + Sync + 'static>) {
         let watch = watch.map(|watch| Arc::new(watch) as Watch);
         *self.watch.lock().unwrap_or_else(PoisonError::into_inner) = watch;
     }
 
-    /// What it refuses from now on. A fault that was to [begin later](Self::fail_at) does not come any more.
+    /// Sets the present fault, and cancels one that was to [begin later](Self::fail_at).
     pub fn set_fault(&self, fault: DiskFault) {
         let mut state = self.state();
         (state.fault, state.fault_at) = (fault, None);
     }
 
-    /// Lets a fault begin with a later operation, counted like [`operations`](Self::operations).
+    /// Makes a fault begin with a later operation, counted like [`operations`](Self::operations).
     pub fn fail_at(&self, operation: u64, fault: DiskFault) {
         self.state().fault_at = Some((operation, fault));
     }
 
-    /// Operations so far.
+    /// The number of operations.
     pub fn operations(&self) -> u64 {
         self.state().operations
     }
@@ -232,7 +233,8 @@ impl SimulatedDisk {
         self.state().names.keys().cloned().collect()
     }
 
-    /// Changes a file behind everybody's back, as damage would; does nothing where there is no such file.
+    /// Changes a file without going through the disk's interface, as damage would. Does nothing if there is no such
+    /// file.
     pub fn damage(&self, path: &str, change: impl FnOnce(&mut Vec<u8>)) {
         let mut state = self.state();
         if let Some(content) = state.names.get(path).copied().and_then(|file| state.files.get_mut(&file)) {

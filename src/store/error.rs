@@ -1,4 +1,4 @@
-//! What may be wrong with a stored world, in one message each.
+//! Errors and troubles of saved worlds, each with a message of one sentence.
 
 use std::{fmt, io};
 
@@ -38,14 +38,14 @@ pub enum StoreError {
         /// The greatest format that this version reads.
         known: u8,
     },
-    /// The ground has another size than that of the saved world, which can't go on there. Nothing was changed.
-    #[error("the saved world has a ground of {saved}, and the one given has {given}: {why}")]
+    /// The ground has another size than that of the saved world, which can't continue on it. Nothing was changed.
+    #[error("the saved world has a ground of {saved}, and the given ground has {given}: {why}")]
     GroundSize {
-        /// The size of the ground that the world was saved with; at least so much, if that is all that is known.
+        /// The size of the ground that the world was saved with; a lower bound if only that is known.
         saved: String,
         /// The size of the ground that is given.
         given: String,
-        /// Why it can't go on there, and what to do.
+        /// The reason why it can't continue on this ground, and what to do.
         why: &'static str,
     },
     /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
@@ -63,8 +63,8 @@ pub enum StoreError {
         /// What the game called the level.
         label: String,
     },
-    /// The world was begun on another level than the one that is given, or the level has changed since, and
-    /// [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds. Nothing is lost.
+    /// The world is based on another level than the given one, or the level has changed since, and
+    /// [`BaseChanged::Refuse`](super::BaseChanged::Refuse) is set. Nothing is lost.
     #[error(
         "the world was begun on the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}: give that \
          level, or allow `base_changed`, which moves the world"
@@ -72,9 +72,9 @@ pub enum StoreError {
     LevelChanged {
         /// What the game called the level.
         label: String,
-        /// The [hash](super::LevelName::hash) of the level of then.
+        /// The [hash](super::LevelName::hash) of the world's level.
         expected: u64,
-        /// That of the level that is given.
+        /// The hash of the given level.
         found: u64,
     },
     /// Nothing of it can be read, and there is no log from which to rebuild it.
@@ -91,15 +91,15 @@ pub enum StoreError {
     /// The files can't be read or written.
     #[error("{doing}: {error}")]
     Files {
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
-        /// What the system says.
+        /// The system's error.
         error: io::Error,
     },
-    /// A terrain can't be made of what was saved.
+    /// A terrain can't be made from the saved data.
     #[error("the saved world does not fit its ground or settings: {0}")]
     Restore(#[from] RestoreError),
-    /// A log that is replayed does not lead to the world that it says.
+    /// Replaying a log does not give the hashes that it contains.
     #[error("the log can't be replayed: {0}")]
     Replay(#[from] ReplayError),
     /// The log can't be replayed from the first commit on, as its beginning is gone. The world itself may be whole.
@@ -125,23 +125,21 @@ pub enum StoreError {
         given: WorldSize,
     },
     /// A server keeps the world of this terrain, and saves it.
-    #[error("the terrain is shared, so its server saves it: a world is saved or shared")]
+    #[error("the terrain is shared, so its server saves it: remove SharedTerrain to save it here")]
     Shared,
-    /// A terrain over another ground, or of another size, was put in the place of the one that the world was to be read for.
-    #[error(
-        "another level is in the place of the terrain that the world was read for, so it is not saved there"
-    )]
+    /// A terrain over another ground, or of another size, replaced the one that the world was being read for.
+    #[error("another level has replaced the terrain that the world was read for, so it is not saved there")]
     OtherTerrain,
     /// The store's thread is gone.
     #[error("the store's thread has ended: nothing is saved any more until the world is opened again")]
     Ended,
-    /// The disk does not answer, and what waits for it takes all the memory that it may. Nothing was taken.
-    #[error("too much waits to be saved, as the disk does not answer")]
+    /// The disk does not answer, and waiting data takes all the memory that it may. Nothing was taken.
+    #[error("too much data waits to be saved, because the disk does not answer")]
     Full,
-    /// The disk has not answered in time. What was given to the store is still written if it answers.
+    /// The disk has not answered in time. Data that the store has taken is still written if the disk answers later.
     #[error("the disk has not answered in time")]
     TimedOut,
-    /// What has to be written can't be for now; it is kept in memory, and tried again.
+    /// Saving fails at present. The data stays in memory, and saving is retried.
     #[error("the world can't be saved for now: {0}")]
     NotSaved(String),
 }
@@ -177,41 +175,42 @@ impl fmt::Display for WorldSize {
 }
 
 impl StoreError {
-    /// Says what was being done when the system refused.
+    /// Wraps an error of the system with the operation that failed.
     pub(super) fn files(doing: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |error| Self::Files { doing, error }
     }
 }
 
-/// Something that a player or an operator should be told of. Play goes on.
+/// A problem to show to a player or an operator. Play continues.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StoreTrouble {
-    /// The world can't be saved for now. Everything is kept in memory and tried again.
-    #[error("saving fails, and is tried again: {0}")]
+    /// The world can't be saved at present. Everything is kept in memory, and saving is retried.
+    #[error("saving fails, and is retried: {0}")]
     NotSaved(String),
     /// Saving works again.
     #[error("saving works again")]
     SavedAgain,
-    /// The disk does not answer: a network share that is away, or a drive that is asleep. What is dug is kept in memory, up to
-    /// [`waiting_bytes`](super::StoreOptions::waiting_bytes), and is saved once it answers; [`SavedAgain`](Self::SavedAgain) says so.
-    #[error("the disk does not answer: what is dug is kept in memory until it does")]
+    /// The disk does not answer: a network share that is not available, or a sleeping drive. Edits are kept in memory,
+    /// up to [`waiting_bytes`](super::StoreOptions::waiting_bytes), and are saved once it answers; then
+    /// [`SavedAgain`](Self::SavedAgain) follows.
+    #[error("the disk does not answer: edits are kept in memory until it does")]
     Hanging,
-    /// Somebody else has the world open, and is waited for.
+    /// Another process has the world open. Opening waits until it is closed.
     #[error("the world is open elsewhere: waiting until it is closed")]
     WaitsForLock,
-    /// The store's thread has ended, which only a fault in this crate can cause. Nothing is saved any more.
+    /// The store's thread has ended, which only a bug in this crate can cause. Nothing is saved any more.
     #[error("saving has ended, and nothing is saved any more ({0}): save the world in another folder")]
     Ended(String),
-    /// The log got a gap, as too much waited to be saved, or came at once, or another world took the place of this one: it can no
-    /// longer rebuild damaged regions. The world is saved whole instead.
-    #[error("the log has a gap at revision {revision}, so the world is saved whole")]
+    /// The log has a gap, because too much data waited or arrived at once, or another world replaced this one: it can
+    /// no longer rebuild damaged regions. The whole world is saved instead.
+    #[error("the log has a gap at revision {revision}, so the whole world is saved")]
     LogGap {
         /// The last revision before the gap.
         revision: u64,
     },
-    /// The log ends in something that is no record: commits that were not durable yet when the power or the process went,
-    /// or damage. A copy of it is kept.
+    /// The log ends in bytes that are not a record: commits that were not durable when the power or the process was
+    /// lost, or damage. A copy of it is kept.
     #[error(
         "the log ends with {bytes} bytes that can't be read after revision {revision}{}",
         copy(quarantine)
@@ -224,12 +223,12 @@ pub enum StoreTrouble {
         /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
-    /// The log leads to another world than it says, so what comes after was left out.
-    #[error("the log can't be replayed behind revision {revision}: {why}{}", copy(quarantine))]
+    /// Replaying the log does not give the hashes that it contains, so the rest of it was skipped.
+    #[error("the log can't be replayed after revision {revision}: {why}{}", copy(quarantine))]
     LogRefused {
         /// The last revision that was replayed.
         revision: u64,
-        /// What does not fit.
+        /// The mismatch.
         why: String,
         /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
@@ -237,14 +236,14 @@ pub enum StoreTrouble {
     /// A damaged part was rebuilt, from the log or from other files; nothing is lost.
     #[error("{what}; it has been rebuilt, and nothing is lost{}", copy(quarantine))]
     Rebuilt {
-        /// What was wrong, in words.
+        /// The damage, in words.
         what: String,
         /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
-    /// A damaged region is lost: the ground there is as the world began.
+    /// A damaged region is lost: the ground there is in its first state.
     #[error(
-        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is as before anybody dug{}",
+        "the region {region} is damaged, and the log does not reach back far enough to rebuild it: the ground there is pristine again{}",
         copy(quarantine)
     )]
     RegionLost {
@@ -253,19 +252,19 @@ pub enum StoreTrouble {
         /// Where a copy of it is, below the world's folder; empty where there is none.
         quarantine: String,
     },
-    /// The log has gone, with all commits that were in it only: somebody removed the folder `journal` after a crash.
-    #[error("the log is missing: what was dug after revision {revision}, before the last crash, is lost")]
+    /// The log is missing, with all commits that were in it only: the folder `journal` was removed after a crash.
+    #[error("the log is missing: edits after revision {revision}, before the last crash, are lost")]
     LogMissing {
         /// The revision of the last checkpoint.
         revision: u64,
     },
-    /// Nothing is left of a world but regions: rules, data of the game's and what undo restored are lost. Only a world that is
-    /// [salvaged](super::StoreOptions::salvage) is opened then.
+    /// Only regions are left of a world: its rules and the game's data are lost. Such a world is opened only with
+    /// [`salvage`](super::StoreOptions::salvage).
     #[error("only regions are left of the world: its rules and the game's data are lost")]
     CheckpointLost,
-    /// Commits that were in the log only were made by a version of the crate in which edits change the ground otherwise; they were
-    /// made again. The ground may differ a little there from what it was.
-    #[error("{commits} commits of another version, behind the last checkpoint, were made again")]
+    /// Commits that were in the log only were made by a version of the crate whose edits differ; they were
+    /// replayed. The ground may differ slightly there.
+    #[error("{commits} commits of another version, after the last checkpoint, were replayed")]
     MadeAgain {
         /// How many.
         commits: u64,
@@ -278,12 +277,12 @@ pub enum StoreTrouble {
     BaseChanged {
         /// Regions with edits over changed ground; all of them, if it is the level.
         regions: usize,
-        /// What became of the edits: "kept" or "replayed".
+        /// Whether the edits were "kept" or "replayed".
         kept: &'static str,
     },
 }
 
-/// Says where a copy is, if there is one.
+/// Text that names the copy, if there is one.
 fn copy(quarantine: &str) -> String {
     if quarantine.is_empty() { String::new() } else { format!("; a copy is in {quarantine}") }
 }

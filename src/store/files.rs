@@ -1,4 +1,4 @@
-//! What the store needs of files, so that tests can put a simulated disk in their place.
+//! The store's interface to files, so that tests can use a simulated disk instead.
 
 use std::fmt;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -11,7 +11,7 @@ use redb::backends::FileBackend;
 /// Files below one folder. Paths are relative to it, with `/` between their parts. Errors should name the file, since they are shown
 /// to players as they are.
 pub trait Files: fmt::Debug + Send + Sync + 'static {
-    /// How messages name the folder.
+    /// The folder's name in messages.
     fn name(&self) -> String;
 
     /// Opens a file for reading and writing.
@@ -26,7 +26,7 @@ pub trait Files: fmt::Debug + Send + Sync + 'static {
     /// When there is no such file, and when the system refuses.
     fn read(&self, path: &str) -> io::Result<Vec<u8>>;
 
-    /// Is there such a file?
+    /// Whether the file exists.
     ///
     /// # Errors
     /// When the system refuses.
@@ -50,13 +50,13 @@ pub trait Files: fmt::Debug + Send + Sync + 'static {
     /// When there is no such file, and when the system refuses.
     fn remove(&self, path: &str) -> io::Result<()>;
 
-    /// Gives a file another path, at which there is no file yet.
+    /// Renames a file to a path without a file.
     ///
     /// # Errors
     /// When there is a file already, and when the system refuses.
     fn rename(&self, from: &str, to: &str) -> io::Result<()>;
 
-    /// Makes sure that files which were created, removed and renamed in a folder are so after a loss of power too.
+    /// Makes the creation, removal and renaming of files in a folder durable.
     ///
     /// # Errors
     /// When the system refuses.
@@ -91,7 +91,7 @@ pub trait OpenFile: fmt::Debug + Send + Sync {
     /// When the system refuses.
     fn length(&self) -> io::Result<u64>;
 
-    /// Fills a buffer with what is stored from an offset on.
+    /// Fills a buffer with the stored bytes from an offset on.
     ///
     /// # Errors
     /// When the file ends before, and when the system refuses.
@@ -109,10 +109,10 @@ pub trait OpenFile: fmt::Debug + Send + Sync {
     /// When the system refuses.
     fn set_length(&self, length: u64) -> io::Result<()>;
 
-    /// Makes sure that what was written is there after a loss of power too.
+    /// Makes all written data durable, so that it survives a loss of power.
     ///
     /// # Errors
-    /// When the system refuses; then nothing is known of what was written since the last time that it did not.
+    /// When the system refuses. Data written since the last success may then be lost.
     fn sync(&self) -> io::Result<()>;
 }
 
@@ -139,7 +139,7 @@ impl Folder {
         if path.is_empty() { self.0.clone() } else { self.0.join(path) }
     }
 
-    /// Does something with a file; an error names it.
+    /// Runs an operation on a file; errors name the file.
     fn with<T>(&self, path: &str, work: impl FnOnce(&Path) -> io::Result<T>) -> io::Result<T> {
         let at = self.at(path);
         work(&at).map_err(|error| named(at.display(), &error))

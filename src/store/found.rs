@@ -1,4 +1,4 @@
-//! What of a world is found in its files, before anything is made of it.
+//! Reads everything that the files of a world contain, before recovery chooses from it.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,7 +35,7 @@ pub(super) struct RegionRecord {
     world: WorldId,
     /// Its bytes. Unpacked they may be far more.
     sealed: Box<[u8]>,
-    /// Does it say how the region differs from the level below, instead of all that it holds?
+    /// Whether it holds the differences from the level below instead of the whole region.
     is_change: bool,
 }
 
@@ -59,7 +59,7 @@ impl RegionRecord {
         self.sealed.len()
     }
 
-    /// What it holds, over a ground.
+    /// Its content, over a ground.
     pub fn decode(&self, at: RegionPos, ground: &Ground) -> Result<WorldChange, FormatError> {
         let kind = if self.is_change { Kind::RegionChange } else { Kind::Region };
         let payload = frame::open(&self.sealed, kind, self.world, &keys::region(at), FRAME_LIMIT)?.payload;
@@ -79,25 +79,25 @@ impl RegionRecord {
 pub(super) struct Contents {
     pub world: WorldId,
     pub segments: Vec<Found>,
-    /// What is wrong with the file of regions, if it can't be used.
+    /// The fault of the file of regions, if it can't be used.
     pub damaged: Option<String>,
     /// Whether there is a file of regions, so that a copy of what is damaged can be kept.
     pub has_database: bool,
     /// Whether the process that wrote the world last put all of it into a checkpoint.
     is_closed: bool,
-    /// Whether the journal has gone in which there were commits.
+    /// Whether a journal with commits is missing.
     pub has_lost_journal: bool,
     /// Why the file of regions can't be read at the moment.
     error: Option<io::Error>,
     /// The checkpoints that the file of regions holds: two alike, but for damage.
     checkpoints: Vec<Checkpoint>,
-    /// The copies beside the journal.
+    /// The copies next to the journal.
     copies: Vec<Checkpoint>,
-    /// Those of other files that may hold regions.
+    /// The checkpoints of other files that may hold regions.
     other_checkpoints: Vec<Checkpoint>,
     /// Valid records of each region: one, but for what was salvaged from a damaged file.
     regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
-    /// Those of other files.
+    /// The records of other files.
     other_regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
     /// Records that are not valid, by region.
     pub invalid: BTreeMap<RegionPos, Vec<u8>>,
@@ -190,7 +190,7 @@ impl Contents {
         Ok(contents)
     }
 
-    /// Nothing says which world it is.
+    /// The error if the world can't be identified.
     fn no_world(&mut self, raw: &[(Vec<u8>, Vec<u8>)]) -> Result<StoreError, StoreError> {
         let newer = |(key, record): &(Vec<u8>, Vec<u8>)| sources::check(key, record).err()?.newer_schema();
         refuse_newer(raw.iter().find_map(newer))?;
@@ -222,7 +222,7 @@ impl Contents {
         Ok(())
     }
 
-    /// Enters what another file holds than the one in place.
+    /// Adds the records of a file other than the current one.
     fn enter_others(&mut self, source: Source) {
         let (Source::Whole(records) | Source::Damaged { records, .. }) = source else { return };
         for (key, record) in records {
@@ -278,7 +278,8 @@ impl Contents {
             let run = runs.range(..=from.saturating_add(1)).next_back();
             run.map_or(from, |(_, last)| from.max(*last))
         };
-        // Those that lie beside their regions come first: over another ground, regions have the same revisions and other content.
+        // Those in a file with their regions come first: over another ground, regions have equal revisions and
+        // different content.
         let all = self.checkpoints.iter().chain(others).chain(&heads);
         // Among equals the newest, after which least has to be replayed.
         let rank = |checkpoint: &&Checkpoint| {
@@ -303,8 +304,8 @@ impl Contents {
         runs
     }
 
-    /// A checkpoint of all regions that were found, where none is left: rules, data of the game's and what was where nothing is
-    /// left are unknown.
+    /// A checkpoint of all regions that were found, if no checkpoint is left: rules, the game's data and missing
+    /// regions are unknown.
     pub fn assume_checkpoint(&self) -> Checkpoint {
         let mut regions = BTreeMap::new();
         for (at, records) in self.regions.iter().chain(&self.other_regions) {
@@ -425,7 +426,7 @@ fn decode_checkpoint(payload: &[u8]) -> Option<Checkpoint> {
     (numbers.max() <= Some(MOST_NUMBER / 2)).then_some(checkpoint)
 }
 
-/// A world that a newer version wrote to is left alone, whole: what this version can't read is no damage.
+/// Refuses a world that a newer version wrote to, because data that this version can't read is not damage.
 fn refuse_newer(schema: Option<u32>) -> Result<(), StoreError> {
     match schema {
         Some(found) => Err(StoreError::Newer { found, known: frame::SCHEMA }),
@@ -446,7 +447,7 @@ mod tests {
     use crate::store::SimulatedDisk;
     use crate::terrain::{Terrain, TerrainSettings};
 
-    /// The same frame as a newer version would write it.
+    /// The frame as a newer version would write it.
     fn newer(frame: &mut [u8]) {
         let body = frame.len() - 8;
         frame[4] = 9;

@@ -1,4 +1,4 @@
-//! The size of a world's ground, which is saved beside the game's data: older versions of the crate take it for such data.
+//! The size of a world's ground, which is saved among the game's data: older versions of the crate treat it as such.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Looking at a world without playing it: what tools print, check and replay.
+//! Inspects, checks and replays a saved world for tools, without changing it.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,7 +20,7 @@ use super::sources::has_world;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
 
-/// What is known of a saved world without its ground.
+/// Facts about a saved world that can be read without its ground.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct WorldInfo {
@@ -38,7 +38,7 @@ pub struct WorldInfo {
     pub ground: u64,
     /// Cells of its ground along x and z; `None` if an older version saved it.
     pub ground_size: Option<(u32, u32)>,
-    /// The level that it was begun on, from which its regions differ.
+    /// The level that it is based on, from which its regions differ.
     pub level: Option<LevelName>,
     /// The revision of its last checkpoint.
     pub checkpoint: u64,
@@ -50,15 +50,15 @@ pub struct WorldInfo {
     pub segments: usize,
     /// Bytes of the log.
     pub log_bytes: u64,
-    /// Does the log reach from the first commit to the last?
+    /// Whether the log reaches from the first commit to the last.
     pub is_log_whole: bool,
     /// Keys of the game's data, and how many bytes each has.
     pub game: Vec<(String, usize)>,
-    /// What is damaged, in words; nothing if all can be read.
+    /// Descriptions of damage; empty if everything can be read.
     pub damage: Vec<String>,
 }
 
-/// Reads what is known of the world in a folder without its ground.
+/// Reads facts about the world in a folder, without its ground.
 ///
 /// # Errors
 /// When there is none, when it is open, and when nothing of it can be read.
@@ -66,7 +66,7 @@ pub fn inspect(folder: impl AsRef<Path>) -> Result<WorldInfo, StoreError> {
     inspect_in(&Folder::new(folder.as_ref()))
 }
 
-/// The same in other [files](Files).
+/// Inspects a world in other [files](Files).
 ///
 /// # Errors
 /// As for a folder.
@@ -132,7 +132,7 @@ fn read(files: &dyn Files) -> Result<(Box<dyn super::files::Lock>, Contents), St
     Ok((lock, Contents::read(files, None)?))
 }
 
-/// What can't be read of the journal and matters to a world at a frame, in words.
+/// Descriptions of unreadable parts of the journal that matter to a world at a frame.
 fn journal_troubles(contents: &Contents, frame: u64, revision: u64) -> Vec<String> {
     let mut troubles = Vec::new();
     for found in &contents.segments {
@@ -160,14 +160,14 @@ fn journal_troubles(contents: &Contents, frame: u64, revision: u64) -> Vec<Strin
 pub struct WorldCheck {
     /// Its name.
     pub world: WorldId,
-    /// The world as opening it would bring it back.
+    /// The world as opening it would restore it.
     pub terrain: Terrain,
-    /// Data of the game's, by key.
+    /// The game's data, by key.
     pub game: BTreeMap<String, Vec<u8>>,
-    /// What opening it would tell.
+    /// The troubles that opening it would report.
     pub troubles: Vec<String>,
-    /// Was the whole log replayed from the first commit, and did it lead to the same world? `None` if it was not replayed, or does
-    /// not reach back so far.
+    /// Whether replaying the whole log from the first commit gave the same world. `None` if it was not replayed, or
+    /// does not reach back to the first commit.
     pub replays: Option<bool>,
 }
 
@@ -184,7 +184,7 @@ pub fn check(
     check_in(&Folder::new(folder.as_ref()), ground, level)
 }
 
-/// The same in other [files](Files).
+/// Checks a world in other [files](Files).
 ///
 /// # Errors
 /// As for a folder.

@@ -1,4 +1,4 @@
-//! Writing the journal: frames that wait until they are durable, in segments that are kept up to a cap.
+//! Writes the journal: frames in segments, of which the oldest are removed beyond a limit of bytes.
 
 use std::collections::VecDeque;
 use std::io;
@@ -12,7 +12,7 @@ use super::unsaved;
 /// The most bytes of a segment. Whole segments are removed, so the log is cut in steps of this.
 const SEGMENT_BYTES: u64 = 1 << 20;
 
-/// How many segments a log has at least when it is as long as it may be.
+/// The least number of segments of a log of full length.
 const LEAST_SEGMENTS: u64 = 16;
 
 /// A frame that is not durable yet.
@@ -28,7 +28,7 @@ struct Current {
     number: u64,
     file: Box<dyn OpenFile>,
     end: u64,
-    /// Is no frame in it durable yet?
+    /// Whether no frame in it is durable yet.
     is_fresh: bool,
 }
 
@@ -56,12 +56,12 @@ pub(super) struct Journal {
     next_segment: u64,
     /// The head of the next segment: a revision and its checkpoint.
     head: (u64, Vec<u8>),
-    /// Whether it was entered that there are commits.
+    /// Whether the marker of unsaved commits was written.
     is_entered: bool,
 }
 
 impl Journal {
-    /// Goes on behind these segments with this frame. The next segment begins with a checkpoint.
+    /// Continues after these segments with this frame. The next segment begins with a checkpoint.
     pub fn new(
         files: Arc<dyn Files>,
         world: WorldId,
@@ -102,7 +102,7 @@ impl Journal {
         self.waiting_bytes
     }
 
-    /// Enters a frame; it is durable after the next [`write`](Self::write) that succeeds.
+    /// Adds a frame; it is durable after the next successful [`write`](Self::write).
     pub fn push(&mut self, revision: u64, payload: &[u8]) {
         let frame = self.next_frame;
         self.next_frame += 1;
@@ -140,7 +140,7 @@ impl Journal {
         !self.segments.is_empty()
     }
 
-    /// Whether the segment that is written is as long as one should be in a log of so many bytes.
+    /// Whether the present segment has reached its full length in a log limited to `log_bytes`.
     pub fn is_long(&self, log_bytes: u64) -> bool {
         let most = SEGMENT_BYTES.min(log_bytes / LEAST_SEGMENTS);
         self.current.as_ref().is_some_and(|current| current.end >= most)
@@ -180,13 +180,14 @@ impl Journal {
         Ok(())
     }
 
-    /// Lets the next frame begin a segment, whose head is this checkpoint of a revision.
+    /// Makes the next frame begin a segment, whose head is this checkpoint of a revision.
     pub fn begin_segment(&mut self, revision: u64, checkpoint: Vec<u8>) {
         self.current = None;
         self.head = (revision, checkpoint);
     }
 
-    /// Removes the oldest segments until the rest takes no more than so many bytes on the disk, but none with frames after `needed`.
+    /// Removes the oldest segments until the rest takes at most `bytes` on the disk, but none with frames after
+    /// `needed`.
     pub fn trim(&mut self, bytes: u64, needed: u64) -> io::Result<()> {
         let mut total: u64 = self.segments.iter().map(|segment| segment::on_disk(segment.bytes)).sum();
         let own = self.current.as_ref().map(|current| current.number);

@@ -4,17 +4,18 @@ use glam::IVec3;
 
 use crate::lattice::RegionPos;
 
-/// The keys of the checkpoint, which is stored twice: without it, intact regions could not be told from older ones.
+/// The keys of the checkpoint, which is stored twice: without it, intact regions could not be distinguished from older
+/// ones.
 pub(super) const CHECKPOINTS: [&[u8]; 2] = [b"c", b"d"];
 
-/// What a record holds.
+/// The content of a record.
 pub(super) enum Key {
     Checkpoint,
     Region(RegionPos),
 }
 
 impl Key {
-    /// What the record with this key holds.
+    /// The content of the record with this key.
     pub fn of(key: &[u8]) -> Option<Self> {
         if CHECKPOINTS.contains(&key) {
             return Some(Self::Checkpoint);

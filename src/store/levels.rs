@@ -1,4 +1,4 @@
-//! Levels in folders and packed files: what designers sculpt, and games ship.
+//! Saves and loads levels, in folders and packed files.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -15,11 +15,11 @@ use super::format::limits::Limits;
 use crate::ground::Ground;
 use crate::terrain::{RestoreError, Terrain};
 
-/// Why no terrain can be made of a level.
+/// The reason why no terrain can be made from a level.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RestoreLevelError {
-    /// A file is damaged, or none of a level.
+    /// A file is damaged, or does not belong to a level.
     #[error(transparent)]
     Format(#[from] FormatError),
     /// It does not fit the ground, or its settings are out of range.
@@ -28,12 +28,12 @@ pub enum RestoreLevelError {
 }
 
 impl Level {
-    /// The level that a terrain is now, without history and what waits.
+    /// The present state of a terrain as a level, without history and waiting edits.
     pub fn of(terrain: &Terrain) -> Self {
         Self::new(terrain.parts(), terrain.voxel_size(), Default::default(), terrain.world().ground())
     }
 
-    /// A terrain of this level over a ground, which should be the one that it was made on.
+    /// A terrain from this level over a ground, which should be the one that the level was made on.
     ///
     /// # Errors
     /// When settings or rules are out of range, or when its bricks do not fit the ground.
@@ -42,20 +42,20 @@ impl Level {
     }
 }
 
-/// The file that lists what of a level is put in place.
+/// The file that lists the remaining steps of a save.
 const PENDING: &str = "level.pending";
 
-/// What of a level is put in place: all new files are there, and durable.
+/// The remaining steps of a save: all new files are there, and durable.
 #[derive(Default, Serialize, Deserialize)]
 struct Pending {
-    /// Files that have new ones beside them, unless these were put in place already.
+    /// Files with a new version next to them that may not have replaced them yet.
     changed: BTreeSet<String>,
     /// Files of regions that hold nothing any more.
     removed: BTreeSet<String>,
 }
 
 impl Pending {
-    /// What a crash left to be done in a folder.
+    /// The steps that a crash left undone in a folder.
     fn read(folder: &Path) -> Result<Option<Self>, StoreError> {
         let bytes = match fs::read(folder.join(PENDING)) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -69,7 +69,7 @@ impl Pending {
         }
     }
 
-    /// Writes new files beside the old ones, and what is to be done then.
+    /// Writes new files next to the old ones, and a list of the remaining steps.
     fn prepare(folder: &Path, files: &LevelFiles) -> Result<(), StoreError> {
         let mut pending = Self::default();
         for (name, bytes) in files {
@@ -100,7 +100,7 @@ impl Pending {
         enter().map_err(StoreError::files("writing the level"))
     }
 
-    /// Puts everything in place that is to be.
+    /// Finishes the remaining steps.
     fn finish(folder: &Path) -> Result<(), StoreError> {
         let Some(pending) = Self::read(folder)? else { return Ok(()) };
         let finish = || {
@@ -130,7 +130,7 @@ fn is_of_level(name: &str) -> bool {
     name == level::LEVEL_JSON || level::region_of_name(name).is_some()
 }
 
-/// The path of the file that takes the place of another.
+/// The path of the file that replaces another one.
 fn new_of(path: &Path) -> PathBuf {
     let mut new = path.as_os_str().to_owned();
     new.push(".new");
@@ -148,12 +148,12 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) { fs::File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
-/// Writes a level to a folder, one file for each region, so that version control stores and shows what changed. Files that are as
-/// they should be are left alone, and those of regions that hold nothing any more are removed. Nothing else in the folder is
+/// Writes a level to a folder, one file for each region, so that version control stores and shows the changes.
+/// Unchanged files are not written, and files of regions that became empty are removed. Nothing else in the folder is
 /// touched.
 ///
 /// After a crash the folder holds the old level or the new one: new files are complete before the first of the old ones is touched,
-/// and [`read_level_files`] reads those that were not put in place yet.
+/// and [`read_level_files`] reads new files that have not replaced the old ones yet.
 ///
 /// # Errors
 /// When a file can't be written.
@@ -213,7 +213,7 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::terrain::TerrainSettings;
 
-    /// Copies of a folder at each step of putting a level in place.
+    /// Copies of a folder at each step of saving a level.
     fn steps(folder: &Path, new: &Level) -> Vec<LevelFiles> {
         let mut seen = vec![read_level_files(folder).unwrap()];
         Pending::prepare(folder, &level::write_level(new).unwrap()).unwrap();
@@ -251,7 +251,7 @@ mod tests {
         assert!(seen[1..].iter().all(|own| *own == after));
         let left = fs::read_dir(&folder).unwrap().flatten().count();
         assert_eq!(left, after.len(), "nothing is left over");
-        // What was not finished is finished by the next one.
+        // The next save finishes an interrupted one.
         Pending::prepare(&folder, &before).unwrap();
         save_level(&folder, &new).unwrap();
         assert_eq!(read_level_files(&folder).unwrap(), after);

@@ -1,4 +1,5 @@
-//! The world as the store knows it from records: the same bricks, shared, so that no checkpoint needs the world itself.
+//! The store's view of the world, built from records. It shares the bricks, so that a checkpoint does not need the
+//! world itself.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -13,16 +14,16 @@ use crate::volume::DiggingRules;
 #[derive(Clone, Debug)]
 pub(super) struct Mirror {
     grid: ChunkGrid,
-    /// Those that hold anything, or differ from the level.
+    /// Regions that hold anything, or differ from the level.
     pub regions: BTreeMap<RegionPos, Region>,
-    /// Those that changed since they were last taken, gone ones included.
+    /// Regions that changed since they were last taken, removed ones included.
     dirty: BTreeSet<RegionPos>,
     pub revision: u64,
     pub hash: u64,
     pub next_field: u64,
     pub rules: Option<DiggingRules>,
     pub loose: Option<LooseSettings>,
-    /// What the game put there.
+    /// The game's data.
     pub game: BTreeMap<String, Vec<u8>>,
     /// The level below.
     pub level: Option<BaseLevel>,
@@ -57,7 +58,7 @@ impl Mirror {
         mirror
     }
 
-    /// Takes other parts in place of all that it holds.
+    /// Replaces the whole world by other parts.
     pub fn replace(&mut self, parts: WorldParts, hash: u64) {
         let mut new = Self::new(self.grid, parts, hash, std::mem::take(&mut self.game), self.level.take());
         new.dirty.extend(self.regions.keys());
@@ -65,7 +66,7 @@ impl Mirror {
         *self = new;
     }
 
-    /// Takes over what a commit changed.
+    /// Applies the changes of a commit.
     pub fn apply(&mut self, record: &CommitRecord) {
         for entry in &record.entries {
             match entry {
@@ -102,7 +103,7 @@ impl Mirror {
         self.next_field = self.next_field.max(change.next_field);
     }
 
-    /// Enters which regions changed, and compares them with the level.
+    /// Records changed regions, and compares them with the level.
     fn settle(&mut self, touched: impl IntoIterator<Item = RegionPos>, revision: u64) {
         let chunk_size = self.chunk_size();
         for at in touched {
@@ -122,7 +123,7 @@ impl Mirror {
         }
     }
 
-    /// Is all as in the level below, or pristine without one?
+    /// Whether everything equals the level below, or is pristine if there is none.
     pub fn is_as_level(&self) -> bool {
         let next_field = self.level.as_ref().map_or(0, |level| level.level().next_field);
         self.next_field == next_field && self.regions.values().all(|region| !region.is_stored)
@@ -145,7 +146,7 @@ impl Mirror {
         RegionPos::of(BrickPos::of(self.grid.origin(chunk)))
     }
 
-    /// Did anything change since the last [`take_dirty`](Self::take_dirty)?
+    /// Whether anything has changed since the last [`take_dirty`](Self::take_dirty).
     pub fn is_dirty(&self) -> bool {
         !self.dirty.is_empty()
     }

@@ -1,4 +1,4 @@
-//! A world in a folder, as a game or server holds it open.
+//! The store: a saved world that a game or server has open.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -34,29 +34,29 @@ const LOCK: &str = "lock";
 /// Bytes of records that a terrain keeps until its store takes them.
 const LOG_BYTES: usize = 256 << 20;
 
-/// Bytes that may wait for the thread, whatever the options say.
+/// Bytes that may wait for the thread, regardless of the options.
 const LEAST_QUEUED: usize = 1 << 20;
 
-/// A world in a folder. Commits go to a thread of its own, which makes them durable within the
-/// [loss window](StoreOptions::loss_window); whoever digs never waits for the disk.
+/// A world in a folder. Commits are sent to a separate thread, which makes them durable within the
+/// [loss window](StoreOptions::loss_window); the caller never waits for the disk.
 ///
-/// Dropping it saves what is left, makes a checkpoint, and waits for both, [as long as it may](StoreOptions::close_timeout).
-/// [`close`](Self::close) does so without waiting.
+/// Dropping it saves the remaining commits, makes a checkpoint, and waits for both, [for a limited
+/// time](StoreOptions::close_timeout). [`close`](Self::close) does so without waiting.
 pub struct Store {
     shared: Arc<Shared>,
     /// `None` once it is closed.
     open: Option<(Sender<Message>, StoreThread)>,
-    /// Where the last of what was given leads to.
+    /// The point that the last given commits lead to.
     point: SavePoint,
-    /// The terrain that was given last.
+    /// The version of the last given terrain.
     version: Version,
     size: WorldSize,
     /// The hash of its ground.
     ground: u64,
-    /// Something was left out, since too much waited: all of the world comes next.
+    /// Whether commits were skipped because too much waited; the whole world is saved next.
     has_gap: bool,
     game: GameData,
-    /// What the game put since the last commits, the last value of each key.
+    /// The game's data since the last commits, the last value of each key.
     unsent: BTreeMap<String, Option<Vec<u8>>>,
     world: WorldId,
     /// Bytes that may wait for the thread.
@@ -81,21 +81,21 @@ pub struct Opened {
     pub terrain: Terrain,
     /// Commits after the last checkpoint, which were replayed.
     pub replayed: u64,
-    /// Can damaged regions be rebuilt from the log?
+    /// Whether damaged regions can be rebuilt from the log.
     pub is_log_whole: bool,
-    /// What should be told.
+    /// Troubles to show to a player or an operator.
     pub troubles: Vec<StoreTrouble>,
 }
 
 impl Store {
-    /// Is there a world in this folder?
+    /// Whether there is a world in this folder.
     pub fn is_in(folder: impl AsRef<Path>) -> bool {
         let files = Folder::new(folder.as_ref());
         has_world(&files).unwrap_or(false)
     }
 
-    /// Saves a terrain as a new world in a folder, on its [level](StoreOptions::level) if that is given, and lets the terrain
-    /// [log](Terrain::keep_log) its commits from now on.
+    /// Saves a terrain as a new world in a folder, on its [level](StoreOptions::level) if that is given, and makes the
+    /// terrain [log](Terrain::keep_log) its later commits.
     ///
     /// # Errors
     /// When there is a world already, and when the folder can't be written.
@@ -107,7 +107,7 @@ impl Store {
         Self::create_in(Arc::new(Folder::new(folder.as_ref())), terrain, options)
     }
 
-    /// The same in other [files](Files).
+    /// Creates a world in other [files](Files).
     ///
     /// # Errors
     /// When there is a world already, and when the files can't be written.
@@ -119,7 +119,7 @@ impl Store {
         Self::create_with_data_in(files, terrain, BTreeMap::new(), options)
     }
 
-    /// Saves a terrain as a new world in [files](Files), together with data of the game's: both are there, or neither.
+    /// Saves a terrain as a new world in [files](Files), together with the game's data: both are created, or neither.
     ///
     /// # Errors
     /// When there is a world already, and when the files can't be written.
@@ -134,7 +134,7 @@ impl Store {
         if has_world(&*files).map_err(StoreError::files("reading the world's folder"))? {
             return Err(StoreError::Exists(name(&*files)));
         }
-        // That of a world which somebody removed.
+        // The marker of a world that was removed.
         unsaved::clear(&*files).map_err(StoreError::files("creating the world"))?;
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
@@ -185,9 +185,9 @@ impl Store {
     /// # Errors
     /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below has changed
     /// and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing, and when
-    /// nothing of it can be read. So is a world of which a file can't be read at the moment that holds something that no other file
-    /// does, and one whose ground had a size in which this one has no room for what was dug. Nothing is changed then. Whatever else
-    /// is wrong is told in [`Opened::troubles`].
+    /// nothing of it can be read. Also when a file that can't be read at the moment holds something that no other file
+    /// has, and when this ground has no room for edits that were made on a ground of another size. Nothing is changed
+    /// then. All other problems are reported in [`Opened::troubles`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -196,7 +196,7 @@ impl Store {
         Self::open_in(Arc::new(Folder::new(folder.as_ref())), ground, options)
     }
 
-    /// The same from other [files](Files).
+    /// Opens a world in other [files](Files).
     ///
     /// # Errors
     /// As for a folder.
@@ -299,14 +299,14 @@ impl Store {
     }
 
     /// Takes the records of a terrain's commits, so that they become durable. Call it as often as you like: it takes
-    /// microseconds, and does nothing where nothing was committed. Where it is another terrain than before, of the same size, all of
-    /// that takes the place of what was saved.
+    /// microseconds, and does nothing if there are no new commits. If it is another terrain of the same size, the whole
+    /// terrain replaces the saved one.
     ///
-    /// While so much waits for a disk that does not answer that no more is kept, nothing is taken, and [all of the
-    /// terrain](Self::append_whole) once there is room.
+    /// While the limit on data that waits for a disk is reached, nothing is taken. Once there is room, the [whole
+    /// terrain](Self::append_whole) is saved.
     ///
     /// # Errors
-    /// [`StoreError::OtherSize`] where the terrain has another size than what is saved, and nothing is taken then;
+    /// [`StoreError::OtherSize`] if the terrain has another size than the saved world; then nothing is taken;
     /// [`StoreError::Ended`] when the store's thread has panicked.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
         let is_next = self.follows(terrain) && !self.has_gap;
@@ -331,13 +331,13 @@ impl Store {
         self.append_whole(terrain)
     }
 
-    /// Whether this terrain is the one that was given last, whatever was committed to it since.
+    /// Whether this is the last given terrain, with or without later commits.
     pub(crate) fn follows(&self, terrain: &Terrain) -> bool {
         terrain.world().version().is_same_world(self.version)
             || terrain.log_sets_ground_after(self.point.revision)
     }
 
-    /// Lets a terrain that was made of the same parts take the place of the one that was given last.
+    /// Replaces the last given terrain by one that was made from the same parts.
     #[cfg(feature = "plugin")]
     pub(crate) fn adopt(&mut self, terrain: &Terrain) {
         self.version = terrain.world().version();
@@ -355,7 +355,7 @@ impl Store {
         if saved == given { Ok(()) } else { Err(StoreError::OtherSize { saved, given }) }
     }
 
-    /// Whether so much waits for the thread that it should take that first.
+    /// Whether more data waits for the thread than allowed.
     fn is_full(&self) -> bool {
         self.shared.queued() > self.most_queued
     }
@@ -365,7 +365,7 @@ impl Store {
         if is_running { Ok(()) } else { Err(StoreError::Ended) }
     }
 
-    /// Does every record follow the one before?
+    /// Whether every record follows the previous one.
     fn continues(&self, records: &[CommitRecord]) -> bool {
         let mut at = self.point.revision;
         records.iter().all(|record| {
@@ -375,7 +375,8 @@ impl Store {
         })
     }
 
-    /// Takes records of commits, so that they become durable, together with all that was [put](Self::put) since the last ones.
+    /// Takes records of commits, so that they become durable, together with everything that was [put](Self::put) since
+    /// the last ones.
     ///
     /// # Errors
     /// [`StoreError::Gap`] when they do not follow those that were taken before; [`StoreError::Full`] when too much waits for a disk
@@ -389,12 +390,13 @@ impl Store {
         self.give(SavePoint { revision, ..self.point }, Content::Commits(records))
     }
 
-    /// Takes all of a terrain, where records are missing or another terrain takes the place of the one before. It is durable with the
+    /// Takes the whole terrain, if records are missing or another terrain replaces the last one. It is durable with the
     /// next checkpoint, which is made at once.
     ///
     /// # Errors
-    /// [`StoreError::OtherSize`] when the terrain has another size than what is saved; [`StoreError::Full`] when too much waits for
-    /// a disk that does not answer. Nothing is taken then. [`StoreError::Ended`] when the store's thread has panicked.
+    /// [`StoreError::OtherSize`] when the terrain has another size than the saved world; [`StoreError::Full`] when too
+    /// much waits for a disk that does not answer. Nothing is taken then. [`StoreError::Ended`] when the store's thread
+    /// has panicked.
     pub fn append_whole(&mut self, terrain: &Terrain) -> Result<(), StoreError> {
         self.check_size(terrain)?;
         let world = terrain.world();
@@ -410,7 +412,7 @@ impl Store {
         Ok(())
     }
 
-    /// Hands something over that leads to a point, with what the game put since the last time.
+    /// Sends content that leads to a point, with the game's data since the last time.
     fn give(&mut self, point: SavePoint, content: Content) -> Result<(), StoreError> {
         if self.is_full() {
             return Err(StoreError::Full);
@@ -424,7 +426,7 @@ impl Store {
         Ok(())
     }
 
-    /// Hands over what the game put. While commits are missing, it waits for the world with them.
+    /// Sends the game's data. While commits are missing, it waits for the world with them.
     fn send_game(&mut self) -> Result<(), StoreError> {
         if self.unsent.is_empty() || self.has_gap { Ok(()) } else { self.append(Vec::new()) }
     }
@@ -434,13 +436,14 @@ impl Store {
         sent.and_then(Result::ok).ok_or(StoreError::Ended)
     }
 
-    /// The terrain that was given last is durable up to this revision, with what the game had put by then: it would survive a loss of
-    /// power. 0 where nothing of it is durable yet; [`durable_point`](Self::durable_point) tells these apart.
+    /// The revision up to which the last given terrain is durable, together with the game's data at that time: it would
+    /// survive a loss of power. 0 also if nothing of it is durable yet; [`durable_point`](Self::durable_point)
+    /// distinguishes the two.
     pub fn durable(&self) -> u64 {
         self.durable_point().map_or(0, SavePoint::revision)
     }
 
-    /// The last point up to which everything is durable; `None` where nothing of the terrain that was given last is.
+    /// The last point up to which everything is durable; `None` if nothing of the last given terrain is.
     pub fn durable_point(&self) -> Option<SavePoint> {
         self.shared.durable().filter(|durable| durable.is_same_terrain(self.point))
     }
@@ -470,7 +473,7 @@ impl Store {
         })?
     }
 
-    /// Waits until all that was taken is durable, and returns its revision.
+    /// Waits until everything taken is durable, and returns its revision.
     ///
     /// # Errors
     /// When it can't be saved for now.
@@ -478,7 +481,7 @@ impl Store {
         self.flush_within(Duration::MAX)
     }
 
-    /// Waits until all that was taken is durable, but no longer than this, and returns its revision.
+    /// Waits until everything taken is durable, but no longer than this, and returns its revision.
     ///
     /// # Errors
     /// When it can't be saved for now; [`StoreError::TimedOut`] when the disk does not answer in time.
@@ -486,8 +489,8 @@ impl Store {
         self.ask(wait, Message::Flush)
     }
 
-    /// Waits until a checkpoint is made of all that was taken, so that nothing has to be replayed. It is made by itself now and
-    /// then, and when the store is dropped.
+    /// Waits for a checkpoint of everything that was taken, so that nothing has to be replayed. Checkpoints are also
+    /// made regularly, and when the store is dropped.
     ///
     /// # Errors
     /// When it can't be saved for now.
@@ -505,7 +508,7 @@ impl Store {
         self.send(Message::Checkpoint(channel().0))
     }
 
-    /// The same, and makes the file of regions as small as it can be.
+    /// Makes a checkpoint, and makes the file of regions as small as possible.
     ///
     /// # Errors
     /// When it can't be saved for now.
@@ -513,17 +516,18 @@ impl Store {
         self.ask(Duration::MAX, Message::Compact)
     }
 
-    /// Keeps data of the game's under a key, say an inventory or the time of day. It becomes durable together with the commits
-    /// of the next [`append`](Self::append) or [`follow`](Self::follow): after a crash both are there, or neither.
+    /// Stores data of the game under a key, such as an inventory or the time of day. It becomes durable together with
+    /// the commits of the next [`append`](Self::append) or [`follow`](Self::follow): after a crash both are there, or
+    /// neither.
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         let (key, bytes) = (key.into(), bytes.into());
-        // Games put the same again and again, which takes no room in the log.
+        // An unchanged value takes no room in the log.
         if self.get(&key) != Some(&bytes[..]) {
             self.change_game((key, Some(bytes)));
         }
     }
 
-    /// Removes data of the game's.
+    /// Removes data of the game.
     pub fn remove(&mut self, key: impl Into<String>) {
         self.change_game((key.into(), None));
     }
@@ -533,27 +537,28 @@ impl Store {
         self.unsent.insert(change.0, change.1);
     }
 
-    /// Data of the game's.
+    /// Data of the game.
     pub fn get(&self, key: &str) -> Option<&[u8]> {
         self.game.get(key).map(Vec::as_slice)
     }
 
-    /// All data of the game's, by key.
+    /// All data of the game, by key.
     pub fn game_data(&self) -> &BTreeMap<String, Vec<u8>> {
         &self.game
     }
 
-    /// What happened since the last call that a player or an operator should be told of; if nobody asks, the latest 256 are kept.
+    /// Troubles since the last call, to show to a player or an operator. If they are not taken, the latest 256 are
+    /// kept.
     pub fn take_troubles(&self) -> Vec<StoreTrouble> {
         self.shared.take_troubles()
     }
 
-    /// The world's name, which no other world has.
+    /// The unique id of the world.
     pub fn world_id(&self) -> WorldId {
         self.world
     }
 
-    /// Saves what is left and makes a last checkpoint, on the store's own thread.
+    /// Saves the remaining commits and makes a last checkpoint, on the store's thread.
     pub fn close(mut self) -> ClosingStore {
         self.begin_closing()
     }
@@ -570,7 +575,7 @@ impl Store {
 impl Drop for Store {
     fn drop(&mut self) {
         if self.open.is_some() {
-            // If the thread panicked, what is durable stays so.
+            // If the thread panicked, durable commits stay durable.
             drop(self.begin_closing().wait(self.close_timeout));
         }
     }

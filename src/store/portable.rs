@@ -1,4 +1,4 @@
-//! A world in one piece: to share it as a `.burrow` file, and to keep it where there are no files.
+//! Converts a world to a single `.burrow` file or to bytes, and back.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use super::format::{FormatError, Metadata};
 use crate::ground::Ground;
 use crate::terrain::{SIMULATION, Terrain, TerrainSettings};
 
-/// The bytes of a terrain's world, with data of the game's by key. The same world under the same name gives the same bytes.
+/// Converts a terrain's world to bytes, with the game's data by key. Equal worlds under one id give equal bytes.
 /// Neither the ground nor history are part of it.
 ///
 /// # Errors
@@ -37,18 +37,19 @@ pub fn to_bytes(
 pub struct Imported {
     /// Its terrain. Nothing is meshed, and there is no history.
     pub terrain: Terrain,
-    /// The name of the world that it is a copy of.
+    /// The id of the world that it is a copy of.
     pub world: WorldId,
-    /// Data of the game's, by key.
+    /// The game's data, by key.
     pub game: BTreeMap<String, Vec<u8>>,
-    /// Is the ground another one than it was saved with? Edited samples are as they were, in any case.
+    /// Whether the ground differs from the one that it was saved with. Edited samples are unchanged in any case.
     pub is_base_changed: bool,
 }
 
-/// The world that [`to_bytes`] made bytes of, over its ground, or over another one.
+/// Reads the bytes of [`to_bytes`], over the world's ground or over another one.
 ///
 /// # Errors
-/// When they are damaged or none of a world's, when a newer version wrote them, and when they do not fit the ground.
+/// When they are damaged or do not belong to a world, when a newer version wrote them, and when they do not fit the
+/// ground.
 pub fn from_bytes(bytes: &[u8], ground: impl Into<Arc<Ground>>) -> Result<Imported, StoreError> {
     let ground = ground.into();
     let portable = read_portable(bytes, &ground)?;

@@ -1,10 +1,11 @@
-//! How far the opening of a world is, for a bar on a title page.
+//! The progress of opening a world, for a progress bar.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// How far a world is opened or created. Clones are one handle: give one to
-/// [`StoreOptions::progress`](super::StoreOptions::progress), and ask the other from whatever thread draws the bar.
+/// The progress of opening or creating a world. Clones share one state: give one to
+/// [`StoreOptions::progress`](super::StoreOptions::progress), and read the other from the thread that draws the
+/// progress bar.
 ///
 /// A handle is for one world: the share never falls.
 #[derive(Clone, Debug, Default)]
@@ -18,7 +19,7 @@ impl PartialEq for Progress {
 }
 
 impl Progress {
-    /// The share that is done, 0 to 1, weighed by the time that parts take. It is 1 once the world can be played, and stays
+    /// The finished share, 0 to 1, in proportion to time. It is 1 once the world can be played, and stays
     /// where it was if it can't be opened.
     pub fn share(&self) -> f32 {
         f32::from_bits(self.0.load(Ordering::Relaxed))
@@ -42,13 +43,13 @@ pub(super) struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    /// So many units from the share of now to another.
+    /// Work of `total` units that advances the progress from its present share to `to`.
     pub fn until(progress: Option<&'a Progress>, to: f32, total: u64) -> Self {
         let from = progress.map_or(0.0, Progress::share);
         Self { progress, from, to, total, done: AtomicU64::new(0) }
     }
 
-    /// So many more units are done.
+    /// Adds finished units.
     pub fn advance(&self, units: u64) {
         let Some(progress) = self.progress else { return };
         let done = self.done.fetch_add(units, Ordering::Relaxed).saturating_add(units);

@@ -1,4 +1,4 @@
-//! Damaged parts are copied or moved aside. Nothing there is ever overwritten or removed.
+//! Quarantine: a folder for copies of damaged parts. Nothing there is ever overwritten or removed.
 
 use std::io;
 

@@ -1,4 +1,4 @@
-//! Reading files of which parts can't be read, as happens with bad sectors.
+//! Reads files with unreadable parts, such as bad sectors.
 
 use std::io;
 use std::ops::Range;

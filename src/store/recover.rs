@@ -1,4 +1,4 @@
-//! A world from what was found of it: regions of the last checkpoint, then the journal's tail, verified frame by frame.
+//! Recovers a world from its files: regions of the last checkpoint, then the journal's tail, verified frame by frame.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -35,10 +35,10 @@ const DECODE: u64 = 1;
 const RESTORE: u64 = 2;
 const REPLAY: u64 = 32;
 
-/// A world as it was recovered.
+/// A recovered world.
 pub(super) struct Recovered {
     pub terrain: Terrain,
-    /// Says which regions differ from their records.
+    /// Its mirror, which knows the regions that differ from their records.
     pub mirror: Mirror,
     /// The last frame that it contains.
     pub frame: u64,
@@ -46,32 +46,32 @@ pub(super) struct Recovered {
     pub checkpoint: u64,
     /// Commits that were replayed.
     pub replayed: u64,
-    /// Can damaged regions be rebuilt from the log?
+    /// Whether damaged regions can be rebuilt from the log.
     pub is_log_whole: bool,
     /// Whether the log reaches from the first commit to the checkpoint, and leads elsewhere.
     pub has_other_log: bool,
-    /// Are its records, or its log, those of another world than it is now?
+    /// Whether its records or its log belong to another world than the present one.
     pub is_new: bool,
     pub findings: Findings,
     /// Why the frame after the last one was refused.
     pub refused: Option<String>,
 }
 
-/// What a recovery found that should be reported.
+/// Findings of a recovery that should be reported.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Findings {
     /// Damaged regions that were rebuilt or lost, and whether they are lost.
     pub damaged: Vec<RegionPos>,
     pub is_lossy: bool,
-    /// Regions over another ground than they were saved with, if the ground is another one, and whether edits were made anew.
+    /// Set if the ground changed since the save: the number of affected regions, and how they were converted.
     pub base_changed: Option<(usize, &'static str)>,
-    /// Commits that another [`SIMULATION`](crate::terrain::SIMULATION) made, and that were made again.
+    /// Commits of another [`SIMULATION`](crate::terrain::SIMULATION) that were replayed.
     pub remade: Option<u64>,
     /// Whether everything but the regions is lost.
     pub has_lost_rest: bool,
 }
 
-/// How far a world is replayed, and whether it is compared with the log.
+/// The end of a replay, and whether the world is compared with the log.
 struct Replayed {
     terrain: Terrain,
     game: GameData,
@@ -81,7 +81,7 @@ struct Replayed {
     refused: Option<String>,
 }
 
-/// Makes a world of what was found.
+/// Recovers a world from its files.
 pub(super) fn recover(
     contents: &Contents,
     ground: &Arc<Ground>,
@@ -121,7 +121,7 @@ pub(super) fn recover(
     let is_same_ground = checkpoint.metadata.ground == ground.hash() || has_lost_rest;
     let other_level = BaseLevel::expect(level, checkpoint.level.as_ref());
     let is_same_base = is_same_ground && other_level.is_ok();
-    // What follows the checkpoint was made by other rules of how edits change the ground: it can be made again, but not verified.
+    // Commits after the checkpoint were made by another simulation: they can be replayed, but not verified.
     let is_remade = is_same_base && tail.iter().any(|frame| frame.base != base);
     let size = GroundSize::of(ground);
     let other_size = checkpoint.cells.filter(|saved| *saved != size);
@@ -368,8 +368,8 @@ fn load_regions(
         fit_fields(&mut change, grid);
     }
     if !is_same_level || checkpoint.metadata.ground != ground.hash() {
-        // Fields of two levels may overlap, and have one name: the new one's go on, and grow. Beyond the rim of a smaller ground, edits
-        // reach into more chunks.
+        // Fields of two levels may overlap and have one name: those of the new level continue, and grow. Beyond the rim
+        // of a smaller ground, edits reach into more chunks.
         change.cover(grid);
     }
     let parts = WorldParts {
@@ -483,7 +483,7 @@ fn replay(
     Ok(Replayed { terrain, game, records, frame: last, commits, refused })
 }
 
-/// Does again what a record was asked for, on a world that is not the one it was made on.
+/// Replays a record on a world that differs from the one it was made on.
 fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), ReplayError> {
     for entry in &record.entries {
         match entry {
@@ -514,7 +514,7 @@ fn reach(change: &WorldChange) -> Option<GroundSize> {
 }
 
 impl Findings {
-    /// What to report, given where copies of damaged records are, what is wrong with the file of regions, and where that is kept.
+    /// The troubles to report, given the copies of damaged records, the damage of the file of regions, and its copy.
     pub fn troubles(
         &self,
         copies: &BTreeMap<RegionPos, String>,
@@ -554,8 +554,8 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::store::format::frame::WorldId;
 
-    /// Writes the frames of a journal anew, as a version with another simulation would have written them: on another base, and with
-    /// other hashes.
+    /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,
+    /// and with other hashes.
     fn by_another_simulation(disk: &SimulatedDisk, world: WorldId, ground: &Ground) {
         for number in segment::list(disk).unwrap() {
             let found = segment::read(disk, Some(world), number).unwrap();

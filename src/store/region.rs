@@ -1,4 +1,4 @@
-//! A part of a world that is saved by itself.
+//! Regions: the parts of a world that are saved separately.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::lattice::{BrickPos, ChunkPos};
 use crate::volume::{Brick, Fields};
 
-/// What is saved of a region in one record.
+/// The content of a region's record.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Region {
     /// Its bricks.
@@ -15,12 +15,12 @@ pub(super) struct Region {
     pub fields: BTreeMap<ChunkPos, Fields>,
     /// The revision that changed it last.
     pub revision: u64,
-    /// Has it a record? Not where it is as in the level below.
+    /// Whether it has a record. A region that equals the level below has none.
     pub is_stored: bool,
 }
 
 impl Region {
-    /// Does it hold neither bricks nor fields?
+    /// Whether it holds neither bricks nor fields.
     pub fn is_empty(&self) -> bool {
         self.bricks.is_empty() && self.fields.is_empty()
     }

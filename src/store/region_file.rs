@@ -1,4 +1,4 @@
-//! The file of regions as the store's thread writes it: changed in place by transactions, or replaced as a whole.
+//! Writes the file of regions: by transactions in place, or by replacing the whole file.
 
 use std::io;
 
@@ -40,7 +40,7 @@ impl RegionFile {
         Self { next: Next::Whole(Old::Quarantined), least_frame, ..Self::new() }
     }
 
-    /// Lets the next checkpoint, which has to hold all regions, make the file as small as it can be.
+    /// Makes the next checkpoint, which has to hold all regions, write the file as small as possible.
     pub fn compact_next(&mut self) {
         if self.next == Next::InPlace {
             self.next = Next::Compact;
@@ -94,7 +94,7 @@ impl RegionFile {
                 if open.has_failed() {
                     self.next = Next::Whole(Old::Removed);
                 }
-                // It takes nothing more after an error, and has to be opened anew.
+                // After an error it accepts no writes, and has to be opened again.
                 self.open = None;
             }
             return written;

@@ -1,18 +1,18 @@
-//! How a file takes the place of another: the only way in which one is ever replaced.
+//! Replacing a file by another one: the only way in which files are ever replaced.
 //!
-//! 1. The new file is written beside the old one, whole, and made durable.
+//! 1. The complete new file is written next to the old one, and made durable.
 //! 2. The old one is moved to quarantine, or removed where the new one holds all that it held.
 //! 3. The new one gets its name.
 //!
-//! At each moment at least one of them is complete. Where a step was interrupted, [recovery](super::sources) reads whichever is
-//! there, and the next replacement finishes the step first.
+//! At each moment at least one of them is complete. If a step was interrupted, [recovery](super::sources) reads the
+//! file that is there, and the next replacement finishes the step first.
 
 use std::io;
 
 use super::files::{Files, Opening};
 use super::quarantine;
 
-/// What becomes of the file that is replaced.
+/// The treatment of the replaced file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Old {
     /// It may be damaged: it is kept in quarantine.
@@ -31,8 +31,8 @@ pub(super) struct Replaced<'a> {
 }
 
 impl Replaced<'_> {
-    /// Replaces the file by one that `build` writes at the path that it is given, and makes durable. Returns where the old one is
-    /// kept, if it is. `is_complete` says of an unfinished file whether it may take the place of the old one.
+    /// Replaces the file by one that `build` writes at the path that it is given, and makes durable. Returns the path
+    /// of the kept old file, if there is one. `is_complete` checks whether an unfinished file may replace the old one.
     pub fn replace<E: From<io::Error>>(
         self,
         files: &dyn Files,
@@ -45,7 +45,7 @@ impl Replaced<'_> {
         if files.exists(self.unfinished)? {
             if is_complete() {
                 kept = self.put_in_place(files, old)?;
-                // What is there now is complete.
+                // The present file is complete.
                 old = Old::Removed;
             } else if files.exists(self.path)? {
                 files.remove(self.unfinished)?;
@@ -54,7 +54,7 @@ impl Replaced<'_> {
             }
         }
         if let Err(error) = build(self.unfinished) {
-            // What is left of it takes space, and is removed at the next try at the latest.
+            // The unfinished file takes space, and is removed at the next try at the latest.
             drop(files.remove(self.unfinished));
             return Err(error);
         }
@@ -62,10 +62,10 @@ impl Replaced<'_> {
         Ok(kept.or(last))
     }
 
-    /// Lets the unfinished file, which is complete, take the place of the old one.
+    /// Replaces the old file by the unfinished one, which is complete.
     fn put_in_place(self, files: &dyn Files, old: Old) -> io::Result<Option<String>> {
         let folder = self.path.rsplit_once('/').map_or("", |(folder, _)| folder);
-        // A process that was killed may not have come so far.
+        // A killed process may not have synced it.
         files.open(self.unfinished, Opening::Existing)?.sync()?;
         files.sync_folder(folder)?;
         let mut kept = None;

@@ -1,4 +1,4 @@
-//! What can still be read of a damaged database: its records are found by their magic, wherever they lie in the file.
+//! Salvages records of a damaged database by searching for their magic number in the whole file.
 
 use super::format::FormatError;
 use super::format::frame;

@@ -1,4 +1,4 @@
-//! Segments of the journal: files of frames, one after the other. Frames are numbered from 1 on through all segments.
+//! Segments of the journal: files with sequences of frames. Frames are numbered from 1 through all segments.
 //!
 //! | bytes | of each entry |
 //! | --- | --- |
@@ -39,7 +39,8 @@ pub(super) fn path(segment: u64) -> String {
     format!("{FOLDER}/{segment:08}.log")
 }
 
-/// The greatest number of a segment, a frame or a revision that is read: others follow without an overflow. Nobody gets so far.
+/// The greatest number of a segment, a frame or a revision that is read, so that counting cannot overflow. No real
+/// world reaches it.
 pub(super) const MOST_NUMBER: u64 = 1 << 60;
 
 /// The segment with this file name. Files that somebody else put there have other names.
@@ -113,7 +114,7 @@ impl Frame {
     }
 }
 
-/// A part of a segment that is no entry.
+/// A part of a segment that is not an entry.
 #[derive(Clone, Debug)]
 pub(super) struct Bad {
     pub range: Range<usize>,
@@ -130,7 +131,7 @@ pub(super) struct Found {
     /// Its head as it is stored.
     head: Option<Box<[u8]>>,
     pub frames: Vec<Frame>,
-    /// What is no entry.
+    /// Parts that are not entries.
     pub bad: Vec<Bad>,
     pub length: usize,
     /// The schema of a frame that is newer than what can be read.

@@ -1,4 +1,4 @@
-//! Getting a journal ready to go on behind the last frame that is part of the world.
+//! Prepares a journal to continue after the last frame that is part of the world.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -16,7 +16,7 @@ use super::segment::{self, Found};
 use super::unsaved;
 use crate::lattice::RegionPos;
 
-/// A journal that can go on.
+/// A journal that can continue.
 pub(super) struct Settled {
     pub segments: Vec<Segment>,
     pub next_frame: u64,
@@ -27,7 +27,7 @@ pub(super) struct Settled {
     pub troubles: Vec<StoreTrouble>,
 }
 
-/// Puts aside what is not part of a world, and makes sure that the rest is durable.
+/// Moves data that is not part of a world to quarantine, and makes the rest durable.
 pub(super) fn settle(files: &dyn Files, contents: &Contents, recovered: &Recovered) -> Settled {
     let mut copies = BTreeMap::<RegionPos, String>::new();
     let (mut failed, mut told) = (None, Vec::new());
@@ -132,7 +132,8 @@ fn cut_journal(
     Ok(())
 }
 
-/// What was read may be in the system's memory only, if the process was killed but the power stayed.
+/// Syncs segments, because data that was read may be in the system's cache only, if the process was killed without a
+/// loss of power.
 fn sync_tail(files: &dyn Files, segments: &[Segment], checkpoint: u64) -> io::Result<()> {
     for tail in segments.iter().filter(|segment| segment.last_frame > checkpoint) {
         files.open(&segment::path(tail.number), Opening::Existing)?.sync()?;

@@ -1,4 +1,4 @@
-//! What the store's thread reports, and data of the game's.
+//! State that the store shares with its thread: reports, and the game's data.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 
 use super::error::StoreTrouble;
 
-/// What the game put into a world, by key.
+/// The game's data in a world, by key.
 pub(super) type GameData = BTreeMap<String, Vec<u8>>;
 
-/// A value of the game's that changes; `None` removes it.
+/// A change of the game's data; `None` removes the value.
 pub(super) type GameChange = (String, Option<Vec<u8>>);
 
-/// What the game has put, changed by these.
+/// Applies changes to the game's data.
 pub(super) fn apply_game(data: &mut GameData, changes: &[GameChange]) {
     for (key, value) in changes {
         match value {
@@ -22,15 +22,16 @@ pub(super) fn apply_game(data: &mut GameData, changes: &[GameChange]) {
     }
 }
 
-/// A moment in what a [`Store`](super::Store) was given: everything up to it is durable, or not yet.
+/// A point in the sequence of data that a [`Store`](super::Store) was given, to ask whether everything up to it is
+/// durable.
 ///
-/// Revisions alone can't say so. They begin again where another terrain takes the place of the one that was saved, and data that the
-/// game puts has none. Points are ordered by when they were given to the store.
+/// Revisions alone do not suffice: they start again if another terrain replaces the saved one, and the game's
+/// data has none. Points are ordered by the time at which they were given to the store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SavePoint {
-    /// How often anything was given to the store.
+    /// How often the store was given data.
     pub(super) number: u64,
-    /// How often another terrain took the place of the one before.
+    /// How often another terrain replaced the previous one.
     pub(super) terrain: u64,
     pub(super) revision: u64,
 }
@@ -47,7 +48,7 @@ impl SavePoint {
     }
 }
 
-/// What the thread reports.
+/// The thread's report.
 #[derive(Debug, Default)]
 pub(super) struct Shared(Mutex<Report>);
 
@@ -87,7 +88,7 @@ impl Shared {
         self.report().durable
     }
 
-    /// Enters that everything up to a point is durable. What is durable stays so: an earlier point changes nothing.
+    /// Records that everything up to a point is durable. An earlier point changes nothing.
     pub fn set_durable(&self, point: SavePoint) {
         let mut report = self.report();
         report.durable = report.durable.max(Some(point));
@@ -97,7 +98,7 @@ impl Shared {
         self.report().tell(trouble);
     }
 
-    /// Enters why saving fails, or that it works.
+    /// Sets the reason why saving fails, or `None` if it works.
     pub fn set_failing(&self, why: Option<&str>) {
         self.report().failing = why.map(Into::into);
     }
@@ -107,7 +108,7 @@ impl Shared {
         self.report().failing.clone()
     }
 
-    /// The thread waits for the disk, which should take no longer than this.
+    /// Records that the thread waits for the disk, and for how long at most.
     pub fn begin_waiting(&self, longest: Duration) {
         self.report().answer_due = Instant::now().checked_add(longest);
     }

@@ -1,4 +1,4 @@
-//! Files that may hold the regions of a world: the one that is in place, and what an interrupted step or damage left beside it.
+//! Files that may hold the regions of a world: the current one, and others that an interrupted step or damage left.
 
 use std::io;
 
@@ -84,7 +84,7 @@ fn salvage(bytes: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
     records
 }
 
-/// Whether a record is what its key says; the world that it belongs to.
+/// Whether a record matches its key; and the world that it belongs to.
 pub(super) fn check(key: &[u8], record: &[u8]) -> Result<WorldId, FormatError> {
     let world = frame::peek(record).map(|peeked| peeked.world).unwrap_or_default();
     let open = |kind| frame::open(record, kind, world, key, FRAME_LIMIT).map(drop);
@@ -119,7 +119,7 @@ pub(super) fn is_complete(files: &dyn Files, path: &str, least_frame: u64) -> bo
     }
 }
 
-/// The files beside the one in place that may hold regions, the most recent first.
+/// Other files that may hold regions, the most recent first.
 pub(super) fn others(files: &dyn Files) -> io::Result<impl Iterator<Item = String>> {
     let kept = quarantine::of(files, DATABASE)?.into_iter().chain(quarantine::of(files, UNFINISHED)?);
     Ok(std::iter::once(UNFINISHED.to_owned()).chain(kept.take(MOST_KEPT)))

@@ -1,6 +1,6 @@
-//! A file that says that commits are in the journal only, so that a journal that somebody removed is missed.
+//! A marker file for commits that are in the journal only, so that a removed journal is noticed.
 //!
-//! It is there from the first frame that is durable after a world is opened until the world is closed with all of it in a
+//! It exists from the first durable frame after a world is opened until the world is closed with everything in a
 //! checkpoint, and holds the number of the segment of that frame, twice.
 
 use std::io;
@@ -10,7 +10,7 @@ use super::files::{Files, Opening};
 /// Its path.
 pub(super) const UNSAVED: &str = "unsaved";
 
-/// Enters that a segment holds commits that may be in no checkpoint.
+/// Records that a segment holds commits that may not be in a checkpoint.
 pub(super) fn enter(files: &dyn Files, segment: u64) -> io::Result<()> {
     if files.exists(UNSAVED)? {
         // That of a process that was killed names an earlier segment.
@@ -22,7 +22,7 @@ pub(super) fn enter(files: &dyn Files, segment: u64) -> io::Result<()> {
     files.sync_folder("")
 }
 
-/// Enters that all commits are in a checkpoint.
+/// Records that all commits are in a checkpoint.
 pub(super) fn clear(files: &dyn Files) -> io::Result<()> {
     if files.exists(UNSAVED)? {
         files.remove(UNSAVED)?;

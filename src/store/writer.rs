@@ -1,4 +1,4 @@
-//! The store's thread: collects records, writes frames and checkpoints, and tries again what fails.
+//! The store's thread: collects records, writes frames and checkpoints, and retries failed writes.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -29,34 +29,34 @@ const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_
 const FRAME_TIME: Duration = Duration::from_secs(3);
 pub(super) const CHECKPOINT_TIME: Duration = Duration::from_secs(30);
 
-/// Where the answer to a request goes: the revision that is durable then.
+/// The channel for the answer to a request: the durable revision.
 pub(super) type Answer = Sender<Result<u64, StoreError>>;
 
-/// What the thread is told.
+/// A message to the thread.
 pub(super) enum Message {
-    /// What has to be saved.
+    /// Saves this.
     Save(Given),
-    /// Makes all that was told so far durable.
+    /// Makes all earlier messages durable.
     Flush(Answer),
-    /// Makes a checkpoint of all that was told so far.
+    /// Makes a checkpoint of all earlier messages.
     Checkpoint(Answer),
-    /// The same, and makes the database as small as it can be.
+    /// Makes a checkpoint, and makes the database as small as possible.
     Compact(Answer),
 }
 
-/// Something that has to be saved, in one piece.
+/// Data that has to be saved together.
 pub(super) struct Given {
-    /// Where this leads to.
+    /// The point that it leads to.
     pub point: SavePoint,
     pub content: Content,
-    /// What the game put beside it.
+    /// The game's data for it.
     pub game: Vec<GameChange>,
 }
 
-/// What was given of the world.
+/// The given content of the world.
 pub(super) enum Content {
     Commits(Vec<CommitRecord>),
-    /// All of the world, since records are missing, its ground, and its hash.
+    /// The whole world, because records are missing, its ground, and its hash.
     Whole(Box<WorldParts>, Arc<Ground>, u64),
 }
 
@@ -84,7 +84,7 @@ fn game_bytes((key, value): &GameChange) -> usize {
     key.len() + value.as_ref().map_or(0, Vec::len)
 }
 
-/// What fails, and when it is tried again.
+/// The present failure, and the time of the next try.
 struct Failing {
     wait: Duration,
     again: Instant,
@@ -138,16 +138,17 @@ pub(super) struct Writer {
     _lock: Box<dyn Lock>,
 }
 
-/// What changes while the thread runs.
+/// The state of the thread.
 #[derive(Default)]
 pub(super) struct State {
     pending: Pending,
     /// Commits since the last checkpoint, and when the first of them came.
     pub commits: u64,
     pub changed: Option<Instant>,
-    /// Are commits missing in the journal since the last checkpoint, so that only a checkpoint makes them durable?
+    /// Whether commits since the last checkpoint are missing in the journal, so that only a checkpoint makes them
+    /// durable.
     pub has_gap: bool,
-    /// Is a checkpoint being made that ends a gap? Frames are durable with it only.
+    /// Whether a checkpoint is being made that ends a gap. Frames become durable only with it.
     pub after_gap: bool,
     /// Up to where frames were written since the last checkpoint was begun.
     pub written: Option<SavePoint>,
@@ -198,7 +199,7 @@ impl Writer {
         self.checkpoint(None)
     }
 
-    /// The same, or else as soon as it can be done.
+    /// Saves the whole world now, or as soon as possible.
     pub fn save_all_or_later(&mut self) {
         self.mirror.mark_all();
         if self.checkpoint(None).is_err() {
@@ -206,8 +207,8 @@ impl Writer {
         }
     }
 
-    /// Lets the journal go on in a new segment. The first one of all begins with the state of now, so that a world can be made of
-    /// the log alone; in others that would only take room away from commits.
+    /// Continues the journal in a new segment. The very first segment begins with the present state, so that a world
+    /// can be made from the log alone; in others this would only reduce the room for commits.
     pub fn begin_segment(&mut self) {
         let mut checkpoint = Vec::new();
         if !self.journal.has_segments() {
@@ -221,7 +222,7 @@ impl Writer {
         self.journal.begin_segment(self.mirror.revision, checkpoint);
     }
 
-    /// Does what it is told until nobody can tell it anything any more, and then makes a last checkpoint.
+    /// Handles messages until the channel is closed, and then makes a last checkpoint.
     pub fn run(mut self, messages: &Receiver<Message>) {
         loop {
             let message = match self.state.later.pop_front() {
@@ -238,7 +239,7 @@ impl Writer {
             }
             self.tick(messages);
         }
-        // What can't be saved now is lost with the process; the game was told.
+        // Data that can't be saved now is lost with the process; the game was notified.
         let mut is_saved = self.flush().is_ok();
         if is_saved && self.is_changed() {
             is_saved = self.checkpoint(None).is_ok();
@@ -249,12 +250,12 @@ impl Writer {
         }
     }
 
-    /// Is there anything that the database does not hold?
+    /// Whether the database lacks any changes.
     fn is_changed(&self) -> bool {
         self.mirror.is_dirty() || self.state.has_gap || self.journal.last_frame() > self.checkpoints[1]
     }
 
-    /// When there is something to do.
+    /// The time of the next work.
     fn next_time(&self) -> Option<Instant> {
         if let Some(failing) = &self.state.failing {
             return Some(failing.again);
@@ -262,17 +263,17 @@ impl Writer {
         [self.frame_due(), self.checkpoint_due()].into_iter().flatten().min()
     }
 
-    /// When what waits has to be written.
+    /// The time at which waiting records have to be written.
     fn frame_due(&self) -> Option<Instant> {
         self.state.pending.since?.checked_add(self.options.loss_window)
     }
 
-    /// When a checkpoint has to be made.
+    /// The time at which a checkpoint has to be made.
     fn checkpoint_due(&self) -> Option<Instant> {
         self.state.changed?.checked_add(self.options.checkpoint_after)
     }
 
-    /// Does what is due.
+    /// Does the work that is due.
     fn tick(&mut self, messages: &Receiver<Message>) {
         let now = Instant::now();
         if let Some(failing) = &self.state.failing {
@@ -315,7 +316,7 @@ impl Writer {
         drop(answer.send(done.map(|()| revision())));
     }
 
-    /// Makes all that came so far durable, by the log if that has no gap.
+    /// Makes everything received durable, through the log if that has no gap.
     fn make_durable(&mut self, messages: &Receiver<Message>) -> Result<(), StoreError> {
         if !self.state.has_gap {
             self.flush()?;
@@ -323,7 +324,7 @@ impl Writer {
         if self.state.has_gap { self.checkpoint(Some(messages)) } else { Ok(()) }
     }
 
-    /// Takes in what has to be saved.
+    /// Accepts data that has to be saved.
     fn enter(&mut self, given: Given) {
         self.shared.remove_queued(given.bytes());
         let Given { point, content, game } = given;
@@ -371,7 +372,7 @@ impl Writer {
         self.state.pending.push(record);
     }
 
-    /// Gives up what waits for the journal: only a checkpoint makes it durable now.
+    /// Drops the records that wait for the journal: now only a checkpoint makes them durable.
     fn leave_gap(&mut self) {
         if !self.state.has_gap {
             let revision = self.shared.durable().map_or(0, SavePoint::revision);
@@ -381,7 +382,7 @@ impl Writer {
         self.checkpoint_soon();
     }
 
-    /// Lets the next tick make a checkpoint, since only that makes durable what came.
+    /// Makes the next tick write a checkpoint, because only that makes received data durable.
     fn checkpoint_soon(&mut self) {
         self.state.changed.get_or_insert_with(Instant::now);
         if self.state.failing.is_none() {
@@ -390,7 +391,7 @@ impl Writer {
         }
     }
 
-    /// Lets the world stand on another ground from now on.
+    /// Changes the ground of the world.
     fn take_ground(&mut self, ground: Arc<Ground>) {
         if ground.hash() != self.ground.hash() {
             self.journal.set_base(base(&ground, self.mirror.level.as_ref()));
@@ -406,7 +407,8 @@ impl Writer {
         self.state.has_gap = true;
     }
 
-    /// Puts what waits into a frame, and makes all frames durable; or leaves a gap, if it is too much for a frame.
+    /// Writes waiting records to a frame, and makes all frames durable; or leaves a gap, if they are too large for a
+    /// frame.
     pub(super) fn flush(&mut self) -> Result<(), StoreError> {
         let pending = std::mem::take(&mut self.state.pending);
         if !pending.batch.is_empty() {
@@ -432,7 +434,7 @@ impl Writer {
                 Ok(())
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                // What was durable is gone with the file.
+                // Durable commits are lost with the file.
                 self.leave_gap();
                 Err(self.fail(&error.to_string()))
             }
@@ -440,7 +442,7 @@ impl Writer {
         }
     }
 
-    /// Takes in what came during a checkpoint, and writes it in time.
+    /// Accepts messages during a checkpoint, and writes their data in time.
     pub(super) fn listen(&mut self, messages: &Receiver<Message>) {
         loop {
             match messages.try_recv() {
@@ -457,7 +459,7 @@ impl Writer {
         }
     }
 
-    /// Tells of a failure once, and waits longer each time.
+    /// Reports a failure once, and waits longer each time.
     pub(super) fn fail(&mut self, why: &str) -> StoreError {
         let wait = match &self.state.failing {
             Some(failing) => (failing.wait * 2).min(RETRY.1),

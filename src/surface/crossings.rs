@@ -89,7 +89,7 @@ fn solid_materials(ends: &[LayerBits; 9], ground: &Ground, low: IVec3) -> SolidM
 /// [`Layers`](crate::volume::Layers). Only those at solid ends of edges are filled in.
 type SolidMaterials = [[[MaterialId; 64]; 4]; 9];
 
-/// What the vertices of a block are made from.
+/// The input for the vertices of a block.
 struct Site<'a, 'b> {
     samples: &'a PaddedSamples,
     stack: &'a mut Stack<'b>,

@@ -1,4 +1,4 @@
-//! Marching cubes by the book: cube by cube.
+//! A simple reference implementation of marching cubes, cube by cube.
 //!
 //! [`block`](super::block) draws the same surface with the same bits, many times faster. [`mesh`] is what it is checked
 //! against, and what to read first.

@@ -1,4 +1,4 @@
-//! The seam validator: is everything that is drawn, together, one closed surface?
+//! The seam validator: checks that everything drawn together is one closed surface.
 //!
 //! Vertices are welded where their world positions are the same, which is where the GPU gets the same bits. The outer
 //! rim of the world may be open; everything else must be closed, consistently oriented and manifold.

@@ -25,9 +25,9 @@ pub(super) struct Stack<'a> {
     /// Lattice edges along x, y and z on the mask's border, once [`Self::is_border`] has been asked.
     borders: Option<[u128; 3]>,
     view: WorldView<'a>,
-    /// What [`Self::normal`] has computed.
+    /// Results of [`Self::normal`].
     normals: [Option<Vec3>; 81],
-    /// What [`Self::mixes`] has computed.
+    /// Results of [`Self::mixes`].
     mixes: [Option<[MaterialMix; 2]>; 81],
     /// The material of all columns of the world, if they have only one.
     single: Option<MaterialMix>,
@@ -81,7 +81,7 @@ impl<'a> Stack<'a> {
         self.low.offset(PLACES[corner].x, PLACES[corner].z)
     }
 
-    /// What all ground is made of, if it is the same everywhere.
+    /// The material of all ground, if it is the same everywhere.
     pub fn single_mix(&self) -> Option<MaterialMix> {
         self.single
     }
@@ -106,7 +106,7 @@ impl<'a> Stack<'a> {
         })
     }
 
-    /// What a corner's column is made of: near the surface, and deeper than the overlay.
+    /// The materials of a corner's column: near the surface, and below the overlay.
     pub fn mixes(&mut self, corner: usize) -> [MaterialMix; 2] {
         let column = self.column(corner);
         *self.mixes[corner].get_or_insert_with(|| {

@@ -1,4 +1,4 @@
-//! The result of a transaction, and how it becomes the world.
+//! The result of a transaction, and its installation into the world.
 
 use std::fmt;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::volume::UniformBricks;
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
 pub struct Commit {
     pub(super) ticket: u64,
-    /// What groups of edits put in place one after the other, or a step through history.
+    /// The parts installed by groups of edits, in order, or by a step through history.
     pub(super) changes: Vec<UndoDelta>,
     pub(super) sample_hash: u64,
     /// The pool of uniform bricks, if it has grown.
@@ -70,7 +70,7 @@ pub(super) struct Installed {
     pub step: Option<HistoryReceipt>,
     /// The receipt of the parts that it replaced.
     pub put: Option<Result<Restored, ChangeError>>,
-    /// What each group replaced that replaced something.
+    /// The replaced parts of each group, if it replaced any.
     pub replaced: Vec<UndoDelta>,
 }
 

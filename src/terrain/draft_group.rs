@@ -9,7 +9,7 @@ use crate::brush::{Edit, Operation};
 use crate::edits::{Draft, Drafter, MergedBricks};
 use crate::volume::DiggingRules;
 
-/// What the search after an edit found.
+/// The result of the search after an edit.
 #[derive(Default)]
 pub(super) struct Found {
     pub pieces: Vec<LoosePiece>,
@@ -17,7 +17,7 @@ pub(super) struct Found {
     pub has_unsearched: bool,
 }
 
-/// What the searches found, by the number of the edit before them. Those that found nothing are left out.
+/// The results of searches by the number of the edit before them, without empty ones.
 pub(super) type LoosePieces = BTreeMap<usize, Found>;
 
 /// Drafts a group of edits over the current samples.

@@ -1,6 +1,6 @@
-//! What is drawn of a world with levels of detail, and what a commit changes of it.
+//! The drawn nodes of a world with levels of detail, and the updates by a commit.
 //!
-//! A node of a coarser level has a mesh of its own. One of level 0 is drawn by its tile and chunks, as without levels, or
+//! A node of a coarser level has one mesh. A node of level 0 is drawn by its tile and chunks, as without levels, or
 //! where the seam towards a coarser node needs it, by one mesh that holds all of them.
 
 use std::borrow::Cow;
@@ -15,7 +15,7 @@ use crate::lattice::TilePos;
 use crate::levels::{Cut, Node};
 use crate::surface::SurfaceMesh;
 
-/// What is drawn of a world: the nodes of a cut.
+/// The drawn part of a world: the nodes of a cut.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DrawnCut {
     pub(super) cut: Cut,
@@ -29,13 +29,13 @@ impl DrawnCut {
         &self.cut
     }
 
-    /// Are a tile and its chunks drawn as they are, each with a mesh of its own?
+    /// Whether a tile and its chunks are drawn as separate meshes.
     pub fn shows_parts(&self, tile: TilePos) -> bool {
         self.cut.contains(Node::over(tile, 0)) && !self.joined.contains(&tile)
     }
 }
 
-/// What a node is drawn with after a commit.
+/// The meshes of a node after a commit.
 #[derive(Clone)]
 pub struct NodeUpdate {
     /// The node.
@@ -44,7 +44,7 @@ pub struct NodeUpdate {
     pub mesh: Option<Arc<SurfaceMesh>>,
     /// Tile and chunks that are drawn from now on.
     pub(crate) shown: Vec<(Drawn, SurfaceDraft)>,
-    /// Tile and chunks that may have been drawn, and are no more.
+    /// Tile and chunks that may have been drawn before and no longer are.
     pub hidden: Vec<Drawn>,
 }
 
@@ -66,11 +66,11 @@ impl fmt::Debug for NodeUpdate {
     }
 }
 
-/// Says which cut comes next, given the world and the cut that is drawn; called in the transaction.
+/// Chooses the next cut from the world and the cut that is drawn; called in the transaction.
 pub type ChooseCut = dyn Fn(&World, &Cut) -> Cut + Send + Sync;
 
 impl DrawnCut {
-    /// What is drawn once these updates are, of a cut.
+    /// The state after these updates have been applied, for a new cut.
     pub(super) fn after(&self, cut: Cut, updates: &[NodeUpdate]) -> Self {
         let mut joined = self.joined.clone();
         for update in updates.iter().filter(|update| update.node.level == 0) {

@@ -1,4 +1,4 @@
-//! The plugin's interface to a terrain, beside the public one.
+//! The plugin's interface to a terrain, in addition to the public one.
 
 use std::sync::Arc;
 
@@ -13,12 +13,12 @@ use super::unseen::Unseen;
 use super::world::Version;
 
 impl Terrain {
-    /// Is a transaction under way that the plugin began?
+    /// Whether a transaction that the plugin began is running.
     pub(crate) fn waits_for_plugin(&self) -> bool {
         self.in_flight.as_ref().is_some_and(|waiting| waiting.is_plugins)
     }
 
-    /// Forgets what is queued and under way; all of it has been answered.
+    /// Drops queued and running work, for which all receipts have been sent.
     pub(crate) fn forget(&mut self) {
         self.in_flight = None;
         self.unseen = None;
@@ -62,38 +62,38 @@ impl Terrain {
         self.unseen = Some(Unseen::nothing(self.world.version()));
     }
 
-    /// What the game committed since `shown`; `None` where that is not known.
+    /// The changes that the game committed since `shown`; `None` if they are not known.
     pub(crate) fn take_unseen(&mut self, shown: Version) -> Option<Unseen> {
         let now = self.world.version();
         let unseen = self.unseen.replace(Unseen::nothing(now))?;
         (unseen.follows(shown) && unseen.version() == now).then_some(unseen)
     }
 
-    /// The commit that rejects all of the transaction with this ticket, because its task panicked; `None` if it is not under
-    /// way.
+    /// The commit that rejects everything in the transaction with this ticket, because its task panicked; `None` if it
+    /// is not running.
     pub(crate) fn rejected(&self, ticket: u64) -> Option<Commit> {
         let waiting = self.in_flight.as_ref().filter(|waiting| waiting.ticket == ticket)?;
         let work = waiting.work.clone();
         Some(self.transaction(ticket, work).rejected())
     }
 
-    /// Is the transaction of this ticket under way?
+    /// Whether the transaction with this ticket is running.
     pub(crate) fn waits_for(&self, ticket: u64) -> bool {
         self.in_flight.as_ref().is_some_and(|waiting| waiting.ticket == ticket)
     }
 
-    /// Forgets what is not shown yet; the plugin has to show all of the world again.
+    /// Drops changes that are not shown yet; the plugin then has to show the whole world again.
     pub(crate) fn forget_unseen(&mut self) {
         self.unseen = None;
     }
 
-    /// Draws a cut from now on, or all of the world in full; the plugin shows it.
+    /// Sets the cut to draw from now on, or the whole world in full detail; the plugin shows it.
     pub(crate) fn draw_from_now_on(&mut self, drawn: Option<Arc<DrawnCut>>) {
         self.drawn_cut = drawn;
     }
 
-    /// Takes the place of a terrain: takes over what waits in it, its engine, limits and budget of history. Edits that wait obey the
-    /// rules of this terrain.
+    /// Replaces a terrain: takes over its queue, engine, limits and undo budget. Queued edits obey the rules
+    /// of this terrain.
     #[cfg(feature = "store")]
     pub(crate) fn take_over(&mut self, old: &mut Self) {
         old.abandon();
@@ -109,7 +109,7 @@ impl Terrain {
         self.set_meshing(old.meshing());
     }
 
-    /// Commits a transaction of the plugin's, which shows it by itself. The caller may drop what is no longer needed elsewhere.
+    /// Commits a transaction that the plugin began and shows. The caller may drop the returned data on another thread.
     pub(crate) fn commit_shown(
         &mut self,
         commit: Commit,

@@ -39,10 +39,10 @@ struct Group<'a> {
     sample_hash: u64,
 }
 
-/// What each edit of a group did and cut off.
+/// The effects of each edit of a group, and the pieces that it cut off.
 type Effects = (Vec<EditEffect>, LoosePieces);
 
-/// What edits change besides bricks and meshes.
+/// The changes by edits in addition to bricks and meshes.
 struct Entered {
     receipts: Vec<Receipt>,
     news: Vec<(ChunkPos, FieldNews)>,
@@ -163,7 +163,7 @@ pub(super) fn edit(transaction: &Transaction, submissions: &[Submission], backen
     }
 }
 
-/// Enters what edits did into fields and receipts. Each group comes with the bricks that it changed.
+/// Updates fields and creates receipts from the effects of edits. Each group comes with the bricks that it changed.
 fn enter<'a>(
     world: &World,
     groups: impl Iterator<Item = ((&'a [Submission], &'a [DraftedBrick]), Effects)>,

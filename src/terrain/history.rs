@@ -18,7 +18,7 @@ use crate::volume::MaterialCounts;
 /// One step through a terrain's history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum HistoryStep {
-    /// Back to before the last group of edits: a stroke, or what was submitted together.
+    /// Undoes the last group of edits: a stroke, or edits that were submitted together.
     Undo,
     /// Repeats the step that was undone last.
     Redo,
@@ -29,7 +29,7 @@ pub enum HistoryStep {
 pub struct History {
     /// Steps that can be undone.
     pub undos: usize,
-    /// Steps that can be done again.
+    /// Steps that can be redone.
     pub redos: usize,
     /// Bytes that history alone holds. What it shares with the world is not counted.
     pub bytes: usize,
@@ -103,7 +103,7 @@ impl HistoryStep {
     }
 }
 
-/// What a group of edits, or a step through history, puts in place; once it is committed, what that replaced.
+/// The parts that a group of edits or a step through history installs; after the commit, the parts that it replaced.
 pub(super) struct UndoDelta {
     pub change: Change,
     /// A box around all of its bricks.
@@ -119,7 +119,7 @@ pub(super) struct UndoDelta {
 }
 
 impl UndoDelta {
-    /// A change by a group of edits, which replaces bricks of so many bytes.
+    /// A change by a group of edits; `replaced_bytes` is the size of the bricks that it replaces.
     pub fn new(
         change: Change,
         replaced_bytes: usize,
@@ -183,7 +183,8 @@ pub(super) struct UndoStack {
     budget: usize,
     /// Bytes of all steps.
     step_bytes: usize,
-    /// The greatest number of a group whose step was dropped for the budget: later edits of it are no step either.
+    /// The greatest number of a group whose step was dropped for the budget; later edits of this group are not
+    /// recorded.
     last_dropped: u64,
 }
 
@@ -200,7 +201,7 @@ impl UndoStack {
         }
     }
 
-    /// What the next step back or forth puts in place.
+    /// The parts that the next undo or redo installs.
     pub fn next(&self, step: HistoryStep) -> Option<&Arc<UndoDelta>> {
         match step {
             HistoryStep::Undo => self.undo.back(),
@@ -263,7 +264,7 @@ impl UndoStack {
         self.trim(dropped);
     }
 
-    /// A step was committed that put `used` in place; what it replaced is the step in the other direction.
+    /// Records a committed step that installed `used`; the parts that it replaced are the step in the other direction.
     pub fn record_step(
         &mut self,
         step: HistoryStep,
@@ -289,7 +290,7 @@ impl UndoStack {
         self.list(step).push_back(Arc::new(replaced));
     }
 
-    /// Drops the steps farthest from now, undo first, until the rest is within the budget.
+    /// Drops the steps farthest from the present, undo first, until the rest is within the budget.
     fn trim(&mut self, dropped: &mut DeferredDrop) {
         self.shrink();
         while self.bytes() > self.budget {

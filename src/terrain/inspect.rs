@@ -1,4 +1,4 @@
-//! Queries for debug views: the parts of a world near a place.
+//! Queries for debug views: the parts of a world near a position.
 
 use glam::{IVec3, Vec3};
 use rustc_hash::FxHashMap;

@@ -1,4 +1,4 @@
-//! What is known of the nodes of a world's quadtree, and the cuts that eyes need by it.
+//! A cache of facts about the nodes of a world's quadtree, and the choice of cuts from them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
@@ -11,11 +11,11 @@ use super::level_meshes::GroundFacts;
 use super::world::{Version, World};
 use crate::levels::{Choice, Cut, Eye, LevelGrid, Node, NodeFacts};
 
-/// How many nodes are known before any is forgotten.
+/// The number of cached nodes above which some are dropped.
 const KEPT_NODES: usize = 32_768;
 
-/// What is known of nodes, shared with tasks. Heights and errors depend on the ground alone, and are kept for nodes that were
-/// drawn once, until there are too many.
+/// Cached facts about nodes, shared with tasks. Heights and errors depend on the ground alone, and are kept for nodes
+/// that were drawn once, until there are too many.
 #[derive(Default)]
 pub struct KnownNodes {
     facts: RwLock<FxHashMap<Node, GroundFacts>>,

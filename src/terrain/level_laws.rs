@@ -40,7 +40,7 @@ fn split(cut: &Cut, node: Node) -> Option<Cut> {
     (gone == 1).then_some(finer)
 }
 
-/// What a world shows before and after a node splits.
+/// The drawn surface before and after a node splits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Counts {
     open: usize,
@@ -255,7 +255,7 @@ fn where_levels_meet_vertices_are_not_each_their_own() {
     assert!(jumps > 0);
 }
 
-/// What a running transaction lays over the world: its bricks, and its words of the mask.
+/// The bricks and words of the mask that a running transaction changes.
 fn overlay(world: &World, commit: &Commit) -> (Vec<(BrickPos, Arc<Brick>)>, Mask) {
     let (mut bricks, mut mask) = (BTreeMap::new(), Mask::default());
     for change in commit.changes.iter().map(|own| &own.change) {

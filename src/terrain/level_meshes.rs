@@ -10,7 +10,7 @@ use crate::surface::{SeamChecker, SeamReport, SurfaceMesh};
 /// Greatest width of a node in voxels: up to this width, 1/4096 of a voxel is exact in `f32`.
 const WIDEST: i32 = 4096;
 
-/// What of a node's [`NodeFacts`] depends on the ground alone.
+/// The part of a node's [`NodeFacts`] that depends on the ground alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GroundFacts {
     /// Its lowest and its highest point, in voxels.

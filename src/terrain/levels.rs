@@ -47,7 +47,7 @@ impl World {
         nodes
     }
 
-    /// The nodes that show some of these tiles, or border on them, drawn anew.
+    /// Redraws the nodes that show some of these tiles or border on them.
     #[cfg(feature = "plugin")]
     pub(crate) fn redraw_tiles(
         &self,
@@ -62,13 +62,13 @@ impl World {
     }
 }
 
-/// Nodes that are drawn anew, and what is drawn with them.
+/// The new cut and its redrawn nodes.
 pub(crate) type NodeChanges = (Arc<DrawnCut>, Vec<NodeUpdate>);
 
-/// What leads from one cut to another: the nodes that are gone, those that are new, and those that touch them.
+/// The updates that lead from one cut to another: removed nodes, new nodes, and nodes that touch them.
 pub(super) fn change_cut(world: &World, drawn: &DrawnCut, choose: &ChooseCut) -> NodeChanges {
     let chosen = choose(world, &drawn.cut);
-    // One of another quadtree leads nowhere.
+    // A cut of another quadtree has no relation to this one.
     let cut = if chosen.grid() == drawn.cut.grid() { chosen } else { drawn.cut.clone() };
     let state = State::committed(world);
     let step = drawn.cut.changes_to(&cut);
@@ -154,9 +154,9 @@ struct State<'a> {
     world: &'a World,
     view: WorldView<'a>,
     stacks: Stacks<'a>,
-    /// None of them where all is committed.
+    /// Empty if everything is committed.
     parts: NewParts<'a>,
-    /// The same by tile, once that is needed: most edits draw no node.
+    /// `parts` by tile. Computed on first use, because most edits draw no node.
     by_tile: OnceLock<FxHashMap<TilePos, NewOver<'a>>>,
 }
 
@@ -194,11 +194,11 @@ impl<'a> State<'a> {
         by_tile.get(&tile)
     }
 
-    /// What these nodes of a cut are drawn with. Nodes of level 0 that were and are drawn by their parts are left out, as parts
-    /// that change have updates of their own.
+    /// The meshes of these nodes of a cut. Nodes of level 0 that were and are drawn by their parts are left out,
+    /// because changed parts have their own updates.
     fn updates(&self, cut: &Cut, nodes: &[Node], shows_parts: impl Fn(TilePos) -> bool) -> Vec<NodeUpdate> {
         let view = LevelView::new(self.view, cut, self.stacks);
-        // Most often nothing is to be drawn near a dig: threads need not be asked.
+        // Most digs draw nothing here, so threads are not involved.
         let changing = nodes.iter().filter_map(|&node| {
             let is_plain = node.level == 0 && level::is_plain(&view, node);
             (!is_plain || !shows_parts(node.tile())).then_some((node, is_plain))
@@ -230,7 +230,7 @@ impl<'a> State<'a> {
         std::iter::once(Drawn::Tile(tile)).chain(chunks.into_iter().map(Drawn::Chunk)).collect()
     }
 
-    /// What a tile or chunk is made from.
+    /// The samples that a tile or chunk is built from.
     fn draft(&self, drawn: Drawn) -> SurfaceDraft {
         let new = self.new_over(drawn.tile());
         match drawn {

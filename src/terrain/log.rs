@@ -130,7 +130,7 @@ impl CommitLog {
         Self { records, sizes, bytes: 0, limit, terms: None, has_gap: false }
     }
 
-    /// Enters the commit that led to this world. Records that do not fit any longer are moved to `dropped`.
+    /// Records the commit that led to this world. Records that no longer fit are moved to `dropped`.
     pub fn enter(&mut self, world: &World, draft: RecordDraft, dropped: &mut Vec<CommitRecord>) {
         let RecordDraft { terms, mut entries, mut change, mut bytes } = draft;
         change.next_field = world.next_field;
@@ -143,7 +143,7 @@ impl CommitLog {
         self.push(record, bytes, dropped);
     }
 
-    /// Enters that these terms hold from now on, if others did.
+    /// Records new terms, if they differ from the previous ones.
     fn enter_terms(&mut self, world: &World, terms: Terms) {
         // The next edit logs them.
         if self.has_gap && self.records.is_empty() {
@@ -185,7 +185,7 @@ impl CommitLog {
 }
 
 impl Terrain {
-    /// From now on a record of each commit is kept until it is [taken](Self::take_log); `None` keeps none and
+    /// Keeps a record of each commit until it is [taken](Self::take_log); `None` keeps none and
     /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps, the
     /// oldest are dropped. A reader that finds a gap between [revisions](CommitRecord::revision), or whose
     /// last record does not have the [world's revision](super::World::revision), has to read [all of the
@@ -236,7 +236,7 @@ impl Terrain {
             && log.records.iter().any(sets_ground)
     }
 
-    /// Enters the terms of later edits into the log, unless edits wait that obey others.
+    /// Records the terms of later edits in the log, unless waiting edits obey other terms.
     pub(super) fn log_terms(&mut self) {
         if self.is_busy() || self.queue.len() > 0 {
             return;

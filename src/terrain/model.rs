@@ -170,7 +170,7 @@ impl Terrain {
         Arc::clone(&self.world)
     }
 
-    /// Lets edits that are submitted later search for pieces of ground that they cut off, which receipts then list.
+    /// Makes later edits search for pieces of ground that they cut off, which receipts then list.
     /// `None`, the default, turns that off. Terrains that must have equal worlds need equal settings.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
         self.loose = settings;

@@ -1,4 +1,4 @@
-//! Parts that are put in place of what a world holds: from a save, or from another machine that has the same world.
+//! Replaces parts of a world by parts from a save or from another machine with the same world.
 
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ pub enum ChangeError {
     /// A brick, or one of its edited samples, lies outside the world.
     #[error("the brick {0:?} extends beyond the world")]
     OutsideWorld(BrickPos),
-    /// A brick says of a pristine sample that it is solid where this ground is air, or the other way round.
+    /// A brick has a pristine sample that is solid where this ground is air, or vice versa.
     #[error("the brick {0:?} was made on a different ground")]
     OtherGround(BrickPos),
     /// Fields of a chunk reach out of it, it comes twice, or one of its fields has the name of another.
@@ -50,9 +50,9 @@ pub enum ChangeError {
     /// The world would not have the hash that was expected.
     #[error("the world would have the hash {found:#018x}, not {expected:#018x}")]
     Hash {
-        /// What it would have.
+        /// The hash that it would have.
         found: u64,
-        /// What it should have.
+        /// The expected hash.
         expected: u64,
     },
     /// The ground has another size, in cells.
@@ -71,7 +71,7 @@ pub enum ChangeError {
     Panicked,
 }
 
-/// What is to be put in place.
+/// The replacement parts.
 #[derive(Debug)]
 pub(super) struct Put {
     pub change: WorldChange,
@@ -96,7 +96,7 @@ impl Put {
     }
 }
 
-/// A brick that is put in place.
+/// A replacement brick.
 struct NewBrick {
     pos: BrickPos,
     brick: Option<Arc<Brick>>,
@@ -246,7 +246,7 @@ pub(super) fn check_number(number: u64) -> Result<u64, ChangeError> {
     if number > u64::MAX / 2 { Err(ChangeError::Number(number)) } else { Ok(number) }
 }
 
-/// Lets uniform bricks of one kind be one; returns the pool, if it has grown.
+/// Shares equal uniform bricks; returns the pool, if it has grown.
 fn share_uniform(world: &World, new: &mut [NewBrick]) -> Option<UniformBricks> {
     let mut grown: Option<UniformBricks> = None;
     for brick in new.iter_mut().filter_map(|own| own.brick.as_mut()) {
@@ -312,10 +312,10 @@ impl Terrain {
         Ok(())
     }
 
-    /// Puts parts in place at once, after everything that waits; like [`apply`](Self::apply) for brushes.
+    /// Replaces parts at once, after everything that waits; like [`apply`](Self::apply) for brushes.
     ///
     /// # Errors
-    /// Says what is wrong with them; nothing changed then.
+    /// When the parts are invalid; then nothing has changed.
     pub fn apply_change(&mut self, change: WorldChange, hash: Option<u64>) -> Result<Restored, ChangeError> {
         self.abandon();
         self.put_now(Put { change, hash, counts: true, ground: None })

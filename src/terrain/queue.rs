@@ -17,7 +17,7 @@ use crate::volume::DiggingRules;
 
 /// Limits of a terrain's work, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
-/// A brick takes the processor about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose pieces are
+/// A brick takes the CPU about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose pieces are
 /// not counted: each has a [budget](super::LooseSettings) that follows from its edit. A step through history counts as a fixed
 /// amount.
 ///
@@ -25,10 +25,10 @@ use crate::volume::DiggingRules;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorkLimits {
-    /// Most work of a transaction, which takes at least one edit in any case; other edits wait for the next. Smaller
-    /// transactions show sooner, larger ones take less time per edit.
+    /// Most work of a transaction, which holds at least one edit in any case; other edits wait for the next. Smaller
+    /// transactions are shown sooner, larger ones take less time per edit.
     pub transaction: u64,
-    /// Most work that may wait, the transaction under way included. An edit that would exceed it is
+    /// Most work that may wait, the running transaction included. An edit that would exceed it is
     /// [rejected](Rejection::Overloaded) when it is submitted, unless nothing else waits.
     pub waiting: u64,
 }
@@ -39,7 +39,7 @@ impl WorkLimits {
 }
 
 impl Default for WorkLimits {
-    /// About a thirtieth of a second for a transaction and two seconds for what waits, on two cores.
+    /// About a thirtieth of a second for a transaction and two seconds for waiting work, on two cores.
     fn default() -> Self {
         Self { transaction: 100_000, waiting: 6_000_000 }
     }
@@ -169,14 +169,14 @@ impl Queue {
         self.requests.push_back(Request::Step(step));
     }
 
-    /// Queues parts that are put in place. Edits after them begin a new group.
+    /// Queues replacement parts. Edits after them begin a new group.
     pub fn push_put(&mut self, put: Put) {
         self.close_group();
         self.work += STEP;
         self.requests.push_back(Request::Put(Arc::new(put)));
     }
 
-    /// Lets the next edit begin a new group.
+    /// Makes the next edit begin a new group.
     pub fn close_group(&mut self) {
         self.open = None;
     }
@@ -195,12 +195,12 @@ impl Queue {
         self.work == 0 || self.work.saturating_add(more) <= self.limits.waiting
     }
 
-    /// The work of all that waits, the transaction under way included.
+    /// The work of everything that waits, the running transaction included.
     pub fn work(&self) -> u64 {
         self.work
     }
 
-    /// Enters that work which was taken is done.
+    /// Subtracts work that is done.
     pub fn finish(&mut self, work: u64) {
         self.work = self.work.saturating_sub(work);
     }
@@ -243,18 +243,18 @@ impl Queue {
         Some((Taken::Edits(edits), work))
     }
 
-    /// Puts requests that were taken and not done back in front.
+    /// Returns requests that were taken but not done to the front of the queue.
     pub fn put_back(&mut self, requests: impl DoubleEndedIterator<Item = Request>) {
         requests.rev().for_each(|request| self.requests.push_front(request));
     }
 
-    /// Takes over what waits in another queue, and its limits; nothing waits in this one.
+    /// Takes over the requests and limits of another queue; this queue is empty.
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub fn take_over(&mut self, other: &mut Self) {
         *self = Self { limits: other.limits, ..std::mem::take(other) };
     }
 
-    /// Lets edits that wait under these rules and settings of loose pieces obey others.
+    /// Replaces the rules and loose settings of waiting edits that have these ones.
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub fn change_terms(
         &mut self,

@@ -39,7 +39,7 @@ pub struct Applied {
 }
 
 impl Applied {
-    /// Was the edit split over several chunks (scenario 5)?
+    /// Whether the edit was split over several chunks (scenario 5).
     pub fn is_split(&self) -> bool {
         self.chunks.len() > 1
     }
@@ -72,7 +72,7 @@ pub enum Rejection {
     /// Too much work is [waiting](super::WorkLimits::waiting).
     #[error("too much work waits already")]
     Overloaded,
-    /// Whoever decides about the edits of a shared terrain, say a server, refused it.
+    /// The authority over a shared terrain, usually a server, refused it.
     #[error("the server refused it")]
     Refused,
     /// Applying it panicked. The others of its transaction were applied without it.

@@ -1,4 +1,4 @@
-//! The commit log: what each commit was asked for, and what it made of the world.
+//! Records of the commit log: the requests of each commit, and its changes of the world.
 
 use std::sync::Arc;
 
@@ -33,13 +33,13 @@ pub enum LogEntry {
     Loose(Option<LooseSettings>),
     /// An edit that was applied.
     Edit(Edit),
-    /// A step through history, or parts that were put in place: what the record's [change](CommitRecord::change) holds.
+    /// A step through history, or replaced parts: the record's [change](CommitRecord::change) contains them.
     Change,
     /// Another ground was [set](super::Terrain::set_ground) below all edits.
     Ground(Arc<Ground>),
 }
 
-/// A commit: what was asked for, and what came of it.
+/// A commit: the requests and their results.
 #[derive(Clone, Debug)]
 pub struct CommitRecord {
     /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same

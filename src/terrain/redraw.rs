@@ -1,4 +1,4 @@
-//! The meshes that a transaction makes again: chunks with dirty blocks, touched tiles.
+//! The meshes that a transaction rebuilds: chunks with dirty blocks, touched tiles.
 
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
@@ -25,14 +25,14 @@ use crate::surface::block::Block;
 use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
 
-/// Meshes that a commit puts in place of old ones. An empty one means that nothing is drawn there any more.
+/// New meshes of a commit, which replace old ones. An empty one means that nothing is drawn there any more.
 #[derive(Clone, Debug, Default)]
 pub struct MeshUpdates {
     /// Tiles whose index lists changed.
     pub tiles: Vec<(TilePos, TileUpdate)>,
     /// Chunks whose surface changed.
     pub chunks: Vec<(ChunkPos, Arc<ChunkSurface>)>,
-    /// Nodes that are drawn otherwise than before, where a [cut](super::DrawnCut) is drawn. Tiles and chunks that
+    /// Nodes that are drawn differently, if a [cut](super::DrawnCut) is drawn. Tiles and chunks that
     /// change are listed above, whether they are drawn or not.
     pub nodes: Vec<NodeUpdate>,
     /// The cut that is drawn afterwards, if it changes.
@@ -41,7 +41,7 @@ pub struct MeshUpdates {
     pub(super) outdated: Vec<ChunkPos>,
 }
 
-/// Every mesh that these cells change, and `newer` words of the mask. `bricks` says which bricks change.
+/// Every mesh that these cells and `newer` words of the mask change; `bricks` are the changed bricks.
 pub(super) fn updates(
     transaction: &Transaction,
     view: &WorldView,
@@ -127,7 +127,7 @@ fn mesh_blocks(
             order();
         })
     });
-    // The backend hands parts out in the middle of its own time.
+    // The backend returns parts while it is still running.
     *meshing = meshing.saturating_sub(own);
     *assembly += own;
     chunks
@@ -198,7 +198,7 @@ fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn Mes
     let update = |chunk: ChunkPos, numbers: &[u32]| {
         let nothing = ChunkSurface::default();
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
-        // That nothing is drawn is news of a chunk whose surface was not kept.
+        // For a chunk without a kept surface, an empty surface counts as a change.
         let empty = || world.unmeshed.contains_key(&chunk).then(ChunkSurface::default);
         Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh)).or_else(empty)?)))
     };

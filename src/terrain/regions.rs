@@ -1,4 +1,4 @@
-//! The world by regions: what is saved, compared and sent of it.
+//! The world by regions, the units in which it is saved, compared and sent.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! A terrain from what was saved of it: from parts, or by replaying records.
+//! Creates a terrain from saved data: from parts, or by replaying records.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -167,8 +167,8 @@ impl Terrain {
 }
 
 impl WorldChange {
-    /// Lets fields take in the edited samples of all bricks that none of them holds; new ones get names that none has
-    /// had. Returns whether there were any.
+    /// Extends fields over edited samples that no field contains; new fields get unused names.
+    /// Returns whether there were any.
     pub(crate) fn cover(&mut self, grid: ChunkGrid) -> bool {
         let mut fields: BTreeMap<ChunkPos, Fields> = std::mem::take(&mut self.fields).into_iter().collect();
         let (mut next, mut has_grown) = (self.next_field, false);

@@ -1,5 +1,5 @@
-//! Bricks, fields and mask of another time, put in place of those of now: a step through history, and what that shares
-//! with parts from a save.
+//! Replaces the present bricks, fields and mask by those of another time, for a step through history; parts from a save
+//! use the same code.
 
 use std::sync::Arc;
 

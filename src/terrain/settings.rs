@@ -1,4 +1,4 @@
-//! Settings that a terrain is made with, and what may be wrong with them.
+//! Settings of a new terrain, and their errors.
 
 /// Settings of a terrain: chunk size and voxel size.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -5,24 +5,24 @@ use super::model::Terrain;
 use super::world::Memory;
 
 impl Terrain {
-    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last group of
-    /// edits that changed the world. Its [`HistoryReceipt`] says what came of it. Where there is [no
-    /// room](Self::set_work_limits) for it, it is answered at once.
+    /// Queues an undo: once its turn comes, after everything that was submitted before, it undoes the last group of
+    /// edits that changed the world. Its [`HistoryReceipt`] reports the result. If there is [no
+    /// room](Self::set_work_limits) for it, the receipt is available at once.
     ///
     /// Groups are decided when edits are submitted, not when their transactions begin: brushes of one
     /// [stroke](crate::brush::Brush::stroke) that follow each other, those that one call of [`apply`](Self::apply) or
     /// [`submit_all`](Self::submit_all) was given, or a single brush. One that changed nothing is no step.
     ///
-    /// Afterwards all is as it was before that group, bit by bit: [`World::hash`](super::World::hash), samples,
-    /// materials, fields with their names, boxes and revisions, mask, meshes and rings. Other than before are
+    /// Afterwards everything equals the state before that group, bit by bit: [`World::hash`](super::World::hash),
+    /// samples, materials, fields with their names, boxes and revisions, mask, meshes and rings. The exceptions are
     /// [`World::revision`](super::World::revision), which counts this as one more commit, and the names that fields
     /// will get from then on: none is ever used for two.
     pub fn submit_undo(&mut self) {
         self.submit_step(HistoryStep::Undo);
     }
 
-    /// Queues a step forth: it does again what was undone last. An edit that changes something in between forgets what
-    /// there was to redo.
+    /// Queues a redo of the step that was undone last. An edit that changes something in between clears the steps that
+    /// could be redone.
     pub fn submit_redo(&mut self) {
         self.submit_step(HistoryStep::Redo);
     }
@@ -57,8 +57,8 @@ impl Terrain {
         self.undo_stack.budget()
     }
 
-    /// Clears what can be undone and redone; the budget stays. Edits that wait or are under way enter history once they
-    /// are committed, and steps that wait find nothing.
+    /// Clears the steps that can be undone and redone; the budget stays. Queued or running edits enter history once
+    /// they are committed, and queued steps find nothing to do.
     ///
     /// ```
     /// # use bevy_burrow::prelude::*;
@@ -88,7 +88,7 @@ impl Terrain {
         self.step(HistoryStep::Undo)
     }
 
-    /// Does again at once what was undone last, after everything that waits.
+    /// Redoes at once the step that was undone last, after everything that waits.
     pub fn redo(&mut self) -> HistoryReceipt {
         self.step(HistoryStep::Redo)
     }

@@ -14,13 +14,13 @@ use super::unmeshed::Meshing;
 use super::world::World;
 use crate::backend::Engine;
 
-/// What one transaction does.
+/// The work of a transaction.
 #[derive(Clone)]
 pub(super) enum Work {
     Edits(Arc<[Submission]>),
     /// A step, and what it puts in place.
     Step(HistoryStep, Arc<UndoDelta>),
-    /// Parts are put in place.
+    /// Parts are replaced.
     Put(Arc<Put>),
     /// Another cut is drawn.
     Cut(Arc<ChooseCut>),

@@ -147,8 +147,8 @@ impl World {
 }
 
 impl Terrain {
-    /// Says which surfaces transactions make from now on. With [`Meshing::Never`] those that are kept are
-    /// dropped: for terrains that are never shown. A plugin that shows the terrain does not learn of changes
+    /// Sets which surfaces later transactions build. [`Meshing::Never`] drops all surfaces,
+    /// for terrains that are never shown. A plugin that shows the terrain does not notice changes
     /// then.
     pub fn set_meshing(&mut self, meshing: Meshing) {
         if meshing == Meshing::Never && self.meshing != meshing {

@@ -51,8 +51,8 @@ impl Unseen {
         &self.fields
     }
 
-    /// What a commit will change of the world at this version. Read from its own lists: the game may have taken its
-    /// meshes.
+    /// The changes of a commit to the world at this version. They are read from its lists, because the game may have
+    /// taken its meshes.
     pub(super) fn of(commit: &Commit, before: Version) -> Self {
         let tiles = commit.rings.iter().map(|(tile, _)| Drawn::Tile(*tile));
         let chunks = commit.surfaces.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));

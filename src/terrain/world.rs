@@ -91,15 +91,15 @@ pub struct World {
     /// Chunks that may draw something and whose surface is not kept: a table without values, counted and shrunk like
     /// the others.
     pub(super) unmeshed: FxHashMap<ChunkPos, ()>,
-    /// Of tiles that bordered on the mask when they were last drawn; some may have none. Those of a tile that is not
-    /// among them are made when they are needed.
+    /// The rings of tiles that bordered on the mask when they were last drawn; some are empty. Other rings
+    /// are built when they are needed.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
     /// With this many kinds, unused ones are removed from the pool.
     many_kinds: usize,
     pub(super) sample_hash: u64,
     pub(super) next_field: u64,
-    /// Tells worlds of one process apart.
+    /// Distinguishes worlds of one process.
     lineage: u64,
     pub(super) revision: u64,
 }
@@ -112,7 +112,7 @@ pub struct Version {
 }
 
 impl Version {
-    /// Is it the same world, whatever was committed to it in between?
+    /// Whether both are versions of one world, whatever was committed in between.
     #[cfg(any(feature = "plugin", feature = "store"))]
     pub(crate) fn is_same_world(self, other: Self) -> bool {
         self.lineage == other.lineage
@@ -188,7 +188,7 @@ impl World {
         SampleView::new(&self.ground, &self.bricks)
     }
 
-    /// What the surface is made from.
+    /// The samples that the surface is extracted from.
     pub fn view(&self) -> WorldView<'_> {
         WorldView { samples: self.samples(), mask: MaskView::new(&self.mask), grid: self.grid }
     }

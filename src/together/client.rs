@@ -1,4 +1,4 @@
-//! What a player's app does with its shared terrain in each frame.
+//! Updates a player's shared terrain in each frame.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use crate::plugin::{
 };
 use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain};
 
-/// What the shared terrains of an app have in common: a connection carries one ground, so one of them is shared.
+/// Which of an app's shared terrains is shared: a connection carries one ground.
 #[derive(Resource, Default)]
 pub(super) struct Sharing {
     active: Option<Entity>,
@@ -43,7 +43,7 @@ impl Sharing {
     }
 }
 
-/// The messages that say what became of edits.
+/// The writers of messages about edits.
 #[derive(SystemParam)]
 pub(super) struct Answers<'w> {
     edited: MessageWriter<'w, GroundEdited>,
@@ -53,7 +53,7 @@ pub(super) struct Answers<'w> {
     moved: MessageWriter<'w, HistoryMoved>,
 }
 
-/// Takes what the server sent. What it sent before it was greeted last is left out by the client.
+/// Reads messages of the server. The client ignores those from before its last greeting.
 pub(super) fn receive(
     mut shared: Query<&mut SharedTerrain>,
     mut order: MessageReader<OrderLane>,
@@ -72,7 +72,8 @@ pub(super) fn receive(
     }
 }
 
-/// Lets pieces of ground appear in the frame in which the ground loses them, and go in the frame in which it has them again.
+/// Reports pieces of ground in the frame in which the ground loses them, and their return in the frame in which they
+/// are ground again.
 pub(super) fn release_pieces(
     mut shared: Query<(&mut SharedTerrain, &mut Terrain)>,
     mut found: MessageWriter<LoosePieceFound>,
@@ -89,8 +90,8 @@ pub(super) fn release_pieces(
     }
 }
 
-/// Takes what the player asked for, follows the server that there is, and sends what is to be sent as soon as the client is not at
-/// work.
+/// Takes the player's requests, follows the present server, and sends messages as soon as the client is not
+/// busy.
 pub(super) fn send(
     service: Res<Service>,
     mut sharing: ResMut<Sharing>,

@@ -1,4 +1,4 @@
-//! What a shared terrain knows of its server: the client, the invitation that it follows, and what waits.
+//! The link of a shared terrain to its server: the client, the invitation that it follows, and waiting requests.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -38,7 +38,7 @@ pub(super) struct Link {
     pub kicked: Option<(Kick, u64)>,
     pub inbox: Vec<(Lane, Vec<u8>)>,
     pub asks: Vec<Ask>,
-    /// So many edits wait that no more are taken.
+    /// Whether the limit of waiting edits is reached, so that no more are taken.
     pub is_full: bool,
     /// Tags of edits, and the number of undos, that are asked for and not answered.
     pub tags: VecDeque<u64>,
@@ -75,7 +75,7 @@ pub(super) struct Display {
     /// Changes that were submitted, and those that were answered.
     pub submitted: u64,
     pub answered: u64,
-    /// What is shown is not what should be: all of it has to be put.
+    /// Whether the shown world is wrong, so that all of it has to be replaced.
     pub is_broken: bool,
     /// All of it, to be put next.
     pub whole: Option<ShownChange>,
@@ -83,14 +83,14 @@ pub(super) struct Display {
     pub pieces: VecDeque<(u64, PieceMessage)>,
 }
 
-/// What happens to a piece.
+/// A message about a piece.
 #[derive(Clone, Debug)]
 pub(super) enum PieceMessage {
     Found(LoosePieceFound),
     Returned(LoosePieceReturned),
 }
 
-/// What a shared terrain does now.
+/// The state of a shared terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Standing {
     /// It follows the server that has sent this invitation.
@@ -157,7 +157,7 @@ impl Link {
         self.tags.len()
     }
 
-    /// Notes what a player asks for.
+    /// Records a request of the player.
     pub fn ask(&mut self, ask: Ask) {
         match &ask {
             Ask::Edit(edit) => self.tags.push_back(edit.tag()),
@@ -166,14 +166,14 @@ impl Link {
         self.asks.push(ask);
     }
 
-    /// Notes that an edit with this tag was answered.
+    /// Records that an edit with this tag was answered.
     pub fn answer(&mut self, tag: u64) {
         if let Some(at) = self.tags.iter().position(|asked| *asked == tag) {
             self.tags.remove(at);
         }
     }
 
-    /// What it does, given who serves.
+    /// The state, given the present server.
     pub fn standing(&self, service: Service) -> Standing {
         if let Some((kick, at)) = self.kicked
             && !matches!(service, Service::Served(_, invitation) if invitation != at)
@@ -222,11 +222,11 @@ impl Display {
         }
     }
 
-    /// Looks at what became of changes in the terrain, and returns what happens to pieces with those.
+    /// Reads the results of changes in the terrain, and returns the messages about pieces that belong to them.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Vec<PieceMessage> {
         let version = terrain.world().version();
         if !version.is_same_world(self.version) {
-            // Another terrain took its place, and what waited there is gone.
+            // Another terrain replaced it, and waiting changes are lost.
             let pieces = std::mem::take(&mut self.pieces);
             *self = Self { is_broken: true, pieces, ..Self::of(terrain) };
             self.hold_pieces();
@@ -263,7 +263,7 @@ impl Display {
         self.answered >= self.submitted
     }
 
-    /// Holds what happens to pieces with what was submitted last.
+    /// Attaches messages about pieces to the change that was submitted last.
     pub fn add_pieces(&mut self, pieces: impl IntoIterator<Item = PieceMessage>) {
         let due = self.submitted + u64::from(self.is_broken);
         self.pieces.extend(pieces.into_iter().map(|piece| (due, piece)));

@@ -1,4 +1,5 @@
-//! The messages that carry the bytes of clients and server. Replicon sends each kind in a channel of its own, reliably and in order.
+//! The messages that carry the bytes of clients and server. Replicon sends each type in a separate channel, reliably
+//! and in order.
 
 use bevy::prelude::*;
 use bevy_replicon::bytes::Bytes;
@@ -10,34 +11,34 @@ use serde::{Deserialize, Serialize};
 use crate::net::{MOST_TO_SERVER, Server};
 use crate::terrain::World;
 
-/// Bytes of a [`FromPlayer`] beside those that it carries, at most.
+/// The most bytes of a [`FromPlayer`] in addition to its content.
 const OVERHEAD: usize = 16;
 
 /// From a client to the server.
 #[derive(Message, Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum FromPlayer {
-    /// What the client says.
+    /// A message of the client.
     Bytes(Vec<u8>),
-    /// Nobody digs there any more.
+    /// The player has left.
     Left,
     /// The message was longer than any may be, and was not kept.
     #[serde(skip)]
     TooLong,
 }
 
-/// From the server to a client, in the lane of what has to come soon.
+/// From the server to a client, in the order lane.
 #[derive(Message, Clone, Debug, Serialize, Deserialize)]
 pub(super) struct OrderLane(pub Vec<u8>);
 
-/// From the server to a client, in the lane of what takes long.
+/// From the server to a client, in the bulk lane.
 #[derive(Message, Clone, Debug, Serialize, Deserialize)]
 pub(super) struct BulkLane(pub Vec<u8>);
 
-/// Invites an authorised client to greet, or with `None` says that no ground is served any more.
+/// Invites an authorised client to greet; `None` if no ground is served any more.
 #[derive(Message, Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Invitation(pub Option<Served>);
 
-/// Which ground is served, and in which run of a server.
+/// The served ground, and the run of its server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Served {
     pub run: u64,
@@ -68,7 +69,7 @@ pub(super) fn register(app: &mut App) {
         .add_server_message::<OrderLane>(Channel::Ordered)
         .add_server_message::<BulkLane>(Channel::Ordered)
         .add_server_message::<Invitation>(Channel::Ordered)
-        // They say themselves what they depend on, and nothing that is replicated is part of it.
+        // They contain their own version numbers, and do not depend on replicated types.
         .make_message_independent::<OrderLane>()
         .make_message_independent::<BulkLane>()
         .make_message_independent::<Invitation>();

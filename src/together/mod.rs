@@ -1,8 +1,9 @@
-//! Digging together in Bevy: [`net`](crate::net) over [bevy_replicon], which brings players, transport and replication.
+//! Multiplayer in Bevy: [`net`](crate::net) over [bevy_replicon], which provides clients, transport and replication.
 //!
 //! The server inserts a [`GroundServer`]. Each player has a terrain with a [`SharedTerrain`], made from the same ground; a player who
-//! is the host has one too. Brushes are sent as ever: they show at once, go to the server, and are [confirmed](GroundEdited) once it
-//! has ordered them. [`Undo`](crate::plugin::Undo) asks the server to take back the player's last stroke, if it lets players do so.
+//! is the host has one too. Write `Brush` messages as in single-player: edits show at once, are sent to the server, and
+//! are [confirmed](GroundEdited) once it has ordered them. [`Undo`](crate::plugin::Undo) asks the server to undo
+//! the player's last stroke, if `UndoPolicy` allows it.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -51,8 +52,8 @@ use crate::plugin::{
     TerrainPlugin,
 };
 
-/// Digging together: add it after `RepliconPlugins` and [`BurrowPlugins`](crate::plugin::BurrowPlugins), on the server and on all
-/// clients, in the same place among all that registers something with replicon.
+/// The multiplayer plugin. Add it after `RepliconPlugins` and [`BurrowPlugins`](crate::plugin::BurrowPlugins), on the
+/// server and on all clients, in the same position among all plugins that register something with replicon.
 ///
 /// A server of `MinimalPlugins` needs `StatesPlugin` for `RepliconPlugins`, and a transport:
 ///
@@ -68,7 +69,7 @@ use crate::plugin::{
 #[derive(Default)]
 pub struct TogetherPlugin;
 
-/// What has to be there before the plugin is added.
+/// The error if plugins are missing.
 const NEEDS_REPLICON: &str = "TogetherPlugin does nothing: it needs RepliconPlugins before it, and these need StatesPlugin, which \
     DefaultPlugins have and MinimalPlugins have not: add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, BurrowPlugins, \
     TogetherPlugin)), and a transport such as RepliconRenetPlugins";

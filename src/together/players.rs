@@ -1,4 +1,4 @@
-//! The players of a ground server: who they are, and which clients are theirs.
+//! The players of a ground server: their numbers and their clients.
 
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
@@ -9,18 +9,18 @@ use super::messages::FromPlayer;
 use super::service::Authorised;
 use crate::net;
 
-/// Bytes of a player's messages that wait for the server while it is at work. Who sends more is kicked.
+/// The most bytes of a player's messages that wait while the server is busy. A player that sends more is kicked.
 const MOST_WAITING_BYTES: usize = 1 << 20;
 
-/// Bytes that a message takes beside its own, about.
+/// The approximate overhead of a message in bytes.
 const MESSAGE_BYTES: usize = 128;
 
 /// The players of a ground server.
 #[derive(Default)]
 pub(super) struct Players {
-    /// Those who have spoken.
+    /// Clients that have sent a message.
     clients: HashMap<net::ClientId, ClientId>,
-    /// Clients that were sent away: nothing is taken from them on the same connection.
+    /// Removed clients: messages from them on the same connection are ignored.
     kicked: HashSet<Entity>,
     /// Those among them whose player has spoken over another connection since, and who were not told so.
     replaced: Vec<Entity>,
@@ -28,16 +28,16 @@ pub(super) struct Players {
     waiting: HashMap<net::ClientId, usize>,
 }
 
-/// What a message comes to.
+/// The meaning of a message.
 pub(super) enum Said {
-    /// The client says this, for the first time if it `begins`.
+    /// A message of the client, the first one if it `begins`.
     Bytes {
         begins: bool,
         bytes: Vec<u8>,
     },
     /// The player has left.
     Leaves,
-    /// The player has sent far more than the server could take by now.
+    /// The player has sent more than the server could handle.
     TooMuch,
     Nothing,
 }
@@ -64,7 +64,7 @@ impl Players {
         number(client, id).filter(|_| !self.kicked.contains(&entity))
     }
 
-    /// Takes a message of a player's.
+    /// Handles a message of a player.
     pub fn hear(&mut self, player: net::ClientId, client: ClientId, message: &FromPlayer) -> Said {
         let said = match message {
             FromPlayer::Left if self.clients.remove(&player).is_some() => Said::Leaves,
@@ -93,12 +93,12 @@ impl Players {
         }
     }
 
-    /// Enters that the server has taken all that waited.
+    /// Records that the server has taken all waiting messages.
     pub fn forget_waiting(&mut self) {
         self.waiting.clear();
     }
 
-    /// Where to send what the server has for a player.
+    /// The client to which messages for a player are sent.
     pub fn client(&self, player: net::ClientId) -> Option<ClientId> {
         self.clients.get(&player).copied()
     }

@@ -1,4 +1,4 @@
-//! A world is saved or shared: the server saves what players share, and never the component that saves a player's own world.
+//! A terrain is either saved or shared: the server saves a shared world, and a player's `SavedWorld` never does.
 
 use bevy::prelude::*;
 

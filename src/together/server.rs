@@ -19,12 +19,12 @@ use crate::saves::{ReadWorld, SavedWorld, WorldReader};
 use crate::store::{Progress, Store, StoreError, StoreTrouble};
 use crate::terrain::Terrain;
 
-/// The ground that players dig together: insert it in the app that is the server. Its [`Server`] owns a terrain that nobody looks
-/// at; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like everybody else.
+/// The server of a shared world: insert it in the server's app. Its [`Server`] owns a terrain that is not
+/// drawn; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like all other players.
 #[derive(Resource)]
 pub struct GroundServer {
     work: Work,
-    /// What is served; `None` until it is there.
+    /// The served world; `None` until it is there.
     served: Option<Served>,
     waiting: Vec<Request>,
     start: Instant,
@@ -34,9 +34,9 @@ pub struct GroundServer {
     data: BTreeMap<String, Vec<u8>>,
 }
 
-/// Where the server is.
+/// The state of the server.
 enum Work {
-    /// Its world is read.
+    /// Its world is being read.
     Opening(ThreadTask<Result<(Box<Parts>, Vec<StoreTrouble>), StoreError>>, Progress),
     Here(Box<Parts>),
     UnderWay(ThreadTask<Box<Parts>>),
@@ -44,26 +44,26 @@ enum Work {
     Gone,
 }
 
-/// What goes to a thread and comes back.
+/// The data that is sent to a thread and returned.
 struct Parts {
     server: Server,
     store: Option<Store>,
 }
 
-/// Most requests of the game that wait until a world is read; what comes then is dropped.
+/// The most requests of the game that wait until a world is read; further ones are dropped.
 const MOST_WAITING: usize = 1 << 14;
 
-/// What waits for the server to come back.
+/// A request that waits until the server is not busy.
 type Request = Box<dyn FnOnce(&mut Parts, Duration) + Send + Sync>;
 
-/// Something happened on the ground's server.
+/// An event of the ground's server.
 #[derive(Message, Clone, Debug)]
 pub enum GroundServerEvent {
-    /// Its world was read, or can't be: then nothing is served.
+    /// Its world was read; or can't be read, and nothing is served.
     Opened(Result<(), Arc<StoreError>>),
-    /// Something about its players.
+    /// An event about its players.
     Players(ServerEvent),
-    /// Something is wrong with its saved world; the game goes on.
+    /// A problem with its saved world; play continues.
     Trouble(StoreTrouble),
 }
 
@@ -74,7 +74,7 @@ impl GroundServer {
     }
 
     /// Serves a saved world: the one in this folder on the ground of this terrain, or where there is none, the terrain, which is
-    /// saved there from now on. It is read on another thread, and [told](GroundServerEvent::Opened).
+    /// saved there from now on. It is read on another thread; [`GroundServerEvent::Opened`] reports the result.
     pub fn saved(world: &SavedWorld, terrain: &Terrain, settings: ServerSettings) -> Self {
         let reader = WorldReader::new(world, terrain, None);
         let progress = reader.progress.clone();
@@ -91,8 +91,8 @@ impl GroundServer {
         if let Work::Opening(_, progress) = &self.work { Some(progress.share()) } else { None }
     }
 
-    /// Serves the world of a store that is open, on a [level](crate::store::StoreOptions::level) say: [`Server::open`] made the
-    /// server of it.
+    /// Serves the world of an open store, for example on a [level](crate::store::StoreOptions::level). Use
+    /// [`Server::open`] to make the server.
     pub fn with_store(server: Server, store: Store) -> Self {
         let data = store.game_data().clone();
         Self { data, ..Self::working(Work::Here(Box::new(Parts { server, store: Some(store) }))) }
@@ -111,13 +111,13 @@ impl GroundServer {
         }
     }
 
-    /// What is served; `None` while its world is read, and if it can't be.
+    /// The served world; `None` while it is being read, and if it can't be read.
     pub(super) fn served(&self) -> Option<Served> {
         self.served
     }
 
-    /// Does something with the server as soon as it is not at work, in the order of these calls: sets where a player is, changes
-    /// the rules.
+    /// Calls a function with the server as soon as it is not busy, in the order of these calls: for example to set a
+    /// player's position or the rules.
     pub fn with(&mut self, work: impl FnOnce(&mut Server) + Send + Sync + 'static) {
         self.ask(move |parts, _| work(&mut parts.server));
     }
@@ -129,7 +129,8 @@ impl GroundServer {
         }
     }
 
-    /// Serves this world where the saved one [can't be read](GroundServerEvent::Opened). Players who have come meanwhile join it.
+    /// Serves this world if the saved one [can't be read](GroundServerEvent::Opened). Players that have connected
+    /// meanwhile join it.
     pub fn serve_instead(&mut self, server: Server) {
         if let Work::Gone = self.work {
             self.served = Some(Served::by(&server));
@@ -137,7 +138,7 @@ impl GroundServer {
         }
     }
 
-    /// Keeps data of the game beside a saved world, as a [`WorldStore`](crate::saves::WorldStore) does.
+    /// Stores data of the game with a saved world, like a [`WorldStore`](crate::saves::WorldStore).
     pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         let (key, bytes) = (key.into(), bytes.into());
         self.data.insert(key.clone(), bytes.clone());
@@ -157,20 +158,21 @@ impl GroundServer {
     /// player on the server's own machine has the number 0.
     ///
     /// The two greatest network ids have no number: [`net::ClientId::SERVER`] is returned, and such clients are not served. A transport
-    /// without network ids gives a new number to each connection, so a player who comes back is somebody else to the server.
+    /// without network ids gives a new number to each connection, so a returning player counts as a new one.
     pub fn player(client: ClientId, ids: &Query<&NetworkId>) -> net::ClientId {
         let id = client.entity().and_then(|entity| ids.get(entity).ok());
         super::players::number(client, id).unwrap_or(net::ClientId::SERVER)
     }
 
-    /// Waits until all that was asked for is done and saved: before the app ends. A world that is still read has nothing to save.
+    /// Waits until all requests are done and saved, before the app ends. A world that is still being read has nothing
+    /// to save.
     pub fn finish(&mut self) {
         let deadline = Instant::now() + Duration::from_secs(10);
         while let Work::UnderWay(_) = self.work {
             if let Some(parts) = self.take_parts(|_| {}) {
                 self.work = Work::Here(parts);
             } else if Instant::now() > deadline {
-                error!("the last edits are not saved: the server is still at work");
+                error!("the last edits are not saved: the server is still busy");
                 return;
             } else {
                 std::thread::sleep(Duration::from_millis(1));
@@ -187,7 +189,7 @@ impl GroundServer {
         }
     }
 
-    /// Takes the server out, if it is not at work.
+    /// Takes the server, if it is not busy.
     fn take_parts(&mut self, mut tell: impl FnMut(GroundServerEvent)) -> Option<Box<Parts>> {
         match std::mem::replace(&mut self.work, Work::Gone) {
             Work::Here(parts) => return Some(parts),
@@ -199,7 +201,7 @@ impl GroundServer {
             Work::Opening(mut task, progress) => match task.finish() {
                 None => self.work = Work::Opening(task, progress),
                 Some(Ok((parts, troubles))) => {
-                    // What was put meanwhile is newer.
+                    // Values that were put meanwhile are newer.
                     let newer = std::mem::take(&mut self.data);
                     self.data.extend(parts.store.iter().flat_map(|store| store.game_data().clone()));
                     self.data.extend(newer);
@@ -230,7 +232,7 @@ impl Parts {
 }
 
 impl GroundServer {
-    /// Reads what players sent. What comes while no world is there is dropped: nobody was invited.
+    /// Reads messages of players. Without a world they are dropped: no player was invited.
     fn receive(
         &mut self,
         messages: &Messages<FromClient<FromPlayer>>,
@@ -262,7 +264,7 @@ impl GroundServer {
     }
 }
 
-/// Hands messages of players to the server, and sends what it has for them.
+/// Passes messages of players to the server, and sends its messages to them.
 pub(super) fn serve(
     mut ground: ResMut<GroundServer>,
     messages: Res<Messages<FromClient<FromPlayer>>>,
@@ -316,7 +318,7 @@ pub(super) fn serve(
     }));
 }
 
-/// Does what players asked for in the last frame, and saves everything before the app ends.
+/// Handles the requests of the last frame, and saves everything before the app ends.
 pub(super) fn finish_at_exit(
     mut ground: ResMut<GroundServer>,
     messages: Res<Messages<FromClient<FromPlayer>>>,

@@ -1,4 +1,4 @@
-//! Who serves the ground: the server invites clients, and each app knows whether somebody serves it.
+//! Finds the server of an app: servers invite clients, and each app tracks whether it has been invited.
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
@@ -7,7 +7,7 @@ use bevy_replicon::prelude::*;
 use super::messages::{BulkLane, Invitation, OrderLane, Served};
 use super::server::GroundServer;
 
-/// Who serves the ground that is shared in this app.
+/// The server of the ground that is shared in this app.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Service {
     /// There is no connection, and no server in this app.
@@ -21,10 +21,10 @@ pub(super) enum Service {
     Served(Served, u64),
 }
 
-/// What [`find_service`] has seen so far.
+/// The state of [`find_service`].
 #[derive(Default)]
 pub(super) struct Seen {
-    /// Invitations so far.
+    /// The number of invitations.
     count: u64,
     /// Whether a server was in this app in the last frame, and what it served.
     local: Option<Option<Served>>,
@@ -38,7 +38,7 @@ impl Seen {
     }
 }
 
-/// Finds out who serves the ground: the server in this app, or else the one that this app is connected to.
+/// Finds the server of the ground: in this app, or the one that this app is connected to.
 pub(super) fn find_service(
     mut service: ResMut<Service>,
     ground: Option<Res<GroundServer>>,
@@ -68,7 +68,7 @@ pub(super) fn find_service(
     }
 }
 
-/// Forgets what came over a connection that has ended.
+/// Drops messages of a connection that has ended.
 pub(super) fn forget_connection(
     mut service: ResMut<Service>,
     mut invitations: ResMut<Messages<Invitation>>,
@@ -84,7 +84,7 @@ pub(super) fn forget_connection(
 /// A client that takes part in the game: replicon has authorised it.
 pub(super) type Authorised = (With<ConnectedClient>, With<AuthorizedClient>);
 
-/// Invites authorised clients to the ground that is served, and tells those who were invited when it is no longer.
+/// Invites authorised clients to the served ground, and notifies invited clients when it is no longer served.
 pub(super) fn invite(
     ground: Option<Res<GroundServer>>,
     clients: Query<(Entity, Has<AuthorizedClient>), With<ConnectedClient>>,
@@ -106,7 +106,7 @@ pub(super) fn invite(
     }
 }
 
-/// Drops what was to be sent to a client that is gone, or no longer authorised. A backend may panic otherwise.
+/// Drops messages to a client that is gone or no longer authorised. A backend may panic otherwise.
 pub(super) fn drop_messages(
     gone: On<Remove, AuthorizedClient>,
     mut invitations: ResMut<Messages<ToClients<Invitation>>>,

@@ -1,4 +1,4 @@
-//! A terrain that a player shares with others, and what is told of it.
+//! A terrain that a player shares with others, and messages about it.
 
 use bevy::prelude::*;
 
@@ -15,22 +15,22 @@ use crate::terrain::Receipt;
 ///
 /// It joins as soon as a server that this app is connected to, or this app itself, has a [`GroundServer`](super::GroundServer), and
 /// again whenever there is a new connection or another server. It may be despawned, removed and inserted again at any time, and another
-/// `Terrain` may be inserted beside it. An app shares one terrain at a time: the first one, until it is gone.
+/// `Terrain` may be inserted on its entity. An app shares one terrain at a time: the first one, until it is gone.
 ///
-/// Whatever keeps it from following a server is sent as a [`SharingTroubleFound`](super::SharingTroubleFound).
+/// If something keeps it from following a server, a [`SharingTroubleFound`](super::SharingTroubleFound) is sent.
 #[derive(Component, Default)]
 #[component(on_add = warn_without_plugin)]
 pub struct SharedTerrain {
-    /// Images that the player may stamp with. The server needs them too; players who lack one get it from there.
+    /// Images that the player may stamp with. The server needs them too; players that lack one get it from there.
     pub stamps: Stamps,
-    /// Where the player is, in voxels of the terrain: the ground comes from there outwards.
+    /// The player's position, in voxels of the terrain: missing ground is fetched from there outwards.
     pub place: IVec3,
     pub(super) link: Option<Link>,
-    /// The place among all shared terrains, in the order in which they were inserted.
+    /// The position among all shared terrains, in the order of insertion.
     pub(super) order: u64,
     /// Whether it has greeted a server, with this ground or another.
     pub(super) was_served: bool,
-    /// What was reported last, if it is still so.
+    /// The last reported trouble, while it persists.
     pub(super) trouble: Option<SharingTrouble>,
 }
 
@@ -66,7 +66,7 @@ impl SharedTerrain {
     }
 }
 
-/// Without the plugin nothing would happen, and nothing would say so.
+/// Logs an error if the plugin is missing, because nothing else would show it.
 fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lifecycle::HookContext) {
     if world.get_resource::<super::client::Sharing>().is_none() {
         error!(
@@ -75,31 +75,32 @@ fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lif
     }
 }
 
-/// What became of an edit.
+/// The outcome of an edit.
 #[derive(Clone, Debug, PartialEq)]
 pub enum WhatBecame {
-    /// It is shown, as far as the player's machine can tell now.
+    /// It is shown as the player's machine predicts it.
     Predicted(Receipt),
     /// The server has ordered it; this is what it came to for all. `None` where the player was away when that happened: then there is no
     /// [`BrushApplied`](crate::plugin::BrushApplied) either.
     Confirmed(Option<Receipt>),
-    /// It is not done, and no longer shown. `None` where it could not be sent, or the player was away when that was told.
+    /// It was refused, and is no longer shown. `None` if it could not be sent, or the player was disconnected when it
+    /// was refused.
     Refused(Option<Refusal>),
 }
 
-/// Something became of an edit on a [`SharedTerrain`]. A [`BrushApplied`](crate::plugin::BrushApplied) follows for those that are
-/// confirmed or refused, so inventories need nothing else.
+/// The result of an edit on a [`SharedTerrain`]. A [`BrushApplied`](crate::plugin::BrushApplied) follows for edits that
+/// are confirmed or refused, so inventories need nothing else.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct GroundEdited {
     /// The terrain.
     pub terrain: Entity,
     /// The tag of the brush.
     pub tag: u64,
-    /// What became of it.
+    /// The outcome.
     pub outcome: WhatBecame,
 }
 
-/// How far a [`SharedTerrain`] has come, or that its player has to go.
+/// The progress of a [`SharedTerrain`] that joins, or that its player was removed.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct GroundJoined {
     /// The terrain.
@@ -108,7 +109,7 @@ pub struct GroundJoined {
     pub event: ClientEvent,
 }
 
-/// Gives a shared terrain the list that its edits go to.
+/// Inserts the outbox for edits into a shared terrain.
 pub(super) fn begin(
     new: On<Insert, SharedTerrain>,
     mut commands: Commands,
@@ -121,7 +122,7 @@ pub(super) fn begin(
     commands.entity(new.entity).try_insert_if_new(EditOutbox::default());
 }
 
-/// Brushes on a terrain that is no longer shared are its own again.
+/// Removes the outbox from a terrain that is no longer shared, so that brushes apply directly again.
 pub(super) fn end(gone: On<Remove, SharedTerrain>, mut commands: Commands) {
     commands.entity(gone.entity).try_remove::<EditOutbox>();
 }

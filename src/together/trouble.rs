@@ -1,15 +1,16 @@
-//! Why a shared terrain follows no server, or why what was asked of it is not done.
+//! Reasons why a shared terrain follows no server, or why it refuses a request.
 
 use bevy::prelude::*;
 
 use crate::net::{Kick, Refusal};
 
-/// Why a [`SharedTerrain`](super::SharedTerrain) follows no server, or why what was asked of it is not done. The text says what helps.
+/// The reason why a [`SharedTerrain`](super::SharedTerrain) follows no server, or refuses a request. The text contains
+/// the remedy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SharingTrouble {
-    /// The connection is gone. Digging goes on, and what is dug is sent over the next connection.
-    #[error("the connection to the server is lost; connect again, and what is dug until then is sent")]
+    /// The connection is lost. Players can keep digging, and their edits are sent over the next connection.
+    #[error("the connection to the server is lost; connect again, and edits made until then are sent")]
     ConnectionLost,
     /// The server's `GroundServer` was removed. Digs are refused until there is another one.
     #[error(
@@ -41,8 +42,8 @@ pub enum SharingTrouble {
         "{0} is shared already, and an app shares one terrain at a time; remove SharedTerrain from one of them"
     )]
     AnotherIsShared(Entity),
-    /// There is no `Terrain` beside the `SharedTerrain`. Sharing begins once there is one.
-    #[error("a SharedTerrain needs a Terrain beside it; sharing begins once it is inserted")]
+    /// The entity of the `SharedTerrain` has no `Terrain`. Sharing begins once there is one.
+    #[error("a SharedTerrain needs a Terrain on the same entity; sharing begins once it is inserted")]
     NoTerrain,
     /// The rules of the terrain were changed, which changes nothing: rules come from the server.
     #[error(
@@ -53,12 +54,12 @@ pub enum SharingTrouble {
     /// The server does not undo the player's last stroke.
     #[error("the server does not undo the last stroke: {0}")]
     UndoRefused(Refusal),
-    /// So many edits wait for the server that no more are taken.
+    /// The limit of edits that wait for the server is reached, and no more are taken.
     #[error("the server has not answered {0} edits; further ones are refused until it does")]
     TooManyPending(usize),
 }
 
-/// A [`SharedTerrain`](super::SharedTerrain) follows no server, or something that was asked of it is not done. It is logged as a
+/// A [`SharedTerrain`](super::SharedTerrain) follows no server, or refuses a request. It is logged as a
 /// warning as well.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SharingTroubleFound {

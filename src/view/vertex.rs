@@ -8,8 +8,8 @@ use bevy::shader::{ShaderRef, load_shader_library};
 /// The vertex shader for the prepasses of a material whose main pass has a vertex shader of its own. Return it from
 /// [`Material::prepass_vertex_shader`].
 ///
-/// With a `DepthPrepass`, the main pass keeps only what has exactly the depth that the prepass wrote. Two vertex shaders
-/// that are compiled separately may differ in the last bit, and then the ground is full of holes, on some graphics cards
+/// With a `DepthPrepass`, the main pass keeps only fragments with exactly the depth that the prepass wrote. Two vertex
+/// shaders that are compiled separately may differ in the last bit, and then the ground is full of holes, on some GPUs
 /// only. Graphics APIs promise equal bits for equal expressions whose results are *invariant*: `Invariant` in SPIR-V,
 /// `[[invariant]]` in Metal, `precise` in HLSL, `invariant` in GLSL. So a vertex shader of your own takes its position
 /// from `bevy_burrow::position`, as this one does, and declares it invariant:

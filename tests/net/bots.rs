@@ -1,4 +1,4 @@
-//! A server, players who dig at random, and the lines between them; what everybody has is checked in every frame.
+//! A server, players that dig at random, and the lines between them; all worlds are checked in every frame.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -27,7 +27,7 @@ pub const TICK: Duration = Duration::from_micros(2 * 16_667);
 /// Frames between two edits of a player.
 const EDIT: u64 = 12;
 
-/// The world as the order says, one entry after the other, and the hash at every number.
+/// The world that results from the order, entry by entry, and its hash at every number.
 pub struct Reference {
     terrain: Terrain,
     ground: Arc<Ground>,
@@ -35,9 +35,9 @@ pub struct Reference {
     pub number: u64,
     pub hashes: BTreeMap<u64, u64>,
     pub loose: usize,
-    /// The edits of players with their numbers in the order, whose they are, and their numbers there.
+    /// Edits of players: the number in the order, the player, and the player's number.
     pub done: Vec<(u64, ClientId, u64)>,
-    /// What undos put back, by who asked for them.
+    /// Restored parts, by the player that asked for the undo.
     pub undone: BTreeMap<ClientId, Vec<Restored>>,
     pub terms: usize,
 }
@@ -51,7 +51,7 @@ impl Reference {
         Self { terrain, ground, stamps, number: 0, hashes, loose: 0, done: Vec::new(), undone, terms: 0 }
     }
 
-    /// Goes back to what a server has that was restarted.
+    /// Returns to the state of a restarted server.
     pub fn begin_again(&mut self, terrain: Terrain, number: u64) {
         self.terrain = terrain;
         self.number = number;
@@ -60,7 +60,7 @@ impl Reference {
         self.hashes.insert(number, self.terrain.world().hash());
     }
 
-    /// Obeys what is new in a message.
+    /// Applies the new entries of a message.
     fn obey(&mut self, message: &[u8]) {
         let message = ToClient::from_bytes(message, &self.ground, &self.stamps).expect("a message");
         let ToClient::Entries(Entries { first, entries }) = message else { return };
@@ -106,7 +106,7 @@ impl Reference {
 pub struct Bot {
     pub id: ClientId,
     pub client: Client,
-    /// What the player sees. It is only put.
+    /// The world that the player sees. It changes only by shown changes.
     pub shown: Terrain,
     up: Way,
     pub order: Way,
@@ -116,12 +116,12 @@ pub struct Bot {
     pub is_digging: bool,
     pub is_undoing: bool,
     pub is_connected: bool,
-    /// May its world differ from the others'? So it is where it is lied to.
+    /// Whether its world may differ from the others', because its messages are tampered with.
     pub may_differ: bool,
     edits: u64,
-    /// When edits were dug that are not shown yet, by tag.
+    /// The frames of edits that are not shown yet, by tag.
     dug: BTreeMap<u64, u64>,
-    /// When the last entry of messages came that are not applied yet.
+    /// The arrival times of messages that are not applied yet.
     arrived: VecDeque<(Duration, u64)>,
     /// The most frames until an own edit was shown.
     pub own_frames: u64,
@@ -132,11 +132,11 @@ pub struct Bot {
     pub joined_at: Option<Duration>,
     pub durable: u64,
     pub bytes: [u64; 2],
-    /// Undos that were asked for.
+    /// Undos that were requested.
     pub undos: u64,
-    /// What undos put back.
+    /// Restored parts.
     pub undone: Vec<Restored>,
-    /// Numbers of tags that came to an end.
+    /// How many tags were answered.
     pub answered: u64,
     /// Tags of edits that are not answered.
     pub open: BTreeSet<u64>,
@@ -259,7 +259,7 @@ impl Bot {
                     "durable"
                 }
                 ClientEvent::Undone(restored) => {
-                    // The reference keeps no list of the pieces that games were told of.
+                    // The reference keeps no list of the pieces that games were notified of.
                     self.undone
                         .extend(restored.map(|restored| Restored { returned: Vec::new(), ..restored }));
                     "undone"
@@ -290,9 +290,9 @@ pub struct Play {
     frame: u64,
     rng: Rng,
     pub tamper: Option<Tamper>,
-    /// Does the server change rules and settings?
+    /// Whether the server changes rules and settings.
     pub changes_terms: bool,
-    /// When edits came to the server that have no number yet.
+    /// The longest time from an edit's arrival at the server until the server ordered it.
     pub up_lag: Duration,
 }
 
@@ -323,14 +323,14 @@ impl Play {
         play
     }
 
-    /// One player more.
+    /// Adds a player.
     pub fn join(&mut self) {
         let bot = Bot::new(self.bots.len() as u64 + 1, &self.ground, &self.image, self.now);
         self.server.connect(bot.id, self.now);
         self.bots.push(bot);
     }
 
-    /// The connection of a player breaks.
+    /// Breaks a player's connection.
     pub fn cut(&mut self, at: usize) {
         let bot = &mut self.bots[at];
         bot.client.disconnect();
@@ -340,7 +340,7 @@ impl Play {
         self.server.disconnect(bot.id);
     }
 
-    /// It is there again.
+    /// Restores a player's connection.
     pub fn reconnect(&mut self, at: usize) {
         let bot = &mut self.bots[at];
         bot.is_connected = true;
@@ -349,7 +349,7 @@ impl Play {
         self.server.connect(bot.id, self.now);
     }
 
-    /// Sends what the server says.
+    /// Sends the server's messages.
     pub fn send(&mut self) {
         for (to, lane, message) in self.server.take_outgoing() {
             if lane == Lane::Order {
@@ -396,7 +396,7 @@ impl Play {
         assert_eq!(self.reference.hashes[&applied], self.server.terrain().world().hash(), "at {applied}");
     }
 
-    /// A frame of everybody's.
+    /// Runs a frame of the server and all players.
     pub fn step(&mut self) {
         self.now += FRAME;
         self.frame += 1;
@@ -443,7 +443,7 @@ impl Play {
         (0..(seconds / FRAME.as_secs_f64()) as u64).for_each(|_| self.step());
     }
 
-    /// Nobody digs any more: until everybody has the same.
+    /// Stops digging and waits until all worlds are equal.
     pub fn settle(&mut self) {
         self.bots.iter_mut().for_each(|bot| bot.is_digging = false);
         self.changes_terms = false;
@@ -455,7 +455,7 @@ impl Play {
                 break;
             }
         }
-        // Marks come and are compared.
+        // Waits until marks have arrived and are compared.
         self.seconds(3.0);
         let hash = self.server.terrain().world().hash();
         for bot in self.bots.iter().filter(|bot| bot.is_connected) {
@@ -471,7 +471,7 @@ impl Play {
     }
 }
 
-/// The names of all fields, and the greatest that there was.
+/// The names of all fields, and the greatest name ever used.
 fn names(world: &World) -> (BTreeMap<ChunkPos, Vec<FieldId>>, u64) {
     let names = |fields: &Fields| fields.iter().map(|field| field.id).collect();
     (world.fields().map(|(chunk, fields)| (chunk, names(fields))).collect(), world.next_field())

@@ -1,4 +1,5 @@
-//! The plainest client: it obeys the order, predicts nothing, and fetches what differs. What the server says is tested with it.
+//! The simplest client: it applies the order, predicts nothing, and fetches regions that differ. Tests of the server
+//! use it.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -29,7 +30,7 @@ pub fn hills(side: u32) -> Arc<Ground> {
     Arc::new(Ground::from_fn(side, side, height).expect("valid heights"))
 }
 
-/// A terrain that nobody looks at.
+/// A terrain without meshes.
 pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
     terrain.set_meshing(Meshing::Never);
@@ -37,30 +38,30 @@ pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
-/// A client that obeys the order.
+/// A client that applies the order.
 pub struct Follower {
     pub id: ClientId,
     ground: Arc<Ground>,
     pub stamps: Stamps,
     pub terrain: Terrain,
     pub epoch: Option<Epoch>,
-    /// The number that the terrain is at.
+    /// The number of the last applied entry.
     pub number: u64,
     pub last_own: u64,
     pub place: IVec3,
-    /// What is to be sent.
+    /// Messages to send.
     pub out: Vec<ToServer>,
-    /// Entries that came and can't be applied yet.
+    /// Received entries that can't be applied yet.
     waiting: VecDeque<(u64, Entry)>,
     /// Regions that are awaited; nothing is applied meanwhile.
     awaited: BTreeSet<RegionPos>,
-    /// Are the awaited ones those of a join?
+    /// Whether the awaited regions are those of a join.
     is_joining: bool,
-    /// Regions that came for a number that is not reached yet.
+    /// Regions that arrived for a number that is not reached yet.
     regions: Vec<RegionContent>,
     table: Option<Box<Terms>>,
     touched: BTreeSet<RegionPos>,
-    /// Hashes of what was touched before each mark whose hashes have not come.
+    /// Hashes of the regions touched before each mark, until the server's hashes arrive.
     marks: BTreeMap<u64, BTreeMap<RegionPos, u64>>,
     hashes: VecDeque<(u64, RegionHashes)>,
     bulk: BulkReader,
@@ -69,13 +70,13 @@ pub struct Follower {
     pub voids: Vec<u64>,
     pub durable: u64,
     pub kicked: Option<Kick>,
-    /// How it was let in, each time.
+    /// How it joined, each time.
     pub joins: Vec<&'static str>,
     /// Regions that differed and were fetched.
     pub repairs: usize,
-    /// Numbers of its own edits and undos that came back.
+    /// Numbers of its own edits and undos that were confirmed.
     pub confirmed: Vec<u64>,
-    /// Bytes that came, by lane.
+    /// Received bytes, by lane.
     pub bytes: [u64; 2],
 }
 
@@ -144,7 +145,7 @@ impl Follower {
         self.last_own
     }
 
-    /// Sends what it has to say.
+    /// Sends its messages.
     pub fn send(&mut self, server: &mut Server, now: Duration) {
         if self.bulk.received() != self.bulk_told {
             self.bulk_told = self.bulk.received();
@@ -172,7 +173,7 @@ impl Follower {
             ToClient::Kicked(why) => self.kicked = Some(why),
             ToClient::Entries(Entries { first, entries }) => {
                 self.waiting.extend((first..).zip(entries));
-                // Old ones come in the other lane.
+                // Old entries arrive in the other lane.
                 self.waiting.make_contiguous().sort_by_key(|(number, _)| *number);
             }
             ToClient::Void { number } => self.voids.push(number),
@@ -236,7 +237,7 @@ impl Follower {
     fn go_on(&mut self) {
         loop {
             if self.is_joining {
-                // In the order in which they come, the last one ends it.
+                // Regions arrive in order; the last one ends the join.
                 for content in std::mem::take(&mut self.regions) {
                     self.is_joining &= content.left > 0;
                     self.put(&content);
@@ -307,7 +308,7 @@ impl Follower {
         }
     }
 
-    /// Compares what it noted at marks with what the server says.
+    /// Compares the hashes that it recorded at marks with those of the server.
     fn check_hashes(&mut self) {
         while let Some((number, hashes)) = self.hashes.front() {
             if *number > self.number {
@@ -316,7 +317,8 @@ impl Follower {
             let noted = self.marks.remove(number).unwrap_or_default();
             let told: BTreeMap<RegionPos, u64> = hashes.iter().copied().collect();
             let world = self.terrain.world();
-            // What was touched before it came and again since the mark is told with the next mark.
+            // A region that was touched before the hashes arrived and again since the mark is compared at the next
+            // mark.
             let later: BTreeSet<RegionPos> =
                 self.marks.values().flat_map(BTreeMap::keys).chain(&self.touched).copied().collect();
             let own = |at: &RegionPos| match noted.get(at) {
@@ -336,7 +338,7 @@ impl Follower {
         }
     }
 
-    /// Puts a region in place as a whole.
+    /// Replaces a whole region.
     fn put(&mut self, content: &RegionContent) {
         let world = self.terrain.world();
         let mut bricks: BTreeMap<_, _> = world.bricks_in(content.pos).map(|(pos, _)| (pos, None)).collect();
@@ -354,7 +356,7 @@ impl Follower {
         self.terrain.apply_change(change, None).expect("a valid region");
     }
 
-    /// Lets fields to come have the names that they have on the server.
+    /// Makes later fields have the same names as on the server.
     fn lower_names(&mut self, next_field: u64) {
         if self.terrain.world().next_field() > next_field {
             let mut parts = self.terrain.parts();
@@ -367,13 +369,13 @@ impl Follower {
         }
     }
 
-    /// Breaks its world, as a bug would.
+    /// Corrupts its world, as a bug would.
     pub fn spoil(&mut self, at: glam::Vec3) {
         self.terrain.apply([Brush::dig(Shape::sphere(at, 3.0))]);
     }
 }
 
-/// Carries messages at once, for so many frames.
+/// Delivers messages without delay for a number of frames.
 pub fn play(server: &mut Server, followers: &mut [&mut Follower], now: &mut Duration, frames: u32) {
     for _ in 0..frames {
         *now += FRAME;

@@ -1,4 +1,4 @@
-//! Whatever bytes come: no panic, bounded memory, everything counted. `BURROW_FUZZ` is the number of messages.
+//! Any received bytes: no panic, bounded memory, everything counted. `BURROW_FUZZ` is the number of messages.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,11 +18,11 @@ use glam::{IVec3, Vec2, Vec3};
 use crate::follower::{FRAME, Follower, count, hills, play, terrain};
 use crate::worlds::any_random_brush;
 
-/// Bytes that a decoder may take besides what it makes of each byte of its input.
+/// Bytes that a decoder may take regardless of the size of its input.
 const ANYWAY: u64 = 1 << 20;
 /// Bytes that a message to the server may take for each of its bytes: an edit is some 200 bytes, and at least 4 in a message.
 const TO_SERVER: u64 = 400;
-/// The same for a message to a client: a brick of few bits takes a thousand bytes.
+/// Bytes that a message to a client may take for each of its bytes: a brick of few bits takes a thousand bytes.
 const TO_CLIENT: u64 = 800;
 
 /// Changes bytes somehow; they may stay the same.
@@ -124,7 +124,7 @@ impl Messages {
         to_server.push(ToServer::Ack { bulk: 300, number: 9 }.to_bytes());
         let region = server.terrain().world().regions().next().unwrap();
         to_server.push(ToServer::Fetch { number: 3, regions: vec![region; 40] }.to_bytes());
-        // What comes in the bulk lane: all regions, then the table of them.
+        // The messages of the bulk lane: all regions, then the table of them.
         for epoch in [None, Some(Epoch { run: 0, ..server.epoch() })] {
             let (mut bulk, mut late) = (BulkReader::default(), Follower::new(9, &ground));
             late.epoch = epoch;
@@ -244,7 +244,7 @@ fn decoders_take_any_bytes() {
     assert!(accepted.iter().all(|&count| count > runs / 400), "{accepted:?}");
 }
 
-/// What a client says first.
+/// The first message of a client.
 fn hello(ground: &Ground) -> Vec<u8> {
     let (simulation, ground) = (SIMULATION, ground.hash());
     let hello = Hello {
@@ -295,7 +295,7 @@ fn a_server_takes_any_messages() {
         let (client, own) = &mut attackers[rng.usize(0..8)];
         let mut bytes = hostile(&mut rng, &to_server);
         if rng.bool() {
-            // With a number that was not seen before, so that it is not taken for one that comes again.
+            // With a new number, so that it is not taken for a repeated edit.
             let edits = edits[rng.usize(0..edits.len())].clone();
             let first = *own;
             *own += edits.len() as u64;
@@ -322,7 +322,7 @@ fn a_server_takes_any_messages() {
                 {
                     kicks[usize::from(why == Kick::Flood)] += 1;
                     begun += 1;
-                    // Whoever comes back does so as somebody else.
+                    // A kicked client reconnects under a new number.
                     let again = ClientId(1000 + begun);
                     attackers.iter_mut().filter(|own| own.0 == to).for_each(|own| *own = (again, 1));
                     begin(&mut server, again, now);
@@ -343,7 +343,7 @@ fn a_server_takes_any_messages() {
     assert!(memory < 128 << 20, "{memory} bytes");
     assert!(figures.messages >= runs + begun);
     assert!(figures.malformed > runs / 10 && figures.kicked >= kicks[0] + kicks[1] && kicks[0] > 0);
-    assert!(figures.ordered > runs / 1000, "few of them get so far that they are ordered");
+    assert!(figures.ordered > runs / 1000, "few of them are ordered");
     assert_eq!(figures.voids, 0);
     assert!(server.clients().any(|client| client == honest.id), "an honest client was kicked");
     assert_eq!(honest.confirmed, (1..=honest.last_own).collect::<Vec<_>>());
@@ -384,14 +384,14 @@ fn a_flooder_is_kicked_and_nobody_else_notices() {
             honest.edit([small()]);
         }
         play(&mut server, &mut [&mut flooder, &mut honest], &mut now, 1);
-        // Its edit is ordered in the frame in which it comes, however much others send.
+        // Its edit is ordered in the frame in which it arrives, however much others send.
         assert_eq!(honest.confirmed.last().copied().unwrap_or_default(), honest.last_own);
     }
     assert_eq!((flooder.kicked, honest.kicked), (Some(Kick::Flood), None));
     assert!(kicked_at.is_some_and(|after| after < Duration::from_secs(10)), "{kicked_at:?}");
     assert!(honest.refused.is_empty());
     assert!(flooder.refused.iter().all(|(_, why)| *why == Refusal::Cost));
-    // Not three times the rate is not flooding: what is too much is refused.
+    // Less than three times the rate is not flooding: excess edits are refused.
     let mut eager = Follower::new(3, &ground);
     eager.connect(&mut server, now);
     play(&mut server, &mut [&mut eager], &mut now, 3);

@@ -1,5 +1,5 @@
-//! Everybody has the same world: while they dig over bad lines, when they come late or come back, after the server's restart, and
-//! after lies that are found out.
+//! All clients have the same world: while they dig over bad lines, after joining late or reconnecting, after a restart
+//! of the server, and after tampered messages are detected.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ fn settings() -> ServerSettings {
     ServerSettings { undo: UndoPolicy::Own, ..ServerSettings::default() }
 }
 
-/// Digs until so many edits were ordered.
+/// Digs until this many edits were ordered.
 fn dig(play: &mut Play, edits: u64) {
     let end = play.server.figures().ordered + edits;
     while play.server.figures().ordered < end {
@@ -60,7 +60,7 @@ fn all_have_the_same_world_at_every_number() {
     }
 }
 
-/// Calls something for the entries that are sent to the first player, until it has done its work; it may drop them.
+/// Calls a function for the entries that are sent to the first player, until it has changed some; it may drop them.
 fn lie(play: &mut Play, mut change: impl FnMut(&mut Vec<Entry>) -> Lie + 'static) {
     let (ground, stamps) = (Arc::clone(&play.ground), Arc::clone(&play.image));
     let mut known = bevy_burrow::net::Stamps::default();
@@ -114,7 +114,7 @@ fn a_lost_message_is_noticed_and_what_it_held_comes_again() {
     assert_eq!(play.bots[1].client.figures().gaps, 0);
 }
 
-/// Only the first player has something to mend, and has mended it once.
+/// Only the first player has something to repair, and has repaired it once.
 fn check_mended(play: &Play) {
     let repairs: Vec<u64> = play.bots.iter().map(|bot| bot.client.figures().repairs).collect();
     assert!(repairs[0] > 0, "nothing was noticed");
@@ -130,7 +130,7 @@ fn quiet_play() -> Play {
     play
 }
 
-/// The server puts a hole, and one bot is told of another one.
+/// The server changes parts of the world, and one bot receives different parts.
 fn lie_about_parts(play: &mut Play, mut damage: impl FnMut(&mut WorldChange) + 'static) {
     let mut other = terrain(&play.ground);
     other.apply([sphere(40.0, 40.0)]);
@@ -199,7 +199,7 @@ fn wait_until_joined(play: &mut Play, at: usize) {
     wait_until(play, at, |bot| bot.client.has_joined());
 }
 
-/// Has so many edits ordered by the server itself.
+/// Lets the server itself order this many edits.
 fn dig_before(play: &mut Play, edits: u64) {
     let mut rng = Rng::with_seed(3);
     for done in 0..edits {
@@ -218,7 +218,7 @@ fn dig_before(play: &mut Play, edits: u64) {
     play.send();
 }
 
-/// Somebody comes after many edits, over a line of 256 KiB a second, while eight dig.
+/// A client joins after many edits, over a line of 256 KiB a second, while eight others dig.
 fn come_late(log_bytes: usize) -> Play {
     // Without undo, edits that wait go into one transaction.
     let settings = ServerSettings { log_bytes, ..ServerSettings::default() };
@@ -240,7 +240,7 @@ fn come_late(log_bytes: usize) -> Play {
     );
     assert!(playable <= Duration::from_secs(15));
     assert!(play.bots.iter().all(|bot| bot.order.most.max(bot.bulk.most) <= 5 << 20));
-    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000, "too much until one can play");
+    assert!(late.bytes.iter().sum::<u64>() <= 2_500_000, "too many bytes until play begins");
     play
 }
 
@@ -253,7 +253,7 @@ fn who_comes_late_plays_soon() {
     let late = &play.bots[8];
     assert!(late.client.has_joined(), "all of the log is there");
     assert!(late.client.figures().applied > count("BURROW_EDITS", 1000) * 3 / 4, "it got regions");
-    assert!(late.event("others") < 500, "what was long ago is told");
+    assert!(late.event("others") < 500, "old edits are reported one by one");
     play.settle();
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
@@ -271,7 +271,7 @@ fn who_comes_late_plays_soon_without_the_whole_log() {
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
 
-/// Cuts the first player's line for some seconds while others dig, and lets it come back.
+/// Cuts the first player's line for some seconds while others dig, and restores it.
 fn come_back(settings: ServerSettings, away: f64) -> Play {
     let mut play = Play::new(&hills(96), 3, settings);
     play.seconds(6.0);
@@ -307,7 +307,7 @@ fn who_comes_back_after_a_long_time_gets_the_regions_that_differ() {
     come_back(ServerSettings { log_bytes: 0, ..settings() }, 6.0);
 }
 
-/// Cuts a player's line while what it begins with comes, and lets it come back.
+/// Cuts a player's line while it joins, and restores it.
 fn is_cut_off(log_bytes: usize, rate: u64) {
     let slow = Rate { per_second: rate, burst: rate / 2 };
     let mut play = Play::new(&hills(160), 2, ServerSettings { bulk: slow, log_bytes, ..settings() });
@@ -350,7 +350,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
     let mut saved = terrain(&ground);
     let mut store = Store::create_in(Arc::new(disk.clone()), &mut saved, options()).expect("a new world");
     for run in 0..3 {
-        // Nothing is ordered while nobody listens.
+        // Nothing is ordered while no client is connected.
         play.changes_terms = false;
         let stamps = play.server.stamps_mut().clone();
         play.server = Server::open(saved, &store, settings());
@@ -358,7 +358,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
         for at in 0..3 {
             if run > 0 {
                 let bot = &play.bots[at];
-                assert!(bot.durable <= play.server.epoch().number, "what is durable is there");
+                assert!(bot.durable <= play.server.epoch().number, "durable edits are lost");
             }
             play.cut(at);
         }
@@ -372,7 +372,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
             play.server.save(&mut store).expect("the store's thread runs");
         }
         assert!(play.bots.iter().all(|bot| bot.durable > number), "nothing became durable");
-        // It is killed: the store does not save what waits.
+        // It is killed: the store does not save waiting commits.
         disk = disk.image().lose_process();
         drop(store);
         let (again, opened) =
@@ -390,7 +390,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
 }
 
-/// The order goes on where a server does that was opened.
+/// The reference continues from the state of a server that was opened again.
 fn begin_again(play: &mut Play) {
     let number = play.server.epoch().number;
     let world = play.server.terrain().world();
@@ -416,7 +416,7 @@ fn each_edit_is_done_once_though_the_server_is_killed() {
         play.cut(at);
         play.reconnect(at);
     });
-    // Edits that were told to their players, and were not saved when the server was killed.
+    // Edits that were confirmed to their players but not saved when the server was killed.
     let (mut lost, mut unseen, mut rng) = (BTreeSet::new(), 0, Rng::with_seed(4));
     let kills = count("BURROW_KILLS", 5);
     for kill in 0..kills {
@@ -452,9 +452,9 @@ fn each_edit_is_done_once_though_the_server_is_killed() {
     let mut done: Vec<(ClientId, u64)> =
         play.reference.done.iter().map(|(_, author, own)| (*author, *own)).collect();
     done.sort_unstable();
-    println!("{kills} kills, {} edits, {unseen} saved and not told, {} lost", done.len(), lost.len());
-    assert!(unseen > 0, "nothing was saved that was not told");
-    assert!(done.windows(2).all(|pair| pair[0] != pair[1]), "an edit was done twice");
+    println!("{kills} kills, {} edits, {unseen} saved and not confirmed, {} lost", done.len(), lost.len());
+    assert!(unseen > 0, "no saved edit was unconfirmed");
+    assert!(done.windows(2).all(|pair| pair[0] != pair[1]), "an edit was applied twice");
     for bot in &play.bots {
         assert!(bot.open.is_empty() && bot.answered == bot.edits());
         for own in 1..=bot.edits() {

@@ -1,4 +1,5 @@
-//! What a player may cost: by player and not by connection, in memory, numbers and time; and what an honest one never loses by it.
+//! Limits on a player, regardless of the number of connections, in memory, numbers and time; and that honest players
+//! lose nothing by them.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -33,7 +34,7 @@ fn edit(brush: &Brush) -> Edit {
     Edit::quantize(brush).expect("a valid brush")
 }
 
-/// A client of the test's own, which sends what it likes, greets and is let in.
+/// A client of this test, which greets, joins, and can send any messages.
 fn let_in(server: &mut Server, id: ClientId, ground: &Ground, now: Duration) {
     let (chunk_size, ground, place) = (32, ground.hash(), IVec3::splat(20));
     let (protocol, simulation) = (PROTOCOL, SIMULATION);
@@ -48,7 +49,7 @@ fn send(server: &mut Server, id: ClientId, first: u64, edits: Vec<Edit>, now: Du
     server.receive(id, &ToServer::Edits { first, edits }.to_bytes(), now);
 }
 
-/// A server and clients of the crate's; lines between them lose nothing.
+/// A server and clients of this crate; lines between them lose nothing.
 struct Play {
     ground: Arc<Ground>,
     server: Server,
@@ -146,7 +147,8 @@ impl Play {
     }
 }
 
-/// What the server holds more after frames in which a client digs, and fetches regions or not; it acknowledges nothing.
+/// Additional bytes that the server holds after a client has dug for some frames, with or without fetching regions. It
+/// acknowledges nothing.
 fn held(fetches: bool) -> i64 {
     let ground = flat(512);
     let mut dug = terrain(&ground);
@@ -180,8 +182,9 @@ fn fetches_that_nobody_takes_keep_one_world_in_memory() {
     assert!(held(true) < without + (8 << 20));
 }
 
-/// What a server holds beside its world, all of which changes in a second: after so many clients have come in eight seconds that take
-/// nothing, and after so many frames more; and the size of the world. It is measured by what is freed in the end, on this thread.
+/// Bytes that a server holds in addition to its world, all of which changes in a second: after `clients` clients that
+/// acknowledge nothing have connected within eight seconds, and after `frames` more frames; and the size of the world.
+/// Measured as bytes freed at the end, on this thread.
 fn held_beside(clients: u64, frames: u32) -> (i64, i64) {
     let ground = flat(128);
     let settings = ServerSettings { log_bytes: 64 << 10, window: 32 << 10, ..ServerSettings::default() };
@@ -213,7 +216,7 @@ fn held_beside(clients: u64, frames: u32) -> (i64, i64) {
 fn clients_that_take_nothing_share_worlds_and_lose_them() {
     let ((quiet, _), (kept, world), (left, _)) =
         (held_beside(0, 0), held_beside(40, 0), held_beside(40, 200));
-    println!("{quiet} bytes, {kept} with 40 clients, {left} later, beside a world of {world}");
+    println!("{quiet} bytes, {kept} with 40 clients, {left} later, in addition to a world of {world}");
     assert!(kept - quiet > world / 2, "no world was kept");
     assert!(kept - quiet < 10 * world, "{kept} bytes for 40 clients instead of {quiet}");
     assert!(left - quiet < world / 2, "{left} bytes are left instead of {quiet}");
@@ -286,8 +289,8 @@ fn bytes_of_the_bulk_lane_are_those_of_a_player() {
     assert!(one > 100 << 10 && many <= one + one / 5, "{many} bytes instead of {one}");
 }
 
-/// What becomes of digs of player 7, after somebody came under that number and sent an edit with the own number `first`: confirmed,
-/// pending, kicked.
+/// The results of digs by player 7, after another client connected under that number and sent an edit with the number
+/// `first`: confirmed, pending, kicked.
 fn after_a_stranger(first: u64) -> (usize, usize, usize) {
     let ground = flat(128);
     let mut server = Server::new(terrain(&ground), ServerSettings::default());
@@ -328,7 +331,7 @@ fn numbers_at_the_end_of_their_range_are_counted() {
     }
 }
 
-/// A server that was replaced by one that knows nothing does not refuse the numbers of those who have dug for long.
+/// A new server that replaces another one does not refuse the numbers of players that have dug for a long time.
 #[test]
 fn who_has_dug_for_long_goes_on_at_a_server_that_knows_less() {
     let ground = flat(64);
@@ -374,7 +377,7 @@ fn nobody_digs_beyond_the_reach() {
     assert_eq!(is_left(Shape::capsule(at(4.0), at(124.0), 2.0)), [true, true]);
     assert_eq!(is_left(Shape::cuboid(at(64.0), Vec3::new(60.0, 2.0, 2.0))), [true, true]);
     assert_eq!(is_left(Shape::sphere(at(10.0), 2.0)), [true, true]);
-    assert_eq!(is_left(Shape::sphere(at(66.0), 4.0)), [true, false], "what is near is dug");
+    assert_eq!(is_left(Shape::sphere(at(66.0), 4.0)), [true, false], "near ground is dug");
 }
 
 #[test]
@@ -429,7 +432,7 @@ fn what_was_dug_without_a_connection_is_done_when_it_is_back() {
     }
 }
 
-/// An honest client's bucket is empty, and it comes back: what it does then waits until it may be done.
+/// An honest client with an empty bucket reconnects: its further edits wait until they are allowed.
 #[test]
 fn who_comes_back_with_an_empty_bucket_is_not_refused() {
     let ground = flat(128);
@@ -493,7 +496,8 @@ fn undos_among_digs_are_done_in_order_while_the_server_is_behind() {
     }
 }
 
-/// How many answers an undo gets in ten seconds, while another player digs so often a frame on a server that may do little.
+/// The number of answers to undos in ten seconds, while another player digs several times a frame on a server with
+/// small work limits.
 fn answers(digs: u32) -> usize {
     let ground = flat(128);
     let settings = ServerSettings { undo: UndoPolicy::Own, work: 60, ..ServerSettings::default() };
@@ -608,7 +612,7 @@ fn who_lacks_the_image_of_a_stamp_gets_it() {
     assert_eq!(play.server.figures().malformed, 0);
 }
 
-/// An image that the server lacks: the edit is refused, and those beside it are done.
+/// An image that the server lacks: the edit is refused, and the others in the message are applied.
 #[test]
 fn a_stamp_that_the_server_does_not_know_is_refused() {
     let ground = flat(128);
@@ -625,7 +629,8 @@ fn a_stamp_that_the_server_does_not_know_is_refused() {
     assert_eq!((player.client.pending(), play.server.figures().malformed), (0, 0));
 }
 
-/// What a game puts goes out as it is acknowledged, and to all in the end; who acknowledges nothing gets no more than a window.
+/// Parts that a game replaces are sent as clients acknowledge them, and reach all in the end; a client that
+/// acknowledges nothing gets at most a window.
 #[test]
 fn the_order_lane_keeps_within_its_window() {
     let ground = flat(512);

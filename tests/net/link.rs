@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use fastrand::Rng;
 
-/// What the lines are like.
+/// The properties of a line.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     pub latency: Duration,
-    /// Up to so much more or less.
+    /// The latency varies by at most this much.
     pub jitter: Duration,
-    /// Of a hundred packets.
+    /// Lost packets of a hundred.
     pub lost: u32,
-    /// After so long what was lost is sent again.
+    /// Lost packets are sent again after this time.
     pub timeout: Duration,
     /// Bytes a second, all lanes of a direction together.
     pub rate: u64,
@@ -29,7 +29,7 @@ impl Line {
         rate: 4 << 20,
     };
 
-    /// The time that a packet takes, with all that it is sent anew.
+    /// The time that a packet takes, including repetitions.
     fn delay(&self, rng: &mut Rng) -> Duration {
         let jitter = 2.0 * self.jitter.as_secs_f64() * rng.f64();
         let mut delay = self.latency - self.jitter + Duration::from_secs_f64(jitter);
@@ -40,13 +40,13 @@ impl Line {
     }
 }
 
-/// Messages on their way in one lane, with the time at which each arrives.
+/// Messages in transit in one lane, with their times of arrival.
 #[derive(Default)]
 pub struct Way {
     messages: VecDeque<(Duration, Vec<u8>)>,
     last: Duration,
     pub bytes: usize,
-    /// The most bytes that were on their way at once.
+    /// The most bytes that were in transit at once.
     pub most: usize,
 }
 
@@ -54,7 +54,7 @@ impl Way {
     /// Sends a message; `free` is the time at which the line is free.
     pub fn send(&mut self, message: Vec<u8>, now: Duration, free: &mut Duration, line: &Line, rng: &mut Rng) {
         *free = (*free).max(now) + Duration::from_secs_f64(message.len() as f64 / line.rate as f64);
-        // What was sent later waits for what is sent again.
+        // Later packets wait for repeated ones.
         self.last = self.last.max(*free + line.delay(rng));
         self.bytes += message.len();
         self.most = self.most.max(self.bytes);

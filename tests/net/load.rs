@@ -1,4 +1,4 @@
-//! What many players cost: bytes for each edit and client, and the server's time.
+//! The cost of many players: bytes for each edit and client, and the server's time.
 //!
 //! ```text
 //! cargo test --release --no-default-features --features net --test net -- --ignored --nocapture load
@@ -20,10 +20,10 @@ use crate::follower::{hills, terrain};
 const FRAMES: u64 = 30;
 /// Edits of a player in a second.
 const EDITS: u64 = 5;
-/// About what UDP, IP and a transport put before the messages of a frame.
+/// Approximate bytes of the headers of UDP, IP and a transport for the messages of a frame.
 const HEADERS: u64 = 40;
 
-/// A player who walks and digs.
+/// A player that walks and digs.
 struct Player {
     id: ClientId,
     at: Vec3,
@@ -37,7 +37,7 @@ impl Player {
         self.at =
             (self.at + 3.0 * step).clamp(Vec3::new(4.0, 14.0, 4.0), Vec3::new(side - 4.0, 24.0, side - 4.0));
         let shape = Shape::sphere(self.at, 2.0 + 0.5 * (self.own / 20 % 3) as f32);
-        // A tool is kept for a while.
+        // A player keeps a tool for some time.
         let brush = match self.own / 10 % 8 {
             0..5 => Brush::dig(shape),
             5 | 6 => Brush::add(shape, MaterialId(2)),
@@ -58,7 +58,7 @@ struct Load {
     longest: Duration,
 }
 
-/// So many players dig for so many seconds.
+/// `clients` players dig for `seconds` seconds.
 fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) -> Load {
     let mut rng = Rng::with_seed(clients);
     let side = ground.width() as f32;
@@ -90,7 +90,7 @@ fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) -> L
         now += Duration::from_secs(1) / FRAMES as u32;
         let mut messages = Vec::new();
         for player in &mut players {
-            // Everybody begins at another time.
+            // Players begin at different times.
             let id = player.id.0;
             let phase = |frame: u64| (frame * EDITS + id * 7) / FRAMES;
             if phase(frame + 1) != phase(frame) {
@@ -124,7 +124,7 @@ fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) -> L
     Load { bytes: each(bytes), with_headers: each(bytes + packets * HEADERS), up: each(up), cpu, longest }
 }
 
-/// The time that the process has worked, all its threads together.
+/// The CPU time of the process, all threads together.
 fn cpu_time() -> Duration {
     #[cfg(target_os = "linux")]
     {

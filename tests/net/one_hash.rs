@@ -1,4 +1,4 @@
-//! One order of edits of all operations has one hash, with one thread and with many, in whatever transactions, and on a card.
+//! One order of edits of all operations has one hash, with one thread and with many, in any transactions, and on a GPU.
 //!
 //! ```text
 //! BURROW_EDITS=100000 cargo test --release --no-default-features --features cuda,net --test net -- --nocapture one_hash
@@ -16,7 +16,7 @@ use glam::{Vec2, Vec3};
 use crate::follower::{count, hills, terrain};
 use crate::worlds::{any_random_brush, random_rules};
 
-/// What is asked for, one after the other.
+/// The requests, in order.
 enum Turn {
     Edit(Edit),
     Rules(DiggingRules),
@@ -93,7 +93,7 @@ fn one_hash() {
     if let EngineState::Cuda(card) = cuda.wait(Duration::from_secs(60)) {
         hashes.extend([(1, 40), (8, 400)].map(|(threads, longest)| run(&card, &cuda, threads, longest)));
         let figures = cuda.figures();
-        println!("{} stages on the card, {} beside it", figures.cuda, figures.cpu);
+        println!("{} stages on the GPU, {} on the CPU", figures.cuda, figures.cpu);
         assert!(figures.cuda > 0 && matches!(cuda.state(), EngineState::Cuda(_)));
     }
     assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:x?}");

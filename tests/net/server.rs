@@ -1,4 +1,4 @@
-//! The server's order, what it refuses, who may undo what, how clients come and come back.
+//! The server's order, its refusals, the policies of undo, and how clients join and reconnect.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -132,7 +132,7 @@ fn an_edit_is_refused_where_its_player_does_not_reach() {
     let mut a = scene.join(1);
     a.edit([dig(30.0, 30.0)]);
     scene.play(&mut [&mut a], 1);
-    assert_eq!(a.refused, [(1, Refusal::TooFar)], "nobody knows where the player is");
+    assert_eq!(a.refused, [(1, Refusal::TooFar)], "the player's position is unknown");
     scene.server.set_place(ClientId(1), Some(IVec3::new(30, 20, 30)));
     // All of a ball of 3 has to be within 13.
     a.edit([dig(30.0, 39.0), dig(30.0, 42.0), dig(20.5, 30.0), dig(10.0, 30.0)]);
@@ -160,7 +160,7 @@ fn an_edit_is_refused_that_costs_more_than_is_left() {
     a.edit([small]);
     scene.play(&mut [&mut a], 1);
     assert_eq!(a.confirmed.len(), accepted + 1, "nothing came back");
-    // What sculpts costs four times as much, less the 20 that each costs.
+    // Sculpting costs four times as much, except for the fixed 20 of each edit.
     let mut b = scene.join(2);
     b.edit((0..20).map(|_| Brush::smooth(Shape::sphere(Vec3::new(30.0, 20.0, 30.0), 3.0), 0.5)));
     scene.play(&mut [&mut a, &mut b], 1);
@@ -217,7 +217,8 @@ fn clients_of_another_kind_are_sent_away() {
 
 #[test]
 fn who_may_undo_what() {
-    // Policy, is the second an administrator, may it undo the first's, may the first undo its own?
+    // The policy, whether the second is an administrator and may undo the first's strokes, whether the first may undo
+    // its own.
     for (undo, is_administrator, foreign, own) in [
         (UndoPolicy::Nobody, true, false, false),
         (UndoPolicy::Administrators, true, true, false),
@@ -262,7 +263,7 @@ fn what_others_touched_is_not_undone() {
     scene.play(&mut [&mut a, &mut b], 1);
     a.edit([dig(60.0, 30.0)]);
     scene.play(&mut [&mut a, &mut b], 1);
-    // Beside both, and into the second.
+    // One next to both holes, and one into the second.
     b.edit([dig(90.0, 90.0), dig(62.0, 30.0)]);
     scene.play(&mut [&mut a, &mut b], 1);
     let before = agreed(&scene.server, &[&a, &b]);
@@ -270,14 +271,14 @@ fn what_others_touched_is_not_undone() {
     scene.play(&mut [&mut a, &mut b], 1);
     assert_eq!(a.refused, [(undone, Refusal::Touched)]);
     assert_eq!(agreed(&scene.server, &[&a, &b]), before);
-    // The first is still as it was left.
+    // The first hole is unchanged.
     a.undo(1);
     scene.play(&mut [&mut a, &mut b], 1);
     assert_ne!(agreed(&scene.server, &[&a, &b]), before);
     let last = a.undo(1);
     scene.play(&mut [&mut a, &mut b], 1);
     assert_eq!(a.refused[1..], [(last, Refusal::Nothing)]);
-    // A stroke into which somebody dug between its edits is touched too.
+    // A stroke between whose edits another player dug is touched too.
     let stroke = |x: f32| dig(x, 60.0).with_stroke(3);
     a.edit([stroke(30.0)]);
     scene.play(&mut [&mut a, &mut b], 1);
@@ -412,7 +413,7 @@ fn regions_come_from_the_player_outwards_and_no_faster_than_allowed() {
         }
         let passed = (scene.now - start).as_secs_f64();
         assert!(got as f64 <= 1000.0 + 4000.0 * passed, "{got} bytes in {passed} s");
-        assert!(got - acknowledged <= 2000, "{} bytes are on their way", got - acknowledged);
+        assert!(got - acknowledged <= 2000, "{} bytes are in transit", got - acknowledged);
         // For the first five seconds nothing is acknowledged.
         if passed > 5.0 {
             acknowledged = got;
@@ -434,7 +435,7 @@ fn what_differs_is_found_at_the_next_mark_and_repaired() {
     scene.play(&mut [&mut a, &mut b], 30);
     b.spoil(Vec3::new(32.0, 20.0, 32.0));
     scene.play(&mut [&mut a, &mut b], 30);
-    assert_eq!(b.repairs, 0, "nobody has dug since");
+    assert_eq!(b.repairs, 0, "no player has dug since");
     a.edit([dig(34.0, 30.0)]);
     scene.play(&mut [&mut a, &mut b], 60);
     agreed(&scene.server, &[&a, &b]);
@@ -464,7 +465,7 @@ fn a_server_goes_on_from_its_store() {
             scene.server.save(&mut store).expect("a store that works");
         }
     }
-    // Not saved: the clients are ahead of what comes back.
+    // Not saved: the clients are ahead of the restarted server.
     a.edit([dig(60.0, 60.0)]);
     scene.play(&mut [&mut a, &mut b], 1);
     let (acknowledged, ahead) = (a.durable, a.number);

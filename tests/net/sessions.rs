@@ -1,5 +1,5 @@
-//! A session can begin again at any moment: whatever happens to connections, clients and servers, everybody ends with the server's
-//! world.
+//! A session can start again at any moment: whatever happens to connections, clients and servers, all clients end with
+//! the server's world.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -21,7 +21,7 @@ const SIDE: u32 = 64;
 struct Player {
     id: ClientId,
     client: Client,
-    /// Whether there is a connection, which both sides may not know yet.
+    /// Whether there is a connection, even if a side has not noticed yet.
     is_connected: bool,
     up: VecDeque<Vec<u8>>,
     down: [VecDeque<Vec<u8>>; 2],
@@ -120,7 +120,7 @@ impl Play {
         client
     }
 
-    /// A frame: of what is on its way, some arrives.
+    /// A frame: some of the messages in transit arrive.
     fn tick(&mut self) {
         self.now += TICK;
         for player in &mut self.players {
@@ -169,7 +169,7 @@ impl Play {
         player.client.connect(self.now);
     }
 
-    /// The connection ends; some of what was on its way has arrived.
+    /// Ends the connection; some of the messages in transit have arrived.
     fn cut(&mut self, at: usize) {
         let player = &mut self.players[at];
         for _ in 0..self.rng.usize(0..=player.up.len()) {
@@ -192,7 +192,7 @@ impl Play {
         self.server.disconnect(player.id);
     }
 
-    /// Another server takes the place of this one, over connections that go on, with messages to the old one on their way.
+    /// Replaces the server while connections persist and messages to the old one are in transit.
     fn replace(&mut self, server: Server) {
         self.server = server;
         for player in self.players.iter().filter(|player| player.is_connected) {
@@ -202,7 +202,7 @@ impl Play {
 
     fn restart(&mut self) {
         let disk = match self.store.take() {
-            // It is killed: what waits is not saved.
+            // It is killed: waiting commits are not saved.
             Some((store, disk)) => {
                 let disk = disk.image().lose_process();
                 drop(store);
@@ -230,7 +230,7 @@ impl Play {
         match self.rng.u32(0..20) {
             0..3 => self.connect(at),
             3..5 => self.cut(at),
-            // On the connection that there is, or is not.
+            // With or without a connection.
             5 | 6 => self.players[at].client.connect(self.now),
             7 | 8 => {
                 self.players[at].client = self.client();
@@ -245,7 +245,7 @@ impl Play {
                 self.replace(Server::new(terrain, settings));
             }
             10 => self.restart(),
-            // The server begins a session anew, and nobody tells the client.
+            // The server starts a new session without a message to the client.
             11 if self.players[at].is_connected => self.server.connect(self.players[at].id, self.now),
             12 => self.players[at].client.undo(None),
             _ => {
@@ -260,8 +260,8 @@ impl Play {
 
     fn is_settled(&self) -> bool {
         let last = self.server.epoch().number;
-        // One that has not noticed yet that its server was replaced may be at the same number of the other order by chance: it has told
-        // this server nothing of it.
+        // A client that has not noticed yet that its server was replaced may be at an equal number of the other order
+        // by chance: it has sent this server nothing about it.
         self.server.applied() == last
             && self.players.iter().all(|player| {
                 let is_here = self.server.acknowledged(player.id) == Some(last);
@@ -270,7 +270,7 @@ impl Play {
             })
     }
 
-    /// Plays a script; returns what is wrong at its end.
+    /// Plays a script. Returns an error if the end state is wrong.
     fn run(&mut self) -> Result<Duration, String> {
         for _ in 0..self.rng.u32(4..16) {
             self.act();
@@ -330,7 +330,7 @@ fn whatever_happens_everybody_ends_with_the_world() {
     assert!(failed.is_empty(), "failing seeds: {failed:?}");
 }
 
-/// A quick server, a world of so many rough digs, and one player with lanes that deliver everything at once.
+/// A fast server, a world of `digs` rough digs, and one player with lanes that deliver everything at once.
 fn quick(side: u32, digs: u32) -> (Server, Arc<Ground>) {
     let ground = Arc::new(Ground::flat(side, side, 0.0).expect("valid"));
     let mut dug = terrain(&ground);
@@ -364,7 +364,7 @@ fn pump(server: &mut Server, client: &mut Client, now: &mut Duration) {
     drop((client.take_shown(), client.take_events()));
 }
 
-/// Joins over the connection of a client before; returns how long that took.
+/// Joins over the connection of a previous client; returns the time that this took.
 fn joins_again(server: &mut Server, ground: &Arc<Ground>, now: &mut Duration) -> Option<Duration> {
     let (mut client, began) = (new_client(ground, *now), *now);
     while !client.has_joined() && *now - began < Duration::from_secs(60) {
@@ -402,7 +402,7 @@ fn a_client_that_comes_after_more_than_a_window_was_sent_joins() {
 fn a_greeting_that_nobody_heard_is_repeated() {
     let ((mut server, ground), mut now) = (quick(128, 20), Duration::from_secs(1));
     let mut client = new_client(&ground, now);
-    // There is no server yet: what is said is lost.
+    // There is no server yet, so messages are lost.
     for _ in 0..100 {
         now += TICK;
         drop(client.take_outgoing());
@@ -411,7 +411,7 @@ fn a_greeting_that_nobody_heard_is_repeated() {
     server.connect(ID, now);
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
     assert!(client.has_joined());
-    // Nor does one that follows and says nothing stay behind, where the server forgets its session.
+    // A client that follows silently does not fall behind either if the server forgets its session.
     server.connect(ID, now);
     server.edit(random_dig(&mut Rng::with_seed(1))).expect("no stamp");
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));

@@ -1,5 +1,5 @@
-//! Eight hostile clients, one for each attack, beside eight honest ones: what the server holds in memory, how long honest edits take, and
-//! what is gained by connecting anew, with the attackers and without.
+//! Eight hostile clients, one for each attack, together with eight honest ones: the server's memory, the time of honest
+//! edits, and the gain from reconnecting, with the attackers and without.
 //!
 //! ```text
 //! BURROW_SIEGE=300 cargo test --release --no-default-features --features net --test net siege -- --nocapture
@@ -23,7 +23,8 @@ use glam::{IVec3, Vec3};
 use crate::follower::{count, hills, terrain};
 
 const TICK: Duration = Duration::from_micros(16_667);
-/// What all dig in a few seconds has to be little of the world: for so long, the world is kept as it was for clients that take nothing.
+/// The size of the world. All edits within a few seconds must be a small part of it, because the old world is kept that
+/// long for clients that acknowledge nothing.
 const SIDE: f32 = 512.0;
 /// Ticks between two edits of an honest player.
 const EDIT: u64 = 12;
@@ -46,18 +47,18 @@ struct Honest {
     refused: u64,
 }
 
-/// What came of a run.
+/// The results of a run.
 #[derive(Debug)]
 struct Outcome {
-    /// What the server's world took at its end, without the ground, which clients here share.
+    /// Bytes of the server's world at its end, without the ground, which clients here share.
     world: i64,
-    /// What the server held beside it.
+    /// Bytes that the server held in addition to it.
     beside: i64,
-    /// Ticks from an edit to its confirmation, of the slowest of a hundred.
+    /// Ticks from an edit to its confirmation, 99th percentile.
     ticks: u64,
-    /// How long the server took for a tick, of the slowest of a hundred.
+    /// The server's time for a tick, 99th percentile.
     took: Duration,
-    /// The edits that the one who always connects anew got through.
+    /// The edits that the constantly reconnecting client got accepted.
     reconnecting: u64,
 }
 
@@ -74,7 +75,7 @@ impl Attackers {
         server.receive(ClientId(HOSTILE + at as u64), &ToServer::Hello(hello).to_bytes(), now);
     }
 
-    /// What all of them send in a tick. Whoever was kicked is there again at once.
+    /// Sends the messages of all of them for a tick. Kicked clients reconnect at once.
     fn act(&mut self, server: &mut Server, tick: u64, now: Duration) {
         for at in 0..8 {
             let id = ClientId(HOSTILE + at as u64);
@@ -86,14 +87,14 @@ impl Attackers {
             let mut send = |message: ToServer| server.receive(id, &message.to_bytes(), now);
             let own = &mut self.own[at];
             match at {
-                // Fetches of worlds that change, and takes nothing.
+                // Fetches regions of a changing world, and acknowledges nothing.
                 0 => {
                     *own += 1;
                     let edits = vec![random_dig(&mut self.rng, 2.0)];
                     send(ToServer::Edits { first: *own, edits });
                     send(ToServer::Fetch { number: 0, regions: vec![RegionPos(IVec3::ZERO); 8] });
                 }
-                // Connects anew all the time, and digs as much as it can.
+                // Reconnects all the time, and digs as much as it can.
                 1 => {
                     let edits = (0..20).map(|_| random_dig(&mut self.rng, 2.0)).collect();
                     send(ToServer::Edits { first: *own + 1, edits });
@@ -119,7 +120,7 @@ impl Attackers {
                     send(ToServer::Edits { first: *own + 1, edits });
                     *own += 100;
                 }
-                // Takes nothing of what it joins with, again and again.
+                // Joins again and again, and acknowledges nothing.
                 6 if tick.is_multiple_of(60) => self.greet(server, at, now),
                 6 => {}
                 _ => {
@@ -139,9 +140,9 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
     while let Some(transaction) = dug.begin() {
         dug.commit(transaction.run()).expect("it waits for it");
     }
-    // What may be undone has a limit of its own, which a busy player fills in any case.
+    // Undo has its own limit, which a busy player fills in any case.
     let undo_bytes = 1 << 20;
-    // Honest players are to be there soon.
+    // Honest players should join quickly.
     let bulk = Rate { per_second: 2 << 20, burst: 64 << 10 };
     let settings = ServerSettings { undo: UndoPolicy::Own, undo_bytes, bulk, ..ServerSettings::default() };
     let mut server = Server::new(dug, settings);
@@ -230,10 +231,10 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
 fn eight_attackers_cost_honest_players_little() {
     let seconds = count("BURROW_SIEGE", 10);
     let (quiet, attacked) = (run(seconds, false), run(seconds, true));
-    // What attackers dig is the world's, as with any player. What is kept for them besides is less than half of that: not a world for
-    // each of them, nor an index, which is a twentieth.
+    // Edits of attackers are part of the world, as for any player. Other memory for them is less than half of that:
+    // there is no copy of the world for each of them, nor of its index, which is a twentieth.
     let more = attacked.beside - quiet.beside;
-    assert!(2 * more <= attacked.world, "{more} bytes more, beside a world of {}", attacked.world);
+    assert!(2 * more <= attacked.world, "{more} bytes more, in addition to a world of {}", attacked.world);
     // 50 ms.
     assert!(attacked.ticks <= quiet.ticks + 3, "{} ticks instead of {}", attacked.ticks, quiet.ticks);
     if seconds >= 60 {
@@ -243,5 +244,5 @@ fn eight_attackers_cost_honest_players_little() {
     let cost = ServerSettings::default().cost;
     let most = (cost.burst + cost.per_second * seconds) / 28;
     assert!(attacked.reconnecting <= most, "{} instead of {most}", attacked.reconnecting);
-    assert!(attacked.reconnecting > most / 4, "it did not get through");
+    assert!(attacked.reconnecting > most / 4, "too few of its edits were accepted");
 }

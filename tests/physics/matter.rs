@@ -113,7 +113,7 @@ fn ground_debris_and_inventories_are_constant() {
     stage.frame();
     let (mut fallen, mut returned, mut most) = (0, 0, 0);
     for step in 0..number("BURROW_STEPS", 150) {
-        // Several in one frame, now and then.
+        // Sometimes several in one frame.
         for _ in 0..rng.usize(1..3) {
             match rng.u8(0..10) {
                 0..=5 => stage.send(random_brush(&mut rng).with_tag(step)),
@@ -210,7 +210,7 @@ fn debris_of_another_dig_stays_where_ground_comes_back() {
     let (mut stage, _) = beams(1);
     saw_off(&mut stage, 0);
     let at = lying(&mut stage)[&0];
-    // A pit that the beam lies beside, or in: nothing is cut off there.
+    // A pit next to the beam, or around it: nothing is cut off there.
     stage.dig([Brush::dig(Shape::sphere(at.with_y(6.0), 4.0)).with_tag(9)]);
     stage.frames((1.0 / STEP) as usize);
     undo(&mut stage);
@@ -245,7 +245,7 @@ fn of_equal_pieces_the_last_one_returns_first() {
         stage.frames((6.0 / STEP) as usize);
     };
     dig(&mut stage, 0);
-    // The same beam again.
+    // An equal beam again.
     stage.dig(beam(0));
     dig(&mut stage, 1);
     undo(&mut stage);

@@ -20,7 +20,7 @@ const TIMEOUT: Duration = Duration::from_secs(300);
 /// Sleep between two frames, so that tasks can proceed.
 const FRAME_SLEEP: Duration = Duration::from_micros(500);
 
-/// The receipts so far.
+/// All receipts.
 #[derive(Resource, Default)]
 struct Receipts {
     all: usize,
@@ -129,7 +129,7 @@ impl Stage {
         self.app.world_mut().resource_mut::<Time<Virtual>>().unpause();
     }
 
-    /// Seconds of physics so far.
+    /// Elapsed seconds of physics.
     pub fn seconds(&self) -> f32 {
         self.app.world().resource::<Time<Physics>>().elapsed_secs()
     }

@@ -14,7 +14,7 @@ use bevy_burrow::terrain::Drawn;
 
 use crate::stage::{Stage, level};
 
-/// Work on the surfaces of one terrain that goes on until it may end.
+/// Work on the surfaces of one terrain that continues until the gate opens.
 struct Slow {
     terrain: Entity,
     gate: Arc<Gate>,

@@ -20,8 +20,8 @@ fn a_walker_is_not_in_the_way_of_its_own_shield() {
     stage.app.world_mut().spawn(shield);
     stage.frames(seconds(3.0));
     let [bare, armed] = [bare, armed].map(|walker| stage.place(walker));
-    assert!(bare.x > 22.0 && (armed.x - bare.x).abs() < 0.1, "{armed} beside {bare}");
-    assert!((armed.y - bare.y).abs() < 0.02 && (armed.z - 30.0).abs() < 0.02, "{armed} beside {bare}");
+    assert!(bare.x > 22.0 && (armed.x - bare.x).abs() < 0.1, "{armed} instead of {bare}");
+    assert!((armed.y - bare.y).abs() < 0.02 && (armed.z - 30.0).abs() < 0.02, "{armed} instead of {bare}");
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn a_walker_does_not_sink_when_the_ground_below_it_is_remeshed() {
     let mut lowest = f32::INFINITY;
     for frame in 0..seconds(14.0) {
         if frame % 2 == 0 {
-            // The same surface, but drawn by another part: the tile loses it, and a chunk gets it.
+            // The surface stays, but is drawn by another part: the tile loses it, and a chunk gets it.
             let ahead = 1.5 + (frame % 13) as f32 * 0.3;
             let place = stage.feet(walkers[frame * 7 % walkers.len()]) + Vec3::X * ahead;
             stage.send(Brush::paint(Shape::sphere(place, 1.5), MaterialId(2)));

@@ -101,7 +101,8 @@ fn while_nobody_looks_nothing_is_merged() {
         assert_eq!(view.below(), 0);
         off(&mut view.camera());
         view.assert_unchanged(60, what);
-        // Digs show meanwhile, and a terrain that loads anew is not built up from the coarsest for those who come back.
+        // Digs show meanwhile, and a terrain that is loaded again is not built up from the coarsest level when cameras
+        // return.
         view.stage.send(crate::stage::dig(40.0, 60.0, 40.0, 9.0));
         view.stage.settle();
         assert_eq!(view.below(), 0, "{what}");
@@ -203,7 +204,7 @@ fn cameras_on_other_layers_and_of_two_dimensions_choose_nothing() {
     assert_eq!(portrait.nodes()[0], 0, "{:?}", portrait.nodes());
     let flat = View::new((Camera2d, orthographic(40.0)));
     assert_eq!(flat.nodes()[0], 0, "{:?}", flat.nodes());
-    // Beside the player's camera they make no difference.
+    // Next to the player's camera they make no difference.
     let mut view = View::perspective();
     let place = Transform::from_xyz(300.0, 90.0, 250.0);
     for number in 1..9 {

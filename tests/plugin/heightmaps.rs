@@ -11,7 +11,7 @@ use bevy_burrow::prelude::*;
 use crate::stage::Stage;
 use crate::worlds;
 
-/// Every failure so far: path and reason.
+/// All failures: path and reason.
 #[derive(Resource, Default)]
 struct Failures(Vec<(String, String)>);
 

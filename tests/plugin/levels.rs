@@ -1,4 +1,4 @@
-//! Levels of detail: what is drawn is closed in each frame, covers the world once, and follows cameras and edits.
+//! Levels of detail: the drawn surface is closed in each frame, covers the world once, and follows cameras and edits.
 
 use bevy::camera::{Camera, PerspectiveProjection, Projection};
 use bevy::prelude::*;

@@ -557,7 +557,7 @@ impl Life {
         }
     }
 
-    /// Another terrain takes the place of the one that is there: what is asked of that one is no longer expected.
+    /// Replaces the terrain: answers for the old one are no longer expected.
     fn renew(&mut self, voxel_size: f32) -> Terrain {
         self.collect();
         #[cfg(feature = "store")]
@@ -574,7 +574,7 @@ impl Life {
         model
     }
 
-    /// What was sent reaches the terrain as it is now.
+    /// Runs a frame so that everything that was sent reaches the present terrain.
     fn collect(&mut self) {
         if self.is_uncollected {
             self.run(1);
@@ -739,7 +739,7 @@ impl Life {
             Event::ToggleSlim => self.toggle(SlimVertices),
             Event::Hide => self.toggle(Visibility::Hidden),
             Event::DespawnPart => {
-                // A tile that a game despawns by mistake comes back with the next mesh; here all are built anew.
+                // A tile that a game despawns by mistake returns with the next mesh; here all meshes are rebuilt.
                 if let Some(&tile) = self.stage.with_component::<Chunk>().first() {
                     self.stage.app.world_mut().despawn(tile);
                     self.stage.app.world_mut().trigger(Redraw::default());

@@ -212,7 +212,7 @@ fn meshes_stay_in_the_main_world_if_asked() {
     stage.app.world_mut().trigger(Redraw { terrain: Some(terrain) });
     stage.frames(2);
     stage.settle();
-    stage.frames_until("all is built anew", |stage| usages(stage) == [RenderAssetUsages::default()]);
+    stage.frames_until("all meshes are rebuilt", |stage| usages(stage) == [RenderAssetUsages::default()]);
     stage.send(dig(30.0, 8.0, 30.0, 6.0));
     stage.settle();
     assert_eq!(usages(&mut stage), [RenderAssetUsages::default()]);

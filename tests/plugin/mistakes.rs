@@ -1,4 +1,4 @@
-//! The commonest mistakes of those who are new to the crate: each is logged once, with what to do about it.
+//! The most common mistakes of new users: each is logged once, with its remedy.
 
 use std::io::Write;
 use std::sync::{Arc, Mutex};

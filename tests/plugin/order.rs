@@ -181,7 +181,7 @@ struct Faulty;
 
 impl SurfaceProcessor for Faulty {
     fn build(&self, part: &Part, _: &SurfaceMesh) -> Option<CommitAction> {
-        assert!(part.revision == 0, "the processor fails, as intended");
+        assert!(part.revision == 0, "the surface processor fails, as intended");
         None
     }
 }

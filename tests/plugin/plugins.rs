@@ -88,7 +88,7 @@ fn ambiguities(app: &mut App, label: impl ScheduleLabel) -> Vec<String> {
     conflicts.collect()
 }
 
-/// Adds what a game may use of the crate beside physics, and checks the order of all systems.
+/// Adds the crate's plugins that a game may use in addition to physics, and checks the order of all systems.
 fn check_order(mut stage: Stage) {
     stage.show(level(1.0));
     stage.frames(2);

@@ -25,7 +25,7 @@ impl Drop for Folder {
     }
 }
 
-/// What was told so far.
+/// All messages that were received.
 #[derive(Resource, Default)]
 pub struct Heard {
     pub opened: Vec<Result<u64, String>>,
@@ -58,7 +58,7 @@ pub fn hear(
     }
 }
 
-/// Lets an app note what is told.
+/// Lets an app record messages.
 pub fn listen(app: &mut App) {
     app.init_resource::<Heard>()
         .add_observer(|_: On<TerrainReady>, mut heard: ResMut<Heard>| heard.ready += 1)

@@ -1,5 +1,5 @@
-//! What changes beside a saved world: its terrain, its level, its folder, its rules. What was dug in one world is never written into
-//! another, and what was told as applied is there.
+//! Changes around a saved world: its terrain, its level, its folder, its rules. Edits of one world are never written
+//! into another, and edits that were reported as applied are saved.
 #![cfg(feature = "store")]
 
 use std::time::{Duration, Instant};
@@ -90,7 +90,7 @@ fn what_was_dug_in_the_frame_of_a_change_is_in_the_world_that_was_left() {
         let (mut game, entity) = app(&first.0);
         run_until_opened(&mut game);
         dig_now(&mut game, 30.0);
-        // The game digs by itself, and changes the world before anything was handed over.
+        // The game digs through the model, and changes the world before the store got anything.
         let mut own = game.world_mut().get_mut::<Terrain>(entity).expect("a terrain");
         own.apply([Brush::dig(Shape::sphere(Vec3::new(60.0, 11.0, 60.0), 5.0))]);
         let before = own.world().hash();
@@ -338,7 +338,7 @@ fn rules_of_a_new_version_of_the_game_hold_in_worlds_of_an_old_one() {
         ((None, None), (None, None), (-30.0, true)),
         ((Some(-20), Some(loose)), (Some(-20), Some(loose)), (-30.0, false)),
         ((Some(-40), None), (Some(-40), Some(loose)), (-30.0, true)),
-        // A game that sets none goes on with what was saved.
+        // A game that sets none continues with the saved ones.
         ((None, None), (Some(-40), Some(loose)), (-45.0, false)),
     ];
     for (number, ((set, set_loose), held, (depth, is_dug))) in versions.into_iter().enumerate() {

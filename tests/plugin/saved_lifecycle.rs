@@ -70,7 +70,7 @@ impl Story {
         self.is_followed = self.has::<WorldStore>() && self.has::<Terrain>();
     }
 
-    /// Notes what was committed so far to a world that is open: all of it has to be in its folder.
+    /// Records the present state of a world that is open: its folder must contain it later.
     fn note(&mut self) {
         if !self.has::<SavedWorld>() {
             self.saved = None;
@@ -179,7 +179,7 @@ impl Story {
         what
     }
 
-    /// Everything comes to rest, and a dig is answered.
+    /// Waits until nothing changes any more, and checks that a dig is answered.
     fn settle(&mut self, story: &str) {
         self.note();
         if self.terrain.is_none() {

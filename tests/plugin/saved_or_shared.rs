@@ -59,7 +59,7 @@ fn a_world_is_opened_to_friends_and_played_alone_again() {
         let shared = hash(&app, entity);
         assert_ne!(alone, shared);
         play_alone_again(&mut app, entity, &folder.0);
-        assert_eq!(hash(&app, entity), shared, "what was dug together is there");
+        assert_eq!(hash(&app, entity), shared, "edits of all players are there");
         assert!(app.world().get::<WorldStore>(entity).is_some());
     }
     let last = hash(&app, entity);

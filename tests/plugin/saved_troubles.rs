@@ -1,4 +1,4 @@
-//! What goes wrong with saved worlds is told, by world, and nothing waits for ever.
+//! Trouble with saved worlds is reported for each world, and nothing waits for ever.
 #![cfg(feature = "store")]
 
 use std::time::{Duration, Instant};
@@ -112,11 +112,11 @@ fn each_world_that_can_not_be_saved_is_told_of() {
         own.apply([Brush::dig(Shape::sphere(Vec3::new(40.0, 11.0, 40.0), 4.0))]);
     }
     let expected: Vec<Entity> = entities[..2].to_vec();
-    run_until(&mut game, "both are told of", move |world| {
+    run_until(&mut game, "both are reported", move |world| {
         expected.iter().all(|entity| world.resource::<Troubled>().0.contains(entity))
     });
     assert!(!game.world().resource::<Troubled>().0.contains(&entities[2]));
-    // What can't be saved when its world is closed is told as well.
+    // Data that can't be saved when its world is closed is reported too.
     game.world_mut().despawn(entities[0]);
     run_until(&mut game, "it is closed", |world| !world.resource::<Heard>().closed.is_empty());
     let closed = &heard(&game).closed[0];

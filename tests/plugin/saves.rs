@@ -1,4 +1,4 @@
-//! Worlds that a `SavedWorld` saves: what was dug is there again, whatever ends the app.
+//! Worlds that a `SavedWorld` saves: edits are there again, whatever ends the app.
 #![cfg(feature = "store")]
 
 use std::path::Path;
@@ -104,7 +104,7 @@ fn another_state_of_its_world_is_saved_in_its_stead() {
     let expected = new.world().hash();
     first.world_mut().resource_mut::<Heard>().saved.clear();
     first.world_mut().entity_mut(entity).insert(new);
-    // Its revision is lower than that of the one before, and is told once it is durable.
+    // Its revision is lower than that of the previous terrain, and is reported once it is durable.
     run_until_saved(&mut first, 1);
     let durable = first.world().get::<WorldStore>(entity).expect("it is open").durable();
     assert_eq!((durable, first.world().resource::<Heard>().closed.len()), (1, 0));
@@ -127,7 +127,7 @@ fn save_now_is_answered_even_where_nothing_is_new() {
     run_until(&mut app, "it is saved", |world| world.resource::<Heard>().saved.len() > before);
 }
 
-/// Changes the ground by itself in each frame.
+/// Changes the ground through the model in each frame.
 fn dig_in_each_frame(mut terrains: Query<&mut Terrain, With<WorldStore>>, mut count: Local<u32>) {
     for mut terrain in &mut terrains {
         *count += 1;
@@ -147,7 +147,7 @@ fn a_world_that_is_dug_in_each_frame_is_told_to_be_saved() {
     assert!(told.is_sorted(), "{told:?}");
     app.world_mut().write_message(SaveNow::default());
     let now = app.world().get::<Terrain>(entity).expect("a terrain").world().revision();
-    run_until(&mut app, "all up to then is told", move |world| {
+    run_until(&mut app, "everything up to then is reported", move |world| {
         world.resource::<Heard>().saved.last().is_some_and(|revision| *revision >= now)
     });
 }

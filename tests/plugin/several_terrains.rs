@@ -8,7 +8,7 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level};
 
-/// A terrain of 64 x 64 metres; and one of 32 x 32 metres with voxels of half a metre, four metres beside it and two
+/// A terrain of 64 x 64 metres; and one of 32 x 32 metres with voxels of half a metre, four metres to its side and two
 /// metres lower. Both have their ground at height 8 in voxels, that is at 8 and 4 - 2 = 2 metres.
 fn pair() -> (Stage, Entity, Entity) {
     let mut stage = Stage::drawing();

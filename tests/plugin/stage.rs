@@ -19,11 +19,11 @@ const FRAME_SLEEP: Duration = Duration::from_micros(500);
 /// Longer than small transactions take.
 const TRANSACTION_TIME: Duration = Duration::from_millis(60);
 
-/// Every receipt so far.
+/// All receipts.
 #[derive(Resource, Default)]
 struct Receipts(Vec<BrushApplied>);
 
-/// Every message of one kind so far.
+/// All messages of one kind.
 #[derive(Resource)]
 struct Recorded<M: Message>(Vec<M>);
 
@@ -81,7 +81,7 @@ impl Stage {
         Self::windowless_with(())
     }
 
-    /// The same with more plugins.
+    /// A windowless stage with more plugins.
     #[cfg(feature = "examples")]
     pub fn windowless_with<M>(after: impl bevy::app::Plugins<M>) -> Self {
         let mut app = App::new();
@@ -217,7 +217,7 @@ impl Stage {
         self.terrain(entity).world().hash()
     }
 
-    /// Every receipt so far.
+    /// All receipts.
     pub fn receipts(&self) -> &[BrushApplied] {
         &self.app.world().resource::<Receipts>().0
     }

@@ -1,4 +1,5 @@
-//! Files that somebody made to do harm, or that a newer version wrote: they take little memory, overflow nothing, and are left alone.
+//! Malicious files, and files of a newer version: reading them takes little memory, overflows nothing, and does not
+//! change them.
 
 use std::sync::Arc;
 
@@ -40,7 +41,7 @@ fn number(mut value: usize) -> Vec<u8> {
     bytes
 }
 
-/// Records one after the other, each of which says that it reaches to the end; their keys do too, if `in_key`.
+/// A sequence of records, each of which claims to reach to the end; with `in_key`, their keys do too.
 fn nested(length: usize, in_key: bool, prefix: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     while bytes.len() + 96 < length {
@@ -73,7 +74,7 @@ fn small_files_take_little_memory_whatever_they_say() {
                 if path == DATABASE || path.starts_with('j') {
                     drop(Files::open(&disk, path, Opening::New));
                 } else {
-                    // It is looked at only where there is no database.
+                    // It is read only if there is no database.
                     disk.remove(DATABASE).expect("it is there");
                     drop(Files::open(&disk, path, Opening::New).expect("a new file"));
                 }

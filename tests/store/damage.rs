@@ -1,4 +1,4 @@
-//! Files are damaged in every way: bits flip, files end early, records are swapped, and older ones come back.
+//! Files are damaged in every way: bits flip, files end early, records are swapped, and older ones reappear.
 //! `BURROW_DAMAGES` is how often, and `BURROW_SEED` the number of the first damage, so that several processes can share the work.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,10 +16,10 @@ use crate::play::{State, count, options, save, state};
 
 const DATABASE: &str = "regions.redb";
 
-/// A world of several regions, as it was at some time of its life.
+/// A world of several regions at some time.
 struct Saved {
     image: DiskImage,
-    /// The same at an earlier time.
+    /// The image at an earlier time.
     earlier: DiskImage,
     ground: Arc<Ground>,
     states: BTreeMap<u64, Vec<State>>,
@@ -66,7 +66,7 @@ fn saved(is_whole: bool, has_tail: bool) -> Saved {
     Saved { image, earlier, ground, states, terrain }
 }
 
-/// Damages a file; returns what was done. Flips only if `only_flips`.
+/// Damages a file, by flipped bits only if `only_flips`; returns a description.
 fn damage(disk: &SimulatedDisk, earlier: &DiskImage, rng: &mut Rng, only_flips: bool) -> String {
     let paths: Vec<String> =
         disk.paths().into_iter().filter(|path| !path.starts_with("quarantine")).collect();
@@ -135,14 +135,14 @@ fn with_a_whole_log_everything_is_rebuilt() {
                 u32::from(opened.troubles.iter().any(|own| matches!(own, StoreTrouble::Rebuilt { .. })));
             if revision < latest {
                 cut += 1;
-                // Only what ends earlier by whole frames can't be told from a log that never was longer.
+                // Only a log that is shorter by whole frames can't be distinguished from one that never was longer.
                 let is_told = !opened.troubles.is_empty();
                 let is_shorter = ["cut to", "kind 4", "kind 5"].iter().any(|kind| what.contains(kind));
                 assert!(what.starts_with("journal"), "{what}: {revision} of {latest}");
                 assert!(is_told || is_shorter, "{what}: {revision} of {latest}");
             }
             drop(store);
-            // It is sound from then on.
+            // It is intact from then on.
             let (_, again) = open_damaged(&disk, &world.ground);
             assert!(again.troubles.is_empty(), "{what}: {:?}", again.troubles);
             assert_eq!(state(&again.terrain), now, "{what}");

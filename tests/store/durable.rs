@@ -1,5 +1,5 @@
-//! What is reported as durable survives, whatever was given to the store in between: other terrains, other grounds, gaps, data alone.
-//! `BURROW_DURABLE` is the number of random stories.
+//! Anything reported as durable survives, whatever the store was given in between: other terrains, other grounds, gaps,
+//! data alone. `BURROW_DURABLE` is the number of random stories.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -32,7 +32,7 @@ fn dig(number: u32) -> Brush {
     Brush::dig(Shape::sphere(Vec3::new(x, 8.0, z), 4.0))
 }
 
-/// Nothing is written before it is asked for.
+/// Options with which nothing is written until it is requested.
 fn lazy() -> StoreOptions {
     let loss_window = Duration::MAX;
     StoreOptions { loss_window, checkpoint_after: Duration::MAX, ..options(u64::MAX) }
@@ -59,11 +59,11 @@ fn of_another_terrain_only_what_was_written_is_durable() {
     assert_eq!((store.durable(), store.revision()), (1, 1));
     second.apply([dig(9)]);
     store.follow(&mut second).expect("the thread runs");
-    assert_eq!((store.durable(), store.is_durable(store.point())), (1, false), "nobody wrote the second");
+    assert_eq!((store.durable(), store.is_durable(store.point())), (1, false), "the second was not written");
     let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("a saved world");
     assert_eq!(opened.terrain.world().revision(), 1);
     store.flush().expect("the disk works");
-    assert_eq!((store.durable(), store.is_durable(point)), (2, true), "what was durable stays so");
+    assert_eq!((store.durable(), store.is_durable(point)), (2, true), "durable commits stay durable");
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn a_terrain_of_another_size_is_refused_before_anything_is_written() {
         }
         store.flush().expect("the disk works");
         assert_eq!(disk.operations(), before, "nothing was written");
-        // The first one goes on.
+        // The first one continues.
         first.apply([dig(3)]);
         store.follow(&mut first).expect("the thread runs");
         drop(store);
@@ -135,7 +135,7 @@ fn a_terrain_of_another_size_is_refused_before_anything_is_written() {
     }
 }
 
-/// What was given to the store by a point.
+/// The state that the store was given at a point.
 struct Past {
     point: SavePoint,
     state: State,
@@ -182,7 +182,7 @@ impl Story {
         let what = self.rng.u32(0..16);
         match what {
             0 => {
-                // Another terrain, now and then one that was dug before.
+                // Another terrain, sometimes one that was already dug.
                 self.terrain = terrain(&self.grounds[self.ground]);
                 for _ in 0..self.rng.u32(0..3) {
                     act(&mut self.terrain, &mut self.rng);
@@ -193,7 +193,7 @@ impl Story {
                 let ground = Arc::clone(&self.grounds[self.ground]);
                 self.terrain.set_ground(ground).expect("it has the same size");
             }
-            // Records are gone.
+            // Records are lost.
             2 => {
                 act(&mut self.terrain, &mut self.rng);
                 drop(self.terrain.take_log());
@@ -230,7 +230,7 @@ impl Story {
         format!("{what}")
     }
 
-    /// Loses the power, and compares what is there with what was reported.
+    /// Loses the power, and compares the saved world with the reports.
     fn check(&mut self, story: &str) {
         let durable = self.store().durable_point();
         let reported = self.past.iter().filter(|past| self.store.as_ref().unwrap().is_durable(past.point));
@@ -250,7 +250,7 @@ impl Story {
             }
             seen.push((past.point, opened.troubles));
         }
-        panic!("{story}: {first:?} is durable, and what is there was never given after that: {seen:?}");
+        panic!("{story}: {first:?} is durable, but the saved world is none of the later ones: {seen:?}");
     }
 }
 

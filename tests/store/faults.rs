@@ -1,4 +1,4 @@
-//! Disks that are full, read-only or broken: play goes on, and saving does when it can.
+//! Disks that are full, read-only or broken: play continues, and saving resumes when it can.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -72,7 +72,7 @@ fn play_goes_on_while_saving_fails_and_nothing_is_lost() {
                 assert!(troubles.iter().any(is_told), "{fault:?} from {begin}: {troubles:?}");
                 assert!(troubles.len() < 6, "{troubles:?}");
             }
-            // The power may go now: what was acknowledged is there.
+            // Even if the power is lost now, acknowledged commits are there.
             let durable = player.store().durable();
             let lost = disk.image().lose_power(|| false);
             let opened = open(&lost, &ground(2)).expect("it can be opened");
@@ -159,7 +159,7 @@ fn files_that_are_removed_are_written_again() {
             }
         }
         player.play(4);
-        // The first time may tell what is gone; then all of the world is saved anew.
+        // The first flush may report the fault; then the whole world is saved again.
         drop(player.store().flush());
         player.play(12);
         player.store().checkpoint().expect("the disk works");

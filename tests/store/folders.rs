@@ -1,4 +1,4 @@
-//! Worlds in folders of the system: locks that somebody removes, links, relative paths, files that may only be read, and stray ones.
+//! Worlds in real folders: removed locks, links, relative paths, read-only files, and stray ones.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use bevy_burrow::store::{
 use crate::opening::Place;
 use crate::play::{State, act, ground, options, save, state, terrain};
 
-/// A world with so many commits, and none but the first checkpoint.
+/// A world with `commits` commits and only the first checkpoint.
 fn create(path: &Path, ground: &Arc<Ground>, commits: u64) -> (Store, Terrain) {
     let (mut world, mut rng) = (terrain(ground), fastrand::Rng::with_seed(8));
     let mut store = Store::create(path, &mut world, options(u64::MAX)).expect("a new world");
@@ -84,7 +84,7 @@ fn stray_files_are_left_alone() {
             );
         }
         assert!(path.exists());
-        // It goes on behind it.
+        // Saving continues next to the stray file.
         let (mut store, own) = Store::open(&place.0, Arc::clone(&ground), options(99)).expect("it is whole");
         let mut world = own.terrain;
         act(&mut world, &mut fastrand::Rng::with_seed(3));
@@ -114,7 +114,7 @@ fn links_are_followed_and_one_that_leads_nowhere_is_reported() {
     assert!(refused.to_string().contains("00000001.log"), "{refused}");
 }
 
-/// Lets files and folders be written, or read only.
+/// Makes files and folders writable or read-only.
 #[cfg(unix)]
 fn allow(place: &Path, writing: bool) {
     use std::os::unix::fs::PermissionsExt;
@@ -133,7 +133,7 @@ fn allow(place: &Path, writing: bool) {
     }
 }
 
-/// Says nothing where permissions do not hold, as for root; the simulated disk stands in there.
+/// Tests nothing where permissions have no effect, as for root; tests with the simulated disk cover these cases.
 #[cfg(unix)]
 #[test]
 fn a_world_that_may_only_be_read_is_read() {
@@ -220,7 +220,7 @@ fn a_journal_that_is_removed_after_a_crash_is_missed() {
     let (now, troubles) = opened(&place.0, &ground).expect("the database is whole");
     assert!(is_told(&troubles) && now.hash == terrain(&ground).world().hash(), "{troubles:?}");
     assert_eq!(opened(&place.0, &ground).expect("it is whole").1, vec![], "it was reported");
-    // After it was closed nothing is missed.
+    // After it was closed, no log is missing.
     let place = Place::new("journal_closed");
     let (store, world) = create(&place.0, &ground, 5);
     drop(store);
@@ -228,7 +228,7 @@ fn a_journal_that_is_removed_after_a_crash_is_missed() {
     assert_eq!(opened(&place.0, &ground).expect("the database is whole"), (state(&world), vec![]));
 }
 
-/// Run by the next test in a process of its own, since it changes the current folder.
+/// Run by the next test in a separate process, because it changes the current folder.
 #[test]
 #[ignore = "it is run by another test"]
 fn child_that_changes_its_folder() {
@@ -275,7 +275,7 @@ fn a_world_stays_where_it_is_when_the_current_folder_changes() {
 
 #[test]
 fn an_unsaved_world_that_is_replaced_by_hand_is_not_taken_for_damaged() {
-    // Somebody removes a world, but for the file that says that it was not closed.
+    // All files of a world are removed except the one that marks it as not closed.
     let ground = ground(1);
     let (place, _) = killed("left", &ground);
     fs::remove_dir_all(place.0.join("journal")).expect("a folder");

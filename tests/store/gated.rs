@@ -5,7 +5,7 @@ use std::sync::{Arc, Condvar, Mutex};
 
 use bevy_burrow::store::{Files, Lock, OpenFile, Opening, SimulatedDisk};
 
-/// What happens to whoever waits for the disk.
+/// What happens to a thread that waits for the disk.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Gate {
     #[default]

@@ -1,4 +1,4 @@
-//! A world that is played gets another ground below its edits: the holes stay, in memory and on the disk.
+//! A running world gets another ground below its edits: the holes stay, in memory and on the disk.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ fn drawn(terrain: &Terrain) -> BTreeMap<Drawn, SurfaceMesh> {
     terrain.world().drawn().filter(|(_, mesh)| !mesh.indices.is_empty()).collect()
 }
 
-/// The same world, written and read over a ground.
+/// The world, written and read again over a ground.
 fn read_over(ground: &Arc<Ground>, terrain: &Terrain) -> Terrain {
     let bytes = to_bytes(terrain, WorldId(1), &BTreeMap::new()).expect("it is small");
     let mut read = from_bytes(&bytes, Arc::clone(ground)).expect("its own bytes").terrain;
@@ -33,7 +33,7 @@ fn read_over(ground: &Arc<Ground>, terrain: &Terrain) -> Terrain {
 
 fn assert_same(one: &Terrain, other: &Terrain, seed: u64) {
     assert_eq!(state(one), state(other), "seed {seed}");
-    assert!(drawn(one) == drawn(other), "seed {seed}: it is drawn otherwise");
+    assert!(drawn(one) == drawn(other), "seed {seed}: it is drawn differently");
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn a_world_on_another_ground_is_as_if_it_was_read_there() {
         assert_eq!(world.history(), History::default());
         assert!(world.world().check_seams().is_flawless(), "seed {seed}");
 
-        // It goes on like any other, and its log leads there too.
+        // It continues like any other world, and replaying its log gives the same state.
         let mut follower = read_over(&before, &first);
         for _ in 0..5 {
             let brush = any_random_brush(&mut rng, &after);
@@ -67,7 +67,7 @@ fn a_world_on_another_ground_is_as_if_it_was_read_there() {
         }
         assert_same(&follower, &world, seed);
 
-        // The old ground brings the old world back.
+        // The old ground restores the old world.
         let mut there = first;
         let hash = there.world().hash();
         let old = drawn(&there);

@@ -1,4 +1,4 @@
-//! What tools say of a world is what opening it does, and looking changes nothing.
+//! Tools report what opening a world would do, and inspecting changes nothing.
 
 use std::sync::Arc;
 
@@ -73,7 +73,7 @@ fn a_world_is_whole_after_a_disk_was_full() {
         go_on(5, true);
         for is_closed in [false, true] {
             let killed = disk.image().lose_process();
-            // What the disk took of a write before it was full.
+            // The part of a write that fitted before the disk was full.
             for path in killed.paths().into_iter().filter(|path| path.starts_with("journal")) {
                 let torn = [&[200, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0][..], b"\xB5BRW", &[1; 40]].concat();
                 killed.damage(&path, |bytes| bytes.extend(torn));
@@ -107,7 +107,7 @@ fn the_log_of_another_branch_is_not_taken_for_that_of_the_world() {
     let mut store = Store::create_in(Arc::new(disk.clone()), &mut world, options(99)).expect("a new world");
     dig(&mut store, &mut world, 1);
     drop(store);
-    // A backup that is played on, otherwise.
+    // A backup that was then edited differently.
     let branches = [2, 3].map(|seed| {
         let branch = disk.image().lose_process();
         let (mut store, opened) = open(&branch, &ground).expect("it is whole");

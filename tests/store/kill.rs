@@ -26,11 +26,11 @@ fn options(log_bytes: u64) -> StoreOptions {
 
 fn say(line: std::fmt::Arguments) {
     let mut out = std::io::stdout().lock();
-    // Whoever listened may be gone.
+    // The reader may be gone.
     drop(out.write_fmt(format_args!("{line}\n")).and_then(|()| out.flush()));
 }
 
-/// What the killed process does; run by the other test only.
+/// The process that is killed; run by the other test only.
 #[test]
 #[ignore = "it is run by another test, and killed"]
 fn child() {
@@ -69,7 +69,7 @@ fn child() {
     }
 }
 
-/// What is known of a world whose process is killed.
+/// The known states of a world whose process is killed.
 #[derive(Default)]
 struct Known {
     hashes: BTreeMap<u64, Vec<u64>>,
@@ -92,7 +92,7 @@ impl Known {
     }
 }
 
-/// Hears a process until something else is to be done, or a time is over.
+/// Reads the output of a process until it should be stopped, or a time has passed.
 fn hear(lines: &Receiver<String>, known: &mut Known, until: Instant, stop: &str) {
     loop {
         match lines.recv_timeout(until.saturating_duration_since(Instant::now())) {
@@ -103,7 +103,7 @@ fn hear(lines: &Receiver<String>, known: &mut Known, until: Instant, stop: &str)
                 }
             }
             Err(RecvTimeoutError::Timeout) => return,
-            Err(RecvTimeoutError::Disconnected) => panic!("the process ended by itself"),
+            Err(RecvTimeoutError::Disconnected) => panic!("the process ended without being killed"),
         }
     }
 }

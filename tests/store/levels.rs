@@ -1,4 +1,4 @@
-//! A world on a level holds only what differs from it, and is lost with neither the level nor the edits.
+//! A world on a level stores only its differences from the level, and neither level nor edits are lost.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use glam::Vec3;
 
 use crate::play::{act, check_opened, count, ground, options, save, state, terrain};
 
-/// A level that somebody sculpted.
+/// A sculpted level.
 pub fn level(ground: &Arc<Ground>, seed: u64, acts: u32) -> BaseLevel {
     let (mut sculpted, mut rng) = (terrain(ground), Rng::with_seed(seed));
     (0..acts).for_each(|_| act(&mut sculpted, &mut rng));
@@ -79,7 +79,7 @@ fn a_world_on_a_level_comes_back_whatever_happens() {
         drop(store);
         let check = check_in(&disk, Arc::clone(&ground), Some(&level)).expect("it can be read");
         assert_eq!((check.troubles, check.replays), (vec![], Some(true)), "seed {seed}");
-        // Without its regions, the log leads there from the level.
+        // Without its regions, replaying the log on the level gives the same world.
         let damaged = disk.image().lose_process();
         damaged.remove("regions.redb").expect("it is there");
         let (_, opened) = open(&damaged).expect("it can be rebuilt");
@@ -126,7 +126,7 @@ fn only_what_differs_is_stored() {
     assert_eq!(none, (0, 0));
     assert!(few.0 > 0 && few.0 < 2_000 && many.0 > few.0 && many.0 < 8_000, "{few:?} {many:?}");
     assert!(whole > 10 * few.0, "{whole} bytes without a level, {few:?} with it");
-    assert_eq!((few.1, many.1), (0, 0), "what is undone is as in the level again");
+    assert_eq!((few.1, many.1), (0, 0), "undone edits leave nothing that differs from the level");
 }
 
 #[test]
@@ -147,7 +147,7 @@ fn a_level_that_is_missing_or_has_changed_is_told_and_loses_nothing() {
     assert!(matches!(&missing, StoreError::LevelMissing { label } if label == "levels/5"), "{missing}");
     let changed = open(Some(&other)).expect_err("it has another level");
     assert!(matches!(&changed, StoreError::LevelChanged { .. }), "{changed}");
-    // The same level under another name will do.
+    // An equal level under another name is accepted.
     let renamed = BaseLevel::new(level.level().clone(), "elsewhere");
     let (store, opened) = open(Some(&renamed)).expect("it is the same level");
     assert_eq!((state(&opened.terrain), opened.troubles), (state(&world), vec![]));
@@ -171,7 +171,7 @@ fn a_world_on_a_level_keeps_its_edits_on_another_ground() {
         (0..20).for_each(|_| act(&mut world, &mut rng));
         restore_brick(&mut world, &mut rng);
         save(&mut store, &mut world).expect("the thread runs");
-        // While it is played, too.
+        // While it is running, too.
         let image = disk.image();
         world.set_ground(Arc::clone(&after)).expect("it has the same size");
         store.checkpoint().expect("the disk works");

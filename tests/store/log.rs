@@ -1,4 +1,4 @@
-//! How long the log lasts: what it costs beside commits.
+//! How long the log lasts: its cost in addition to commits.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use crate::play::{count, open, options};
 
-/// Bytes that can't be packed.
+/// Bytes that can't be compressed.
 fn noise(bytes: usize, seed: u64) -> Vec<u8> {
     let mut rng = fastrand::Rng::with_seed(seed);
     (0..bytes).map(|_| rng.u8(..)).collect()
@@ -56,7 +56,7 @@ impl Game {
     }
 }
 
-/// A value is logged once for each time that it changes, and not once for each checkpoint, so is the list of regions.
+/// A value is logged once for each change, and not once for each checkpoint, and so is the list of regions.
 #[test]
 fn checkpoints_take_no_room_in_the_log() {
     let mut lengths = Vec::new();
@@ -114,7 +114,7 @@ fn a_value_that_is_put_again_and_again_is_logged_once_in_each_frame_and_only_if_
     };
     assert!(logged(1, true) > 64 << 10);
     assert!(logged(60, true) < 2 * (64 << 10), "only the last one in a frame counts");
-    assert!(logged(60, false) < 2 * (64 << 10), "the same again is no change");
+    assert!(logged(60, false) < 2 * (64 << 10), "an equal value is no change");
 }
 
 #[test]

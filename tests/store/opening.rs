@@ -1,4 +1,4 @@
-//! Creating, opening, and what is told where that can't be.
+//! Creating and opening worlds, and the errors where that is impossible.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -201,7 +201,7 @@ fn game_data_is_there_by_its_keys() {
     assert_eq!((keys, after.get("time")), (vec!["time", "weather"], Some(&[8; 4][..])));
 }
 
-/// Opens a world, and asks all the while how far that is: what was seen, and whether it was opened.
+/// Opens a world and polls its progress meanwhile. Returns the values seen, and whether it was opened.
 fn watched(disk: &SimulatedDisk, ground: &Arc<Ground>, base_changed: BaseChanged) -> (Vec<f32>, bool) {
     let progress = Progress::default();
     let options = StoreOptions { base_changed, progress: Some(progress.clone()), ..options(99) };

@@ -1,4 +1,4 @@
-//! A game ships a new version of a level: saves that were begun on the old one go on, and keep what was dug.
+//! A game ships a new version of a level: saves that were begun on the old one continue, and keep their edits.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
@@ -40,7 +40,7 @@ fn own_bricks(world: &Terrain, level: &BaseLevel) -> WorldChange {
     WorldChange { bricks: own.collect(), ..WorldChange::default() }
 }
 
-/// What a world should be on another level, made by hand: that level, then the world's own bricks on it.
+/// The expected world on another level: that level with the world's own bricks on it.
 fn by_hand(world: &Terrain, ground: &Arc<Ground>, from: &BaseLevel, to: &BaseLevel) -> Terrain {
     let mut moved = to.level().terrain(Arc::clone(ground)).expect("its own ground");
     moved.set_meshing(Meshing::Never);
@@ -48,7 +48,7 @@ fn by_hand(world: &Terrain, ground: &Arc<Ground>, from: &BaseLevel, to: &BaseLev
     moved
 }
 
-/// Another version of a level, or at times another level.
+/// Another version of a level, or sometimes another level.
 fn version(before: &BaseLevel, ground: &Arc<Ground>, seed: u64) -> BaseLevel {
     match seed % 5 {
         3 => level(ground, seed + 1000, 25),
@@ -74,7 +74,7 @@ fn open(
     Store::open_in(Arc::new(disk.clone()), Arc::clone(ground), options)
 }
 
-/// Fields hold all edited samples of their chunks, and each has a name of its own that was given.
+/// Fields contain all edited samples of their chunks, and each has a unique name that was assigned.
 fn assert_fields(terrain: &Terrain) {
     let (world, change) = (terrain.world(), terrain.parts().change);
     let mut names = BTreeSet::new();
@@ -96,7 +96,7 @@ fn was_kept(troubles: &[StoreTrouble]) -> bool {
     matches!(troubles, [StoreTrouble::BaseChanged { kept: "kept", .. }])
 }
 
-/// A world that was played on a level and closed, or killed.
+/// A world that was edited on a level and closed, or whose process was killed.
 fn played(level: &BaseLevel, ground: &Arc<Ground>, seed: u64) -> (SimulatedDisk, Terrain) {
     let (disk, mut rng) = (SimulatedDisk::new(), Rng::with_seed(seed));
     let (mut store, mut world) = begin(&disk, level, ground, options(rng.u64(3..30)));
@@ -141,7 +141,7 @@ fn own_bricks_stay_and_all_others_are_those_of_the_new_level() {
         if seed < 8 {
             assert!(moved.world().check_seams().is_flawless(), "seed {seed}");
         }
-        // It goes on as a world on the new level, which the old one is another level for now.
+        // It continues as a world on the new level; the old level is now a different one.
         moved.set_meshing(Meshing::Never);
         let mut rng = Rng::with_seed(seed);
         (0..8).for_each(|_| act(&mut moved, &mut rng));
@@ -154,7 +154,7 @@ fn own_bricks_stay_and_all_others_are_those_of_the_new_level() {
                 .expect("it is its level");
             assert_eq!((state(&again.terrain), again.troubles), (state(&moved), vec![]), "seed {seed}");
         }
-        // No record of before is left.
+        // No record of the old state is left.
         let is_region = |(key, _): &&Record| key.len() == 13 && key[0] == b'r';
         let stored = records(&disk).1.iter().filter(is_region).count();
         assert_eq!(stored, inspect_in(&disk).expect("it can be read").regions, "seed {seed}");
@@ -258,7 +258,7 @@ fn commits_behind_the_last_checkpoint_are_made_again() {
             let brush = any_random_brush(&mut rng, &ground);
             [&mut world, &mut expected].into_iter().for_each(|own| drop(own.apply([brush.clone()])));
             if rng.bool() {
-                // What undo put back is put back as it was, on whatever level.
+                // Bricks that an undo restored keep their content on any level.
                 let before = world.parts().change;
                 drop(world.undo());
                 let (before, after) = (bricks(before), bricks(world.parts().change));

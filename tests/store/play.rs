@@ -1,4 +1,4 @@
-//! A player who digs, undoes and changes rules at random, and what every revision of the world was.
+//! A player that digs, undoes and changes rules at random, and the states of all revisions of the world.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ pub fn ground(seed: u64) -> Arc<Ground> {
     Arc::new(random_ground_of_size(&mut Rng::with_seed(seed), seed, 70 + seed as u32 % 60, 80))
 }
 
-/// A terrain that nobody looks at.
+/// A terrain without meshes.
 pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     let settings = TerrainSettings { chunk_size: 25, ..TerrainSettings::default() };
     let mut terrain = Terrain::new(Arc::clone(ground), &settings).expect("valid settings");
@@ -31,12 +31,12 @@ pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
-/// Saves at once, and makes checkpoints after so many commits.
+/// Saves at once, and makes a checkpoint after this many commits.
 pub fn options(checkpoint_commits: u64) -> StoreOptions {
     StoreOptions { loss_window: Duration::ZERO, checkpoint_commits, ..StoreOptions::default() }
 }
 
-/// All that a save must bring back.
+/// Everything that a save must restore.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     pub hash: u64,
@@ -46,7 +46,7 @@ pub struct State {
     pub loose: Option<LooseSettings>,
 }
 
-/// What a terrain is like.
+/// The state of a terrain.
 pub fn state(terrain: &Terrain) -> State {
     let world = terrain.world();
     State {
@@ -87,16 +87,16 @@ pub fn act(terrain: &mut Terrain, rng: &mut Rng) {
     }
 }
 
-/// The key under which the revision is put, so that game data and ground can be compared.
+/// The key of the revision in the game data, so that game data and ground can be compared.
 pub const TURN: &str = "turn";
 
-/// Puts the revision beside the commits that lead to it, and hands both over.
+/// Stores the revision together with the commits that lead to it.
 pub fn save(store: &mut Store, terrain: &mut Terrain) -> Result<(), StoreError> {
     store.put(TURN, terrain.world().revision().to_le_bytes());
     store.follow(terrain)
 }
 
-/// Checks that a world that was opened is one that was, between two revisions; returns its revision.
+/// Checks that an opened world equals one of the states between two revisions; returns its revision.
 pub fn check_opened(
     (store, opened): &(Store, Opened),
     states: &BTreeMap<u64, Vec<State>>,

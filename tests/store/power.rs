@@ -13,7 +13,7 @@ use crate::play::{State, act, check_opened, count, ground, open, options, save, 
 /// No revision was acknowledged yet, not even 0.
 const NOTHING: u64 = u64::MAX;
 
-/// What is kept of what was not synced: nothing, all, or anything.
+/// The parts of unsynced data that survive: nothing, all, or a random part.
 fn losses(seed: u64) -> [Box<dyn FnMut() -> bool>; 4] {
     let mut rng = Rng::with_seed(seed);
     let mut other = Rng::with_seed(!seed);
@@ -51,7 +51,7 @@ fn no_loss_of_power_loses_what_was_acknowledged() {
             for mut keep in losses(image.operations()) {
                 so_far.fetch_add(1, Ordering::SeqCst);
                 let after = image.lose_power(&mut keep);
-                // Now and then the power is lost in the recovery too.
+                // Sometimes the power is lost during recovery too.
                 let again = Arc::new(Mutex::new(Vec::new()));
                 let is_twice = image.operations() % 7 == 3 && seconds.load(Ordering::SeqCst) < recoveries;
                 if is_twice {
@@ -70,7 +70,7 @@ fn no_loss_of_power_loses_what_was_acknowledged() {
                 let seen = after.operations();
                 drop(opened);
                 for second in again.lock().expect("no panic").iter() {
-                    // What a player has seen after the first recovery is there after the second.
+                    // The world after the first recovery is there after the second.
                     let least = if second.operations() >= seen { revision } else { least };
                     for keep in losses(second.operations()) {
                         so_far.fetch_add(1, Ordering::SeqCst);

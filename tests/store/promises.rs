@@ -1,4 +1,4 @@
-//! The guide lists every trouble, and each promise in it names tests that there are.
+//! The guide lists every trouble, and each of its promises names existing tests.
 
 use std::fs;
 use std::path::Path;

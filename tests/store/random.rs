@@ -11,12 +11,12 @@ use fastrand::Rng;
 use crate::play::{State, check_opened, count, ground, open, options, save, state, terrain};
 use crate::worlds::any_random_brush;
 
-/// Those of every terrain here.
+/// The settings of every terrain here.
 fn settings() -> TerrainSettings {
     TerrainSettings { chunk_size: 25, ..TerrainSettings::default() }
 }
 
-/// A world in memory, and what it was since it was last known to be durable.
+/// A world in memory, and its states since the last durable one.
 struct Model {
     terrain: Terrain,
     states: BTreeMap<u64, Vec<State>>,
@@ -43,7 +43,7 @@ impl Model {
         self.parts.retain(|(own, _)| *own >= revision);
     }
 
-    /// Goes back to what was recovered.
+    /// Returns to the recovered state.
     fn go_back(&mut self, ground: &Arc<Ground>, to: &Terrain) {
         let found = state(to);
         let is_it = |(revision, parts): &&(u64, WorldParts)| {
@@ -85,7 +85,7 @@ fn play(seed: u64, operations: u64) -> [u64; 5] {
                 done[1] += 1;
             }
             kind @ 4..=5 => {
-                // The store is closed, or the process dies, or the power goes.
+                // The store is closed, or the process dies, or the power is lost.
                 let image = disk.image();
                 let power = rng.bool();
                 if kind == 4 {
@@ -107,7 +107,7 @@ fn play(seed: u64, operations: u64) -> [u64; 5] {
                 store = Some(opened.0);
             }
             39 => {
-                // The world goes through one piece of bytes into another folder.
+                // The world is exported to bytes and imported into another folder.
                 let bytes =
                     to_bytes(&saved, open_store.world_id(), open_store.game_data()).expect("it is small");
                 drop(store.take());

@@ -1,6 +1,7 @@
-//! Files are replaced while something goes wrong: the power or the process goes at each operation on the disk, or the disk gets full or
-//! breaks there. A world that was damaged before is there afterwards, whatever the moment.
-//! `BURROW_MATRIX` is how many operations are tried for each case, spread over all of them, and `BURROW_COMMITS` the commits of a world.
+//! Files are replaced during a fault: at each operation on the disk, the power or the process is lost, or the disk
+//! becomes full or breaks. A world that was damaged before can be opened afterwards, regardless of the moment.
+//! `BURROW_MATRIX` is how many operations are tried for each case, spread over all of them, and `BURROW_COMMITS` the
+//! commits of a world.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -18,7 +19,7 @@ use crate::play::{State, act, count, ground, options, save, state, terrain};
 
 const DATABASE: &str = "regions.redb";
 
-/// What was wrong with a world before.
+/// The earlier damage of a world.
 #[derive(Clone, Copy, Debug)]
 enum Before {
     Undamaged,
@@ -28,7 +29,7 @@ enum Before {
     MovedDatabase,
 }
 
-/// A world that was played, and what it was at each revision.
+/// An edited world, and its state at each revision.
 struct Played {
     disk: SimulatedDisk,
     ground: Arc<Ground>,
@@ -36,7 +37,7 @@ struct Played {
     latest: u64,
 }
 
-/// Plays a world whose log is whole or not, and kills the process.
+/// Edits a world whose log is complete or not, and kills the process.
 fn played(before: Before, is_whole: bool) -> Played {
     let (ground, mut rng) = (ground(9), Rng::with_seed(9));
     let disk = SimulatedDisk::new();
@@ -76,16 +77,16 @@ fn played(before: Before, is_whole: bool) -> Played {
     Played { disk, ground, states, latest: commits }
 }
 
-/// What is done to a world.
+/// The operation on a world.
 #[derive(Clone, Copy, Debug)]
 enum Doing {
     Playing,
     Compacting,
-    /// It is opened over another ground, which is the only one for which the states of before do not hold.
+    /// It is opened over another ground; only then do the old states no longer apply.
     Replacing,
 }
 
-/// What is known of a world while something is done to it.
+/// The known states of a world during an operation.
 struct Known {
     states: Mutex<BTreeMap<u64, Vec<State>>>,
     acknowledged: AtomicU64,
@@ -115,7 +116,7 @@ fn other_ground(ground: &Ground) -> Arc<Ground> {
     Arc::new(other.expect("valid heights"))
 }
 
-/// Opens a world and does something to it, as far as that goes.
+/// Opens a world and runs the operation, as far as the fault allows.
 fn go_on(disk: &SimulatedDisk, played: &Played, known: &Known, doing: Doing) -> Result<(), StoreError> {
     let ground = match doing {
         Doing::Replacing => other_ground(&played.ground),
@@ -147,7 +148,7 @@ fn go_on(disk: &SimulatedDisk, played: &Played, known: &Known, doing: Doing) -> 
     Ok(())
 }
 
-/// Opens a world twice on a disk that works: it is there, and sound afterwards.
+/// Opens a world twice on a working disk, and checks that it is intact.
 fn check(disk: &SimulatedDisk, played: &Played, known: &Known, what: &str) {
     let mut found = None;
     for time in 0..2 {
@@ -172,7 +173,7 @@ fn check(disk: &SimulatedDisk, played: &Played, known: &Known, what: &str) {
     }
 }
 
-/// So many numbers of a list, spread evenly.
+/// At most `BURROW_MATRIX` items of a list, spread evenly.
 fn some<T>(all: Vec<T>) -> Vec<T> {
     let most = usize::try_from(count("BURROW_MATRIX", 8)).unwrap_or(usize::MAX).max(1);
     let step = all.len().div_ceil(most).max(1);
@@ -184,7 +185,7 @@ fn matrix(before: Before, is_whole: bool) -> usize {
     let played = played(before, is_whole);
     for doing in [Doing::Playing, Doing::Compacting, Doing::Replacing] {
         let name = format!("{before:?}, log whole: {is_whole}, {doing:?}");
-        // The power or the process goes.
+        // The power or the process is lost.
         let disk = played.disk.image().lose_process();
         let (known, images) = (Arc::new(Known::of(&played)), Arc::new(Mutex::new(Vec::new())));
         let (seen, so_far) = (Arc::clone(&images), Arc::clone(&known));
@@ -212,7 +213,7 @@ fn matrix(before: Before, is_whole: bool) -> usize {
                 let name = format!("{name}, {fault:?} from operation {at}");
                 let (disk, known) = (played.disk.image().lose_process(), Known::of(&played));
                 disk.fail_at(disk.operations() + at + 1, fault);
-                // It may not even be opened.
+                // Opening may fail too.
                 drop(go_on(&disk, &played, &known, doing));
                 check(&disk.image().lose_process(), &played, &known, &name);
                 check(&disk.image().lose_power(|| false), &played, &known, &name);
@@ -251,7 +252,7 @@ fn a_world_whose_database_is_in_quarantine_survives_a_fault_at_each_operation() 
     }
 }
 
-/// Imports a world, with data, and something goes wrong: afterwards all of it is there, or nothing.
+/// Imports a world with data during a fault: afterwards all of it is there, or nothing.
 #[test]
 fn a_world_is_created_with_its_data_or_not_at_all() {
     let ground = ground(4);
@@ -301,7 +302,7 @@ fn a_world_is_created_with_its_data_or_not_at_all() {
     assert!(there > 0 && gone > 0, "{there} {gone}");
 }
 
-/// A replacement that was interrupted long ago is not mistaken for the world of now.
+/// A replacement that was interrupted long ago is not mistaken for the present world.
 #[test]
 fn what_an_old_replacement_left_is_not_the_world_of_now() {
     let played = played(Before::Undamaged, false);
@@ -312,5 +313,5 @@ fn what_an_old_replacement_left_is_not_the_world_of_now() {
     let file = Files::open(&disk, "regions.new", Opening::New).expect("a new file");
     file.write_at(0, &old).expect("the disk works");
     disk.damage(DATABASE, |bytes| bytes[0] ^= 1);
-    check(&disk, &played, &known, "damaged, beside an old one");
+    check(&disk, &played, &known, "damaged, next to an old one");
 }

@@ -1,4 +1,4 @@
-//! Disks with sectors that can't be read: what else is there is enough, and a disk that is gone is no damage.
+//! Disks with sectors that can't be read: the remaining files suffice, and a missing disk is not treated as damage.
 
 use std::io;
 use std::ops::Range;
@@ -22,10 +22,10 @@ struct BadDisk {
     disk: SimulatedDisk,
     path: String,
     bad: Range<u64>,
-    /// The disk answers until the bad bytes are asked for, and no more then.
+    /// The disk fails permanently once the bad bytes are read.
     goes: bool,
     is_gone: Arc<AtomicBool>,
-    /// How often the database can't be synced from now on, and how often a new one was begun.
+    /// How many further syncs of the database fail, and how often a new database was begun.
     failing_syncs: Arc<AtomicU64>,
     new_databases: Arc<AtomicU64>,
 }
@@ -192,7 +192,7 @@ fn a_bad_sector_of_the_database_costs_nothing_while_the_log_is_whole() {
             let (now, _) = open(BadDisk::new(&disk, DATABASE, bad.clone(), false), false)
                 .unwrap_or_else(|why| panic!("{bad:?}: {why}"));
             assert_eq!(now, expected, "{bad:?}");
-            // The new file has no bad sector, and what could not be read is kept.
+            // The new file has no bad sector, and the unreadable file is kept.
             let check = check_in(&disk, ground(), None).expect("it is whole");
             assert_eq!((state(&check.terrain), check.troubles), (expected.clone(), vec![]), "{bad:?}");
         }
@@ -249,7 +249,7 @@ fn a_disk_that_is_gone_is_no_damage() {
                 Ok((now, _)) => assert_eq!(now, expected, "{path}"),
             }
             assert_eq!(disk.paths(), before, "nothing was changed");
-            // It comes back.
+            // The disk works again.
             let opened = Store::open_in(Arc::new(disk), ground(), options(9)).expect("it is whole");
             assert_eq!((state(&opened.1.terrain), opened.1.troubles), (expected.clone(), vec![]));
         }
@@ -258,13 +258,13 @@ fn a_disk_that_is_gone_is_no_damage() {
 
 #[test]
 fn a_file_that_can_not_be_read_at_all_is_no_reason_to_lock_anybody_out() {
-    // The log says all that the database holds.
+    // The log contains everything that the database holds.
     let (disk, expected) = played(true, true);
     let all = 0..u64::MAX;
     let (now, _) = open(BadDisk::new(&disk.image().lose_process(), DATABASE, all.clone(), false), false)
         .expect("the log is whole");
     assert_eq!(now, expected);
-    // Without it something may be lost, so somebody has to ask for it.
+    // Without it something may be lost, so salvage has to be requested.
     let (disk, expected) = played(false, false);
     for path in disk.paths().into_iter().filter(|path| path != "lock" && path != "unsaved") {
         let bad = || BadDisk::new(&disk.image().lose_process(), &path, all.clone(), false);
@@ -278,7 +278,8 @@ fn a_file_that_can_not_be_read_at_all_is_no_reason_to_lock_anybody_out() {
     }
 }
 
-/// Pages that could not be written look as if they were, once they are read again: the file can't be trusted any more.
+/// Pages that could not be written may look as if they were once they are read again, so the file can't be trusted any
+/// more.
 #[test]
 fn a_database_that_could_not_be_synced_is_written_anew() {
     let disk = SimulatedDisk::new();

@@ -1,4 +1,4 @@
-//! Grounds of another size: what was dug is there on it, or the world is refused in one sentence and stays as it is.
+//! Grounds of another size: all edits are kept on them, or the world is refused in one sentence and not changed.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ fn flat(width: u32, depth: u32) -> Arc<Ground> {
     Arc::new(Ground::flat(width, depth, 0.0).expect("valid heights"))
 }
 
-/// A world on a ground of this size that was dug at these places, closed or killed.
+/// A world on a ground of this size with digs at these places; closed, or its process was killed.
 fn dug(side: u32, places: &[(f32, f32)], is_closed: bool) -> (SimulatedDisk, Terrain) {
     let disk = SimulatedDisk::new();
     let mut world = Terrain::new(flat(side, side), &TerrainSettings::default()).expect("valid settings");
@@ -75,7 +75,7 @@ fn another_size_and_back_changes_nothing_or_is_refused() {
                     assert!(sizes.iter().all(|size| text.contains(size)), "{what}: {text}");
                 }
             }
-            // Larger and back: fields at the rim have grown into what is no chunk here, and shrink again.
+            // Larger and back: fields at the rim have grown beyond the chunks here, and shrink again.
             match open(&disk, &own, BaseChanged::Keep) {
                 Ok((back, _)) => assert_eq!(back.world().hash(), world.world().hash(), "{what}"),
                 Err(why) => panic!("{what}: back: {why}"),
@@ -90,7 +90,7 @@ fn a_larger_map_keeps_what_was_dug_at_the_old_rim() {
     let (mut moved, _) = open(&disk, &flat(128, 128), BaseChanged::Keep).expect("it is larger");
     assert_eq!(moved.world().revision(), world.world().revision());
     assert!(moved.world().check_seams().is_flawless());
-    // It goes on there.
+    // It can be edited there.
     moved.apply([Brush::dig(Shape::sphere(Vec3::new(66.0, 0.0, 30.0), 5.0))]);
     assert!(moved.world().check_seams().is_flawless());
 }

@@ -1,4 +1,4 @@
-//! How long saving and opening take, and how many bytes: printed, not asserted. Run with `--ignored --nocapture times`.
+//! Times and bytes of saving and opening: printed, not asserted. Run with `--ignored --nocapture times`.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ fn dig_at(ground: &Ground, [x, z]: [f32; 2], radius: f32) -> Brush {
     Brush::dig(Shape::sphere(Vec3::new(x, height, z), radius))
 }
 
-/// A dig of a player who walks all over the landscape.
+/// A dig of a player that walks all over the landscape.
 fn dig(ground: &Ground, number: u32) -> Brush {
     let (at, turn) = (f64::from(number) * 1.3, f64::from(number) * 0.013);
     let place = [turn.cos(), turn.sin()].map(|part| (500.0 + (at * 0.31).min(400.0) * part) as f32);
@@ -119,7 +119,7 @@ fn times() {
         ms(tail),
         ms(checkpoint)
     );
-    // What a game without a store does: the same brushes, one by one, with meshes.
+    // Without a store: the brushes one by one, with meshes.
     let mut by_hand = Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
     let start = Instant::now();
     (0..2025 * 10).for_each(|number| drop(by_hand.apply([far(number)])));

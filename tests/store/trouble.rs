@@ -1,4 +1,5 @@
-//! Disks that do not answer, threads that end, settings at the end of their range: each is reported, and nothing waits for ever.
+//! Disks that do not answer, threads that end, settings at the limit of their range: each is reported, and nothing
+//! waits for ever.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -78,7 +79,7 @@ fn a_disk_that_does_not_answer_is_reported_and_catches_up() {
 fn what_waits_for_a_disk_that_does_not_answer_is_bounded_and_nothing_is_lost() {
     let mut game = Game::new(StoreOptions { waiting_bytes: 0, ..options(u64::MAX) });
     game.gate.set(Gate::Shut);
-    // More than waits: a value that can't be packed with each commit.
+    // More than the limit on waiting data: an incompressible value with each commit.
     let (mut rng, mut refused) = (fastrand::Rng::with_seed(1), 0);
     for number in 0..12u8 {
         let value: Vec<u8> = (0..200 << 10).map(|_| rng.u8(..)).collect();
@@ -92,7 +93,7 @@ fn what_waits_for_a_disk_that_does_not_answer_is_bounded_and_nothing_is_lost() {
     assert!(matches!(game.store.append(records), Err(StoreError::Gap { .. } | StoreError::Full)));
     game.gate.set(Gate::Open);
     game.store.flush().expect("the disk answers");
-    // All of the terrain comes with the next commit.
+    // The whole terrain is saved with the next commit.
     game.dig();
     game.store.flush().expect("the disk answers");
     assert_eq!(game.store.durable(), game.terrain.world().revision());
@@ -157,7 +158,7 @@ fn a_thread_that_panics_is_reported_and_lets_the_world_go() {
     game.gate.set(Gate::Panics);
     game.dig();
     assert!(matches!(game.store.flush(), Err(StoreError::Ended)));
-    // It may be told a moment after its channel is gone.
+    // It may be reported a moment after its channel is gone.
     let start = Instant::now();
     let mut told = game.store.take_troubles();
     while told.is_empty() && start.elapsed() < Duration::from_secs(60) {

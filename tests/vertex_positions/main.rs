@@ -1,7 +1,7 @@
 //! All passes that draw the ground put a vertex in exactly the same place, so that a depth prepass leaves no holes.
 //!
 //! Whether two shaders differ in the last bit of a depth depends on the compiler of a driver. So this test looks at the
-//! shaders themselves, composed as Bevy does it, without a graphics card: in every pass the position is `@invariant`, and
+//! shaders themselves, composed as Bevy does it, without a GPU: in every pass the position is `@invariant`, and
 //! computed by the same operations on the same inputs.
 #![cfg(feature = "examples")]
 

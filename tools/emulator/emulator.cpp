@@ -9,7 +9,7 @@
 //   6 fill      address, length, byte
 //
 // Kernels: 0 scatter, 1 edit, 2 mesh, 3 heights, 4 stencil_edit. At the end of the input it ends. Past each allocation lies
-// memory that nobody may touch. With BURROW_EMULATOR_SHUFFLE set to a number, the threads of a block run in another order
+// protected memory. With BURROW_EMULATOR_SHUFFLE set to a number, the threads of a block run in another order
 // after each barrier, and some warps wait while others run on, which shows where a barrier is missing.
 
 #include "emulator.h"
@@ -79,7 +79,7 @@ void fail(const char* why) {
 }
 
 // ---- Changing from one fiber to another. Jumps are many times faster than swapcontext, which calls the kernel; the
-// sanitizer wants to be told, and takes no jumps between stacks. ----
+// sanitizer has to be notified, and allows no jumps between stacks. ----
 
 __attribute__((noinline)) static void leave(State state) {
     Fiber& fiber = fibers[running];
@@ -216,7 +216,7 @@ struct Allocation {
 
 static std::unordered_map<uint64_t, Allocation> allocations;
 
-// Memory full of rubbish that ends where a page begins that nobody may touch.
+// Memory with random content that ends where a protected page begins.
 static uint64_t allocate(uint64_t bytes) {
     const uint64_t PAGE = (uint64_t)sysconf(_SC_PAGESIZE), MOST = 1ull << 40;
     if (bytes > MOST) return 0;

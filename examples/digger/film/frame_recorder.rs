@@ -22,11 +22,11 @@ pub struct FrameRecorder {
     pub studio: Studio,
     /// Frames per second of the film.
     fps: u32,
-    /// One of so many frames is drawn.
+    /// One of this many frames is drawn.
     interval: f64,
     played: usize,
     drawn: usize,
-    /// Was the previous frame drawn?
+    /// Whether the previous frame was drawn.
     is_warm: bool,
 }
 
@@ -43,12 +43,13 @@ impl FrameRecorder {
         (f64::from(self.fps) / self.interval) as f32
     }
 
-    /// The number of frames drawn so far.
+    /// The number of drawn frames.
     pub fn drawn(&self) -> usize {
         self.drawn
     }
 
-    /// Plays a scene of so many seconds. `direct` is called before each frame, with the progress of the scene from 0 to
+    /// Plays a scene of this many seconds. `direct` is called before each frame, with the progress of the scene from 0
+    /// to
     /// 1.
     ///
     /// # Errors

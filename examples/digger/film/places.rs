@@ -132,7 +132,7 @@ impl Land<'_> {
         self.model.height(x, z).map(|height| height as f32 - self.origin.y as f32)
     }
 
-    /// Is there no ground between two places?
+    /// Whether there is no ground between two places.
     fn is_free(&self, from: Vec3, to: Vec3) -> bool {
         let direction = (to - from).as_dvec3();
         self.model.raycast(self.voxel(from), direction, direction.length()).is_none()
@@ -217,12 +217,12 @@ impl<'a> Relief<'a> {
         found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, hillside)| hillside)
     }
 
-    /// Is this ground in the sun?
+    /// Whether this ground is in the sun.
     fn is_sunny(&self, place: Vec3) -> bool {
         (2..=60).map(|i| place + Vec3::Y + SUN * 3.0 * i as f32).all(|high| self.height(high.xz()) < high.y)
     }
 
-    /// Is there rock above the tunnel, except for its first metres, and around its room?
+    /// Whether there is rock above the tunnel, except for its first metres, and around its room.
     fn covers(&self, hillside: &Hillside) -> bool {
         let [mouth, bend, end] = hillside.floor();
         let under = |place: Vec3, ceiling: f32| self.height(place.xz()) >= place.y + ceiling + 3.0;

@@ -10,7 +10,7 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SeamReport;
 use bevy_burrow::terrain::Memory;
 
-/// The results of all brushes so far.
+/// The results of all brushes.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct EditLog {
     /// Brushes that were applied, including those that changed nothing.
@@ -73,7 +73,7 @@ impl fmt::Display for Durations {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut sorted = self.0.clone();
         sorted.sort_unstable();
-        // The nearest rank: the least time that so many percent do not exceed.
+        // The nearest rank: the least time that this percentage of frames does not exceed.
         let ms = |percent: usize| {
             let rank = (sorted.len() * percent).div_ceil(100).saturating_sub(1);
             sorted.get(rank).copied().unwrap_or_default().as_secs_f64() * 1e3
@@ -86,7 +86,7 @@ impl fmt::Display for Durations {
 pub struct Report {
     pub renderer: Option<String>,
     pub engine: EngineState,
-    /// Stages of transactions on the CPU and on a graphics card.
+    /// Stages of transactions on the CPU and on a GPU.
     pub stages: (u64, u64),
     pub size: (i32, i32),
     pub tunnel: f32,
@@ -162,7 +162,7 @@ impl fmt::Display for Report {
             _ => "the CPU",
         };
         let (cpu, cuda) = self.stages;
-        writeln!(f, "  computed by   {computer}: {cuda} stages of transactions on a card, {cpu} on the CPU")?;
+        writeln!(f, "  computed by   {computer}: {cuda} stages of transactions on a GPU, {cpu} on the CPU")?;
         let (played, shown) = (frames.0.len(), drawn.0.len());
         writeln!(f, "  frames        {played} played in {frames} ms, {shown} drawn in {drawn} ms")?;
         write!(f, "  pictures      {}", self.pictures.len())?;

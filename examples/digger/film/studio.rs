@@ -89,7 +89,7 @@ impl Studio {
             .map_err(|error| format!("{}: {error}", options.out.display()))?;
         let renders = renderer.is_some();
         let engine = options.backend.engine();
-        // Without this, a short script could end before a graphics card is found.
+        // Without this, a short script could end before a GPU is found.
         engine.wait(PATIENCE);
         let mut app = offscreen::build(renderer, |app| {
             app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
@@ -223,7 +223,7 @@ impl Studio {
         Ok(Stance { feet: character.feet(middle), eye: character.eyes(middle) })
     }
 
-    /// Does the player wait for colliders?
+    /// Whether the player waits for colliders.
     fn is_held(&self) -> bool {
         self.app.world().get::<HeldByGround>(self.player).is_some()
     }

@@ -1,4 +1,4 @@
-//! Hosting and joining: what the terrain's `SharedTerrain` needs around it comes and goes with it.
+//! Hosting and joining: sets up and removes connections together with the terrain's `SharedTerrain`.
 
 use std::fmt;
 use std::net::{AddrParseError, IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
@@ -25,7 +25,7 @@ const PLAYERS: usize = 16;
 /// Seconds until a lost connection is tried again.
 const RETRY_PAUSE: f32 = 2.0;
 
-/// Who plays in this world.
+/// The players in this world.
 #[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub enum Party {
     #[default]
@@ -117,7 +117,7 @@ impl Plugin for ConnectionPlugin {
     }
 }
 
-/// Is the world shared with others?
+/// Whether the world is shared with others.
 pub fn is_shared(party: Option<Res<Party>>) -> bool {
     party.is_some_and(|party| *party != Party::Alone)
 }
@@ -140,7 +140,7 @@ fn open(
     own: Res<OwnNumber>,
     mut time: ResMut<Time<Virtual>>,
 ) -> Result {
-    // It may have been paused, and goes on for all.
+    // It may have been paused, and continues for all.
     time.unpause();
     let terrain = terrains.get(new.entity)?;
     match *party {
@@ -171,7 +171,7 @@ fn unsaved(ground: &OriginalGround) -> Result<Server> {
     Ok(Server::new(landscape::new_terrain(&ground.0)?, settings()))
 }
 
-/// Goes on without saving where the world can't be read.
+/// Continues without saving if the world can't be read.
 fn serve_unsaved(
     mut events: MessageReader<GroundServerEvent>,
     ground: Option<Res<OriginalGround>>,
@@ -238,7 +238,7 @@ fn connect(
 }
 
 fn announce_loss(next: Option<Res<NextTry>>, mut hints: MessageWriter<Hint>) {
-    // Who has left does not try again.
+    // A player that has left does not try again.
     if next.is_some() {
         hints.write(Hint(texts::HOST_LOST.into()));
     }

@@ -18,7 +18,7 @@ const NAME_DISTANCE: f32 = 120.0;
 const NAME_HEIGHT: f32 = 2.15;
 /// How fast figures follow what is known of their players, per second.
 const FOLLOW_RATE: f32 = 14.0;
-/// A figure that is so far off is put in its place at once.
+/// A figure at least this far from its position is moved there at once.
 const JUMP_DISTANCE: f32 = 8.0;
 /// Luminous power of the lamp of a figure, in lumens.
 const LAMP: f32 = 4_000_000.0;

@@ -27,9 +27,9 @@ const POSE_EVERY: Duration = Duration::from_millis(50);
 const NAME_EVERY: Duration = Duration::from_millis(500);
 /// Most letters of a name.
 pub const MOST_LETTERS: usize = 16;
-/// No player is so far from the middle of the world, in metres.
+/// The greatest possible distance of a player from the middle of the world, in metres.
 const FAR: f32 = 20_000.0;
-/// The host's clock is taken over where it differs by so many hours.
+/// The host's clock is taken over if it differs by this many hours.
 const CLOCK_DIFFERENCE: f32 = 0.02;
 
 /// A player, this one too.
@@ -50,7 +50,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Can somebody stand there?
+    /// Whether a player can be there.
     fn is_possible(&self) -> bool {
         self.feet.abs().max_element() < FAR && self.yaw.is_finite() && self.pitch.is_finite()
     }
@@ -61,7 +61,7 @@ impl Pose {
     }
 }
 
-/// The time of day at the host, on its own [`PlayerInfo`].
+/// The time of day at the host, on the host's [`PlayerInfo`].
 #[derive(Component, Clone, Copy, Debug, Serialize, Deserialize)]
 struct HostClock(f32);
 

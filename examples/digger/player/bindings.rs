@@ -48,7 +48,7 @@ impl Binding {
 #[error("there is no key or button {0:?}")]
 pub struct UnknownBinding(String);
 
-/// Finds the unit variant with this name by reflection, because Bevy has so many keys.
+/// Finds the unit variant with this name by reflection, because Bevy has hundreds of keys.
 fn variant_named<E: Typed + FromReflect>(name: &str) -> Option<E> {
     let variant = E::type_info().as_enum().ok()?.variant(name)?;
     if variant.variant_type() != VariantType::Unit {

@@ -61,7 +61,7 @@ fn rebinding_names_the_action_that_loses_the_binding_and_leaves_other_devices_al
     assert_eq!(bindings.rebind(Action::Headlamp, space), Some(Action::Jump));
     assert_eq!(bindings.of(Action::Headlamp), [space, Binding::Pad(GamepadButton::North)]);
     assert_eq!(bindings.of(Action::Jump), [Binding::Pad(GamepadButton::South)]);
-    // The same again changes nothing.
+    // Repeating it changes nothing.
     let before = bindings.clone();
     assert_eq!(bindings.rebind(Action::Headlamp, space), None);
     assert_eq!(bindings, before);
@@ -88,7 +88,7 @@ fn unknown_actions_and_keys_are_ignored() {
     // W is bound to undo, so it does not walk.
     assert_eq!(bindings.of(Action::Forward), [key(KeyCode::ArrowUp)]);
     assert_eq!(bindings.of(Action::Headlamp), [Binding::Pad(GamepadButton::North)]);
-    // An action that lost a binding gets its defaults back, beside what could be read.
+    // An action that lost a binding gets its defaults back, in addition to bindings that could be read.
     let left = Binding::Mouse(MouseButton::Left);
     assert_eq!(bindings.of(Action::Use), [Binding::Pad(GamepadButton::RightTrigger2), left]);
     assert_eq!(bindings.of(Action::Build)[0], key(KeyCode::KeyB));

@@ -76,7 +76,7 @@ fn spawn_camera(mut commands: Commands) {
     ));
 }
 
-/// Without a graphics card, the game starts with low quality.
+/// Without a GPU, the game starts with low quality.
 fn prefer_low_quality_in_software(
     adapter: Option<Res<RenderAdapterInfo>>,
     file: Res<SettingsFile>,
@@ -173,7 +173,7 @@ fn apply_settings(
     let is_cheap = settings.quality == Quality::Low || draws_in_software(adapter.as_deref());
     for (mut look, mut shown) in &mut terrains {
         shown.set_if_neq(levels.clone());
-        // The high quality reads some fifty texels per pixel: fast on a graphics card, but seconds per frame without
+        // The high quality reads some fifty texels per pixel: fast on a GPU, but seconds per frame without
         // one.
         look.quality = if is_cheap { GroundQuality::Low } else { GroundQuality::High };
     }

@@ -9,10 +9,10 @@ use crate::player::game_state::GameState;
 use crate::player::input::{Action, Actions};
 use crate::world::landscape::NewGame;
 
-// Luminous power in lumens. It is much higher than a real lamp's, so that it is seen beside the sun.
+// Luminous power in lumens. It is much higher than a real lamp's, so that it is visible in sunlight.
 /// A narrow beam that reaches far.
 const BEAM: f32 = 12_000_000.0;
-/// A wide light around the beam. One light for both would overexpose what is near, or not reach what is far.
+/// A wide light around the beam. One light for both would overexpose near ground, or not reach far ground.
 const FLOOD: f32 = 2_400_000.0;
 /// A small light on the tool in hand.
 const TOOL: f32 = 9_000.0;
@@ -23,7 +23,7 @@ const FULL_POWER_DISTANCE: f32 = 13.0;
 #[derive(Component)]
 pub struct Headlamp(f32);
 
-/// Is the headlamp on?
+/// Whether the headlamp is on.
 #[derive(Resource, Default)]
 pub struct HeadlampSwitch(pub bool);
 
@@ -62,7 +62,7 @@ pub fn lights() -> impl Bundle {
     let flood =
         SpotLight { range: 24.0, inner_angle: 0.3, outer_angle: 1.3, shadow_maps_enabled: false, ..beam };
     let tool = PointLight { color: beam.color, intensity: 0.0, range: 1.6, ..default() };
-    // Beside the camera, so that the beam's shadows are seen, and in front of the tool, which it would overexpose.
+    // Next to the camera, so that the beam's shadows are seen, and in front of the tool, which it would overexpose.
     let place = Transform::from_xyz(0.22, 0.12, -0.34);
     children![
         (Headlamp(BEAM), beam, place),

@@ -90,7 +90,7 @@ impl Actions {
         self.buttons.pressed(action)
     }
 
-    /// Was it pressed in this frame?
+    /// Whether it was pressed in this frame.
     pub fn just_pressed(&self, action: Action) -> bool {
         self.buttons.just_pressed(action)
     }

@@ -130,7 +130,7 @@ fn end_jump(mut players: Query<&mut CharacterSteering, (With<Player>, Without<Sc
     }
 }
 
-/// Stops players who are not steered by a script.
+/// Stops players that are not steered by a script.
 pub fn stop_walking(mut players: Query<&mut CharacterSteering, Without<Scripted>>) {
     for mut steering in &mut players {
         *steering = default();

@@ -1,4 +1,4 @@
-//! Brings the player back who got out of the world or deep into rock.
+//! Brings a player back that left the world or is deep inside rock.
 
 use std::time::Duration;
 
@@ -13,9 +13,10 @@ use crate::player::{self, Player, Scripted};
 use crate::ui::hud::Hint;
 use crate::ui::texts;
 
-/// Players this many metres below all air are lost. Those who are just built over are lifted by the plugin's physics.
+/// Players this many metres below all air are lost. Players that were only built over are lifted by the plugin's
+/// physics.
 const DEPTH: f32 = 4.0;
-/// A player who is lost in so many checks, two per second, is brought back.
+/// A player that is lost in this many checks, two per second, is brought back.
 const CHECKS: u32 = 4;
 
 /// Keeps the player in the world. The walls around it are the plugin's
@@ -51,7 +52,7 @@ fn bring_back(
     }
 }
 
-/// Is this place outside the world, or below all air of its column?
+/// Whether this position is outside the world, or below all air of its column.
 fn is_lost(feet: Vec3, air: &[Span]) -> bool {
     let lowest = air.iter().map(|span| span.floor).reduce(f64::min);
     !feet.is_finite() || lowest.is_none_or(|floor| f64::from(feet.y) < floor - f64::from(DEPTH))

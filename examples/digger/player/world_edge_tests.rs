@@ -50,7 +50,7 @@ fn a_player_outside_the_world_or_in_rock_is_brought_back() {
     let start = Vec3::new(20.0, 20.0, 32.0);
     for (lost, back) in [
         (Vec3::new(-30.0, 20.0, 10.0), start),
-        // The plugin's physics lift whoever is in the ground.
+        // The plugin's physics lift players out of the ground.
         (Vec3::new(40.0, -80.0, 40.0), Vec3::new(40.0, 20.0, 40.0)),
         (Vec3::new(500.0, -900.0, 32.0), start),
     ] {

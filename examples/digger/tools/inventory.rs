@@ -143,7 +143,7 @@ impl Inventory {
         self.apply(&total)
     }
 
-    /// Applies what a step put back, whatever brushes it was of, and returns what it changed.
+    /// Applies the voxels that an undo or redo step restored, and returns the changes.
     fn apply_restored(&mut self, restored: &Restored) -> Vec<(MaterialId, i64)> {
         let mut total = Amounts::default();
         for (sign, counts) in [(1, &restored.removed), (-1, &restored.added), (-1, &restored.painted)] {
@@ -168,7 +168,7 @@ impl Inventory {
         self.amounts.iter_mut().zip(&saved.amounts).for_each(|(amount, saved)| *amount = *saved);
     }
 
-    /// Empties the inventory for a new game. Tags go on counting, because receipts of the old game may still arrive.
+    /// Empties the inventory for a new game. Tags keep counting, because receipts of the old game may still arrive.
     pub fn reset(&mut self) {
         *self = Self { next_tag: self.next_tag, ..default() };
     }

@@ -114,7 +114,7 @@ impl Tool {
     }
 }
 
-/// The element so many places after another one, in a list that goes round.
+/// The element `by` places after another one, in a cyclic list.
 fn cycle<T: Copy + PartialEq>(all: &[T], from: T, by: usize) -> T {
     let at = all.iter().position(|one| *one == from).unwrap_or(0);
     all[(at + by) % all.len()]

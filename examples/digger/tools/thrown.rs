@@ -1,4 +1,4 @@
-//! What bombs and balls have in common when they are thrown.
+//! Code that bombs and balls share: throwing.
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
@@ -9,7 +9,7 @@ use crate::world::landscape::DespawnOnNewGame;
 
 /// Nearer to the camera than this many metres, a thrown thing is hidden, because it would fill the view.
 const VISIBLE_DISTANCE: f32 = 0.7;
-/// After so many seconds it is visible wherever it is: it may have bounced back from a wall.
+/// After this many seconds it is visible everywhere: it may have bounced back from a wall.
 const MAX_HIDDEN_TIME: f32 = 0.1;
 
 /// Shows things some time after they were thrown.

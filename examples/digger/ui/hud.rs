@@ -26,7 +26,7 @@ use crate::world::landscape::{self, BEDROCK, MATERIALS};
 
 /// Seconds that a hint or a find is shown, in real time: also while the game is paused.
 const SHOWN: f32 = 2.6;
-/// Seconds after which it is told that the world is not on the disk yet.
+/// Seconds after which a hint says that the world is not on the disk yet.
 const SLOW_SAVE: f32 = 5.0;
 /// Finds that are shown at the same time.
 const MAX_FINDS: usize = 4;

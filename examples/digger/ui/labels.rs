@@ -9,7 +9,7 @@ use bevy::prelude::*;
 
 use crate::player::bindings::Binding;
 
-/// The letters of the keys that were pressed so far.
+/// The letters of the keys that have been pressed.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Labels(BTreeMap<KeyCode, char>);
 

@@ -80,7 +80,7 @@ mod tests {
         add_systems(&mut app);
         go_to(&mut app, GameState::Playing);
         let player = app.world_mut().spawn((Player::default(), CharacterSteering::default())).id();
-        // Does the player walk and swing while these actions are held?
+        // Whether the player walks and swings while these actions are held.
         let frame = |app: &mut App, held: &[Action]| {
             hold(app, held);
             let direction = app.world().get::<CharacterSteering>(player).expect("a player").direction;

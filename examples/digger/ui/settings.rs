@@ -17,7 +17,7 @@ use crate::tools::aim::BuildShape;
 pub struct Settings {
     /// Factor for the speed of mouse and sticks.
     pub sensitivity: f32,
-    /// Does pushing the mouse forward look down?
+    /// Whether pushing the mouse forward looks down.
     pub invert_y: bool,
     /// Vertical field of view in degrees.
     pub field_of_view: f32,
@@ -35,7 +35,7 @@ pub struct Settings {
     pub radius: f32,
     /// The shape of what is built.
     pub shape: BuildShape,
-    /// Does the inventory limit what can be built?
+    /// Whether the inventory limits building.
     pub survival: bool,
     /// What others call the player.
     pub name: String,

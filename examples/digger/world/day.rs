@@ -21,7 +21,7 @@ const TILT: (f32, f32) = (0.6187, 0.7857);
 pub struct Clock {
     /// Hours since midnight, below 24.
     pub hour: f32,
-    /// Does the time of day advance?
+    /// Whether the time of day advances.
     pub runs: bool,
 }
 

@@ -65,7 +65,7 @@ const WORLD: u32 = 8192;
 const REAL_CORNER: Column = Column::new(3456, 3552);
 /// Cells that the elevation model covers.
 pub const REAL_SIZE: [i32; 2] = [1206, 1029];
-/// Over so many cells inside its rim, the real land blends into the hills around it.
+/// Over this many cells inside its rim, the real land blends into the hills around it.
 const REAL_MARGIN: i32 = 64;
 
 /// The voxel at the origin of space: a corner of the real land. Numbers are small there, so what the player holds does not
@@ -94,7 +94,8 @@ const MOUNTAINS: NoiseHeights = NoiseHeights {
     base: 250.0,
 };
 
-/// There are only mountains up to so many cells from the world's edge. Over `MOUNTAINS_MARGIN` more they sink to hills.
+/// There are only mountains up to this many cells from the world's edge. Over `MOUNTAINS_MARGIN` more they sink to
+/// hills.
 const MOUNTAINS_WIDTH: i32 = 700;
 const MOUNTAINS_MARGIN: i32 = 2000;
 
@@ -118,7 +119,7 @@ impl Plugin for LandscapePlugin {
     }
 }
 
-/// A new game begins: everything that play changed goes back to its start. Whoever owns such a thing observes this.
+/// A new game begins: everything that play changed is reset. Modules with such state observe this event.
 #[derive(Event, Clone, Copy, Debug)]
 pub struct NewGame;
 

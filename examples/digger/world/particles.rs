@@ -14,7 +14,7 @@ use crate::world::landscape::MATERIALS;
 /// Sizes of the pools. When all particles fly, the oldest is used again.
 const CHIPS: usize = 260;
 const PUFFS: usize = 90;
-/// A puff of dust or fire fades in so many steps. Each step has its own material, so no material asset ever changes.
+/// A puff of dust or fire fades in this many steps. Each step has its own material, so no material asset ever changes.
 const FADE_STEPS: usize = 6;
 const GRAVITY: f32 = 14.0;
 

@@ -1,7 +1,7 @@
-//! Saved worlds: the folder of the world that is played, and what the game keeps beside its ground.
+//! Saved worlds: the folder of the world that is played, and the game's data that is saved with its ground.
 //!
-//! The ground saves itself. Inventory, time of day and the player's place are put beside it in the frame in which they change, so
-//! that after a crash nothing is there twice, or neither here nor there.
+//! The plugin saves the ground. Inventory, time of day and the player's place are stored with it in the frame in which
+//! they change, so that after a crash nothing is duplicated or lost.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -237,7 +237,7 @@ pub struct SavedPlace {
 #[derive(Resource)]
 struct GameIsRead;
 
-/// What is saved beside the ground: all that the player has, holds and has placed.
+/// The data that is saved with the ground: everything that the player has, holds and has placed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct SavedGame {
     inventory: inventory::SavedInventory,
@@ -260,7 +260,7 @@ struct PlayedGame<'w, 's> {
     headlamp: ResMut<'w, HeadlampSwitch>,
     lamps: SavedLamps<'w, 's>,
     players: Query<'w, 's, (&'static Player, Body)>,
-    /// The place of a player who is not there yet.
+    /// The place of a player that is not there yet.
     place: Option<Res<'w, SavedPlace>>,
     commands: Commands<'w, 's>,
 }
@@ -299,7 +299,7 @@ impl PlayedGame<'_, '_> {
     }
 }
 
-/// Puts the game beside the ground: the host's, where players share it.
+/// Stores the game's data with the ground: the host's, if the world is shared.
 fn put_game(game: PlayedGame, mut worlds: Query<&mut WorldStore>, mut server: Option<ResMut<GroundServer>>) {
     if worlds.is_empty() && server.is_none() {
         return;
@@ -317,7 +317,7 @@ fn put_game(game: PlayedGame, mut worlds: Query<&mut WorldStore>, mut server: Op
     }
 }
 
-/// Goes on with the game that was saved.
+/// Continues the saved game.
 fn continue_game(
     mut opened: MessageReader<WorldOpened>,
     mut served: MessageReader<GroundServerEvent>,

@@ -44,7 +44,7 @@ pub struct SkyMaterial {
 pub struct SkyLook {
     /// The direction to the sun, and the brightness of its disc.
     pub sun: Vec4,
-    /// The same for the moon.
+    /// The direction to the moon, and the brightness of its disc.
     pub moon: Vec4,
     pub zenith: Vec4,
     pub horizon: Vec4,

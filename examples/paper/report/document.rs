@@ -138,7 +138,7 @@ fn machines(page: &mut String, measurements: &Measurements, machine: &Machine) -
         threads => format!("{threads} threads"),
     };
     writeln!(page, "| | CPU | edits run on | system | compiler |\n| --- | --- | --- | --- | --- |")?;
-    writeln!(page, "| paper | {} | not told | Windows 7 | not told |", published::MACHINE)?;
+    writeln!(page, "| paper | {} | not stated | Windows 7 | not stated |", published::MACHINE)?;
     writeln!(page, "| here | {cpu}, {threads} threads | {used} | {system} | {rustc} |\n")
 }
 
@@ -164,7 +164,7 @@ fn experiment(page: &mut String, measurements: &Measurements) -> std::fmt::Resul
     )?;
     writeln!(
         page,
-        "- **First run**: nobody has edited the terrain, nothing is allocated. **Second run**: the same shapes at the same \
+        "- **First run**: the terrain is not edited yet, nothing is allocated. **Second run**: the same shapes at the same \
          places with the polarity reversed. A second dig of the same hole would change nothing here and cost next to \
          nothing; reversed, each edit changes samples and meshes that are there already. The table of checks counts those \
          that did not; none is left out of the times. The ratio of both runs comes from processes that play one test and \

@@ -53,7 +53,7 @@ use super::BrushError;
 use super::quantize::check_extent;
 use crate::lattice::ONE;
 
-/// What the world has to know of a shape in integers. All but `check` may rely on numbers that were checked.
+/// The integer geometry of a shape. All methods except `check` may rely on checked numbers.
 pub(super) trait ShapeGeometry {
     /// Its distance function.
     type Distance: Distance;

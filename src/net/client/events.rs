@@ -1,4 +1,4 @@
-//! What a client tells the game, and what it counts.
+//! Events and statistics of a client.
 
 use super::super::message::{ClientId, Kick, Refusal};
 use crate::lattice::RegionPos;
@@ -19,32 +19,33 @@ pub enum ClientEvent {
     Playable,
     /// All of the world is there, and the client follows the order.
     Joined,
-    /// An edit of the player's is shown, as far as the client can tell now.
+    /// An edit of the player is shown with the predicted result.
     Predicted(Receipt),
-    /// The server has ordered an edit of the player's: this is what it came to for all. Inventories should follow this.
+    /// The server has ordered an edit of the player, with this result for all players. Inventories should follow this.
     Confirmed {
         /// The edit's tag.
         tag: u64,
-        /// What it came to; `None` where the client was away when that happened.
+        /// The result; `None` if the client was disconnected when the edit was ordered.
         receipt: Option<Receipt>,
     },
-    /// An edit of the player's is not done, and no longer shown.
+    /// An edit of the player was refused, and is no longer shown.
     Refused {
         /// The edit's tag.
         tag: u64,
-        /// Why; `None` where it could not be sent or applied, or the client was away when that was told.
+        /// The reason; `None` if it could not be sent or applied, or the client was disconnected when it was refused.
         why: Option<Refusal>,
     },
-    /// A stroke was taken back that this client asked for: what that put back, without tags, as the order does not tell whose
-    /// edits they were. Inventories should follow this. `None` where the client was away when that happened.
+    /// An undo by this client succeeded, with the restored parts. They have no tags, because the order does not contain
+    /// tags of edits. Inventories should follow this. `None` if the client was disconnected when it happened.
     Undone(Option<Restored>),
-    /// A stroke is not taken back. `None` where that could not be asked for, or the client was away when the reason was told.
+    /// An undo was refused. `None` if the request could not be sent, or the client was disconnected when it was
+    /// refused.
     UndoRefused(Option<Refusal>),
-    /// An edit of somebody else's.
+    /// An edit of another player or of the server.
     Others {
-        /// Whose.
+        /// Its author.
         author: ClientId,
-        /// What it came to. Its tag is 0.
+        /// The result. Its tag is 0.
         receipt: Receipt,
     },
     /// Pieces of ground were cut off or are ground again, in what is shown from the next [change](super::Client::take_shown) on. Whatever a
@@ -62,11 +63,11 @@ pub enum ClientEvent {
     Durable(u64),
     /// These regions differed from the server's, and were fetched. This is a bug: of the plugin's or of a machine.
     Repaired(Vec<RegionPos>),
-    /// The client has to go.
+    /// The server has removed the client.
     Kicked(Kick),
 }
 
-/// What a client has counted so far.
+/// Statistics of a client.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClientFigures {
     /// Entries that were applied.
@@ -77,10 +78,10 @@ pub struct ClientFigures {
     pub repairs: u64,
     /// Times that entries were missing.
     pub gaps: u64,
-    /// Messages that meant nothing.
+    /// Invalid messages.
     pub malformed: u64,
-    /// Times that edits which the server had not answered were worked out, at first and where others met what they read.
+    /// How often pending edits were predicted: at first, and again if other edits changed samples that they read.
     pub drafts: u64,
-    /// The edits that were worked out at these times, in all.
+    /// The number of edits in these predictions.
     pub drafted: u64,
 }

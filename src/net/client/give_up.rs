@@ -1,10 +1,10 @@
-//! Giving up what the server has not answered.
+//! Gives up edits and undos that the server has not answered.
 
 use super::outbox::Outbox;
 use super::{Client, ClientEvent};
 
 impl Client {
-    /// Gives up edits and undos that the server has not answered, because it will not: edits are no longer shown after the next
+    /// Gives up edits and undos that the server will not answer any more: edits are no longer shown after the next
     /// [`advance`](Self::advance), and all of them are reported as refused.
     pub fn give_up(&mut self) {
         let numbers: Vec<u64> = self.replica.pending().map(|(number, _)| number).collect();

@@ -12,7 +12,7 @@ use crate::ground::GreyImage;
 #[derive(Default)]
 pub(super) struct Images {
     parked: Vec<(Lane, Vec<u8>)>,
-    /// Images that were asked for and have not come.
+    /// Images that were requested and have not arrived.
     awaited: BTreeSet<StampId>,
 }
 
@@ -22,7 +22,7 @@ impl Images {
         *self = Self::default();
     }
 
-    /// Lets a message wait for images; returns the messages that ask for them.
+    /// Stores a message until its images arrive; returns the messages that request them.
     pub fn park(&mut self, lane: Lane, bytes: Vec<u8>, missing: BTreeSet<StampId>) -> Vec<Vec<u8>> {
         self.parked.push((lane, bytes));
         let new: Vec<StampId> = missing.into_iter().filter(|id| self.awaited.insert(*id)).collect();
@@ -31,7 +31,7 @@ impl Images {
 }
 
 impl Client {
-    /// An image has come: what waited for it is looked at again.
+    /// Adds an image: messages that waited for it are read again.
     pub(super) fn take_image(&mut self, image: Arc<GreyImage>) {
         if !self.images.awaited.remove(&StampId::of(&image)) {
             self.figures.malformed += 1;

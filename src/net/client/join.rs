@@ -1,4 +1,4 @@
-//! Getting to where the server is.
+//! Joining: catching up with the server.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,17 +14,17 @@ use crate::brush::Edit;
 use crate::lattice::RegionPos;
 use crate::terrain::WorldChange;
 
-/// How far a client has come.
+/// The progress of a join.
 pub(super) enum Stage {
     /// There is no connection.
     Apart,
     /// It waits for its welcome.
     Greeting,
-    /// Old entries come, up to a number. The server has seen own edits up to `own`.
+    /// Old entries arrive, up to the number `to`. The server has seen own edits up to `own`.
     ByLog { to: u64, own: u64 },
-    /// Regions at a number come, so many more.
+    /// Regions at the number `to` arrive; `left` more are missing.
     ByRegions { to: u64, left: usize },
-    /// The table of regions at a number comes.
+    /// The table of regions at a number arrives.
     ByTable { to: u64 },
     /// It follows the order.
     Following,
@@ -60,7 +60,7 @@ impl Client {
         let to = epoch.number;
         self.is_part = !matches!(join, Join::Log { .. });
         self.voids.clear();
-        // Until it is there, it has what it had.
+        // Until the join is finished, it keeps its old world.
         let known = self.epoch.map_or(0, |known| known.number);
         match join {
             Join::Log { voids } => {
@@ -87,12 +87,13 @@ impl Client {
         self.finish_regions();
     }
 
-    /// Goes on from another place of the order.
+    /// Continues from another position of the order.
     fn restart(&mut self, terms: &Terms, keeps_world: bool, own: u64) {
         if self.replica.restart(terms, keeps_world).is_err() {
             self.figures.malformed += 1;
         }
-        // What became of these was told while the client was away; if they were done, the world holds them.
+        // The answers to these were sent while the client was disconnected; if they were applied, the world contains
+        // them.
         for tag in self.take_answered(own) {
             self.events.push(ClientEvent::Confirmed { tag, receipt: None });
         }
@@ -100,7 +101,7 @@ impl Client {
         self.events.extend(undone);
     }
 
-    /// Takes back own edits up to a number; returns their tags.
+    /// Removes pending edits up to a number; returns their tags.
     fn take_answered(&mut self, own: u64) -> Vec<u64> {
         let answered: Vec<u64> =
             self.replica.pending().map(|(number, _)| number).filter(|number| *number <= own).collect();
@@ -146,7 +147,7 @@ impl Client {
         }
     }
 
-    /// Has it come to the end of old entries?
+    /// Finishes the join if all old entries are applied.
     pub(super) fn finish_log(&mut self) {
         if let Stage::ByLog { to, own } = self.stage
             && self.number() >= to
@@ -161,7 +162,7 @@ impl Client {
         }
     }
 
-    /// Have all regions come?
+    /// Finishes the join if all regions have arrived.
     fn finish_regions(&mut self) {
         if let Stage::ByRegions { left: 0, .. } = self.stage {
             self.follow_from_now();
@@ -179,7 +180,8 @@ impl Client {
         self.events.push(ClientEvent::Joined);
     }
 
-    /// The table of all regions: those that differ are fetched, and what the server has not is pristine.
+    /// Handles the table of all regions: regions that differ are fetched, and regions that the server lacks become
+    /// pristine.
     pub(super) fn take_table(&mut self, number: u64, regions: &RegionHashes) {
         let Stage::ByTable { to } = self.stage else { return };
         if number != to {
@@ -200,7 +202,7 @@ impl Client {
         self.finish_regions();
     }
 
-    /// Asks for more of the regions that differ, once most of those have come that were asked for.
+    /// Requests more of the regions that differ, once most of the requested ones have arrived.
     fn fetch_more(&mut self) {
         let Stage::ByRegions { to, left } = self.stage else { return };
         let awaited = left.saturating_sub(self.wanted.len());
@@ -217,7 +219,7 @@ impl Client {
         }
     }
 
-    /// A region that it waits for.
+    /// Handles a region that it waits for.
     pub(super) fn take_region(&mut self, content: RegionContent) {
         if let Some(repair) = &mut self.repair {
             repair.add(content);
@@ -241,7 +243,7 @@ impl Client {
         self.finish_regions();
     }
 
-    /// Lets fields to come have the names that they have on the server: what was put can only have raised them.
+    /// Makes later fields have the same names as on the server.
     pub(super) fn lower_names(&mut self, next_field: u64) {
         if self.replica.world().next_field() > next_field {
             let terms = Terms { next_field, ..self.replica.terms() };
@@ -256,7 +258,7 @@ impl Client {
     }
 }
 
-/// From a place to a region along the axis on which it is farthest, in voxels.
+/// The distance from a position to a region along the axis on which it is farthest, in voxels.
 fn distance(region: RegionPos, place: IVec3) -> i64 {
     let samples = region.samples();
     let (low, high) = (samples.min.as_i64vec3(), samples.max.as_i64vec3());

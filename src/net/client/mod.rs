@@ -1,13 +1,13 @@
-//! The client: its edits show at once, and what the server orders follows.
+//! The client: it shows its own edits at once, and follows the server's order.
 //!
 //! | file | what it does |
 //! | --- | --- |
-//! | `client` | what a game calls, and messages that come |
-//! | `join` | getting to where the server is: old entries, regions, a comparison |
-//! | `outbox` | own edits and undos on their way, as fast as the server's limits allow |
+//! | `client` | the interface for games, and received messages |
+//! | `join` | catching up with the server: old entries, regions, a comparison |
+//! | `outbox` | sends own edits and undos as fast as the server's limits allow |
 //! | `repair` | marks, and regions that differ |
 //! | `images` | images of stamps that are missing |
-//! | `replica` | the world of the order, and what is shown of it |
+//! | `replica` | the world of the order, and the shown world |
 
 mod events;
 mod give_up;
@@ -50,28 +50,29 @@ const BATCH: usize = 2048;
 const ACK: Duration = Duration::from_millis(100);
 const ACK_BYTES: u64 = 16 << 10;
 
-/// A greeting is repeated after so long, until it is answered.
+/// The interval at which a greeting is repeated until it is answered.
 const GREET_AGAIN: Duration = Duration::from_secs(1);
 
-/// No honest server tells greater numbers, so that counting on can never overflow.
+/// Greater numbers are refused, so counting can never overflow.
 const MOST_NUMBER: u64 = u64::MAX / 2;
 
 /// A client: bytes in, bytes out.
 ///
-/// In each frame: [`receive`](Self::receive) what came, [`dig`](Self::dig) what the player digs, send what
-/// [`take_outgoing`](Self::take_outgoing) returns, then [`advance`](Self::advance), which takes as long as edits take, put what
-/// [`take_shown`](Self::take_shown) returns into the terrain that is shown, and look at [events](Self::take_events).
+/// In each frame, pass received messages to [`receive`](Self::receive) and edits of the player to [`dig`](Self::dig),
+/// send the messages of [`take_outgoing`](Self::take_outgoing), call [`advance`](Self::advance), which takes as long as
+/// its edits take, apply the changes of [`take_shown`](Self::take_shown) to the shown terrain, and handle the
+/// [events](Self::take_events).
 pub struct Client {
     replica: Replica,
     stamps: Stamps,
     chunk_size: u32,
     place: IVec3,
-    /// Regions so near, in voxels, have to be there before play begins.
+    /// Regions within this distance, in voxels, have to be there before play begins.
     near: u32,
     id: Option<ClientId>,
     /// Where the world is; `None` before the first welcome.
     epoch: Option<Epoch>,
-    /// Does the world lack regions of its number?
+    /// Whether the world lacks regions of its number.
     is_part: bool,
     stage: Stage,
     now: Duration,
@@ -79,7 +80,7 @@ pub struct Client {
     stream: u64,
     /// When it greeted last.
     greeted: Duration,
-    /// By lane: has the stream begun there? What comes before belongs to an earlier one.
+    /// By lane: whether the stream has begun there. Earlier messages belong to a previous stream.
     has_begun: [bool; 2],
     inbox: VecDeque<(Lane, Vec<u8>)>,
     images: Images,
@@ -98,7 +99,7 @@ pub struct Client {
     voids: BTreeSet<u64>,
     /// Regions that are to be fetched, whatever their hashes are.
     doubtful: BTreeSet<RegionPos>,
-    /// Was the ground around the player there once?
+    /// Whether the ground around the player has been complete once.
     is_playable: bool,
     /// The number of the next own edit.
     next_own: u64,
@@ -187,7 +188,7 @@ impl Client {
         &mut self.stamps
     }
 
-    /// Says where the player is, in voxels: regions come from there outwards.
+    /// Sets the player's position, in voxels: regions are sent from there outwards.
     pub fn set_place(&mut self, place: IVec3) {
         self.place = place;
     }
@@ -197,7 +198,7 @@ impl Client {
         self.near = near;
     }
 
-    /// Greets the server: over a connection that has just begun, or again over one that goes on. What was under way is forgotten; the
+    /// Greets the server over a new connection, or again over an existing one. Unfinished messages are dropped; the
     /// world, and edits that the server has not answered, stay.
     pub fn connect(&mut self, now: Duration) {
         self.now = now;
@@ -206,7 +207,7 @@ impl Client {
         self.greet();
     }
 
-    /// Enters that the connection is gone. Edits go on to be shown.
+    /// Records that the connection is lost. Edits are still shown.
     pub fn disconnect(&mut self) {
         self.stage = Stage::Apart;
         self.inbox.clear();
@@ -232,7 +233,7 @@ impl Client {
             simulation: SIMULATION,
             ground: self.replica.world().ground().hash(),
             chunk_size: self.chunk_size,
-            // No number is that of a part of a world: the server tells what is missing.
+            // A part of a world has no number: the server determines what is missing.
             epoch: self
                 .epoch
                 .map(|epoch| if self.is_part { Epoch { number: u64::MAX, ..epoch } } else { epoch }),
@@ -256,7 +257,7 @@ impl Client {
         self.id
     }
 
-    /// Does it follow the order, with all of the world there?
+    /// Whether it has the whole world and follows the order.
     pub fn has_joined(&self) -> bool {
         matches!(self.stage, Stage::Following)
     }
@@ -275,7 +276,7 @@ impl Client {
         self.replica.whole(shown)
     }
 
-    /// What was counted so far.
+    /// Its statistics.
     pub fn figures(&self) -> ClientFigures {
         let (drafts, drafted) = (self.replica.drafts(), self.replica.drafted());
         ClientFigures { drafts, drafted, ..self.figures }
@@ -286,8 +287,8 @@ impl Client {
         self.replica.pending().count() + self.early.len()
     }
 
-    /// An edit of the player: it is sent, and shown after the next [`advance`](Self::advance). [Events](ClientEvent) tell by its tag
-    /// what becomes of it.
+    /// Submits an edit of the player: it is sent, and shown after the next [`advance`](Self::advance).
+    /// [Events](ClientEvent) report its result by its tag.
     pub fn dig(&mut self, edit: Edit) {
         if self.id.is_none() {
             self.early.push(edit);
@@ -309,8 +310,9 @@ impl Client {
         self.outbox.edit(own, edit, cost);
     }
 
-    /// Asks the server to take back the last stroke of a player, by default the own one, as of this place among the player's edits.
-    /// If it may be, it comes as an entry; [`ClientEvent::Undone`] or [`ClientEvent::UndoRefused`] tell of it.
+    /// Asks the server to undo the last stroke of a player, by default this one, before this position among the
+    /// player's edits. If allowed, it arrives as an entry; [`ClientEvent::Undone`] or [`ClientEvent::UndoRefused`]
+    /// report the result.
     pub fn undo(&mut self, of: Option<ClientId>) {
         let Some(of) = of.or(self.id).filter(|_| self.is_welcome()) else {
             // By the time it could be sent, it may be of another stroke.
@@ -321,7 +323,7 @@ impl Client {
         self.next_own += 1;
     }
 
-    /// Has the server welcomed it on this connection?
+    /// Whether the server has welcomed it on this connection.
     fn is_welcome(&self) -> bool {
         !matches!(self.stage, Stage::Apart | Stage::Greeting)
     }
@@ -335,12 +337,12 @@ impl Client {
         std::mem::take(&mut self.outgoing)
     }
 
-    /// A message from the server. It is looked at in [`advance`](Self::advance).
+    /// Receives a message from the server. [`advance`](Self::advance) reads it.
     pub fn receive(&mut self, lane: Lane, bytes: Vec<u8>) {
         self.inbox.push_back((lane, bytes));
     }
 
-    /// What is to be put into the shown terrain, in order, with [`Terrain::submit_change`](crate::terrain::Terrain::submit_change);
+    /// Changes for the shown terrain, in order, for [`Terrain::submit_change`](crate::terrain::Terrain::submit_change);
     /// each is returned once.
     pub fn take_shown(&mut self) -> Vec<ShownChange> {
         std::mem::take(&mut self.shown)
@@ -351,7 +353,8 @@ impl Client {
         std::mem::take(&mut self.events)
     }
 
-    /// Looks at what came, applies entries, and brings what is shown up to date. Returns whether there is more to do at once.
+    /// Reads received messages, applies entries, and updates the shown world. Returns whether more work can be done at
+    /// once.
     pub fn advance(&mut self, now: Duration) -> bool {
         self.now = self.now.max(now);
         while let Some((lane, bytes)) = self.inbox.pop_front() {
@@ -378,7 +381,7 @@ impl Client {
         }
     }
 
-    /// Are the entries that it applies from before its player came? They are not told, and shown as one once all are there.
+    /// Whether the client is still catching up. Entries are then applied without events and shown all at once.
     fn is_history(&self) -> bool {
         matches!(self.stage, Stage::ByLog { .. }) && !self.is_playable
     }
@@ -465,7 +468,7 @@ impl Client {
         self.events.push(ClientEvent::Kicked(why));
     }
 
-    /// Looks at what has come in the bulk lane. What comes there before the welcome waits for it: there is no order between lanes.
+    /// Reads the bulk lane. Messages that arrive there before the welcome wait for it: there is no order between lanes.
     fn read_bulk(&mut self) {
         while self.is_welcome() {
             match self.bulk.next_bytes() {
@@ -482,7 +485,7 @@ impl Client {
         }
     }
 
-    /// Notes that entries have come; greets anew where others are missing before them.
+    /// Records received entries; greets again if others before them are missing.
     fn note_received(&mut self, lane: Lane, Entries { first, entries }: &Entries) {
         let last = first.saturating_add(entries.len() as u64).saturating_sub(1);
         if lane == Lane::Order && self.is_welcome() {
@@ -529,7 +532,8 @@ impl Client {
         }
     }
 
-    /// The next entries up to a number, at most so many. A mark ends them, and parts come alone: what they make ground is looked for.
+    /// The next entries up to a number, at most `most`. A mark ends them, and parts are returned alone, because pieces
+    /// that they turn into ground have to be found.
     fn next_batch(&mut self, end: u64, most: usize) -> Vec<Entry> {
         let (mut batch, mut number) = (Vec::new(), self.number());
         let is_parts = |entry: Option<&Entry>| matches!(entry, Some(Entry::Parts { .. }));

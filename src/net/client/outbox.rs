@@ -1,5 +1,5 @@
-//! Own edits and undos on their way to the server, in order, as fast as its limits allow: however much was done without a
-//! connection, nothing of it is refused for its cost.
+//! Sends own edits and undos to the server, in order, as fast as its limits allow, so nothing is refused for its cost,
+//! even after a long time without a connection.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -24,26 +24,26 @@ struct Cost {
     most: u64,
 }
 
-/// What waits to be sent, and what the server has not answered.
+/// Edits and undos that wait to be sent, and those that the server has not answered.
 ///
-/// The server's bucket is mirrored. So much of it as messages on their way may cost is left out: however these are delayed, it is there
-/// when they arrive, all at once too.
+/// It mirrors the server's bucket, less the possible cost of messages in transit: even if these are delayed and arrive
+/// at once, the server's bucket holds enough.
 pub struct Outbox {
     waiting: VecDeque<(u64, Cost, Own)>,
     bucket: Bucket,
     burst: u64,
     /// The most that the part of the bucket holds that is mirrored.
     mirrored: u64,
-    /// What is on its way and what it costs, by own number.
+    /// The costs of edits and undos in transit, by own number.
     on_the_way: BTreeMap<u64, Cost>,
-    /// What is on its way costs so much, but for what undos restore.
+    /// The cost of everything in transit, without the parts that undos restore.
     cost: u64,
     /// The greatest own number that was handed over to be sent.
     sent: u64,
 }
 
 impl Outbox {
-    /// For a server that has just told what its bucket gets each second, holds at most, and has left.
+    /// For a server that has just sent the refill, capacity and content of its bucket.
     pub fn new([per_second, burst]: [u64; 2], left: u64, now: Duration) -> Self {
         let mirrored = burst - burst / 4;
         // Clocks differ.
@@ -54,9 +54,9 @@ impl Outbox {
         Self { waiting, bucket, burst, mirrored, on_the_way, cost: 0, sent: 0 }
     }
 
-    /// Adds an edit that costs so much.
+    /// Adds an edit with its cost.
     pub fn edit(&mut self, own: u64, edit: Edit, cost: u64) {
-        // What costs too much is refused, whatever is left.
+        // An edit that costs more than the burst is refused in any case.
         let counted = if cost <= self.burst { cost } else { 0 };
         self.waiting.push_back((own, Cost { known: counted, most: counted }, Own::Edit(edit)));
     }
@@ -69,7 +69,7 @@ impl Outbox {
         self.waiting.push_back((own, Cost { known, most }, Own::Undo(of)));
     }
 
-    /// Notes that the server has answered what has this number. It has cost so much, if that is known.
+    /// Records that the server has answered the edit or undo with this number, and its cost if that is known.
     pub fn answer(&mut self, own: u64, cost: Option<u64>, now: Duration) {
         if let Some(Cost { known, most }) = self.on_the_way.remove(&own) {
             self.cost -= known;

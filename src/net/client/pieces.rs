@@ -1,4 +1,4 @@
-//! Loose pieces that are out of the ground that is shown, so that each is either there or with the game.
+//! Loose pieces that are not part of the shown ground, so that each piece is either ground or debris of the game.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -20,12 +20,12 @@ struct Gone {
     runs: Arc<[Run]>,
 }
 
-/// Pieces that the game knows of.
+/// Pieces that were reported to the game.
 #[derive(Default)]
 pub(super) struct Pieces {
-    /// Those of own edits that the server has not answered, by the numbers of these.
+    /// Pieces of pending edits, by the numbers of these edits.
     predicted: BTreeMap<u64, Vec<Gone>>,
-    /// All others, in the order in which they were cut off.
+    /// All other pieces, in the order in which they were cut off.
     gone: VecDeque<Gone>,
 }
 
@@ -57,22 +57,22 @@ impl Pieces {
         self.gone.drain(..excess);
     }
 
-    /// Gives own edits other numbers: pairs of those before and after.
+    /// Renumbers own edits: pairs of old and new numbers.
     pub fn renumber(&mut self, numbers: impl Iterator<Item = (u64, u64)>) {
         let mut before = std::mem::take(&mut self.predicted);
         let renumbered = numbers.filter_map(|(old, new)| Some((new, before.remove(&old)?)));
         self.predicted = renumbered.collect();
     }
 
-    /// The places in the list of those within a box, or of all, whose samples are ground.
+    /// The indices of pieces within a box, or of all pieces, whose samples are ground.
     fn ground(&self, within: Option<LatticeBox>, is_solid: impl Fn(IVec3) -> bool) -> BTreeSet<usize> {
         let is_near = |gone: &Gone| within.is_none_or(|within| within.intersection(gone.bounds).is_some());
         let there = |(_, gone): &(usize, &Gone)| is_near(gone) && gone.is_ground(&is_solid);
         self.gone.iter().enumerate().filter(there).map(|(at, _)| at).collect()
     }
 
-    /// Takes out those that are ground now and were not before. Of those that have samples in common, the one that was cut off last
-    /// has come back.
+    /// Removes pieces that have become ground again. Among pieces with common samples, the one that was cut off last
+    /// has returned.
     fn take_ground(&mut self, now: &BTreeSet<usize>, before: &BTreeSet<usize>) -> Vec<ReturnedPiece> {
         let (mut returned, mut taken) = (Vec::new(), FxHashSet::default());
         for &at in now.iter().rev().filter(|at| !before.contains(at)) {
@@ -87,7 +87,7 @@ impl Pieces {
 }
 
 impl Client {
-    /// An own edit is predicted.
+    /// Records the pieces of a predicted edit.
     pub(super) fn predict_pieces(&mut self, own: u64, receipt: &Receipt) {
         let gone: Vec<Gone> = all(receipt).filter_map(|piece| Gone::of(receipt.tag, piece)).collect();
         if !gone.is_empty() {
@@ -96,7 +96,7 @@ impl Client {
         self.tell_pieces(receipt.tag, all(receipt).cloned().collect(), Vec::new());
     }
 
-    /// The order has an edit, an own one with this number. What was predicted otherwise is put right.
+    /// The server has ordered an edit, `own` if it is one of this client. Corrects wrong predictions.
     pub(super) fn confirm_pieces(&mut self, own: Option<u64>, receipt: &Receipt) {
         let mut predicted = own.and_then(|own| self.pieces.predicted.remove(&own)).unwrap_or_default();
         let mut found = Vec::new();
@@ -112,19 +112,21 @@ impl Client {
         self.tell_pieces(tag, found, predicted.into_iter().map(|gone| gone.piece).collect());
     }
 
-    /// An own edit is not done.
+    /// Returns the pieces of a refused edit.
     pub(super) fn refuse_pieces(&mut self, own: u64) {
         let predicted = self.pieces.predicted.remove(&own).unwrap_or_default();
         self.tell_pieces(0, Vec::new(), predicted.into_iter().map(|gone| gone.piece).collect());
     }
 
-    /// An own edit was answered while the client was away. [`Self::check_pieces`] finds out what came of it.
+    /// Handles an own edit that was answered while the client was disconnected. [`Self::check_pieces`] determines the
+    /// result.
     pub(super) fn settle_pieces(&mut self, own: u64) {
         let predicted = self.pieces.predicted.remove(&own).unwrap_or_default();
         self.pieces.add(predicted);
     }
 
-    /// Those of the pieces within a box, or of all, where there is ground: before parts are put, because somebody has built there.
+    /// The pieces within a box, or of all pieces, that are ground before parts are replaced, because a player has built
+    /// there.
     pub(super) fn ground_pieces(&self, within: Option<LatticeBox>) -> BTreeSet<usize> {
         if self.pieces.gone.is_empty() {
             return BTreeSet::new();
@@ -133,8 +135,8 @@ impl Client {
         self.pieces.ground(within, |sample| view.is_solid(sample))
     }
 
-    /// Parts were put into the world: pieces within a box, or anywhere, may be ground again. Returns those that are, but for those
-    /// that were it [before](Self::ground_pieces).
+    /// Checks pieces after parts of the world were replaced, within a box or anywhere. Returns those that are ground
+    /// again, except those that were ground [before](Self::ground_pieces).
     pub(super) fn check_pieces(
         &mut self,
         within: Option<LatticeBox>,

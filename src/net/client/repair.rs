@@ -1,4 +1,4 @@
-//! Marks: places of the order at which the hashes of regions are compared, and the repair of those that differ.
+//! Marks: positions of the order at which hashes of regions are compared; and the repair of regions that differ.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -10,19 +10,19 @@ use crate::lattice::{BrickPos, LatticeBox, RegionPos};
 use crate::net::regions::region_hash;
 use crate::terrain::World;
 
-/// Marks that wait for the other side, at most.
+/// The most marks that wait for the other side.
 const MOST_MARKS: usize = 256;
 
-/// Edits whose reach is remembered, in case that the server voids one.
+/// The most edits whose reach is remembered, in case the server fails to apply one.
 const MOST_REACHES: usize = 4096;
 
-/// Void entries that are to come, at most.
+/// The most announced void entries.
 const MOST_VOIDS: usize = 1 << 16;
 
 /// The most regions that are fetched because of one void entry.
 const MOST_VOID: usize = 512;
 
-/// What both sides have at marks.
+/// The hashes of both sides at marks.
 #[derive(Default)]
 pub(super) struct Marks {
     /// Regions that were touched since the last mark.
@@ -40,7 +40,7 @@ impl Marks {
         self.touched.append(&mut regions);
     }
 
-    /// Notes the hashes of a world at a mark.
+    /// Records the hashes of a world at a mark.
     pub fn mark(&mut self, number: u64, world: &World) {
         let touched = std::mem::take(&mut self.touched);
         let hashes = touched.into_iter().map(|region| (region, region_hash(world, region))).collect();
@@ -57,7 +57,7 @@ impl Marks {
         }
     }
 
-    /// Forgets what was noted of regions before they were repaired.
+    /// Forgets recorded hashes of regions before their repair.
     fn forget(&mut self, repaired: &BTreeSet<RegionPos>) {
         self.touched.retain(|region| !repaired.contains(region));
         self.ours.values_mut().for_each(|hashes| hashes.retain(|(region, _)| !repaired.contains(region)));
@@ -75,8 +75,8 @@ impl Marks {
                 self.theirs.remove(&number).unwrap_or_default().into_iter().collect();
             count += 1;
             for (&region, &hash) in &theirs {
-                // One that was not touched here before the mark is as it was then, unless it was touched later: the next mark
-                // tells.
+                // A region that was not touched here before the mark is unchanged since, unless it was touched later:
+                // then the next mark compares it.
                 let own = ours.get(&region).copied();
                 let own = own
                     .or_else(|| (!self.is_touched_after(number, region)).then(|| region_hash(world, region)));
@@ -113,13 +113,13 @@ impl Reaches {
     }
 }
 
-/// Regions that are fetched. Until all of them have come, no entries are applied; then those up to their number are, and the
-/// regions take their places.
+/// Regions that are being fetched. Until all of them have arrived, no entries are applied; then those up to their
+/// number are, and the regions are replaced.
 pub(super) struct Repair {
     wanted: BTreeSet<RegionPos>,
     /// The number that the world was at when they were asked for.
     from: u64,
-    /// Those that have come, all of one number.
+    /// Regions that have arrived, all of one number.
     contents: BTreeMap<RegionPos, RegionContent>,
 }
 
@@ -158,7 +158,7 @@ impl Client {
         self.repair = Some(Repair { wanted, from, contents: BTreeMap::new() });
     }
 
-    /// Puts regions that were fetched into their places, once the world is at their number.
+    /// Replaces regions by the fetched ones, once the world is at their number.
     pub(super) fn finish_repair(&mut self) {
         let at = self.number();
         let Some(repair) = self.repair.take_if(|repair| repair.number().is_some_and(|number| number <= at))
@@ -175,7 +175,7 @@ impl Client {
         self.events.push(ClientEvent::Repaired(repair.wanted.into_iter().collect()));
     }
 
-    /// The server could not apply an entry.
+    /// Handles an entry that the server could not apply.
     pub(super) fn take_void(&mut self, number: u64) {
         if number > self.number() {
             if self.voids.len() < MOST_VOIDS {
@@ -191,7 +191,7 @@ impl Client {
         }
     }
 
-    /// An entry as it is to be applied. Those that the server could not apply do nothing.
+    /// The entry to apply: one without effect if the server could not apply it.
     pub(super) fn valid(&mut self, number: u64, entry: Entry) -> Entry {
         if !self.voids.remove(&number) {
             return entry;

@@ -1,4 +1,4 @@
-//! Entries become the world.
+//! Applies entries of the order to the server's world.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -101,7 +101,7 @@ impl Server {
         work.max(1)
     }
 
-    /// Applies edits, and notes what they touch.
+    /// Applies edits, and records the touched regions.
     fn transact(&mut self, edits: &[Edit], stroke: Option<(super::ClientId, Option<u64>)>) -> Vec<Receipt> {
         self.terrain.submit_edits(edits);
         let mut receipts = self.terrain.take_answered();
@@ -133,7 +133,7 @@ impl Server {
         match self.terrain.apply_change(change.clone(), None) {
             Ok(_) => self.touch(change),
             Err(ChangeError::Panicked | ChangeError::Overloaded) => self.void(number),
-            // Nothing changed, and so it is everywhere.
+            // Nothing changed, and the same holds on all machines.
             Err(_) => {}
         }
     }
@@ -151,14 +151,14 @@ impl Server {
         self.send_to_all(&ToClient::Hashes { number, regions });
     }
 
-    /// The hashes of regions as they are; those that are known are not computed again.
+    /// The present hashes of regions; known ones are not computed again.
     pub(super) fn hashes_of(&mut self, regions: BTreeSet<RegionPos>) -> RegionHashes {
         let (world, known) = (self.terrain.world(), &mut self.known_hashes);
         let mut hash = |region| *known.entry(region).or_insert_with(|| region_hash(world, region));
         regions.into_iter().map(|region| (region, hash(region))).collect()
     }
 
-    /// Takes a stroke back in the world as it is, with all entries applied that were ordered before it; returns the work.
+    /// Undoes a stroke in the present world, which contains all entries ordered before; returns the work.
     fn undo(&mut self, request: &UndoRequest) -> u64 {
         self.waiting_cost = self.waiting_cost.saturating_sub(UNDO);
         let change = self.strokes.undo(request.of, self.terrain.world()).map_err(|why| match why {
@@ -184,7 +184,7 @@ impl Server {
         }
     }
 
-    /// Orders what came after an undo that is answered, up to the next one.
+    /// Orders the entries that waited for an undo, up to the next undo.
     fn release(&mut self) {
         while let Some(Later::Entry(ordered)) =
             self.later.pop_front_if(|later| matches!(later, Later::Entry(_)))
@@ -194,7 +194,7 @@ impl Server {
     }
 }
 
-/// Does the receipt tell of what may be otherwise on another machine?
+/// Whether the edit failed for a reason that other machines may not have.
 fn is_void(receipt: &Receipt) -> bool {
     matches!(receipt.outcome, Err(Rejection::Panicked | Rejection::Overloaded | Rejection::TerrainGone))
 }

@@ -1,10 +1,10 @@
-//! What a server tells the game, and what it counts.
+//! Events and statistics of a server.
 
 use crate::lattice::RegionPos;
 
 use crate::net::message::{ClientId, Kick};
 
-/// What a game or an operator may want to know.
+/// An event for a game or an operator.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ServerEvent {
@@ -18,16 +18,16 @@ pub enum ServerEvent {
     Void(u64),
 }
 
-/// What a server has counted since it began.
+/// Statistics of a server since its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ServerFigures {
-    /// Messages that came.
+    /// Received messages.
     pub messages: u64,
-    /// Those of clients that are not connected.
+    /// Messages of clients that are not connected.
     pub strays: u64,
-    /// Those that meant nothing.
+    /// Invalid messages.
     pub malformed: u64,
-    /// Edits that came.
+    /// Received edits.
     pub edits: u64,
     /// Edits and undos that were refused.
     pub refused: u64,
@@ -37,7 +37,7 @@ pub struct ServerFigures {
     pub voids: u64,
     /// Clients that were kicked.
     pub kicked: u64,
-    /// Clients that had to begin again, because a world was kept for them and they took nothing.
+    /// Clients whose session was restarted, because a world was kept for them and they acknowledged nothing.
     pub stuck: u64,
     /// Regions that clients fetched because they differed.
     pub repairs: u64,

@@ -1,4 +1,4 @@
-//! Clients that come, come back, or have another world.
+//! Clients that join, reconnect, or have a different world.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -14,16 +14,17 @@ use crate::lattice::RegionPos;
 use crate::net::message::{ClientId, Epoch, Hello, Join, Kick, Lane, RegionHashes, ToClient, Welcome};
 use crate::net::regions::{region_hash, regions_of};
 
-/// Regions that are encoded to estimate how many bytes all of them take.
+/// The number of regions that are encoded to estimate the bytes of all regions.
 const MEASURED: usize = 16;
 
-/// Fetches are answered so often at most: each time the world is kept as it is, and its index is copied once it changes.
+/// The shortest interval between answers to fetches: each one keeps a state of the world, whose index is copied once it
+/// changes.
 const FETCH_INTERVAL: Duration = Duration::from_millis(100);
 
-/// A client that is connected and says nothing is asked to greet this often.
+/// How often a silent connected client is asked to greet.
 const ASK_INTERVAL: Duration = Duration::from_secs(1);
 
-/// What comes in the bulk lane after a welcome.
+/// The data in the bulk lane after a welcome.
 enum Bulk {
     /// These messages.
     Messages(Vec<Arc<[u8]>>),
@@ -32,7 +33,7 @@ enum Bulk {
 }
 
 impl Server {
-    /// Takes a greeting.
+    /// Handles a greeting.
     pub(super) fn greet(&mut self, client: ClientId, stream: Option<u64>, hello: Hello) {
         let world = self.terrain.world();
         let checks = [
@@ -63,7 +64,7 @@ impl Server {
         let (mut greeted, mut silent) = (Vec::new(), Vec::new());
         for (client, session) in &mut self.sessions {
             match std::mem::replace(&mut session.stage, Stage::Joined) {
-                // What it asked for before has to have a number, as the welcome tells that it was seen.
+                // Its earlier edits must have numbers, because the welcome acknowledges them.
                 Stage::Greeted(hello)
                     if !self.later.iter().any(|later| later.is_of(*client))
                         && self.kept.as_ref().is_none_or(|kept: &Kept| {
@@ -105,7 +106,7 @@ impl Server {
         // Old entries lead up to the last one, regions are those of a world that was kept.
         let (number, (join, bulk)) = match (log, hello.epoch) {
             (Some(log), _) => (self.epoch.number, log),
-            // Whatever it has, it needs what differs.
+            // Whatever its state is, it needs the differences.
             (None, Some(_)) => self.compare(client),
             (None, None) => self.all_regions(hello.place),
         };
@@ -134,7 +135,8 @@ impl Server {
         self.tell(ServerEvent::Joined(client));
     }
 
-    /// The messages with all entries after a number, if they are there, and take fewer bytes than the regions that changed since.
+    /// The messages with all entries after a number, if the log has them and they take fewer bytes than the regions
+    /// that changed since.
     fn entries_after(&self, number: u64) -> Option<(Join, Bulk)> {
         let messages = self.log.after(number)?;
         let bytes: usize = messages.iter().map(|message| message.len()).sum();
@@ -159,7 +161,7 @@ impl Server {
         (world.0, (join, Bulk::Regions(world, regions)))
     }
 
-    /// The table of all regions. The world stays as it is for the client, until it goes on.
+    /// The table of all regions. The world is kept for the client until it continues.
     fn compare(&mut self, client: ClientId) -> (u64, (Join, Bulk)) {
         let ((number, world), terms) = self.keep();
         let (new, same): (BTreeSet<RegionPos>, BTreeSet<RegionPos>) = regions_of(&world)
@@ -209,8 +211,8 @@ impl Server {
         }
     }
 
-    /// Sends entries to clients that were not sent all of them, as far as they have acknowledged what came before. One for which
-    /// entries are missing has to begin again.
+    /// Sends missing entries to clients, as far as they have acknowledged earlier ones. A client whose missing entries
+    /// are no longer in the log has to join again.
     pub(super) fn catch_up(&mut self) {
         for (client, session) in &mut self.sessions {
             while session.has_joined() && session.order.sent() < self.epoch.number {
@@ -228,7 +230,7 @@ impl Server {
         }
     }
 
-    /// Sends of the bulk lanes what may be sent.
+    /// Sends data of the bulk lanes, within their limits.
     pub(super) fn send_bulk(&mut self, now: Duration) {
         for (client, session) in &mut self.sessions {
             let bucket = &mut self.players.player(*client).bulk;
@@ -241,7 +243,7 @@ impl Server {
     }
 }
 
-/// About how many bytes regions take in messages, as some of them do.
+/// Estimates the bytes of regions in messages from some of them.
 fn bytes_of(world: &Snapshot, regions: &[RegionPos]) -> usize {
     let step = regions.len().div_ceil(MEASURED).max(1);
     let some: Vec<RegionPos> = regions.iter().step_by(step).copied().collect();
@@ -249,7 +251,7 @@ fn bytes_of(world: &Snapshot, regions: &[RegionPos]) -> usize {
     bytes * regions.len() / some.len().max(1)
 }
 
-/// From a place to the middle of a region.
+/// The distance from a position to the middle of a region.
 fn squared_distance(region: RegionPos, place: IVec3) -> i128 {
     let way = region.samples().min.as_i64vec3() + i64::from(RegionPos::VOXELS / 2) - place.as_i64vec3();
     way.to_array().into_iter().map(|way| i128::from(way).pow(2)).sum()

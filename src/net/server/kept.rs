@@ -1,7 +1,8 @@
-//! Worlds that are kept as they were, for clients to get them bit by bit.
+//! Older states of the world that are kept while clients download them.
 //!
 //! Once the server's world changes, each that is kept takes as much memory as its index and what has changed since. So clients that come
-//! at about the same time share one, and those that do not go on lose theirs: however many clients take nothing, few worlds are kept.
+//! at about the same time share one, and clients that make no progress lose theirs, so few worlds are kept for any
+//! number of clients.
 
 use std::time::Duration;
 
@@ -10,10 +11,10 @@ use super::sender::Snapshot;
 use super::session::Session;
 use crate::net::message::{Hello, Lane, Terms, ToClient};
 
-/// Clients get a world that is so old, and entries after it.
+/// The greatest age of a world that new clients get, together with later entries.
 const SHARED: Duration = Duration::from_secs(1);
 
-/// The world that clients get who come now.
+/// The world that new clients get.
 pub struct Kept {
     pub world: Snapshot,
     pub terms: Terms,
@@ -21,7 +22,7 @@ pub struct Kept {
 }
 
 impl Server {
-    /// Forgets the world that clients share, once it is too old, or not all that came after it can be sent.
+    /// Drops the shared world once it is too old, or the log no longer has all later entries.
     pub(super) fn forget_kept(&mut self, now: Duration) {
         let (first, voids) = (self.log.first(), &self.voids);
         self.kept.take_if(|Kept { world: (number, _), since, .. }| {
@@ -30,7 +31,7 @@ impl Server {
         });
     }
 
-    /// The world that clients get now, with its number, and what holds there.
+    /// The world that clients get now, with its number and terms.
     pub(super) fn keep(&mut self) -> (Snapshot, Terms) {
         let (now, number) = (self.now, self.applied);
         let kept = self.kept.get_or_insert_with(|| {
@@ -44,7 +45,7 @@ impl Server {
         (kept.world.clone(), kept.terms.clone())
     }
 
-    /// Lets clients begin again that keep a world and have not gone on for long.
+    /// Restarts sessions of clients for which a world is kept and that make no progress.
     pub(super) fn drop_stuck(&mut self, now: Duration) {
         for (client, session) in &mut self.sessions {
             if session.is_stuck(now, self.applied) {
@@ -58,10 +59,10 @@ impl Server {
 }
 
 impl Kept {
-    /// Whether a client that has been here before may get it: it holds all that the client did and has seen.
+    /// Whether a returning client may get it: it contains everything that the client has done and seen.
     pub fn is_for(&self, hello: &Hello, run: u64, last_own: u64) -> bool {
         let number = self.world.0;
-        // One that has a part of a world tells no number.
+        // A client with a part of a world sends no number.
         let has_more = |number_there: u64| number_there > number && number_there != u64::MAX;
         hello.epoch.is_none_or(|epoch| last_own <= number && !(epoch.run == run && has_more(epoch.number)))
     }

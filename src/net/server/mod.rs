@@ -1,17 +1,17 @@
-//! The server: it owns the order. It numbers what clients ask for, sends it on, and applies it to its own terrain, which nobody
-//! looks at.
+//! The server: it owns the order. It numbers the edits of clients, sends them on, and applies them to its own terrain,
+//! which has no meshes.
 //!
 //! | file | what it does |
 //! | --- | --- |
-//! | `settings`, `events` | what it allows, what it tells and counts |
-//! | `session`, `players` | a client that is connected, what is remembered of its player |
-//! | `receive`, `validation` | messages that come, and what is refused |
+//! | `settings`, `events` | its limits, its events and statistics |
+//! | `session`, `players` | a connected client, data that is kept for its player |
+//! | `receive`, `validation` | received messages, and the reasons to refuse edits |
 //! | `order_log` | the latest entries, in long messages |
 //! | `own_numbers` | the last numbers of players' own edits |
-//! | `apply` | entries become the world |
-//! | `strokes` | what may be taken back |
-//! | `join`, `sender` | clients that come, come back, or differ; the bulk lane |
-//! | `kept` | worlds that are kept as they were, for these |
+//! | `apply` | applies entries to the world |
+//! | `strokes` | strokes that can be undone |
+//! | `join`, `sender` | clients that join, reconnect, or differ; the bulk lane |
+//! | `kept` | older states of the world that are kept for joining clients |
 //! | `save` | a server that survives a restart |
 
 mod apply;
@@ -55,16 +55,16 @@ use session::Session;
 pub use settings::{Reach, ServerSettings, UndoPolicy};
 use strokes::Strokes;
 
-/// Says whether a client may do an edit.
+/// Decides whether a client may make an edit.
 pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
 
-/// Says whether a player may take part, or for which reason not.
+/// Decides whether a player may join; otherwise the reason.
 pub type Admission = Box<dyn Fn(ClientId) -> Result<(), u32> + Send + Sync>;
 
 /// The most events that wait to be taken.
 const MOST_EVENTS: usize = 4096;
 
-/// A message with entries is sent once it has so many bytes, even if more are ordered at the same time.
+/// A message with entries is sent once it has this many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
 
 /// The image of a stamp is not among those that both sides have.
@@ -84,14 +84,14 @@ struct Ordered {
     cost: u64,
 }
 
-/// An undo that waits until all entries before it are applied: what it restores is known only then.
+/// An undo that waits until all entries before it are applied, because only then its result is known.
 struct UndoRequest {
     by: ClientId,
     own: u64,
     of: ClientId,
 }
 
-/// What came after an undo that waits, or that undo.
+/// A waiting undo, or an entry after it.
 enum Later {
     Undo(UndoRequest),
     Entry(Ordered),
@@ -109,8 +109,9 @@ impl Later {
 
 /// The server of a world: bytes in, bytes out.
 ///
-/// In each frame: [`receive`](Self::receive) every message that came, send what [`take_outgoing`](Self::take_outgoing) returns, then
-/// [`advance`](Self::advance), which takes as long as edits take, and send again. Times count from any start and never run back.
+/// In each frame, pass every received message to [`receive`](Self::receive), send the messages of
+/// [`take_outgoing`](Self::take_outgoing), call [`advance`](Self::advance), which takes as long as its edits take, and
+/// send again. Times count from any start and never decrease.
 pub struct Server {
     terrain: Terrain,
     settings: ServerSettings,
@@ -129,9 +130,9 @@ pub struct Server {
     log: OrderLog,
     /// Entries of the log that could not be applied.
     voids: BTreeSet<u64>,
-    /// Does the order lead from the pristine world to this one?
+    /// Whether the order leads from the pristine world to this one.
     is_whole: bool,
-    /// An undo, and all that came after it: it gets numbers once the undo has one, so an undo is of what came before it.
+    /// An undo and all later entries, which get numbers after the undo has one, so it applies to everything before it.
     later: VecDeque<Later>,
     strokes: Strokes,
     /// Regions that were touched since the last mark.
@@ -146,7 +147,7 @@ pub struct Server {
     sessions: BTreeMap<ClientId, Session>,
     players: Players,
     own_numbers: OwnNumbers,
-    /// The world that clients get who come now.
+    /// The world that new clients get.
     kept: Option<Kept>,
     /// When fetches were answered last.
     fetched: Duration,
@@ -254,7 +255,7 @@ impl Server {
         self.durable
     }
 
-    /// What was counted so far.
+    /// Its statistics.
     pub fn figures(&self) -> ServerFigures {
         self.figures
     }
@@ -264,24 +265,25 @@ impl Server {
         &self.settings
     }
 
-    /// The images that stamps may have. Clients that lack one get it when it is used first.
+    /// The images that stamps may have. A client that lacks an image gets it at its first use.
     pub fn stamps_mut(&mut self) -> &mut Stamps {
         &mut self.stamps
     }
 
-    /// Sets who may do which edit; asked for each, after all other checks. By default everybody may do everything.
+    /// Sets a function that decides about each edit, after all other checks. By default every edit is allowed.
     pub fn set_permission(&mut self, permission: impl Fn(ClientId, &Edit) -> bool + Send + Sync + 'static) {
         self.permission = Box::new(permission);
     }
 
-    /// Sets who may take part; asked at each greeting. `Err` sends a player away with [`Kick::Refused`] and a number of the game's
-    /// own. By default everybody may. For those who are here already, see [`kick_for`](Self::kick_for).
+    /// Sets a function that decides at each greeting whether a player may join. `Err` rejects the player with
+    /// [`Kick::Refused`] and a number chosen by the game. By default all players may join. To remove a player that has
+    /// joined already, see [`kick_for`](Self::kick_for).
     pub fn set_admission(&mut self, admission: impl Fn(ClientId) -> Result<(), u32> + Send + Sync + 'static) {
         self.admission = Box::new(admission);
     }
 
-    /// Enters that a client is connected. If it was so already, it begins anew. What it may spend is what its player has left from
-    /// connections before.
+    /// Adds a connected client. If it was connected already, its session starts again. Its player keeps the budget left
+    /// from earlier connections.
     pub fn connect(&mut self, client: ClientId, now: Duration) {
         self.now = self.now.max(now);
         self.disconnect(client);
@@ -291,18 +293,18 @@ impl Server {
         self.own_numbers.trim(|client| self.sessions.contains_key(&client));
     }
 
-    /// Enters that a client is gone. What was to be sent to it is dropped.
+    /// Removes a disconnected client. Messages that wait for it are dropped.
     pub fn disconnect(&mut self, client: ClientId) {
         self.sessions.remove(&client);
         self.outgoing.retain(|(to, ..)| *to != client);
     }
 
-    /// Sends a client away. It is told so; close its connection then.
+    /// Removes a client. It is notified; close its connection then.
     pub fn kick(&mut self, client: ClientId) {
         self.kick_for(client, Kick::ByGame);
     }
 
-    /// Sends a client away for a reason that it is told; close its connection then.
+    /// Removes a client and sends it the reason; close its connection then.
     pub fn kick_for(&mut self, client: ClientId, why: Kick) {
         if self.sessions.remove(&client).is_some() {
             self.figures.kicked += 1;
@@ -323,8 +325,8 @@ impl Server {
         session.map(|session| session.acknowledged)
     }
 
-    /// Says where a client's player is, in voxels: from there its [reach](ServerSettings::reach) counts. `None`: nowhere. It holds
-    /// until it is set again: before the client connects, and over its connections.
+    /// Sets the position of a client's player, in voxels, from which its [reach](ServerSettings::reach) is measured;
+    /// `None` if it is unknown. It can be set before the client connects, and persists over its connections.
     pub fn set_place(&mut self, client: ClientId, place: Option<IVec3>) {
         if place.is_some() || self.players.get(client).is_some() {
             self.players.player(client).place = place;
@@ -332,15 +334,15 @@ impl Server {
         }
     }
 
-    /// Says whether a client may take back what others did: see [`UndoPolicy`]. It holds until it is set again: before the client
-    /// connects, and over its connections. It is not saved.
+    /// Sets whether a client may undo strokes of others: see [`UndoPolicy`]. It can be set before the client connects,
+    /// and persists over its connections. It is not saved.
     pub fn set_administrator(&mut self, client: ClientId, is_one: bool) {
         if is_one || self.players.get(client).is_some() {
             self.players.player(client).is_administrator = is_one;
         }
     }
 
-    /// Sets the rules for edits that come later.
+    /// Sets the rules of later edits.
     ///
     /// # Errors
     /// When they are for a material that nothing has.
@@ -351,12 +353,12 @@ impl Server {
         Ok(())
     }
 
-    /// Sets how edits that come later search for loose pieces.
+    /// Sets the loose settings of later edits.
     pub fn set_loose(&mut self, loose: Option<LooseSettings>) {
         self.order(Entry::Loose(loose));
     }
 
-    /// Orders an edit of the game's own, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
+    /// Orders an edit of the game, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
     ///
     /// # Errors
     /// When it is a stamp whose image is not among the [stamps](Self::stamps_mut): no client could read it.
@@ -368,10 +370,10 @@ impl Server {
         Ok(())
     }
 
-    /// Orders that parts take the place of others.
+    /// Orders the replacement of parts.
     ///
     /// # Errors
-    /// When they take more bytes than a message may; put them in smaller parts then.
+    /// When they take more bytes than a message may; split them then.
     pub fn put(&mut self, change: WorldChange) -> Result<(), FormatError> {
         let entry = Entry::Parts { by: None, change: Arc::new(change) };
         let (length, limit) = (entry_bytes(&entry) as u64, MOST_TO_CLIENT as u64 / 2);
@@ -413,7 +415,7 @@ impl Server {
         }
     }
 
-    /// Sends what was ordered to all clients that have everything before it, and room for it.
+    /// Sends ordered entries to all clients that have everything before them, and room for them.
     fn flush(&mut self) {
         let (last, writer) = (self.epoch.number, std::mem::take(&mut self.writer));
         let Some(message) = writer.message(last) else { return };
@@ -435,7 +437,7 @@ impl Server {
         self.outgoing.push((client, Lane::Order, bytes));
     }
 
-    /// Sends a message to all clients that have joined, after what was ordered.
+    /// Sends a message to all clients that have joined, after all ordered entries.
     fn send_to_all(&mut self, message: &ToClient) {
         self.flush();
         let bytes = message.to_bytes();
@@ -454,7 +456,7 @@ impl Server {
         self.events.push_back(event);
     }
 
-    /// Applies what was ordered, welcomes clients that have come, and sends what takes long, as much as may be sent by now.
+    /// Applies ordered entries, welcomes new clients, and sends bulk data within its limits.
     pub fn advance(&mut self, now: Duration) {
         self.now = self.now.max(now);
         let is_due = now.saturating_sub(self.last_mark) >= self.settings.mark;
@@ -471,15 +473,15 @@ impl Server {
         self.send_bulk(now);
     }
 
-    /// Messages that are to be sent, in order; each is returned once. Each lane of each client has to deliver all of them in
-    /// order.
+    /// Messages to send, in order; each is returned once. Each lane of each client has to deliver all of its messages
+    /// in order.
     pub fn take_outgoing(&mut self) -> Vec<Outgoing> {
         self.flush();
         self.catch_up();
         std::mem::take(&mut self.outgoing)
     }
 
-    /// What happened since the last call; if nobody asks, the latest 4096 are kept.
+    /// Events since the last call. If they are not taken, the latest 4096 are kept.
     pub fn take_events(&mut self) -> Vec<ServerEvent> {
         std::mem::take(&mut self.events).into()
     }

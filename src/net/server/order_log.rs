@@ -1,4 +1,4 @@
-//! The latest entries in long messages, for clients that come, or come back.
+//! The latest entries in long messages, for clients that join or reconnect.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub struct OrderLog {
 }
 
 impl OrderLog {
-    /// Of an order that goes on after a number.
+    /// The log of an order that continues after a number.
     pub fn new(limit: usize, number: u64) -> Self {
         let (blocks, writer) = Default::default();
         Self { first: number + 1, blocks, bytes: 0, limit, writer, last: number }
@@ -93,7 +93,7 @@ mod tests {
     use crate::net::stamps::Stamps;
     use crate::terrain::LooseSettings;
 
-    /// Marks as every third entry, and search for loose pieces otherwise.
+    /// Every third entry is a mark, and the others are loose settings.
     fn entry(number: u64) -> Entry {
         let loose = LooseSettings { debris: number as u32, ..LooseSettings::default() };
         if number.is_multiple_of(3) { Entry::Mark } else { Entry::Loose(Some(loose)) }
@@ -107,7 +107,7 @@ mod tests {
         log
     }
 
-    /// The numbers of all entries after this one, which are as they were added.
+    /// The numbers of all entries after this one; checks that these are unchanged.
     fn numbers(log: &OrderLog, number: u64) -> Option<Vec<u64>> {
         let ground = Ground::flat(8, 8, 4.0).expect("a valid ground");
         let mut numbers = Vec::new();

@@ -1,4 +1,4 @@
-//! The last numbers of players' own edits: what a client sends again after a gap is not done twice.
+//! The last numbers of players' own edits, so that edits which a client sends again are not applied twice.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,13 +9,13 @@ use crate::store::Store;
 /// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its world holds.
 const KEY: &str = "own/";
 
-/// Players whose numbers are remembered, at most, beside those that are connected.
+/// The most players whose numbers are remembered, in addition to those that are connected.
 const MOST_SEEN: usize = 1 << 16;
 
 /// No player has numbers beyond this one, so that counting on can never overflow.
 const MOST_OWN: u64 = u64::MAX / 2;
 
-/// Players whose numbers are saved, at most: those who dug last.
+/// The most players whose numbers are saved: the most recent ones.
 const MOST_SAVED: usize = 1024;
 
 /// The last edit of a player that the world holds.
@@ -27,7 +27,7 @@ struct Applied {
     number: u64,
 }
 
-/// What a number of a player's is.
+/// How a player's number relates to earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OwnNumber {
     New,
@@ -61,7 +61,7 @@ impl OwnNumbers {
         self.seen.get(&client).map_or(0, |seen| seen.own)
     }
 
-    /// What a number is that came.
+    /// Classifies a received number.
     pub fn judge(&self, client: ClientId, own: u64) -> OwnNumber {
         let last = self.last(client);
         if own == 0 || own > last.saturating_add(MOST_OWN_JUMP).min(MOST_OWN) {
@@ -73,14 +73,15 @@ impl OwnNumbers {
         }
     }
 
-    /// Notes that a number was seen.
+    /// Records that a number was seen.
     pub fn note(&mut self, client: ClientId, own: u64) {
         self.uses += 1;
         let seen = self.seen.entry(client).or_default();
         *seen = Seen { own: own.max(seen.own), used: self.uses };
     }
 
-    /// Forgets those who sent nothing for the longest time, where there are too many; `is_kept` tells who stays in any case.
+    /// Forgets the players that have been silent for the longest time, if there are too many; `is_kept` selects players
+    /// that stay in any case.
     pub fn trim(&mut self, is_kept: impl Fn(ClientId) -> bool) {
         if self.seen.len() <= MOST_SEEN {
             return;
@@ -93,7 +94,7 @@ impl OwnNumbers {
         self.seen.retain(|client, seen| seen.used >= oldest || is_kept(*client));
     }
 
-    /// Notes that an edit of a player's is applied.
+    /// Records that an edit of a player was applied.
     pub fn apply(&mut self, client: ClientId, own: u64, number: u64) {
         if client == ClientId::SERVER {
             return;
@@ -114,7 +115,7 @@ impl OwnNumbers {
         self.applied.get(&client).map_or(0, |last| last.number)
     }
 
-    /// Hands over to a store what it does not have yet.
+    /// Sends changed numbers to a store.
     pub fn save(&mut self, store: &mut Store) {
         for client in std::mem::take(&mut self.changed) {
             let key = format!("{RESERVED}{KEY}{}", client.0);
@@ -127,7 +128,7 @@ impl OwnNumbers {
         }
     }
 
-    /// What a store has.
+    /// The numbers in a store.
     pub fn open(store: &Store) -> Self {
         let mut numbers = Self::default();
         let prefix = format!("{}{KEY}", super::save::prefix(store));

@@ -1,4 +1,5 @@
-//! What a server remembers of players, whether they are connected or not: whoever comes back under the same number has what was left.
+//! Data that a server keeps for players, connected or not: a player that reconnects under the same number has the same
+//! budget.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,14 +10,14 @@ use super::settings::ServerSettings;
 use crate::net::bucket::{Bucket, Rate};
 use crate::net::message::ClientId;
 
-/// Players who are remembered, at most, beside those that are connected and administrators. Whoever is forgotten begins with full
-/// buckets.
+/// The most players that are remembered, in addition to connected ones and administrators. A player that was forgotten
+/// starts with full buckets.
 const MOST_PLAYERS: usize = 1 << 14;
 
-/// Greetings that are answered; others wait.
+/// The rate of answered greetings; others wait.
 const GREETINGS: Rate = Rate { per_second: 1, burst: 8 };
 
-/// What is known of a player.
+/// The data of a player.
 pub struct Player {
     pub cost: Bucket,
     pub flood: Bucket,
@@ -46,7 +47,7 @@ impl Player {
     }
 }
 
-/// What is known of all players.
+/// The data of all players.
 pub struct Players {
     players: BTreeMap<ClientId, Player>,
     settings: ServerSettings,
@@ -71,7 +72,7 @@ impl Players {
         self.players.get(&client)
     }
 
-    /// Forgets those who were away for the longest time, where there are too many.
+    /// Forgets the players that have been away for the longest time, if there are too many.
     pub fn trim(&mut self, is_connected: impl Fn(ClientId) -> bool) {
         if self.players.len() <= MOST_PLAYERS {
             return;

@@ -1,4 +1,4 @@
-//! Messages that come from clients.
+//! Handles messages from clients.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,9 +14,10 @@ use crate::net::price::{UNDO, cost};
 use crate::net::stamps::StampId;
 use crate::store::format::bricks::is_possible;
 
-/// What a greeting costs, as flooding is counted. So many as are [answered](super::players) a second cost more work than that.
+/// The cost of a greeting in the count of flooding. The greetings that are [answered](super::players) in a second cost
+/// more work.
 const HELLO: u64 = 200;
-/// What each region costs that is fetched.
+/// The cost of each fetched region.
 const REGION: u64 = 1;
 /// Bytes of a message that cost 1.
 const BYTES: u64 = 64;
@@ -27,7 +28,7 @@ const MOST_JOBS: usize = 2 * MOST_REGIONS;
 const MOST_IMAGE: usize = 2 * 256 * 256;
 
 impl Server {
-    /// Takes a message of a client's. Whatever its bytes are, it is answered, or counted as invalid.
+    /// Handles a message of a client. Any bytes are answered, or counted as invalid.
     pub fn receive(&mut self, client: ClientId, bytes: &[u8], now: Duration) {
         self.now = self.now.max(now);
         self.figures.messages += 1;
@@ -53,7 +54,7 @@ impl Server {
             }
             Ok((ToServer::Undo { own, of }, _)) => self.receive_undo(client, own, of, now),
             Ok((message, _)) => {
-                // What comes of an earlier stream means nothing.
+                // Messages of an earlier stream are ignored.
                 let has_joined = self.sessions.get(&client).is_some_and(|session| session.has_joined());
                 !has_joined || self.receive_joined(client, message, now)
             }
@@ -67,7 +68,7 @@ impl Server {
         }
     }
 
-    /// Takes a message that only clients send that have joined.
+    /// Handles a message that only joined clients send.
     fn receive_joined(&mut self, client: ClientId, message: ToServer, now: Duration) -> bool {
         match message {
             ToServer::Fetch { number, regions } => self.receive_fetch(client, number, regions, now),
@@ -86,7 +87,7 @@ impl Server {
         may
     }
 
-    /// `unknown` are the places of edits whose stamps have images that are not here.
+    /// `unknown` are the positions of edits whose stamps have images that the server lacks.
     fn receive_edits(
         &mut self,
         client: ClientId,

@@ -1,20 +1,21 @@
-//! A server that survives a restart.
+//! Saves a server's world, so that a restarted server continues from it.
 
 use super::own_numbers::OwnNumbers;
 use super::{Server, ServerSettings, ToClient};
 use crate::store::{Store, StoreError};
 use crate::terrain::Terrain;
 
-/// The beginning of the keys that a server has in a store beside the game's data. No key that a person would write begins so.
+/// The prefix of a server's keys in a store, next to the game's data. No person would choose it for a key.
 pub const RESERVED: &str = "\u{1}bevy_burrow/net/";
 
-/// The beginning of the keys that servers had before.
+/// The prefix of the keys of earlier versions.
 const FORMER: &str = "net/";
 
 /// Below these, the key under which a store keeps the number of the last entry that its world holds.
 const NUMBER: &str = "number";
 
-/// The beginning of a server's keys in a store. Where a server of now has saved, what has former keys is the game's.
+/// The prefix of a server's keys in a store. If a present version has saved there, keys with the former prefix belong
+/// to the game.
 pub fn prefix(store: &Store) -> &'static str {
     if store.get(&format!("{RESERVED}{NUMBER}")).is_some() { RESERVED } else { FORMER }
 }
@@ -35,9 +36,9 @@ impl Server {
         Self { saved_revision: store.revision(), own_numbers, ..server }
     }
 
-    /// Hands over to the store what was committed, and tells clients what has become durable. Call it after each
-    /// [`advance`](Self::advance); it takes microseconds. Entries that are no commits, such as rules, are told to be durable with the
-    /// commit after them.
+    /// Passes new commits to the store, and reports to clients what has become durable. Call it after each
+    /// [`advance`](Self::advance); it takes microseconds. Entries without a commit, such as rules, are reported as
+    /// durable with the commit after them.
     ///
     /// # Errors
     /// When the store's thread has ended.
@@ -47,7 +48,7 @@ impl Server {
             self.own_numbers.save(store);
             store.follow(&mut self.terrain)?;
             self.saved_number = self.applied;
-            // Where no commit was among what was handed over, it is saved for sure once the next commit is.
+            // Without a commit among the records, they are certainly saved once the next commit is.
             let revision = store.revision();
             let is_later = revision > self.saved_revision;
             self.saved.push_back((revision.saturating_add((!is_later).into()), self.applied));

@@ -1,4 +1,4 @@
-//! What is sent to a client, and what waits until it has acknowledged what came before.
+//! Sends data to a client, within a window of bytes that it has not acknowledged.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::net::message::{RegionContent, ToClient};
 use crate::net::regions::chunks_of;
 use crate::terrain::World;
 
-/// Entries on their way to a client in the order lane: never more bytes than the window, or one message.
+/// Unacknowledged entries in the order lane of a client: at most the bytes of the window, or one message.
 pub struct OrderSender {
     /// The number of the last entry that was sent.
     sent: u64,
@@ -34,7 +34,7 @@ impl OrderSender {
         self.sent
     }
 
-    /// Notes that a message with entries up to a number is sent, if there is room for it. Returns `true` if there is.
+    /// Records that a message with entries up to a number is sent, if there is room for it. Returns `true` if there is.
     pub fn send(&mut self, last: u64, bytes: usize) -> bool {
         let bytes = bytes as u64;
         let has_room = self.on_the_way.is_empty() || self.bytes.saturating_add(bytes) <= self.window;
@@ -46,7 +46,7 @@ impl OrderSender {
         has_room
     }
 
-    /// Notes that the client has applied all entries up to a number.
+    /// Records that the client has applied all entries up to a number.
     pub fn acknowledge(&mut self, number: u64) {
         while let Some((_, bytes)) = self.on_the_way.pop_front_if(|(last, _)| *last <= number) {
             self.bytes -= bytes;
@@ -54,13 +54,13 @@ impl OrderSender {
     }
 }
 
-/// What is to be sent in the bulk lane.
+/// A job of the bulk lane.
 pub enum Job {
     /// A message in bytes.
     Message(Arc<[u8]>),
     /// An image.
     Image(Arc<GreyImage>),
-    /// A region of the lane's world, with so many others to follow. It is made into bytes when its turn comes.
+    /// A region of the lane's world, followed by `left` others. It is encoded when its turn comes.
     Region { pos: RegionPos, left: u32 },
 }
 
@@ -76,7 +76,7 @@ pub fn region_bytes((number, world): &Snapshot, pos: RegionPos, left: u32) -> Ve
     ToClient::Region(RegionContent { number: *number, pos, left, next_field, bricks, fields }).to_bytes()
 }
 
-/// The bulk lane of a client: so many bytes a second, and never more on their way than the window.
+/// The bulk lane of a client: limited in bytes a second, and in unacknowledged bytes by the window.
 pub struct BulkSender {
     jobs: VecDeque<Job>,
     /// Regions among these.
@@ -88,7 +88,8 @@ pub struct BulkSender {
     at: usize,
     sent: u64,
     acknowledged: u64,
-    /// What was acknowledged when it [went on](Self::goes_on) last, and how many bytes more are that again.
+    /// The acknowledged bytes at the last [progress](Self::goes_on), and the number of further bytes that count as
+    /// progress again.
     noted: u64,
     least: u64,
     window: u64,
@@ -148,7 +149,8 @@ impl BulkSender {
         self.world.as_ref().map(|(number, _)| *number)
     }
 
-    /// Whether the client has taken much since it last went on, or everything, so that the next is for the server to send.
+    /// Whether the client has acknowledged enough since its last progress, or everything, so that the server has to
+    /// send more.
     pub fn goes_on(&mut self) -> bool {
         let is_waiting = !self.jobs.is_empty() || self.at < self.stream.len();
         let has_all = self.acknowledged == self.sent && (is_waiting || self.acknowledged > self.noted);
@@ -159,7 +161,7 @@ impl BulkSender {
         goes_on
     }
 
-    /// Notes that so many bytes have come. Returns `false` if that is impossible.
+    /// Records the number of bytes that have arrived. Returns `false` if it is impossible.
     pub fn acknowledge(&mut self, bytes: u64) -> bool {
         self.acknowledged = self.acknowledged.max(bytes.min(self.sent));
         bytes <= self.sent
@@ -177,7 +179,7 @@ impl BulkSender {
         let on_the_way = self.sent - self.acknowledged;
         let room = self.window.saturating_sub(on_the_way).min(bucket.left(now));
         let whole = rest.len().min(self.piece);
-        // A crumb is not worth a message.
+        // A tiny piece is not worth a message.
         let is_worth_it = room >= whole as u64;
         if !is_worth_it || !bucket.spend(now, whole as u64) {
             return None;

@@ -1,4 +1,4 @@
-//! What a server knows of a client that is connected.
+//! The session of a connected client.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -11,12 +11,12 @@ use crate::net::message::Hello;
 use crate::net::stamps::StampId;
 use crate::terrain::World;
 
-/// A client for which a world is kept begins again if it takes nothing for so long.
+/// If a client for which a world is kept acknowledges nothing for this time, its session starts again.
 const STUCK: Duration = Duration::from_secs(5);
 
-/// How far a client has come.
+/// The progress of a client.
 pub enum Stage {
-    /// It has said nothing yet, or has to begin again.
+    /// It has not greeted yet, or has to greet again.
     Connected,
     /// It waits for its welcome.
     Greeted(Hello),
@@ -31,14 +31,14 @@ pub struct Fetch {
     pub regions: Vec<RegionPos>,
 }
 
-/// A client that is connected. All but the time belongs to its [stream](crate::net::ToServer::Greeting).
+/// A connected client. Everything except the time belongs to its [stream](crate::net::ToServer::Greeting).
 pub struct Session {
     pub stage: Stage,
     /// The stream that it began last; `None` for one without marks.
     pub stream: Option<u64>,
     /// When it connected, or was last asked to greet.
     pub asked: Duration,
-    /// The number that its world is at, as it says.
+    /// The number that its world is at, as it has acknowledged.
     pub acknowledged: u64,
     pub order: OrderSender,
     pub bulk: BulkSender,
@@ -47,7 +47,7 @@ pub struct Session {
     pub images: BTreeSet<StampId>,
     /// The world that it compares its own with, and that one's number.
     pub compared: Option<(u64, Arc<World>)>,
-    /// When it last went on to take what a world is kept for.
+    /// The time of its last progress with data for which a world is kept.
     went_on: Duration,
 }
 
@@ -67,7 +67,7 @@ impl Session {
         }
     }
 
-    /// Begins a new stream with a greeting: nothing of an earlier one counts.
+    /// Begins a new stream with a greeting, and resets the state of an earlier one.
     pub fn begin(&mut self, stream: Option<u64>, hello: Hello, settings: &ServerSettings) {
         let new = Self::new(settings, self.asked);
         *self = Self { stage: Stage::Greeted(hello), stream, ..new };
@@ -77,7 +77,8 @@ impl Session {
         matches!(self.stage, Stage::Joined)
     }
 
-    /// Whether a world that has changed since is kept for it, and it has taken nothing for long. `applied` is the number of the world now.
+    /// Whether an outdated world is kept for it and it has acknowledged nothing for too long. `applied` is the present
+    /// number of the world.
     pub fn is_stuck(&mut self, now: Duration, applied: u64) -> bool {
         let compared = self.compared.as_ref().map(|(number, _)| *number);
         let is_kept = self.bulk.number().into_iter().chain(compared).any(|number| number < applied);

@@ -1,11 +1,11 @@
-//! What a server allows and how much it sends.
+//! The limits of a server.
 
 use std::time::Duration;
 
 use crate::net::bucket::Rate;
 
-/// How far from its player a client may dig: all of the edit's shape has to be so near, to the voxel. A player that moves is where the server knows it
-/// to be, or as far from there as it comes in the latency.
+/// How far from its player a client may dig: the whole shape of an edit must be within this distance, exact to a voxel.
+/// It is measured from the last known position of the player, plus the way that the player can move within the latency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reach {
     /// In voxels.
@@ -27,12 +27,12 @@ impl Reach {
 /// Who may take back strokes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UndoPolicy {
-    /// Nobody: nothing is kept for it.
+    /// No player. Nothing is stored for undo.
     #[default]
     Nobody,
-    /// [Administrators](super::Server::set_administrator) take back the last stroke of any player.
+    /// [Administrators](super::Server::set_administrator) may undo the last stroke of any player.
     Administrators,
-    /// Each player takes back their own, and administrators those of all.
+    /// Players may undo their own strokes, and administrators those of all players.
     Own,
 }
 
@@ -42,19 +42,19 @@ pub struct ServerSettings {
     /// How far from its player a client may dig; `None` does not check it. Otherwise a client whose
     /// [place](super::Server::set_place) is not known may not dig.
     pub reach: Option<Reach>,
-    /// What a client's edits may cost. An edit costs 20 and 1 for each brick that it reaches, or 4 if it sculpts; those that cost more
-    /// are refused.
+    /// The budget for a client's edits. An edit costs 20, and 1 for each brick that it reaches, or 4 if it sculpts;
+    /// edits beyond the budget are refused.
     pub cost: Rate,
-    /// A client is kicked once its messages cost so many times as much as `cost` allows, accepted or not. An edit counts as a
-    /// sixteenth of the burst at most.
+    /// A client is kicked once its messages, accepted or not, cost more than this factor times `cost`. An edit counts
+    /// as at most a sixteenth of the burst.
     pub flood: u64,
     /// Invalid messages: a client with more is kicked.
     pub malformed: Rate,
     /// Who may take back strokes. Anything but [`UndoPolicy::Nobody`] makes a transaction of each stroke.
     pub undo: UndoPolicy,
-    /// Bytes of strokes that may be taken back.
+    /// Bytes of strokes that can be undone.
     pub undo_bytes: usize,
-    /// Bytes of old entries that are kept for clients that come back.
+    /// Bytes of old entries that are kept for clients that reconnect.
     pub log_bytes: usize,
     /// Bytes of the bulk lane for each client.
     pub bulk: Rate,

@@ -1,4 +1,4 @@
-//! Strokes that may be taken back: what each replaced, and what it led to.
+//! Strokes that can be undone: the parts that each replaced, and their new content.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -12,25 +12,25 @@ use crate::volume::{Brick, Fields};
 
 type Stored = Option<Arc<Brick>>;
 
-/// What was there, and what came in its place.
+/// The old and the new content of a part.
 struct Replaced<T> {
     before: T,
     after: T,
 }
 
-/// Edits of a player that are taken back together.
+/// Edits of a player that are undone together.
 struct Stroke {
     /// Counts strokes of all players.
     number: u64,
     label: Option<u64>,
     bricks: BTreeMap<BrickPos, Replaced<Stored>>,
     fields: BTreeMap<ChunkPos, Replaced<Fields>>,
-    /// Did somebody else change what it had led to, between its edits?
+    /// Whether another player changed its result between its edits.
     is_touched: bool,
     bytes: usize,
 }
 
-/// Why a stroke is not taken back.
+/// The reason why a stroke is not undone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoUndo {
     Nothing,
@@ -40,7 +40,7 @@ pub enum NoUndo {
 /// The strokes of all players, within a limit of bytes.
 pub struct Strokes {
     players: FxHashMap<ClientId, VecDeque<Stroke>>,
-    /// Whose the strokes are, by number from the oldest that is kept.
+    /// The players of the strokes, by number from the oldest that is kept.
     order: VecDeque<(u64, ClientId)>,
     next: u64,
     bytes: usize,
@@ -53,7 +53,7 @@ impl Strokes {
         Self { players, order, next: 0, bytes: 0, limit }
     }
 
-    /// Notes that an edit changes this world so. Edits with the same label that follow each other are one stroke.
+    /// Records an edit's changes of this world. Consecutive edits with equal labels are one stroke.
     pub fn record(&mut self, player: ClientId, label: Option<u64>, world: &World, change: &WorldChange) {
         let strokes = self.players.entry(player).or_default();
         let goes_on = label.is_some() && strokes.back().is_some_and(|stroke| stroke.label == label);
@@ -87,7 +87,7 @@ impl Strokes {
         }
     }
 
-    /// Takes the last stroke of a player out, and tells what takes it back in this world.
+    /// Removes the last stroke of a player, and returns the change that undoes it in this world.
     pub fn undo(&mut self, player: ClientId, world: &World) -> Result<WorldChange, NoUndo> {
         let strokes = self.players.get_mut(&player).ok_or(NoUndo::Nothing)?;
         let stroke = strokes.pop_back().ok_or(NoUndo::Nothing)?;
@@ -127,8 +127,8 @@ impl Stroke {
         }
     }
 
-    /// What takes it back, if all that it led to is still there. Fields that others have changed since stay: they hold what it
-    /// replaced too.
+    /// The change that undoes it, if its result is still unchanged. Fields that others have changed since stay: they
+    /// also contain the replaced parts.
     fn undone(&self, world: &World) -> Option<WorldChange> {
         let is_there = |(pos, own): (&BrickPos, &Replaced<Stored>)| {
             Brick::is_same(own.after.as_ref(), world.brick(*pos))

@@ -1,4 +1,4 @@
-//! What is checked of an edit before it gets into the order.
+//! Checks of an edit before it is ordered.
 
 use std::time::Duration;
 
@@ -36,7 +36,7 @@ fn squared_length(way: I64Vec3) -> u128 {
 }
 
 impl Server {
-    /// Checks an edit, and takes its cost out of the client's bucket; returns the cost.
+    /// Checks an edit, and charges its cost to the client's bucket; returns the cost.
     pub(super) fn validate(&mut self, client: ClientId, edit: &Edit, now: Duration) -> Result<u64, Refusal> {
         let cost = cost(self.terrain.world().grid(), edit).ok_or(Refusal::OutsideWorld)?;
         let player = self.players.player(client);
@@ -57,7 +57,7 @@ impl Server {
         Ok(cost)
     }
 
-    /// Checks whether a client may take back what this one did, and takes the cost out of its bucket.
+    /// Checks whether a client may undo strokes of another one, and charges the cost to its bucket.
     pub(super) fn validate_undo(
         &mut self,
         client: ClientId,

@@ -1,4 +1,4 @@
-//! Entries that the server could not apply, for a reason that other machines do not have: everybody is without them.
+//! Entries that fail on the server for a reason that other machines do not have: no client applies them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -140,7 +140,7 @@ fn a_void_entry_that_clients_have_applied_is_mended() {
     assert_eq!(play.agreed(), pristine);
     assert_eq!(play.server.figures().voids, 1);
     assert!(play.repairs().iter().all(|repairs| *repairs > 0));
-    // Names of fields go on alike.
+    // Later names of fields are equal too.
     play.dig(2, dig(80.0, 80.0));
     let repairs = play.repairs();
     assert_ne!(play.agreed(), pristine);

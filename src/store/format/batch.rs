@@ -1,8 +1,8 @@
-//! Commits in bytes: what a frame of the journal holds.
+//! The encoding of commits: the content of a frame of the journal.
 //!
 //! Most commits are one edit, and lead to the next revision: these begin with an odd byte, whose other bits are the head of the
-//! [edit](super::edits). Others begin with 0. Each has the hash of the world that it leads to. What the game put up to the last
-//! of them comes with them.
+//! [edit](super::edits). Others begin with 0. Each has the hash of the world that it leads to. The game's data up to
+//! the last of them follows.
 
 use std::sync::Arc;
 
@@ -21,17 +21,17 @@ const EDIT: u8 = 2;
 const CHANGE: u8 = 3;
 const GROUND: u8 = 4;
 
-/// Commits one after the other, and what the game put up to the last of them.
+/// A sequence of commits, and the game's data up to the last of them.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
     /// Commits in order. Their changes count where they have an entry [`LogEntry::Change`]; edits lead to theirs again.
     pub commits: Vec<CommitRecord>,
-    /// What the game put, in order; `None` where it removed a key.
+    /// Changes of the game's data, in order; `None` if it removed a key.
     pub game: Vec<(String, Option<Vec<u8>>)>,
 }
 
 impl Batch {
-    /// Does it hold nothing?
+    /// Whether it holds nothing.
     pub fn is_empty(&self) -> bool {
         self.commits.is_empty() && self.game.is_empty()
     }

@@ -1,4 +1,4 @@
-//! The bricks of a region in bytes.
+//! The encoding of a region's bricks.
 //!
 //! | part | holds |
 //! | --- | --- |
@@ -31,7 +31,7 @@ const WHOLE: u8 = 1;
 const FLAT: u8 = 2;
 /// Materials are stored.
 const MATERIALS: u8 = 4;
-/// What a head may say.
+/// The flags of a head.
 const KNOWN: u8 = WHOLE | FLAT | MATERIALS;
 
 /// The place of a brick in its region: bricks in order have rising places.
@@ -45,7 +45,7 @@ pub fn position(region: RegionPos, place: usize) -> BrickPos {
     BrickPos(region.first_brick().0 + IVec3::new(place >> 6, place & 7, place >> 3 & 7))
 }
 
-/// The densities of bricks of a region that are known so far, by place.
+/// The already known densities of the bricks of a region, by position.
 struct Region {
     slots: [u16; MOST],
     bricks: Vec<[i16; 512]>,
@@ -61,7 +61,7 @@ impl Region {
         self.bricks.push(densities);
     }
 
-    /// What is known around a brick.
+    /// The known densities around a brick.
     fn around(&self, place: usize) -> Known {
         let steps = [64, 8, 1];
         let neighbours = std::array::from_fn(|number| {
@@ -76,7 +76,7 @@ impl Region {
     }
 }
 
-/// A flag that is set if something is so.
+/// A flag that is set if a condition holds.
 fn flag(is_so: bool, flag: u8) -> u8 {
     if is_so { flag } else { 0 }
 }
@@ -261,7 +261,7 @@ fn runs(
     if left == 0 { Ok(materials) } else { Err(FormatError::Invalid("run of materials")) }
 }
 
-/// May a region lie there at all?
+/// Whether a region can be at this position.
 pub fn is_possible(region: RegionPos) -> bool {
     const MOST: i32 = REACH / RegionPos::VOXELS + 1;
     region.0.max_element() <= MOST && region.0.min_element() >= -MOST

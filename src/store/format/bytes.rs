@@ -1,4 +1,4 @@
-//! Numbers in bytes: integers of variable length, and a reader that never reads beyond its end.
+//! The encoding of numbers: integers of variable length, and a reader that never reads beyond its end.
 
 use super::error::FormatError;
 
@@ -80,7 +80,7 @@ impl<'a> Reader<'a> {
         self.take(count)
     }
 
-    /// Is all read?
+    /// Checks that everything has been read.
     pub fn end(self) -> Result<(), FormatError> {
         if self.0.is_empty() { Ok(()) } else { Err(FormatError::Invalid("end: more follows")) }
     }

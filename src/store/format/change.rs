@@ -1,4 +1,4 @@
-//! Parts that were put in place, in bytes: bricks by regions, pristine ones by name only, and fields.
+//! The encoding of replaced parts: bricks by regions, pristine ones by position only, and fields.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

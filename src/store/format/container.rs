@@ -28,13 +28,13 @@ const ENTRY: usize = 9;
 /// A file taken apart.
 pub struct Container<'a> {
     pub world: WorldId,
-    /// What its head says beside its frames.
+    /// The part of its head that does not describe frames.
     pub own: Vec<u8>,
     /// Frames with the lengths and checksums that the head names.
     pub frames: Vec<&'a [u8]>,
 }
 
-/// A file of frames; `own` is what its head says beside.
+/// A file of frames; `own` is additional data in its head.
 ///
 /// # Errors
 /// When the head would have more bytes than `limit`.
@@ -87,7 +87,7 @@ pub fn read(kind: Kind, file: &[u8], limit: usize) -> Result<Container<'_>, Form
     Ok(Container { world, own, frames })
 }
 
-/// The world and what the head says beside its frames, without looking at these.
+/// The world and the additional data in the head, without reading the frames.
 pub fn read_own(kind: Kind, file: &[u8], limit: usize) -> Result<(WorldId, Vec<u8>), FormatError> {
     let (world, head, _) = read_head(kind, file, limit)?;
     Ok((world, Reader(&head).bytes()?.to_vec()))

@@ -1,4 +1,4 @@
-//! Edits in bytes, each as the difference from the one before: players move by little between digs.
+//! The encoding of edits, each as the difference from the previous one, because players move little between digs.
 //!
 //! The serialised form of an [`Edit`] is cut into shape, middle, what lies between, tag and stroke. Bits of a head say which of
 //! them are as before; it is below 128. Reading joins them again and deserialises the result, which checks it.
@@ -23,7 +23,7 @@ const NO_STROKE: u8 = 32;
 /// Not a difference: the serialised edit follows.
 const SERIALIZED: u8 = 64;
 
-/// What is longer is never repeated by a bit, so that no few bytes take much memory.
+/// Longer parts are never repeated by a bit, so that few bytes can't take much memory.
 const LONGEST_REST: usize = 64;
 
 /// A serialised edit, cut up.
@@ -151,7 +151,7 @@ fn edit(serialized: &[u8]) -> Result<Edit, FormatError> {
     }
 }
 
-/// Appends an edit by itself.
+/// Appends a single edit.
 pub fn put_edit(to: &mut Vec<u8>, edit: &Edit, sequence: &mut EditSequence) {
     let at = to.len();
     to.push(0);

@@ -1,4 +1,4 @@
-//! Why bytes are not what they should be.
+//! Errors of reading the formats.
 
 use thiserror::Error;
 
@@ -10,7 +10,7 @@ use crate::lattice::{BrickPos, ChunkPos};
 #[non_exhaustive]
 pub enum FormatError {
     /// They don't begin like a record.
-    #[error("this is no record of a saved world")]
+    #[error("these bytes are not a record of a saved world")]
     Magic,
     /// They end too early.
     #[error("the record is cut off")]

@@ -1,4 +1,4 @@
-//! The fields of chunks in bytes.
+//! The encoding of the fields of chunks.
 
 use glam::IVec3;
 

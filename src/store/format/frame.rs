@@ -1,4 +1,4 @@
-//! Frames: what every part of a saved world is wrapped in, so that damage, swaps and newer versions are told.
+//! Frames: the envelope of every part of a saved world, which detects damage, swapped parts and newer versions.
 //!
 //! | bytes | |
 //! | --- | --- |
@@ -42,7 +42,7 @@ const CHECKSUM: usize = 8;
 const PACKED: u8 = 1;
 const GROUND: u8 = 2;
 
-/// What a frame holds.
+/// The content of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[non_exhaustive]
@@ -59,11 +59,11 @@ pub enum Kind {
     Level,
     /// A file of a level.
     LevelFile,
-    /// What a region holds otherwise than the level below.
+    /// The differences of a region from the level below.
     RegionChange,
 }
 
-/// Names a world: no two have the same.
+/// Identifies a world uniquely.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct WorldId(pub u128);
 
@@ -82,7 +82,7 @@ impl fmt::Display for WorldId {
     }
 }
 
-/// What a frame held.
+/// The content of an opened frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Opened {
     /// The revision that it was sealed with.
@@ -93,7 +93,7 @@ pub struct Opened {
     pub payload: Vec<u8>,
 }
 
-/// What a frame says of itself before it is checked.
+/// The unchecked header of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Peeked<'a> {
     /// The world that it belongs to.
@@ -119,7 +119,7 @@ pub fn seal(
     sealed(kind, world, key, revision, ground_hash, payload, packed)
 }
 
-/// The same without packing, for what is packed or compared by others.
+/// Seals a payload without compression, for payloads that are compressed or compared elsewhere.
 pub fn seal_unpacked(kind: Kind, world: WorldId, key: &[u8], ground_hash: u64, payload: &[u8]) -> Vec<u8> {
     sealed(kind, world, key, 0, ground_hash, payload, None)
 }
@@ -190,7 +190,7 @@ fn split_schema(bytes: &[u8]) -> Result<(u8, &[u8]), FormatError> {
     rest.split_first().map(|(&schema, rest)| (schema, rest)).ok_or(FormatError::Truncated)
 }
 
-/// What a frame at the front of `bytes` says of itself, unchecked; `None` if none begins there that this version can read.
+/// The unchecked header of a frame at the front of `bytes`; `None` if no frame that this version can read begins there.
 pub fn peek(bytes: &[u8]) -> Option<Peeked<'_>> {
     let (schema, rest) = split_schema(bytes).ok()?;
     let (parts, after) = (u32::from(schema) == SCHEMA).then(|| parts(rest))?.ok()?;
@@ -217,7 +217,7 @@ pub fn open(
     Ok(rest.1)
 }
 
-/// The same, of whatever world.
+/// Opens a frame of any world.
 pub fn open_any_world(
     bytes: &[u8],
     kind: Kind,

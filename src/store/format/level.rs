@@ -1,6 +1,6 @@
-//! A designer's level: a folder of files that version control compares well, and the same packed into one file to ship.
+//! The format of levels: a folder of files for version control, or one packed file to ship.
 //!
-//! - `level.json` says what the level is, and names its regions.
+//! - `level.json` describes the level, and names its regions.
 //! - `r.X.Y.Z.region` holds a region's bricks and fields. It has neither revision nor time, so it changes only with its content,
 //!   and is not packed, so that version control can store differences.
 
@@ -19,7 +19,7 @@ use crate::lattice::RegionPos;
 use crate::terrain::{LooseSettings, SIMULATION, TerrainSettings, WorldParts};
 use crate::volume::DiggingRules;
 
-/// The file that says what a level is.
+/// The file that describes a level.
 pub const LEVEL_JSON: &str = "level.json";
 
 /// The files of a level by name.
@@ -44,7 +44,7 @@ pub struct Level {
     pub regions: BTreeMap<RegionPos, SavedRegion>,
 }
 
-/// What `level.json` holds.
+/// The content of `level.json`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -95,7 +95,7 @@ fn file_error(name: &str, why: impl ToString) -> FormatError {
     FormatError::File { name: name.into(), why: why.to_string() }
 }
 
-/// The files of a level. The same content gives the same bytes, file by file.
+/// The files of a level. Equal content gives equal bytes, file by file.
 ///
 /// # Errors
 /// When settings hold numbers that JSON can't, and [`FormatError::TooLarge`] when `level.json` with the game's data takes more than
@@ -175,7 +175,7 @@ fn of_hex(hex: &str) -> Option<Vec<u8>> {
 }
 
 fn read_description(json: &[u8]) -> Result<Description, FormatError> {
-    /// What all schemas have.
+    /// The part that all schemas have.
     #[derive(Deserialize)]
     struct Schema {
         burrow_level: u32,

@@ -1,4 +1,4 @@
-//! How much the parts of files may hold once they are unpacked. What is written keeps to it, so that it can be read again.
+//! Limits on the unpacked size of parts of files. Writers obey them too, so that every written file can be read again.
 
 use super::error::FormatError;
 
@@ -34,7 +34,7 @@ pub(super) fn within(content: Vec<u8>, limit: usize) -> Result<Vec<u8>, FormatEr
     Ok(content)
 }
 
-/// Can content be read again within a limit?
+/// Checks that content can be read again within a limit.
 pub(super) fn check(content: &[u8], limit: usize) -> Result<(), FormatError> {
     let (length, most) = (content.len() as u64, limit as u64);
     if length > most { Err(FormatError::TooLarge { length, limit: most }) } else { Ok(()) }

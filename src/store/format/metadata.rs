@@ -1,4 +1,4 @@
-//! What is saved of a world beside its regions.
+//! The saved data of a world in addition to its regions.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ pub struct Metadata {
     pub revision: u64,
     /// Its hash.
     pub hash: u64,
-    /// The greatest name that a field has had so far.
+    /// The greatest name that a field has had.
     pub next_field: u64,
     /// Rules for edits.
     pub rules: Option<DiggingRules>,
@@ -26,7 +26,7 @@ pub struct Metadata {
     pub simulation: u32,
     /// The hash of the whole ground, as [`Ground::hash`](crate::ground::Ground::hash) gives it.
     pub ground: u64,
-    /// What the game put, by key.
+    /// The game's data, by key.
     pub game: Vec<(String, Vec<u8>)>,
 }
 

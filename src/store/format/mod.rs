@@ -1,18 +1,18 @@
-//! The bytes of saved worlds, and worlds from bytes: no files, no threads, no clocks.
+//! The formats of saved worlds, as pure conversions to and from bytes: no files, no threads, no clocks.
 //!
-//! | file | turns into bytes |
+//! | file | encodes |
 //! | --- | --- |
-//! | [`frame`] | what every part is wrapped in: checksum, schema, world, key |
+//! | [`frame`] | the envelope of every part: checksum, schema, world, key |
 //! | [`region`], [`bricks`], [`fields`] | a region's record |
 //! | [`predict`], [`residuals`] | densities of bricks |
 //! | [`batch`], [`edits`], [`change`] | commits, for journals |
 //! | [`metadata`] | a world without its regions |
 //! | [`portable`] | a whole world as one file |
 //! | [`level`] | a designer's level: a folder of files, or one packed file |
-//! | [`container`], [`bytes`], [`plain`], [`limits`] | what these share |
+//! | [`container`], [`bytes`], [`plain`], [`limits`] | shared by the others |
 //!
-//! Whatever bytes are read, the result is what was written or a [`FormatError`]: nothing panics, and memory is taken by the length of
-//! the input and by limits that the caller names. The same content always gives the same bytes.
+//! Reading any bytes gives the written content or a [`FormatError`]: nothing panics, and memory is bounded by the
+//! length of the input and by limits that the caller sets. Equal content always gives equal bytes.
 
 pub mod batch;
 pub mod bricks;

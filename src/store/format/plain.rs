@@ -1,4 +1,4 @@
-//! Values of no special form, as `postcard` writes them.
+//! Values without a special encoding, written by `postcard`.
 
 use serde::{Deserialize, Serialize};
 

@@ -47,7 +47,7 @@ impl SavedRegion {
     }
 }
 
-/// All that a portable file holds.
+/// The content of a portable file.
 #[derive(Clone, Debug, Default)]
 pub struct PortableWorld {
     /// The world's name.
@@ -60,7 +60,7 @@ pub struct PortableWorld {
     pub journal: Vec<Batch>,
 }
 
-/// What the head of a portable file tells without the ground.
+/// The head of a portable file, which can be read without the ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PortableHead {
     /// The world without its regions.
@@ -212,7 +212,7 @@ pub(in crate::store) fn read_within(
     Ok(portable)
 }
 
-/// What a portable file says of itself: its world's name, and its head. The rest of the file is not looked at, and no ground is
+/// Reads the world's id and the head of a portable file. The rest of the file is not read, and no ground is
 /// needed.
 ///
 /// # Errors

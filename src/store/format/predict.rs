@@ -2,7 +2,7 @@
 //!
 //! Densities are distances, nearly linear in space. With a, b, c the neighbours one step lower along each axis, ab the one a step
 //! lower along two of them, and so on, a sample is about a + b + c - ab - bc - ac + abc. Where some of them are not known,
-//! it is predicted from a plane, from a line, or from what is near.
+//! it is predicted from a plane, from a line, or from a nearby sample.
 
 use crate::brush::{BAND, DEPTH};
 use crate::lattice::BRICK;
@@ -25,7 +25,7 @@ pub enum Context {
     Planes,
     /// From lines through two samples.
     Lines,
-    /// From what is near, or from nothing.
+    /// From any known sample nearby, or without one.
     Near,
 }
 
@@ -69,7 +69,7 @@ impl Known {
         self.0[Self::place(index)] = density;
     }
 
-    /// What a sample may be, from those before it.
+    /// Predicts a sample from earlier ones.
     pub fn predict(&self, index: usize) -> (Context, i16) {
         let at = Self::place(index);
         let get =

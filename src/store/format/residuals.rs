@@ -1,4 +1,4 @@
-//! Small integers in few bits: Rice codes that adapt to what came before.
+//! Small integers in few bits: Rice codes that adapt to earlier values.
 //!
 //! A number u is written as `u >> k` ones, a zero, and the low k bits of u. Each [`Context`](super::predict::Context) has its own
 //! k, which follows the mean of its last numbers. R. F. Rice, *Some Practical Universal Noiseless Coding Techniques*, 1979.
@@ -6,7 +6,7 @@
 use super::error::FormatError;
 use super::predict::Context;
 
-/// So many ones mean that all 16 bits follow.
+/// This number of ones means that all 16 bits follow.
 const ESCAPE: u32 = 20;
 
 /// Means of last numbers, times 8.
@@ -130,7 +130,7 @@ impl<'a> ResidualReader<'a> {
         Ok(())
     }
 
-    /// Is all read but for zero bits of a last byte?
+    /// Checks that everything except zero bits of the last byte has been read.
     pub fn end(self) -> Result<(), FormatError> {
         let is_end = self.bytes.is_empty() && self.filled < 8 && self.word == 0;
         if is_end { Ok(()) } else { Err(FormatError::Invalid("end of densities")) }

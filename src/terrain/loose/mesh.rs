@@ -57,7 +57,7 @@ impl Lattice for Piece<'_> {
     }
 }
 
-/// What marching cubes draws of a piece alone: closed, with its vertices where the world has them.
+/// The closed marching-cubes surface of a piece alone, with its vertices at their positions in the world.
 pub(super) fn closed(view: SampleView, grid: ChunkGrid, piece: &Component, origin: IVec3) -> SurfaceMesh {
     let samples = search::bricks(piece).map(|(pos, layers)| (pos, *layers)).collect();
     let piece_view = Piece { view, grid, samples };

@@ -10,8 +10,8 @@
 //! does not depend on the order of the search.
 //!
 //! **Budget.** The search after an edit visits a bounded number of bricks, and what it finds has a bounded number of voxels:
-//! see [`LooseSettings`]. What lies beyond stays as ground, and the receipt says so. Seeds are taken in a fixed order, so the
-//! outcome is the same on every machine.
+//! see [`LooseSettings`]. Pieces beyond these bounds stay as ground, and the receipt reports it. Seeds are taken in a
+//! fixed order, so the outcome is the same on every machine.
 //!
 //! **Removal.** The samples of a removed piece get the density of air in the middle of a dig, and so does air that touches
 //! them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this belongs to
@@ -44,17 +44,17 @@ use search::{Budget, Component, Solid};
 /// A search is as bounded as its edit: it visits at most 4096 bricks of 8x8x8 samples and 16 more for each brick that the edit
 /// changed, or an eighth of [`largest`](Self::largest) if that is more; all pieces that it finds have at most four times
 /// `largest` voxels together, or 131,072 if that is more. Pieces beyond these bounds stay as ground, and
-/// [`Applied::has_unsearched`](super::Applied::has_unsearched) says that there may be some. A later dig beside them finds
-/// them.
+/// [`Applied::has_unsearched`](super::Applied::has_unsearched) reports that there may be some. A later dig next to them
+/// finds them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
     /// The largest piece to look for, in voxels. Larger ones count as anchored; this bounds the time of a search.
     pub largest: u32,
-    /// Pieces up to so many voxels vanish.
+    /// Pieces of at most this many voxels vanish.
     pub crumbs: u32,
-    /// Larger ones, up to so many voxels, break off: they are taken out of the ground, and leave a closed mesh to make a
-    /// body of. Others stay where they are, and are reported.
+    /// Larger pieces of at most this many voxels break off: they are removed from the ground, and their closed mesh
+    /// can become a body. Others stay where they are, and are reported.
     pub debris: u32,
 }
 
@@ -66,7 +66,7 @@ impl Default for LooseSettings {
 }
 
 impl LooseSettings {
-    /// The fate of a piece of so many voxels.
+    /// The fate of a piece with this number of voxels.
     fn fate(&self, voxels: u64) -> PieceFate {
         if voxels <= u64::from(self.crumbs) {
             PieceFate::Removed
@@ -80,7 +80,7 @@ impl LooseSettings {
 
 impl World {
     /// The loose pieces of up to `largest` voxels that hold some sample of a box, in order of their lowest samples there.
-    /// Says what the settings would make of each, but takes none out, and makes no meshes. The search has no budget.
+    /// Each has the fate that the settings give it, but none is removed and no mesh is built. The search has no budget.
     pub fn loose_pieces(&self, around: LatticeBox, settings: &LooseSettings) -> Vec<LoosePiece> {
         let solid = Solid::new(self, self.samples(), None);
         let Some(around) = around.intersection(self.grid.edit_bounds()) else { return Vec::new() };
@@ -108,7 +108,7 @@ pub(super) fn seeds(world: &World, before: SampleView, drafted: &[DraftedBrick])
     search::seeds(&Solid::new(world, before, None), drafted)
 }
 
-/// What a search after an edit found, and what taking pieces out changed.
+/// The pieces that a search after an edit found, and the changes from removing them.
 #[derive(Default)]
 pub(super) struct Fallen {
     pub pieces: Vec<LoosePiece>,
@@ -166,7 +166,7 @@ pub(super) fn fall(
     Fallen { pieces, has_unsearched: budget.has_run_out, removed }
 }
 
-/// Do the rules keep some part of a piece from being taken away, whatever the brush?
+/// Whether the rules protect some part of a piece from removal, whatever the brush.
 fn keep(rules: &DiggingRules, component: &Component, piece: &LoosePiece) -> bool {
     let is_protected = |samples: &LatticeBox| {
         samples.intersection(piece.bounds).is_some()

@@ -1,4 +1,4 @@
-//! Loose pieces as receipts list them, and what names them.
+//! Loose pieces as receipts list them, and their names.
 
 use std::sync::Arc;
 
@@ -29,8 +29,8 @@ pub enum PieceFate {
 /// decide these, so an edit gives its pieces the same names on every machine: as a client's prediction, on the server, and
 /// when it is redone.
 ///
-/// Two pieces have the same name only if they came from exactly the same samples and materials: say if a game builds the same
-/// wall again and cuts it off once more. Take the later one for the one that an undo brings back.
+/// Two pieces have the same name only if they came from exactly the same samples and materials: for example if a game
+/// builds the same wall again and cuts it off once more. An undo then returns the later one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct PieceId(pub u64);
 

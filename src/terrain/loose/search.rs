@@ -2,7 +2,7 @@
 //!
 //! From each seed a component of solid samples grows, brick by brick and the lowest brick first. Two things end it early:
 //! a brick without any stored one below it, whose solid samples stand on pristine ground all the way down; and a sample
-//! that an earlier search reached, which ended early itself. A component that is neither and ends by itself is loose.
+//! that an earlier search reached, which ended early itself. A component whose growth ends without either is loose.
 //!
 //! Seeds are taken lowest brick first, and so are the bricks of a component. So it depends on the world alone what a search
 //! had reached when its budget ran out.
@@ -45,7 +45,7 @@ impl<'a> Solid<'a> {
         layers::and(&layers, &layers::within(pos, self.bounds))
     }
 
-    /// Is nothing stored in the brick's stack, from it downwards?
+    /// Whether nothing is stored in the brick's stack from this brick downwards.
     fn is_bottomless(&self, pos: BrickPos) -> bool {
         let stored = self.world.stacks.get(&pos.stack()).and_then(|stack| stack.first().copied());
         let newer = self.newer.and_then(|newer| newer.lowest(pos.stack()));
@@ -61,11 +61,11 @@ pub(super) fn bricks(component: &Component) -> impl Iterator<Item = (BrickPos, &
     component.iter().map(|(&place, layers)| (BrickPos::from_layer_order(place), layers))
 }
 
-/// What a search may still cost.
+/// The remaining budget of a search.
 pub(super) struct Budget {
     /// Bricks that it may visit. One that is reached again later counts again.
     bricks: u64,
-    /// Voxels of what it finds.
+    /// Voxels of the pieces that it finds.
     voxels: u64,
     /// Whether something was left out.
     pub has_run_out: bool,
@@ -77,7 +77,7 @@ impl Budget {
         Self { bricks: u64::MAX, voxels: u64::MAX, has_run_out: false }
     }
 
-    /// For the search after an edit that changed so many bricks: see [`LooseSettings`].
+    /// The budget of a search after an edit that changed `changed` bricks: see [`LooseSettings`].
     pub fn of_edit(settings: &LooseSettings, changed: usize) -> Self {
         let largest = u64::from(settings.largest);
         let bricks = (largest / 8).max(4096) + 16 * changed as u64;
@@ -94,7 +94,7 @@ impl Budget {
     }
 }
 
-/// Takes some of what is left, or notes that there is not as much.
+/// Subtracts `some` from `left`, or sets `has_run_out` if less is left.
 fn take(left: &mut u64, some: u64, has_run_out: &mut bool) -> bool {
     let rest = left.checked_sub(some);
     *has_run_out |= rest.is_none();
@@ -133,16 +133,16 @@ pub(super) fn search(solid: &Solid, seeds: &Samples, largest: u64, budget: &mut 
     found
 }
 
-/// One component in the making.
+/// A component that is growing.
 #[derive(Default)]
 struct Growth {
     reached: Samples,
-    /// Samples to go on from, by brick.
+    /// Samples from which growth continues, by brick.
     waiting: BTreeMap<[i32; 3], Layers>,
 }
 
 impl Growth {
-    /// Grows from a seed; returns how many voxels it has, if it ended by itself.
+    /// Grows from a seed. Returns the number of voxels, or `None` if the growth was ended early.
     fn grow(
         &mut self,
         solid: &Solid,

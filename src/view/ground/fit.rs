@@ -11,7 +11,7 @@ use bevy::render::render_resource::{
 
 use super::look::{GroundLook, MAX_LAYERS};
 
-/// Why a game's own images are not used; see [`GroundLoading::failure`](super::GroundLoading::failure).
+/// The reason why a game's own images are not used; see [`GroundLoading::failure`](super::GroundLoading::failure).
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GroundTexturesError {
@@ -20,7 +20,7 @@ pub enum GroundTexturesError {
     Load {
         /// `albedo` or `relief`.
         image: &'static str,
-        /// What Bevy says.
+        /// Bevy's error.
         source: Arc<AssetLoadError>,
     },
     /// An image is not an array of layers, but for example an ordinary picture.
@@ -28,10 +28,10 @@ pub enum GroundTexturesError {
     NoArray {
         /// `albedo` or `relief`.
         image: &'static str,
-        /// What it is to the renderer, which wants [`TextureViewDimension::D2Array`].
+        /// Its view dimension; the renderer needs [`TextureViewDimension::D2Array`].
         view: TextureViewDimension,
     },
-    /// An image has texels that the graphics card can't filter: whole numbers, depths, mostly also floats of 32 bits.
+    /// An image has texels that the GPU can't filter: integers, depths, on most GPUs also 32-bit floats.
     #[error("the {image} can't be filtered: its format is {format:?}")]
     Format {
         /// `albedo` or `relief`.
@@ -59,7 +59,7 @@ pub enum GroundTexturesError {
         /// `albedo` or `relief`.
         image: &'static str,
     },
-    /// An image never comes to the renderer.
+    /// An image never reaches the renderer.
     #[error("the {image} stays in the main world: its RenderAssetUsages lack RENDER_WORLD")]
     MainWorld {
         /// `albedo` or `relief`.
@@ -75,7 +75,7 @@ pub(super) fn layers(
     features: WgpuFeatures,
 ) -> Result<u32, GroundTexturesError> {
     let (texture, view) = (&image.texture_descriptor, image.texture_view_descriptor.as_ref());
-    // Unless it is said, as wgpu has it.
+    // wgpu's default if it is not set.
     let dimension = view.and_then(|view| view.dimension).unwrap_or(match texture.dimension {
         TextureDimension::D1 => TextureViewDimension::D1,
         TextureDimension::D2 if texture.array_layer_count() == 1 => TextureViewDimension::D2,
@@ -114,7 +114,7 @@ pub(super) fn is_anisotropic(image: &Image) -> bool {
     }
 }
 
-/// Why usable arrays are probably a mistake.
+/// A reason why usable arrays are probably a mistake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum ArrayMismatch {
     #[error("albedo has {albedo} layers, relief {relief}")]
@@ -124,7 +124,7 @@ pub(super) enum ArrayMismatch {
 }
 
 impl ArrayMismatch {
-    /// For arrays of so many layers.
+    /// Compares arrays with these numbers of layers with the looks.
     pub(super) fn find<'a>(
         [albedo, relief]: [u32; 2],
         looks: impl Iterator<Item = (Entity, &'a GroundLook)>,
@@ -155,14 +155,14 @@ mod tests {
         layers("relief", image, WgpuFeatures::empty())
     }
 
-    /// So many layers, without a word on how to see them.
+    /// An image of this many layers, without a view descriptor.
     fn stack(layers: u32) -> Image {
         let mut image = Image::default();
         image.texture_descriptor.size.depth_or_array_layers = layers;
         image
     }
 
-    /// The same, seen as this.
+    /// An image of this many layers with a view of this dimension.
     fn seen(layers: u32, dimension: TextureViewDimension) -> Image {
         let view = TextureViewDescriptor { dimension: Some(dimension), ..default() };
         Image { texture_view_descriptor: Some(view), ..stack(layers) }

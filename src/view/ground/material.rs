@@ -121,7 +121,7 @@ impl GroundUniform {
         }
     }
 
-    /// The same for a piece whose mesh counts from a voxel.
+    /// The uniform for a piece whose mesh is relative to a voxel.
     pub(super) fn of_piece(self, origin: IVec3) -> Self {
         let voxel = self.voxel;
         let place = Mat4::from_scale_rotation_translation(

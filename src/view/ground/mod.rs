@@ -3,7 +3,7 @@
 //! | part | content |
 //! | --- | --- |
 //! | [`GroundLook`] | a terrain's settings; put it on the terrain instead of a material |
-//! | [`GroundTextures`] | which textures: baked by the project, or a game's own |
+//! | [`GroundTextures`] | the textures: baked by this crate, or a game's own |
 //! | [`GroundLoading`] | their progress, and why a game's own are not used |
 //! | [`GroundMaterial`] | the resulting material |
 //!
@@ -44,8 +44,8 @@ use crate::plugin::{
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
-/// Dresses terrains that have a [`GroundLook`]. Does nothing where there is no renderer. Add it after Bevy's plugins, else
-/// an error tells that no ground will be drawn.
+/// Applies materials and textures to terrains that have a [`GroundLook`]. Does nothing without a renderer. Add it after
+/// Bevy's plugins; otherwise no ground is drawn and an error is logged.
 #[derive(Default)]
 pub struct GroundPlugin;
 
@@ -57,7 +57,7 @@ impl Plugin for GroundPlugin {
         }
         VertexPlugin::add_once(app);
         embedded_asset!(app, "ground.wgsl");
-        // Pieces have one of their own, which knows where they were in the ground.
+        // Pieces have separate materials, which contain their original position in the ground.
         propagate_look::<GroundMaterial>(app);
         warn_of_undrawn::<GroundLook>(app);
         warn_of_textures(app);
@@ -76,7 +76,7 @@ impl Plugin for GroundPlugin {
     }
 }
 
-/// Has materials made, and kept as terrains and their looks are.
+/// Adds the systems that create materials and update them with terrains and looks.
 fn keep_materials(app: &mut App) {
     app.add_systems(
         Update,
@@ -90,14 +90,14 @@ fn keep_materials(app: &mut App) {
                 .in_set(BurrowSystems::Propagate),
         ),
     )
-    // Where meshes are drawn is known then; a material that changes later is drawn as it was.
+    // Transforms are final by then; a material that changes later shows only in the next frame.
     .add_systems(
         PostUpdate,
         (follow, pieces::follow).chain().after(TransformSystems::Propagate).before(AssetEventSystems),
     );
 }
 
-/// The material that a terrain has from here: what the game puts on it by itself is not taken away.
+/// The material that this plugin gave a terrain. A material that the game inserted is not removed.
 #[derive(Component, Clone, Copy)]
 struct OwnMaterial(AssetId<GroundMaterial>);
 
@@ -138,12 +138,12 @@ fn add_materials(
     }
 }
 
-/// A terrain without a look has colours again.
+/// Restores vertex colours on a terrain that lost its look.
 fn thicken_vertices(gone: On<Remove, GroundLook>, mut commands: Commands) {
     commands.entity(gone.entity).try_remove::<SlimVertices>();
 }
 
-/// Takes the material of a terrain that has lost its look, and has no other one by now.
+/// Removes the material of a terrain that has lost its look and has no other material.
 fn remove_materials(
     mut commands: Commands,
     with_own: Query<(Entity, Option<&MeshMaterial3d<GroundMaterial>>, &OwnMaterial), Without<GroundLook>>,
@@ -166,8 +166,8 @@ fn follow(
     mut materials: ResMut<Assets<GroundMaterial>>,
 ) {
     for (look, place, material) in &looks {
-        // Bevy prepares the material and all tiles anew once it is touched, and a terrain's place counts as changed whenever
-        // anything below it moves.
+        // Bevy prepares the material and all tiles again once it is touched, and a terrain's transform counts as
+        // changed whenever anything below it moves.
         let (uniform, quality) = (GroundUniform::new(look, place), look.quality);
         let is_other = |material: &GroundMaterial| {
             material.extension.uniform != uniform || material.extension.quality != quality
@@ -182,7 +182,7 @@ fn follow(
     }
 }
 
-/// Was Bevy's renderer for materials added only after the ground?
+/// Whether Bevy's renderer for materials was added only after the ground.
 fn is_before_renderer(app: &App) -> bool {
     app.is_plugin_added::<PbrPlugin>() && !app.is_plugin_added::<MaterialPlugin<GroundMaterial>>()
 }
@@ -191,7 +191,7 @@ fn is_before_renderer(app: &App) -> bool {
 mod tests {
     use super::*;
 
-    /// Bevy knows plugins by their names.
+    /// Bevy identifies plugins by their names.
     struct Renderer;
 
     impl Plugin for Renderer {

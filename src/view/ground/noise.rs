@@ -1,7 +1,7 @@
-//! Noise that repeats: what textures without seams are made of.
+//! Periodic noise, for textures without seams.
 //!
-//! The `noise` crate has no periodic noise but by way of four dimensions, at several times the cost. Only `+ - * / sqrt`
-//! and integers, in a fixed order, so that every machine paints the same pictures.
+//! The `noise` crate has periodic noise only by way of four dimensions, at several times the cost. This module uses
+//! only `+ - * / sqrt` and integers in a fixed order, so every machine paints the same pictures.
 
 /// A number from a lattice point; the same bits everywhere.
 pub(super) fn hash(x: i32, y: i32, z: i32, seed: u32) -> u32 {
@@ -38,7 +38,7 @@ fn floor(at: f32) -> i32 {
     whole - i32::from(at < whole as f32)
 }
 
-/// What is left of lattice steps when periods are taken away. Most lie within the first one, and divisions are slow.
+/// Lattice steps modulo the period. Most lie within the first period, so this avoids slow divisions.
 fn wrap(at: i32, period: i32) -> i32 {
     if (0..period).contains(&at) { at } else { at.rem_euclid(period) }
 }

@@ -10,9 +10,9 @@ use super::bake::array;
 
 /// Most texels along a side.
 const MAX_SIDE: u32 = 4096;
-/// Most layers: what any graphics card takes, and as many as a `u8` can name.
+/// Most layers: the limit of any GPU, and the number of values of a `u8`.
 const MAX_ARRAY_LAYERS: usize = 256;
-/// How much sharper than usual slanting ground is filtered.
+/// Anisotropic filtering of slanting ground.
 const ANISOTROPY: u16 = 4;
 
 /// The pictures of one layer, as texture libraries have them. All are square, as large as those of the other layers, and
@@ -21,12 +21,12 @@ const ANISOTROPY: u16 = 4;
 pub struct GroundLayerImages {
     /// Colours in sRGB; heights in alpha, unless [`height`](Self::height) has them.
     pub albedo: Image,
-    /// Heights in red, 0 low to 255 high: what is higher is on top where layers meet. Without it, and with an albedo that
-    /// is opaque throughout, the layer lies flat at half height.
+    /// Heights in red, 0 low to 255 high: the higher layer is on top where layers meet. Without it, and with an albedo
+    /// that is opaque throughout, the layer lies flat at half height.
     pub height: Option<Image>,
     /// A normal map as [`StandardMaterial`] takes it, x right and y up; none is flat.
     pub normal: Option<Image>,
-    /// Is the normal map made for DirectX, with a green channel that points down?
+    /// Whether the normal map is made for DirectX, with a green channel that points down.
     pub flip_normal_map_y: bool,
     /// Occlusion in red, as glTF has it; none is no occlusion.
     pub occlusion: Option<Image>,
@@ -34,7 +34,7 @@ pub struct GroundLayerImages {
     pub roughness: Option<Image>,
 }
 
-/// Why pictures can't be packed into [`GroundArrays`].
+/// The reason why pictures can't be packed into [`GroundArrays`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GroundArraysError {
@@ -78,7 +78,7 @@ pub enum GroundArraysError {
         picture: &'static str,
         /// The layer's number.
         layer: usize,
-        /// What Bevy says.
+        /// Bevy's error.
         source: IntoDynamicImageError,
     },
 }
@@ -117,7 +117,7 @@ pub struct GroundArrays {
 impl GroundArrays {
     /// Packs the pictures of all layers, in the order of their numbers. Takes up to seconds, over all of rayon's threads:
     /// work for a task or a loading screen. Colours are averaged as light, normals keep their length. Samplers repeat,
-    /// with fourfold anisotropic filtering, without which software renderers go; both images can be given others.
+    /// with fourfold anisotropic filtering, which software renderers skip; both images can be given other samplers.
     ///
     /// # Errors
     ///
@@ -142,7 +142,7 @@ impl GroundArrays {
         })
     }
 
-    /// Adds both arrays to the images of the app: insert what comes back as a resource.
+    /// Adds both arrays to the images of the app. Insert the returned value as a resource.
     pub fn add_to(self, images: &mut Assets<Image>) -> GroundTextures {
         GroundTextures::Images { albedo: images.add(self.albedo), relief: images.add(self.relief) }
     }
@@ -166,7 +166,7 @@ fn pack_layer(
         }
         texels(image).map_err(|source| GroundArraysError::Unreadable { picture, layer, source })
     };
-    // No texels where there is no picture: nothing is laid over what is there.
+    // Without a picture there are no texels, so nothing is overwritten.
     let overlay = |picture, image: Option<Image>| image.map_or(Ok(vec![]), |image| read(picture, image));
     let mut albedo = read("albedo", images.albedo)?;
     // No heights are in an opaque albedo, and at 255 the layer would be on top of all others.
@@ -194,7 +194,7 @@ fn pack_layer(
 /// The bytes of a picture, four to a texel.
 fn texels(mut image: Image) -> Result<Texels, IntoDynamicImageError> {
     match image.texture_descriptor.format {
-        // The same bytes; Bevy's conversion knows them by one name only.
+        // Both formats have equal bytes; Bevy's conversion accepts only one of them.
         TextureFormat::Rgba8Unorm => image.texture_descriptor.format = TextureFormat::Rgba8UnormSrgb,
         // Bevy reads grey and alpha there, others red and green.
         format @ TextureFormat::Rg8Unorm => return Err(IntoDynamicImageError::UnsupportedFormat(format)),

@@ -8,7 +8,7 @@ use super::noise::{cells, chance, gradient, octaves, ridges, smooth};
 pub(super) struct Point {
     /// sRGB, 0 to 1.
     pub color: [f32; 3],
-    /// 0 low to 1 high, for relief, and for blending: what stands high stays on top.
+    /// 0 low to 1 high, for relief, and for blending: higher points stay on top.
     pub height: f32,
     /// Perceptual roughness.
     pub roughness: f32,
@@ -22,7 +22,7 @@ pub(super) struct Recipe {
     pub relief: f32,
     /// Metres that the picture covers.
     pub metres: f32,
-    /// What it shows at a place, both coordinates 0 to 1.
+    /// The point at a position, both coordinates from 0 to 1.
     pub paint: fn(f32, f32) -> Point,
     /// Blades or stones scattered over it.
     pub scatter: Option<Scatter>,
@@ -78,7 +78,7 @@ fn lit(color: [f32; 3], factor: f32) -> [f32; 3] {
 }
 
 /// Grey and craggy, with lichen. Joints are a matter of relief more than of colour, and most of them end somewhere: a net of
-/// dark lines is what an eye finds again wherever the layer repeats.
+/// dark lines would make the repetition of the layer visible.
 fn rock(u: f32, v: f32) -> Point {
     let (wu, wv) = (u + 0.06 * octaves(u, v, 4, 4, 11), v + 0.06 * octaves(u, v, 4, 4, 12));
     let crag = ridges(wu, wv, 3, 6, 13);
@@ -103,7 +103,7 @@ fn rock(u: f32, v: f32) -> Point {
     Point { color: lit(color, dark), height, roughness: 0.88 + 0.08 * grain }
 }
 
-/// What lies between the blades of grass.
+/// The soil between blades of grass.
 fn turf(u: f32, v: f32) -> Point {
     let clump = octaves(u, v, 10, 4, 21);
     let color = mix([0.12, 0.14, 0.06], [0.23, 0.24, 0.11], 0.5 + 0.5 * clump);
@@ -193,8 +193,8 @@ fn coal(u: f32, v: f32) -> Point {
     Point { color: lit(color, 0.5 + 0.5 * edge), height, roughness: 0.34 + 0.3 * name }
 }
 
-/// Nuggets and threads in dark quartz. The metal stands high and the stone low: where a vein thins out, the metal goes on
-/// for a while in whatever is around it.
+/// Nuggets and threads in dark quartz. The metal is high and the stone low, so where a vein thins out, the metal
+/// continues for a short distance into the surrounding material.
 fn gold(u: f32, v: f32) -> Point {
     let (tilt, edge, name) = facets(u, v, 8, 81);
     let (wu, wv) = (u + 0.07 * octaves(u, v, 4, 4, 85), v + 0.07 * octaves(u, v, 4, 4, 86));
@@ -296,7 +296,7 @@ fn sandstone(u: f32, v: f32) -> Point {
     Point { color: lit(color, 0.82 + 0.18 * ledge), height, roughness: 0.92 }
 }
 
-/// The same from above: grain, and here and there a sheet that is worn away.
+/// Sandstone from above: grain, and in some places a sheet that is worn away.
 fn sandstone_top(u: f32, v: f32) -> Point {
     let (sheet, middle) = sheets(u, v, 2.5, 131);
     let grain = octaves(u, v, 70, 3, 134);
@@ -331,7 +331,7 @@ fn shale(u: f32, v: f32) -> Point {
     }
 }
 
-/// The same from above: flakes.
+/// Shale from above: flakes.
 fn shale_top(u: f32, v: f32) -> Point {
     let (sheet, middle) = sheets(u, v, 6.0, 141);
     let flake = cells(u + 0.03 * octaves(u, v, 6, 4, 142), v + 0.03 * octaves(u, v, 6, 4, 143), 9, 144);

@@ -159,7 +159,7 @@ mod tests {
         let ground = extension(&app, terrain);
         assert_eq!(ground.uniform, GroundUniform::new(&GroundLook::default(), &place.into()));
         assert_eq!(extension(&app, debris), of_piece(&ground, &piece));
-        assert_eq!(count_changes(&mut app), 2, "the renderer is told in the same frame");
+        assert_eq!(count_changes(&mut app), 2, "the renderer sees the change in the same frame");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What tests of materials stand on: an app that draws nothing, with terrains that have a look.
+//! A test app for materials that draws nothing, with terrains that have a look.
 
 use bevy::prelude::*;
 
@@ -34,7 +34,7 @@ pub(super) fn spawn_terrain(app: &mut App) -> Entity {
     app.world_mut().spawn((terrain, GroundLook::default(), GlobalTransform::IDENTITY)).id()
 }
 
-/// What an entity is drawn with.
+/// The material of an entity.
 pub(super) fn extension(app: &App, of: Entity) -> GroundExtension {
     let material = app.world().get::<MeshMaterial3d<GroundMaterial>>(of).expect("it is dressed");
     let materials = app.world().resource::<Assets<GroundMaterial>>();

@@ -21,7 +21,8 @@ pub enum GroundTextures {
     /// The project's own, painted from noise in a task when the first [`GroundLook`](super::GroundLook) comes:
     /// 0 rock, 1 grass, 2 sand, 3 snow, 4 clay, 5 concrete, 6 coal, 7 gold, 8 soil, 9 sandstone, 10 shale, 11 gravel,
     /// 12 iron, 13 copper; 14 and 15 are 9 and 10 as they look from above, see [`GroundLayer::top`](super::GroundLayer::top).
-    /// The same bytes on every machine. They stay when the last look goes, so that the next one need not wait for them.
+    /// The bytes are equal on every machine. They are kept when the last look is removed, so the next one need not
+    /// wait.
     Baked {
         /// Texels along a side: a power of two from 16 to 2048, else the next larger one.
         side: u32,
@@ -30,7 +31,7 @@ pub enum GroundTextures {
     },
     /// A game's own: two arrays with one layer for each material id, alike in number and size, with mip levels and
     /// samplers that repeat. [`GroundArrays`](super::GroundArrays) makes them of ordinary pictures;
-    /// a warning tells of arrays that differ, or have fewer layers than a look names.
+    /// a warning is logged if arrays differ, or have fewer layers than a look names.
     ///
     /// Images that can't be loaded, or are no arrays that can be filtered, are not used: see [`GroundLoading::failure`].
     ///
@@ -50,7 +51,8 @@ impl Default for GroundTextures {
     }
 }
 
-/// How far the textures are; for a progress bar. It counts as changed when one of its answers does.
+/// The progress of the textures, for a progress bar. Change detection reports it when one of its methods returns
+/// another value.
 #[derive(Resource, Default)]
 pub struct GroundLoading {
     meter: Meter,
@@ -59,13 +61,13 @@ pub struct GroundLoading {
     wanted: Option<GroundTextures>,
     baked: Option<[Handle<Image>; 3]>,
     pub(super) ready: Option<Textures>,
-    /// Are those the ones that were wanted last?
+    /// Whether `ready` has the textures that the settings ask for.
     is_current: bool,
     /// Whether usable images were there at the last check.
     was_sound: bool,
-    /// Why there were none.
+    /// The reason why there were none.
     failure: Option<GroundTexturesError>,
-    /// What was odd about them.
+    /// A warning about usable images.
     misfit: Option<ArrayMismatch>,
     /// The state that change detection last reported.
     told: Answers,
@@ -81,7 +83,7 @@ impl fmt::Debug for GroundLoading {
     }
 }
 
-/// What can be asked of [`GroundLoading`].
+/// The values that [`GroundLoading`] returns.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Answers {
     progress: f32,
@@ -89,17 +91,17 @@ struct Answers {
     failure: Option<String>,
 }
 
-/// What materials are made with.
+/// The images of a material.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Textures {
     pub albedo: Handle<Image>,
     pub relief: Handle<Image>,
     pub noise: Handle<Image>,
-    /// Are the samplers of albedo and relief unused?
+    /// Whether the sampler of the noise replaces those of albedo and relief.
     pub without_anisotropy: bool,
 }
 
-/// What draws the ground.
+/// The renderer that draws the ground.
 #[derive(Clone, Copy)]
 struct Renderer {
     features: WgpuFeatures,
@@ -118,20 +120,20 @@ impl Renderer {
 }
 
 impl GroundLoading {
-    /// From 0 (nothing asked for, or just begun) to 1 (terrains are dressed). While other textures are made, terrains keep
-    /// those they have, and this begins anew. After a [`failure`](Self::failure) it never gets to 1.
+    /// From 0 (nothing requested, or just started) to 1 (all terrains are textured). While other textures are made,
+    /// terrains keep the old ones, and this starts again at 0. After a [`failure`](Self::failure) it never reaches 1.
     pub fn progress(&self) -> f32 {
         if self.is_current { 1.0 } else { self.meter.progress().min(0.99) }
     }
 
-    /// Are the textures there, and terrains dressed with them? Not any more when a game removes the images of its own.
+    /// Whether the textures are there and applied to terrains. No longer `true` if a game removes its own images.
     pub fn is_ready(&self) -> bool {
         self.is_current
     }
 
-    /// Why a game's own images are not used: a loading screen that waits for them waits in vain. Terrains keep the
-    /// textures they have; those that have none get the project's own, as coarse as can be. It is told until
-    /// [`GroundTextures`] are changed, or the images are; a warning tells it too.
+    /// The reason why a game's own images are not used. A loading screen should stop waiting for them then. Terrains
+    /// keep their textures; terrains without textures get this crate's own at the lowest resolution. It is returned
+    /// until [`GroundTextures`] or the images change; a warning is logged too.
     ///
     /// ```
     /// # use bevy::prelude::*;
@@ -151,7 +153,7 @@ impl GroundLoading {
         Answers { progress: self.progress(), is_ready: self.is_ready(), failure }
     }
 
-    /// Remembers why images are not used, and tells it once.
+    /// Records why images are not used, and logs it once.
     fn fail(&mut self, failure: GroundTexturesError) {
         (self.is_current, self.was_sound) = (false, false);
         if self.failure.as_ref().is_none_or(|told| told.to_string() != failure.to_string()) {
@@ -203,7 +205,7 @@ impl GroundLoading {
         let Some([albedo, relief, noise]) = self.baked.clone() else { return };
         let read = |albedo: Handle<Image>, relief: Handle<Image>| {
             let filters = [&albedo, &relief].map(|image| images.get(image).is_some_and(is_anisotropic));
-            // Lavapipe filters anisotropically by explicit gradients in minutes, if it ever comes to an end.
+            // Lavapipe takes minutes for anisotropic filtering with explicit gradients, if it finishes at all.
             let without_anisotropy = renderer.is_software && filters.contains(&true);
             Textures { albedo, relief, noise: noise.clone(), without_anisotropy }
         };
@@ -212,7 +214,7 @@ impl GroundLoading {
             GroundTextures::Baked { .. } => baked.clone(),
             GroundTextures::Images { albedo, relief } => read(albedo.clone(), relief.clone()),
         };
-        // In every frame, since images may change: what is drawn with unfit ones would end the app.
+        // In every frame, since images may change, and drawing with invalid ones would end the app.
         let find = |name, handle: &Handle<Image>| match (images.get(handle), server) {
             (Some(image), _) => layers(name, image, renderer.features).map(Some),
             (None, Some(server)) => match server.load_state(handle) {
@@ -227,8 +229,8 @@ impl GroundLoading {
         match find_both(&textures) {
             Ok(Some((albedo, relief))) => {
                 self.failure = None;
-                // The renderer takes up images and materials in any order: one that was mended just now may still be there
-                // as it was before.
+                // The renderer takes over images and materials in any order: it may still have the old version of an
+                // image that was repaired in this frame.
                 if !std::mem::replace(&mut self.was_sound, true) {
                     return;
                 }
@@ -244,7 +246,7 @@ impl GroundLoading {
                     self.ready = Some(textures);
                 }
             }
-            // Still to come, or taken away.
+            // Not loaded yet, or removed.
             Ok(None) => (self.is_current, self.was_sound, self.failure) = (false, false, None),
             Err(failure) => {
                 if self.ready.as_ref().is_none_or(|worn| find_both(worn).is_err()) {
@@ -255,10 +257,10 @@ impl GroundLoading {
         }
     }
 
-    /// Begins with other textures.
+    /// Starts to make other textures.
     fn begin(&mut self, settings: &GroundTextures) {
         self.wanted = Some(settings.clone());
-        // Noise is needed in any case; with a game's own images the layers are baked as small as can be.
+        // Noise is needed in any case; with a game's own images the layers are baked at the smallest size.
         let (side, anisotropy) = match settings {
             GroundTextures::Baked { side, anisotropy } => {
                 (side.clamp(&16, &2048).next_power_of_two(), *anisotropy)
@@ -286,7 +288,7 @@ mod tests {
     /// Painted fast.
     const SMALL: GroundTextures = GroundTextures::Baked { side: 16, anisotropy: 1 };
 
-    /// An app that draws nothing, with somebody who looks.
+    /// An app that draws nothing, with a terrain that has a look.
     fn app() -> App {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, AssetPlugin::default()))
@@ -317,7 +319,7 @@ mod tests {
         app.world_mut().resource_mut::<Assets<Image>>().add(image)
     }
 
-    /// The same as [`load_textures`], drawn by the processor.
+    /// Runs [`load_textures`] as on a software renderer.
     fn load_in_software(
         mut loading: ResMut<GroundLoading>,
         settings: Res<GroundTextures>,
@@ -370,7 +372,7 @@ mod tests {
         }
     }
 
-    /// From now on it is seen as this.
+    /// Sets the view dimension of an image.
     fn see(app: &mut App, image: &Handle<Image>, dimension: TextureViewDimension) {
         let mut images = app.world_mut().resource_mut::<Assets<Image>>();
         let mut image = images.get_mut(image).expect("an image");
@@ -404,7 +406,7 @@ mod tests {
         app.update();
         assert!(loading(&app).is_ready() && uses(&app, &albedo));
 
-        // Loaded anew, say.
+        // As if the image was loaded again.
         see(&mut app, &relief, TextureViewDimension::D2);
         app.update();
         assert!(loading(&app).failure().is_some() && !loading(&app).is_ready() && !uses(&app, &albedo));
@@ -431,7 +433,7 @@ mod tests {
         update_until(&mut app, "textures", GroundLoading::is_ready);
     }
 
-    /// Two images that can be drawn with, worn.
+    /// Two usable images that are applied to a terrain.
     fn use_own(app: &mut App) -> [Handle<Image>; 2] {
         let own = [(); 2].map(|()| add(app, Image::default()));
         own.iter().for_each(|image| see(app, image, TextureViewDimension::D2Array));
@@ -459,7 +461,7 @@ mod tests {
         assert!(loading(&app).is_ready() && uses(&app, &albedo));
     }
 
-    /// How often somebody who watches was told of a change.
+    /// The number of changes that change detection reported.
     #[derive(Resource, Default)]
     struct Told(usize);
 
@@ -483,7 +485,7 @@ mod tests {
         let [albedo, relief] = [(); 2].map(|()| add(&mut app, Image::default()));
         app.insert_resource(GroundTextures::Images { albedo, relief });
         app.update();
-        assert_eq!(told(&app), before + 1, "it begins anew");
+        assert_eq!(told(&app), before + 1, "it starts again");
         update_until(&mut app, "a failure", |loading| loading.failure().is_some());
         let before = told(&app);
         app.update();

@@ -91,9 +91,9 @@ fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, 
 struct Tour {
     film: FrameRecorder,
     bar: ProgressBar,
-    /// Do scenes fade?
+    /// Whether scenes fade.
     fades: bool,
-    /// Is the next scene the first one?
+    /// Whether the next scene is the first one.
     is_first: bool,
 }
 

@@ -100,7 +100,7 @@ fn reset_asks_first() {
         click(&mut app, answer);
         assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Controls);
         assert_eq!(app.world().resource::<Settings>().bindings == default(), answer == 1);
-        // What was said before the question is gone.
+        // The text before the question is gone.
         assert!(crate::ui::menu::words(&mut app).contains(&texts::CHOOSE_ACTION.into()));
     }
 }

@@ -30,7 +30,7 @@ pub enum Field {
     Seed,
 }
 
-/// What is typed of a world, until it is created or renamed.
+/// The input for a world that is being created or renamed.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Draft {
     pub name: String,

@@ -49,9 +49,9 @@ impl Plugin for TitlePlugin {
 
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct Start {
-    /// Is there a game to continue?
+    /// Whether there is a game to continue.
     has_begun: bool,
-    /// Does the player want to start as soon as the landscape has loaded?
+    /// Whether the player wants to start as soon as the landscape has loaded.
     pub is_wanted: bool,
 }
 
@@ -209,7 +209,7 @@ fn show_progress(
     }
 }
 
-/// What is done, and how much of it where that is known.
+/// The text of a running task, with its progress if that is known.
 fn progress_text(words: &str, share: f32) -> String {
     if share < 1.0 { format!("{words}: {:.0} %", 100.0 * share) } else { format!("{words} ...") }
 }

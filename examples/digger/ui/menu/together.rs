@@ -62,7 +62,7 @@ fn change_host(
     mut start: ResMut<Start>,
 ) {
     *party = if *party == Party::Alone { Party::Host(PORT) } else { Party::Alone };
-    // What is hosted is saved, also if nothing was played yet.
+    // A hosted world is saved, also if no world was played yet.
     if *party != Party::Alone && played.0.is_none() {
         played.0 = saves::new_name().and_then(|name| saves::create(&name, 0).ok());
     }

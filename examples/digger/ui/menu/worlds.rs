@@ -47,7 +47,7 @@ struct FirstShown(usize);
 #[derive(Resource)]
 struct Chosen(PathBuf);
 
-/// What is done with a world as soon as it is closed.
+/// The action on a world as soon as it is closed.
 #[derive(Resource, Clone, Debug)]
 enum Change {
     Delete(PathBuf),

@@ -29,7 +29,7 @@ const MANY: usize = 128;
 /// memory.
 const COPIED: usize = 256;
 
-/// The same limit in jobs: many edits of few bricks also write long lists, whose length only the device
+/// [`COPIED`] as a number of jobs: many edits of few bricks also write long lists, whose length only the device
 /// knows.
 const COPIED_JOBS: usize = 1 << 12;
 

@@ -1,4 +1,4 @@
-//! Are two of a kind the same, bit for bit?
+//! Compares values of one type bit by bit.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

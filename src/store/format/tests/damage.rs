@@ -1,4 +1,4 @@
-//! Damage: flips, cuts, swaps and stale records are told; nothing is ever silently different.
+//! Damage: flips, cuts, swaps and stale records are detected; nothing is ever silently different.
 
 use fastrand::Rng;
 
@@ -75,7 +75,7 @@ fn damaged_files_are_told() {
             Err(_) => told += 1,
         }
     }
-    println!("{told} damaged files were told");
+    println!("damage of {told} files was detected");
 }
 
 #[test]

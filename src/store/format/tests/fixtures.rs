@@ -1,4 +1,4 @@
-//! Files of each schema that were written once: they can be read for good, and are written like that today.
+//! Stored files of each schema: they can still be read, and are still written with the same bytes.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -57,7 +57,7 @@ fn written() -> (PortableWorld, Vec<u8>, LevelFiles) {
     (portable, file, write_level(&level).expect("a valid level"))
 }
 
-/// Writes the files anew: only when a schema is not released yet.
+/// Writes the files again: only while a schema is not released yet.
 #[test]
 #[ignore = "writes the fixtures"]
 fn write_fixtures() {

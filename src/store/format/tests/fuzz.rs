@@ -125,7 +125,7 @@ fn frames() {
 
 const LIMIT: usize = Limits::FORMAT.head;
 
-/// The same file with a right checksum for its changed head, and with the frames that it had.
+/// The file with a correct checksum for its changed head, and with its old frames.
 fn resealed(file: &[u8], kind: Kind, own: &[u8]) -> Vec<u8> {
     let container = container::read(kind, file, LIMIT).unwrap();
     let frames: Vec<Vec<u8>> = container.frames.iter().map(|frame| frame.to_vec()).collect();

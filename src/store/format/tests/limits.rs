@@ -1,4 +1,4 @@
-//! What would be too large to be read is not written, and everything else is.
+//! Data that would be too large to read is not written, and all other data is.
 
 use fastrand::Rng;
 

@@ -1,4 +1,4 @@
-//! Laws of the formats: what is written can be read again, bit for bit; what is damaged is told; nothing panics.
+//! Laws of the formats: written data can be read again, bit for bit; damage is detected; nothing panics.
 
 mod compare;
 mod damage;

@@ -1,4 +1,4 @@
-//! What is written comes back, bit for bit.
+//! Reading returns the written data, bit for bit.
 
 use std::sync::Arc;
 

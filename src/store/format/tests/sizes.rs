@@ -1,4 +1,4 @@
-//! How many bytes worlds take.
+//! The sizes of saved worlds in bytes.
 
 use super::worlds;
 use crate::store::format::Batch;

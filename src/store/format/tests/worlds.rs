@@ -1,4 +1,4 @@
-//! Worlds to save.
+//! Test worlds to save.
 
 use std::sync::Arc;
 
@@ -75,7 +75,7 @@ pub fn crater(ground: &Ground) -> Vec<Brush> {
     vec![Brush::dig(Shape::sphere(surface(ground, middle, middle), 28.0))]
 }
 
-/// The same with all kinds of brushes and materials.
+/// Brushes of all kinds with all materials.
 pub fn mixed(ground: &Ground, count: usize, seed: u64) -> Vec<Brush> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let side = ground.width() as f32 - 24.0;
