@@ -312,6 +312,7 @@
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking character; debris | |
 //! | `store` | worlds on disk: a commit journal, checkpoints, portable files | |
 //! | `net` | multiplayer: a server and clients without a transport | |
+//! | `import` | heights from TIFF and EXR files | |
 //! | `picking` | Bevy's pointer events on the ground, with the `TerrainHit` as extra data | |
 //! | `replicon` | multiplayer over bevy_replicon | |
 //! | `egui` | the panel: brush, settings, live figures | |
