@@ -9,9 +9,9 @@ use bevy::ecs::query::Allow;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::components::{EXIT_WAIT, SavedWorld, WorldStore};
+use super::components::{EXIT_WAIT, SavedWorld, Unopened, WorldStore};
 use super::messages::{ClosedBecause, StoreTroubleFound, WorldClosed, WorldOpened};
-use super::opening::{OpeningWorld, Unopened};
+use super::opening::OpeningWorld;
 use super::saving::follow_same;
 use crate::store::{ClosingStore, Store, StoreError};
 use crate::terrain::Terrain;

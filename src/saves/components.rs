@@ -3,10 +3,15 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use bevy::ecs::lifecycle::HookContext;
+use bevy::ecs::world::DeferredWorld;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::messages::ClosedBecause;
+use crate::plugin::Held;
 use crate::store::{BaseChanged, SavePoint, Store, StoreOptions};
+use crate::terrain::Terrain;
 
 /// The longest time that an exiting app waits for the disk.
 pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
@@ -24,7 +29,7 @@ pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
 /// | a `Terrain` over the same ground, of the same size | that is another state of the same world, and takes the place of what was saved |
 /// | a `SharedTerrain` | the world is closed, and this component removed: the server saves what players share |
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
-#[component(on_insert = super::opening::hold)]
+#[component(on_insert = hold)]
 #[reflect(Component)]
 pub struct SavedWorld {
     /// The folder, for this world alone. It is made if it is missing, with those around it.
@@ -105,4 +110,80 @@ impl WorldStore {
     pub fn get(&self, key: &str) -> Option<&[u8]> {
         self.store.as_ref()?.get(key)
     }
+}
+
+/// The plugin that opens and saves worlds is there.
+#[derive(Resource)]
+pub(super) struct SavesWorlds;
+
+/// Without the plugin a terrain would be held for ever, and nothing would say why.
+pub(super) fn warn_without_plugin(world: &DeferredWorld, component: &str) {
+    if world.get_resource::<SavesWorlds>().is_none() {
+        error!("a {component} holds its terrain until there is a SavePlugin: add BurrowPlugins");
+    }
+}
+
+/// A world that nobody has begun to read.
+#[derive(Component)]
+pub(super) struct Unopened {
+    pub since: Instant,
+    /// Whether it was logged that there is no terrain.
+    pub told: bool,
+    /// What the world was to be read for before its terrain was removed.
+    pub level: Option<LevelId>,
+}
+
+impl Unopened {
+    pub fn new(level: Option<LevelId>) -> Self {
+        Self { since: Instant::now(), told: false, level }
+    }
+}
+
+/// What tells a level from others: its ground and its sizes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LevelId {
+    ground: u64,
+    size: (i32, i32),
+    pub chunk_size: u32,
+    pub voxel_size: f32,
+}
+
+impl LevelId {
+    pub fn of(terrain: &Terrain) -> Self {
+        let (ground, grid) = (terrain.world().ground(), terrain.world().grid());
+        Self {
+            ground: ground.hash(),
+            size: (ground.width(), ground.depth()),
+            chunk_size: grid.size().cast_unsigned(),
+            voxel_size: terrain.voxel_size(),
+        }
+    }
+}
+
+/// A terrain is [`Held`] by this module, and not by the game.
+#[derive(Component)]
+pub(super) struct HeldHere;
+
+/// Holds a terrain; what is under way on it is done later.
+pub(super) fn hold_now(entity: &mut EntityWorldMut) {
+    if let Some(mut terrain) = entity.get_mut::<Terrain>() {
+        terrain.abandon();
+    }
+    if !entity.contains::<Held>() {
+        entity.insert((Held, HeldHere));
+    }
+}
+
+/// Holds a terrain until its world is read. What is under way on it is done on the world that was read.
+///
+/// This is a hook, so that it comes before whatever observers do with the component, and looks whether the component is still there.
+fn hold(mut world: DeferredWorld, context: HookContext) {
+    warn_without_plugin(&world, "SavedWorld");
+    world.commands().queue(move |world: &mut World| {
+        let Ok(mut entity) = world.get_entity_mut(context.entity) else { return };
+        if entity.contains::<SavedWorld>() {
+            entity.insert(Unopened::new(None));
+            hold_now(&mut entity);
+        }
+    });
 }

@@ -14,8 +14,8 @@ use bevy::ecs::world::DeferredWorld;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::components::WorldStore;
-use super::opening::{hold_now, release};
+use super::components::{WorldStore, hold_now, warn_without_plugin};
+use super::opening::release;
 use crate::plugin::{ThreadTask, Threads, free_later};
 use crate::store::{FormatError, Level, LevelFiles, RestoreLevelError, pack_level, read_level, unpack_level};
 use crate::terrain::{Terrain, Version};
@@ -171,7 +171,7 @@ impl FindLevel<'_> {
 
 /// Holds a terrain until its level is loaded.
 pub(super) fn hold(mut world: DeferredWorld, context: HookContext) {
-    super::warn_without_plugin(&world, "StartLevel");
+    warn_without_plugin(&world, "StartLevel");
     // A world that is closed with the same insertion is closed by then.
     world.commands().queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(context.entity) else { return };

@@ -31,7 +31,6 @@ pub use messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldClosed, World
 pub use opening::OpeningWorld;
 pub(crate) use opening::{ReadWorld, WorldReader};
 
-use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
 
 use crate::plugin::{BeforeLoad, BurrowSystems};
@@ -53,6 +52,8 @@ impl Plugin for SavePlugin {
             .add_message::<WorldClosed>()
             .add_message::<StoreTroubleFound>()
             .init_resource::<closing::ClosingWorlds>()
+            .insert_resource(components::SavesWorlds)
+            .add_observer(opening::begin_anew)
             .add_observer(opening::give_up)
             .add_observer(opening::read_anew)
             .add_observer(opening::wait_for_terrain)
@@ -83,12 +84,5 @@ impl Plugin for SavePlugin {
         if app.world().contains_resource::<AssetServer>() {
             app.init_asset::<BurrowLevel>().init_asset_loader::<LevelLoader>();
         }
-    }
-}
-
-/// Without the plugin a terrain would be held for ever, and nothing would say why.
-fn warn_without_plugin(world: &DeferredWorld, component: &str) {
-    if world.get_resource::<closing::ClosingWorlds>().is_none() {
-        error!("a {component} holds its terrain until there is a SavePlugin: add BurrowPlugins");
     }
 }

@@ -4,14 +4,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy::ecs::entity_disabling::Disabled;
-use bevy::ecs::lifecycle::HookContext;
 use bevy::ecs::query::Allow;
-use bevy::ecs::world::DeferredWorld;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::closing::{ClosingWorlds, detach};
-use super::components::{SavedWorld, WorldStore};
+use super::components::{HeldHere, LevelId, SavedWorld, Unopened, WorldStore, hold_now};
 use super::level::{BurrowLevel, FindLevel, MakingLevel, StartLevel, Waiting};
 use super::messages::{ClosedBecause, StoreTroubleFound, WorldOpened};
 use crate::ground::Ground;
@@ -30,47 +28,6 @@ const LOG_BYTES: usize = 64 << 20;
 
 /// How long a component waits for a terrain before that is logged.
 const TERRAIN_TOLD: Duration = Duration::from_secs(10);
-
-/// A world that nobody has begun to read.
-#[derive(Component)]
-pub(super) struct Unopened {
-    since: Instant,
-    /// Whether it was logged that there is no terrain.
-    told: bool,
-    /// What the world was to be read for before its terrain was removed.
-    level: Option<LevelId>,
-}
-
-impl Unopened {
-    fn new(level: Option<LevelId>) -> Self {
-        Self { since: Instant::now(), told: false, level }
-    }
-}
-
-/// What tells a level from others: its ground and its sizes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct LevelId {
-    ground: u64,
-    size: (i32, i32),
-    chunk_size: u32,
-    voxel_size: f32,
-}
-
-impl LevelId {
-    fn of(terrain: &Terrain) -> Self {
-        let (ground, grid) = (terrain.world().ground(), terrain.world().grid());
-        Self {
-            ground: ground.hash(),
-            size: (ground.width(), ground.depth()),
-            chunk_size: grid.size().cast_unsigned(),
-            voxel_size: terrain.voxel_size(),
-        }
-    }
-}
-
-/// A terrain is [`Held`] by this module, and not by the game.
-#[derive(Component)]
-struct HeldHere;
 
 /// The world of a [`SavedWorld`] is being read; the plugin inserts it and takes it away.
 #[derive(Component)]
@@ -232,18 +189,9 @@ impl WorldReader {
     }
 }
 
-/// Holds a terrain until its world is read. What is under way on it is done on the world that was read.
-///
-/// This is a hook, so that it comes before whatever observers do with the component, and looks whether the component is still there.
-pub(super) fn hold(mut world: DeferredWorld, context: HookContext) {
-    super::warn_without_plugin(&world, "SavedWorld");
-    world.commands().queue(move |world: &mut World| {
-        let Ok(mut entity) = world.get_entity_mut(context.entity) else { return };
-        if entity.contains::<SavedWorld>() {
-            entity.remove::<OpeningWorld>().insert(Unopened::new(None));
-            hold_now(&mut entity);
-        }
-    });
+/// A world that is to be read is not being read for what was there before.
+pub(super) fn begin_anew(new: On<Insert, Unopened>, mut commands: Commands) {
+    commands.entity(new.entity).try_remove::<OpeningWorld>();
 }
 
 /// A component that the game has changed in its place is like another one that was inserted: what it named before is closed.
@@ -259,16 +207,6 @@ pub(super) fn follow_changed(
         if before.is_some_and(|before| before != saved) {
             commands.entity(entity).try_insert(saved.clone());
         }
-    }
-}
-
-/// Holds a terrain, with what is under way on it.
-pub(super) fn hold_now(entity: &mut EntityWorldMut) {
-    if let Some(mut terrain) = entity.get_mut::<Terrain>() {
-        terrain.abandon();
-    }
-    if !entity.contains::<Held>() {
-        entity.insert((Held, HeldHere));
     }
 }
 
@@ -314,7 +252,7 @@ fn read_again(commands: &mut Commands, entity: Entity) {
         };
         let id = opening.reader.id;
         if id == LevelId::of(terrain) {
-            entity.remove::<OpeningWorld>().insert(Unopened::new(Some(id)));
+            entity.insert(Unopened::new(Some(id)));
         } else {
             detach(&mut entity, ClosedBecause::OtherTerrain);
         }
