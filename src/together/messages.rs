@@ -16,10 +16,10 @@ const OVERHEAD: usize = 16;
 /// From a client to the server.
 #[derive(Message, Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum FromPlayer {
-    /// What the client says.
-    Bytes(Vec<u8>),
-    /// Nobody digs there any more.
-    Left,
+    /// What the client says to the server of this [run](Served::run).
+    Bytes(u32, Vec<u8>),
+    /// Nobody digs there any more, who was invited in this run.
+    Left(u32),
     /// The message was longer than any may be, and was not kept.
     #[serde(skip)]
     TooLong,
@@ -40,7 +40,7 @@ pub(super) struct Invitation(pub Option<Served>);
 /// Which ground is served, and in which run of a server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Served {
-    pub run: u64,
+    pub run: u32,
     pub ground: GroundId,
 }
 
@@ -53,7 +53,14 @@ pub(super) struct GroundId {
 
 impl Served {
     pub fn by(server: &Server) -> Self {
-        Self { run: server.epoch().run, ground: GroundId::of(server.terrain().world()) }
+        Self { run: server.epoch().run as u32, ground: GroundId::of(server.terrain().world()) }
+    }
+}
+
+impl FromPlayer {
+    /// Whether it was said to the server of another run than this one. It may arrive after that server was replaced.
+    pub fn is_for_another(&self, run: u32) -> bool {
+        matches!(self, Self::Bytes(own, _) | Self::Left(own) if *own != run)
     }
 }
 

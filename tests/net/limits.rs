@@ -146,7 +146,8 @@ impl Play {
     }
 }
 
-/// What the server holds more after frames in which a client digs, and fetches regions or not; it acknowledges nothing.
+/// What the server holds more after ten seconds in which a client digs, and fetches regions or not; it acknowledges nothing, and yet all
+/// of its edits are done.
 fn held(fetches: bool) -> i64 {
     let ground = flat(512);
     let mut dug = terrain(&ground);
@@ -156,7 +157,7 @@ fn held(fetches: bool) -> i64 {
     let mut now = BEGIN;
     let_in(&mut server, ONE, &ground, now);
     let held = measure(|| {
-        for own in 1..=300 {
+        for own in 1..=600 {
             let brush = [ball(256.0, 256.0, 1.0), Brush::add(ball(256.0, 256.0, 1.0).shape, MaterialId(1))];
             send(&mut server, ONE, own, vec![edit(&brush[own as usize % 2])], now);
             if fetches {

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use super::Server;
 use super::sender::Snapshot;
-use super::session::Session;
 use crate::net::message::{Hello, Lane, Terms, ToClient};
 
 /// Clients get a world that is so old, and entries after it.
@@ -48,7 +47,7 @@ impl Server {
     pub(super) fn drop_stuck(&mut self, now: Duration) {
         for (client, session) in &mut self.sessions {
             if session.is_stuck(now, self.applied) {
-                *session = Session::new(&self.settings, now);
+                session.begin_again(&self.settings, now);
                 self.figures.stuck += 1;
                 self.outgoing.retain(|(to, ..)| to != client);
                 self.outgoing.push((*client, Lane::Order, ToClient::Greet.to_bytes()));
