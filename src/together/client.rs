@@ -202,7 +202,9 @@ impl Turn<'_, '_> {
         }
         self.hand_over(link, &mut client, standing);
         if link.greeted.is_some() {
-            messages.write_batch(client.take_outgoing().into_iter().map(FromPlayer::Bytes));
+            let run = link.run;
+            messages
+                .write_batch(client.take_outgoing().into_iter().map(|bytes| FromPlayer::Bytes(run, bytes)));
         }
         link.inbox.drain(..).for_each(|(lane, bytes)| client.receive(lane, bytes));
         link.facts.number = client.number();
@@ -246,13 +248,14 @@ fn change_server(
 ) {
     link.inbox.clear();
     link.greeted = invitation;
-    if invitation.is_some() {
+    if let (Some(_), Service::Served(served, _)) = (invitation, service) {
+        link.run = served.run;
         client.connect(link.start.elapsed());
         (link.was_served, link.kicked) = (true, None);
     } else {
         client.disconnect();
         if service != Service::Apart {
-            messages.write(FromPlayer::Left);
+            messages.write(FromPlayer::Left(link.run));
         }
     }
 }
@@ -337,7 +340,7 @@ impl Answers<'_> {
         (0..link.undos)
             .for_each(|_| self.stepped(terrain, HistoryStep::Undo, Err(HistoryRejection::Refused)));
         if link.greeted.is_some() {
-            messages.write(FromPlayer::Left);
+            messages.write(FromPlayer::Left(link.run));
         }
         // It holds a world.
         free_later(link);
@@ -426,11 +429,12 @@ pub(super) fn send_last(
                 Ask::Step(HistoryStep::Redo) => {}
             }
         }
+        let run = link.run;
         messages.write_batch(
-            client
-                .take_outgoing()
-                .into_iter()
-                .map(|bytes| FromClient { client_id: ClientId::Server, message: FromPlayer::Bytes(bytes) }),
+            client.take_outgoing().into_iter().map(|bytes| FromClient {
+                client_id: ClientId::Server,
+                message: FromPlayer::Bytes(run, bytes),
+            }),
         );
     }
 }

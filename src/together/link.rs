@@ -32,6 +32,8 @@ pub(super) struct Link {
     pub ground: GroundId,
     /// The invitation of the server that the client has greeted; `None` while there is none to greet.
     pub greeted: Option<u64>,
+    /// The [run](super::messages::Served::run) of the server that it has greeted last.
+    pub run: u32,
     /// Whether there was one.
     pub was_served: bool,
     /// The server of this invitation has sent the player away.
@@ -136,6 +138,7 @@ impl Link {
             task,
             ground,
             greeted: None,
+            run: 0,
             was_served: false,
             kicked: None,
             inbox: Vec::new(),

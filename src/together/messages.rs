@@ -17,10 +17,10 @@ const OVERHEAD: usize = 16;
 /// From a client to the server.
 #[derive(Message, Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum FromPlayer {
-    /// A message of the client.
-    Bytes(Vec<u8>),
-    /// The player has left.
-    Left,
+    /// A message of the client to the server of this [run](Served::run).
+    Bytes(u32, Vec<u8>),
+    /// The player, who was invited in this run, has left.
+    Left(u32),
     /// The message was longer than any may be, and was not kept.
     #[serde(skip)]
     TooLong,
@@ -41,7 +41,7 @@ pub(super) struct Invitation(pub Option<Served>);
 /// The served ground, and the run of its server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Served {
-    pub run: u64,
+    pub run: u32,
     pub ground: GroundId,
 }
 
@@ -54,7 +54,14 @@ pub(super) struct GroundId {
 
 impl Served {
     pub fn by(server: &Server) -> Self {
-        Self { run: server.epoch().run, ground: GroundId::of(server.terrain().world()) }
+        Self { run: server.epoch().run as u32, ground: GroundId::of(server.terrain().world()) }
+    }
+}
+
+impl FromPlayer {
+    /// Whether it was said to the server of another run than this one. It may arrive after that server was replaced.
+    pub fn is_for_another(&self, run: u32) -> bool {
+        matches!(self, Self::Bytes(own, _) | Self::Left(own) if *own != run)
     }
 }
 

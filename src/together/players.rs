@@ -67,10 +67,10 @@ impl Players {
     /// Handles a message of a player.
     pub fn hear(&mut self, player: net::ClientId, client: ClientId, message: &FromPlayer) -> Said {
         let said = match message {
-            FromPlayer::Left if self.clients.remove(&player).is_some() => Said::Leaves,
-            FromPlayer::Left => return Said::Nothing,
+            FromPlayer::Left(_) if self.clients.remove(&player).is_some() => Said::Leaves,
+            FromPlayer::Left(_) => return Said::Nothing,
             // One that was too long is counted as an invalid message.
-            FromPlayer::Bytes(_) | FromPlayer::TooLong => {
+            FromPlayer::Bytes(..) | FromPlayer::TooLong => {
                 let earlier = self.clients.insert(player, client);
                 let begins = earlier != Some(client);
                 if let Some(earlier) = earlier.filter(|_| begins).and_then(|earlier| earlier.entity()) {
@@ -78,7 +78,8 @@ impl Players {
                     self.kicked.insert(earlier);
                     self.replaced.push(earlier);
                 }
-                let bytes = if let FromPlayer::Bytes(bytes) = message { bytes.clone() } else { Vec::new() };
+                let bytes =
+                    if let FromPlayer::Bytes(_, bytes) = message { bytes.clone() } else { Vec::new() };
                 Said::Bytes { begins, bytes }
             }
         };

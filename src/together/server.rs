@@ -241,7 +241,12 @@ impl GroundServer {
         let is_open = matches!(self.work, Work::Here(_) | Work::UnderWay(_));
         let mut said = Vec::new();
         for FromClient { client_id, message } in self.read.read(messages) {
-            if is_open && let Some(number) = self.players.find(*client_id, clients) {
+            // What was said to another server says nothing to this one: its ground may be another.
+            let is_ours = self.served.is_some_and(|served| !message.is_for_another(served.run));
+            if is_open
+                && is_ours
+                && let Some(number) = self.players.find(*client_id, clients)
+            {
                 said.push((number, self.players.hear(number, *client_id, message)));
             }
         }

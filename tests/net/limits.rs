@@ -147,8 +147,8 @@ impl Play {
     }
 }
 
-/// Additional bytes that the server holds after a client has dug for some frames, with or without fetching regions. It
-/// acknowledges nothing.
+/// Additional bytes that the server holds after ten seconds in which a client digs, with or without fetching regions. It
+/// acknowledges nothing, and yet all of its edits are done.
 fn held(fetches: bool) -> i64 {
     let ground = flat(512);
     let mut dug = terrain(&ground);
@@ -158,7 +158,7 @@ fn held(fetches: bool) -> i64 {
     let mut now = BEGIN;
     let_in(&mut server, ONE, &ground, now);
     let held = measure(|| {
-        for own in 1..=300 {
+        for own in 1..=600 {
             let brush = [ball(256.0, 256.0, 1.0), Brush::add(ball(256.0, 256.0, 1.0).shape, MaterialId(1))];
             send(&mut server, ONE, own, vec![edit(&brush[own as usize % 2])], now);
             if fetches {

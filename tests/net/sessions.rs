@@ -461,7 +461,7 @@ fn what_was_dug_without_a_connection_is_done_though_the_player_dug_elsewhere() {
         play(&mut server, &mut first, &mut now);
         let expected = (0..dug_before).chain(100..104).chain(200..200 + dug_elsewhere);
         assert_eq!(done, expected.collect::<BTreeSet<u64>>());
-        assert_eq!(server.figures().ordered, 4 + dug_before + dug_elsewhere, "each is done once");
+        assert_eq!(server.figures().edits, 4 + dug_before + dug_elsewhere, "each is sent once");
         assert_eq!(first.world().hash(), server.terrain().world().hash());
     }
 }

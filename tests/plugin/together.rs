@@ -174,9 +174,23 @@ impl Party {
     fn rounds_until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
         let start = Instant::now();
         while !is_so(self) {
-            assert!(start.elapsed() < PATIENCE, "never: {what}");
+            assert!(start.elapsed() < PATIENCE, "never: {what}; {}", self.describe());
             self.round();
         }
+    }
+
+    /// What each player has.
+    fn describe(&self) -> String {
+        let one = |(stage, terrain): &(Stage, Entity)| {
+            let shared = stage.app.world().get::<SharedTerrain>(*terrain);
+            let model = stage.app.world().get::<Terrain>(*terrain);
+            let shared = shared.map(|shared| {
+                (shared.has_joined(), shared.number(), shared.pending(), shared.id(), shared.trouble())
+            });
+            let model = model.map(|model| (model.world().hash(), model.queued(), model.is_busy()));
+            format!("{shared:?} {model:x?}")
+        };
+        self.players.iter().map(one).collect::<Vec<_>>().join("; ")
     }
 
     fn all_join(&mut self) {

@@ -50,7 +50,7 @@ impl Server {
         }
         let Some(session) = self.sessions.get_mut(&client) else { return };
         let is_repeated = stream.is_some() && stream == session.stream;
-        if is_repeated && !matches!(session.stage, Stage::Connected) {
+        if is_repeated && !session.has_to_greet() {
             return;
         }
         session.begin(stream, hello, &self.settings);
@@ -76,8 +76,7 @@ impl Server {
                 }
                 stage => session.stage = stage,
             }
-            if matches!(session.stage, Stage::Connected) && now.saturating_sub(session.asked) >= ASK_INTERVAL
-            {
+            if session.has_to_greet() && now.saturating_sub(session.asked) >= ASK_INTERVAL {
                 session.asked = now;
                 silent.push(*client);
             }
@@ -220,7 +219,7 @@ impl Server {
                     Some((last, message)) if session.order.send(last, message.len()) => message.to_vec(),
                     Some(_) => break,
                     None => {
-                        (session.stage, session.asked) = (Stage::Connected, self.now);
+                        (session.stage, session.asked) = (Stage::Stale, self.now);
                         ToClient::Greet.to_bytes()
                     }
                 };

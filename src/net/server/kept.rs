@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use super::Server;
 use super::sender::Snapshot;
-use super::session::Session;
 use crate::net::message::{Hello, Lane, Terms, ToClient};
 
 /// The greatest age of a world that new clients get, together with later entries.
@@ -49,7 +48,7 @@ impl Server {
     pub(super) fn drop_stuck(&mut self, now: Duration) {
         for (client, session) in &mut self.sessions {
             if session.is_stuck(now, self.applied) {
-                *session = Session::new(&self.settings, now);
+                session.begin_again(&self.settings, now);
                 self.figures.stuck += 1;
                 self.outgoing.retain(|(to, ..)| to != client);
                 self.outgoing.push((*client, Lane::Order, ToClient::Greet.to_bytes()));

@@ -102,7 +102,7 @@ impl Server {
         for (place, edit) in edits.into_iter().enumerate() {
             let own = first + place as u64;
             self.figures.edits += 1;
-            if !self.sessions.get(&client).is_some_and(|session| session.has_joined()) {
+            if !self.sessions.get(&client).is_some_and(|session| session.takes_edits()) {
                 // It counts as not seen: the client may send it again once it has joined.
                 self.refuse(client, own, Refusal::NotJoined);
                 continue;
@@ -131,7 +131,7 @@ impl Server {
     }
 
     fn receive_undo(&mut self, client: ClientId, own: u64, of: ClientId, now: Duration) -> bool {
-        if !self.sessions.get(&client).is_some_and(|session| session.has_joined()) {
+        if !self.sessions.get(&client).is_some_and(|session| session.takes_edits()) {
             self.refuse(client, own, Refusal::NotJoined);
             return true;
         }

@@ -16,8 +16,10 @@ const STUCK: Duration = Duration::from_secs(5);
 
 /// The progress of a client.
 pub enum Stage {
-    /// It has not greeted yet, or has to greet again.
+    /// It has not greeted yet.
     Connected,
+    /// It had joined and has to begin again. What it asks for meanwhile is done, and its welcome says so.
+    Stale,
     /// It waits for its welcome.
     Greeted(Hello),
     /// It gets entries as they are ordered.
@@ -75,6 +77,23 @@ impl Session {
 
     pub fn has_joined(&self) -> bool {
         matches!(self.stage, Stage::Joined)
+    }
+
+    /// Whether it has to be asked to greet.
+    pub fn has_to_greet(&self) -> bool {
+        matches!(self.stage, Stage::Connected | Stage::Stale)
+    }
+
+    /// Whether edits of its player are taken.
+    pub fn takes_edits(&self) -> bool {
+        matches!(self.stage, Stage::Joined | Stage::Stale)
+    }
+
+    /// Lets it begin again: nothing of its stream counts.
+    pub fn begin_again(&mut self, settings: &ServerSettings, now: Duration) {
+        let new = Self::new(settings, now);
+        let stage = if self.takes_edits() { Stage::Stale } else { Stage::Connected };
+        *self = Self { stage, ..new };
     }
 
     /// Whether an outdated world is kept for it and it has acknowledged nothing for too long. `applied` is the present

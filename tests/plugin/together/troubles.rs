@@ -177,7 +177,7 @@ fn what_comes_before_a_world_is_read_takes_little_memory() {
         // As long as messages may be.
         for _ in 0..100 {
             let mut bytes = vec![0; 40_000];
-            bytes[1..4].copy_from_slice(&[0xb0, 0xb8, 0x02]);
+            bytes[2..5].copy_from_slice(&[0xb0, 0xb8, 0x02]);
             messages.insert_received(client, channels - 1, bytes);
         }
         server.update();
