@@ -70,8 +70,10 @@ fn a_pristine_world_comes_back_from_its_heightmap_and_an_edited_one_as_it_is_ask
     ]);
     let elevation = terrain.world().elevation().expect("a small world");
     for (x, z) in (0..=41).flat_map(|z| (0..=70).map(move |x| (x, z))) {
-        let expected = terrain.world().height(f64::from(x), f64::from(z)).expect("inside") as f32;
-        assert_eq!(elevation.value(x, z), expected, "({x}, {z})");
+        let expected = terrain.world().height(f64::from(x), f64::from(z)).expect("inside");
+        // At the rim, places are asked for a millionth of a voxel inside.
+        let difference = (f64::from(elevation.value(x, z)) - expected).abs();
+        assert!(difference < 1e-3, "({x}, {z}): {difference}");
     }
     assert_ne!(elevation.into_ground(&ElevationScale::default()).expect("valid").hash(), hash);
 }

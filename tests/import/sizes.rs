@@ -55,7 +55,7 @@ fn raw(width: u32, height: u32) -> Vec<u8> {
 }
 
 fn hgt(width: u32, height: u32) -> Vec<u8> {
-    samples(width, height).into_iter().flat_map(|value| (value as i16).to_be_bytes()).collect()
+    samples(width, height).into_iter().flat_map(|value| (value / 2).to_be_bytes()).collect()
 }
 
 fn ascii(width: u32, height: u32) -> Vec<u8> {
@@ -94,7 +94,8 @@ fn large_files_are_read_exactly_within_three_times_their_size() {
                 decoded.expect("measured").unwrap_or_else(|error| panic!("{format}: {error}"));
             assert_eq!((grid.width(), grid.height()), (width, height), "{format}");
             let value = |sample: u16| match format {
-                HeightFormat::Hgt => f32::from(sample as i16),
+                // Half of it, which is within signed 16 bits.
+                HeightFormat::Hgt => f32::from(sample / 2),
                 _ => f32::from(sample),
             };
             let expected = samples(width, height).into_iter().map(value);
