@@ -690,7 +690,9 @@ fn a_game_that_saves_its_worlds_itself_hides_the_files() {
     for shows_files in [true, false] {
         screen.panel.shows_files = shows_files;
         (0..2).for_each(|_| screen.frame(Vec::new()));
-        assert!(["New", "Open", "Save"].iter().all(|name| screen.places.0.contains_key(*name) == shows_files));
+        assert!(
+            ["New", "Open", "Save"].iter().all(|name| screen.places.0.contains_key(*name) == shows_files)
+        );
         assert!(screen.places.0.contains_key("Undo"));
     }
 }
