@@ -168,19 +168,21 @@ class Player:
 
 
 def fits(stage):
-    """All texts of the page that opened last are within the window, and none is over another. With --pictures, it is shot too."""
+    """All texts of the page that opened last are within their boxes and the window, and none is over another. With --pictures, it is shot too."""
     stage.wait(r"^texts end", stage.page_mark)
     lines = stage.lines()
     end = max(at for at, line in enumerate(lines) if line == "texts end")
     found = []
     for line in reversed(lines[:end]):
-        match = re.match(r"^text (\".*\") (-?\d+) (-?\d+) (-?\d+) (-?\d+)$", line)
+        match = re.match(r"^text (\".*\")((?: -?\d+){8})$", line)
         if not match:
             break
-        found.append((json.loads(match.group(1)), *map(int, match.groups()[1:])))
-    for text, left, top, right, bottom in found:
+        found.append((json.loads(match.group(1)), *map(int, match.group(2).split())))
+    for text, left, top, right, bottom, *behind in found:
         if left < 0 or top < 0 or right > stage.size[0] or bottom > stage.size[1]:
             raise Failed(f"{text!r} is cut: {left} {top} {right} {bottom}")
+        if left < behind[0] or top < behind[1] or right > behind[2] or bottom > behind[3]:
+            raise Failed(f"{text!r} at {left} {top} {right} {bottom} is not all within its box, {behind}")
     for at, (one, *a) in enumerate(found):
         for other, *b in found[at + 1:]:
             wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])

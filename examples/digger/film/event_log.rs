@@ -61,21 +61,35 @@ fn log_items(
     log_change(format!("items {} {}", focus.0, serde_json::json!(names)), &mut last);
 }
 
-/// Logs the places of all visible texts whenever a page has opened: left, top, right, bottom, and whether all is in sight.
+/// Logs the places of all visible texts whenever a page has opened, and of what is behind them: left, top, right, bottom.
 fn log_texts(
     state: Res<State<MenuPage>>,
-    texts: Query<(&Text, &ComputedNode, &UiGlobalTransform, &InheritedVisibility)>,
+    texts: Query<(Entity, &Text, &InheritedVisibility)>,
+    nodes: Query<(&ComputedNode, &UiGlobalTransform)>,
+    fills: Query<AnyOf<(&BackgroundColor, &BackgroundGradient)>>,
+    parents: Query<&ChildOf>,
     mut frames: Local<u32>,
 ) {
     *frames = if state.is_changed() { 0 } else { *frames + 1 };
     if *frames != 4 {
         return;
     }
-    for (text, node, place, _) in texts.iter().filter(|(text, .., shown)| shown.get() && !text.0.is_empty()) {
+    let is_dark = |node: &Entity| {
+        let fill = fills.get(*node);
+        fill.is_ok_and(|(color, gradient)| {
+            gradient.is_some() || color.is_some_and(|fill| fill.0.alpha() > 0.7)
+        })
+    };
+    let place = |node: Entity| {
+        let (node, place) = nodes.get(node).ok()?;
         let (middle, half) = (place.translation, node.size() / 2.0);
         let (from, to) = (middle - half, middle + half);
-        let words = serde_json::json!(text.0);
-        println!("text {words} {:.0} {:.0} {:.0} {:.0}", from.x, from.y, to.x, to.y);
+        Some(format!("{:.0} {:.0} {:.0} {:.0}", from.x, from.y, to.x, to.y))
+    };
+    for (entity, text, _) in texts.iter().filter(|(_, text, shown)| shown.get() && !text.0.is_empty()) {
+        let behind = parents.iter_ancestors(entity).find(is_dark).and_then(place);
+        let (words, place) = (serde_json::json!(text.0), place(entity).unwrap_or_default());
+        println!("text {words} {place} {}", behind.unwrap_or_else(|| "0 0 0 0".into()));
     }
     println!("texts end");
 }

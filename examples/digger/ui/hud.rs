@@ -257,7 +257,7 @@ fn show_core_sample(
     if let Ok(mut shown) = boxes.get_mut(core.1.parent()) {
         shown.set_if_neq(if lines.is_empty() { Visibility::Hidden } else { Visibility::Inherited });
     }
-    core.0.set_if_neq(Text::new(lines));
+    core.0.set_if_neq(Text::new(format!("{}\n{lines}", texts::CORE_SAMPLE)));
 }
 
 /// The materials by depth. Where nothing can be dug, that is what counts.
@@ -418,7 +418,8 @@ fn show_keys(
     mut list: Single<&mut Text, (With<KeyList>, Without<SlotKey>)>,
     mut slots: Query<(&SlotKey, &mut Text)>,
 ) {
-    let lines = [Action::Help, Action::Headlamp, Action::Undo, Action::Pause]
+    use Action as A;
+    let lines = [A::Use, A::Build, A::Grow, A::Help, A::Headlamp, A::Undo, A::Pause]
         .map(|action| format!("{}  {}", settings.bindings.first(action, &labels), action.label()));
     list.0 = lines.join("\n");
     for (slot, mut text) in &mut slots {

@@ -45,7 +45,7 @@ pub const HELP_GAMEPAD: &str =
 pub const HELP_KEYS: [&str; 14] = [
     "walk", "run", "jump", "use the tool; hold to repeat", "build with the chosen material", "brush size",
     "choose a material", "build shape", "next tool", "previous tool", "headlamp", "undo, redo",
-    "terrain panel: frame times, debug views", "pause",
+    "terrain panel", "pause",
 ];
 
 /// The actions, in the order of `Action`.
@@ -63,9 +63,9 @@ pub const TOOLS: [(&str, &str); 8] = [
     ("shovel", "smooths rough ground"),
     ("drill", "drives a tunnel straight ahead"),
     ("builder", "places what you have dug"),
-    ("painter", "repaints the ground with a material you have dug"),
-    ("bomb", "bounces, and blasts a cave out of a hillside"),
-    ("lamp", "stays where you put it and lights up caves"),
+    ("painter", "repaints the ground"),
+    ("bomb", "bounces, and blasts a cave"),
+    ("lamp", "stays where you put it"),
     ("ball", "bounces, and rolls downhill"),
 ];
 
@@ -77,7 +77,7 @@ pub const BEDROCK: &str = "bedrock";
 /// The directions of the compass, clockwise from north.
 pub const COMPASS: [&str; 8] = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 texts! {
-    HEADLAMP_ON = "headlamp", SAVING = "saving", SOMEBODY = "somebody",
+    CORE_SAMPLE = "Under the crosshair", HEADLAMP_ON = "headlamp", SAVING = "saving", SOMEBODY = "somebody",
     TOO_FAR = "Too far away. Move closer.", UNBREAKABLE = "Bedrock can't be broken.",
     BROUGHT_BACK = "You are back on solid ground.",
     HOST_LOST = "The host can't be reached. What you dig meanwhile is sent later.",
@@ -98,6 +98,10 @@ pub fn failed(what: &str, why: impl Display) -> String {
 
 pub fn join_at(address: impl Display) -> String {
     format!("Others can join at {address}")
+}
+
+pub fn would_join_at(address: impl Display) -> String {
+    format!("While you host, others can join at {address}")
 }
 
 pub fn joined(host: impl Display) -> String {
@@ -224,10 +228,10 @@ pub const WHEEL: [&str; 2] = ["Wheel up", "Wheel down"];
 /// The usual name of a gamepad button, from Bevy's.
 pub fn pad(button: &str) -> String {
     match button {
-        "South" => "A",
-        "East" => "B",
-        "West" => "X",
-        "North" => "Y",
+        "South" => "Pad A",
+        "East" => "Pad B",
+        "West" => "Pad X",
+        "North" => "Pad Y",
         "LeftTrigger" => "LB",
         "RightTrigger" => "RB",
         "LeftTrigger2" => "LT",

@@ -276,6 +276,7 @@ mod tests {
             let samples = sound.samples();
             let loudest = samples.iter().fold(0.0f32, |most, sample| most.max(sample.abs()));
             assert!((0.3..=1.0).contains(&loudest), "{sound:?}: {loudest}");
+            assert!((0.1..=1.0).contains(&sound.volume()), "{sound:?}");
             let [first, last] = [samples[0], samples[samples.len() - 1]];
             assert!(first.abs() < 0.05 && last == 0.0, "{sound:?}: {first} {last}");
             assert!((0.1..3.0).contains(&(samples.len() as f32 / RATE as f32)), "{sound:?}");

@@ -145,7 +145,9 @@ fn show_bindings(
         let (words, new_color) = if waiting.as_ref().is_some_and(|waiting| waiting.0 == action) {
             (texts::PRESS_KEY.into(), WHITE)
         } else {
-            let bindings = settings.bindings.of(action).iter();
+            // Where gamepads do nothing, their buttons would only be taken for keys.
+            let works = |binding: &&Binding| cfg!(feature = "gamepad") || !matches!(binding, Binding::Pad(_));
+            let bindings = settings.bindings.of(action).iter().filter(works);
             (bindings.map(|&binding| labels.of(binding)).collect::<Vec<_>>().join("  "), GOLD)
         };
         text.set_if_neq(Text::new(words));

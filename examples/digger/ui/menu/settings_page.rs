@@ -107,7 +107,7 @@ fn open(mut commands: Commands) {
     super::spawn_page(&mut commands, MenuPage::Settings, texts::SETTINGS, 600.0, |column| {
         for (at, &(label, _, adjust)) in ROWS.iter().enumerate() {
             let row = Node {
-                padding: UiRect::axes(px(14), px(6)),
+                padding: UiRect::axes(px(14), px(4)),
                 justify_content: JustifyContent::SpaceBetween,
                 align_items: AlignItems::Center,
                 ..default()

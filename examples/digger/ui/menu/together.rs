@@ -38,7 +38,7 @@ fn open(mut commands: Commands, party: Res<Party>, played: Res<PlayedWorld>) {
             .map(|address| Address(SocketAddr::new(address, port), saves::seed(&played, &party)));
         let address = address.map_or_else(|| texts::THIS_MACHINE.into(), |address| address.to_string());
         let (host, note) = match *party {
-            Party::Alone => (texts::HOST, texts::join_at(address)),
+            Party::Alone => (texts::HOST, texts::would_join_at(address)),
             Party::Host(_) => (texts::STOP_HOSTING, texts::join_at(address)),
             Party::Guest(host, seed) => (texts::LEAVE, texts::joined(Address(host, seed))),
         };
