@@ -164,12 +164,12 @@ fn ground_debris_and_all_inventories_are_constant_for_every_player() {
             .map(|(app, _)| app.world().resource::<Owned>())
             .map(|owned| owned.inventory + owned.crumbs)
             .sum();
-        for player in 0..2 {
+        for (player, most) in most.iter_mut().enumerate() {
             let seen = party.seen(player).expect("nothing is under way");
             assert_eq!(seen + owned, 0, "step {step}, player {player}: {seen} seen, {owned} owned");
             let now = debris(&mut party.players[player].0).unwrap_or_default();
-            fallen += usize::from(now != most[player]);
-            most[player] = now;
+            fallen += usize::from(now != *most);
+            *most = now;
         }
     }
     assert!(fallen > 5, "debris changed {fallen} times");
