@@ -107,6 +107,7 @@ pub(super) fn send(
         let shared = shared.bypass_change_detection();
         if is_held && shared.link.is_none() && active == Some(entity) {
             // It begins with the level that the terrain waits for.
+            shared.trouble = None;
             continue;
         }
         let asks = outbox.map(take_asks).unwrap_or_default();

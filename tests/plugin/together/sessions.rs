@@ -168,7 +168,9 @@ fn the_next_level_is_joined_whoever_changes_first() {
             // A dig is not done on ground that nobody serves, and not confirmed.
             let before = party.terrain_hash(0);
             party.dig_at(0, 50.0, 50.0);
-            party.rounds(50);
+            party.round();
+            party.rounds_until("it is answered", |party| party.shared(0).pending() == 0);
+            party.round();
             assert!(matches!(party.outcomes(0)[..], [WhatBecame::Refused(None)]));
             assert_eq!(party.terrain_hash(0), before);
             party.server.insert_resource(other);
