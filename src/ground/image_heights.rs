@@ -60,7 +60,7 @@ impl Default for Detail {
 
 impl Detail {
     /// The noise in voxels over the column (x, z), from checked parameters.
-    fn noise(self) -> Result<DetailNoise, GroundError> {
+    pub(super) fn noise(self) -> Result<DetailNoise, GroundError> {
         let Self { amplitude, scale, octaves, seed } = self;
         let noise =
             NoiseHeights { seed, octaves, scale, amplitude, ..NoiseHeights::default() }.generator()?;
@@ -175,7 +175,7 @@ impl ImageLine<'_> {
 
 impl LinePosition {
     /// Value here of the Catmull-Rom spline through `count` samples, at least 2. At a sample exactly the sample.
-    fn interpolate(self, count: u32, value: impl Fn(u32) -> f64) -> f64 {
+    pub(super) fn interpolate(self, count: u32, value: impl Fn(u32) -> f64) -> f64 {
         let t = self.fraction;
         if t == 0.0 {
             return value(self.sample);

@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | a number, a function, a list | [`Ground::flat`], [`Ground::from_fn`], [`Ground::from_heights`] |
 //! | a grey PNG or RAW image | [`GreyImage::decode_png`], [`GreyImage::decode_raw`], then [`Ground::from_image`] |
+//! | a TIFF, an EXR, satellite data, a PNG of any kind of grey, tiles of several files | [`ElevationGrid`] |
 //! | noise | [`Ground::from_noise`], or [`Ground::from_noise_fn`] for any function of the crate [`noise`] |
 //! | anything of these and more, computed where it is needed | a [`HeightSource`], then [`Ground::from_source`] |
 //! | materials by slope, height or image | [`Ground::with_materials`] |
@@ -23,6 +24,7 @@ mod error;
 mod extent;
 mod grey_image;
 mod image_heights;
+mod import;
 mod material;
 mod noise_heights;
 mod noise_params;
@@ -45,6 +47,10 @@ pub use control::MaterialControl;
 pub use error::{GroundError, ImageError};
 pub use grey_image::{GreyImage, ImageLimits, RawFormat};
 pub use image_heights::{Detail, ImageScale, MAX_VOXELS_PER_SAMPLE};
+pub use import::{
+    ElevationGrid, ElevationScale, ElevationTile, HeightFormat, HeightScale, ImportError, ImportNote,
+    ImportOptions, ImportReport, RawLayout, Repair, SampleKind, TileEdges, tile_place,
+};
 pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]

@@ -1,0 +1,205 @@
+//! Tiles of several files that make one grid.
+
+use std::collections::BTreeMap;
+
+use super::decoded::reserve;
+use super::error::ImportError;
+use super::grid::ElevationGrid;
+use super::report::ImportNote;
+
+/// A tile of a larger grid.
+#[derive(Clone, Debug)]
+pub struct ElevationTile {
+    /// Its place along x; the lowest one is the grid's first column.
+    pub column: i32,
+    /// Its place along z; the lowest one is the grid's top row.
+    pub row: i32,
+    /// Its samples.
+    pub grid: ElevationGrid,
+}
+
+/// How tiles meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TileEdges {
+    /// As their samples suggest.
+    #[default]
+    Guess,
+    /// The last column or row of a tile is the first one of the next: 1025 samples for 1024 cells.
+    Shared,
+    /// A tile begins with the sample after the last one of the tile before.
+    Apart,
+}
+
+impl ElevationGrid {
+    /// One grid from tiles, in any order, that fill a rectangle. All tiles of a column have the same width, all of a
+    /// row the same height. Returns notes on how they meet. A tile's memory is released once it is copied.
+    ///
+    /// # Errors
+    /// [`ImportError::Tile`] for a tile that is missing, there twice, or of another size than its row or column;
+    /// [`ImportError::Limit`] if the grid would be larger than 16385 samples along a side; [`ImportError::Empty`]
+    /// without tiles.
+    pub fn join(tiles: Vec<ElevationTile>, edges: TileEdges) -> Result<(Self, Vec<ImportNote>), ImportError> {
+        let mut places = BTreeMap::new();
+        let (mut widths, mut heights) = (BTreeMap::new(), BTreeMap::new());
+        let Some(sample) = tiles.first().map(|tile| tile.grid.sample_kind()) else {
+            return Err(ImportError::Empty);
+        };
+        for ElevationTile { column, row, grid } in tiles {
+            let wrong = |problem: String| ImportError::Tile { column, row, problem };
+            let (width, height) = (grid.width(), grid.height());
+            let expected = (*widths.entry(column).or_insert(width), *heights.entry(row).or_insert(height));
+            if expected != (width, height) {
+                let (across, down) = expected;
+                return Err(wrong(format!("has {width} x {height} samples in place of {across} x {down}")));
+            }
+            if places.insert((row, column), grid).is_some() {
+                return Err(wrong("is given twice".into()));
+            }
+        }
+        let (columns, rows) = (consecutive(&widths), consecutive(&heights));
+        let all = columns.iter().flat_map(|&column| rows.iter().map(move |&row| (row, column)));
+        if let Some((row, column)) = all.clone().find(|place| !places.contains_key(place)) {
+            return Err(ImportError::Tile { column, row, problem: "is missing".into() });
+        }
+        let mut notes = Vec::new();
+        let meeting = Meeting::of(&places);
+        let are_shared = match edges {
+            TileEdges::Shared => true,
+            TileEdges::Apart => false,
+            TileEdges::Guess => {
+                let are_shared = meeting.looks_shared(&widths);
+                if places.len() > 1 {
+                    notes.push(ImportNote::EdgesGuessed { are_shared });
+                }
+                are_shared
+            }
+        };
+        if are_shared && meeting.different > 0 {
+            notes.push(ImportNote::EdgesDiffer { count: meeting.different, largest: meeting.largest });
+        }
+        let overlap = u32::from(are_shared);
+        let starts = |sizes: &BTreeMap<i32, u32>| -> (BTreeMap<i32, u64>, u64) {
+            let mut next = 0;
+            let starts = sizes.iter().map(|(&place, &size)| {
+                let start = next;
+                next += u64::from(size.saturating_sub(overlap));
+                (place, start)
+            });
+            (starts.collect(), next + u64::from(overlap))
+        };
+        let ((lefts, width), (tops, height)) = (starts(&widths), starts(&heights));
+        let side = |side: u64| u32::try_from(side).unwrap_or(u32::MAX);
+        let limits = crate::ground::ImageLimits { max_alloc_bytes: u64::MAX, ..Default::default() };
+        limits.check_image(side(width), side(height), 4)?;
+        let mut samples = reserve(width * height)?;
+        samples.resize((width * height) as usize, f32::NAN);
+        // From the last tile on, so that of shared edges those of the left and upper tile stay.
+        while let Some(((row, column), grid)) = places.pop_last() {
+            let (left, top) = (lefts[&column] as usize, tops[&row] as usize);
+            for (z, line) in grid.samples().chunks_exact(grid.width() as usize).enumerate() {
+                samples[(top + z) * width as usize + left..][..line.len()].copy_from_slice(line);
+            }
+        }
+        Ok((Self::with_kind(sample, side(width), side(height), samples)?, notes))
+    }
+}
+
+/// All places from the first to the last one, as far as they can be told apart.
+fn consecutive(sizes: &BTreeMap<i32, u32>) -> Vec<i32> {
+    let (Some((&first, _)), Some((&last, _))) = (sizes.first_key_value(), sizes.last_key_value()) else {
+        return Vec::new();
+    };
+    // One gap is enough to be told of.
+    let most = sizes.len() as i64;
+    (i64::from(first)..=i64::from(last)).take(most as usize + 1).map(|at| at as i32).collect()
+}
+
+/// How the edges of neighbouring tiles compare.
+#[derive(Default)]
+struct Meeting {
+    equal: u64,
+    different: u64,
+    largest: f32,
+    /// Samples of edges that equal the next ones of their own tile, so that they say nothing.
+    level: u64,
+}
+
+impl Meeting {
+    fn of(places: &BTreeMap<(i32, i32), ElevationGrid>) -> Self {
+        let mut found = Self::default();
+        for (&(row, column), grid) in places {
+            let (width, height) = (grid.width(), grid.height());
+            if let Some(right) = column.checked_add(1).and_then(|next| places.get(&(row, next))) {
+                let last = width - 1;
+                (0..height).for_each(|z| {
+                    found.add(grid.value(last, z), right.value(0, z), grid.value(last.saturating_sub(1), z));
+                });
+            }
+            if let Some(below) = row.checked_add(1).and_then(|next| places.get(&(next, column))) {
+                let last = height - 1;
+                (0..width).for_each(|x| {
+                    found.add(grid.value(x, last), below.value(x, 0), grid.value(x, last.saturating_sub(1)));
+                });
+            }
+        }
+        found
+    }
+
+    fn add(&mut self, own: f32, other: f32, before: f32) {
+        if own == other || own.is_nan() && other.is_nan() {
+            self.equal += 1;
+            self.level += u64::from(own == before || own.is_nan());
+        } else {
+            self.different += 1;
+            // A void on one side has no difference.
+            self.largest = self.largest.max((own - other).abs());
+        }
+    }
+
+    /// Whether most samples of edges are equal; where all is level, whether tiles have a sample more than a power of
+    /// two.
+    fn looks_shared(&self, widths: &BTreeMap<i32, u32>) -> bool {
+        if self.equal == self.level {
+            return self.different == 0
+                && widths.values().all(|&width| width > 1 && (width - 1).is_power_of_two());
+        }
+        self.equal >= self.different
+    }
+}
+
+/// The place of a tile as its file's name says it, as column and row; `None` if it does not.
+///
+/// | name | column and row |
+/// | --- | --- |
+/// | `island_x3_y5.png`, `island_y5_x3.r16` | 3, 5 |
+/// | `island_3_5.png`, `3-5.tif` | 3, 5 |
+/// | `N46E007.hgt` | 7, -46: rows go south |
+pub fn tile_place(name: &str) -> Option<(i32, i32)> {
+    let stem = name.rsplit(['/', '\\']).next()?;
+    let stem = stem.split_once('.').map_or(stem, |(stem, _)| stem).to_ascii_lowercase();
+    let after = |letter: char| {
+        stem.char_indices().filter(|&(_, own)| own == letter).find_map(|(at, _)| {
+            let is_start = !stem[..at]
+                .ends_with(|before: char| before.is_ascii_alphanumeric() && !before.is_ascii_digit());
+            let rest = &stem[at + letter.len_utf8()..];
+            let digits = rest.len() - rest.trim_start_matches(|digit: char| digit.is_ascii_digit()).len();
+            rest[..digits].parse::<i32>().ok().filter(|_| is_start)
+        })
+    };
+    if let (Some(column), Some(row)) = (after('x'), after('y')) {
+        return Some((column, row));
+    }
+    let degrees =
+        |positive: char, negative: char| after(positive).or_else(|| after(negative).map(|degrees| -degrees));
+    if stem.starts_with(['n', 's'])
+        && let (Some(north), Some(east)) = (degrees('n', 's'), degrees('e', 'w'))
+    {
+        return Some((east, -north));
+    }
+    let mut numbers = stem.rsplit(['_', '-']).map(str::parse::<i32>);
+    match (numbers.next(), numbers.next()) {
+        (Some(Ok(row)), Some(Ok(column))) => Some((column, row)),
+        _ => None,
+    }
+}

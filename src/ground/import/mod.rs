@@ -1,0 +1,56 @@
+//! Heights from files: what terrain tools, surveys and satellites deliver, read exactly, with a report.
+//!
+//! | format | what is read |
+//! | --- | --- |
+//! | PNG | grey of 1 to 16 bits, interlaced or not; palettes and colours that are grey; alpha is ignored |
+//! | RAW | 16 and 32 bits, signed or not, and 32-bit floats, in either byte order; see [`RawLayout`] |
+//! | TIFF, BigTIFF (feature `import`) | one channel of 8 to 64 bits, integers or floats; GeoTIFF's scale, place and void value |
+//! | OpenEXR (feature `import`) | one channel of 16 or 32 bits |
+//! | SRTM `.hgt` | signed 16 bits, high byte first, void value -32768 |
+//! | Esri ASCII grid | any numbers, with its cell size, place and void value |
+//!
+//! Decoding takes at most three times the memory of the finished grid, which has 4 bytes a sample, if the file has one
+//! channel.
+//!
+//! An [`ElevationGrid`] holds the values as the file has them, in whatever unit that is. [`ElevationGrid::into_ground`]
+//! makes ground of it:
+//!
+//! ```no_run
+//! # use bevy_burrow::ground::{ElevationGrid, ElevationScale, ImportOptions};
+//! let (grid, report) = ElevationGrid::open("island.tif", &ImportOptions::default())?;
+//! println!("{report}");
+//! let ground = grid.into_ground(&ElevationScale::default())?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! **Voids** are samples without a value: NaN, infinity, the value that the file or [`ImportOptions`] declares, and
+//! well-known ones such as -9999 that lie far outside of all others. **Outliers** are single samples far above or below
+//! all that surrounds them. [`Repair`] chooses what becomes of either. The report counts both.
+
+mod ascii;
+mod decoded;
+mod doubts;
+mod error;
+#[cfg(feature = "import")]
+mod exr;
+mod grid;
+mod join;
+mod kind;
+mod onto_ground;
+mod open;
+mod options;
+mod png;
+mod raw;
+mod repair;
+mod report;
+#[cfg(feature = "import")]
+mod tiff;
+mod write;
+
+pub use error::ImportError;
+pub use grid::ElevationGrid;
+pub use join::{ElevationTile, TileEdges, tile_place};
+pub use kind::{HeightFormat, SampleKind};
+pub use onto_ground::{ElevationScale, HeightScale};
+pub use options::{ImportOptions, RawLayout, Repair};
+pub use report::{ImportNote, ImportReport};

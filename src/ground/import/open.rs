@@ -1,0 +1,152 @@
+//! Reading a file: its format, its samples, what is wrong with them.
+
+use std::fs;
+use std::path::Path;
+
+use super::decoded::Decoded;
+use super::doubts::doubts;
+use super::error::ImportError;
+use super::grid::{ElevationGrid, range};
+use super::kind::{HeightFormat, SampleKind};
+use super::options::ImportOptions;
+use super::repair::repair;
+use super::report::ImportReport;
+use super::{ascii, png, raw};
+
+impl ElevationGrid {
+    /// Reads a file. Its name matters only for `.hgt`, which has no header.
+    ///
+    /// # Errors
+    /// [`ImportError`]; nothing is read from a file larger than the limits allow.
+    pub fn open(
+        path: impl AsRef<Path>,
+        options: &ImportOptions,
+    ) -> Result<(Self, ImportReport), ImportError> {
+        let path = path.as_ref();
+        let failed = |error: std::io::Error| ImportError::File {
+            path: path.display().to_string(),
+            reason: error.to_string(),
+        };
+        let bytes = fs::metadata(path).map_err(failed)?.len();
+        let limit = options.limits.max_file_bytes;
+        if bytes > limit {
+            return Err(crate::ground::ImageError::FileSize { bytes, limit }.into());
+        }
+        let is_hgt = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hgt"));
+        let format = options.format.or(is_hgt.then_some(HeightFormat::Hgt));
+        Self::decode(&fs::read(path).map_err(failed)?, &ImportOptions { format, ..options.clone() })
+    }
+
+    /// Decodes the bytes of a file.
+    ///
+    /// # Errors
+    /// [`ImportError`]
+    pub fn decode(bytes: &[u8], options: &ImportOptions) -> Result<(Self, ImportReport), ImportError> {
+        options.check()?;
+        options.limits.check_file(bytes)?;
+        if bytes.is_empty() {
+            return Err(ImportError::Empty);
+        }
+        let format = match options.format {
+            Some(format) => format,
+            None => format_of(bytes)?,
+        };
+        let mut decoded = match format {
+            HeightFormat::Png => png::decode(bytes, &options.limits),
+            HeightFormat::Raw => raw::decode(bytes, &options.raw, &options.limits),
+            HeightFormat::Hgt => decode_hgt(bytes, options),
+            HeightFormat::Ascii => ascii::decode(bytes, &options.limits),
+            #[cfg(feature = "import")]
+            HeightFormat::Tiff => super::tiff::decode(bytes, &options.limits),
+            #[cfg(feature = "import")]
+            HeightFormat::Exr => super::exr::decode(bytes, &options.limits),
+            #[cfg(not(feature = "import"))]
+            HeightFormat::Tiff | HeightFormat::Exr => Err(ImportError::Feature { format }),
+        }?;
+        let doubts = doubts(&decoded);
+        decoded.notes.extend(doubts);
+        let repaired = repair(&mut decoded, options)?;
+        let Decoded { format, sample, width, height, samples, spacing, origin, notes, .. } = decoded;
+        let report = ImportReport {
+            format,
+            sample,
+            width,
+            height,
+            range: range(&samples).unwrap_or_default(),
+            voids: repaired.voids,
+            outliers: repaired.outliers,
+            spacing,
+            origin,
+            notes,
+        };
+        Ok((Self::with_kind(sample, width, height, samples)?, report))
+    }
+}
+
+/// The format of a file, by its first bytes; RAW if there are none that say it.
+fn format_of(bytes: &[u8]) -> Result<HeightFormat, ImportError> {
+    const HEIGHTS: [(&[u8], HeightFormat); 6] = [
+        (b"\x89PNG", HeightFormat::Png),
+        (b"II*\0", HeightFormat::Tiff),
+        (b"MM\0*", HeightFormat::Tiff),
+        (b"II+\0", HeightFormat::Tiff),
+        (b"MM\0+", HeightFormat::Tiff),
+        (b"\x76\x2f\x31\x01", HeightFormat::Exr),
+    ];
+    const OTHERS: [(&[u8], &str); 15] = [
+        (b"\xFF\xD8\xFF", "a JPEG, which loses the heights' detail"),
+        (b"GIF8", "a GIF"),
+        (b"PK\x03\x04", "a ZIP archive, to be unpacked first"),
+        (b"\x1F\x8B", "a gzip archive, to be unpacked first"),
+        (b"7z\xBC\xAF", "a 7z archive, to be unpacked first"),
+        (b"Rar!", "a RAR archive, to be unpacked first"),
+        (b"RIFF", "a WebP image or another RIFF file"),
+        (b"\x89HDF", "an HDF file"),
+        (b"CDF\x01", "a NetCDF file"),
+        (b"8BPS", "a Photoshop file"),
+        (b"DDS ", "a DDS texture"),
+        (b"#?RADIANCE", "a Radiance HDR image"),
+        (b"\xABKTX", "a KTX texture"),
+        (b"<", "a text in HTML or XML, perhaps an error page of a download"),
+        (b"version https://git-lfs", "a pointer of Git LFS, whose file was not fetched"),
+    ];
+    if let Some((_, format)) = HEIGHTS.iter().find(|(first, _)| bytes.starts_with(first)) {
+        return Ok(*format);
+    }
+    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();
+    let starts_with = |word: &[u8]| text.get(..word.len()).is_some_and(|own| own.eq_ignore_ascii_case(word));
+    if starts_with(b"ncols") || starts_with(b"nrows") {
+        return Ok(HeightFormat::Ascii);
+    }
+    // Heights may begin with any bytes. So a signature counts only where it is long, or all of the file's beginning is
+    // text.
+    let is_text = bytes.iter().take(256).all(|&byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace());
+    let found = OTHERS.iter().find(|(first, _)| {
+        bytes.starts_with(first)
+            && (first.len() > 2 || is_text || first == b"\x1F\x8B" && bytes.get(2) == Some(&8))
+    });
+    match found {
+        Some(&(_, found)) => Err(ImportError::Format { found }),
+        None if is_text => Err(ImportError::Format { found: "a text that is no Esri ASCII grid" }),
+        None => Ok(HeightFormat::Raw),
+    }
+}
+
+/// Decodes an SRTM tile: signed 16 bits, high byte first.
+fn decode_hgt(bytes: &[u8], options: &ImportOptions) -> Result<Decoded, ImportError> {
+    let length = bytes.len() as u64;
+    let count = length / 2;
+    let side = count.isqrt();
+    let (width, height) = match count {
+        _ if !length.is_multiple_of(2) || side < 2 => return Err(ImportError::HgtLength { bytes: length }),
+        _ if side * side == count => (side, side),
+        6_485_401 => (1801, 3601),
+        _ => return Err(ImportError::HgtLength { bytes: length }),
+    };
+    let (width, height) = (width as u32, height as u32);
+    options.limits.check_image(width, height, 4)?;
+    let sample = SampleKind::Signed(16);
+    let (samples, _) = raw::read(bytes, count, raw::Reading { sample, is_big_endian: true })?;
+    let decoded = Decoded::new(HeightFormat::Hgt, sample, (width, height), samples);
+    Ok(Decoded { no_data: Some(-32_768.0), ..decoded })
+}

@@ -1,0 +1,208 @@
+//! Heights from RAW files, which have no header: what is not given is guessed.
+
+use super::decoded::{Decoded, reserve};
+use super::doubts::{roughness, row_difference};
+use super::error::ImportError;
+use super::kind::{HeightFormat, SampleKind};
+use super::options::RawLayout;
+use super::report::ImportNote;
+use crate::ground::{ImageLimits, RawFormat};
+
+/// Longest side of a guessed size, in units of the shorter one.
+const MAX_ASPECT: u64 = 64;
+
+/// Samples that are looked at for a guess.
+const PROBES: usize = 1 << 16;
+
+/// How the bytes of a sample are read.
+#[derive(Clone, Copy)]
+pub(super) struct Reading {
+    pub sample: SampleKind,
+    pub is_big_endian: bool,
+}
+
+impl Reading {
+    /// Bytes of a sample; `None` for types that RAW files do not have.
+    fn bytes(self) -> Option<usize> {
+        match self.sample {
+            SampleKind::Unsigned(bits @ (16 | 32)) | SampleKind::Signed(bits @ (16 | 32)) => {
+                Some(usize::from(bits / 8))
+            }
+            SampleKind::Float(32) => Some(4),
+            _ => None,
+        }
+    }
+
+    /// The value of a sample.
+    fn value(self, bytes: &[u8]) -> f64 {
+        let order = |mut bytes: [u8; 4], count: usize| {
+            if self.is_big_endian {
+                bytes[..count].reverse();
+            }
+            bytes
+        };
+        match *bytes {
+            [a, b] => {
+                let [a, b, ..] = order([a, b, 0, 0], 2);
+                match self.sample {
+                    SampleKind::Signed(_) => i16::from_le_bytes([a, b]).into(),
+                    _ => u16::from_le_bytes([a, b]).into(),
+                }
+            }
+            [a, b, c, d] => {
+                let bytes = order([a, b, c, d], 4);
+                match self.sample {
+                    SampleKind::Signed(_) => i32::from_le_bytes(bytes).into(),
+                    SampleKind::Unsigned(_) => u32::from_le_bytes(bytes).into(),
+                    _ => f32::from_le_bytes(bytes).into(),
+                }
+            }
+            _ => f64::NAN,
+        }
+    }
+}
+
+/// Reads samples one after the other, top row first; says whether any was rounded.
+pub(super) fn read(bytes: &[u8], count: u64, reading: Reading) -> Result<(Vec<f32>, bool), ImportError> {
+    let mut samples = reserve(count)?;
+    let mut is_rounded = false;
+    for sample in bytes.chunks_exact(reading.bytes().unwrap_or(1)).take(count as usize) {
+        let value = reading.value(sample);
+        samples.push(value as f32);
+        is_rounded |= f64::from(value as f32) != value && !value.is_nan();
+    }
+    Ok((samples, is_rounded))
+}
+
+/// Decodes a RAW file.
+pub(super) fn decode(bytes: &[u8], layout: &RawLayout, limits: &ImageLimits) -> Result<Decoded, ImportError> {
+    let skipped = usize::try_from(layout.header).unwrap_or(usize::MAX).min(bytes.len());
+    let bytes = &bytes[skipped..];
+    let length = bytes.len() as u64;
+    if bytes.is_empty() {
+        return Err(ImportError::Empty);
+    }
+    let mut notes = Vec::new();
+    let given = layout.sample.map(|sample| Reading { sample, is_big_endian: false }.bytes());
+    let per_sample = match (given, layout.size) {
+        (Some(None), _) => {
+            let allowed = "16 or 32 bits, or floats of 32";
+            let value = match layout.sample {
+                Some(SampleKind::Unsigned(bits) | SampleKind::Signed(bits) | SampleKind::Float(bits)) => bits,
+                _ => 0,
+            };
+            return Err(ImportError::Option { name: "raw.sample", value: value.into(), allowed });
+        }
+        (Some(Some(bytes)), _) => bytes as u64,
+        (None, Some((width, height))) => {
+            let count = u64::from(width) * u64::from(height);
+            if Some(length) == count.checked_mul(4) { 4 } else { 2 }
+        }
+        (None, None) if length.is_multiple_of(4) && is_square(length / 4) && !is_square(length / 2) => 4,
+        (None, None) => 2,
+    };
+    if layout.sample.is_none() {
+        notes.push(ImportNote::SampleGuessed);
+    }
+    if let Some((width, height)) = layout.size {
+        limits.check_image(width, height, 4)?;
+        let expected = u64::from(width) * u64::from(height) * per_sample;
+        if expected != length {
+            let bytes_per_sample = per_sample as u32;
+            return Err(ImportError::RawLength { width, height, bytes_per_sample, expected, actual: length });
+        }
+    } else if !length.is_multiple_of(per_sample) {
+        return Err(ImportError::RawSize { bytes: length });
+    }
+    let reading = guess_reading(bytes, per_sample as usize, layout);
+    if layout.byte_order.is_none() {
+        notes.push(ImportNote::ByteOrderGuessed { is_big_endian: reading.is_big_endian });
+    }
+    let count = length / per_sample;
+    if layout.size.is_none() {
+        notes.push(ImportNote::SizeGuessed);
+    }
+    let candidates = match layout.size {
+        Some((width, _)) => vec![u64::from(width)],
+        None => widths(count, limits),
+    };
+    if candidates.is_empty() {
+        return Err(ImportError::RawSize { bytes: length });
+    }
+    limits.check_image(candidates[0] as u32, (count / candidates[0]) as u32, 4)?;
+    let (mut samples, is_rounded) = read(bytes, count, reading)?;
+    let score = |width: &u64| row_difference(&samples, *width as usize);
+    let width = candidates.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b))).unwrap_or(count);
+    let (width, height) = (width as u32, (count / width) as u32);
+    if layout.is_bottom_up {
+        flip(&mut samples, width as usize);
+    }
+    let mut decoded = Decoded::new(HeightFormat::Raw, reading.sample, (width, height), samples);
+    decoded.notes = notes;
+    if is_rounded {
+        decoded.notes.push(ImportNote::Rounded);
+    }
+    Ok(decoded)
+}
+
+/// Exchanges the order of rows.
+fn flip(samples: &mut [f32], width: usize) {
+    let mut rest = samples;
+    while rest.len() >= 2 * width {
+        let (first, others) = rest.split_at_mut(width);
+        let (between, last) = others.split_at_mut(others.len() - width);
+        first.swap_with_slice(last);
+        rest = between;
+    }
+}
+
+fn is_square(count: u64) -> bool {
+    count.isqrt().pow(2) == count
+}
+
+/// Plausible widths of an image of so many samples: a square's alone, if it can be one.
+fn widths(count: u64, limits: &ImageLimits) -> Vec<u64> {
+    let is_allowed = |&width: &u64| {
+        let height = count / width;
+        width <= u64::from(limits.max_width)
+            && height <= u64::from(limits.max_height)
+            && width.max(height) <= width.min(height) * MAX_ASPECT
+    };
+    let root = count.isqrt();
+    if is_square(count) {
+        return [root].into_iter().filter(is_allowed).collect();
+    }
+    let divisors = (2..=root).filter(|&width| count.is_multiple_of(width));
+    divisors.flat_map(|width| [width, count / width]).filter(is_allowed).collect()
+}
+
+/// The sample type and byte order under which the samples vary least, of those that the layout leaves open.
+fn guess_reading(bytes: &[u8], per_sample: usize, layout: &RawLayout) -> Reading {
+    let kinds = match (layout.sample, per_sample) {
+        (Some(sample), _) => vec![sample],
+        (None, 4) => vec![SampleKind::Float(32), SampleKind::Unsigned(32), SampleKind::Signed(32)],
+        (None, _) => vec![SampleKind::Unsigned(16), SampleKind::Signed(16)],
+    };
+    let orders = match layout.byte_order {
+        Some(format) => vec![format == RawFormat::BigEndian],
+        None => vec![false, true],
+    };
+    let readings = orders
+        .iter()
+        .flat_map(|&is_big_endian| kinds.iter().map(move |&sample| Reading { sample, is_big_endian }));
+    let count = bytes.len() / per_sample;
+    // Runs of neighbours, spread over the file.
+    let runs = count.div_ceil(64).clamp(1, PROBES / 64);
+    let probe = |reading: Reading| {
+        let run = |number: usize| {
+            let start = count * number / runs * per_sample;
+            let end = (start + 64 * per_sample).min(bytes.len());
+            bytes[start..end].chunks_exact(per_sample).map(move |sample| reading.value(sample))
+        };
+        roughness((0..runs).map(run), reading.sample)
+    };
+    let rated = readings.map(|reading| (probe(reading), reading));
+    // Of equals the first: low byte first, floats, unsigned.
+    let best = rated.reduce(|best, next| if next.0 < best.0 { next } else { best });
+    best.map_or(Reading { sample: kinds[0], is_big_endian: orders[0] }, |(_, reading)| reading)
+}

@@ -1,0 +1,166 @@
+//! What an import found.
+
+use std::fmt;
+
+use super::kind::{HeightFormat, SampleKind};
+
+/// What was read from a file. [`Display`](fmt::Display) gives it as text, a line for each note.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ImportReport {
+    /// The format of the file.
+    pub format: HeightFormat,
+    /// The type of its samples.
+    pub sample: SampleKind,
+    /// Samples in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The least and greatest value, after repairs.
+    pub range: [f32; 2],
+    /// Samples without a value, before repairs.
+    pub voids: u64,
+    /// Samples far from all around them, before repairs.
+    pub outliers: u64,
+    /// Distance between samples along x and z, where the file says it, in its own unit (metres or degrees).
+    pub spacing: Option<[f64; 2]>,
+    /// Place of the first sample of the top row, where the file says it: east and north, in its own unit.
+    pub origin: Option<[f64; 2]>,
+    /// What was guessed, ignored or looks wrong.
+    pub notes: Vec<ImportNote>,
+}
+
+/// Something that was guessed, ignored or looks wrong.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ImportNote {
+    /// An alpha channel was ignored.
+    AlphaIgnored,
+    /// Colours or a palette hold grey alone, and were read as such.
+    GreyAsColour,
+    /// Only the first image of several was read.
+    FirstOfSeveral,
+    /// Black and white are exchanged in this file (`WhiteIsZero`): values are as the decoder gives them.
+    WhiteIsZero,
+    /// Values were rounded to `f32`, which has 24 bits.
+    Rounded,
+    /// The size of a RAW file was guessed.
+    SizeGuessed,
+    /// The type of a RAW file's samples was guessed.
+    SampleGuessed,
+    /// The byte order of a RAW file was guessed.
+    ByteOrderGuessed {
+        /// Whether the high byte comes first.
+        is_big_endian: bool,
+    },
+    /// With the bytes of each sample exchanged the ground would be much smoother.
+    LooksByteSwapped,
+    /// With another number of samples in a row the ground would be much smoother.
+    LooksTransposed {
+        /// The number of samples in a row that fits better.
+        width: u32,
+    },
+    /// A value far outside of all others was taken for the value of voids.
+    NoDataGuessed {
+        /// The value.
+        value: f32,
+        /// Samples with this value.
+        count: u64,
+    },
+    /// A value far outside of all others may be the value of voids; it was kept.
+    LooksLikeNoData {
+        /// The value.
+        value: f32,
+        /// Samples with this value.
+        count: u64,
+    },
+    /// Samples far from all around them were found.
+    Outliers {
+        /// Their number.
+        count: u64,
+        /// Column of the first one.
+        x: u32,
+        /// Its row.
+        z: u32,
+        /// Its value.
+        value: f32,
+    },
+    /// All samples have the same value.
+    Level,
+    /// Tiles share their edges, or do not; this was guessed from their samples.
+    EdgesGuessed {
+        /// Whether the last column of a tile is the first one of the next.
+        are_shared: bool,
+    },
+    /// Tiles that should share their edges differ there; the tile to the left, or above, was used.
+    EdgesDiffer {
+        /// Samples that differ.
+        count: u64,
+        /// The largest difference.
+        largest: f32,
+    },
+}
+
+impl fmt::Display for ImportNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AlphaIgnored => f.write_str("the alpha channel was ignored"),
+            Self::GreyAsColour => f.write_str("the file holds grey as colours; plain grey would be smaller"),
+            Self::FirstOfSeveral => f.write_str("the file holds several images, of which the first was read"),
+            Self::WhiteIsZero => {
+                f.write_str("the file stores white as 0; exchange low and high if it looks upside down")
+            }
+            Self::Rounded => f.write_str("values were rounded to 24 bits"),
+            Self::SizeGuessed => f.write_str("the size was guessed; set `RawLayout::size` if it is wrong"),
+            Self::SampleGuessed => {
+                f.write_str("the sample type was guessed; set `RawLayout::sample` if it is wrong")
+            }
+            Self::ByteOrderGuessed { is_big_endian } => {
+                let order = if *is_big_endian { "high byte first" } else { "low byte first" };
+                write!(f, "the byte order was guessed: {order}; set `RawLayout::byte_order` if it is wrong")
+            }
+            Self::LooksByteSwapped => f.write_str(
+                "neighbours differ wildly, and less with the bytes exchanged: use the other byte order",
+            ),
+            Self::LooksTransposed { width } => {
+                write!(
+                    f,
+                    "rows do not fit each other; with {width} samples in a row they would: correct the size"
+                )
+            }
+            Self::NoDataGuessed { value, count } => {
+                write!(f, "{count} samples of {value}, far outside of all others, were taken for voids")
+            }
+            Self::LooksLikeNoData { value, count } => write!(
+                f,
+                "{count} samples of {value} lie far outside of all others: if they are voids, set \
+                 `ImportOptions::no_data`"
+            ),
+            Self::Outliers { count, x, z, value } => write!(
+                f,
+                "{count} samples lie far from all around them, first ({x}, {z}) with {value}: \
+                 `ImportOptions::outliers` can repair them"
+            ),
+            Self::Level => f.write_str("all samples have the same value"),
+            Self::EdgesGuessed { are_shared: true } => {
+                f.write_str("tiles share their edges, by their samples")
+            }
+            Self::EdgesGuessed { are_shared: false } => f.write_str("tiles share no edges, by their samples"),
+            Self::EdgesDiffer { count, largest } => {
+                write!(f, "{count} samples differ between tiles that share an edge, by up to {largest}")
+            }
+        }
+    }
+}
+
+impl fmt::Display for ImportReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { format, sample, width, height, range: [low, high], voids, outliers, .. } = self;
+        write!(f, "{format}, {width} x {height} samples, {sample}, {low} to {high}")?;
+        write!(f, "; {voids} voids, {outliers} outliers")?;
+        if let Some([x, z]) = self.spacing {
+            write!(f, "; samples are {x} x {z} apart")?;
+        }
+        self.notes.iter().try_for_each(|note| write!(f, "\n- {note}"))
+    }
+}
