@@ -9,7 +9,7 @@ use crate::ground::MaterialId;
 
 /// The operation inside the shape.
 ///
-/// Dig, add and paint look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All
+/// Dig, add, paint and reset look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All
 /// others *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change
 /// nothing outside. Beyond the world's rim they assume that everything continues as at the rim.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,6 +84,13 @@ pub enum Operation {
         #[serde(rename = "height", default, skip_serializing_if = "is_default")]
         base: f32,
     },
+    /// Returns ground to what it was before any edit: densities and materials, exactly. Where nothing edited is left,
+    /// nothing is stored any more.
+    ///
+    /// It reaches as far as a dig of the same shape, [`BAND`](super::BAND) beyond it, so a reset of that shape takes a
+    /// dig back. The terrain's rules hold: a sample is reset entirely, or refused. Ground that loses its support does
+    /// not fall.
+    Reset,
 }
 
 impl Operation {
@@ -97,13 +104,14 @@ impl Operation {
 
     /// Returns `true` if it sculpts. Only then the brush's [`Blend`](super::Blend) is used.
     pub fn is_sculpting(&self) -> bool {
-        !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. })
+        !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Reset)
     }
 
     /// The names of its fields in a line of JSON, in addition to those of the blend.
     pub(super) fn fields(&self) -> &'static [&'static str] {
         match self {
-            Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Smooth | Self::Sharpen => &[],
+            Self::Dig | Self::Add { .. } | Self::Paint { .. } => &[],
+            Self::Smooth | Self::Sharpen | Self::Reset => &[],
             Self::Flatten { .. } => &["point", "normal"],
             Self::Level { .. } => &["height"],
             Self::Raise { .. } | Self::Lower { .. } => &["amount"],
@@ -145,12 +153,13 @@ pub(crate) enum Kind {
     Add { material: MaterialId },
     Paint { material: MaterialId },
     Sculpt,
+    Reset,
 }
 
 impl Kind {
     /// The density of a sample after a dig, an add or a paint, from its density `before` and its signed distance to the
     /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt
-    /// look at more than that: for them, it gives `before`.
+    /// look at more than that, and a reset at the ground: for them, it gives `before`.
     ///
     /// A shape counts as [`DEPTH`] deep at most: beyond, no surface shows the difference, and the middle of a large
     /// cave or hill is all one number. Applying an operation twice is the same as once, and neither a dig ever adds
@@ -161,7 +170,7 @@ impl Kind {
         match self {
             Self::Dig => before.max(-outside),
             Self::Add { .. } => before.min(outside),
-            Self::Paint { .. } | Self::Sculpt => before,
+            Self::Paint { .. } | Self::Sculpt | Self::Reset => before,
         }
     }
 

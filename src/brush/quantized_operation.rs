@@ -35,6 +35,7 @@ pub(super) enum QuantizedOperation {
     Lower { amount: i32 },
     Stamp { stamp: QuantizedStamp },
     Terrace { step: i32, base: i32 },
+    Reset,
 }
 
 impl QuantizedOperation {
@@ -57,6 +58,7 @@ impl QuantizedOperation {
             Operation::Terrace { step, base } => {
                 Self::Terrace { step: in_range("step", *step, STEP.0, STEP.1)?, base: height("base", *base)? }
             }
+            Operation::Reset => Self::Reset,
         })
     }
 
@@ -94,6 +96,7 @@ impl QuantizedOperation {
             Self::Lower { amount } => Operation::Lower { amount: voxels(*amount) },
             Self::Stamp { stamp } => Operation::Stamp { stamp: stamp.stamp() },
             Self::Terrace { step, base } => Operation::Terrace { step: voxels(*step), base: voxels(*base) },
+            Self::Reset => Operation::Reset,
         }
     }
 
@@ -119,6 +122,7 @@ impl QuantizedOperation {
             Self::Dig => Kind::Dig,
             Self::Add { material } => Kind::Add { material },
             Self::Paint { material } => Kind::Paint { material },
+            Self::Reset => Kind::Reset,
             _ => Kind::Sculpt,
         }
     }

@@ -138,6 +138,11 @@ impl Brush {
         Self::new(shape, Operation::Terrace { step, base: 0.0 })
     }
 
+    /// A brush that returns the ground in its shape to what it was before any edit.
+    pub fn reset(shape: Shape) -> Self {
+        Self::new(shape, Operation::Reset)
+    }
+
     /// The brush with another strength, if it sculpts: 0 to 1.
     #[must_use]
     pub fn with_strength(self, strength: f32) -> Self {

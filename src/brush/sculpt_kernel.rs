@@ -302,7 +302,10 @@ impl SculptKernel {
             QuantizedOperation::Lower { amount } => SculptOp::Shift(*amount),
             QuantizedOperation::Stamp { stamp } => SculptOp::Stamp(stamp.constants()),
             QuantizedOperation::Terrace { step, base } => SculptOp::Terrace(*step, *base),
-            QuantizedOperation::Dig | QuantizedOperation::Add { .. } | QuantizedOperation::Paint { .. } => {
+            QuantizedOperation::Dig
+            | QuantizedOperation::Add { .. }
+            | QuantizedOperation::Paint { .. }
+            | QuantizedOperation::Reset => {
                 return None;
             }
         };

@@ -7,7 +7,7 @@
 //!
 //! Edits that read samples around those they change, such as sculpting or those that
 //! [rules](crate::volume::DiggingRules) restrict, take the slower path of `stencil_edit`; all others are applied row by
-//! row by `plain_edit`.
+//! row by `plain_edit`. A reset, which takes bricks away, goes none of these ways: see `reset`.
 
 mod batches;
 mod brick_editor;
@@ -20,6 +20,7 @@ mod plain_edit;
 mod prepared;
 mod prepared_edit;
 mod removal;
+mod reset;
 mod restore;
 mod rule_scope;
 mod stencil_edit;
@@ -34,6 +35,7 @@ pub(crate) use jobs::Job;
 pub(crate) use prepared::PreparedEdits;
 pub(crate) use prepared_edit::reach;
 pub(crate) use removal::take_out;
+pub(crate) use reset::{ResetBrick, edited_within, reset};
 pub(crate) use restore::count_replaced;
 #[cfg(feature = "cuda")]
 pub(crate) use {prepared_edit::PreparedEdit, rule_scope::BatchRules};

@@ -353,7 +353,8 @@ fn stretched(brush: &Brush, matrix: Mat3A, rotation: Quat, translation: Vec3) ->
         | Operation::Smooth
         | Operation::Sharpen
         | Operation::Raise { .. }
-        | Operation::Lower { .. } => {}
+        | Operation::Lower { .. }
+        | Operation::Reset => {}
     }
     brush
 }

@@ -27,6 +27,20 @@ pub struct Draft {
     pub regions_hash: u64,
 }
 
+/// Two changes, one after the other, as one.
+fn merged(earlier: WorldChange, later: WorldChange) -> WorldChange {
+    fn fill_in<K: Copy + Ord, V>(later: &mut Vec<(K, V)>, earlier: Vec<(K, V)>) {
+        // Stable: of two with the same key the later one comes first.
+        later.extend(earlier);
+        later.sort_by_key(|own| own.0);
+        later.dedup_by_key(|own| own.0);
+    }
+    let WorldChange { mut bricks, mut fields, next_field } = later;
+    fill_in(&mut bricks, earlier.bricks);
+    fill_in(&mut fields, earlier.fields);
+    WorldChange { bricks, fields, next_field }
+}
+
 impl Terrain {
     /// The result of these edits on the last committed world, under the rules and settings of edits that are
     /// submitted now. Nothing changes. It takes as long as their transaction on a terrain that [never
@@ -40,19 +54,31 @@ impl Terrain {
             let terms = (self.rules.clone(), self.loose);
             queue.push_edit(self.world.grid(), edit.tag(), checked, together, terms);
         }
-        let Some((Taken::Edits(edits), _)) = queue.take() else {
-            let change = WorldChange { next_field: self.world.next_field, ..WorldChange::default() };
-            let (hash, regions_hash) = (self.world.hash(), self.world.sample_hash);
-            return Draft { receipts: Vec::new(), change, hash, regions_hash };
-        };
-        let transaction = self.transaction(unique(), Work::Edits(edits));
-        let transaction =
-            Transaction { meshing: Meshing::Never, drawn_cut: None, is_logged: false, ..transaction };
-        let commit = transaction.run();
-        let regions_hash = commit.sample_hash();
+        let mut world = Arc::clone(&self.world);
+        let (mut receipts, mut regions_hash) = (Vec::new(), world.sample_hash);
+        let mut change = WorldChange { next_field: world.next_field, ..WorldChange::default() };
+        // All of them are one transaction, unless there is a reset among them.
+        while let Some((Taken::Edits(edits), _)) = queue.take() {
+            let transaction = self.transaction(unique(), Work::Edits(edits));
+            let transaction = Transaction {
+                meshing: Meshing::Never,
+                drawn_cut: None,
+                is_logged: false,
+                world: Arc::clone(&world),
+                ..transaction
+            };
+            let mut commit = transaction.run();
+            regions_hash = commit.sample_hash();
+            receipts.append(&mut commit.receipts);
+            change = merged(change, commit.change());
+            if queue.len() > 0 {
+                let mut next = World::clone(&world);
+                commit.install(&mut next);
+                world = Arc::new(next);
+            }
+        }
         let hash = World::hash_of(self.world.ground().hash(), regions_hash);
-        let change = commit.change();
-        Draft { receipts: commit.receipts, change, hash, regions_hash }
+        Draft { receipts, change, hash, regions_hash }
     }
 
     /// A terrain with the same world, rules and settings, in which nothing waits. Both share the world until one of them changes.

@@ -264,7 +264,7 @@ fn share_uniform(world: &World, new: &mut [NewBrick]) -> Option<UniformBricks> {
 
 /// Evaluates rule 2 again near changed bricks, as samples may have become pristine again. Returns the mask
 /// words that change.
-fn words_of(
+pub(super) fn words_of(
     world: &World,
     bricks: &[(BrickPos, Arc<Brick>)],
     changed: &[(BrickPos, LatticeBox)],

@@ -111,6 +111,7 @@ impl Submission {
 }
 
 /// Requests that wait for their transaction.
+#[expect(clippy::large_enum_variant, reason = "almost all are edits")]
 pub(super) enum Request {
     Edit(Submission),
     Step(HistoryStep),
@@ -216,10 +217,17 @@ impl Queue {
             return Some((single, STEP));
         }
         let mut work = 0_u64;
+        // A reset is a transaction of its own.
+        let is_reset = |request: &Request| match request {
+            Request::Edit(own) => own.edit.as_ref().is_ok_and(|edit| edit.kind() == Kind::Reset),
+            Request::Step(_) | Request::Put(_) => false,
+        };
+        let is_single = self.requests.front().is_some_and(is_reset);
         let is_taken = |request: &&Request| {
             let fits = work == 0 || work.saturating_add(request.work()) <= self.limits.transaction;
+            let is_alone = work != 0 && (is_single || is_reset(request));
             work += if fits { request.work() } else { 0 };
-            fits && matches!(request, Request::Edit(_))
+            fits && !is_alone && matches!(request, Request::Edit(_))
         };
         let count = self.requests.iter().take_while(is_taken).count();
         let edits = self.requests.drain(..count).filter_map(|request| match request {

@@ -24,8 +24,9 @@ use super::redraw::MeshUpdates;
 use super::stages::Stages;
 use super::transaction::{Transaction, Work};
 use super::world::World;
-use super::{groups, restore};
+use super::{groups, reset, restore};
 use crate::backend::{Compute, Cpu, Engine};
+use crate::brush::Kind;
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ItemCost};
 
@@ -62,7 +63,12 @@ impl Transaction {
         #[cfg(test)]
         panic_if_marked(&self.work);
         let run = || match &self.work {
-            Work::Edits(submissions) => groups::edit(self, submissions, backend),
+            Work::Edits(submissions) => match &submissions[..] {
+                [own @ Submission { edit: Ok(edit), .. }] if edit.kind() == Kind::Reset => {
+                    reset::commit(self, own, edit, backend)
+                }
+                all => groups::edit(self, all, backend),
+            },
             Work::Step(step, target) => restore::step(self, *step, target, backend),
             Work::Put(parts) => put::put(self, parts, backend),
             Work::Cut(choose) => self.cut(choose.as_ref()),

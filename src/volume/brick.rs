@@ -173,6 +173,19 @@ impl Brick {
         brick
     }
 
+    /// This brick with some samples pristine again, which are solid where `solid` says so.
+    pub(crate) fn without_edits(&self, samples: &Layers, solid: &Layers) -> Self {
+        let mut brick = self.clone();
+        layers::indices(samples).for_each(|index| brick.samples[index] = Sample::PRISTINE);
+        for y in 0..8 {
+            brick.clear_materials(y, samples[y]);
+            brick.edited[y] &= !samples[y];
+            brick.solid[y] = brick.solid[y] & !samples[y] | solid[y] & samples[y];
+        }
+        brick.materials.take_if(|all| all.iter().all(|&material| material == MaterialId::GROUND));
+        brick
+    }
+
     /// A brick of samples, bits that agree with them, and materials.
     #[cfg(feature = "cuda")]
     pub(crate) fn of_parts(
