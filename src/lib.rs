@@ -73,6 +73,7 @@
 //! | a game wants | it uses |
 //! | --- | --- |
 //! | a landscape | [`Ground`](ground::Ground) from an image, noise or a function; [`MaterialControl`](ground::MaterialControl) |
+//! | heights from TIFF, EXR, satellites, tiles | [`ElevationGrid`](ground::ElevationGrid) |
 //! | to put it into the world | the [`Terrain`](terrain::Terrain) component; `BurrowPlugins` |
 //! | another level | a new [`Terrain`](terrain::Terrain), inserted in place of the old one |
 //! | ground to the horizon | `LevelsOfDetail` on the terrain; [`Ground::from_source`](ground::Ground::from_source) |
@@ -80,7 +81,7 @@
 //! | sculpted levels as assets | `BurrowLevel`, `StartLevel` (feature `store`) |
 //! | several players | `GroundServer` and `SharedTerrain` (feature `replicon`); `net` for other transports (feature `net`) |
 //! | to dig, build, paint | [`Brush`](brush::Brush) messages; [`Shape`](brush::Shape), [`Roughness`](brush::Roughness) |
-//! | to sculpt | [`Brush::smooth`](brush::Brush::smooth), `flatten`, `level`, `raise`, `stamp`, ...; [`Blend`](brush::Blend) |
+//! | to sculpt | [`Brush::smooth`](brush::Brush::smooth), `flatten`, `level`, `raise`, `stamp`, `reset`, ...; [`Blend`](brush::Blend) |
 //! | ground that resists | [`Terrain::set_rules`](terrain::Terrain::set_rules) with [`DiggingRules`](volume::DiggingRules) |
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to undo it | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
@@ -306,6 +307,7 @@
 //! | feature | what it adds | default |
 //! | --- | --- | --- |
 //! | `cuda` | transactions on an NVIDIA GPU where one is found, see [`backend`]; compiles everywhere | |
+//! | `import` | heights from TIFF and EXR files, see [`ElevationGrid`](ground::ElevationGrid) | |
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking character; debris | |
@@ -411,6 +413,7 @@ mod guide {
         Readme "README.md"
         GettingStarted "docs/guide/src/getting-started.md"
         Sizes "docs/guide/src/sizes.md"
+        Import "docs/guide/src/import.md"
         Levels "docs/guide/src/levels.md"
         Brushes "docs/guide/src/brushes.md"
         Materials "docs/guide/src/materials.md"

@@ -154,6 +154,11 @@ impl Evaluator {
         self.roughness.is_some()
     }
 
+    /// Whether only the CPU computes these distances.
+    pub(crate) fn is_for_cpu(&self) -> bool {
+        self.form.is_for_cpu()
+    }
+
     /// All parameters of distances.
     pub(crate) fn constants(&self) -> Constants {
         let (kind, shape) = self.form.constants();

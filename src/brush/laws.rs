@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3, IVec3, Quat, Vec2, Vec3};
 use proptest::prelude::*;
 use serde_json::json;
 
-use super::shapes::{Capsule, Cone, Cuboid, Cylinder, Sphere, Torus};
+use super::shapes::{Capsule, Cone, Cuboid, Curve, Cylinder, Sphere, Torus};
 use super::*;
 use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::{LatticeBox, hash::mix};
@@ -36,6 +36,12 @@ fn shape(far: f32, size: f32) -> impl Strategy<Value = Shape> {
         (vector(far), axis(), radius(), 0.0f32..1.0).prop_map(|(center, axis, radius, tube)| {
             Shape::torus(center, axis, radius, (radius * tube).max(0.25))
         }),
+        (vector(far), prop::array::uniform3(vector(size / 2.0)), radius(), radius()).prop_map(
+            |(from, [a, b, c], first, last)| Shape::curve(
+                [from, from + a, from + a + b, from + b + c],
+                [first, last]
+            )
+        ),
     ]
 }
 
@@ -66,13 +72,14 @@ fn wild() -> impl Strategy<Value = f32> {
 fn wild_brush() -> impl Strategy<Value = Brush> {
     let vector = || prop::array::uniform3(wild()).prop_map(Vec3::from_array);
     let turn = prop_oneof![rotation(), prop::array::uniform4(wild()).prop_map(Quat::from_array)];
-    let shape = (0..6, vector(), vector(), turn, wild()).prop_map(|(kind, a, b, turn, radius)| match kind {
+    let shape = (0..7, vector(), vector(), turn, wild()).prop_map(|(kind, a, b, turn, radius)| match kind {
         0 => Shape::sphere(a, radius),
         1 => Shape::turned_cuboid(a, b, turn),
         2 => Shape::cylinder(a, b, radius),
         3 => Shape::capsule(a, b, radius),
         4 => Shape::cone(a, b, radius),
-        _ => Shape::torus(a, b, radius, turn.x),
+        5 => Shape::torus(a, b, radius, turn.x),
+        _ => Shape::curve([a, b, b, a + b], [radius, turn.x]),
     });
     let roughness = (wild(), wild(), any::<u32>()).prop_map(|(a, s, seed)| Roughness::new(a, s, seed));
     let blend = (wild(), wild(), prop::option::of(any::<u8>().prop_map(MaterialId)))
@@ -132,6 +139,24 @@ fn plain_distance(shape: &Shape, p: DVec3) -> f64 {
             let (own, half) = (turn.inverse() * (p - center.as_dvec3()), half.as_dvec3());
             let nearest = own.clamp(-half, half);
             if nearest == own { -(half - own.abs()).min_element() } else { own.distance(nearest) }
+        }
+        Shape::Curve(Curve { from, from_control, to_control, to, from_radius, to_radius }) => {
+            // Balls along it, much denser than its pieces. The pieces' corners lie on the curve, and are rounded.
+            let corners = [from, from_control, to_control, to].map(|corner| corner.as_dvec3());
+            let [a, b, c, d] = corners;
+            let at = |t: f64| {
+                let s = 1.0 - t;
+                a * (s * s * s) + b * (3.0 * s * s * t) + c * (3.0 * s * t * t) + d * (t * t * t)
+            };
+            let radius =
+                |t: f64| f64::from(from_radius) + (f64::from(to_radius) - f64::from(from_radius)) * t;
+            let point = |index: i32| {
+                let (piece, part) = (f64::from(index / 64), f64::from(index % 64) / 64.0);
+                let (low, high) = (piece / 32.0, (piece + 1.0) / 32.0);
+                (at(low).lerp(at(high), part), radius(low) + (radius(high) - radius(low)) * part)
+            };
+            let ball = |(center, radius): (DVec3, f64)| p.distance(center) - radius;
+            (0..32 * 64).map(point).map(ball).fold(ball((d, to_radius.into())), f64::min)
         }
         Shape::Torus(Torus { center, axis, radius, tube }) => {
             // To the point of the circle that lies the way the point lies.

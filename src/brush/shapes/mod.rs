@@ -2,7 +2,7 @@
 //!
 //! A shape is a struct over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). To
 //! add one, write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
-//! `kernels/shapes.cuh`.
+//! `kernels/shapes.cuh`, unless [`ShapeSdf::is_for_cpu`] keeps it from GPUs.
 
 /// Converts a shape field by field, as in `convert!(Sphere { center: point, radius: length })`.
 macro_rules! convert {
@@ -24,6 +24,7 @@ macro_rules! convert {
 mod capsule;
 mod cone;
 mod cuboid;
+mod curve;
 mod cylinder;
 mod distance;
 mod numbers;
@@ -37,6 +38,7 @@ use serde::{Deserialize, Serialize};
 pub use capsule::Capsule;
 pub use cone::Cone;
 pub use cuboid::Cuboid;
+pub use curve::Curve;
 pub use cylinder::Cylinder;
 pub use numbers::{Numbers, Units, Voxels};
 pub use sphere::Sphere;
@@ -241,7 +243,7 @@ macro_rules! shapes {
     };
 }
 
-// In the order in which `kernels/shapes.cuh` has them.
+// In the order in which `kernels/shapes.cuh` has them; those that it does not have come last.
 shapes! {
     Sphere,
     #[serde(rename = "box")]
@@ -250,6 +252,7 @@ shapes! {
     Capsule,
     Cone,
     Torus,
+    Curve,
 }
 
 impl Shape {
@@ -276,6 +279,14 @@ impl Shape {
         // Moving fails for no number.
         let moved = self.convert(&mut to).unwrap_or(*self);
         (moved, to.fields)
+    }
+}
+
+#[cfg(feature = "cuda")]
+impl ShapeSdf {
+    /// Whether only the CPU computes distances of the shape.
+    pub(super) fn is_for_cpu(&self) -> bool {
+        matches!(self, Self::Curve(_))
     }
 }
 

@@ -213,5 +213,7 @@ fn shapes_have_the_same_numbers() {
     let shapes = include_str!("../kernels/shapes.cuh");
     let list = shapes.split_once("enum Kind {").and_then(|(_, rest)| rest.split_once('}')).expect("a list").0;
     let names: Vec<String> = list.split(',').map(|name| name.trim().to_lowercase()).collect();
-    assert!(crate::brush::shapes::NAMES.iter().map(|name| name.to_lowercase()).eq(names));
+    // The curve is for the CPU alone.
+    let known = crate::brush::shapes::NAMES.iter().filter(|name| **name != "Curve");
+    assert!(known.map(|name| name.to_lowercase()).eq(names));
 }
