@@ -307,6 +307,7 @@
 //! | feature | what it adds | default |
 //! | --- | --- | --- |
 //! | `cuda` | transactions on an NVIDIA GPU where one is found, see [`backend`]; compiles everywhere | |
+//! | `import` | heights from TIFF and EXR files, see [`ElevationGrid`](ground::ElevationGrid) | |
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking character; debris | |
