@@ -1,8 +1,5 @@
 //! Negative controls: faults that were fixed are put back on purpose, built from public parts, and the laws of the matrix find each.
 
-use bevy::camera::visibility::VisibilityClass;
-use bevy::platform::collections::HashMap;
-
 use super::*;
 
 /// What happens in a life.
@@ -67,39 +64,6 @@ fn tiles_that_outlive_their_terrain_are_found() {
         app.add_observer(leave);
     };
     assert_found(Load::Nothing, fault, |life| happen(life, Event::RemoveAndInsert), "without a parent");
-}
-
-/// Chunks lost their mesh and kept their class, so each time that a mesh came back they were seen once more.
-#[test]
-fn chunks_that_are_seen_once_more_with_each_mesh_are_found() {
-    #[derive(Resource, Default)]
-    struct Had(HashMap<Entity, usize>);
-    fn keep(
-        new: On<Add, VisibilityClass>,
-        mut classes: Query<&mut VisibilityClass, With<Chunk>>,
-        mut had: ResMut<Had>,
-    ) {
-        let Ok(mut class) = classes.get_mut(new.entity) else { return };
-        let had = had.0.entry(new.entity).or_default();
-        let one = class[0];
-        (0..*had).for_each(|_| class.push(one));
-        *had += 1;
-    }
-    let fault = |app: &mut App| {
-        app.init_resource::<Had>().add_observer(keep);
-    };
-    // The camera goes far away, where all is drawn coarsely, and comes back.
-    let story = |life: &mut Life| {
-        happen(life, Event::Dig);
-        for height in [9000.0, 20.0] {
-            let camera = life.camera;
-            let place = Transform::from_xyz(32.0, height, 32.0);
-            life.stage.app.world_mut().entity_mut(camera).insert(place);
-            life.run(20);
-            life.settle();
-        }
-    };
-    assert_found(Load::Levels, fault, story, "seen twice");
 }
 
 /// Tiles got their parent after observers had seen them.
