@@ -354,6 +354,10 @@ pub mod panel;
 pub mod physics;
 #[cfg(feature = "plugin")]
 pub mod plugin;
+#[cfg(feature = "plugin")]
+mod plugins;
+#[cfg(feature = "plugin")]
+pub use plugins::BurrowPlugins;
 #[cfg(all(feature = "plugin", feature = "store"))]
 pub mod saves;
 #[cfg(feature = "store")]
@@ -371,6 +375,8 @@ mod worlds;
 
 /// What most games import.
 pub mod prelude {
+    #[cfg(feature = "plugin")]
+    pub use crate::BurrowPlugins;
     pub use crate::brush::{Blend, Brush, BrushError, Edit, Operation, Roughness, Shape, Stamp};
     pub use crate::ground::{
         Bedding, ColumnMaterial, Detail, GreyImage, Ground, HeightSource, ImageLimits, ImageScale, Interval,
@@ -379,10 +385,10 @@ pub mod prelude {
     };
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
-        BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
-        DetailSource, Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround,
-        LoosePieceFound, LoosePieceReturned, MaterialColors, Redo, Redraw, ShownLevels, SlimVertices,
-        TargetedBrush, TerrainHit, TerrainPropagatePlugin, TerrainReady, Terrains, Tile, Undo,
+        BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, BurrowSystems, Chunk, DetailSource, Field,
+        GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
+        LoosePieceReturned, MaterialColors, Redo, Redraw, ShownLevels, SlimVertices, TargetedBrush,
+        TerrainHit, TerrainPropagatePlugin, TerrainReady, Terrains, Tile, Undo,
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{

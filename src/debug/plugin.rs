@@ -240,8 +240,8 @@ fn focus(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::BurrowPlugins;
     use crate::ground::Ground;
-    use crate::plugin::BurrowPlugins;
     use crate::terrain::TerrainSettings;
 
     /// An app that shows the chunks of a terrain, which stands there.

@@ -50,6 +50,7 @@
 
 mod character;
 mod character_plugin;
+mod collider_source;
 mod colliders;
 mod columns;
 mod cone;
@@ -69,13 +70,13 @@ mod walking;
 
 pub use character::{Character, CharacterMotion, CharacterSteering};
 pub use character_plugin::{CharacterPlugin, CharacterSystems};
+pub use collider_source::ColliderSource;
 pub use debris::{Debris, DebrisCrumbled, DebrisOf, DebrisPlugin, DebrisSettings, TerrainDebris};
 pub use edge_walls::EdgeWalls;
 pub use ground::{GroundBody, GroundCollider, GroundContact, TerrainContact, TerrainPhysicsDisabled};
 pub use hold::HeldByGround;
 pub use hull::debris_collider;
 pub use shape::GroundShape;
-pub use sources::ColliderSource;
 
 use std::time::Duration;
 

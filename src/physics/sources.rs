@@ -9,37 +9,13 @@ use bevy::prelude::*;
 use super::colliders::GroundColliders;
 use super::near::{Neighbourhood, ahead, stops, voxel_size};
 use super::solids::{Extent, Solids};
-use super::{HeldByGround, PhysicsFigures, TerrainPhysicsDisabled};
+use super::{ColliderSource, HeldByGround, PhysicsFigures, TerrainPhysicsDisabled};
 use crate::lattice::ChunkGrid;
 use crate::plugin::{LevelsOfDetail, Places, WantedTiles};
 use crate::terrain::Terrain;
 
 /// How far ahead of a moving source colliders are made, in seconds.
 const AHEAD: f32 = 1.0;
-
-/// Ground has colliders in all columns of chunks within the radius of a source, and nowhere else.
-///
-/// Put it on players and on everything else that needs ground. With a radius of `f32::INFINITY` all ground has colliders.
-///
-/// A source that enters another voxel costs main-thread time for each column of chunks within its radius and on its way
-/// ahead; one that reaches the whole terrain does so only when it enters another column. Each collider costs time in a task,
-/// and memory: some 190 MB for a square of 1000 x 1000 voxels. A source that wants more than 256 MB is warned of once.
-///
-/// With a `LinearVelocity`, ground where the source will be in a second has colliders too, up to 64 chunks ahead. Bodies
-/// need not be sources: those too far from any are [held](super::HeldByGround).
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default)]
-#[require(Transform)]
-pub struct ColliderSource {
-    /// Metres, along x and z.
-    pub radius: f32,
-}
-
-impl Default for ColliderSource {
-    fn default() -> Self {
-        Self { radius: 48.0 }
-    }
-}
 
 /// About how many bytes colliders take for each cell (x, z): two triangles, with their share of vertices and of the tree.
 const CELL_BYTES: f32 = 186.0;

@@ -207,9 +207,9 @@ mod tests {
     use bevy::time::TimeUpdateStrategy;
 
     use super::*;
+    use crate::BurrowPlugins;
     use crate::ground::Ground;
     use crate::physics::{ColliderSource, HeldByGround, TerrainPhysicsPlugin};
-    use crate::plugin::BurrowPlugins;
     use crate::terrain::TerrainSettings;
 
     /// An app with level ground of four tiles, where building the first `panics` colliders panics.

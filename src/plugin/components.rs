@@ -21,9 +21,14 @@ impl Component for Terrain {
         required.register_required(MaterialColors::default);
         required.register_required(TerrainPlace::default);
         #[cfg(feature = "render")]
-        required.register_required(super::materials::Materials::default);
+        required.register_required(Materials::default);
     }
 }
+
+/// Which types of materials a terrain has, as bits in the order of precedence.
+#[cfg(feature = "render")]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Materials(pub u64);
 
 /// A tile of the heightmap: child of its [`Terrain`]. Has a `Mesh3d` while some of its cells are not dug.
 ///

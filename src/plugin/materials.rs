@@ -3,13 +3,10 @@
 use bevy::prelude::*;
 
 use super::TerrainReady;
+use super::components::Materials;
 use super::propagate::{Overruled, PropagateSteps, propagate_to_ground, propagate_to_pieces};
 use super::reports::{Report, Reported, Reports};
 use crate::terrain::Terrain;
-
-/// Which types of materials a terrain has, as bits in the order of precedence.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Materials(u64);
 
 /// The precedence of a look, which all other materials make way for.
 const LOOK: usize = 63;

@@ -40,7 +40,7 @@ use crate::plugin::{BeforeLoad, BurrowSystems};
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SaveSystems;
 
-/// Opens and saves the worlds of terrains with a [`SavedWorld`]; part of [`BurrowPlugins`](crate::plugin::BurrowPlugins).
+/// Opens and saves the worlds of terrains with a [`SavedWorld`]; part of [`BurrowPlugins`](crate::BurrowPlugins).
 #[derive(Default)]
 pub struct SavePlugin;
 

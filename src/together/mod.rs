@@ -52,7 +52,7 @@ use crate::plugin::{
     TerrainPlugin,
 };
 
-/// The multiplayer plugin. Add it after `RepliconPlugins` and [`BurrowPlugins`](crate::plugin::BurrowPlugins), on the
+/// The multiplayer plugin. Add it after `RepliconPlugins` and [`BurrowPlugins`](crate::BurrowPlugins), on the
 /// server and on all clients, in the same position among all plugins that register something with replicon.
 ///
 /// A server of `MinimalPlugins` needs `StatesPlugin` for `RepliconPlugins`, and a transport:

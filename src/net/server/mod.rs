@@ -18,6 +18,7 @@ mod apply;
 mod events;
 mod join;
 mod kept;
+mod keys;
 mod order_log;
 mod own_numbers;
 mod players;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::save::RESERVED;
+use super::keys::{RESERVED, prefix};
 use crate::net::message::{ClientId, MOST_OWN_JUMP};
 use crate::store::Store;
 
@@ -131,7 +131,7 @@ impl OwnNumbers {
     /// The numbers in a store.
     pub fn open(store: &Store) -> Self {
         let mut numbers = Self::default();
-        let prefix = format!("{}{KEY}", super::save::prefix(store));
+        let prefix = format!("{}{KEY}", prefix(store));
         for (key, bytes) in store.game_data().range(prefix.clone()..) {
             let Some(id) = key.strip_prefix(&prefix) else { break };
             if let Ok(id) = id.parse()

@@ -1,24 +1,10 @@
 //! Saves a server's world, so that a restarted server continues from it.
 
+use super::keys::{NUMBER, RESERVED, prefix};
 use super::own_numbers::OwnNumbers;
 use super::{Server, ServerSettings, ToClient};
 use crate::store::{Store, StoreError};
 use crate::terrain::Terrain;
-
-/// The prefix of a server's keys in a store, next to the game's data. No person would choose it for a key.
-pub const RESERVED: &str = "\u{1}bevy_burrow/net/";
-
-/// The prefix of the keys of earlier versions.
-const FORMER: &str = "net/";
-
-/// Below these, the key under which a store keeps the number of the last entry that its world holds.
-const NUMBER: &str = "number";
-
-/// The prefix of a server's keys in a store. If a present version has saved there, keys with the former prefix belong
-/// to the game.
-pub fn prefix(store: &Store) -> &'static str {
-    if store.get(&format!("{RESERVED}{NUMBER}")).is_some() { RESERVED } else { FORMER }
-}
 
 impl Server {
     /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or one that a store

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::frame::{Kind, WorldId};
+use super::ids::{Kind, WorldId};
 use crate::lattice::{BrickPos, ChunkPos};
 
 /// Why bytes can't be read as a part of a saved world.

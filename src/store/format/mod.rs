@@ -23,6 +23,7 @@ pub mod edits;
 pub mod error;
 pub mod fields;
 pub mod frame;
+pub mod ids;
 pub mod level;
 pub mod limits;
 pub mod metadata;
