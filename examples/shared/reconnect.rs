@@ -3,6 +3,8 @@
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
+use bevy_burrow::net::Kick;
+use bevy_burrow::together::{SharingTrouble, SharingTroubleFound};
 use bevy_replicon::prelude::ClientState;
 
 /// Makes a connection. A token is good for one, so each try asks for a new one.
@@ -29,8 +31,22 @@ impl Plugin for ReconnectPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(
             Update,
-            reconnect.run_if(in_state(ClientState::Disconnected)).run_if(resource_exists::<StayConnected>),
+            (
+                stop,
+                reconnect
+                    .run_if(in_state(ClientState::Disconnected))
+                    .run_if(resource_exists::<StayConnected>),
+            )
+                .chain(),
         );
+    }
+}
+
+/// A player who has connected from another device plays there. Connecting from here would end that connection.
+fn stop(mut troubles: MessageReader<SharingTroubleFound>, mut commands: Commands) {
+    let plays_elsewhere = SharingTrouble::Kicked(Kick::ConnectedAgain);
+    if troubles.read().any(|found| found.trouble == plays_elsewhere) {
+        commands.remove_resource::<StayConnected>();
     }
 }
 
