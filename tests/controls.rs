@@ -205,8 +205,8 @@ impl<'a> ReferenceMesher<'a> {
         }
     }
 
-    /// With strata: do two lattice levels or more separate the heights of two neighbouring columns of a cell, while the
-    /// solid ends of all such edges and the voxels below its corners are of several materials?
+    /// With strata: do two lattice levels or more separate the heights of two neighbouring columns of a cell, but nowhere
+    /// more than 64, while the solid ends of all such edges and the voxels below its corners are of several materials?
     fn is_steep(&self, cell: Column) -> bool {
         let (ground, [a, b, c, d]) = (self.view.ground(), cell.corners());
         let is_solid = |point: &IVec3| point.y * ONE < ground.height(Column::of(*point));
@@ -220,7 +220,7 @@ impl<'a> ReferenceMesher<'a> {
         let tops = [a, b, c, d].map(|column| column.at((ground.height(column) - 1).div_euclid(ONE)));
         let mut voxels = lines.iter().flatten().chain(&tops);
         ground.strata().is_some()
-            && lines.iter().any(|line| line.len() >= 2)
+            && (2..=64).contains(&lines.iter().map(Vec::len).max().unwrap_or(0))
             && voxels.any(|&voxel| ground.material(voxel) != ground.material(tops[0]))
     }
 

@@ -41,7 +41,7 @@ const EXAMPLES: [Example; 5] = [
         arguments: "--tour --fps 10 --frames 12 --width 320 --height 180",
         pictures: 12,
         ground: 0.3,
-        black: 0.25,
+        black: 0.45,
     },
     Example {
         name: "sculpt",
