@@ -2,7 +2,7 @@
 //!
 //! A shape is a struct over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). To
 //! add one, write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
-//! `kernels/shapes.cuh`, unless [`ShapeSdf::is_for_cpu`] keeps it from GPUs.
+//! `kernels/shapes.cuh`, unless `ShapeSdf::is_for_cpu` keeps it from GPUs.
 
 /// Converts a shape field by field, as in `convert!(Sphere { center: point, radius: length })`.
 macro_rules! convert {
