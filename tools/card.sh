@@ -32,7 +32,7 @@ for program in "$golden:golden" "$frames:frame_times" "$CARGO_TARGET_DIR/release
 done
 cp -r assets "$out/assets"
 cp -r tests/golden/pictures "$out/tests/golden/pictures"
-"$CARGO_TARGET_DIR/release/examples/digger" --headless --width 640 --height 360 --out "$out/software"
+"$CARGO_TARGET_DIR/release/examples/digger" --headless --low --width 640 --height 360 --out "$out/software"
 cat >"$out/run.sh" <<'EOS'
 #!/usr/bin/env bash
 set -uo pipefail
@@ -49,7 +49,8 @@ step() {
     "$@" 2>&1 | tee -a "$out/report.txt" || failed="$failed $name"
 }
 step digger bin/digger --headless --width 640 --height 360 --out "$out/digger"
-step compare env BURROW_COMPARE="software:$out/digger" bin/golden --ignored --nocapture two_renderers
+step low bin/digger --headless --low --width 640 --height 360 --out "$out/low"
+step compare env BURROW_COMPARE="software:$out/low" bin/golden --ignored --nocapture two_renderers
 step golden bin/golden --nocapture --test-threads 1
 if [ -n "${FRAMES:-}" ]; then
     step frames bin/frame_times 0 2560 1440

@@ -102,6 +102,9 @@ pub struct Options {
     /// Draw every frame of the script, not only the pictures, to measure frame times.
     #[arg(long, requires = "headless")]
     draw_all: bool,
+    /// Draw the script in low quality on a GPU too, as software renderers always do, so that pictures can be compared.
+    #[arg(long, requires = "headless")]
+    low: bool,
     /// Log events to standard output, for programs that play the game.
     #[arg(long)]
     tell: bool,

@@ -37,7 +37,7 @@ use crate::player::{Player, Scripted};
 use crate::tools::Hand;
 use crate::tools::tool_in_hand::ShowTool;
 use crate::ui::hud::ShowHud;
-use crate::ui::settings::SettingsFile;
+use crate::ui::settings::{Quality, Settings, SettingsFile};
 use crate::ui::widgets::scale_for;
 use crate::world::day::Clock;
 use crate::world::landscape::ORIGIN;
@@ -111,6 +111,9 @@ impl Studio {
         world.resource_mut::<ShowHud>().0 = false;
         world.resource_mut::<ShowTool>().0 = false;
         world.resource_mut::<Hand>().preview = false;
+        if options.low {
+            world.resource_mut::<Settings>().quality = Quality::Low;
+        }
         world.resource_mut::<NextState<GameState>>().set(GameState::Playing);
         app.update();
         photographer.draws_all = options.draw_all;
