@@ -8,8 +8,8 @@
 //! timed from its start until the GPU has drawn it, so unlike in a game, frames never overlap. The plugin's
 //! time on the main thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same
 //! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
-//! times the plain material's part of the frame the look takes. With `passes`, the graphics card's own time of each render
-//! pass is printed for each of them, which costs time itself. What is drawn is looked at too: the benchmark fails if ground
+//! times the plain material's part of the frame the look takes. With `passes`, the GPU's own time of each render pass is
+//! printed for each of them, which costs time itself. Pictures are checked too: the benchmark fails if ground
 //! is missing where a ray meets it.
 
 #[path = "../examples/shared/capture.rs"]
@@ -264,7 +264,7 @@ impl Walk {
         self.is_far = false;
     }
 
-    /// Prints what each pass took on the graphics card since the last call, if that is measured.
+    /// Prints the GPU time of each pass since the last call, if that is measured.
     fn report_passes(&mut self, what: &str) {
         let mut diagnostics = self.app.world_mut().resource_mut::<DiagnosticsStore>();
         let mut passes = Vec::new();

@@ -42,7 +42,7 @@ impl Plugin for ReconnectPlugin {
     }
 }
 
-/// A player who has connected from another device plays there. Connecting from here would end that connection.
+/// Stops reconnecting once the player has connected from another device, as a connection from here would end that one.
 fn stop(mut troubles: MessageReader<SharingTroubleFound>, mut commands: Commands) {
     let plays_elsewhere = SharingTrouble::Kicked(Kick::ConnectedAgain);
     if troubles.read().any(|found| found.trouble == plays_elsewhere) {

@@ -17,7 +17,7 @@ use crate::volume::{Brick, DiggingRules, SampleView, VoxelOutcome, pristine_laye
 /// A brick that a reset changed.
 pub(crate) struct ResetBrick {
     pub pos: BrickPos,
-    /// What is left of it; `None` if it is pristine now.
+    /// The remaining brick; `None` if all of it is pristine now.
     pub brick: Option<Arc<Brick>>,
     /// The samples that are pristine now and were not before.
     pub samples: Layers,

@@ -69,7 +69,7 @@ impl Sound {
         })
     }
 
-    /// How loud it is beside the others, from 0 to 1.
+    /// Its loudness relative to other sounds, from 0 to 1.
     pub const fn volume(self) -> f32 {
         match self {
             Self::Explosion => 1.0,
@@ -80,7 +80,7 @@ impl Sound {
     }
 }
 
-/// The times of so many seconds' samples.
+/// The times of all samples of a sound of this length.
 fn times(seconds: f32) -> impl Iterator<Item = f32> {
     (0..(seconds * RATE as f32) as u32).map(|sample| sample as f32 / RATE as f32)
 }
