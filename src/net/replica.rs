@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::message::{Entry, Terms};
 use super::never_shown;
-use super::regions::{chunks_of, touched_regions};
+use super::regions::{RegionSums, Steps, chunks_of, touched_regions};
 use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
@@ -61,6 +61,8 @@ pub(super) struct Replica {
     /// The world after the order's entries. It is never meshed.
     confirmed: Terrain,
     pending: VecDeque<Pending>,
+    /// The hashes of its regions.
+    sums: RegionSums,
     /// Bricks whose shown content differs from the confirmed one.
     bricks: BTreeMap<BrickPos, Stored>,
     /// Fields of chunks that differ between the shown and the confirmed world.
@@ -118,6 +120,7 @@ impl Replica {
         Ok(Self {
             confirmed,
             pending,
+            sums: RegionSums::default(),
             bricks,
             fields,
             samples,
@@ -150,6 +153,11 @@ impl Replica {
     /// The hash of the shown world after all returned changes.
     pub fn shown_hash(&self) -> u64 {
         World::hash_of(self.world().ground().hash(), self.samples)
+    }
+
+    /// The [hash](super::region_hash) of a region of the confirmed world.
+    pub fn region_hash(&mut self, region: RegionPos) -> u64 {
+        self.sums.hash(self.confirmed.world(), region)
     }
 
     /// Times that pending edits were worked out.
@@ -263,8 +271,10 @@ impl Replica {
             let change = commit.change();
             self.before.note(self.confirmed.world(), &change);
             applied.regions.append(&mut touched_regions(self.world().grid(), &change));
+            let steps = Steps::of(self.confirmed.world(), &change);
             // It is the one under way.
             applied.receipts.extend(self.confirmed.commit(commit).unwrap_or_default());
+            self.sums.add(self.confirmed.world(), steps);
         }
         applied
     }
@@ -325,6 +335,7 @@ impl Replica {
         let settings = TerrainSettings { chunk_size, voxel_size: self.confirmed.voxel_size() };
         self.confirmed = Terrain::restore(self.confirmed.world().shared_ground(), &settings, parts)?;
         never_shown(&mut self.confirmed);
+        self.sums.clear();
         self.is_outdated = true;
         self.shown = None;
         Ok(())
