@@ -586,6 +586,8 @@ def sculpt(stage):
         stage.wait(rf"^tool .*shape={shape} ", since)
         dig(middle[0] + 20, middle[1])
     press_key("0", r"^tool operation=Stamp ")
+    # Each operation has rows of its own above the shapes.
+    stage.rest()
     since = stage.mark()
     stage.click(*stage.middle("Box"))
     stage.wait(r"^tool .*shape=Box ", since)
@@ -597,6 +599,7 @@ def sculpt(stage):
         raise Failed("a stamp takes a torus")
     stage.say("each shape works, and a torus can't be a stamp")
     press_key("1", r"^tool operation=Dig ")
+    stage.rest()
 
     before = float(stage.last(tool).group(3))
     since = stage.mark()
