@@ -16,6 +16,7 @@ import json
 import os
 import pathlib
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -711,7 +712,9 @@ def main():
     finally:
         stage.close()
     print(f"{args.play}: all of it happened, {len(stage.shots)} pictures in {args.out}")
-    print(f"{args.play}: {time.monotonic() - start:.0f} s, {stage.frames()} frames")
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    busy = used.ru_utime + used.ru_stime
+    print(f"{args.play}: {time.monotonic() - start:.0f} s, {busy:.0f} s of processor time, {stage.frames()} frames")
     return 0
 
 
