@@ -18,7 +18,9 @@ use crate::plugin::{
     BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads,
     free_later,
 };
-use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain};
+use crate::terrain::{
+    Applied, HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain,
+};
 
 /// Which of an app's shared terrains is shared: a connection carries one ground.
 #[derive(Resource, Default)]
@@ -365,9 +367,10 @@ impl Answers<'_> {
             }
             ClientEvent::Confirmed { tag, receipt } => {
                 link.answer(tag);
-                if let Some(receipt) = receipt.clone() {
-                    self.applied.write(BrushApplied { terrain: Some(terrain), receipt });
-                }
+                // What it changed is not known if the player was away: what is not known is not counted.
+                let unknown = || Receipt { tag, outcome: Ok(Applied::default()) };
+                let known = receipt.clone().unwrap_or_else(unknown);
+                self.applied.write(BrushApplied { terrain: Some(terrain), receipt: known });
                 self.edited.write(edited(tag, WhatBecame::Confirmed(receipt)));
             }
             ClientEvent::Refused { tag, why } => {
