@@ -242,6 +242,7 @@
 //! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
 //! | [`surface`], [`dense`] | marching cubes, heightmap and their seam; a mesher of plain arrays |
 //! | [`backend`], [`terrain`] | engines on CPU and GPU; transactions, history, queries |
+//! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
 //! | `plugin`, `view`, `saves`, `together`, `physics`, `debug`, `panel` | everything that uses Bevy |
 //!
@@ -311,9 +312,9 @@
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking character; debris | |
+//! | `format` | levels and portable worlds as bytes, without files; part of `store` and `net` | |
 //! | `store` | worlds on disk: a commit journal, checkpoints, portable files | |
 //! | `net` | multiplayer: a server and clients without a transport | |
-//! | `import` | heights from TIFF and EXR files | |
 //! | `picking` | Bevy's pointer events on the ground, with the `TerrainHit` as extra data | |
 //! | `replicon` | multiplayer over bevy_replicon | |
 //! | `egui` | the panel: brush, settings, live figures | |
@@ -343,6 +344,8 @@ pub mod brush;
 pub mod debug;
 pub mod dense;
 mod edits;
+#[cfg(feature = "format")]
+pub mod format;
 pub mod ground;
 pub mod lattice;
 pub mod levels;
@@ -364,6 +367,8 @@ pub mod saves;
 pub mod store;
 pub mod surface;
 pub mod terrain;
+#[cfg(feature = "plugin")]
+mod threads;
 #[cfg(feature = "replicon")]
 pub mod together;
 #[cfg(feature = "render")]

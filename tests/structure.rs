@@ -10,8 +10,9 @@ use std::path::Path;
 
 /// The modules of the crate, from the ground up. Each imports only those before it.
 const MODULES: &[&str] = &[
-    "lattice", "levels", "ground", "brush", "volume", "edits", "surface", "dense", "backend", "terrain",
-    "store", "net", "plugin", "view", "saves", "plugins", "together", "physics", "debug", "panel",
+    "threads", "lattice", "levels", "ground", "brush", "volume", "edits", "surface", "dense", "backend",
+    "terrain", "format", "store", "net", "plugin", "view", "saves", "plugins", "together", "physics",
+    "debug", "panel",
 ];
 
 /// Imports of a higher module that still exist: the file, and the module that it imports.

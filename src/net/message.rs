@@ -31,9 +31,9 @@ use glam::IVec3;
 
 use super::stamps::StampId;
 use crate::brush::Edit;
+use crate::format::WorldId;
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
-use crate::store::WorldId;
 use crate::terrain::{LooseSettings, WorldChange};
 use crate::volume::{Brick, DiggingRules, Fields};
 

@@ -18,10 +18,11 @@ use super::reports::{Report, Reports};
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
-    LoosePieceFound, MaterialColors, SlimVertices, free_later,
+    LoosePieceFound, MaterialColors, SlimVertices,
 };
 use crate::lattice::ChunkPos;
-use crate::terrain::{Drawn, FieldNews, Receipt, Rejection, Terrain, World as Ground};
+use crate::terrain::{Drawn, FieldNews, Receipt, Rejection, Terrain, World as TerrainWorld};
+use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
 pub(super) fn begin_transactions(
@@ -257,7 +258,7 @@ impl Display<'_, '_> {
     /// Shows all that a commit changed of a terrain.
     fn show(
         &mut self,
-        (entity, world): (Entity, &Ground),
+        (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
         surfaces: Vec<BuiltSurface>,
         fields: &[(ChunkPos, FieldNews)],
@@ -279,7 +280,7 @@ impl Display<'_, '_> {
     /// Shows a tile or chunk with its new surface, if it has a new one; spawns its entity if it has none yet.
     fn show_part(
         &mut self,
-        (entity, world): (Entity, &Ground),
+        (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
         drawn: Drawn,
         built: Option<BuiltSurface>,
@@ -318,7 +319,7 @@ impl Display<'_, '_> {
     /// Shows nodes as they are drawn from now on.
     fn show_nodes(
         &mut self,
-        (entity, world): (Entity, &Ground),
+        (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
         nodes: Vec<BuiltNode>,
     ) {

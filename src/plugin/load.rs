@@ -16,11 +16,11 @@ use super::places::{LocalPlaces, TerrainPlace, place_terrain};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::reports::{Report, Reports};
 use super::task::{InFlight, TaskCounter};
-use super::threads::{ThreadTask, Threads, panic_message};
 use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SlimVertices};
 use crate::lattice::ChunkPos;
 use crate::levels::Cut;
 use crate::terrain::{Drawn, DrawnCut, KnownNodes, Terrain, World};
+use crate::threads::{ThreadTask, Threads, panic_message};
 
 /// Surfaces of one snapshot that are built, and passed to the renderer, until all can be shown.
 #[derive(Component)]

@@ -43,12 +43,10 @@ mod places;
 mod processor;
 mod propagate;
 mod query;
-mod reach;
 mod redraw;
 mod reports;
 mod settings;
 mod task;
-mod threads;
 mod times;
 
 pub use components::{
@@ -81,18 +79,13 @@ pub(crate) use propagate::{Inherited, remove_inherited};
 pub use query::{TerrainHit, Terrains};
 pub use redraw::Redraw;
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
-pub use threads::ThreadSettings;
-pub(crate) use threads::free_later;
-#[cfg(feature = "avian")]
-pub(crate) use threads::panic_message;
-#[cfg(any(feature = "render", feature = "avian", feature = "store"))]
-pub(crate) use threads::{ThreadTask, Threads};
 pub use times::Times;
 
 use bevy::ecs::reflect::ReflectMessage;
 use bevy::prelude::*;
 
 use crate::brush::Brush;
+pub use crate::threads::ThreadSettings;
 
 /// The plugin's system sets in `Update`, in this order.
 ///
@@ -222,7 +215,7 @@ impl Plugin for TerrainPlugin {
         );
         app.add_systems(
             First,
-            threads::resize_pools
+            crate::threads::resize_pools
                 .run_if(resource_exists_and_changed::<ThreadSettings>)
                 .after(bevy::ecs::message::MessageUpdateSystems),
         );

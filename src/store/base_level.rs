@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::StoreError;
-use super::format::level::Level;
-use super::format::portable::SavedRegion;
-use super::format::region::region_key;
 use super::region::Region;
+use crate::format::level::Level;
+use crate::format::portable::SavedRegion;
+use crate::format::region::region_key;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, RegionPos};
 use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldChange, WorldParts, brick_over};

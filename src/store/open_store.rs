@@ -11,7 +11,6 @@ use super::closing::{ClosingStore, StoreThread};
 use super::database::DATABASE;
 use super::error::{StoreError, StoreTrouble, WorldSize};
 use super::files::{Files, Folder, Lock};
-use super::format::frame::WorldId;
 use super::found::Contents;
 use super::journal::Journal;
 use super::mirror::Mirror;
@@ -25,6 +24,7 @@ use super::shared::{GameChange, GameData, SavePoint, Shared, apply_game};
 use super::sources::has_world;
 use super::unsaved;
 use super::writer::{Answer, Content, Given, Message, Writer};
+use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, Terrain, TerrainSettings, Version, WorldChange};
 

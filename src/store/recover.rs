@@ -9,7 +9,6 @@ use rayon::prelude::*;
 use super::base_level::BaseLevel;
 use super::checkpoint::Checkpoint;
 use super::error::{StoreError, StoreTrouble};
-use super::format::Batch;
 use super::found::Contents;
 use super::ground_size::GroundSize;
 use super::keys;
@@ -18,6 +17,7 @@ use super::options::{BaseChanged, StoreOptions};
 use super::progress::{Progress, Work};
 use super::segment::{self, Frame};
 use super::shared::{GameData, apply_game};
+use crate::format::Batch;
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, RegionPos};
 use crate::terrain::{
@@ -552,7 +552,7 @@ mod tests {
     use super::super::{SimulatedDisk, Store};
     use super::*;
     use crate::brush::{Brush, Shape};
-    use crate::store::format::frame::WorldId;
+    use crate::format::frame::WorldId;
 
     /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,
     /// and with other hashes.

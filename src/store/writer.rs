@@ -10,8 +10,6 @@ use rustc_hash::FxHashMap;
 use super::checkpoint::Checkpoint;
 use super::error::{StoreError, StoreTrouble};
 use super::files::{Files, Lock};
-use super::format::Batch;
-use super::format::frame::WorldId;
 use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
@@ -19,6 +17,8 @@ use super::region_file::RegionFile;
 use super::segment::{FRAME_LIMIT, base};
 use super::shared::{GameChange, SavePoint, Shared, apply_game};
 use super::unsaved;
+use crate::format::Batch;
+use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, TerrainSettings, WorldChange, WorldParts};
 

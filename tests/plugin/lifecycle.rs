@@ -239,7 +239,7 @@ impl Expected {
                     let at = Vec3::new(10.0 + 20.0 * number as f32, 5.0, 30.0);
                     Brush::dig(Shape::sphere(at, 4.0 + rng.u32(0..4) as f32))
                 }));
-                let level = bevy_burrow::store::Level::of(&plain);
+                let level = bevy_burrow::format::Level::of(&plain);
                 plain = level.terrain(Arc::clone(&ground)).expect("its own ground");
             }
             _ => {}
@@ -444,7 +444,7 @@ impl Life {
             }
             #[cfg(feature = "store")]
             Load::StartLevel => {
-                let level = bevy_burrow::store::Level::of(&self.expected.plain);
+                let level = bevy_burrow::format::Level::of(&self.expected.plain);
                 let level = BurrowLevel::new(&level).expect("it can be written");
                 let world = self.stage.app.world_mut();
                 let level = world.resource_mut::<Assets<BurrowLevel>>().add(level);

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use bevy_burrow::format::Level;
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseChanged, BaseLevel, Files, Level, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
-    check_in, from_bytes, inspect_in, to_bytes,
+    BaseChanged, BaseLevel, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble, check_in,
+    from_bytes, inspect_in, to_bytes,
 };
 use bevy_burrow::terrain::{Meshing, WorldChange};
 use fastrand::Rng;

@@ -3,10 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
+use bevy_burrow::format::Level;
 use bevy_burrow::lattice::{BrickPos, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseChanged, BaseLevel, DiskImage, Level, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
+    BaseChanged, BaseLevel, DiskImage, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
     check_in, inspect_in,
 };
 use bevy_burrow::terrain::{Meshing, WorldChange};

@@ -4,7 +4,7 @@ use super::error::FormatError;
 
 /// The most bytes of each part.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::store) struct Limits {
+pub(crate) struct Limits {
     /// The head of a file: a world without its regions, or the list of a level's files.
     pub head: usize,
     /// A region. 512 bricks and their fields take less.

@@ -6,16 +6,16 @@ use fastrand::Rng;
 
 use super::damage::damage;
 use super::{compare, count, round_trips, worlds};
+use crate::format::bytes::Reader;
+use crate::format::container;
+use crate::format::edits::{EditSequence, put_edit, read_edit};
+use crate::format::frame::{self, Kind, WorldId};
+use crate::format::level::{Level, read_level, unpack_level, write_level};
+use crate::format::limits::Limits;
+use crate::format::portable::{read_portable, write_portable};
+use crate::format::{Batch, Metadata, decode_region, encode_region};
 use crate::ground::{GreyImage, ImageLimits};
 use crate::lattice::RegionPos;
-use crate::store::format::bytes::Reader;
-use crate::store::format::container;
-use crate::store::format::edits::{EditSequence, put_edit, read_edit};
-use crate::store::format::frame::{self, Kind, WorldId};
-use crate::store::format::level::{Level, read_level, unpack_level, write_level};
-use crate::store::format::limits::Limits;
-use crate::store::format::portable::{read_portable, write_portable};
-use crate::store::format::{Batch, Metadata, decode_region, encode_region};
 
 /// Bytes that a decoder may take besides what it makes of each byte of its input.
 const ANYWAY: u64 = 4 << 20;
@@ -164,7 +164,7 @@ fn levels() {
     let ground = worlds::hills(64);
     let terrain = worlds::eventful(&ground, 5, 4);
     let files = write_level(&Level::new(terrain.parts(), 1.0, Default::default(), &ground)).unwrap();
-    let packed = crate::store::format::level::pack_level(&files).unwrap();
+    let packed = crate::format::level::pack_level(&files).unwrap();
     fuzz("packed level", &[packed], 800, |bytes| unpack_level(bytes).is_ok());
     for (name, file) in &files {
         fuzz(name, std::slice::from_ref(file), 800, |bytes| {

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use glam::{IVec3, Vec3};
 
 use crate::brush::{Brush, Shape};
+use crate::format::frame::WorldId;
+use crate::format::portable::PortableWorld;
+use crate::format::{Batch, Metadata};
 use crate::ground::{Ground, MaterialId};
-use crate::store::format::frame::WorldId;
-use crate::store::format::portable::PortableWorld;
-use crate::store::format::{Batch, Metadata};
 use crate::terrain::{CommitRecord, LooseSettings, Meshing, SIMULATION, Terrain, TerrainSettings};
 use crate::volume::DiggingRules;
 

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::format::Batch;
+use crate::format::portable::{PortableWorld, SavedRegion};
 use crate::lattice::{BrickPos, RegionPos};
-use crate::store::format::Batch;
-use crate::store::format::portable::{PortableWorld, SavedRegion};
 use crate::terrain::{CommitRecord, LogEntry, WorldChange, WorldParts};
 use crate::volume::Brick;
 

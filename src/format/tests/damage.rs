@@ -3,10 +3,10 @@
 use fastrand::Rng;
 
 use super::{compare, count, worlds};
-use crate::store::format::FormatError;
-use crate::store::format::frame::{self, Kind, WorldId, seal};
-use crate::store::format::level::{Level, pack_level, unpack_level, write_level};
-use crate::store::format::portable::{read_portable, write_portable};
+use crate::format::FormatError;
+use crate::format::frame::{self, Kind, WorldId, seal};
+use crate::format::level::{Level, pack_level, unpack_level, write_level};
+use crate::format::portable::{read_portable, write_portable};
 
 /// Changes bytes somehow; they may stay the same.
 pub fn damage(rng: &mut Rng, bytes: &mut Vec<u8>) {

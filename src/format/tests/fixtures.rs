@@ -7,10 +7,10 @@ use glam::{IVec3, Vec3};
 
 use super::{compare, worlds};
 use crate::brush::{Brush, Shape};
+use crate::format::level::{LEVEL_JSON, Level, LevelFiles, read_level, write_level};
+use crate::format::portable::{PortableWorld, read_portable, write_portable};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::LatticeBox;
-use crate::store::format::level::{LEVEL_JSON, Level, LevelFiles, read_level, write_level};
-use crate::store::format::portable::{PortableWorld, read_portable, write_portable};
 use crate::terrain::{LooseSettings, Terrain, TerrainSettings};
 use crate::volume::DiggingRules;
 

@@ -32,7 +32,7 @@ pub struct SavedRegion {
 }
 
 impl SavedRegion {
-    pub(in crate::store) fn encode(&self) -> Vec<u8> {
+    pub(crate) fn encode(&self) -> Vec<u8> {
         let bricks = self.bricks.iter().map(|(pos, brick)| (pos, brick));
         encode_region(bricks, self.fields.iter().map(|(chunk, fields)| (chunk, fields)))
     }
@@ -150,10 +150,7 @@ pub fn write_portable(portable: &PortableWorld) -> Result<Vec<u8>, FormatError> 
     write_within(portable, &Limits::FORMAT)
 }
 
-pub(in crate::store) fn write_within(
-    portable: &PortableWorld,
-    limits: &Limits,
-) -> Result<Vec<u8>, FormatError> {
+pub(crate) fn write_within(portable: &PortableWorld, limits: &Limits) -> Result<Vec<u8>, FormatError> {
     let PortableWorld { world, metadata, regions, journal } = portable;
     let head = PortableHead {
         metadata: metadata.clone(),
@@ -183,7 +180,7 @@ pub fn read_portable(file: &[u8], ground: &Ground) -> Result<PortableWorld, Form
     read_within(file, ground, &Limits::FORMAT)
 }
 
-pub(in crate::store) fn read_within(
+pub(crate) fn read_within(
     file: &[u8],
     ground: &Ground,
     limits: &Limits,

@@ -1,9 +1,9 @@
 //! The sizes of saved worlds in bytes.
 
 use super::worlds;
-use crate::store::format::Batch;
-use crate::store::format::frame::{Kind, WorldId, seal};
-use crate::store::format::region::{encode_region, region_key};
+use crate::format::Batch;
+use crate::format::frame::{Kind, WorldId, seal};
+use crate::format::region::{encode_region, region_key};
 use crate::terrain::World;
 use crate::volume::layers;
 
@@ -76,8 +76,8 @@ fn speed() {
             encode += start.elapsed().as_secs_f64();
             let start = std::time::Instant::now();
             let opened =
-                crate::store::format::frame::open(&sealed, Kind::Region, WORLD, &region_key(region), 1 << 23);
-            crate::store::format::decode_region(&opened.unwrap().payload, region, &ground).unwrap();
+                crate::format::frame::open(&sealed, Kind::Region, WORLD, &region_key(region), 1 << 23);
+            crate::format::decode_region(&opened.unwrap().payload, region, &ground).unwrap();
             decode += start.elapsed().as_secs_f64();
         }
         let million = samples as f64 / 1e6;

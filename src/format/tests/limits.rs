@@ -3,10 +3,10 @@
 use fastrand::Rng;
 
 use super::{count, worlds};
-use crate::store::format::FormatError;
-use crate::store::format::level::{self, Level, write_level};
-use crate::store::format::limits::Limits;
-use crate::store::format::portable::{self, write_portable};
+use crate::format::FormatError;
+use crate::format::level::{self, Level, write_level};
+use crate::format::limits::Limits;
+use crate::format::portable::{self, write_portable};
 
 /// Limits some of which are near these sizes.
 fn random_limits(rng: &mut Rng, sizes: &[usize]) -> Limits {

@@ -156,7 +156,7 @@ impl Threads {
 }
 
 /// Gives the pools the number of threads that the settings say.
-pub(super) fn resize_pools(settings: Res<ThreadSettings>) {
+pub(crate) fn resize_pools(settings: Res<ThreadSettings>) {
     for pool in Threads::ALL {
         POOLS[pool as usize].resize(pool.count(&settings));
     }

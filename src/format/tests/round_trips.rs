@@ -6,15 +6,15 @@ use glam::{Quat, Vec2, Vec3};
 
 use super::{compare, count, worlds};
 use crate::brush::{Brush, Edit, Roughness, Shape, Stamp};
-use crate::ground::{GreyImage, MaterialId};
-use crate::lattice::RegionPos;
-use crate::store::format::bytes::Reader;
-use crate::store::format::edits::{EditSequence, put_edit, read_edit};
-use crate::store::format::level::{
+use crate::format::bytes::Reader;
+use crate::format::edits::{EditSequence, put_edit, read_edit};
+use crate::format::level::{
     Level, pack_level, read_level, region_name, region_of_name, unpack_level, write_level,
 };
-use crate::store::format::portable::{read_portable, read_portable_head, write_portable};
-use crate::store::format::{Batch, Metadata, decode_region, encode_region};
+use crate::format::portable::{read_portable, read_portable_head, write_portable};
+use crate::format::{Batch, Metadata, decode_region, encode_region};
+use crate::ground::{GreyImage, MaterialId};
+use crate::lattice::RegionPos;
 use crate::terrain::{Terrain, TerrainSettings};
 use crate::volume::layers;
 

@@ -1,12 +1,13 @@
 //! Whether a brush reaches a world, even if it is not valid there.
 
-use bevy::prelude::*;
+use glam::Vec3;
 
-use crate::brush::{BAND, Extent, Shape};
+use super::shapes::Extent;
+use super::{BAND, Shape};
 use crate::lattice::{ChunkGrid, ONE};
 
 /// Does a shape, in voxels, come near to a world's columns? `None` if its position is not a number.
-pub(super) fn reaches(shape: &Shape, grid: ChunkGrid) -> Option<bool> {
+pub(crate) fn reaches(shape: &Shape, grid: ChunkGrid) -> Option<bool> {
     let (low, high) = bounds(shape)?;
     let (world, band) = (grid.edit_bounds(), (BAND / ONE) as f32);
     let (min, max) = (world.min.as_vec3() - band, world.max.as_vec3() + band);
@@ -26,6 +27,8 @@ fn bounds(shape: &Shape) -> Option<(Vec3, Vec3)> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Quat;
+
     use super::*;
     use crate::brush::{Brush, Edit};
 
