@@ -238,7 +238,7 @@
 //!
 //! | modules | subject |
 //! | --- | --- |
-//! | [`lattice`], [`levels`], [`ground`] | coordinates, levels of detail, the pristine world |
+//! | [`lattice`], [`lod`], [`ground`] | coordinates, levels of detail, the pristine world |
 //! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
 //! | [`surface`], [`dense`] | marching cubes, heightmap and their seam; a mesher of plain arrays |
 //! | [`backend`], [`terrain`] | engines on CPU and GPU; transactions, history, queries |
@@ -261,9 +261,9 @@
 //! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes:
 //!    [`Edit::reach`](brush::Edit::reach).
 //!
-//! Three more rules close the gaps between [levels of detail](levels): a coarse cell fans over the line of its finer
+//! Three more rules close the gaps between [levels of detail](lod): a coarse cell fans over the line of its finer
 //! neighbours, a coarse vertex of an edit is a vertex of the finest level, and columns beyond the rim equal the rim's
-//! ([`surface::level`]).
+//! ([`surface::lod`]).
 //!
 //! Rejected alternatives: *snapping* border vertices to the nearest point of the other surface tears on steep
 //! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep
@@ -348,7 +348,7 @@ mod edits;
 pub mod format;
 pub mod ground;
 pub mod lattice;
-pub mod levels;
+pub mod lod;
 #[cfg(feature = "net")]
 pub mod net;
 #[cfg(feature = "egui")]

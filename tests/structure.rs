@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The modules of the crate, from the ground up. Each imports only those before it.
 const MODULES: &[&str] = &[
-    "threads", "lattice", "levels", "ground", "brush", "volume", "edits", "surface", "dense", "backend",
+    "threads", "lattice", "lod", "ground", "brush", "volume", "edits", "surface", "dense", "backend",
     "terrain", "format", "store", "net", "plugin", "view", "saves", "plugins", "together", "physics",
     "debug", "panel",
 ];
@@ -37,9 +37,9 @@ const CIRCLES: &[&[&str]] = &[
         "terrain/commit.rs",
         "terrain/drawn_cut.rs",
         "terrain/ground.rs",
-        "terrain/levels.rs",
         "terrain/log.rs",
         "terrain/model.rs",
+        "terrain/nodes.rs",
         "terrain/put.rs",
         "terrain/queue.rs",
         "terrain/redraw.rs",

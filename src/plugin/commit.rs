@@ -10,8 +10,8 @@ use super::collect::{HistoryMessages, send_history};
 use super::diagnostics::measure_commit;
 use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive};
 use super::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
-use super::level_state::{LevelState, ShownLevels, WantedTiles, Watchers};
 use super::load::Loading;
+use super::lod_state::{LodState, ShownLevels, WantedTiles, Watchers};
 use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface};
 use super::reports::{Report, Reports};
@@ -34,7 +34,7 @@ pub(super) fn begin_transactions(
             &TerrainEntities,
             Option<&MaterialColors>,
             Has<SlimVertices>,
-            Option<&mut LevelState>,
+            Option<&mut LodState>,
         ),
         (Without<Loading>, Without<InFlight>, Without<Held>),
     >,
@@ -98,7 +98,7 @@ pub(super) fn commit_transactions(
         &mut Terrain,
         &mut TerrainEntities,
         &mut InFlight,
-        Option<(&mut LevelState, Option<&mut ShownLevels>, &Watchers)>,
+        Option<(&mut LodState, Option<&mut ShownLevels>, &Watchers)>,
     )>,
     mut display: Display,
     mut messages: CommitMessages,
@@ -142,7 +142,7 @@ fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
     mut entities: Mut<TerrainEntities>,
-    levels: Option<(Mut<LevelState>, Option<Mut<ShownLevels>>, &Watchers)>,
+    levels: Option<(Mut<LodState>, Option<Mut<ShownLevels>>, &Watchers)>,
     output: Option<TaskOutput>,
     display: &mut Display,
     messages: &mut CommitMessages,

@@ -29,9 +29,9 @@ mod entities;
 mod figures;
 mod heightmap;
 mod inbox;
-mod level_state;
-mod levels;
 mod load;
+mod lod;
+mod lod_state;
 #[cfg(feature = "render")]
 mod materials;
 mod meshes;
@@ -59,8 +59,8 @@ pub use figures::BurrowFigures;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
-pub(crate) use level_state::WantedTiles;
-pub use level_state::{DetailSource, LevelsOfDetail, ShownLevels};
+pub(crate) use lod_state::WantedTiles;
+pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[cfg(feature = "render")]
 pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
 pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
@@ -195,17 +195,15 @@ impl Plugin for TerrainPlugin {
                         load::drop_replaced,
                         load::start_loading,
                         places::place_terrains,
-                        levels::find_eyes,
+                        lod::find_eyes,
                         load::finish_loading,
-                        levels::keep_wanted_tiles,
+                        lod::keep_wanted_tiles,
                     )
                         .chain()
                         .in_set(BurrowSystems::Load),
                     (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
                     commit::commit_transactions.in_set(BurrowSystems::Commit),
-                    (levels::begin_level_changes, commit::begin_transactions)
-                        .chain()
-                        .in_set(BurrowSystems::Begin),
+                    (lod::begin_lod_changes, commit::begin_transactions).chain().in_set(BurrowSystems::Begin),
                 ),
             );
         #[cfg(feature = "replicon")]

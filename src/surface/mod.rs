@@ -15,7 +15,7 @@ pub(crate) mod cell_outline;
 mod crossings;
 pub mod indices;
 mod layer_bits;
-pub mod level;
+pub mod lod;
 pub mod mask;
 pub mod mesh;
 pub(crate) mod meshed_blocks;

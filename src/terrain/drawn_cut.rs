@@ -12,7 +12,7 @@ use rustc_hash::FxHashSet;
 use super::surface_draft::SurfaceDraft;
 use super::world::{Drawn, World};
 use crate::lattice::TilePos;
-use crate::levels::{Cut, Node};
+use crate::lod::{Cut, Node};
 use crate::surface::SurfaceMesh;
 
 /// The drawn part of a world: the nodes of a cut.

@@ -7,9 +7,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::level_meshes::GroundFacts;
+use super::node_facts::GroundFacts;
 use super::world::{Version, World};
-use crate::levels::{Choice, Cut, Eye, LevelGrid, Node, NodeFacts};
+use crate::lod::{Choice, Cut, Eye, LodGrid, Node, NodeFacts};
 
 /// The number of cached nodes above which some are dropped.
 const KEPT_NODES: usize = 32_768;
@@ -26,7 +26,7 @@ pub struct KnownNodes {
 
 impl KnownNodes {
     /// Finds the facts of these nodes where they are not known yet, in parallel.
-    pub fn learn(&self, world: &World, grid: LevelGrid, nodes: impl Iterator<Item = Node>) {
+    pub fn learn(&self, world: &World, grid: LodGrid, nodes: impl Iterator<Item = Node>) {
         let new: Vec<Node> = {
             let known = self.read();
             nodes.filter(|node| !known.contains_key(node)).collect()
@@ -45,7 +45,7 @@ impl KnownNodes {
         self.facts.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn edited(&self, world: &World, grid: LevelGrid) -> Arc<FxHashSet<Node>> {
+    fn edited(&self, world: &World, grid: LodGrid) -> Arc<FxHashSet<Node>> {
         let mut known = self.edited.write().unwrap_or_else(PoisonError::into_inner);
         match &*known {
             Some((version, nodes)) if *version == world.version() => Arc::clone(nodes),
@@ -110,7 +110,7 @@ mod tests {
         let settings = TerrainSettings { chunk_size: 8, ..TerrainSettings::default() };
         let terrain = Terrain::new(Ground::flat(320, 270, 8.0).unwrap(), &settings).unwrap();
         let (world, known) = (terrain.world(), KnownNodes::default());
-        let grid = world.level_grid(u8::MAX);
+        let grid = world.lod_grid(u8::MAX);
         let (coarse, fine) = (Cut::coarsest(grid), Cut::new(grid, |_| true));
         known.learn(world, grid, coarse.nodes().chain(fine.nodes()));
         let all = known.read().len();

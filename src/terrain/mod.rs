@@ -30,12 +30,12 @@ mod history;
 mod inspect;
 mod known_nodes;
 #[cfg(test)]
-mod level_laws;
-mod level_meshes;
-mod levels;
+mod lod_laws;
 mod log;
 mod loose;
 mod model;
+mod node_facts;
+mod nodes;
 #[cfg(test)]
 mod order;
 mod put;
@@ -72,9 +72,9 @@ pub use field_log::FieldNews;
 pub(crate) use ground::brick_over;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
 pub use known_nodes::KnownNodes;
-pub use level_meshes::GroundFacts;
 pub use loose::{LoosePiece, LooseSettings, PieceFate, PieceId, ReturnedPiece, Run};
 pub use model::{StaleCommit, Terrain};
+pub use node_facts::GroundFacts;
 pub use put::ChangeError;
 pub use query::{RayHit, Span};
 #[cfg(feature = "plugin")]

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::by_brick::{ByBrick, is_same_stack};
 use super::dirty::dirty_blocks;
 use super::drawn_cut::{DrawnCut, NodeUpdate};
-use super::levels::redraw_changed;
+use super::nodes::redraw_changed;
 use super::stages::Stages;
 use super::surface::{ChunkSurface, Fresh, Key};
 use super::surface_draft::TileUpdate;

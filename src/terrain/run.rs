@@ -15,8 +15,8 @@ use std::sync::Arc;
 use super::commit::Commit;
 use super::drawn_cut::ChooseCut;
 use super::history::{HistoryReceipt, HistoryRejection};
-use super::levels;
 use super::log::RecordDraft;
+use super::nodes;
 use super::put::{self, ChangeError};
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
@@ -110,7 +110,7 @@ impl Transaction {
     fn cut(&self, choose: &ChooseCut) -> Commit {
         let mut meshes = MeshUpdates::default();
         if let Some(drawn) = &self.drawn_cut {
-            let (after, nodes) = levels::change_cut(&self.world, drawn, choose);
+            let (after, nodes) = nodes::change_cut(&self.world, drawn, choose);
             (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
         }
         self.commit(Vec::new(), self.world.sample_hash, meshes)

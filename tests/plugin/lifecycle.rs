@@ -803,9 +803,8 @@ impl Life {
             let model = world.get::<Terrain>(terrain).expect("it is there");
             let is_held = world.entity(terrain).contains::<Held>();
             let shown = world.get::<ShownLevels>(terrain);
-            let has_levels = world.entity(terrain).contains::<LevelsOfDetail>();
-            let levels =
-                !has_levels || shown.is_some_and(|shown| shown.waiting == 0 && !shown.nodes.is_empty());
+            let has_lod = world.entity(terrain).contains::<LevelsOfDetail>();
+            let levels = !has_lod || shown.is_some_and(|shown| shown.waiting == 0 && !shown.nodes.is_empty());
             !is_held && levels && model.queued() == 0 && !model.is_busy() && is_ready(stage)
         });
     }

@@ -12,14 +12,14 @@ use bevy::prelude::*;
 
 use super::entities::TerrainEntities;
 use super::figures::MainThread;
-use super::level_state::{DetailSource, LevelState, LevelsOfDetail, WantedTiles, Watchers};
 use super::load::Loading;
+use super::lod_state::{DetailSource, LevelsOfDetail, LodState, WantedTiles, Watchers};
 use super::meshes::VertexExtras;
 use super::places::Places;
 use super::processor::BuildSettings;
 use super::task::{InFlight, TaskCounter};
 use super::{BurrowEngine, BurrowFigures, Held, MaterialColors, SlimVertices};
-use crate::levels::{Eye, View};
+use crate::lod::{Eye, View};
 use crate::terrain::{ChooseCut, Terrain};
 
 /// Faster cameras were teleported, and will not continue like this: metres a second.
@@ -194,14 +194,14 @@ fn velocity(before: &Eye, now: &Eye, seconds: f32, metres: f32, is_after_pause: 
 }
 
 /// Starts a change of levels on each terrain that needs one and has no running transaction.
-pub(super) fn begin_level_changes(
+pub(super) fn begin_lod_changes(
     mut commands: Commands,
     mut terrains: Query<
         (
             Entity,
             &mut Terrain,
             &LevelsOfDetail,
-            &mut LevelState,
+            &mut LodState,
             &Watchers,
             &TerrainEntities,
             Option<&MaterialColors>,

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Cut, LevelGrid, Node};
+use super::{Cut, LodGrid, Node};
 
 /// Factor by which all limits grow each time there would be too many nodes.
 const GROWTH: f32 = 1.2;
@@ -170,7 +170,7 @@ impl Choice {
     /// `share`, times their growth.
     fn is_split(
         &self,
-        grid: LevelGrid,
+        grid: LodGrid,
         node: Node,
         facts: NodeFacts,
         eyes: &[Eye],
@@ -218,8 +218,8 @@ mod tests {
         Eye { position, velocity, pixels: PIXELS, view: View::Perspective }
     }
 
-    fn world() -> LevelGrid {
-        LevelGrid::new(ChunkGrid::new(32, 16_384, 16_384), 6)
+    fn world() -> LodGrid {
+        LodGrid::new(ChunkGrid::new(32, 16_384, 16_384), 6)
     }
 
     #[test]

@@ -12,8 +12,8 @@ use super::{Commit, Terrain, TerrainSettings, World};
 use crate::brush::{Brush, Shape};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, Column, SNAP};
-use crate::levels::{Cut, Node};
-use crate::surface::level::{self, Fault, LevelView, nodes_near};
+use crate::lod::{Cut, Node};
+use crate::surface::lod::{self, Fault, LodView, nodes_near};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh};
 use crate::volume::{Brick, pristine_layers};
@@ -21,11 +21,11 @@ use crate::worlds::{any_random_brush, random_ground_of_size, world_count};
 
 type Drawings = BTreeMap<Node, SurfaceMesh>;
 
-fn draw(view: &LevelView) -> Drawings {
-    view.cut.nodes().map(|node| (node, level::node_mesh(view, node))).collect()
+fn draw(view: &LodView) -> Drawings {
+    view.cut.nodes().map(|node| (node, lod::node_mesh(view, node))).collect()
 }
 
-fn seams(view: &LevelView, drawings: &Drawings) -> SeamReport {
+fn seams(view: &LodView, drawings: &Drawings) -> SeamReport {
     let mut checker = SeamChecker::default();
     for (node, mesh) in drawings {
         checker.add(mesh, view.cut.grid().columns(*node).0.at(0));
@@ -73,15 +73,15 @@ impl Counts {
     }
 }
 
-fn edges(view: &LevelView) -> FxHashMap<(IVec3, usize, i32), IVec3> {
+fn edges(view: &LodView) -> FxHashMap<(IVec3, usize, i32), IVec3> {
     let coarse = view.cut.nodes().filter(|node| node.level > 0);
-    coarse.flat_map(|node| level::edge_vertices(view, node)).map(|own| (own.edge, own.place)).collect()
+    coarse.flat_map(|node| lod::edge_vertices(view, node)).map(|own| (own.edge, own.place)).collect()
 }
 
 /// Counts what all laws speak of, when each of some nodes splits.
 fn examine(world: &World, cut: &Cut, nodes: &[Node], fault: Option<Fault>) -> Counts {
-    fn view<'a>(world: &'a World, cut: &'a Cut, fault: Option<Fault>) -> LevelView<'a> {
-        LevelView { fault, ..world.level_view(cut) }
+    fn view<'a>(world: &'a World, cut: &'a Cut, fault: Option<Fault>) -> LodView<'a> {
+        LodView { fault, ..world.lod_view(cut) }
     }
     let before = draw(&view(world, cut, fault));
     let report = seams(&view(world, cut, fault), &before);
@@ -108,7 +108,7 @@ fn examine(world: &World, cut: &Cut, nodes: &[Node], fault: Option<Fault>) -> Co
             let origin = finer.grid().columns(*child).0.at(0) * SNAP;
             drawn.extend(mesh.triangles().flatten().map(|vertex| vertex.position + origin));
         }
-        for own in level::edge_vertices(&view(world, cut, fault), node) {
+        for own in lod::edge_vertices(&view(world, cut, fault), node) {
             if own.edge.2 == node.stride() && !own.is_pristine {
                 let count = if drawn.contains(&own.place) {
                     &mut counts.nested
@@ -152,7 +152,7 @@ fn random_world(index: u64) -> (Terrain, Cut) {
     let ground = random_ground_of_size(&mut rng, index, width, depth);
     let settings = TerrainSettings { chunk_size, ..Default::default() };
     let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
-    let cut = Cut::random(terrain.world().level_grid(4), rng.u64(..), rng.u64(10..80));
+    let cut = Cut::random(terrain.world().lod_grid(4), rng.u64(..), rng.u64(10..80));
     let brushes: Vec<Brush> = (0..rng.u32(1..7))
         .map(|_| match rng.u32(0..2) {
             0 => any_random_brush(&mut rng, terrain.world().ground()),
@@ -186,7 +186,7 @@ fn control_world() -> (Terrain, Cut) {
     let ground = Ground::from_fn(width, depth, height).expect("finite heights");
     let mut terrain = Terrain::new(ground, &TerrainSettings { chunk_size: 8, ..Default::default() })
         .expect("valid settings");
-    let cut = Cut::random(terrain.world().level_grid(2), 3, 50);
+    let cut = Cut::random(terrain.world().lod_grid(2), 3, 50);
     let mut brushes: Vec<Brush> =
         (0..12).map(|_| corner_brush(&mut rng, terrain.world().ground(), &cut)).collect();
     let dig = |x: f32, z: f32| Brush::dig(Shape::sphere(Vec3::new(x, 2.0, z), 4.0));
@@ -247,7 +247,7 @@ fn where_levels_meet_vertices_are_not_each_their_own() {
     let mut jumps = 0;
     for index in 0..40 {
         let (terrain, cut) = random_world(index);
-        let view = LevelView { fault: Some(Fault::OwnVertices), ..terrain.world().level_view(&cut) };
+        let view = LodView { fault: Some(Fault::OwnVertices), ..terrain.world().lod_view(&cut) };
         let report = seams(&view, &draw(&view));
         assert!(report.is_closed());
         jumps += usize::from(report.worst_normal_at.is_some());
@@ -270,7 +270,7 @@ fn overlay(world: &World, commit: &Commit) -> (Vec<(BrickPos, Arc<Brick>)>, Mask
 
 /// Runs the submitted edits, and compares the meshes of the running transaction with those after its commit.
 fn check_transaction(terrain: &mut Terrain, cut: &Cut, what: &str) -> [usize; 2] {
-    let before = draw(&terrain.world().level_view(cut));
+    let before = draw(&terrain.world().lod_view(cut));
     let commit = terrain.begin().expect("something waits").run();
     let (bricks, mask) = overlay(terrain.world(), &commit);
     let running = {
@@ -280,15 +280,15 @@ fn check_transaction(terrain: &mut Terrain, cut: &Cut, what: &str) -> [usize; 2]
         let samples = world.samples().under(&latest);
         let mask = MaskView::new(world.mask()).over(&mask);
         let view = WorldView { samples, mask, grid: world.grid() };
-        let view = LevelView::new(view, cut, world.edited_stacks().over(&positions));
-        let is_plain: Vec<bool> = cut.nodes().map(|node| level::is_plain(&view, node)).collect();
+        let view = LodView::new(view, cut, world.edited_stacks().over(&positions));
+        let is_plain: Vec<bool> = cut.nodes().map(|node| lod::is_plain(&view, node)).collect();
         (draw(&view), is_plain)
     };
     terrain.commit(commit).expect("the one under way");
-    let view = terrain.world().level_view(cut);
+    let view = terrain.world().lod_view(cut);
     let after = draw(&view);
     assert!(running.0 == after, "{what}");
-    assert!(cut.nodes().map(|node| level::is_plain(&view, node)).eq(running.1), "{what}");
+    assert!(cut.nodes().map(|node| lod::is_plain(&view, node)).eq(running.1), "{what}");
     // Nodes that are not near do not change.
     let mut near = FxHashSet::default();
     for (pos, _) in &bricks {

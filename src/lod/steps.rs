@@ -133,7 +133,7 @@ impl Cut {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::LevelGrid;
+    use super::super::LodGrid;
     use super::super::cut::hash_node;
     use super::super::cut::tests::{assert_is_cut, random_cut};
     use super::*;
@@ -145,7 +145,7 @@ mod tests {
             width in 30i32..300, depth in 30i32..300, top in 1u8..6, seeds: [u64; 2], percents in [0u64..100, 0u64..100],
             most in 1usize..40,
         ) {
-            let grid = LevelGrid::new(ChunkGrid::new(8, width, depth), top);
+            let grid = LodGrid::new(ChunkGrid::new(8, width, depth), top);
             let [mut cut, target] = [0, 1].map(|at| random_cut(grid, seeds[at], percents[at]));
             let most_nodes = cut.nodes().count().max(target.nodes().count() + 3);
             let mut before = cut.clone();
@@ -171,7 +171,7 @@ mod tests {
 
         #[test]
         fn a_step_makes_few_meshes_unless_one_change_makes_more(seeds: [u64; 2], most in 16usize..60) {
-            let grid = LevelGrid::new(ChunkGrid::new(8, 500, 400), 5);
+            let grid = LodGrid::new(ChunkGrid::new(8, 500, 400), 5);
             let [mut cut, target] = seeds.map(|seed| random_cut(grid, seed, 70));
             while let Some(step) = cut.step_to(&target, most, |_| 0) {
                 let is_single = step.new.len() == 1 || step.gone.len() == 1;

@@ -14,5 +14,5 @@ mod steps;
 
 pub use choice::{Choice, Eye, NodeFacts, View};
 pub use cut::Cut;
-pub use node::{LevelGrid, Node};
+pub use node::{LodGrid, Node};
 pub use steps::Step;

@@ -7,12 +7,12 @@ use glam::IVec3;
 use super::near_bricks::Stacks;
 use crate::ground::Ground;
 use crate::lattice::{Column, ONE};
-use crate::levels::Cut;
+use crate::lod::Cut;
 use crate::surface::vertex::WorldView;
 
 /// A world, and the cut by which it is drawn.
 #[derive(Clone, Copy)]
-pub struct LevelView<'a> {
+pub struct LodView<'a> {
     /// Samples, mask and rim.
     pub world: WorldView<'a>,
     /// The nodes.
@@ -24,7 +24,7 @@ pub struct LevelView<'a> {
     pub(crate) fault: Option<super::Fault>,
 }
 
-impl<'a> LevelView<'a> {
+impl<'a> LodView<'a> {
     /// A world drawn by a cut.
     pub fn new(world: WorldView<'a>, cut: &'a Cut, stacks: Stacks<'a>) -> Self {
         Self {

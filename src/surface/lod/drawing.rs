@@ -8,16 +8,16 @@ use super::Fault;
 use super::builder::{Builder, Number, page_vertex};
 use super::edge::{Edge, shared_height_vertex};
 use super::sides::{Cell, Interval, SIDES};
-use super::view::LevelView;
+use super::view::LodView;
 use super::volumetric::Volumetric;
 use crate::lattice::{Column, ONE};
-use crate::levels::Node;
+use crate::lod::Node;
 use crate::surface::tile::fan;
 use crate::surface::vertex::height_vertex;
 use crate::surface::{SurfaceMesh, Vertex, cases};
 
 /// The mesh of a node whose level is 1 at least, relative to its lowest column at y = 0.
-pub(super) fn mesh(view: &LevelView, node: Node) -> SurfaceMesh {
+pub(super) fn mesh(view: &LodView, node: Node) -> SurfaceMesh {
     let mut drawing = Drawing::new(view, node);
     drawing.draw();
     drawing.builder.finish()
@@ -25,7 +25,7 @@ pub(super) fn mesh(view: &LevelView, node: Node) -> SurfaceMesh {
 
 /// A node under construction.
 pub(super) struct Drawing<'a> {
-    pub view: LevelView<'a>,
+    pub view: LodView<'a>,
     pub volumetric: Volumetric<'a>,
     level: u8,
     pub stride: i32,
@@ -45,7 +45,7 @@ pub(super) struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    pub fn new(view: &LevelView<'a>, node: Node) -> Self {
+    pub fn new(view: &LodView<'a>, node: Node) -> Self {
         let (low, high) = view.cut.grid().columns(node);
         let stride = node.stride();
         let size = stride * view.world.grid.size();

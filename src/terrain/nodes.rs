@@ -11,8 +11,8 @@ use super::surface::ChunkSurface;
 use super::surface_draft::{SurfaceDraft, TileUpdate};
 use super::world::{Drawn, World};
 use crate::lattice::{BrickPos, ChunkPos, Column, ItemCost, ONE, TilePos, parallel_map};
-use crate::levels::{Cut, LevelGrid, Node};
-use crate::surface::level::{self, LevelView, Stacks};
+use crate::lod::{Cut, LodGrid, Node};
+use crate::surface::lod::{self, LodView, Stacks};
 use crate::surface::vertex::WorldView;
 
 /// Tiles and chunks that a running transaction changes.
@@ -21,7 +21,7 @@ pub(super) type NewParts<'a> = (&'a [(TilePos, TileUpdate)], &'a [(ChunkPos, Arc
 impl World {
     /// A cut as it is drawn, and all meshes for it. In place of a cut of a world of another size, the coarsest is drawn.
     pub fn draw_cut(&self, cut: Cut) -> (DrawnCut, Vec<NodeUpdate>) {
-        let cut = if self.has_cut(&cut) { cut } else { Cut::coarsest(self.level_grid(u8::MAX)) };
+        let cut = if self.has_cut(&cut) { cut } else { Cut::coarsest(self.lod_grid(u8::MAX)) };
         let mut nodes: Vec<Node> = cut.nodes().collect();
         nodes.sort_unstable();
         let before = DrawnCut { cut: Cut::coarsest(cut.grid()), joined: FxHashSet::default() };
@@ -31,7 +31,7 @@ impl World {
     }
 
     /// All nodes with edits, of all levels.
-    pub fn edited_nodes(&self, grid: LevelGrid) -> FxHashSet<Node> {
+    pub fn edited_nodes(&self, grid: LodGrid) -> FxHashSet<Node> {
         let mut nodes = FxHashSet::default();
         for &(x, z) in self.stacks.keys() {
             // Samples of a brick may belong to two tiles, along x and z each.
@@ -110,7 +110,7 @@ fn redraw(
     shows_parts: impl Fn(TilePos) -> bool,
 ) -> NodeChanges {
     let mut nodes: Vec<Node> =
-        merged(areas).into_iter().flat_map(|(low, high)| level::nodes_near(&drawn.cut, low, high)).collect();
+        merged(areas).into_iter().flat_map(|(low, high)| lod::nodes_near(&drawn.cut, low, high)).collect();
     // Where no coarser node is near, nodes that are drawn by their parts stay so. Most digs are there.
     if nodes.iter().all(|node| node.level == 0 && shows_parts(node.tile())) {
         return (Arc::clone(drawn), Vec::new());
@@ -197,16 +197,16 @@ impl<'a> State<'a> {
     /// The meshes of these nodes of a cut. Nodes of level 0 that were and are drawn by their parts are left out,
     /// because changed parts have their own updates.
     fn updates(&self, cut: &Cut, nodes: &[Node], shows_parts: impl Fn(TilePos) -> bool) -> Vec<NodeUpdate> {
-        let view = LevelView::new(self.view, cut, self.stacks);
+        let view = LodView::new(self.view, cut, self.stacks);
         // Most digs draw nothing here, so threads are not involved.
         let changing = nodes.iter().filter_map(|&node| {
-            let is_plain = node.level == 0 && level::is_plain(&view, node);
+            let is_plain = node.level == 0 && lod::is_plain(&view, node);
             (!is_plain || !shows_parts(node.tile())).then_some((node, is_plain))
         });
         parallel_map(&changing.collect::<Vec<_>>(), ItemCost::Surface, |&(node, is_plain)| {
             let parts = if node.level == 0 { self.parts_over(node.tile()) } else { Vec::new() };
             if !is_plain {
-                let mesh = Some(Arc::new(level::node_mesh(&view, node)));
+                let mesh = Some(Arc::new(lod::node_mesh(&view, node)));
                 return NodeUpdate { node, mesh, shown: Vec::new(), hidden: parts };
             }
             let shown = parts.into_iter().map(|drawn| (drawn, self.draft(drawn))).collect();

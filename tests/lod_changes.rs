@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bevy_burrow::lattice::ChunkGrid;
-use bevy_burrow::levels::{Cut, Node};
+use bevy_burrow::lod::{Cut, Node};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::{SeamChecker, SurfaceMesh};
 use bevy_burrow::terrain::{ChooseCut, Commit, Drawn, World};
@@ -145,7 +145,7 @@ fn after_each_commit_what_is_drawn_is_closed_and_as_if_made_from_scratch() {
             terrain = Terrain::restore(Arc::clone(&ground), &settings, terrain.parts()).expect("its own");
         }
         let mut saved = vec![terrain.parts()];
-        let grid = terrain.world().level_grid(rng.u8(1..6));
+        let grid = terrain.world().lod_grid(rng.u8(1..6));
         let (drawn, nodes) = terrain.world().draw_cut(Cut::coarsest(grid));
         let mut display = Display::default();
         display.show_nodes(&nodes);
@@ -198,7 +198,7 @@ fn edits_and_receipts_know_no_levels() {
         let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
         let mut terrains =
             [(); 2].map(|()| Terrain::new(Arc::clone(&ground), &settings).expect("a valid size"));
-        let cut = Cut::coarsest(terrains[0].world().level_grid(5));
+        let cut = Cut::coarsest(terrains[0].world().lod_grid(5));
         let (drawn, _) = terrains[0].world().draw_cut(cut);
         terrains[0].set_drawn_cut(Some(Arc::new(drawn)));
         for _ in 0..8 {
@@ -224,7 +224,7 @@ fn cuts_of_another_world_are_not_drawn() {
         Terrain::new(ground, &TerrainSettings { chunk_size: 8, ..TerrainSettings::default() }).expect("valid")
     };
     let (mut small, large) = (terrain(40), terrain(500));
-    let foreign = Cut::random(large.world().level_grid(4), 3, 70);
+    let foreign = Cut::random(large.world().lod_grid(4), 3, 70);
     let (drawn, nodes) = small.world().draw_cut(foreign.clone());
     assert_eq!(drawn.cut().grid().chunks(), small.world().grid());
     let mut display = Display::default();

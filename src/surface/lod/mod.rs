@@ -10,12 +10,12 @@
 //! 9. **Rim.** A column beyond the rim is the rim's, heights and edits, and is drawn there.
 //!
 //! The mesh of a node depends on its own level and on the levels of the nodes that touch it. A node of level
-//! 0 is drawn by its tile and chunks as they are, unless a coarser node changes its mask (`ground_level`).
+//! 0 is drawn by its tile and chunks as they are, unless a coarser node changes its mask (`finest`).
 
 mod builder;
 mod drawing;
 mod edge;
-mod ground_level;
+mod finest;
 mod near_bricks;
 mod sides;
 mod view;
@@ -23,11 +23,11 @@ mod volumetric;
 mod walls;
 
 pub use near_bricks::Stacks;
-pub use view::LevelView;
+pub use view::LodView;
 
 use super::SurfaceMesh;
 use crate::lattice::Column;
-use crate::levels::{Cut, Node};
+use crate::lod::{Cut, Node};
 
 /// A rule that is broken on purpose, in tests only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,17 +59,17 @@ pub(crate) enum Fault {
 }
 
 /// The mesh of a node, relative to its lowest column at y = 0; empty where the world has no such node.
-pub fn node_mesh(view: &LevelView, node: Node) -> SurfaceMesh {
+pub fn node_mesh(view: &LodView, node: Node) -> SurfaceMesh {
     match node.level {
         _ if !view.cut.grid().has(node) => SurfaceMesh::default(),
-        0 => ground_level::mesh(view, node),
+        0 => finest::mesh(view, node),
         _ => drawing::mesh(view, node),
     }
 }
 
 /// Returns `true` if a node is drawn by its tile and the chunks below it, unchanged.
-pub fn is_plain(view: &LevelView, node: Node) -> bool {
-    node.level == 0 && view.cut.grid().has(node) && ground_level::drawn_mask(view, node).is_none()
+pub fn is_plain(view: &LodView, node: Node) -> bool {
+    node.level == 0 && view.cut.grid().has(node) && finest::drawn_mask(view, node).is_none()
 }
 
 /// The drawn nodes whose meshes may depend on samples of some columns, both ends included; in order.
@@ -108,7 +108,7 @@ pub(crate) struct EdgeVertex {
 
 /// The vertices of a node above level 0 that lie on lattice edges.
 #[cfg(test)]
-pub(crate) fn edge_vertices(view: &LevelView, node: Node) -> Vec<EdgeVertex> {
+pub(crate) fn edge_vertices(view: &LodView, node: Node) -> Vec<EdgeVertex> {
     let mut drawing = drawing::Drawing::new(view, node);
     drawing.draw();
     let of = |(&edge, &number): (&edge::Edge, &builder::Number)| {

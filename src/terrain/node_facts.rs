@@ -3,8 +3,8 @@
 use super::world::World;
 use crate::ground::Ground;
 use crate::lattice::ONE;
-use crate::levels::{Cut, LevelGrid, Node, NodeFacts};
-use crate::surface::level::{self, LevelView, Stacks};
+use crate::lod::{Cut, LodGrid, Node, NodeFacts};
+use crate::surface::lod::{self, LodView, Stacks};
 use crate::surface::{SeamChecker, SeamReport, SurfaceMesh};
 
 /// Greatest width of a node in voxels: up to this width, 1/4096 of a voxel is exact in `f32`.
@@ -21,7 +21,7 @@ pub struct GroundFacts {
 
 impl GroundFacts {
     /// Those of a node.
-    pub fn new(ground: &Ground, grid: LevelGrid, node: Node) -> Self {
+    pub fn new(ground: &Ground, grid: LodGrid, node: Node) -> Self {
         if !grid.has(node) {
             return Self::default();
         }
@@ -55,9 +55,9 @@ impl GroundFacts {
 impl World {
     /// The quadtree over the world's tiles, with levels up to `top`; fewer where one node would cover the world or be
     /// wider than 4,096 voxels.
-    pub fn level_grid(&self, top: u8) -> LevelGrid {
+    pub fn lod_grid(&self, top: u8) -> LodGrid {
         let widest = (0..=top).take_while(|&level| i64::from(self.grid.size()) << level <= i64::from(WIDEST));
-        LevelGrid::new(self.grid, widest.last().unwrap_or_default())
+        LodGrid::new(self.grid, widest.last().unwrap_or_default())
     }
 
     /// Where edits are.
@@ -66,8 +66,8 @@ impl World {
     }
 
     /// The world as a cut draws it.
-    pub(crate) fn level_view<'a>(&'a self, cut: &'a Cut) -> LevelView<'a> {
-        LevelView::new(self.view(), cut, self.edited_stacks())
+    pub(crate) fn lod_view<'a>(&'a self, cut: &'a Cut) -> LodView<'a> {
+        LodView::new(self.view(), cut, self.edited_stacks())
     }
 
     /// Returns `true` if the cut was made for a world of this size.
@@ -78,13 +78,13 @@ impl World {
     /// The mesh of a node of a cut, relative to its lowest column at y = 0. What it draws depends on the nodes of the
     /// cut that touch it. Empty where the world has no such node, or if the cut is of a world of another size.
     pub fn node_mesh(&self, cut: &Cut, node: Node) -> SurfaceMesh {
-        if self.has_cut(cut) { level::node_mesh(&self.level_view(cut), node) } else { SurfaceMesh::default() }
+        if self.has_cut(cut) { lod::node_mesh(&self.lod_view(cut), node) } else { SurfaceMesh::default() }
     }
 
     /// Returns `true` if a node of level 0 is drawn by [its tile](Self::tile_mesh) and [the
     /// chunks](Self::chunk_mesh) below it, unchanged.
     pub fn is_plain(&self, cut: &Cut, node: Node) -> bool {
-        self.has_cut(cut) && level::is_plain(&self.level_view(cut), node)
+        self.has_cut(cut) && lod::is_plain(&self.lod_view(cut), node)
     }
 
     /// Everything that a cut draws: its nodes in order, each with its mesh.
@@ -107,13 +107,13 @@ impl World {
     }
 
     /// The properties of a node that a choice depends on.
-    pub fn node_facts(&self, grid: LevelGrid, node: Node) -> NodeFacts {
+    pub fn node_facts(&self, grid: LodGrid, node: Node) -> NodeFacts {
         let GroundFacts { heights, error } = GroundFacts::new(&self.ground, grid, node);
         NodeFacts { heights, error, has_edits: self.has_edits(grid, node) }
     }
 
     /// Returns `true` if a node contains edits.
-    pub fn has_edits(&self, grid: LevelGrid, node: Node) -> bool {
+    pub fn has_edits(&self, grid: LodGrid, node: Node) -> bool {
         let (low, high) = grid.columns(node);
         grid.has(node) && self.edited_stacks().has_any(low, high)
     }

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashSet;
 
-use super::{LevelGrid, Node};
+use super::{LodGrid, Node};
 use crate::lattice::TilePos;
 
 /// Nodes that together cover the world once. Those that share an edge differ by at most one level; across a corner they
@@ -11,19 +11,19 @@ use crate::lattice::TilePos;
 /// It is kept as the set of nodes that are split. A node of the cut is one that is not split, of a parent that is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cut {
-    grid: LevelGrid,
+    grid: LodGrid,
     split: FxHashSet<Node>,
 }
 
 impl Cut {
     /// The nodes of the coarsest level.
-    pub fn coarsest(grid: LevelGrid) -> Self {
+    pub fn coarsest(grid: LodGrid) -> Self {
         Self { grid, split: FxHashSet::default() }
     }
 
     /// The coarsest cut in which every node is split that ought to be. Nodes are asked about from above; the children
     /// of one that neither ought to be split nor has to be, for the sake of its neighbours, are not.
-    pub fn new(grid: LevelGrid, mut is_split: impl FnMut(Node) -> bool) -> Self {
+    pub fn new(grid: LodGrid, mut is_split: impl FnMut(Node) -> bool) -> Self {
         let mut cut = Self::coarsest(grid);
         let mut asked: Vec<Node> = grid.roots().collect();
         while let Some(node) = asked.pop() {
@@ -35,7 +35,7 @@ impl Cut {
     }
 
     /// A cut for tests and experiments, in which each node is split with a chance of `percent`; equal for equal seeds.
-    pub fn random(grid: LevelGrid, seed: u64, percent: u64) -> Self {
+    pub fn random(grid: LodGrid, seed: u64, percent: u64) -> Self {
         Self::new(grid, |node| (hash_node(node, seed) >> 7) % 100 < percent)
     }
 
@@ -60,7 +60,7 @@ impl Cut {
     }
 
     /// The quadtree that it cuts.
-    pub const fn grid(&self) -> LevelGrid {
+    pub const fn grid(&self) -> LodGrid {
         self.grid
     }
 
@@ -152,7 +152,7 @@ pub(super) mod tests {
     use super::*;
     use crate::lattice::ChunkGrid;
 
-    pub fn random_cut(grid: LevelGrid, seed: u64, percent: u64) -> Cut {
+    pub fn random_cut(grid: LodGrid, seed: u64, percent: u64) -> Cut {
         Cut::random(grid, seed, percent)
     }
 
@@ -189,7 +189,7 @@ pub(super) mod tests {
             width in 1i32..700, depth in 1i32..700, size in prop::sample::select(vec![8, 25, 32]), top in 0u8..6,
             seed: u64, percent in 0u64..100,
         ) {
-            let grid = LevelGrid::new(ChunkGrid::new(size, width, depth), top);
+            let grid = LodGrid::new(ChunkGrid::new(size, width, depth), top);
             let cut = random_cut(grid, seed, percent);
             assert_is_cut(&cut);
             // Every node that should be split is split, if it exists.
@@ -200,7 +200,7 @@ pub(super) mod tests {
 
         #[test]
         fn touching_nodes_are_those_that_share_a_side_or_a_corner(seed: u64, percent in 20u64..80) {
-            let cut = random_cut(LevelGrid::new(ChunkGrid::new(8, 170, 130), 4), seed, percent);
+            let cut = random_cut(LodGrid::new(ChunkGrid::new(8, 170, 130), 4), seed, percent);
             for node in cut.nodes() {
                 let mut expected: Vec<Node> = cut.nodes().filter(|&other| node.touches(other)).collect();
                 expected.sort_unstable();
@@ -212,7 +212,7 @@ pub(super) mod tests {
     #[test]
     fn a_world_without_levels_is_drawn_tile_by_tile() {
         let chunks = ChunkGrid::new(16, 100, 50);
-        let cut = Cut::coarsest(LevelGrid::new(chunks, 0));
+        let cut = Cut::coarsest(LodGrid::new(chunks, 0));
         let mut tiles: Vec<TilePos> = cut.nodes().map(Node::tile).collect();
         tiles.sort_unstable();
         let mut expected: Vec<TilePos> = chunks.tiles().collect();

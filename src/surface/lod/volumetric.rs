@@ -6,20 +6,20 @@ use rustc_hash::FxHashMap;
 use super::Fault;
 use super::near_bricks::NearBricks;
 use super::sides::{Cell, Interval, SIDES};
-use super::view::LevelView;
+use super::view::LodView;
 use crate::lattice::Column;
-use crate::levels::Node;
+use crate::lod::Node;
 
 /// The volumetric cells in and around a node.
 pub(super) struct Volumetric<'a> {
-    pub view: LevelView<'a>,
+    pub view: LodView<'a>,
     pub near: NearBricks<'a>,
     known: FxHashMap<Cell, bool>,
 }
 
 impl<'a> Volumetric<'a> {
     /// The volumetric cells in a node, and around it as far as its mesh depends on them.
-    pub fn new(view: &LevelView<'a>, node: Node) -> Self {
+    pub fn new(view: &LodView<'a>, node: Node) -> Self {
         let (low, high) = view.cut.grid().columns(node);
         let (stride, last) = (node.stride(), view.last());
         // A neighbouring cell may be promoted by an interval twice its width.

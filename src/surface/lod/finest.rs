@@ -9,10 +9,10 @@ use rustc_hash::FxHashSet;
 
 use super::near_bricks::NearBricks;
 use super::sides::Cell;
-use super::view::LevelView;
+use super::view::LodView;
 use super::volumetric::Volumetric;
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, SNAP, TilePos};
-use crate::levels::Node;
+use crate::lod::Node;
 use crate::surface::block::{Block, Mesher, Parts};
 use crate::surface::mask::cell_sheet;
 use crate::surface::vertex::WorldView;
@@ -20,7 +20,7 @@ use crate::surface::{Indices, Mask, MaskView, SurfaceMesh, Vertex, tile};
 
 /// The mask by which a node of level 0 is drawn, right for its cells and those around them; `None` if it is the
 /// world's.
-pub(super) fn drawn_mask(view: &LevelView, node: Node) -> Option<Mask> {
+pub(super) fn drawn_mask(view: &LodView, node: Node) -> Option<Mask> {
     if view.cut.touching(node).iter().all(|other| other.level == 0) {
         return None;
     }
@@ -51,7 +51,7 @@ pub(super) fn drawn_mask(view: &LevelView, node: Node) -> Option<Mask> {
 }
 
 /// The mesh of a node of level 0, relative to its lowest column at y = 0.
-pub(super) fn mesh(view: &LevelView, node: Node) -> SurfaceMesh {
+pub(super) fn mesh(view: &LodView, node: Node) -> SurfaceMesh {
     let drawn = drawn_mask(view, node);
     let world = match &drawn {
         Some(mask) => WorldView { mask: MaskView::new(mask), ..view.world },
@@ -82,7 +82,7 @@ pub(super) fn mesh(view: &LevelView, node: Node) -> SurfaceMesh {
 }
 
 /// Every block of a tile that may draw something.
-fn blocks(view: &LevelView, world: &WorldView, tile: TilePos) -> Vec<Block> {
+fn blocks(view: &LodView, world: &WorldView, tile: TilePos) -> Vec<Block> {
     let (low, high) = world.grid.tile_cells(tile);
     let mut bricks: FxHashSet<BrickPos> = FxHashSet::default();
     // Edited samples are corners of cells up to one below them.

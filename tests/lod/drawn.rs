@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bevy_burrow::lattice::SNAP;
-use bevy_burrow::levels::{Cut, Node};
+use bevy_burrow::lod::{Cut, Node};
 use bevy_burrow::surface::{SeamChecker, SurfaceMesh, Vertex};
 use bevy_burrow::terrain::World;
 use glam::{I64Vec3, IVec3};

@@ -1,7 +1,7 @@
 //! Random worlds, random cuts of them, and edits at the faces and corners of their nodes.
 
 use bevy_burrow::lattice::{Column, TilePos};
-use bevy_burrow::levels::{Cut, Node};
+use bevy_burrow::lod::{Cut, Node};
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 use glam::Vec3;
@@ -33,7 +33,7 @@ pub fn random_world(index: u64) -> (Terrain, Cut) {
     let ground = random_ground_of_size(&mut rng, index, width, depth);
     let mut terrain =
         Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings");
-    let grid = terrain.world().level_grid(5);
+    let grid = terrain.world().lod_grid(5);
     let cut = Cut::random(grid, rng.u64(..), rng.u64(10..85));
     if index % 7 == 6 {
         let rules = random_rules(&mut rng, terrain.world().ground());

@@ -7,7 +7,7 @@
 use glam::IVec3;
 
 use super::Fault;
-use super::view::LevelView;
+use super::view::LodView;
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::Vertex;
@@ -62,11 +62,11 @@ impl Edge {
         self.p + AXES[self.axis] * self.length
     }
 
-    pub fn is_pristine(self, view: &LevelView) -> bool {
+    pub fn is_pristine(self, view: &LodView) -> bool {
         !view.is_edited(self.p) && !view.is_edited(self.q())
     }
 
-    fn is_crossed(self, view: &LevelView) -> bool {
+    fn is_crossed(self, view: &LodView) -> bool {
         view.is_solid(self.p) != view.is_solid(self.q())
     }
 
@@ -78,13 +78,13 @@ impl Edge {
 
     /// Of the two halves of an edge with a crossing, one has a crossing.
     #[cfg(test)]
-    pub fn half(self, view: &LevelView) -> Self {
+    pub fn half(self, view: &LodView) -> Self {
         let [low, high] = self.halves();
         if low.is_crossed(view) { low } else { high }
     }
 
     /// Rule 8: while an end is edited, an edge gives way to its half whose ends differ in sign.
-    pub fn descended(mut self, view: &LevelView) -> Self {
+    pub fn descended(mut self, view: &LodView) -> Self {
         if view.has(Fault::NoDescent) {
             return self;
         }
@@ -101,7 +101,7 @@ impl Edge {
     }
 
     /// Rule 9: the edge as it is drawn.
-    pub fn drawn(self, view: &LevelView) -> Self {
+    pub fn drawn(self, view: &LodView) -> Self {
         if view.has(Fault::OverTheRim) {
             return self;
         }
@@ -113,7 +113,7 @@ impl Edge {
     /// different levels meet at it, `is_on_border` whether it lies on the border of the mask of its level.
     pub fn vertex(
         self,
-        view: &LevelView,
+        view: &LodView,
         origin: IVec3,
         is_between_levels: bool,
         is_on_border: impl FnOnce() -> bool,
@@ -132,7 +132,7 @@ impl Edge {
     }
 
     /// The vertex of an edge of one voxel that is not on the mask's border.
-    fn edited_vertex(self, view: &LevelView, origin: IVec3) -> Vertex {
+    fn edited_vertex(self, view: &LodView, origin: IVec3) -> Vertex {
         if self.length != 1 {
             // Only where a rule is broken.
             return self.linear_vertex(view, origin);
@@ -141,7 +141,7 @@ impl Edge {
     }
 
     /// The vertex of an edge that is not descended. Only for broken rules.
-    pub fn linear_vertex(self, view: &LevelView, origin: IVec3) -> Vertex {
+    pub fn linear_vertex(self, view: &LodView, origin: IVec3) -> Vertex {
         let drawn = self.drawn(view);
         let sheet = drawn.sheet_vertex(view.ground(), origin);
         if self.is_pristine(view) {
@@ -177,7 +177,7 @@ impl Edge {
     }
 
     /// Where the vertex of an edge that descends no further is, in 1/4096 voxel.
-    fn place(self, view: &LevelView) -> IVec3 {
+    fn place(self, view: &LodView) -> IVec3 {
         let drawn = self.drawn(view);
         let step = match (self.is_pristine(view), self.axis) {
             (true, 1) => (view.ground().height(Column::of(drawn.p)) - drawn.p.y * ONE) * (SNAP / ONE),
@@ -191,7 +191,7 @@ impl Edge {
 
     /// Where levels meet: the vertex of a pristine edge, or that of the shortest of its parts which have one at the
     /// same place.
-    fn shortest(mut self, view: &LevelView, origin: IVec3) -> Vertex {
+    fn shortest(mut self, view: &LodView, origin: IVec3) -> Vertex {
         if view.has(Fault::OwnVertices) {
             return self.drawn(view).sheet_vertex(view.ground(), origin);
         }
@@ -227,7 +227,7 @@ impl Edge {
 
 /// The heightmap's vertex over a column where levels meet. Where edits left the surface at the same height, finer nodes
 /// may have the vertex of an edge of one voxel there, so it is that one.
-pub(super) fn shared_height_vertex(view: &LevelView, column: Column, origin: IVec3) -> Vertex {
+pub(super) fn shared_height_vertex(view: &LodView, column: Column, origin: IVec3) -> Vertex {
     let height = view.ground().height(column);
     let edge = Edge { p: column.at(crate::lattice::ceil(height) - 1), axis: 1, length: 1 };
     let is_shared =
@@ -236,7 +236,7 @@ pub(super) fn shared_height_vertex(view: &LevelView, column: Column, origin: IVe
 }
 
 /// The stride of the node over a point.
-fn stride_at(view: &LevelView, point: IVec3) -> i32 {
+fn stride_at(view: &LodView, point: IVec3) -> i32 {
     let last = view.last();
     let cell = Column::new(point.x.min(last.x - 1), point.z.min(last.z - 1));
     1 << view.level_at(cell).unwrap_or_default()

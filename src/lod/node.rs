@@ -78,12 +78,12 @@ impl Node {
 
 /// All nodes that a world can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LevelGrid {
+pub struct LodGrid {
     grid: ChunkGrid,
     top: u8,
 }
 
-impl LevelGrid {
+impl LodGrid {
     /// Levels up to `top`, or as many as it takes until one node covers the world, if these are fewer.
     pub fn new(grid: ChunkGrid, top: u8) -> Self {
         let (x, z) = grid.tile_counts();

@@ -6,7 +6,7 @@ use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
 use crate::lattice::TilePos;
-use crate::levels::{Choice, Cut, Eye, View};
+use crate::lod::{Choice, Cut, Eye, View};
 use crate::terrain::{KnownNodes, Version};
 
 /// Draws far ground coarsely: insert it on a terrain's entity, and worlds may be many kilometres wide.
@@ -158,7 +158,7 @@ impl WantedTiles {
 
 /// The inputs of the last choice of a terrain's levels.
 #[derive(Component, Default)]
-pub(super) struct LevelState {
+pub(super) struct LodState {
     pub known: Arc<KnownNodes>,
     pub eyes: Vec<Eye>,
     pub settings: Option<LevelsOfDetail>,
@@ -185,7 +185,7 @@ fn is_same_view(a: View, b: View) -> bool {
 /// How far an eye moves before levels are chosen again, in voxels.
 const NEAR: f32 = 1.0;
 
-impl LevelState {
+impl LodState {
     pub(super) fn new(known: Arc<KnownNodes>) -> Self {
         Self { known, ..Self::default() }
     }

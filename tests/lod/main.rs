@@ -1,6 +1,6 @@
 //! Levels of detail: whatever was dug, and whichever nodes of the quadtree are drawn, everything together is closed.
 //!
-//! `BURROW_WORLDS=10000 cargo test --release --no-default-features --test levels` draws more random worlds.
+//! `BURROW_WORLDS=10000 cargo test --release --no-default-features --test lod` draws more random worlds.
 
 #[path = "../worlds/mod.rs"]
 mod worlds;

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use bevy_burrow::levels::{Choice, Cut, Eye, Node, NodeFacts, View};
+use bevy_burrow::lod::{Choice, Cut, Eye, Node, NodeFacts, View};
 use bevy_burrow::surface::{SeamChecker, SeamReport, SurfaceMesh};
 use bevy_burrow::terrain::World;
 use glam::Vec3;
@@ -36,7 +36,7 @@ pub struct LevelFigures {
 impl Levels {
     /// The cut that was asked for; `None` if the world is drawn in full.
     pub fn new(args: &Args, world: &World) -> Option<Self> {
-        let grid = world.level_grid(u8::MAX);
+        let grid = world.lod_grid(u8::MAX);
         let cut = match (&args.eye[..], args.random_cut) {
             (&[x, y, z], _) => {
                 let pixels = args.screen_height as f32 / (2.0 * (ANGLE / 2.0).to_radians().tan());

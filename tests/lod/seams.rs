@@ -6,7 +6,7 @@ use crate::drawn::{Counts, check, draw};
 use crate::random::{for_worlds, random_brushes, random_world, split_once};
 use crate::worlds::world_count;
 use bevy_burrow::ground::Strata;
-use bevy_burrow::levels::Cut;
+use bevy_burrow::lod::Cut;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 
@@ -41,7 +41,7 @@ fn cliffs_of_many_beds_are_closed_at_every_level() {
     let mut rng = Rng::with_seed(4);
     for _ in 0..6 {
         for percent in [15, 40, 70] {
-            let cut = Cut::random(terrain.world().level_grid(4), rng.u64(..), percent);
+            let cut = Cut::random(terrain.world().lod_grid(4), rng.u64(..), percent);
             let counts = check(terrain.world(), &cut, &draw(terrain.world(), &cut));
             assert!(counts.is_flawless() && counts.coarse > 0, "{counts:?}");
             let brushes = random_brushes(&mut rng, &terrain, &cut);
