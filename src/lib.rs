@@ -241,7 +241,9 @@
 //! | [`lattice`], [`lod`], [`ground`] | coordinates, levels of detail, the pristine world |
 //! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
 //! | [`surface`], [`dense`] | marching cubes, heightmap and their seam; a mesher of plain arrays |
-//! | [`backend`], [`terrain`] | engines on CPU and GPU; transactions, history, queries |
+//! | [`backend`] | engines on CPU and GPU |
+//! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
+//! | [`terrain`] | transactions, history, the commit log; exports what the three above have for games |
 //! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
 //! | `plugin`, `view`, `saves`, `together`, `physics`, `debug`, `panel` | everything that uses Bevy |
@@ -349,6 +351,7 @@ pub mod format;
 pub mod ground;
 pub mod lattice;
 pub mod lod;
+mod loose;
 #[cfg(feature = "net")]
 pub mod net;
 #[cfg(feature = "egui")]
@@ -361,6 +364,7 @@ pub mod plugin;
 mod plugins;
 #[cfg(feature = "plugin")]
 pub use plugins::BurrowPlugins;
+mod redraw;
 #[cfg(all(feature = "plugin", feature = "store"))]
 pub mod saves;
 #[cfg(feature = "store")]
@@ -374,6 +378,7 @@ pub mod together;
 #[cfg(feature = "render")]
 pub mod view;
 pub mod volume;
+mod world;
 #[cfg(test)]
 #[path = "../tests/worlds/mod.rs"]
 mod worlds;

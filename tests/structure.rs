@@ -11,8 +11,8 @@ use std::path::Path;
 /// The modules of the crate, from the ground up. Each imports only those before it.
 const MODULES: &[&str] = &[
     "threads", "lattice", "lod", "ground", "brush", "volume", "edits", "surface", "dense", "backend",
-    "terrain", "format", "store", "net", "plugin", "view", "saves", "plugins", "together", "physics",
-    "debug", "panel",
+    "world", "loose", "redraw", "terrain", "format", "store", "net", "plugin", "view", "saves", "plugins",
+    "together", "physics", "debug", "panel",
 ];
 
 /// Imports of a higher module that still exist: the file, and the module that it imports.
@@ -31,26 +31,20 @@ const CIRCLES: &[&[&str]] = &[
     &["panel/files.rs", "panel/level.rs"],
     &["panel/operations.rs", "panel/tool.rs"],
     &["saves/closing.rs", "saves/level.rs", "saves/opening.rs", "saves/saving.rs"],
-    &["together/client.rs", "together/shared.rs"],
-    &["together/players.rs", "together/server.rs", "together/service.rs"],
     &[
         "terrain/commit.rs",
-        "terrain/drawn_cut.rs",
-        "terrain/ground.rs",
         "terrain/log.rs",
         "terrain/model.rs",
-        "terrain/nodes.rs",
-        "terrain/put.rs",
         "terrain/queue.rs",
-        "terrain/redraw.rs",
         "terrain/replay.rs",
-        "terrain/restore.rs",
-        "terrain/surface_draft.rs",
-        "terrain/tiles.rs",
+        "terrain/resolve/ground.rs",
+        "terrain/resolve/parts.rs",
+        "terrain/resolve/step.rs",
         "terrain/transaction.rs",
-        "terrain/unmeshed.rs",
         "terrain/unseen.rs",
     ],
+    &["together/client.rs", "together/shared.rs"],
+    &["together/players.rs", "together/server.rs", "together/service.rs"],
 ];
 
 /// The text of a crate's files, by path below `src`.

@@ -3,19 +3,19 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::drawn_cut::DrawnCut;
-use super::field_log::FieldNews;
 use super::history::{HistoryReceipt, Restored, UndoDelta};
 use super::log::RecordDraft;
-use super::put::ChangeError;
 use super::receipt::Receipt;
-use super::redraw::MeshUpdates;
-use super::stages::Stages;
-use super::surface::ChunkSurface;
-use super::world::World;
+use super::resolve::ChangeError;
+use super::resolve::FieldNews;
 use crate::lattice::{ChunkPos, TilePos};
+use crate::redraw::DrawnCut;
+use crate::redraw::MeshUpdates;
+use crate::redraw::Stages;
+use crate::surface::ChunkSurface;
 use crate::surface::tile::Rings;
 use crate::volume::UniformBricks;
+use crate::world::World;
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]

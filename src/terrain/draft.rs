@@ -5,14 +5,14 @@ use std::sync::Arc;
 use super::model::Terrain;
 use super::queue::{Queue, Taken, Together, WorkLimits};
 use super::receipt::Receipt;
-use super::record::WorldChange;
-use super::settings::{TerrainError, TerrainSettings};
 use super::transaction::{Transaction, Work};
-use super::unmeshed::Meshing;
-use super::world::{World, unique};
 use crate::brush::Edit;
 use crate::lattice::BrickPos;
 use crate::volume::Brick;
+use crate::world::Meshing;
+use crate::world::WorldChange;
+use crate::world::{TerrainError, TerrainSettings};
+use crate::world::{World, unique};
 
 /// The changes that edits would make.
 #[derive(Clone, Debug, Default)]

@@ -8,12 +8,12 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::change::{Change, ChangedBrick};
-use super::loose::{LoosePiece, ReturnedPiece};
 use super::record::CommitRecord;
-use super::world::World;
 use crate::lattice::LatticeBox;
+use crate::loose::{LoosePiece, ReturnedPiece};
 use crate::volume::MaterialCounts;
+use crate::world::World;
+use crate::world::{Change, ChangedBrick};
 
 /// One step through a terrain's history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -3,14 +3,14 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::change::brick_bytes;
 use super::commit::Commit;
-use super::loose::LooseSettings;
-use super::model::Terrain;
-use super::record::{CommitRecord, LogEntry, WorldChange};
+use super::record::{CommitRecord, LogEntry};
 use super::transaction::Work;
-use super::world::World;
+use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
+use crate::world::World;
+use crate::world::WorldChange;
+use crate::world::brick_bytes;
 
 /// Rules and settings of loose pieces.
 type Terms = (Option<Arc<DiggingRules>>, Option<LooseSettings>);
@@ -125,7 +125,7 @@ pub(super) struct CommitLog {
 }
 
 impl CommitLog {
-    fn new(limit: usize) -> Self {
+    pub fn new(limit: usize) -> Self {
         let (records, sizes) = Default::default();
         Self { records, sizes, bytes: 0, limit, terms: None, has_gap: false }
     }
@@ -144,7 +144,7 @@ impl CommitLog {
     }
 
     /// Records new terms, if they differ from the previous ones.
-    fn enter_terms(&mut self, world: &World, terms: Terms) {
+    pub fn enter_terms(&mut self, world: &World, terms: Terms) {
         // The next edit logs them.
         if self.has_gap && self.records.is_empty() {
             return;
@@ -157,6 +157,35 @@ impl CommitLog {
             let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
             self.push(record, bytes, &mut Vec::new());
         }
+    }
+
+    /// Sets the most bytes that records may hold; the oldest are dropped if they hold more.
+    pub fn set_limit(&mut self, limit: usize) {
+        self.limit = limit;
+        self.trim(&mut Vec::new());
+    }
+
+    /// The records since the last call, in order. A gap shows in their revisions.
+    pub fn take(&mut self) -> Vec<CommitRecord> {
+        self.has_gap &= self.records.is_empty();
+        self.sizes.clear();
+        self.bytes = 0;
+        std::mem::take(&mut self.records).into()
+    }
+
+    /// Whether no record waits.
+    pub fn is_empty(&self) -> bool {
+        self.records.is_empty()
+    }
+
+    /// Whether the records follow this revision, and one of them sets another ground.
+    #[cfg(feature = "store")]
+    pub fn sets_ground_after(&self, revision: u64) -> bool {
+        let sets_ground =
+            |record: &CommitRecord| record.entries.iter().any(|entry| matches!(entry, LogEntry::Ground(_)));
+        let first = self.records.front();
+        first.is_some_and(|first| first.revision == revision.saturating_add(first.is_commit().into()))
+            && self.records.iter().any(sets_ground)
     }
 
     fn push(&mut self, record: CommitRecord, bytes: usize, dropped: &mut Vec<CommitRecord>) {
@@ -181,68 +210,5 @@ impl CommitLog {
         }
         // The dropped records may have held the current terms, so these are logged again.
         self.terms = None;
-    }
-}
-
-impl Terrain {
-    /// Keeps a record of each commit until it is [taken](Self::take_log); `None` keeps none and
-    /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps, the
-    /// oldest are dropped. A reader that finds a gap between [revisions](CommitRecord::revision), or whose
-    /// last record does not have the [world's revision](super::World::revision), has to read [all of the
-    /// world](Self::parts).
-    ///
-    /// Rules and settings of loose pieces are logged with the first edit that obeys them, or once nothing
-    /// waits.
-    pub fn keep_log(&mut self, bytes: Option<usize>) {
-        match (&mut self.log, bytes) {
-            (_, None) => self.log = None,
-            (Some(log), Some(limit)) => {
-                log.limit = limit;
-                log.trim(&mut Vec::new());
-            }
-            (None, Some(limit)) => {
-                self.log = Some(CommitLog::new(limit));
-                // Its commit would hold no record.
-                self.abandon();
-            }
-        }
-        self.log_terms();
-    }
-
-    /// The records of the commits since the last call, in order; each is returned once.
-    pub fn take_log(&mut self) -> Vec<CommitRecord> {
-        let Some(log) = &mut self.log else { return Vec::new() };
-        // The caller sees the gap in the revisions.
-        log.has_gap &= log.records.is_empty();
-        log.sizes.clear();
-        log.bytes = 0;
-        std::mem::take(&mut log.records).into()
-    }
-
-    /// Returns `true` if there is a record to [take](Self::take_log).
-    pub fn has_log(&self) -> bool {
-        self.log.as_ref().is_some_and(|log| !log.records.is_empty())
-    }
-
-    /// Whether the records that wait follow this revision, and one of them sets another ground: then the world is another one than before,
-    /// and the terrain is the same.
-    #[cfg(feature = "store")]
-    pub(crate) fn log_sets_ground_after(&self, revision: u64) -> bool {
-        let Some(log) = &self.log else { return false };
-        let sets_ground =
-            |record: &CommitRecord| record.entries.iter().any(|entry| matches!(entry, LogEntry::Ground(_)));
-        let first = log.records.front();
-        first.is_some_and(|first| first.revision == revision.saturating_add(first.is_commit().into()))
-            && log.records.iter().any(sets_ground)
-    }
-
-    /// Records the terms of later edits in the log, unless waiting edits obey other terms.
-    pub(super) fn log_terms(&mut self) {
-        if self.is_busy() || self.queue.len() > 0 {
-            return;
-        }
-        if let Some(log) = &mut self.log {
-            log.enter_terms(&self.world, (self.rules.clone(), self.loose));
-        }
     }
 }

@@ -1,18 +1,17 @@
 //! Creates a terrain from saved data: from parts, or by replaying records.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::model::Terrain;
-use super::put::{ChangeError, Put, check_number};
 use super::queue::WorkLimits;
 use super::receipt::Receipt;
-use super::record::{CommitRecord, LogEntry, WorldChange, WorldParts};
-use super::settings::{TerrainError, TerrainSettings};
-use super::unmeshed::Meshing;
+use super::record::{CommitRecord, LogEntry, WorldParts};
+use super::resolve::{ChangeError, Put, check_number};
 use crate::ground::Ground;
-use crate::lattice::{ChunkGrid, ChunkPos};
-use crate::volume::{DiggingRules, FieldId, Fields, RulesError};
+use crate::volume::{DiggingRules, RulesError};
+use crate::world::Meshing;
+use crate::world::WorldChange;
+use crate::world::{TerrainError, TerrainSettings};
 
 /// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -163,31 +162,5 @@ impl Terrain {
             true => Err(ReplayError::Rejected(record.revision)),
             false => Ok(receipts),
         }
-    }
-}
-
-impl WorldChange {
-    /// Extends fields over edited samples that no field contains; new fields get unused names.
-    /// Returns whether there were any.
-    pub(crate) fn cover(&mut self, grid: ChunkGrid) -> bool {
-        let mut fields: BTreeMap<ChunkPos, Fields> = std::mem::take(&mut self.fields).into_iter().collect();
-        let (mut next, mut has_grown) = (self.next_field, false);
-        for (pos, brick) in &self.bricks {
-            let Some(edited) = brick.as_ref().and_then(|brick| brick.edited_bounds(*pos)) else { continue };
-            for chunk in grid.chunks_of(edited) {
-                let Some(own) = grid.chunk_samples(chunk).intersection(edited) else { continue };
-                let fields = fields.entry(chunk).or_default();
-                if fields.iter().any(|field| field.bounds.encloses(own)) {
-                    continue;
-                }
-                has_grown = true;
-                fields.absorb(own, || {
-                    next = next.saturating_add(1);
-                    FieldId(next)
-                });
-            }
-        }
-        (self.fields, self.next_field) = (fields.into_iter().collect(), next);
-        has_grown
     }
 }

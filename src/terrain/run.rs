@@ -13,22 +13,21 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
 use super::commit::Commit;
-use super::drawn_cut::ChooseCut;
 use super::history::{HistoryReceipt, HistoryRejection};
 use super::log::RecordDraft;
-use super::nodes;
-use super::put::{self, ChangeError};
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
-use super::redraw::MeshUpdates;
-use super::stages::Stages;
+use super::resolve::{self, ChangeError};
 use super::transaction::{Transaction, Work};
-use super::world::World;
-use super::{groups, reset, restore};
 use crate::backend::{Compute, Cpu, Engine};
 use crate::brush::Kind;
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ItemCost};
+use crate::redraw;
+use crate::redraw::ChooseCut;
+use crate::redraw::MeshUpdates;
+use crate::redraw::Stages;
+use crate::world::World;
 
 /// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for
 /// more would take too long.
@@ -65,12 +64,12 @@ impl Transaction {
         let run = || match &self.work {
             Work::Edits(submissions) => match &submissions[..] {
                 [own @ Submission { edit: Ok(edit), .. }] if edit.kind() == Kind::Reset => {
-                    reset::commit(self, own, edit, backend)
+                    resolve::reset(self, own, edit, backend)
                 }
-                all => groups::edit(self, all, backend),
+                all => resolve::edit(self, all, backend),
             },
-            Work::Step(step, target) => restore::step(self, *step, target, backend),
-            Work::Put(parts) => put::put(self, parts, backend),
+            Work::Step(step, target) => resolve::step(self, *step, target, backend),
+            Work::Put(parts) => resolve::put(self, parts, backend),
             Work::Cut(choose) => self.cut(choose.as_ref()),
         };
         // A large one runs on a thread of the pool: entering the pool for each stage would take longer.
@@ -110,7 +109,7 @@ impl Transaction {
     fn cut(&self, choose: &ChooseCut) -> Commit {
         let mut meshes = MeshUpdates::default();
         if let Some(drawn) = &self.drawn_cut {
-            let (after, nodes) = nodes::change_cut(&self.world, drawn, choose);
+            let (after, nodes) = redraw::change_cut(&self.world, drawn, choose);
             (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
         }
         self.commit(Vec::new(), self.world.sample_hash, meshes)

@@ -4,15 +4,15 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::commit::Commit;
-use super::drawn_cut::{ChooseCut, DrawnCut};
 use super::history::{HistoryStep, UndoDelta};
-use super::put::Put;
 use super::queue::Submission;
-use super::redraw::MeshUpdates;
-use super::stages::Stages;
-use super::unmeshed::Meshing;
-use super::world::World;
-use crate::backend::Engine;
+use super::resolve::Put;
+use crate::backend::{Compute, Engine};
+use crate::redraw::Stages;
+use crate::redraw::{ChooseCut, DrawnCut};
+use crate::redraw::{MeshUpdates, Scene};
+use crate::world::Meshing;
+use crate::world::World;
 
 /// The work of a transaction.
 #[derive(Clone)]
@@ -69,6 +69,11 @@ impl Transaction {
     /// Returns `true` if it holds no edit.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// The world that it applies to, and how it is drawn.
+    pub(super) fn scene<'a>(&'a self, backend: &'a dyn Compute) -> Scene<'a> {
+        Scene { world: &self.world, meshing: self.meshing, cut: self.drawn_cut.as_ref(), backend }
     }
 
     /// A commit of changes and of what is drawn then.

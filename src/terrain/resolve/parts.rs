@@ -1,0 +1,290 @@
+//! Replaces parts of a world by parts from a save or from another machine with the same world.
+
+use std::sync::Arc;
+
+use glam::IVec3;
+use rayon::prelude::*;
+use rustc_hash::FxHashSet;
+use web_time::Instant;
+
+use super::ground::put_on;
+use super::step::{Placed, place};
+use crate::backend::Compute;
+use crate::edits::{EditEffect, count_replaced};
+use crate::ground::Ground;
+use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
+use crate::redraw::MeshUpdates;
+use crate::redraw::Stages;
+use crate::redraw::{dirty_cells, joined_mask};
+use crate::surface::vertex::WorldView;
+use crate::surface::{Mask, MaskView};
+use crate::terrain::commit::Commit;
+use crate::terrain::history::{Restored, UndoDelta};
+use crate::terrain::transaction::Transaction;
+use crate::volume::layers::{self, offset};
+use crate::volume::{Brick, Field, FieldId, UniformBricks, pristine_layers};
+use crate::world::WorldChange;
+use crate::world::{Change, replaced_bytes};
+use crate::world::{World, columns_of};
+
+/// The reason why parts were not replaced; nothing changed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChangeError {
+    /// Bricks come twice or out of order.
+    #[error("the brick {0:?} is repeated or out of order: sort bricks by position")]
+    Order(BrickPos),
+    /// A brick, or one of its edited samples, lies outside the world.
+    #[error("the brick {0:?} extends beyond the world")]
+    OutsideWorld(BrickPos),
+    /// A brick has a pristine sample that is solid where this ground is air, or vice versa.
+    #[error("the brick {0:?} was made on a different ground")]
+    OtherGround(BrickPos),
+    /// Fields of a chunk reach out of it, it comes twice, or one of its fields has the name of another.
+    #[error("the fields of chunk {0:?} extend beyond it, are repeated, or share a name")]
+    Fields(ChunkPos),
+    /// A revision or the name of a field is so great that no others could follow.
+    #[error("{0} is too large for a revision or the name of a field")]
+    Number(u64),
+    /// The world would not have the hash that was expected.
+    #[error("the world would have the hash {found:#018x}, not {expected:#018x}")]
+    Hash {
+        /// The hash that it would have.
+        found: u64,
+        /// The expected hash.
+        expected: u64,
+    },
+    /// The ground has another size, in cells.
+    #[error("the new ground has {found:?} cells, but the world has {expected:?}")]
+    GroundSize {
+        /// Width and depth of the new one.
+        found: (i32, i32),
+        /// Those of the world's.
+        expected: (i32, i32),
+    },
+    /// Too much work [waits](crate::terrain::WorkLimits::waiting).
+    #[error("the queue is full: try again once waiting work is done")]
+    Overloaded,
+    /// It panicked.
+    #[error("replacing parts panicked: this is a bug in bevy_burrow")]
+    Panicked,
+}
+
+/// The replacement parts.
+#[derive(Debug)]
+pub(crate) struct Put {
+    pub change: WorldChange,
+    /// The hash that the world must have afterwards.
+    pub hash: Option<u64>,
+    /// Whether its receipt counts voxels.
+    pub counts: bool,
+    /// Another ground below all edits; nothing else changes then.
+    pub ground: Option<Arc<Ground>>,
+}
+
+impl Put {
+    /// Returns `true` if it certainly changes nothing.
+    pub fn is_empty(&self) -> bool {
+        self.change.bricks.is_empty() && self.change.fields.is_empty() && self.ground.is_none()
+    }
+
+    /// Returns `true` if it certainly changes none of these samples.
+    pub fn misses(&self, samples: LatticeBox) -> bool {
+        let misses = |pos: &BrickPos| pos.samples().intersection(samples).is_none();
+        self.ground.is_none() && self.change.bricks.iter().all(|(pos, _)| misses(pos))
+    }
+}
+
+/// A replacement brick.
+struct NewBrick {
+    pos: BrickPos,
+    brick: Option<Arc<Brick>>,
+    changed: Option<LatticeBox>,
+    effect: EditEffect,
+    /// By how much the hash of the world's samples changes.
+    hash: u64,
+}
+
+impl NewBrick {
+    fn new(
+        world: &World,
+        pos: BrickPos,
+        brick: Option<&Arc<Brick>>,
+        counts: bool,
+    ) -> Result<Self, ChangeError> {
+        let mut brick = brick.map(Arc::clone);
+        let (bounds, own) = (world.grid.edit_bounds(), pos.samples());
+        // Far out, lattice points do not fit 32 bits, and those that wrap around may seem to lie in the world.
+        if BrickPos::of(own.min) != pos || own.intersection(bounds).is_none() {
+            return Err(ChangeError::OutsideWorld(pos));
+        }
+        if let Some(new) = &brick {
+            let is_inside = |index| bounds.contains(pos.origin() + offset(index));
+            if !bounds.encloses(own) && !layers::indices(new.edited()).all(is_inside) {
+                return Err(ChangeError::OutsideWorld(pos));
+            }
+            let pristine = layers::without(&pristine_layers(&world.ground, pos), new.edited());
+            if layers::without(new.solid(), new.edited()) != pristine {
+                return Err(ChangeError::OtherGround(pos));
+            }
+        }
+        // One without an edited sample is pristine.
+        brick.take_if(|brick| *brick.edited() == layers::NONE);
+        let before = world.bricks.get(&pos);
+        let mut effect = EditEffect::default();
+        let changed = if counts || before.is_some() {
+            let pair = [before.map(Arc::as_ref), brick.as_deref()];
+            count_replaced(&world.ground, pos, pair, &mut effect)
+        } else {
+            brick.as_ref().and_then(|brick| layers::bounds(brick.edited(), pos.origin()))
+        };
+        let columns = columns_of(pos);
+        let hash = |brick: Option<&Arc<Brick>>| {
+            brick.map_or(0, |brick| brick.hash(pos.origin().y, brick.edited(), &columns))
+        };
+        let hash = hash(brick.as_ref()).wrapping_sub(hash(before));
+        Ok(Self { pos, brick, changed, effect, hash })
+    }
+}
+
+/// Puts parts in place.
+pub(crate) fn put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> Commit {
+    let start = Instant::now();
+    let commit = match &put.ground {
+        Some(ground) => put_on(transaction, ground),
+        None => checked_put(transaction, put, backend),
+    };
+    let failed = |error| {
+        let commit = transaction.commit(Vec::new(), transaction.world.sample_hash, MeshUpdates::default());
+        Commit { put: Some(Err(error)), ..commit }
+    };
+    let mut commit = commit.unwrap_or_else(failed);
+    commit.stages.whole = start.elapsed();
+    commit
+}
+
+fn checked_put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> Result<Commit, ChangeError> {
+    let (world, change, mut stages) = (&*transaction.world, &put.change, Stages::default());
+    check_order(&change.bricks)?;
+    let next_field = check_fields(world, change)?;
+    let all = change.bricks.par_iter().with_min_len(64);
+    let all = all.map(|(pos, brick)| NewBrick::new(world, *pos, brick.as_ref(), put.counts));
+    let mut new = Stages::time(&mut stages.edit, || all.collect::<Result<Vec<NewBrick>, ChangeError>>())?;
+    let delta = new.iter().fold(0u64, |sum, own| sum.wrapping_add(own.hash));
+    let sample_hash = world.sample_hash.wrapping_add(delta);
+    let found = World::hash_of(world.ground.hash(), sample_hash);
+    if let Some(expected) = put.hash.filter(|&expected| expected != found) {
+        return Err(ChangeError::Hash { found, expected });
+    }
+    let uniform = share_uniform(world, &mut new);
+    let mut effect = EditEffect::default();
+    for own in &mut new {
+        let EditEffect { removed, added, painted, .. } = std::mem::take(&mut own.effect);
+        effect.removed.add(&removed);
+        effect.added.add(&added);
+        effect.painted.add(&painted);
+    }
+    let bricks: Vec<(BrickPos, Option<Arc<Brick>>)> =
+        new.iter().map(|own| (own.pos, own.brick.clone())).collect();
+    let changed: Vec<(BrickPos, LatticeBox)> =
+        new.iter().filter_map(|own| Some((own.pos, own.changed?))).collect();
+    let pristine = |pos| Arc::new(Brick::pristine(pristine_layers(&world.ground, pos)));
+    let whole: Vec<(BrickPos, Arc<Brick>)> =
+        bricks.iter().map(|(pos, brick)| (*pos, brick.clone().unwrap_or_else(|| pristine(*pos)))).collect();
+    let words = Stages::time(&mut stages.ring, || words_of(world, &whole, &changed));
+    let change = Change { bricks, fields: change.fields.clone(), mask: words, sample_hash };
+    let replaced = change.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
+    let Placed { meshes, news } = place(transaction, &change, &whole, &changed, backend, &mut stages);
+    let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
+    let EditEffect { removed, added, painted, .. } = effect;
+    let restored = Restored { bounds, removed, added, painted, ..Restored::default() };
+    let delta = UndoDelta::new(change, replaced, 0, Default::default());
+    Ok(Commit {
+        put: Some(Ok(restored)),
+        news,
+        uniform,
+        next_field,
+        stages,
+        ..transaction.commit(vec![delta], sample_hash, meshes)
+    })
+}
+
+fn check_order(bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> Result<(), ChangeError> {
+    let wrong = bricks.windows(2).find(|pair| pair[0].0 >= pair[1].0);
+    wrong.map_or(Ok(()), |pair| Err(ChangeError::Order(pair[1].0)))
+}
+
+/// Checks the fields of a change; returns the greatest name that a field will have had.
+fn check_fields(world: &World, change: &WorldChange) -> Result<u64, ChangeError> {
+    let (mut chunks, mut names) = (FxHashSet::default(), FxHashSet::default());
+    let mut greatest = check_number(world.next_field.max(change.next_field))?;
+    for (chunk, fields) in &change.fields {
+        let own = world.grid.chunk_samples(*chunk).intersection(world.grid.edit_bounds());
+        let is_inside = |field: &Field| own.is_some_and(|own| own.encloses(field.bounds));
+        if !world.grid.has_tile(chunk.tile()) || !chunks.insert(*chunk) || !fields.iter().all(is_inside) {
+            return Err(ChangeError::Fields(*chunk));
+        }
+        for FieldId(name) in fields.iter().map(|field| field.id) {
+            greatest = greatest.max(check_number(name)?);
+            if !names.insert(name) {
+                return Err(ChangeError::Fields(*chunk));
+            }
+        }
+    }
+    Ok(greatest)
+}
+
+/// Checks that a revision or the name of a field leaves room for those that follow.
+pub(crate) fn check_number(number: u64) -> Result<u64, ChangeError> {
+    if number > u64::MAX / 2 { Err(ChangeError::Number(number)) } else { Ok(number) }
+}
+
+/// Shares equal uniform bricks; returns the pool, if it has grown.
+fn share_uniform(world: &World, new: &mut [NewBrick]) -> Option<UniformBricks> {
+    let mut grown: Option<UniformBricks> = None;
+    for brick in new.iter_mut().filter_map(|own| own.brick.as_mut()) {
+        let Some(kind) = brick.uniform() else { continue };
+        let pool = grown.as_ref().unwrap_or(&world.uniform);
+        match pool.get(&kind) {
+            Some(shared) => *brick = Arc::clone(shared),
+            None => {
+                grown.get_or_insert_with(|| world.uniform.clone()).insert(kind, Arc::clone(brick));
+            }
+        }
+    }
+    grown
+}
+
+/// Evaluates rule 2 again near changed bricks, as samples may have become pristine again. Returns the mask
+/// words that change.
+pub(crate) fn words_of(
+    world: &World,
+    bricks: &[(BrickPos, Arc<Brick>)],
+    changed: &[(BrickPos, LatticeBox)],
+) -> Vec<((i32, i32), u64)> {
+    // A cell has its corners in its own stack of bricks and in those behind it.
+    let stacks: FxHashSet<(i32, i32)> = changed.iter().map(|(pos, _)| pos.stack()).collect();
+    let behind = |&(x, z): &(i32, i32)| [(x, z), (x - 1, z), (x, z - 1), (x - 1, z - 1)];
+    let words: FxHashSet<(i32, i32)> = stacks.iter().flat_map(behind).collect();
+    let read: FxHashSet<(i32, i32)> =
+        words.iter().flat_map(|&(x, z)| [(x, z), (x + 1, z), (x, z + 1), (x + 1, z + 1)]).collect();
+    let mut cleared = Mask::default();
+    words.iter().for_each(|&word| cleared.lay_word(word, 0));
+    let stored = read.iter().flat_map(|stack| {
+        let ys = world.stacks.get(stack).map(Vec::as_slice).unwrap_or_default();
+        ys.iter().map(|&y| BrickPos(IVec3::new(stack.0, y, stack.1)))
+    });
+    let mut near: Vec<BrickPos> = stored.chain(bricks.iter().map(|(pos, _)| *pos)).collect();
+    near.sort_unstable();
+    near.dedup();
+    let latest: Vec<_> = bricks.iter().map(|(pos, brick)| (*pos, brick.as_ref())).collect();
+    let view = WorldView {
+        samples: world.samples().under(&latest),
+        mask: MaskView::new(&world.mask).over(&cleared),
+        grid: world.grid,
+    };
+    let cells = dirty_cells(world.grid, &near, |&pos| (pos, pos.samples(), true));
+    let found = joined_mask(world, &view, &cells);
+    let words = words.into_iter().map(|word| (word, found.get_word(word).unwrap_or_default()));
+    words.filter(|&(word, cells)| cells != world.mask.word(word)).collect()
+}

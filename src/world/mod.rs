@@ -1,0 +1,35 @@
+//! The world at one revision: ground, bricks, fields, mask and the surfaces that were meshed from them; and queries.
+//!
+//! | file | what it holds |
+//! | --- | --- |
+//! | `state` | the committed world |
+//! | `change` | what a commit swaps |
+//! | `parts`, `regions` | bricks and fields, as they are saved, compared and sent |
+//! | `unmeshed` | surfaces that are made when they are asked for |
+//! | `query`, `ray`, `triangles`, `inspect`, `heights` | heights, rays, debug views, export |
+//! | `memory` | the bytes that it takes |
+//! | `settings` | voxel size and chunk size |
+
+mod change;
+mod heights;
+mod inspect;
+mod memory;
+mod parts;
+mod query;
+mod ray;
+mod regions;
+mod settings;
+mod state;
+mod triangles;
+mod unmeshed;
+
+pub(crate) use change::{Change, ChangedBrick, brick_bytes, replaced_bytes};
+pub use memory::Memory;
+pub use parts::WorldChange;
+pub(crate) use parts::{brick_over, columns_of};
+pub use query::{RayHit, Span};
+pub use settings::{TerrainError, TerrainSettings};
+pub(crate) use state::unique;
+pub use state::{Drawn, Version, World};
+pub use unmeshed::Meshing;
+pub(crate) use unmeshed::{UnmeshedChunk, blocks_of};
