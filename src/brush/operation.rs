@@ -5,8 +5,7 @@ use glam::Mat3A;
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
-use super::{DEPTH, Stamp};
+use super::{DEPTH, Stamp, is_default};
 use crate::ground::MaterialId;
 
 /// The operation inside the shape.

@@ -12,7 +12,7 @@ use super::edits::{EditSequence, put_edit, read_edit};
 use super::error::FormatError;
 use super::plain;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, WorldChange};
+use crate::terrain::{CommitRecord, LogEntry, Patch};
 use crate::volume::DiggingRules;
 
 const RULES: u8 = 0;
@@ -79,7 +79,7 @@ impl Batch {
                 0 => read_commit(&mut reader, revision, &mut edits, ground)?,
                 odd if odd & 1 == 1 => {
                     let entries = vec![LogEntry::Edit(edits.read(head >> 1, &mut reader)?)];
-                    let (revision, change) = (revision.wrapping_add(1), WorldChange::default());
+                    let (revision, change) = (revision.wrapping_add(1), Patch::default());
                     CommitRecord { revision, hash: 0, entries, change }
                 }
                 _ => return Err(FormatError::Invalid("commit")),
@@ -157,7 +157,7 @@ fn read_commit(
     }
     let change = match entries.contains(&LogEntry::Change) {
         true => read_change(reader, ground)?,
-        false => WorldChange::default(),
+        false => Patch::default(),
     };
     Ok(CommitRecord { revision, hash: 0, entries, change })
 }

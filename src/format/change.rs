@@ -9,11 +9,11 @@ use super::error::FormatError;
 use super::fields::{point, put_fields, put_point, read_fields};
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, RegionPos};
-use crate::terrain::WorldChange;
+use crate::terrain::Patch;
 use crate::volume::Brick;
 
 /// Appends a change.
-pub fn put_change(to: &mut Vec<u8>, change: &WorldChange) {
+pub fn put_change(to: &mut Vec<u8>, change: &Patch) {
     let mut regions = BTreeMap::<RegionPos, (Vec<(BrickPos, &Brick)>, Vec<usize>)>::new();
     for (pos, brick) in &change.bricks {
         let (stored, pristine) = regions.entry(RegionPos::of(*pos)).or_default();
@@ -35,7 +35,7 @@ pub fn put_change(to: &mut Vec<u8>, change: &WorldChange) {
 }
 
 /// Reads what [`put_change`] appended.
-pub fn read_change(reader: &mut Reader, ground: &Ground) -> Result<WorldChange, FormatError> {
+pub fn read_change(reader: &mut Reader, ground: &Ground) -> Result<Patch, FormatError> {
     let (mut bricks, mut flat_bricks) = (Vec::<(BrickPos, Option<Arc<Brick>>)>::new(), FlatBricks::default());
     for _ in 0..reader.count()? {
         let region = RegionPos(point(reader)?);
@@ -54,5 +54,5 @@ pub fn read_change(reader: &mut Reader, ground: &Ground) -> Result<WorldChange, 
     if let Some(pair) = bricks.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         return Err(FormatError::Brick(pair[0].0));
     }
-    Ok(WorldChange { bricks, fields: read_fields(reader)?, next_field: reader.number()? })
+    Ok(Patch { bricks, fields: read_fields(reader)?, next_field: reader.number()? })
 }

@@ -6,16 +6,15 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::batch::Batch;
-use super::container;
 use super::error::FormatError;
 use super::frame::{self, Kind, WorldId};
 use super::limits::{Limits, within};
 use super::metadata::Metadata;
-use super::plain;
 use super::region::{decode_region, encode_region, region_key, region_of_key};
+use super::{container, plain};
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
-use crate::terrain::{WorldChange, WorldParts};
+use crate::terrain::{Patch, WorldParts};
 use crate::volume::{Brick, Fields};
 
 /// A region as it is saved.
@@ -98,7 +97,7 @@ impl PortableWorld {
 
 /// Cuts a world into regions. Fields belong to the region with their chunk's lowest corner.
 pub fn by_region(
-    change: WorldChange,
+    change: Patch,
     chunk_size: u32,
     revision: u64,
     ground: &Ground,
@@ -130,8 +129,8 @@ pub fn by_region(
 }
 
 /// Joins regions to a world.
-pub fn of_regions(regions: &BTreeMap<RegionPos, SavedRegion>, next_field: u64) -> WorldChange {
-    let mut change = WorldChange { next_field, ..WorldChange::default() };
+pub fn of_regions(regions: &BTreeMap<RegionPos, SavedRegion>, next_field: u64) -> Patch {
+    let mut change = Patch { next_field, ..Patch::default() };
     for region in regions.values() {
         change.bricks.extend(region.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))));
         change.fields.extend_from_slice(&region.fields);

@@ -6,10 +6,9 @@ use super::bits::Samples;
 use super::search::{self, Component};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, ChunkGrid, Column, ONE};
-use crate::surface::SurfaceMesh;
-use crate::surface::cases;
 use crate::surface::plain::CubeMesh;
 use crate::surface::vertex::{Lattice, vertex};
+use crate::surface::{SurfaceMesh, cases};
 use crate::volume::{SampleView, layers};
 
 /// Density of what lies beyond the world's sides. The piece ends at its last sample there, not halfway to the next.

@@ -6,12 +6,11 @@
 use glam::IVec3;
 
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox};
-use crate::surface::Mask;
 use crate::surface::block::Block;
-use crate::surface::mask;
 use crate::surface::pristine::{self, PristineStack};
 use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
+use crate::surface::{Mask, mask};
 
 use rustc_hash::FxHashSet;
 

@@ -5,14 +5,11 @@ use std::sync::{Arc, OnceLock};
 
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, TilePos};
-use crate::surface::ChunkSurface;
 use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
-use crate::surface::{Indices, SurfaceMesh};
-use crate::world::Drawn;
-use crate::world::UnmeshedChunk;
-use crate::world::World;
+use crate::surface::{ChunkSurface, Indices, SurfaceMesh};
+use crate::world::{Drawn, UnmeshedChunk, World};
 
 /// The mesh data of a tile. Its columns never change, so only its rings and indices do.
 #[derive(Clone, Debug)]

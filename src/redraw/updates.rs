@@ -16,11 +16,10 @@ use crate::backend::Compute;
 use crate::lattice::{
     BrickPos, ChunkPos, Column, ItemCost, LatticeBox, TilePos, side_by_side, sort_permutation,
 };
-use crate::surface::Mask;
 use crate::surface::block::Block;
 use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
-use crate::surface::{ChunkSurface, FreshPart, PartKey};
+use crate::surface::{ChunkSurface, FreshPart, Mask, PartKey};
 use crate::world::{Meshing, World};
 
 /// New meshes of a commit, which replace old ones. An empty one means that nothing is drawn there any more.

@@ -7,10 +7,9 @@ use super::database::{self, DATABASE, DatabaseError, UNFINISHED};
 use super::error::StoreError;
 use super::files::{Files, Opening};
 use super::keys::{self, Key};
-use super::quarantine;
 use super::reading::{FileBytes, is_refused, read_file};
-use super::salvage;
 use super::segment::{self, FRAME_LIMIT};
+use super::{quarantine, salvage};
 use crate::format::FormatError;
 use crate::format::frame::{self, Kind, WorldId};
 

@@ -6,12 +6,9 @@ use std::sync::Arc;
 use super::history::{HistoryReceipt, Restored, UndoDelta};
 use super::log::RecordDraft;
 use super::receipt::Receipt;
-use super::resolve::ChangeError;
-use super::resolve::FieldNews;
+use super::resolve::{ChangeError, FieldNews};
 use crate::lattice::{ChunkPos, TilePos};
-use crate::redraw::DrawnCut;
-use crate::redraw::MeshUpdates;
-use crate::redraw::Stages;
+use crate::redraw::{DrawnCut, MeshUpdates, Stages};
 use crate::surface::ChunkSurface;
 use crate::surface::tile::Rings;
 use crate::volume::UniformBricks;
@@ -116,7 +113,7 @@ impl Commit {
     pub(super) fn install(self, world: &mut World) -> Installed {
         let mut replaced = self.changes;
         replaced.iter_mut().for_each(|own| own.change.swap(world));
-        replaced.retain(|own| !own.change.bricks.is_empty());
+        replaced.retain(|own| !own.change.patch.bricks.is_empty());
         if let Some(uniform) = self.uniform {
             world.set_uniform(uniform);
         }

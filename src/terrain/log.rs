@@ -8,9 +8,7 @@ use super::record::{CommitRecord, LogEntry};
 use super::transaction::Work;
 use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
-use crate::world::World;
-use crate::world::WorldChange;
-use crate::world::brick_bytes;
+use crate::world::{Patch, World, brick_bytes};
 
 /// Rules and settings of loose pieces.
 type Terms = (Option<Arc<DiggingRules>>, Option<LooseSettings>);
@@ -28,7 +26,7 @@ pub(super) struct RecordDraft {
     /// The terms of the first and of the last edit that was applied. Entries say how those in between differ.
     terms: Option<[Terms; 2]>,
     entries: Vec<LogEntry>,
-    change: WorldChange,
+    change: Patch,
     /// Bytes that the record may hold alone.
     bytes: usize,
 }
@@ -70,27 +68,21 @@ impl RecordDraft {
 
 impl Commit {
     /// The bricks and fields that it leads to, as its [record](CommitRecord) lists them.
-    pub fn change(&self) -> WorldChange {
+    pub fn change(&self) -> Patch {
         if let Some(whole) = &self.whole {
             return whole.all_parts();
         }
-        let (mut bricks, mut fields) = (Vec::new(), Vec::new());
-        // Of several groups the last one holds.
-        for change in self.changes.iter().rev().map(|own| &own.change) {
-            bricks.extend(change.bricks.iter().cloned());
-            fields.extend(change.fields.iter().cloned());
-        }
-        bricks.sort_by_key(|(pos, _)| *pos);
-        bricks.dedup_by_key(|(pos, _)| *pos);
-        fields.sort_by_key(|(chunk, _)| *chunk);
-        fields.dedup_by_key(|(chunk, _)| *chunk);
-        WorldChange { bricks, fields, next_field: self.next_field }
+        let mut changes = self.changes.iter().map(|own| own.change.patch.clone());
+        let mut patch = changes.next().unwrap_or_default();
+        changes.for_each(|later| patch.then(later));
+        patch.next_field = self.next_field;
+        patch
     }
 }
 
 /// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main
 /// thread.
-fn bytes_of(entries: &[LogEntry], change: &WorldChange) -> usize {
+fn bytes_of(entries: &[LogEntry], change: &Patch) -> usize {
     let rules = entries.iter().map(rule_bytes);
     let bricks = change.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));
     let fields = change.fields.iter().map(|(_, fields)| fields.bytes());
@@ -152,7 +144,7 @@ impl CommitLog {
         let entries: Vec<LogEntry> = changed_terms(self.terms.as_ref(), &terms).collect();
         if !entries.is_empty() {
             self.terms = Some(terms);
-            let change = WorldChange { next_field: world.next_field, ..WorldChange::default() };
+            let change = Patch { next_field: world.next_field, ..Patch::default() };
             let bytes = bytes_of(&entries, &change);
             let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
             self.push(record, bytes, &mut Vec::new());

@@ -50,7 +50,7 @@ pub(crate) use crate::world::brick_over;
 #[cfg(any(feature = "plugin", test))]
 pub(crate) use crate::world::unique;
 pub use crate::world::{
-    Drawn, Memory, Meshing, RayHit, Span, TerrainError, TerrainSettings, Version, World, WorldChange,
+    Drawn, Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, Version, World,
 };
 pub use commit::Commit;
 pub use draft::Draft;

@@ -19,9 +19,7 @@ use crate::lattice::LatticeBox;
 use crate::loose::LooseSettings;
 use crate::redraw::{ChooseCut, DrawnCut};
 use crate::volume::{DiggingRules, RulesError};
-use crate::world::Meshing;
-use crate::world::{TerrainError, TerrainSettings};
-use crate::world::{World, unique};
+use crate::world::{Meshing, TerrainError, TerrainSettings, World, unique};
 
 /// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
 pub(super) const UNDO_BUDGET: usize = 64 << 20;

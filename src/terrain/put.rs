@@ -6,7 +6,7 @@ use super::history::Restored;
 use super::model::Terrain;
 use super::resolve::{ChangeError, Put};
 use crate::ground::Ground;
-use crate::world::WorldChange;
+use crate::world::Patch;
 
 impl Terrain {
     /// Queues parts that replace parts of the world, after everything that was submitted before; for example
@@ -16,7 +16,7 @@ impl Terrain {
     ///
     /// # Errors
     /// [`ChangeError::Overloaded`] where too much work waits.
-    pub fn submit_change(&mut self, change: WorldChange, hash: Option<u64>) -> Result<(), ChangeError> {
+    pub fn submit_change(&mut self, change: Patch, hash: Option<u64>) -> Result<(), ChangeError> {
         if !self.queue.has_room_for_step() {
             return Err(ChangeError::Overloaded);
         }
@@ -28,7 +28,7 @@ impl Terrain {
     ///
     /// # Errors
     /// When the parts are invalid; then nothing has changed.
-    pub fn apply_change(&mut self, change: WorldChange, hash: Option<u64>) -> Result<Restored, ChangeError> {
+    pub fn apply_change(&mut self, change: Patch, hash: Option<u64>) -> Result<Restored, ChangeError> {
         self.abandon();
         self.put_now(Put { change, hash, counts: true, ground: None })
     }
@@ -82,6 +82,6 @@ impl Terrain {
         if found != expected {
             return Err(ChangeError::GroundSize { found, expected });
         }
-        Ok(Put { change: WorldChange::default(), hash: None, counts: false, ground: Some(ground) })
+        Ok(Put { change: Patch::default(), hash: None, counts: false, ground: Some(ground) })
     }
 }

@@ -6,7 +6,7 @@ use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
-use crate::world::WorldChange;
+use crate::world::Patch;
 
 /// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was
 /// written under another number can't be replayed.
@@ -39,7 +39,7 @@ pub struct CommitRecord {
     /// The items of the commit, in order. Rejected edits are left out; a commit of such edits alone has no entry.
     pub entries: Vec<LogEntry>,
     /// What changed.
-    pub change: WorldChange,
+    pub change: Patch,
 }
 
 impl CommitRecord {
@@ -56,7 +56,7 @@ impl CommitRecord {
 #[derive(Clone, Debug, Default)]
 pub struct WorldParts {
     /// Every stored brick, and all fields.
-    pub change: WorldChange,
+    pub change: Patch,
     /// Cells along the side of the chunks that the fields belong to.
     pub chunk_size: u32,
     /// Its revision.

@@ -9,9 +9,7 @@ use super::record::{CommitRecord, LogEntry, WorldParts};
 use super::resolve::{ChangeError, Put, check_number};
 use crate::ground::Ground;
 use crate::volume::{DiggingRules, RulesError};
-use crate::world::Meshing;
-use crate::world::WorldChange;
-use crate::world::{TerrainError, TerrainSettings};
+use crate::world::{Meshing, Patch, TerrainError, TerrainSettings};
 
 /// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -155,7 +153,7 @@ impl Terrain {
         }
         if record.entries.is_empty() {
             // All of its edits were rejected.
-            self.apply_change(WorldChange::default(), Some(record.hash))?;
+            self.apply_change(Patch::default(), Some(record.hash))?;
         }
         let receipts = self.finish();
         match receipts.iter().any(|receipt| receipt.outcome.is_err()) {

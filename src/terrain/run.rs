@@ -24,9 +24,7 @@ use crate::brush::Kind;
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ItemCost};
 use crate::redraw;
-use crate::redraw::ChooseCut;
-use crate::redraw::MeshUpdates;
-use crate::redraw::Stages;
+use crate::redraw::{ChooseCut, MeshUpdates, Stages};
 use crate::world::World;
 
 /// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for
@@ -95,7 +93,7 @@ impl Transaction {
                 ItemCost::Lookup
                     .is_shared(usize::try_from(bricks.fold(0, u64::saturating_add)).unwrap_or(usize::MAX))
             }
-            Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.bricks.len()),
+            Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.patch.bricks.len()),
             Work::Put(put) => {
                 let bricks =
                     if put.ground.is_some() { self.world.bricks.len() } else { put.change.bricks.len() };

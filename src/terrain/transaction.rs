@@ -8,11 +8,8 @@ use super::history::{HistoryStep, UndoDelta};
 use super::queue::Submission;
 use super::resolve::Put;
 use crate::backend::{Compute, Engine};
-use crate::redraw::Stages;
-use crate::redraw::{ChooseCut, DrawnCut};
-use crate::redraw::{MeshUpdates, Scene};
-use crate::world::Meshing;
-use crate::world::World;
+use crate::redraw::{ChooseCut, DrawnCut, MeshUpdates, Scene, Stages};
+use crate::world::{Meshing, World};
 
 /// The work of a transaction.
 #[derive(Clone)]

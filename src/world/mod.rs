@@ -3,6 +3,7 @@
 //! | file | what it holds |
 //! | --- | --- |
 //! | `state` | the committed world |
+//! | `patch` | what differs between two states |
 //! | `change` | what a commit swaps |
 //! | `parts`, `regions` | bricks and fields, as they are saved, compared and sent |
 //! | `unmeshed` | surfaces that are made when they are asked for |
@@ -15,6 +16,7 @@ mod heights;
 mod inspect;
 mod memory;
 mod parts;
+mod patch;
 mod query;
 mod ray;
 mod regions;
@@ -23,10 +25,11 @@ mod state;
 mod triangles;
 mod unmeshed;
 
-pub(crate) use change::{Change, ChangedBrick, brick_bytes, replaced_bytes};
+pub(crate) use change::{Change, brick_bytes, replaced_bytes};
 pub use memory::Memory;
-pub use parts::WorldChange;
 pub(crate) use parts::{brick_over, columns_of};
+pub use patch::Patch;
+pub(crate) use patch::{ChangedBrick, Overlay, Places, State};
 pub use query::{RayHit, Span};
 pub use settings::{TerrainError, TerrainSettings};
 pub(crate) use state::unique;

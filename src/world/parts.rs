@@ -3,23 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::patch::Patch;
 use super::state::World;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column};
 use crate::volume::{Brick, FieldId, Fields, column_hash, pristine_layers};
 
-/// Parts of a world that take the place of others.
-#[derive(Clone, Debug, Default)]
-pub struct WorldChange {
-    /// Bricks in order, each position once; `None` is a pristine one.
-    pub bricks: Vec<(BrickPos, Option<Arc<Brick>>)>,
-    /// All fields of each chunk whose fields change, by chunk.
-    pub fields: Vec<(ChunkPos, Fields)>,
-    /// The greatest name that any field has had.
-    pub next_field: u64,
-}
-
-impl WorldChange {
+impl Patch {
     /// Extends fields over edited samples that no field contains; new fields get unused names.
     /// Returns whether there were any.
     pub(crate) fn cover(&mut self, grid: ChunkGrid) -> bool {
@@ -47,13 +37,13 @@ impl WorldChange {
 
 impl World {
     /// All bricks and fields, in order.
-    pub(crate) fn all_parts(&self) -> WorldChange {
+    pub(crate) fn all_parts(&self) -> Patch {
         let mut bricks: Vec<(BrickPos, Option<Arc<Brick>>)> =
             self.bricks.iter().map(|(pos, brick)| (*pos, Some(Arc::clone(brick)))).collect();
         bricks.sort_unstable_by_key(|(pos, _)| *pos);
         let mut fields: Vec<_> = self.fields.iter().map(|(chunk, fields)| (*chunk, fields.clone())).collect();
         fields.sort_unstable_by_key(|(chunk, _)| *chunk);
-        WorldChange { bricks, fields, next_field: self.next_field }
+        Patch { bricks, fields, next_field: self.next_field }
     }
 }
 

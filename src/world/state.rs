@@ -9,12 +9,10 @@ use rustc_hash::FxHashMap;
 
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash, shrink_if_sparse};
-use crate::surface::ChunkSurface;
-use crate::surface::block;
 use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
-use crate::surface::{Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh};
+use crate::surface::{ChunkSurface, Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh, block};
 use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 
 /// The pool of uniform bricks is not cleaned up while it holds fewer kinds.

@@ -14,8 +14,7 @@ use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column};
 use crate::surface::block::Block;
 use crate::surface::pristine::sheet_rows;
 use crate::surface::vertex::WorldView;
-use crate::surface::{ChunkSurface, FreshPart};
-use crate::surface::{Mask, MaskView};
+use crate::surface::{ChunkSurface, FreshPart, Mask, MaskView};
 use crate::volume::{Bricks, SampleView};
 
 /// Selects the surfaces that a terrain's transactions make.

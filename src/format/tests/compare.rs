@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::format::Batch;
 use crate::format::portable::{PortableWorld, SavedRegion};
 use crate::lattice::{BrickPos, RegionPos};
-use crate::terrain::{CommitRecord, LogEntry, WorldChange, WorldParts};
+use crate::terrain::{CommitRecord, LogEntry, Patch, WorldParts};
 use crate::volume::Brick;
 
 pub fn bricks(a: &Brick, b: &Brick) -> bool {
@@ -18,7 +18,7 @@ pub fn lists(a: &[(BrickPos, Arc<Brick>)], b: &[(BrickPos, Arc<Brick>)]) -> bool
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.0 == b.0 && bricks(&a.1, &b.1))
 }
 
-pub fn changes(a: &WorldChange, b: &WorldChange) -> bool {
+pub fn changes(a: &Patch, b: &Patch) -> bool {
     let same = |pair: (&Option<Arc<Brick>>, &Option<Arc<Brick>>)| match pair {
         (Some(a), Some(b)) => bricks(a, b),
         (None, None) => true,

@@ -7,13 +7,12 @@ use fastrand::Rng;
 use super::damage::damage;
 use super::{compare, count, round_trips, worlds};
 use crate::format::bytes::Reader;
-use crate::format::container;
 use crate::format::edits::{EditSequence, put_edit, read_edit};
 use crate::format::frame::{self, Kind, WorldId};
 use crate::format::level::{Level, read_level, unpack_level, write_level};
 use crate::format::limits::Limits;
 use crate::format::portable::{read_portable, write_portable};
-use crate::format::{Batch, Metadata, decode_region, encode_region};
+use crate::format::{Batch, Metadata, container, decode_region, encode_region};
 use crate::ground::{GreyImage, ImageLimits};
 use crate::lattice::RegionPos;
 

@@ -47,7 +47,7 @@ use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::format::{FormatError, WorldId};
 use crate::lattice::RegionPos;
-use crate::terrain::{LooseSettings, Terrain, WorldChange};
+use crate::terrain::{LooseSettings, Patch, Terrain};
 use crate::volume::{DiggingRules, RulesError};
 pub use events::{ServerEvent, ServerFigures};
 use kept::Kept;
@@ -380,7 +380,7 @@ impl Server {
     ///
     /// # Errors
     /// When they take more bytes than a message may; split them then.
-    pub fn put(&mut self, change: WorldChange) -> Result<(), FormatError> {
+    pub fn put(&mut self, change: Patch) -> Result<(), FormatError> {
         let entry = Entry::Parts { by: None, change: Arc::new(change) };
         let (length, limit) = (entry_bytes(&entry) as u64, MOST_TO_CLIENT as u64 / 2);
         if length > limit {

@@ -15,9 +15,7 @@ use crate::edits::{DraftedBrick, Drafter, EditDelta, EditEffect, MergedBricks, P
 use crate::lattice::{BrickPos, ChunkPos, ItemCost, parallel_map_into, side_by_side};
 use crate::loose::LoosePiece;
 use crate::redraw;
-use crate::redraw::ByBrick;
-use crate::redraw::Stages;
-use crate::redraw::{dirty_cells, joined_mask};
+use crate::redraw::{ByBrick, Stages, dirty_cells, joined_mask};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::terrain::commit::Commit;
@@ -26,8 +24,7 @@ use crate::terrain::queue::Submission;
 use crate::terrain::receipt::{Applied, Receipt, Rejection};
 use crate::terrain::transaction::Transaction;
 use crate::volume::{Brick, Fields};
-use crate::world::World;
-use crate::world::{Change, ChangedBrick, brick_bytes, replaced_bytes};
+use crate::world::{Change, ChangedBrick, Patch, World, brick_bytes, replaced_bytes};
 
 /// A group of edits, and what it changes.
 struct Group<'a> {
@@ -144,11 +141,13 @@ pub(crate) fn edit(transaction: &Transaction, submissions: &[Submission], backen
 
     drop(bricks);
     groups.push(Group { submissions: last, bricks: draft.bricks, mask, sample_hash: draft.hash });
+    let next_field = entered.next_field;
     let changes = groups.into_iter().zip(entered.groups).map(|(group, own)| {
         let Group { submissions, bricks, mask, sample_hash } = group;
         let EnteredGroup { fields, replaced_bytes, tags, pieces } = own;
         let mask = exact(mask.word_count(), mask.words());
-        let change = Change { bricks: changed_bricks(bricks), fields, mask, sample_hash };
+        let patch = Patch { bricks: changed_bricks(bricks), fields, next_field };
+        let change = Change { patch, mask, sample_hash };
         let number = submissions.first().map_or(0, |first| first.terms.group);
         UndoDelta::new(change, replaced_bytes, number, (tags, pieces))
     });

@@ -12,8 +12,7 @@ use crate::terrain::model::Terrain;
 use crate::terrain::record::WorldParts;
 use crate::terrain::replay::RestoreError;
 use crate::terrain::transaction::Transaction;
-use crate::world::TerrainSettings;
-use crate::world::brick_over;
+use crate::world::{TerrainSettings, brick_over};
 
 /// The commit that leads to the same edits on another ground.
 pub(crate) fn put_on(transaction: &Transaction, ground: &Arc<Ground>) -> Result<Commit, ChangeError> {

@@ -13,9 +13,7 @@ use crate::backend::Compute;
 use crate::edits::{EditEffect, count_replaced};
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::redraw::MeshUpdates;
-use crate::redraw::Stages;
-use crate::redraw::{dirty_cells, joined_mask};
+use crate::redraw::{MeshUpdates, Stages, dirty_cells, joined_mask};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::terrain::commit::Commit;
@@ -23,9 +21,7 @@ use crate::terrain::history::{Restored, UndoDelta};
 use crate::terrain::transaction::Transaction;
 use crate::volume::layers::{self, offset};
 use crate::volume::{Brick, Field, FieldId, UniformBricks, pristine_layers};
-use crate::world::WorldChange;
-use crate::world::{Change, replaced_bytes};
-use crate::world::{World, columns_of};
+use crate::world::{Change, Patch, World, columns_of, replaced_bytes};
 
 /// The reason why parts were not replaced; nothing changed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -73,7 +69,7 @@ pub enum ChangeError {
 /// The replacement parts.
 #[derive(Debug)]
 pub(crate) struct Put {
-    pub change: WorldChange,
+    pub change: Patch,
     /// The hash that the world must have afterwards.
     pub hash: Option<u64>,
     /// Whether its receipt counts voxels.
@@ -85,7 +81,7 @@ pub(crate) struct Put {
 impl Put {
     /// Returns `true` if it certainly changes nothing.
     pub fn is_empty(&self) -> bool {
-        self.change.bricks.is_empty() && self.change.fields.is_empty() && self.ground.is_none()
+        self.change.is_empty() && self.ground.is_none()
     }
 
     /// Returns `true` if it certainly changes none of these samples.
@@ -192,8 +188,11 @@ fn checked_put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> R
     let whole: Vec<(BrickPos, Arc<Brick>)> =
         bricks.iter().map(|(pos, brick)| (*pos, brick.clone().unwrap_or_else(|| pristine(*pos)))).collect();
     let words = Stages::time(&mut stages.ring, || words_of(world, &whole, &changed));
-    let change = Change { bricks, fields: change.fields.clone(), mask: words, sample_hash };
-    let replaced = change.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
+    let mut fields = change.fields.clone();
+    fields.sort_by_key(|(chunk, _)| *chunk);
+    let patch = Patch { bricks, fields, next_field };
+    let change = Change { patch, mask: words, sample_hash };
+    let replaced = change.patch.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
     let Placed { meshes, news } = place(transaction, &change, &whole, &changed, backend, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let EditEffect { removed, added, painted, .. } = effect;
@@ -215,7 +214,7 @@ fn check_order(bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> Result<(), ChangeEr
 }
 
 /// Checks the fields of a change; returns the greatest name that a field will have had.
-fn check_fields(world: &World, change: &WorldChange) -> Result<u64, ChangeError> {
+fn check_fields(world: &World, change: &Patch) -> Result<u64, ChangeError> {
     let (mut chunks, mut names) = (FxHashSet::default(), FxHashSet::default());
     let mut greatest = check_number(world.next_field.max(change.next_field))?;
     for (chunk, fields) in &change.fields {

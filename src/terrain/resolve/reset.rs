@@ -15,18 +15,14 @@ use crate::backend::Compute;
 use crate::brush::Edit;
 use crate::edits::{EditEffect, ResetBrick, count_replaced, edited_within, reach, reset};
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::redraw::MeshUpdates;
-use crate::redraw::Stages;
+use crate::redraw::{MeshUpdates, Stages};
 use crate::terrain::commit::Commit;
 use crate::terrain::history::UndoDelta;
 use crate::terrain::queue::Submission;
 use crate::terrain::receipt::{Applied, ChunkScenario, Receipt, Rejection};
 use crate::terrain::transaction::Transaction;
-use crate::volume::layers;
-use crate::volume::{Brick, Field, Fields, Scenario, pristine_layers};
-use crate::world::World;
-use crate::world::columns_of;
-use crate::world::{Change, replaced_bytes};
+use crate::volume::{Brick, Field, Fields, Scenario, layers, pristine_layers};
+use crate::world::{Change, Patch, World, columns_of, replaced_bytes};
 
 /// Computes the commit of a reset.
 pub(crate) fn commit(
@@ -63,11 +59,12 @@ pub(crate) fn commit(
     }
     let mask = Stages::time(&mut stages.ring, || words_of(world, &whole, &changed));
     let (fields, chunks) = shrunk_fields(world, &found);
-    let change = Change { bricks, fields, mask, sample_hash };
+    let patch = Patch { bricks, fields, next_field: world.next_field };
+    let change = Change { patch, mask, sample_hash };
     let Placed { meshes, news } = place(transaction, &change, &whole, &changed, backend, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let tags = if found.is_empty() { Vec::new() } else { vec![tag] };
-    let replaced = change.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
+    let replaced = change.patch.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
     let delta = UndoDelta::new(change, replaced, submission.terms.group, (tags, Vec::new()));
     let EditEffect { removed, added, painted, refused, .. } = effect;
     let applied = Applied { chunks, bounds, removed, added, painted, refused, ..Applied::default() };

@@ -10,9 +10,7 @@ use crate::backend::Compute;
 use crate::edits::{EditEffect, count_replaced};
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::loose::ReturnedPiece;
-use crate::redraw::Stages;
-use crate::redraw::dirty_cells;
-use crate::redraw::{self, MeshUpdates};
+use crate::redraw::{self, MeshUpdates, Stages, dirty_cells};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::terrain::commit::Commit;
@@ -52,7 +50,7 @@ pub(crate) fn place(
     let positions = || bricks.iter().map(|(pos, _)| *pos).collect();
     let meshes = redraw::updates(transaction.scene(backend), &view, &dirty, &mask, positions, stages);
     let nothing = Fields::default();
-    let news = change.fields.iter().flat_map(|(chunk, after)| {
+    let news = change.patch.fields.iter().flat_map(|(chunk, after)| {
         let before = world.fields.get(chunk).unwrap_or(&nothing);
         news_of_replaced(before, after).into_iter().map(|news| (*chunk, news))
     });
@@ -67,10 +65,10 @@ pub(crate) fn step(
     backend: &dyn Compute,
 ) -> Commit {
     let (world, start, mut stages) = (&*transaction.world, Instant::now(), Stages::default());
-    let (change, mut bricks) = (target.change.clone(), Vec::with_capacity(target.change.bricks.len()));
-    let (mut effect, mut changed) = (EditEffect::default(), Vec::with_capacity(change.bricks.len()));
+    let (change, mut bricks) = (target.change.clone(), Vec::with_capacity(target.change.patch.bricks.len()));
+    let (mut effect, mut changed) = (EditEffect::default(), Vec::with_capacity(change.patch.bricks.len()));
     Stages::time(&mut stages.edit, || {
-        for (pos, after) in &change.bricks {
+        for (pos, after) in &change.patch.bricks {
             let before = world.bricks.get(pos).map(Arc::as_ref);
             let own = count_replaced(&world.ground, *pos, [before, after.as_deref()], &mut effect);
             let pristine = || Arc::new(Brick::pristine(pristine_layers(&world.ground, *pos)));
@@ -91,7 +89,7 @@ pub(crate) fn step(
     }
     let tags = target.tags.clone();
     let restored = Restored { tags: tags.clone(), bounds, removed, added, painted, returned, loose };
-    let replaced_bytes = change.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
+    let replaced_bytes = change.patch.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
     let sample_hash = change.sample_hash;
     let delta = UndoDelta::new(change, replaced_bytes, target.group, (tags, target.pieces.clone()));
     stages.whole = start.elapsed();
