@@ -31,18 +31,6 @@ const CIRCLES: &[&[&str]] = &[
     &["panel/files.rs", "panel/level.rs"],
     &["panel/operations.rs", "panel/tool.rs"],
     &["saves/closing.rs", "saves/level.rs", "saves/opening.rs", "saves/saving.rs"],
-    &[
-        "terrain/commit.rs",
-        "terrain/log.rs",
-        "terrain/model.rs",
-        "terrain/queue.rs",
-        "terrain/replay.rs",
-        "terrain/resolve/ground.rs",
-        "terrain/resolve/parts.rs",
-        "terrain/resolve/step.rs",
-        "terrain/transaction.rs",
-        "terrain/unseen.rs",
-    ],
     &["together/client.rs", "together/shared.rs"],
     &["together/players.rs", "together/server.rs", "together/service.rs"],
 ];

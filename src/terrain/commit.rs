@@ -6,13 +6,14 @@ use std::sync::Arc;
 use super::history::{HistoryReceipt, Restored, UndoDelta};
 use super::log::RecordDraft;
 use super::receipt::Receipt;
-use super::resolve::{ChangeError, FieldNews};
+use super::replacement::ChangeError;
+use super::resolve::{FieldNews, Resolved, patch_of};
 use crate::lattice::{ChunkPos, TilePos};
 use crate::redraw::{DrawnCut, MeshUpdates, Stages};
 use crate::surface::ChunkSurface;
 use crate::surface::tile::Rings;
 use crate::volume::UniformBricks;
-use crate::world::World;
+use crate::world::{Patch, World};
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
@@ -72,6 +73,49 @@ pub(super) struct Installed {
 }
 
 impl Commit {
+    /// The commit of what a transaction's work leads to.
+    pub(super) fn new(ticket: u64, is_cut: bool, resolved: Resolved) -> Self {
+        let Resolved {
+            changes,
+            sample_hash,
+            uniform,
+            next_field,
+            receipts,
+            step,
+            put,
+            news,
+            whole,
+            meshes,
+            stages,
+        } = resolved;
+        Self {
+            ticket,
+            changes,
+            sample_hash,
+            uniform,
+            next_field,
+            receipts,
+            step,
+            put,
+            record: None,
+            news,
+            whole,
+            copy: None,
+            drawn_cut: meshes.drawn_cut.clone(),
+            is_cut,
+            surfaces: meshes.chunks.clone(),
+            outdated: meshes.outdated.clone(),
+            rings: meshes.tiles.iter().map(|(tile, update)| (*tile, update.kept_rings())).collect(),
+            meshes,
+            stages,
+        }
+    }
+
+    /// The bricks and fields that it leads to, as its [record](super::CommitRecord) lists them.
+    pub fn change(&self) -> Patch {
+        patch_of(&self.changes, self.whole.as_deref(), self.next_field)
+    }
+
     /// Hash of every edited sample, once this is committed: equal for equal edits of equal samples, whatever ran them.
     pub fn sample_hash(&self) -> u64 {
         self.sample_hash

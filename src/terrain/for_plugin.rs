@@ -7,8 +7,8 @@ use super::history::{DeferredDrop, HistoryStep};
 use super::model::{StaleCommit, Terrain};
 use super::queue::{Request, Submission};
 use super::receipt::Receipt;
-use super::transaction::Work;
 use super::unseen::Unseen;
+use super::work::Work;
 use crate::redraw::DrawnCut;
 use crate::world::Version;
 

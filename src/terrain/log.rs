@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::commit::Commit;
+use super::receipt::Receipt;
 use super::record::{CommitRecord, LogEntry};
-use super::transaction::Work;
+use super::work::Work;
 use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
 use crate::world::{Patch, World, brick_bytes};
@@ -32,14 +32,14 @@ pub(super) struct RecordDraft {
 }
 
 impl RecordDraft {
-    /// The record of a commit, by what it was asked for.
-    pub fn new(work: &Work, commit: &Commit) -> Self {
+    /// The record of a commit, by what it was asked for, what was answered, and what changes.
+    pub fn new(work: &Work, receipts: &[Receipt], change: Patch) -> Self {
         let (mut terms, mut entries) = (None::<[Terms; 2]>, Vec::new());
         match work {
             Work::Edits(submissions) => {
                 // With room for the first terms, if those before were others.
                 entries.reserve_exact(submissions.len() + 2);
-                for (submission, receipt) in submissions.iter().zip(&commit.receipts) {
+                for (submission, receipt) in submissions.iter().zip(receipts) {
                     let (Ok(edit), Ok(_)) = (&submission.edit, &receipt.outcome) else { continue };
                     let own = (submission.terms.rules.clone(), submission.terms.loose);
                     let first = match terms.take() {
@@ -59,24 +59,9 @@ impl RecordDraft {
             Work::Step(..) => entries.push(LogEntry::Change),
             Work::Cut(_) => {}
         }
-        let change = commit.change();
         let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
         let bytes = bytes_of(&entries, &change) + room;
         Self { terms, entries, change, bytes }
-    }
-}
-
-impl Commit {
-    /// The bricks and fields that it leads to, as its [record](CommitRecord) lists them.
-    pub fn change(&self) -> Patch {
-        if let Some(whole) = &self.whole {
-            return whole.all_parts();
-        }
-        let mut changes = self.changes.iter().map(|own| own.change.patch.clone());
-        let mut patch = changes.next().unwrap_or_default();
-        changes.for_each(|later| patch.then(later));
-        patch.next_field = self.next_field;
-        patch
     }
 }
 

@@ -25,10 +25,11 @@ mod log;
 mod model;
 #[cfg(test)]
 mod order;
-mod put;
 mod queue;
 mod receipt;
 mod record;
+mod replace;
+mod replacement;
 mod replay;
 mod resolve;
 mod run;
@@ -37,6 +38,7 @@ mod submit;
 mod transaction;
 #[cfg(feature = "plugin")]
 mod unseen;
+mod work;
 
 pub use crate::loose::{LoosePiece, LooseSettings, PieceFate, PieceId, ReturnedPiece, Run};
 #[cfg(feature = "plugin")]
@@ -61,8 +63,9 @@ pub(crate) use queue::Together;
 pub use queue::WorkLimits;
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
+pub use replacement::ChangeError;
 pub use replay::{ReplayError, RestoreError};
-pub use resolve::{ChangeError, FieldNews};
+pub use resolve::FieldNews;
 pub use transaction::Transaction;
 #[cfg(feature = "plugin")]
 pub(crate) use unseen::Unseen;

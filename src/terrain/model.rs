@@ -9,10 +9,11 @@ use super::history::{DeferredDrop, HistoryReceipt, Restored, UndoStack};
 use super::log::CommitLog;
 use super::queue::{Queue, Request, Taken};
 use super::receipt::Receipt;
-use super::resolve::ChangeError;
-use super::transaction::{Transaction, Work};
+use super::replacement::ChangeError;
+use super::transaction::Transaction;
 #[cfg(feature = "plugin")]
 use super::unseen::Unseen;
+use super::work::Work;
 use crate::backend::Engine;
 use crate::ground::Ground;
 use crate::lattice::LatticeBox;

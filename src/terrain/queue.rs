@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::history::HistoryStep;
 use super::receipt::Rejection;
-use super::resolve::Put;
+use super::replacement::Put;
 use crate::brush::{Edit, Kind};
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};

@@ -1,15 +1,17 @@
 //! Creates a terrain from saved data: from parts, or by replaying records.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use super::model::Terrain;
 use super::queue::WorkLimits;
 use super::receipt::Receipt;
 use super::record::{CommitRecord, LogEntry, WorldParts};
-use super::resolve::{ChangeError, Put, check_number};
+use super::replacement::ChangeError;
+use super::resolve::world_of;
 use crate::ground::Ground;
 use crate::volume::{DiggingRules, RulesError};
-use crate::world::{Meshing, Patch, TerrainError, TerrainSettings};
+use crate::world::{Patch, TerrainError, TerrainSettings};
 
 /// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -89,17 +91,17 @@ impl Terrain {
     ) -> Result<Self, RestoreError> {
         let mut terrain = Self::new(ground, settings)?;
         let WorldParts { mut change, chunk_size, revision, rules, loose } = parts;
-        check_number(revision)?;
         if chunk_size != settings.chunk_size {
             change.fields.clear();
             change.cover(terrain.world.grid());
         }
-        terrain.meshing = Meshing::Never;
-        terrain.put_now(Put { change, hash: None, counts: false, ground: None })?;
-        terrain.meshing = Meshing::All;
+        let ground = terrain.world.shared_ground();
+        let made = || world_of(ground, settings.chunk_size as i32, change, revision);
+        // Unwind safe: nothing else sees what it makes.
+        let world = catch_unwind(AssertUnwindSafe(made)).unwrap_or(Err(ChangeError::Panicked))?;
+        terrain.world = Arc::new(world);
         terrain.set_rules(rules.unwrap_or_default())?;
         terrain.loose = loose;
-        Arc::make_mut(&mut terrain.world).revision = revision;
         Ok(terrain)
     }
 

@@ -17,14 +17,15 @@ use super::history::{HistoryReceipt, HistoryRejection};
 use super::log::RecordDraft;
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
-use super::resolve::{self, ChangeError};
-use super::transaction::{Transaction, Work};
+use super::replacement::ChangeError;
+use super::resolve::{self, Resolved};
+use super::transaction::Transaction;
+use super::work::Work;
 use crate::backend::{Compute, Cpu, Engine};
-use crate::brush::Kind;
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ItemCost};
 use crate::redraw;
-use crate::redraw::{ChooseCut, MeshUpdates, Stages};
+use crate::redraw::{ChooseCut, Scene, Stages};
 use crate::world::World;
 
 /// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for
@@ -59,27 +60,28 @@ impl Transaction {
         let backend = self.engine.as_ref().map_or(&Cpu as &dyn Compute, Engine::compute);
         #[cfg(test)]
         panic_if_marked(&self.work);
+        let scene = self.scene(backend);
         let run = || match &self.work {
-            Work::Edits(submissions) => match &submissions[..] {
-                [own @ Submission { edit: Ok(edit), .. }] if edit.kind() == Kind::Reset => {
-                    resolve::reset(self, own, edit, backend)
-                }
-                all => resolve::edit(self, all, backend),
-            },
-            Work::Step(step, target) => resolve::step(self, *step, target, backend),
-            Work::Put(parts) => resolve::put(self, parts, backend),
-            Work::Cut(choose) => self.cut(choose.as_ref()),
+            Work::Edits(submissions) => resolve::edits(scene, submissions),
+            Work::Step(step, target) => resolve::step(scene, *step, target),
+            Work::Put(parts) => resolve::parts(scene, parts),
+            Work::Cut(choose) => cut(scene, choose.as_ref()),
         };
         // A large one runs on a thread of the pool: entering the pool for each stage would take longer.
-        let commit = if self.is_large() { rayon::scope(|_| run()) } else { run() };
+        let mut resolved = if self.is_large() { rayon::scope(|_| run()) } else { run() };
         // Terrain and transaction hold the world. If others do too, the commit changes a copy, which is made here.
-        let is_changed = !matches!(self.work, Work::Cut(_)) && commit.whole.is_none();
+        let is_changed = !matches!(self.work, Work::Cut(_)) && resolved.whole.is_none();
         let is_shared = Arc::strong_count(&self.world) > 2 && is_changed;
-        let mut stages = commit.stages;
         let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
-        let copy = Stages::time(&mut stages.whole, copy);
-        let record = self.is_logged.then(|| RecordDraft::new(&self.work, &commit));
-        Commit { copy, record, stages, ..commit }
+        let copy = Stages::time(&mut resolved.stages.whole, copy);
+        let commit = self.commit(resolved);
+        let record = self.is_logged.then(|| RecordDraft::new(&self.work, &commit.receipts, commit.change()));
+        Commit { copy, record, ..commit }
+    }
+
+    /// The commit of what its work leads to.
+    fn commit(&self, resolved: Resolved) -> Commit {
+        Commit::new(self.ticket, matches!(self.work, Work::Cut(_)), resolved)
     }
 
     /// Returns `true` if it may reach enough bricks for several threads.
@@ -101,16 +103,6 @@ impl Transaction {
             }
             Work::Cut(_) => true,
         }
-    }
-
-    /// Computes the commit that leads to another cut.
-    fn cut(&self, choose: &ChooseCut) -> Commit {
-        let mut meshes = MeshUpdates::default();
-        if let Some(drawn) = &self.drawn_cut {
-            let (after, nodes) = redraw::change_cut(&self.world, drawn, choose);
-            (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
-        }
-        self.commit(Vec::new(), self.world.sample_hash, meshes)
     }
 
     /// Computes the commit of a transaction that panicked. Runs it once more, because the panic may not have come from
@@ -157,23 +149,34 @@ impl Transaction {
 
     /// The commit that changes nothing and rejects all edits, or the step.
     pub(super) fn rejected(&self) -> Commit {
-        let commit = self.commit(Vec::new(), self.world.sample_hash, MeshUpdates::default());
-        match &self.work {
+        let nothing = Resolved::nothing(&self.world);
+        let resolved = match &self.work {
             Work::Edits(submissions) => {
                 let rejected = |own: &Submission| Receipt {
                     tag: own.tag,
                     outcome: Err(own.edit.as_ref().err().cloned().unwrap_or(Rejection::Panicked)),
                 };
-                Commit { receipts: submissions.iter().map(rejected).collect(), ..commit }
+                Resolved { receipts: submissions.iter().map(rejected).collect(), ..nothing }
             }
             Work::Step(step, _) => {
                 let outcome = Err(HistoryRejection::Panicked);
-                Commit { step: Some(HistoryReceipt { step: *step, outcome }), ..commit }
+                Resolved { step: Some(HistoryReceipt { step: *step, outcome }), ..nothing }
             }
-            Work::Put(_) => Commit { put: Some(Err(ChangeError::Panicked)), ..commit },
-            Work::Cut(_) => commit,
-        }
+            Work::Put(_) => Resolved { put: Some(Err(ChangeError::Panicked)), ..nothing },
+            Work::Cut(_) => nothing,
+        };
+        self.commit(resolved)
     }
+}
+
+/// What leads to another cut.
+fn cut(scene: Scene, choose: &ChooseCut) -> Resolved {
+    let mut resolved = Resolved::nothing(scene.world);
+    if let Some(drawn) = scene.cut {
+        let (after, nodes) = redraw::change_cut(scene.world, drawn, choose);
+        (resolved.meshes.drawn_cut, resolved.meshes.nodes) = (Some(after), nodes);
+    }
+    resolved
 }
 
 /// The tag of an edit that panics in tests has this bit.

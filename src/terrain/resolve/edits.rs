@@ -10,19 +10,19 @@ use web_time::Instant;
 
 use super::draft_group::{Found, LoosePieces, draft_group};
 use super::field_log::{FieldLog, FieldNews};
-use crate::backend::Compute;
+use super::reset::reset;
+use super::resolved::Resolved;
+use crate::brush::Kind;
 use crate::edits::{DraftedBrick, Drafter, EditDelta, EditEffect, MergedBricks, PreparedEdits, latest};
 use crate::lattice::{BrickPos, ChunkPos, ItemCost, parallel_map_into, side_by_side};
 use crate::loose::LoosePiece;
 use crate::redraw;
-use crate::redraw::{ByBrick, Stages, dirty_cells, joined_mask};
+use crate::redraw::{ByBrick, Scene, Stages, dirty_cells, joined_mask};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::terrain::commit::Commit;
 use crate::terrain::history::UndoDelta;
 use crate::terrain::queue::Submission;
 use crate::terrain::receipt::{Applied, Receipt, Rejection};
-use crate::terrain::transaction::Transaction;
 use crate::volume::{Brick, Fields};
 use crate::world::{Change, ChangedBrick, Patch, World, brick_bytes, replaced_bytes};
 
@@ -85,9 +85,18 @@ fn merged<'a>(earlier: &[Group], last: &'a [DraftedBrick]) -> Cow<'a, [DraftedBr
     Cow::Owned(merged.into_list())
 }
 
+/// What edits lead to, in order.
+pub(crate) fn edits(scene: Scene, submissions: &[Submission]) -> Resolved {
+    match submissions {
+        [own @ Submission { edit: Ok(edit), .. }] if edit.kind() == Kind::Reset => reset(scene, own, edit),
+        all => edit(scene, all),
+    }
+}
+
 /// Applies edits, in order.
-pub(crate) fn edit(transaction: &Transaction, submissions: &[Submission], backend: &dyn Compute) -> Commit {
-    let (world, start, mut stages) = (&*transaction.world, Instant::now(), Stages::default());
+fn edit(scene: Scene, submissions: &[Submission]) -> Resolved {
+    let Scene { world, backend, .. } = scene;
+    let (start, mut stages) = (Instant::now(), Stages::default());
     let apply = |work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta])| backend.edit(work, each);
     let mut drafter = Drafter::new(world.samples(), world.grid, world.sample_hash, &world.uniform, &apply);
     let (mut groups, mut effects) = (Vec::<Group>::new(), Vec::<Effects>::new());
@@ -132,7 +141,6 @@ pub(crate) fn edit(transaction: &Transaction, submissions: &[Submission], backen
     }
     let view = WorldView { mask: MaskView::new(&world.mask).over(&all_mask), ..before };
     let positions = || bricks.iter().map(|drafted| drafted.pos).collect();
-    let scene = transaction.scene(backend);
     let meshes = || redraw::updates(scene, &view, &dirty, &all_mask, positions, &mut stages);
     let all = groups.iter().map(|group| (group.submissions, &*group.bricks));
     let all = all.chain([(last, &*draft.bricks)]).zip(effects);
@@ -151,15 +159,15 @@ pub(crate) fn edit(transaction: &Transaction, submissions: &[Submission], backen
         let number = submissions.first().map_or(0, |first| first.terms.group);
         UndoDelta::new(change, replaced_bytes, number, (tags, pieces))
     });
-    let commit = transaction.commit(changes.collect(), draft.hash, meshes);
+    let changes = changes.collect();
     stages.whole = start.elapsed();
-    Commit {
+    Resolved {
         uniform: drafter.into_uniform(),
         receipts: entered.receipts,
         news: entered.news,
         next_field: entered.next_field,
         stages,
-        ..commit
+        ..Resolved::new(world, changes, draft.hash, meshes)
     }
 }
 

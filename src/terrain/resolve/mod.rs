@@ -3,14 +3,13 @@
 mod draft_group;
 mod edits;
 mod field_log;
-mod ground;
 mod parts;
 mod reset;
+mod resolved;
 mod step;
 
-pub(crate) use edits::edit;
+pub(crate) use edits::edits;
 pub use field_log::FieldNews;
-pub use parts::ChangeError;
-pub(crate) use parts::{Put, check_number, put};
-pub(crate) use reset::commit as reset;
+pub(crate) use parts::{parts, world_of};
+pub(crate) use resolved::{Resolved, patch_of};
 pub(crate) use step::step;

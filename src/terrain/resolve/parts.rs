@@ -7,89 +7,21 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 use web_time::Instant;
 
-use super::ground::put_on;
+use super::resolved::Resolved;
 use super::step::{Placed, place};
-use crate::backend::Compute;
+use crate::backend::Cpu;
 use crate::edits::{EditEffect, count_replaced};
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::redraw::{MeshUpdates, Stages, dirty_cells, joined_mask};
+use crate::lattice::{BrickPos, LatticeBox};
+use crate::redraw::{Scene, Stages, dirty_cells, joined_mask};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::terrain::commit::Commit;
 use crate::terrain::history::{Restored, UndoDelta};
-use crate::terrain::transaction::Transaction;
+use crate::terrain::replacement::{ChangeError, Put, check_number};
 use crate::volume::layers::{self, offset};
 use crate::volume::{Brick, Field, FieldId, UniformBricks, pristine_layers};
-use crate::world::{Change, Patch, World, columns_of, replaced_bytes};
-
-/// The reason why parts were not replaced; nothing changed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ChangeError {
-    /// Bricks come twice or out of order.
-    #[error("the brick {0:?} is repeated or out of order: sort bricks by position")]
-    Order(BrickPos),
-    /// A brick, or one of its edited samples, lies outside the world.
-    #[error("the brick {0:?} extends beyond the world")]
-    OutsideWorld(BrickPos),
-    /// A brick has a pristine sample that is solid where this ground is air, or vice versa.
-    #[error("the brick {0:?} was made on a different ground")]
-    OtherGround(BrickPos),
-    /// Fields of a chunk reach out of it, it comes twice, or one of its fields has the name of another.
-    #[error("the fields of chunk {0:?} extend beyond it, are repeated, or share a name")]
-    Fields(ChunkPos),
-    /// A revision or the name of a field is so great that no others could follow.
-    #[error("{0} is too large for a revision or the name of a field")]
-    Number(u64),
-    /// The world would not have the hash that was expected.
-    #[error("the world would have the hash {found:#018x}, not {expected:#018x}")]
-    Hash {
-        /// The hash that it would have.
-        found: u64,
-        /// The expected hash.
-        expected: u64,
-    },
-    /// The ground has another size, in cells.
-    #[error("the new ground has {found:?} cells, but the world has {expected:?}")]
-    GroundSize {
-        /// Width and depth of the new one.
-        found: (i32, i32),
-        /// Those of the world's.
-        expected: (i32, i32),
-    },
-    /// Too much work [waits](crate::terrain::WorkLimits::waiting).
-    #[error("the queue is full: try again once waiting work is done")]
-    Overloaded,
-    /// It panicked.
-    #[error("replacing parts panicked: this is a bug in bevy_burrow")]
-    Panicked,
-}
-
-/// The replacement parts.
-#[derive(Debug)]
-pub(crate) struct Put {
-    pub change: Patch,
-    /// The hash that the world must have afterwards.
-    pub hash: Option<u64>,
-    /// Whether its receipt counts voxels.
-    pub counts: bool,
-    /// Another ground below all edits; nothing else changes then.
-    pub ground: Option<Arc<Ground>>,
-}
-
-impl Put {
-    /// Returns `true` if it certainly changes nothing.
-    pub fn is_empty(&self) -> bool {
-        self.change.is_empty() && self.ground.is_none()
-    }
-
-    /// Returns `true` if it certainly changes none of these samples.
-    pub fn misses(&self, samples: LatticeBox) -> bool {
-        let misses = |pos: &BrickPos| pos.samples().intersection(samples).is_none();
-        self.ground.is_none() && self.change.bricks.iter().all(|(pos, _)| misses(pos))
-    }
-}
+use crate::world::{self, Change, Meshing, Patch, World, brick_over, columns_of};
 
 /// A replacement brick.
 struct NewBrick {
@@ -143,24 +75,54 @@ impl NewBrick {
     }
 }
 
-/// Puts parts in place.
-pub(crate) fn put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> Commit {
+/// What replaced parts lead to.
+pub(crate) fn parts(scene: Scene, put: &Put) -> Resolved {
     let start = Instant::now();
-    let commit = match &put.ground {
-        Some(ground) => put_on(transaction, ground),
-        None => checked_put(transaction, put, backend),
+    let resolved = match &put.ground {
+        Some(ground) => on_ground(scene.world, ground),
+        None => replaced(scene, put),
     };
-    let failed = |error| {
-        let commit = transaction.commit(Vec::new(), transaction.world.sample_hash, MeshUpdates::default());
-        Commit { put: Some(Err(error)), ..commit }
-    };
-    let mut commit = commit.unwrap_or_else(failed);
-    commit.stages.whole = start.elapsed();
-    commit
+    let failed = |error| Resolved { put: Some(Err(error)), ..Resolved::nothing(scene.world) };
+    let mut resolved = resolved.unwrap_or_else(failed);
+    resolved.stages.whole = start.elapsed();
+    resolved
 }
 
-fn checked_put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> Result<Commit, ChangeError> {
-    let (world, change, mut stages) = (&*transaction.world, &put.change, Stages::default());
+/// A world of these parts. Nothing is meshed: surfaces are made when they are asked for.
+pub(crate) fn world_of(
+    ground: Arc<Ground>,
+    chunk_size: i32,
+    parts: Patch,
+    revision: u64,
+) -> Result<World, ChangeError> {
+    check_number(revision)?;
+    let mut world = World::new(ground, chunk_size);
+    let put = Put { change: parts, hash: None, counts: false, ground: None };
+    let scene = Scene { world: &world, meshing: Meshing::Never, cut: None, backend: &Cpu };
+    let resolved = replaced(scene, &put)?;
+    // What it replaces is pristine.
+    Commit::new(0, false, resolved).install(&mut world);
+    world.revision = revision;
+    Ok(world)
+}
+
+/// The same edits on another ground.
+fn on_ground(before: &World, ground: &Arc<Ground>) -> Result<Resolved, ChangeError> {
+    let mut parts = before.all_parts();
+    for (pos, brick) in &mut parts.bricks {
+        *brick = brick.take().map(|brick| brick_over(ground, *pos, brick));
+    }
+    let world = world_of(Arc::clone(ground), before.grid.size(), parts, before.revision)?;
+    Ok(Resolved {
+        put: Some(Ok(Restored::default())),
+        next_field: world.next_field,
+        whole: Some(Arc::new(world)),
+        ..Resolved::nothing(before)
+    })
+}
+
+fn replaced(scene: Scene, put: &Put) -> Result<Resolved, ChangeError> {
+    let (world, change, mut stages) = (scene.world, &put.change, Stages::default());
     check_order(&change.bricks)?;
     let next_field = check_fields(world, change)?;
     let all = change.bricks.par_iter().with_min_len(64);
@@ -192,19 +154,19 @@ fn checked_put(transaction: &Transaction, put: &Put, backend: &dyn Compute) -> R
     fields.sort_by_key(|(chunk, _)| *chunk);
     let patch = Patch { bricks, fields, next_field };
     let change = Change { patch, mask: words, sample_hash };
-    let replaced = change.patch.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
-    let Placed { meshes, news } = place(transaction, &change, &whole, &changed, backend, &mut stages);
+    let replaced_bytes = change.patch.bricks.iter().map(|(pos, _)| world::replaced_bytes(world, *pos)).sum();
+    let Placed { meshes, news } = place(scene, &change, &whole, &changed, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let EditEffect { removed, added, painted, .. } = effect;
     let restored = Restored { bounds, removed, added, painted, ..Restored::default() };
-    let delta = UndoDelta::new(change, replaced, 0, Default::default());
-    Ok(Commit {
+    let delta = UndoDelta::new(change, replaced_bytes, 0, Default::default());
+    Ok(Resolved {
         put: Some(Ok(restored)),
         news,
         uniform,
         next_field,
         stages,
-        ..transaction.commit(vec![delta], sample_hash, meshes)
+        ..Resolved::new(world, vec![delta], sample_hash, meshes)
     })
 }
 
@@ -231,11 +193,6 @@ fn check_fields(world: &World, change: &Patch) -> Result<u64, ChangeError> {
         }
     }
     Ok(greatest)
-}
-
-/// Checks that a revision or the name of a field leaves room for those that follow.
-pub(crate) fn check_number(number: u64) -> Result<u64, ChangeError> {
-    if number > u64::MAX / 2 { Err(ChangeError::Number(number)) } else { Ok(number) }
 }
 
 /// Shares equal uniform bricks; returns the pool, if it has grown.

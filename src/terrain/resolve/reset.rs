@@ -10,38 +10,31 @@ use rustc_hash::FxHashMap;
 use web_time::Instant;
 
 use super::parts::words_of;
+use super::resolved::Resolved;
 use super::step::{Placed, place};
-use crate::backend::Compute;
 use crate::brush::Edit;
-use crate::edits::{EditEffect, ResetBrick, count_replaced, edited_within, reach, reset};
+use crate::edits::{self, EditEffect, ResetBrick, count_replaced, edited_within, reach};
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::redraw::{MeshUpdates, Stages};
-use crate::terrain::commit::Commit;
+use crate::redraw::{Scene, Stages};
 use crate::terrain::history::UndoDelta;
 use crate::terrain::queue::Submission;
 use crate::terrain::receipt::{Applied, ChunkScenario, Receipt, Rejection};
-use crate::terrain::transaction::Transaction;
 use crate::volume::{Brick, Field, Fields, Scenario, layers, pristine_layers};
 use crate::world::{Change, Patch, World, columns_of, replaced_bytes};
 
-/// Computes the commit of a reset.
-pub(crate) fn commit(
-    transaction: &Transaction,
-    submission: &Submission,
-    edit: &Edit,
-    backend: &dyn Compute,
-) -> Commit {
-    let (world, start, mut stages) = (&*transaction.world, Instant::now(), Stages::default());
+/// What a reset leads to.
+pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resolved {
+    let (world, start, mut stages) = (scene.world, Instant::now(), Stages::default());
     let tag = submission.tag;
     if reach(world.grid, edit).is_none() {
         let receipts = vec![Receipt { tag, outcome: Err(Rejection::OutsideWorld) }];
-        let commit = transaction.commit(Vec::new(), world.sample_hash, MeshUpdates::default());
-        return Commit { receipts, ..commit };
+        return Resolved { receipts, ..Resolved::nothing(world) };
     }
     let mut effect = EditEffect::default();
     let rules = submission.terms.rules.as_deref();
-    let found =
-        Stages::time(&mut stages.edit, || reset(world.samples(), world.grid, edit, rules, &mut effect));
+    let found = Stages::time(&mut stages.edit, || {
+        edits::reset(world.samples(), world.grid, edit, rules, &mut effect)
+    });
     let (mut bricks, mut whole) = (Vec::with_capacity(found.len()), Vec::with_capacity(found.len()));
     let (mut changed, mut sample_hash) = (Vec::with_capacity(found.len()), world.sample_hash);
     for ResetBrick { pos, brick, .. } in &found {
@@ -61,7 +54,7 @@ pub(crate) fn commit(
     let (fields, chunks) = shrunk_fields(world, &found);
     let patch = Patch { bricks, fields, next_field: world.next_field };
     let change = Change { patch, mask, sample_hash };
-    let Placed { meshes, news } = place(transaction, &change, &whole, &changed, backend, &mut stages);
+    let Placed { meshes, news } = place(scene, &change, &whole, &changed, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let tags = if found.is_empty() { Vec::new() } else { vec![tag] };
     let replaced = change.patch.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
@@ -69,11 +62,11 @@ pub(crate) fn commit(
     let EditEffect { removed, added, painted, refused, .. } = effect;
     let applied = Applied { chunks, bounds, removed, added, painted, refused, ..Applied::default() };
     stages.whole = start.elapsed();
-    Commit {
+    Resolved {
         receipts: vec![Receipt { tag, outcome: Ok(applied) }],
         news,
         stages,
-        ..transaction.commit(vec![delta], sample_hash, meshes)
+        ..Resolved::new(world, vec![delta], sample_hash, meshes)
     }
 }
 

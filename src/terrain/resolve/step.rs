@@ -6,16 +6,14 @@ use std::sync::Arc;
 use web_time::Instant;
 
 use super::field_log::{FieldNews, news_of_replaced};
-use crate::backend::Compute;
+use super::resolved::Resolved;
 use crate::edits::{EditEffect, count_replaced};
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::loose::ReturnedPiece;
-use crate::redraw::{self, MeshUpdates, Stages, dirty_cells};
+use crate::redraw::{self, MeshUpdates, Scene, Stages, dirty_cells};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::terrain::commit::Commit;
 use crate::terrain::history::{HistoryReceipt, HistoryStep, Restored, UndoDelta};
-use crate::terrain::transaction::Transaction;
 use crate::volume::{Brick, Fields, pristine_layers};
 use crate::world::{Change, replaced_bytes};
 
@@ -28,14 +26,13 @@ pub(crate) struct Placed {
 /// Draws the world with a change; `bricks` are those of the change with pristine ones made, `changed` says where
 /// samples differ.
 pub(crate) fn place(
-    transaction: &Transaction,
+    scene: Scene,
     change: &Change,
     bricks: &[(BrickPos, Arc<Brick>)],
     changed: &[(BrickPos, LatticeBox)],
-    backend: &dyn Compute,
     stages: &mut Stages,
 ) -> Placed {
-    let world = &*transaction.world;
+    let world = scene.world;
     let mut mask = Mask::default();
     change.mask.iter().for_each(|&(word, cells)| mask.lay_word(word, cells));
     let latest: Vec<_> = bricks.iter().map(|(pos, brick)| (*pos, brick.as_ref())).collect();
@@ -48,7 +45,7 @@ pub(crate) fn place(
         dirty_cells(world.grid, changed, |&(pos, own)| (pos, own, false))
     });
     let positions = || bricks.iter().map(|(pos, _)| *pos).collect();
-    let meshes = redraw::updates(transaction.scene(backend), &view, &dirty, &mask, positions, stages);
+    let meshes = redraw::updates(scene, &view, &dirty, &mask, positions, stages);
     let nothing = Fields::default();
     let news = change.patch.fields.iter().flat_map(|(chunk, after)| {
         let before = world.fields.get(chunk).unwrap_or(&nothing);
@@ -57,14 +54,9 @@ pub(crate) fn place(
     Placed { meshes, news: news.collect() }
 }
 
-/// Puts in place what a step through history holds.
-pub(crate) fn step(
-    transaction: &Transaction,
-    step: HistoryStep,
-    target: &UndoDelta,
-    backend: &dyn Compute,
-) -> Commit {
-    let (world, start, mut stages) = (&*transaction.world, Instant::now(), Stages::default());
+/// What a step through history leads to.
+pub(crate) fn step(scene: Scene, step: HistoryStep, target: &UndoDelta) -> Resolved {
+    let (world, start, mut stages) = (scene.world, Instant::now(), Stages::default());
     let (change, mut bricks) = (target.change.clone(), Vec::with_capacity(target.change.patch.bricks.len()));
     let (mut effect, mut changed) = (EditEffect::default(), Vec::with_capacity(change.patch.bricks.len()));
     Stages::time(&mut stages.edit, || {
@@ -77,7 +69,7 @@ pub(crate) fn step(
             bricks.push((*pos, brick));
         }
     });
-    let Placed { meshes, news } = place(transaction, &change, &bricks, &changed, backend, &mut stages);
+    let Placed { meshes, news } = place(scene, &change, &bricks, &changed, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let EditEffect { removed, added, painted, .. } = effect;
     let (mut returned, mut loose) = (Vec::new(), Vec::new());
@@ -93,10 +85,10 @@ pub(crate) fn step(
     let sample_hash = change.sample_hash;
     let delta = UndoDelta::new(change, replaced_bytes, target.group, (tags, target.pieces.clone()));
     stages.whole = start.elapsed();
-    Commit {
+    Resolved {
         step: Some(HistoryReceipt { step, outcome: Ok(restored) }),
         news,
         stages,
-        ..transaction.commit(vec![delta], sample_hash, meshes)
+        ..Resolved::new(world, vec![delta], sample_hash, meshes)
     }
 }

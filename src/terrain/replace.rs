@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::history::Restored;
 use super::model::Terrain;
-use super::resolve::{ChangeError, Put};
+use super::replacement::{ChangeError, Put};
 use crate::ground::Ground;
 use crate::world::Patch;
 
@@ -33,7 +33,7 @@ impl Terrain {
         self.put_now(Put { change, hash, counts: true, ground: None })
     }
 
-    pub(crate) fn put_now(&mut self, put: Put) -> Result<Restored, ChangeError> {
+    fn put_now(&mut self, put: Put) -> Result<Restored, ChangeError> {
         self.queue.push_put(put);
         let receipts = self.finish();
         receipts.into_iter().for_each(|receipt| self.answer(receipt));
