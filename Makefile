@@ -1,7 +1,7 @@
 # bevy_burrow: diggable ground for Bevy. `make help` lists what can be done.
 #
 # One feature set and one profile for everything that compiles Bevy, so that it is compiled once:
-#   without Bevy   cargo ... --no-default-features --features cuda,net,import   the model: tests, soak
+#   without Bevy   cargo ... --no-default-features --features cuda,net,store,import   the model: tests, soak
 #   with Bevy      cargo ... --release --features examples           the plugin and the examples
 #
 # Builds are in CARGO_TARGET_DIR, outside the clone unless set otherwise.
@@ -10,10 +10,10 @@ SHELL := /bin/sh
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
 
-WITHOUT_BEVY := --no-default-features --features cuda,net,import
+WITHOUT_BEVY := --no-default-features --features cuda,net,store,import
 comma := ,
 # What somebody may choose besides. Each set with Bevy has other features of Bevy's crates, so that much is checked anew.
-SETS_WITHOUT_BEVY := '' store net import cuda,net,import
+SETS_WITHOUT_BEVY := '' format store net import cuda,net,store,import
 SETS_WITH_BEVY := default plugin replicon render avian egui debug examples,gamepad examples,sound
 # Features besides: `make run MORE=gamepad` or MORE=gamepad,sound compiles some crates more.
 WITH_BEVY := --release --features examples$(MORE:%=$(comma)%)

@@ -238,10 +238,13 @@
 //!
 //! | modules | subject |
 //! | --- | --- |
-//! | [`lattice`], [`levels`], [`ground`] | coordinates, levels of detail, the pristine world |
+//! | [`lattice`], [`lod`], [`ground`] | coordinates, levels of detail, the pristine world |
 //! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
 //! | [`surface`], [`dense`] | marching cubes, heightmap and their seam; a mesher of plain arrays |
-//! | [`backend`], [`terrain`] | engines on CPU and GPU; transactions, history, queries |
+//! | [`backend`] | engines on CPU and GPU |
+//! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
+//! | [`terrain`] | transactions, history, the commit log; exports what the three above have for games |
+//! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
 //! | `plugin`, `view`, `saves`, `together`, `physics`, `debug`, `panel` | everything that uses Bevy |
 //!
@@ -260,9 +263,9 @@
 //! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes:
 //!    [`Edit::reach`](brush::Edit::reach).
 //!
-//! Three more rules close the gaps between [levels of detail](levels): a coarse cell fans over the line of its finer
+//! Three more rules close the gaps between [levels of detail](lod): a coarse cell fans over the line of its finer
 //! neighbours, a coarse vertex of an edit is a vertex of the finest level, and columns beyond the rim equal the rim's
-//! ([`surface::level`]).
+//! ([`surface::lod`]).
 //!
 //! Rejected alternatives: *snapping* border vertices to the nearest point of the other surface tears on steep
 //! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep
@@ -311,9 +314,9 @@
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking character; debris | |
+//! | `format` | levels and portable worlds as bytes, without files; part of `store` and `net` | |
 //! | `store` | worlds on disk: a commit journal, checkpoints, portable files | |
 //! | `net` | multiplayer: a server and clients without a transport | |
-//! | `import` | heights from TIFF and EXR files | |
 //! | `picking` | Bevy's pointer events on the ground, with the `TerrainHit` as extra data | |
 //! | `replicon` | multiplayer over bevy_replicon | |
 //! | `egui` | the panel: brush, settings, live figures | |
@@ -343,9 +346,12 @@ pub mod brush;
 pub mod debug;
 pub mod dense;
 mod edits;
+#[cfg(feature = "format")]
+pub mod format;
 pub mod ground;
 pub mod lattice;
-pub mod levels;
+pub mod lod;
+mod loose;
 #[cfg(feature = "net")]
 pub mod net;
 #[cfg(feature = "egui")]
@@ -358,17 +364,21 @@ pub mod plugin;
 mod plugins;
 #[cfg(feature = "plugin")]
 pub use plugins::BurrowPlugins;
+mod redraw;
 #[cfg(all(feature = "plugin", feature = "store"))]
 pub mod saves;
 #[cfg(feature = "store")]
 pub mod store;
 pub mod surface;
 pub mod terrain;
+#[cfg(feature = "plugin")]
+mod threads;
 #[cfg(feature = "replicon")]
 pub mod together;
 #[cfg(feature = "render")]
 pub mod view;
 pub mod volume;
+mod world;
 #[cfg(test)]
 #[path = "../tests/worlds/mod.rs"]
 mod worlds;

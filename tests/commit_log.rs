@@ -7,8 +7,7 @@ use std::sync::Arc;
 use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{
-    ChangeError, CommitRecord, Drawn, LogEntry, Meshing, ReplayError, RestoreError, SIMULATION, World,
-    WorldChange,
+    ChangeError, CommitRecord, Drawn, LogEntry, Meshing, Patch, ReplayError, RestoreError, SIMULATION, World,
 };
 use bevy_burrow::volume::Brick;
 use fastrand::Rng;
@@ -278,14 +277,13 @@ fn parts_that_do_not_fit_are_errors_and_change_nothing() {
     let mut terrain = flat();
     terrain.apply([dig(20.0)]);
     let (parts, hash) = (terrain.parts(), terrain.world().hash());
-    let twice = WorldChange {
+    let twice = Patch {
         bricks: parts.change.bricks.iter().take(1).cycle().take(2).cloned().collect(),
-        ..WorldChange::default()
+        ..Patch::default()
     };
     assert!(matches!(terrain.apply_change(twice, None), Err(ChangeError::Order(_))));
     let far = BrickPos(IVec3::new(400, 1, 3));
-    let outside =
-        WorldChange { bricks: vec![(far, parts.change.bricks[0].1.clone())], ..WorldChange::default() };
+    let outside = Patch { bricks: vec![(far, parts.change.bricks[0].1.clone())], ..Patch::default() };
     assert_eq!(terrain.apply_change(outside, None), Err(ChangeError::OutsideWorld(far)));
     let higher = Arc::new(Ground::flat(64, 64, 11.0).expect("valid"));
     let restored = Terrain::restore(higher, &TerrainSettings::default(), parts);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy_burrow::lattice::{BrickPos, ChunkPos, LatticeBox};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{ChangeError, RestoreError, WorldChange, WorldParts};
+use bevy_burrow::terrain::{ChangeError, Patch, RestoreError, WorldParts};
 use bevy_burrow::volume::{Brick, Field, FieldId, Fields};
 use glam::{IVec3, Vec3};
 
@@ -20,7 +20,7 @@ fn dig(x: f32) -> Brush {
 }
 
 /// The result of a change; if it is refused, nothing has changed, and the terrain still works.
-fn put(change: WorldChange) -> Result<(), ChangeError> {
+fn put(change: Patch) -> Result<(), ChangeError> {
     let mut terrain = terrain();
     let (before, next) = (terrain.parts().change, terrain.world().hash());
     let outcome = terrain.apply_change(change, None).map(drop);
@@ -34,13 +34,13 @@ fn put(change: WorldChange) -> Result<(), ChangeError> {
     outcome
 }
 
-fn bricks(list: impl IntoIterator<Item = (BrickPos, Option<Arc<Brick>>)>) -> WorldChange {
-    WorldChange { bricks: list.into_iter().collect(), ..WorldChange::default() }
+fn bricks(list: impl IntoIterator<Item = (BrickPos, Option<Arc<Brick>>)>) -> Patch {
+    Patch { bricks: list.into_iter().collect(), ..Patch::default() }
 }
 
-fn fields(list: impl IntoIterator<Item = (ChunkPos, Vec<Field>)>) -> WorldChange {
+fn fields(list: impl IntoIterator<Item = (ChunkPos, Vec<Field>)>) -> Patch {
     let restored = |(chunk, fields)| (chunk, Fields::restored(fields).expect("valid fields"));
-    WorldChange { fields: list.into_iter().map(restored).collect(), ..WorldChange::default() }
+    Patch { fields: list.into_iter().map(restored).collect(), ..Patch::default() }
 }
 
 fn field(id: u64, low: i32, high: i32) -> Field {
@@ -111,7 +111,7 @@ fn a_new_field_never_gets_the_name_of_another() {
 #[test]
 fn numbers_that_count_can_always_go_on() {
     for greatest in [u64::MAX, u64::MAX / 2 + 1] {
-        let name = WorldChange { next_field: greatest, ..WorldChange::default() };
+        let name = Patch { next_field: greatest, ..Patch::default() };
         assert_eq!(put(name), Err(ChangeError::Number(greatest)));
         let name = fields([(chunk(0), vec![field(greatest, 1, 4)])]);
         assert_eq!(put(name), Err(ChangeError::Number(greatest)));

@@ -8,7 +8,7 @@
 //! a level has anywhere. Nodes beyond the view are not drawn. Its morphing costs no triangles and is left out:
 //! with it, ranges would be larger.
 
-use bevy_burrow::levels::{Choice, Cut, LevelGrid, Node};
+use bevy_burrow::lod::{Choice, Cut, LodGrid, Node};
 use bevy_burrow::terrain::{GroundFacts, World};
 use glam::{Vec2, Vec3, Vec3Swizzles};
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ const SAMPLES: i32 = 24;
 /// CDLOD's quadtree over a world.
 struct Quadtree<'a> {
     world: &'a World,
-    grid: LevelGrid,
+    grid: LodGrid,
     eye: Vec3,
     /// How far each level is drawn, from level 0 on.
     ranges: Vec<f32>,
@@ -69,7 +69,7 @@ impl Quadtree<'_> {
 }
 
 /// The greatest error of each level, of nodes that are evenly spread; 0 at level 0.
-fn greatest_errors(world: &World, grid: LevelGrid) -> Vec<f32> {
+fn greatest_errors(world: &World, grid: LodGrid) -> Vec<f32> {
     let greatest = |level: u8| {
         let step = |tiles: i32| (((tiles - 1) >> level) / SAMPLES + 1) as usize;
         let (across, down) = grid.chunks().tile_counts();
@@ -102,7 +102,7 @@ fn is_in_view(cut: &Cut, node: Node, eye: Vec3, view: f32) -> bool {
 
 /// Prints triangles all round, within the view, for views of 0.5 to 16 km.
 pub fn compare(world: &World, summit: Vec3) {
-    let grid = world.level_grid(u8::MAX);
+    let grid = world.lod_grid(u8::MAX);
     let errors = greatest_errors(world, grid);
     let first = first_range(&errors, &Choice::default(), super::PIXELS);
     println!("\nCDLOD: greatest errors by level {errors:.1?} voxels, so level 0 reaches {first:.0} voxels");

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use bevy_burrow::lattice::Column;
-use bevy_burrow::levels::{Cut, Node};
+use bevy_burrow::lod::{Cut, Node};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
 use glam::Vec3;
@@ -28,7 +28,7 @@ pub fn nodes() {
     // A node of level 1 between finer and coarser ones.
     let one = Node { level: 1, x: 5, z: 4 };
     let split = Node { level: 1, x: 4, z: 4 };
-    let cut = Cut::new(terrain.world().level_grid(3), |node| node.covers(split));
+    let cut = Cut::new(terrain.world().lod_grid(3), |node| node.covers(split));
     let nodes =
         [Node { level: 0, x: 9, z: 8 }, one, Node { level: 2, x: 3, z: 2 }, Node { level: 3, x: 3, z: 3 }];
     let times = |terrain: &Terrain, what: &str| {

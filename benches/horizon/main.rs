@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bevy_burrow::ground::{GreyImage, Ground, ImageScale, ImageSource, NoiseSource};
-use bevy_burrow::levels::{Choice, Cut, Eye, Node, View};
+use bevy_burrow::lod::{Choice, Cut, Eye, Node, View};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{ChooseCut, GroundFacts, KnownNodes, NodeUpdate, World};
 use glam::{Vec2, Vec3, Vec3Swizzles};
@@ -32,7 +32,7 @@ const VERTEX: usize = 32;
 
 /// The cut that an eye needs, level by level from the coarsest, as the plugin reaches it.
 fn cut_for(world: &World, choice: &Choice, eye: Eye) -> Cut {
-    let (known, mut cut) = (KnownNodes::default(), Cut::coarsest(world.level_grid(u8::MAX)));
+    let (known, mut cut) = (KnownNodes::default(), Cut::coarsest(world.lod_grid(u8::MAX)));
     loop {
         let next = known.next_cut(world, &cut, choice, &[eye], usize::MAX);
         if next == cut {
@@ -182,7 +182,7 @@ fn bytes(nodes: &[NodeUpdate]) -> usize {
 fn load(terrain: Terrain, summit: Vec3) {
     let world = terrain.world();
     let start = Instant::now();
-    let (_, first) = world.draw_cut(Cut::coarsest(world.level_grid(u8::MAX)));
+    let (_, first) = world.draw_cut(Cut::coarsest(world.lod_grid(u8::MAX)));
     let first_took = start.elapsed();
     let cut = cut_for(world, &Choice::default(), eye(summit));
     let chosen = start.elapsed();
@@ -221,7 +221,7 @@ fn nodes(world: &World, summit: Vec3) {
     let image = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
     println!("\n| a node, ms | level 0 | 1 | 2 | 3 | 4 | 5 |\n| --- | --- | --- | --- | --- | --- | --- |");
     for (name, world) in [("noise", world), ("image", image.world())] {
-        let grid = world.level_grid(u8::MAX);
+        let grid = world.lod_grid(u8::MAX);
         let times = (0..6u8).map(|level| {
             // Each node is new, so no page of it was computed before.
             let cut = Cut::new(grid, |node| node.level > level);

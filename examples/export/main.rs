@@ -41,7 +41,7 @@
 mod brush_lines;
 #[path = "../shared/json.rs"]
 mod json;
-mod levels;
+mod lod;
 mod obj;
 #[path = "../shared/output.rs"]
 mod output;
@@ -67,7 +67,7 @@ use clap::Parser;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use levels::Levels;
+use lod::Levels;
 use report::{Report, milliseconds};
 use staging::Staging;
 

@@ -7,7 +7,7 @@ use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{Drawn, World};
 use glam::{I64Vec3, IVec3};
 
-use crate::levels::Levels;
+use crate::lod::Levels;
 
 /// Writes all tiles and chunks of a world, one group each, and returns the number of bytes.
 pub fn write(world: &World, out: &mut impl Write) -> io::Result<u64> {

@@ -10,7 +10,7 @@ use bevy_burrow::terrain::{Memory, Receipt, ScenarioCounts, World};
 use bevy_burrow::volume::{MaterialCounts, Refused};
 use serde::Serialize;
 
-use crate::levels::{LevelFigures, Levels};
+use crate::lod::{LevelFigures, Levels};
 use crate::play::Played;
 
 /// The content of `report.json`. Everything except `timings` is the same on every machine for the same input.

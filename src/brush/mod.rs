@@ -97,6 +97,8 @@ mod line;
 mod operation;
 mod quantize;
 mod quantized_operation;
+#[cfg(feature = "plugin")]
+mod reach;
 mod request;
 mod roughness;
 mod sculpt_kernel;
@@ -110,13 +112,13 @@ pub use error::BrushError;
 pub use evaluator::Evaluator;
 pub(crate) use operation::Kind;
 pub use operation::Operation;
+#[cfg(feature = "plugin")]
+pub(crate) use reach::reaches;
 pub use request::Brush;
 pub use roughness::Roughness;
 #[cfg(feature = "cuda")]
 pub(crate) use sculpt_kernel::SculptOp;
 pub(crate) use sculpt_kernel::{FARTHEST, SculptKernel, Stencil, is_moved};
-#[cfg(feature = "plugin")]
-pub(crate) use shapes::Extent;
 pub use shapes::Shape;
 pub use stamp::Stamp;
 

@@ -1,10 +1,11 @@
 //! The operations of brushes.
 
+#[cfg(feature = "plugin")]
+use glam::Mat3A;
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::is_default;
-use super::{DEPTH, Stamp};
+use super::{DEPTH, Stamp, is_default};
 use crate::ground::MaterialId;
 
 /// The operation inside the shape.
@@ -142,6 +143,30 @@ impl Operation {
                 },
             },
             same => same.clone(),
+        }
+    }
+
+    /// Stretches its points and heights. Amounts are sizes, which have no direction and stay.
+    #[cfg(feature = "plugin")]
+    pub(super) fn stretch(&mut self, matrix: Mat3A) {
+        let stretch = |point: &mut Vec3| *point = matrix * *point;
+        let lift = |height: &mut f32| *height *= matrix.y_axis.y;
+        match self {
+            Self::Flatten { point, normal } => {
+                stretch(point);
+                *normal = matrix.inverse().transpose() * *normal;
+            }
+            Self::Level { height } => lift(height),
+            Self::Terrace { step, base } => [step, base].into_iter().for_each(lift),
+            Self::Stamp { stamp } => stretch(&mut stamp.center),
+            Self::Dig
+            | Self::Add { .. }
+            | Self::Paint { .. }
+            | Self::Smooth
+            | Self::Sharpen
+            | Self::Raise { .. }
+            | Self::Lower { .. }
+            | Self::Reset => {}
         }
     }
 }

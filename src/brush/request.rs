@@ -2,6 +2,8 @@
 
 #[cfg(feature = "plugin")]
 use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
+#[cfg(feature = "plugin")]
+use glam::Mat3A;
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -206,6 +208,26 @@ impl Brush {
             blend: Blend { falloff: self.blend.falloff * scale, ..self.blend },
             power: self.power,
         }
+    }
+
+    /// The brush in the space of a terrain that is scaled evenly and then rotated and moved.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn placed_in(&self, scale: f32, rotation: Quat, translation: Vec3) -> Self {
+        let (rotation, scale) = (rotation.inverse(), scale.recip());
+        self.transformed(rotation, rotation * -translation * scale, scale)
+    }
+
+    /// The brush in the space of a terrain that a parent stretches: points are transformed exactly, and sizes, which have
+    /// no direction, are scaled by the cube root of the change in volume. `rotation` is that of `matrix`.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn placed_in_stretched(&self, matrix: Mat3A, rotation: Quat, translation: Vec3) -> Self {
+        let scale = matrix.determinant().abs().cbrt();
+        let mut brush = self.placed_in(scale, rotation, translation);
+        // The rest of the transform into the terrain.
+        let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;
+        brush.shape = brush.shape.stretched(|arrow| rest * arrow);
+        brush.operation.stretch(rest);
+        brush
     }
 }
 

@@ -6,12 +6,11 @@ use std::sync::Arc;
 use glam::{IVec3, Quat, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::BrushError;
-use super::is_default;
 use super::quantize::{
     check_point, check_size, check_turn, in_range, matrix, point, restored_point, restored_turn, size, turn,
     voxels,
 };
+use super::{BrushError, is_default};
 use crate::ground::GreyImage;
 use crate::lattice::ONE;
 

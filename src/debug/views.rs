@@ -6,7 +6,7 @@ use super::DebugView;
 use super::lines::LineBuffer;
 use super::wires::{SeamWires, around, edges_of, voxels};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP};
-use crate::levels::{Cut, Node};
+use crate::lod::{Cut, Node};
 use crate::terrain::{Drawn, Terrain, World};
 
 const CHUNK: LinearRgba = LinearRgba::rgb(0.08, 0.60, 1.0);
@@ -50,7 +50,7 @@ pub fn draw(view: DebugView, terrain: &Terrain, place: Place, dirty: &[Dirty], o
         DebugView::Wires => SeamWires::around(world, place.focus, place.near).draw(out),
         DebugView::Levels => match terrain.drawn_cut() {
             Some(drawn) => levels(world, drawn.cut(), place, out),
-            None => levels(world, &Cut::coarsest(world.level_grid(0)), place, out),
+            None => levels(world, &Cut::coarsest(world.lod_grid(0)), place, out),
         },
     }
 }

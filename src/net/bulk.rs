@@ -3,9 +3,9 @@
 
 use super::message::{MOST_TO_CLIENT, ToClient};
 use super::stamps::Stamps;
+use crate::format::FormatError;
+use crate::format::bytes::{Reader, put_bytes};
 use crate::ground::Ground;
-use crate::store::FormatError;
-use crate::store::format::bytes::{Reader, put_bytes};
 
 /// Appends a message to a stream.
 pub(super) fn put_message(to: &mut Vec<u8>, message: &[u8]) {

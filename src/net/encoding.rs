@@ -1,4 +1,4 @@
-//! The encoding of messages: a tag, then integers of [variable length](crate::store::format::bytes), edits as
+//! The encoding of messages: a tag, then integers of [variable length](crate::format::bytes), edits as
 //! differences from the previous one in the message, bricks as in saves.
 //!
 //! Reading any bytes gives a message or a [`FormatError`]: nothing panics, and memory is bounded by the length of
@@ -10,14 +10,13 @@ use std::sync::Arc;
 use super::message::*;
 use super::stamps::{StampId, Stamps};
 use crate::brush::Edit;
+use crate::format::bytes::{Reader, put_bytes, put_number};
+use crate::format::change::{put_change, read_change};
+use crate::format::edits::EditSequence;
+use crate::format::fields::{point, put_point};
+use crate::format::{FormatError, WorldId, decode_region, encode_region, plain};
 use crate::ground::{GreyImage, Ground};
 use crate::lattice::RegionPos;
-use crate::store::format::bytes::{Reader, put_bytes, put_number};
-use crate::store::format::change::{put_change, read_change};
-use crate::store::format::edits::EditSequence;
-use crate::store::format::fields::{point, put_point};
-use crate::store::format::{decode_region, encode_region, plain};
-use crate::store::{FormatError, WorldId};
 use crate::volume::DiggingRules;
 
 const HELLO: u8 = 0;
@@ -677,7 +676,7 @@ fn read_hashes(reader: &mut Reader) -> Result<RegionHashes, FormatError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::FormatError;
+    use crate::format::FormatError;
 
     /// A message of `count` marks.
     fn marks(count: usize) -> Vec<u8> {

@@ -31,10 +31,10 @@ use glam::IVec3;
 
 use super::stamps::StampId;
 use crate::brush::Edit;
+use crate::format::WorldId;
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
-use crate::store::WorldId;
-use crate::terrain::{LooseSettings, WorldChange};
+use crate::terrain::{LooseSettings, Patch};
 use crate::volume::{Brick, DiggingRules, Fields};
 
 /// The version of the protocol. It changes whenever the encoding of messages does.
@@ -96,7 +96,7 @@ pub enum Entry {
         /// The client that asked for it, and the number that it had there.
         by: Option<(ClientId, u64)>,
         /// The parts.
-        change: Arc<WorldChange>,
+        change: Arc<Patch>,
     },
     /// Changes nothing. The hashes of regions that were touched since the previous mark are compared here.
     Mark,

@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 use xxhash_rust::xxh3::Xxh3Default;
 
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, RegionPos};
-use crate::terrain::{World, WorldChange};
+use crate::terrain::{Patch, World};
 
 /// The hash of a region in marks and tables: of its [samples](World::region_hash), and of the names of the fields in
 /// all chunks that reach into it. 0 for a pristine region.
@@ -24,7 +24,7 @@ pub(super) struct Steps(FxHashMap<RegionPos, u64>);
 
 impl Steps {
     /// Those of a change before it is applied to a world.
-    pub fn of(world: &World, change: &WorldChange) -> Self {
+    pub fn of(world: &World, change: &Patch) -> Self {
         let mut steps = FxHashMap::<RegionPos, u64>::default();
         for (pos, brick) in &change.bricks {
             let sum = steps.entry(RegionPos::of(*pos)).or_default();
@@ -70,7 +70,7 @@ fn hash_with_names(world: &World, region: RegionPos, samples: u64) -> u64 {
 }
 
 /// The regions whose [hash](region_hash) a change may change.
-pub fn touched_regions(grid: ChunkGrid, change: &WorldChange) -> BTreeSet<RegionPos> {
+pub fn touched_regions(grid: ChunkGrid, change: &Patch) -> BTreeSet<RegionPos> {
     let mut regions: BTreeSet<RegionPos> = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos)).collect();
     for (chunk, _) in &change.fields {
         let Some(samples) = grid.chunk_samples(*chunk).intersection(grid.edit_bounds()) else { continue };
@@ -158,8 +158,7 @@ mod tests {
             let (chunk, fields) = parts.fields.first().expect("a field").clone();
             let renamed = fields.iter().map(|field| Field { id: FieldId(field.id.0 + 70), ..*field });
             let renamed = Fields::restored(renamed.collect()).expect("names that differ");
-            let change =
-                WorldChange { fields: vec![(chunk, renamed)], next_field: 100, ..WorldChange::default() };
+            let change = Patch { fields: vec![(chunk, renamed)], next_field: 100, ..Patch::default() };
             terrain.apply_change(change, Some(hash)).expect("it fits");
             let own = BrickPos::of(fields.iter().next().expect("a field").bounds.min);
             assert_ne!(hashes(terrain.world())[&RegionPos::of(own)], before[&RegionPos::of(own)]);

@@ -13,10 +13,11 @@ use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{
-    ChangeError, Receipt, RestoreError, Restored, Terrain, TerrainError, TerrainSettings, World, WorldChange,
+    ChangeError, Patch, Receipt, RestoreError, Restored, Terrain, TerrainError, TerrainSettings, World,
     WorldParts,
 };
 use crate::volume::{Brick, Fields};
+use crate::world::{Overlay, Places, State};
 
 type Stored = Option<Arc<Brick>>;
 
@@ -31,7 +32,7 @@ const MANY: usize = 16;
 #[derive(Clone, Debug)]
 pub struct ShownChange {
     /// Bricks and fields.
-    pub change: WorldChange,
+    pub change: Patch,
     /// The hash that the shown world has afterwards.
     pub hash: u64,
 }
@@ -63,10 +64,8 @@ pub(super) struct Replica {
     pending: VecDeque<Pending>,
     /// The hashes of its regions.
     sums: RegionSums,
-    /// Bricks whose shown content differs from the confirmed one.
-    bricks: BTreeMap<BrickPos, Stored>,
-    /// Fields of chunks that differ between the shown and the confirmed world.
-    fields: BTreeMap<ChunkPos, Fields>,
+    /// The shown content where it differs from the confirmed one.
+    predicted: Overlay,
     /// The sum of the hashes of all regions of the shown world.
     samples: u64,
     /// Difference from the confirmed world's hash at the last comparison.
@@ -75,7 +74,7 @@ pub(super) struct Replica {
     next_field: u64,
     /// The old content of those parts of the confirmed world that changed since the last comparison with the shown
     /// world.
-    before: Before,
+    before: Overlay,
     /// Whether the shown world may differ from the confirmed world with the pending edits.
     is_outdated: bool,
     /// Whether all changes of the confirmed world since the last comparison are outside the samples that pending edits
@@ -91,38 +90,18 @@ pub(super) struct Replica {
     drafted: u64,
 }
 
-/// Parts of a world before they changed.
-#[derive(Default)]
-struct Before {
-    bricks: BTreeMap<BrickPos, Stored>,
-    fields: BTreeMap<ChunkPos, Fields>,
-}
-
-impl Before {
-    /// Records the present content of parts that will change, unless they are recorded already.
-    fn note(&mut self, world: &World, change: &WorldChange) {
-        for (pos, _) in &change.bricks {
-            self.bricks.entry(*pos).or_insert_with(|| world.brick(*pos).cloned());
-        }
-        for (chunk, _) in &change.fields {
-            self.fields.entry(*chunk).or_insert_with(|| fields_of(world, *chunk));
-        }
-    }
-}
-
 impl Replica {
     /// The pristine world.
     pub fn new(ground: Arc<Ground>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
         let mut confirmed = Terrain::new(ground, settings)?;
         never_shown(&mut confirmed);
         let (samples, next_field) = (confirmed.world().regions_hash(), confirmed.world().next_field());
-        let (pending, bricks, fields, before, is_outdated, is_apart) = Default::default();
+        let (pending, predicted, before, is_outdated, is_apart) = Default::default();
         Ok(Self {
             confirmed,
             pending,
             sums: RegionSums::default(),
-            bricks,
-            fields,
+            predicted,
             samples,
             more: 0,
             next_field,
@@ -222,7 +201,7 @@ impl Replica {
                 Entry::Loose(loose) => self.confirmed.set_loose(*loose),
                 Entry::Edit { edit, .. } => self.confirmed.submit_edit(edit),
                 Entry::Parts { change, .. } => {
-                    submitted.push(self.confirmed.submit_change(WorldChange::clone(change), None));
+                    submitted.push(self.confirmed.submit_change(Patch::clone(change), None));
                 }
                 Entry::Mark => {}
             }
@@ -269,7 +248,7 @@ impl Replica {
         while let Some(transaction) = self.confirmed.begin() {
             let commit = transaction.run();
             let change = commit.change();
-            self.before.note(self.confirmed.world(), &change);
+            self.before.keep(change.inverse(self.confirmed.world()));
             applied.regions.append(&mut touched_regions(self.world().grid(), &change));
             let steps = Steps::of(self.confirmed.world(), &change);
             // It is the one under way.
@@ -281,7 +260,7 @@ impl Replica {
 
     /// Shares the shown bricks with the confirmed world where they are equal, and forgets these differences.
     fn share(&mut self) {
-        let shown = |pos: &BrickPos| self.bricks.get(pos).and_then(Option::as_ref);
+        let shown = |pos: &BrickPos| self.predicted.bricks.get(pos).and_then(Option::as_ref);
         let changed = self.before.bricks.keys().filter_map(|pos| Some((*pos, Arc::clone(shown(pos)?))));
         let changed: Vec<(BrickPos, Arc<Brick>)> = changed.collect();
         self.confirmed.share_bricks(changed.iter().map(|(pos, brick)| (*pos, brick)));
@@ -291,26 +270,16 @@ impl Replica {
         // The shown world does not change: all changes were shown before.
         self.more = self.samples.wrapping_sub(self.world().regions_hash());
         let before = std::mem::take(&mut self.before);
-        let world = self.confirmed.world();
-        for (pos, old) in before.bricks {
-            let shown = self.bricks.remove(&pos).unwrap_or(old);
-            if !Brick::is_same(shown.as_ref(), world.brick(pos)) {
-                self.bricks.insert(pos, shown);
-            }
-        }
-        for (chunk, old) in before.fields {
-            let shown = self.fields.remove(&chunk).unwrap_or(old);
-            if shown != fields_of(world, chunk) {
-                self.fields.insert(chunk, shown);
-            }
-        }
+        let places = before.places();
+        self.predicted.keep(before.patch(0));
+        self.predicted.forget(self.confirmed.world(), &places);
     }
 
     /// Replaces parts of the confirmed world by those of another machine.
     ///
     /// # Errors
     /// When they do not fit.
-    pub fn put(&mut self, change: WorldChange) -> Result<Applied, ChangeError> {
+    pub fn put(&mut self, change: Patch) -> Result<Applied, ChangeError> {
         self.confirmed.submit_change(change, None)?;
         let applied = self.run();
         self.is_outdated = true;
@@ -326,10 +295,10 @@ impl Replica {
     pub fn restart(&mut self, terms: &Terms, keeps_world: bool) -> Result<(), RestoreError> {
         let WorldParts { change, chunk_size, .. } = self.confirmed.parts();
         if !keeps_world {
-            self.before.note(self.confirmed.world(), &change);
+            self.before.keep(change.inverse(self.confirmed.world()));
         }
-        let kept = if keeps_world { change } else { WorldChange::default() };
-        let change = WorldChange { next_field: terms.next_field, ..kept };
+        let kept = if keeps_world { change } else { Patch::default() };
+        let change = Patch { next_field: terms.next_field, ..kept };
         let (rules, loose) = (terms.rules.clone(), terms.loose);
         let parts = WorldParts { change, chunk_size, revision: 0, rules, loose };
         let settings = TerrainSettings { chunk_size, voxel_size: self.confirmed.voxel_size() };
@@ -348,7 +317,7 @@ impl Replica {
         bricks: Vec<(BrickPos, Arc<Brick>)>,
         fields: Vec<(ChunkPos, Fields)>,
         next_field: u64,
-    ) -> WorldChange {
+    ) -> Patch {
         let world = self.confirmed.world();
         let mut all: BTreeMap<BrickPos, Stored> =
             world.bricks_in(region).map(|(pos, _)| (pos, None)).collect();
@@ -358,14 +327,14 @@ impl Replica {
             .map(|chunk| (chunk, Fields::default()))
             .collect();
         chunks.extend(fields);
-        WorldChange { bricks: all.into_iter().collect(), fields: chunks.into_iter().collect(), next_field }
+        Patch { bricks: all.into_iter().collect(), fields: chunks.into_iter().collect(), next_field }
     }
 
     /// Whether the pending edits have the same results as before, despite the changes of the confirmed world.
     /// `next_field` is its old value.
     fn reads_nothing_of_before(&self, next_field: u64) -> bool {
         if self.pending.is_empty() {
-            return self.bricks.is_empty() && self.fields.is_empty();
+            return self.predicted.is_empty();
         }
         let world = self.world();
         // Pieces may come loose anywhere, and new fields have the next names.
@@ -379,15 +348,18 @@ impl Replica {
         let chunks: BTreeSet<ChunkPos> =
             reads.iter().flat_map(|samples| world.grid().chunks_of(*samples)).collect();
         let is_read = |pos: &BrickPos| reads.iter().any(|own| own.intersection(pos.samples()).is_some());
-        self.before.fields.keys().all(|chunk| !chunks.contains(chunk) && !self.fields.contains_key(chunk))
-            && self.before.bricks.keys().all(|pos| !is_read(pos) && !self.bricks.contains_key(pos))
+        self.before
+            .fields
+            .keys()
+            .all(|chunk| !chunks.contains(chunk) && !self.predicted.fields.contains_key(chunk))
+            && self.before.bricks.keys().all(|pos| !is_read(pos) && !self.predicted.bricks.contains_key(pos))
     }
 
     /// Updates the shown world. Returns its change, if there is one, and the receipts of the pending edits that were
     /// predicted last, in order.
     pub fn update(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
         // Names of fields may differ that were drafted one after the other.
-        self.is_outdated |= self.pending.is_empty() && !(self.bricks.is_empty() && self.fields.is_empty());
+        self.is_outdated |= self.pending.is_empty() && !self.predicted.is_empty();
         let updated = match self.can_append().then(|| self.append()).flatten() {
             Some((change, receipts)) => (change, Some(receipts)),
             None => {
@@ -424,35 +396,20 @@ impl Replica {
         self.appended = 0;
         shown.submit_edits(&edits);
         let mut receipts = shown.take_answered();
-        let (mut bricks, mut fields) = (BTreeMap::new(), BTreeMap::new());
+        let mut change = Patch::default();
         while let Some(transaction) = shown.begin() {
             let commit = transaction.run();
-            let WorldChange { bricks: new, fields: renamed, .. } = commit.change();
-            bricks.extend(new);
-            fields.extend(renamed);
+            change.then(commit.change());
             // It is the one under way.
             receipts.extend(shown.commit(commit).unwrap_or_default());
         }
         let world = self.confirmed.world();
-        for (pos, brick) in &bricks {
-            if Brick::is_same(brick.as_ref(), world.brick(*pos)) {
-                self.bricks.remove(pos);
-            } else {
-                self.bricks.insert(*pos, brick.clone());
-            }
-        }
-        for (chunk, own) in &fields {
-            if *own == fields_of(world, *chunk) {
-                self.fields.remove(chunk);
-            } else {
-                self.fields.insert(*chunk, own.clone());
-            }
-        }
+        self.predicted.lay(&change);
+        self.predicted.forget(world, &change.places());
         (self.samples, self.next_field) = (shown.world().regions_hash(), shown.world().next_field());
         self.more = self.samples.wrapping_sub(world.regions_hash());
-        let (bricks, fields) = (bricks.into_iter().collect(), fields.into_iter().collect());
-        let change = WorldChange { bricks, fields, next_field: self.next_field };
-        let is_empty = change.bricks.is_empty() && change.fields.is_empty();
+        change.next_field = self.next_field;
+        let is_empty = change.is_empty();
         let hash = self.shown_hash();
         Some(((!is_empty).then_some(ShownChange { change, hash }), receipts))
     }
@@ -461,10 +418,7 @@ impl Replica {
     fn fork_shown(&self) -> Option<Terrain> {
         let mut shown = self.confirmed.fork().ok()?;
         never_shown(&mut shown);
-        let bricks = self.bricks.iter().map(|(pos, brick)| (*pos, brick.clone())).collect();
-        let fields = self.fields.iter().map(|(chunk, fields)| (*chunk, fields.clone())).collect();
-        let change = WorldChange { bricks, fields, next_field: self.next_field };
-        shown.apply_change(change, Some(self.shown_hash())).ok()?;
+        shown.apply_change(self.predicted.patch(self.next_field), Some(self.shown_hash())).ok()?;
         Some(shown)
     }
 
@@ -482,39 +436,23 @@ impl Replica {
         let edits: Vec<Edit> = self.pending.iter().map(|pending| pending.edit.clone()).collect();
         let draft = self.confirmed.draft(&edits);
         let (world, before) = (self.confirmed.world(), std::mem::take(&mut self.before));
-        let drafted = |pos: BrickPos, brick: &Stored| !Brick::is_same(brick.as_ref(), world.brick(pos));
-        let mut bricks: BTreeMap<BrickPos, Stored> = draft.change.bricks.into_iter().collect();
-        bricks.retain(|pos, brick| drafted(*pos, brick));
-        let mut fields: BTreeMap<ChunkPos, Fields> = draft.change.fields.into_iter().collect();
-        fields.retain(|chunk, fields| *fields != fields_of(world, *chunk));
-        let mut change = WorldChange { next_field: draft.change.next_field, ..WorldChange::default() };
-        let places: BTreeSet<BrickPos> =
-            before.bricks.keys().chain(self.bricks.keys()).chain(bricks.keys()).copied().collect();
-        for pos in places {
-            let old = self.bricks.get(&pos).or(before.bricks.get(&pos)).map(Option::as_ref);
-            let old = old.unwrap_or_else(|| world.brick(pos));
-            let new = bricks.get(&pos).map_or_else(|| world.brick(pos), Option::as_ref);
-            if !Brick::is_same(old, new) {
-                change.bricks.push((pos, new.cloned()));
-            } else if let Some(drafted) = bricks.get_mut(&pos) {
-                // The one that is shown stays, so that it is held once.
-                *drafted = old.cloned();
-            }
-        }
-        let chunks: BTreeSet<ChunkPos> =
-            before.fields.keys().chain(self.fields.keys()).chain(fields.keys()).copied().collect();
-        for chunk in chunks {
-            let old = self.fields.get(&chunk).or(before.fields.get(&chunk)).cloned();
-            let old = old.unwrap_or_else(|| fields_of(world, chunk));
-            let new = fields.get(&chunk).cloned().unwrap_or_else(|| fields_of(world, chunk));
-            if old != new {
-                change.fields.push((chunk, new));
+        let mut predicted = Overlay::default();
+        predicted.lay(&draft.change);
+        predicted.forget(world, &draft.change.places());
+        let places = before.places().and(self.predicted.places()).and(predicted.places());
+        let confirmed = before.over(world);
+        let shown = self.predicted.over(&confirmed);
+        let change = Patch::between(&shown, &predicted.over(world), places, draft.change.next_field);
+        // Of equal bricks the one that is shown stays, so that it is held once.
+        for (pos, brick) in &mut predicted.bricks {
+            if change.bricks.binary_search_by_key(pos, |own| own.0).is_err() {
+                *brick = shown.brick(*pos).cloned();
             }
         }
         self.more = draft.regions_hash.wrapping_sub(world.regions_hash());
-        (self.bricks, self.fields, self.samples) = (bricks, fields, draft.regions_hash);
+        (self.predicted, self.samples) = (predicted, draft.regions_hash);
         self.next_field = change.next_field;
-        let is_empty = change.bricks.is_empty() && change.fields.is_empty();
+        let is_empty = change.is_empty();
         let shown = (!is_empty).then_some(ShownChange { change, hash: draft.hash });
         (shown, Some(draft.receipts))
     }
@@ -522,58 +460,23 @@ impl Replica {
     /// The change of the shown world if the confirmed world has changed apart from the pending edits, whose results
     /// stay.
     fn follow_apart(&mut self) -> Option<ShownChange> {
-        let Before { bricks, fields } = std::mem::take(&mut self.before);
+        let before = std::mem::take(&mut self.before);
         self.samples = self.world().regions_hash().wrapping_add(self.more);
         let (hash, world) = (self.shown_hash(), self.confirmed.world());
         self.next_field = self.next_field.max(world.next_field());
-        let bricks = bricks.into_iter().filter_map(|(pos, old)| {
-            let new = world.brick(pos);
-            (!Brick::is_same(old.as_ref(), new)).then(|| (pos, new.cloned()))
-        });
-        let fields = fields.into_iter().filter_map(|(chunk, old)| {
-            let new = fields_of(world, chunk);
-            (old != new).then_some((chunk, new))
-        });
-        let change =
-            WorldChange { bricks: bricks.collect(), fields: fields.collect(), next_field: self.next_field };
-        let is_empty = change.bricks.is_empty() && change.fields.is_empty();
+        let change = Patch::between(&before.over(world), world, before.places(), self.next_field);
+        let is_empty = change.is_empty();
         (!is_empty).then_some(ShownChange { change, hash })
     }
 
     /// What is to be put into a world, whatever it holds, so that it is what is to be shown.
     pub fn whole(&self, shown: &World) -> ShownChange {
         let world = self.confirmed.world();
-        let own = |pos: BrickPos| self.bricks.get(&pos).map_or_else(|| world.brick(pos), Option::as_ref);
-        let places: BTreeSet<BrickPos> = world
-            .bricks()
-            .map(|(pos, _)| pos)
-            .chain(self.bricks.keys().copied())
-            .chain(shown.bricks().map(|(pos, _)| pos))
-            .collect();
-        let chunks: BTreeSet<ChunkPos> = world
-            .fields()
-            .map(|(chunk, _)| chunk)
-            .chain(self.fields.keys().copied())
-            .chain(shown.fields().map(|(chunk, _)| chunk))
-            .collect();
-        let fields =
-            |chunk: ChunkPos| self.fields.get(&chunk).cloned().unwrap_or_else(|| fields_of(world, chunk));
-        let bricks = places.into_iter().filter_map(|pos| {
-            let own = own(pos);
-            (!Brick::is_same(own, shown.brick(pos))).then(|| (pos, own.cloned()))
-        });
-        let fields = chunks.into_iter().filter_map(|chunk| {
-            let own = fields(chunk);
-            (own != fields_of(shown, chunk)).then_some((chunk, own))
-        });
+        let places = Places::of(world).and(self.predicted.places()).and(Places::of(shown));
         let next_field = self.next_field.max(world.next_field());
-        let change = WorldChange { bricks: bricks.collect(), fields: fields.collect(), next_field };
+        let change = Patch::between(shown, &self.predicted.over(world), places, next_field);
         ShownChange { change, hash: self.shown_hash() }
     }
-}
-
-fn fields_of(world: &World, chunk: ChunkPos) -> Fields {
-    world.fields_of(chunk).cloned().unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -80,7 +80,7 @@ fn turn(rng: &mut Rng, reference: &Terrain) -> Entry {
             bricks.sort_unstable();
             let fields = world.fields().take(1).map(|(chunk, _)| (chunk, Fields::default())).collect();
             let bricks = bricks.into_iter().map(|pos| (pos, None)).collect();
-            let change = WorldChange { bricks, fields, next_field: world.next_field() };
+            let change = Patch { bricks, fields, next_field: world.next_field() };
             Entry::Parts { by: None, change: Arc::new(change) }
         }
     }
@@ -99,7 +99,7 @@ fn obey(terrain: &mut Terrain, entry: &Entry) {
         }
         Entry::Loose(loose) => terrain.set_loose(*loose),
         Entry::Parts { change, .. } => {
-            terrain.apply_change(WorldChange::clone(change), None).expect("they fit");
+            terrain.apply_change(Patch::clone(change), None).expect("they fit");
         }
         Entry::Mark => {}
     }

@@ -7,9 +7,10 @@ use bevy::prelude::*;
 use super::files::Files;
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::texts;
-use crate::plugin::{ThreadTask, Threads};
-use crate::store::{Level, StoreError, load_level, save_level};
+use crate::format::Level;
+use crate::store::{StoreError, load_level, save_level};
 use crate::terrain::{Terrain, TerrainError, TerrainSettings};
+use crate::threads::{ThreadTask, Threads};
 use crate::volume::DiggingRules;
 
 /// A level on its way.

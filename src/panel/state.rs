@@ -115,7 +115,7 @@ pub enum PanelAction {
     Redo,
     /// Saves a screenshot of the camera that draws the panel, including the panel.
     SavePicture,
-    /// Saves the terrain as a [level](crate::store::Level) in a task: where it was opened from or saved last, or else in the
+    /// Saves the terrain as a [level](crate::format::Level) in a task: where it was opened from or saved last, or else in the
     /// [folder](BurrowPanel::level). Asks before another level is replaced.
     SaveLevel,
     /// Saves the terrain as a level in the [folder](BurrowPanel::level). Asks before another level is replaced.

@@ -8,9 +8,10 @@ use super::plot::Line;
 use super::state::{BurrowPanel, Note, Verdict};
 use super::texts;
 use crate::backend::{Choice, EngineState};
-use crate::plugin::{BurrowEngine, BurrowFigures, MeshBytes, ThreadTask, Threads};
+use crate::plugin::{BurrowEngine, BurrowFigures, MeshBytes};
 use crate::surface::SeamReport;
 use crate::terrain::{Memory, Terrain, Version, World};
+use crate::threads::{ThreadTask, Threads};
 
 /// How often the terrain and the engine are examined.
 const PERIOD: Duration = Duration::from_millis(500);

@@ -4,8 +4,9 @@ use bevy::ecs::system::Commands;
 use bevy::log::warn;
 use bevy::prelude::{Entity, EntityWorldMut};
 
-use crate::plugin::{LooseGround, free_later};
+use crate::plugin::LooseGround;
 use crate::terrain::Terrain;
+use crate::threads::free_later;
 use crate::view::GroundLook;
 use crate::volume::DiggingRules;
 

@@ -8,9 +8,8 @@ use bevy_egui::egui::{
     emath::Numeric,
 };
 
-use super::PanelPlaces;
-use super::texts;
 use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
+use super::{PanelPlaces, texts};
 
 /// Positions of the widgets drawn in this frame.
 #[derive(Clone, Default)]

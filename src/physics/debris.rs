@@ -9,11 +9,11 @@ use super::debris_collider;
 use crate::ground::MaterialId;
 use crate::lattice::SNAP;
 use crate::plugin::{
-    BurrowSystems, GroundPiece, LoosePieceFound, LoosePieceReturned, MaterialColors, Places, ThreadTask,
-    Threads, panic_message, trigger_if_alive,
+    BurrowSystems, GroundPiece, LoosePieceFound, LoosePieceReturned, MaterialColors, Places, trigger_if_alive,
 };
 use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, PieceId, Terrain};
+use crate::threads::{ThreadTask, Threads, panic_message};
 
 /// Makes ground that broke off fall as a rigid body. Put a [`LooseGround`](crate::plugin::LooseGround) on the terrain;
 /// its `debris` is the largest piece that falls, in voxels. If the app has `Assets<Mesh>`, a piece is drawn from the

@@ -79,8 +79,8 @@ pub(super) fn find_near(
     }
     if !near.is(&known) {
         colliders.set_near(near.clone());
-        let with_levels = terrains.iter().filter(|(.., has_levels)| *has_levels);
-        wanted.0 = with_levels.map(|(terrain, ..)| (terrain, near.tiles(terrain).collect())).collect();
+        let with_lod = terrains.iter().filter(|(.., has_lod)| *has_lod);
+        wanted.0 = with_lod.map(|(terrain, ..)| (terrain, near.tiles(terrain).collect())).collect();
         *known = near;
     }
     figures.main_thread += start.elapsed();

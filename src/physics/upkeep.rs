@@ -15,8 +15,9 @@ use super::colliders::{BuiltCollider, GroundColliders, detach};
 use super::columns::{Columns, PartState, Parts};
 use super::ground::{GroundBody, GroundCollider};
 use super::near::Neighbourhood;
-use crate::plugin::{Part, TerrainEntities, ThreadTask, Threads, panic_message};
+use crate::plugin::{Part, TerrainEntities};
 use crate::terrain::{SurfaceDraft, Terrain};
+use crate::threads::{ThreadTask, Threads, panic_message};
 
 /// Colliders built by one task; few, so that the nearest ones are ready soon.
 const BATCH: usize = 16;

@@ -8,18 +8,18 @@ use bevy::prelude::*;
 use super::figures::MainThread;
 use super::inbox::Requests;
 use super::places::{Places, is_usable};
-use super::reach::reaches;
 use super::reports::{Report, Reports};
 use super::{
     BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LooseGround, LoosePieceFound, LoosePieceReturned,
-    Redo, TargetedBrush, Undo, free_later,
+    Redo, TargetedBrush, Undo,
 };
-use crate::brush::{Brush, BrushError, Edit, Operation};
+use crate::brush::{Brush, BrushError, Edit, reaches};
 use crate::lattice::ChunkGrid;
 use crate::terrain::{
     HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, ReturnedPiece, Terrain, Together,
     unique,
 };
+use crate::threads::free_later;
 
 /// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected at
 /// once, and so is a brush that reaches no terrain. Edits of a terrain with an [`EditOutbox`] are put there instead.
@@ -316,45 +316,8 @@ const EVEN: f32 = 1e-5;
 fn to_terrain(brush: &Brush, place: &GlobalTransform) -> Brush {
     let (scale, rotation, translation) = place.to_scale_rotation_translation();
     if (scale / scale.x).abs_diff_eq(Vec3::ONE, EVEN) {
-        evenly(brush, scale.x, rotation, translation)
+        brush.placed_in(scale.x, rotation, translation)
     } else {
-        stretched(brush, place.affine().matrix3, rotation.normalize(), translation)
+        brush.placed_in_stretched(place.affine().matrix3, rotation.normalize(), translation)
     }
-}
-
-/// The brush for a terrain that is scaled evenly.
-fn evenly(brush: &Brush, scale: f32, rotation: Quat, translation: Vec3) -> Brush {
-    let (rotation, scale) = (rotation.inverse(), scale.recip());
-    brush.transformed(rotation, rotation * -translation * scale, scale)
-}
-
-/// The brush for a terrain that a parent stretches: points are transformed exactly, and sizes, which have no direction, are
-/// scaled by the cube root of the change in volume.
-fn stretched(brush: &Brush, matrix: Mat3A, rotation: Quat, translation: Vec3) -> Brush {
-    let scale = matrix.determinant().abs().cbrt();
-    let mut brush = evenly(brush, scale, rotation, translation);
-    // The rest of the transform into the terrain.
-    let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;
-    let stretch = |point: &mut Vec3| *point = rest * *point;
-    let lift = |height: &mut f32| *height *= rest.y_axis.y;
-    brush.shape = brush.shape.stretched(|arrow| rest * arrow);
-    match &mut brush.operation {
-        Operation::Flatten { point, normal } => {
-            stretch(point);
-            *normal = rest.inverse().transpose() * *normal;
-        }
-        Operation::Level { height } => lift(height),
-        Operation::Terrace { step, base } => [step, base].into_iter().for_each(lift),
-        Operation::Stamp { stamp } => stretch(&mut stamp.center),
-        // They have no position or height; amounts are scaled like sizes.
-        Operation::Dig
-        | Operation::Add { .. }
-        | Operation::Paint { .. }
-        | Operation::Smooth
-        | Operation::Sharpen
-        | Operation::Raise { .. }
-        | Operation::Lower { .. }
-        | Operation::Reset => {}
-    }
-    brush
 }

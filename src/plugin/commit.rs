@@ -10,18 +10,19 @@ use super::collect::{HistoryMessages, send_history};
 use super::diagnostics::measure_commit;
 use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive};
 use super::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
-use super::level_state::{LevelState, ShownLevels, WantedTiles, Watchers};
 use super::load::Loading;
+use super::lod_state::{LodState, ShownLevels, WantedTiles, Watchers};
 use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface};
 use super::reports::{Report, Reports};
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
-    LoosePieceFound, MaterialColors, SlimVertices, free_later,
+    LoosePieceFound, MaterialColors, SlimVertices,
 };
 use crate::lattice::ChunkPos;
-use crate::terrain::{Drawn, FieldNews, Receipt, Rejection, Terrain, World as Ground};
+use crate::terrain::{Drawn, FieldNews, Receipt, Rejection, Terrain, World as TerrainWorld};
+use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
 pub(super) fn begin_transactions(
@@ -33,7 +34,7 @@ pub(super) fn begin_transactions(
             &TerrainEntities,
             Option<&MaterialColors>,
             Has<SlimVertices>,
-            Option<&mut LevelState>,
+            Option<&mut LodState>,
         ),
         (Without<Loading>, Without<InFlight>, Without<Held>),
     >,
@@ -97,7 +98,7 @@ pub(super) fn commit_transactions(
         &mut Terrain,
         &mut TerrainEntities,
         &mut InFlight,
-        Option<(&mut LevelState, Option<&mut ShownLevels>, &Watchers)>,
+        Option<(&mut LodState, Option<&mut ShownLevels>, &Watchers)>,
     )>,
     mut display: Display,
     mut messages: CommitMessages,
@@ -141,7 +142,7 @@ fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
     mut entities: Mut<TerrainEntities>,
-    levels: Option<(Mut<LevelState>, Option<Mut<ShownLevels>>, &Watchers)>,
+    levels: Option<(Mut<LodState>, Option<Mut<ShownLevels>>, &Watchers)>,
     output: Option<TaskOutput>,
     display: &mut Display,
     messages: &mut CommitMessages,
@@ -257,7 +258,7 @@ impl Display<'_, '_> {
     /// Shows all that a commit changed of a terrain.
     fn show(
         &mut self,
-        (entity, world): (Entity, &Ground),
+        (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
         surfaces: Vec<BuiltSurface>,
         fields: &[(ChunkPos, FieldNews)],
@@ -279,7 +280,7 @@ impl Display<'_, '_> {
     /// Shows a tile or chunk with its new surface, if it has a new one; spawns its entity if it has none yet.
     fn show_part(
         &mut self,
-        (entity, world): (Entity, &Ground),
+        (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
         drawn: Drawn,
         built: Option<BuiltSurface>,
@@ -318,7 +319,7 @@ impl Display<'_, '_> {
     /// Shows nodes as they are drawn from now on.
     fn show_nodes(
         &mut self,
-        (entity, world): (Entity, &Ground),
+        (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
         nodes: Vec<BuiltNode>,
     ) {

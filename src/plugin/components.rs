@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use super::places::TerrainPlace;
 use crate::brush::Edit;
 use crate::lattice::{ChunkPos, TilePos};
-use crate::levels::Node;
+use crate::lod::Node;
 use crate::terrain::{HistoryStep, Terrain};
 use crate::volume;
 

@@ -6,9 +6,9 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::BurrowEngine;
-use super::threads::Threads;
 use crate::backend::{Engine, EngineState};
 use crate::terrain::Terrain;
+use crate::threads::Threads;
 
 /// How often engines free memory that they have not used lately.
 const TRIMMED_EVERY: Duration = Duration::from_secs(30);

@@ -9,7 +9,7 @@ use super::{
     Chunk, CommitAction, Field, FieldChanged, FieldCreated, FieldMerged, ShownSurface, TerrainReady, Tile,
 };
 use crate::lattice::{ChunkPos, TilePos};
-use crate::levels::Node;
+use crate::lod::Node;
 use crate::terrain::{Drawn, FieldNews, Terrain, Version, World};
 use crate::volume::{self, FieldId};
 
@@ -22,7 +22,7 @@ pub struct TerrainEntities {
     /// Whether they were built with [`SlimVertices`](super::SlimVertices).
     pub(super) is_slim: bool,
     /// Whether they were built with [`LevelsOfDetail`](super::LevelsOfDetail).
-    pub(super) has_levels: bool,
+    pub(super) has_lod: bool,
     /// Whether all of them have to be rebuilt.
     pub(super) is_outdated: bool,
     drawn: HashMap<Drawn, Entity>,
@@ -36,12 +36,12 @@ pub struct TerrainEntities {
 }
 
 impl TerrainEntities {
-    pub(super) fn new(shown: Version, voxel_size: f32, is_slim: bool, has_levels: bool) -> Self {
+    pub(super) fn new(shown: Version, voxel_size: f32, is_slim: bool, has_lod: bool) -> Self {
         Self {
             shown,
             voxel_size,
             is_slim,
-            has_levels,
+            has_lod,
             is_outdated: false,
             drawn: HashMap::default(),
             nodes: HashMap::default(),
@@ -102,7 +102,7 @@ impl TerrainEntities {
     /// Might a body over this tile fall through, as the tile has no entity yet that could have a collider?
     #[cfg(feature = "avian")]
     pub(crate) fn lack(&self, tile: TilePos) -> bool {
-        self.has_levels && !self.drawn.contains_key(&Drawn::Tile(tile))
+        self.has_lod && !self.drawn.contains_key(&Drawn::Tile(tile))
     }
 
     /// The entity with the mesh of a node, which is spawned if there is none. One of level 0 is its tile's.

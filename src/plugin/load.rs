@@ -10,35 +10,35 @@ use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
-use super::level_state::{LevelState, LevelsOfDetail, ShownLevels};
+use super::lod_state::{LevelsOfDetail, LodState, ShownLevels};
 use super::meshes::{BuiltMesh, MeshFacts, VertexExtras};
 use super::places::{LocalPlaces, TerrainPlace, place_terrain};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::reports::{Report, Reports};
 use super::task::{InFlight, TaskCounter};
-use super::threads::{ThreadTask, Threads, panic_message};
 use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SlimVertices};
 use crate::lattice::ChunkPos;
-use crate::levels::Cut;
+use crate::lod::Cut;
 use crate::terrain::{Drawn, DrawnCut, KnownNodes, Terrain, World};
+use crate::threads::{ThreadTask, Threads, panic_message};
 
 /// Surfaces of one snapshot that are built, and passed to the renderer, until all can be shown.
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
     is_slim: bool,
-    has_levels: bool,
+    has_lod: bool,
     task: Option<ThreadTask<BuiltWorld>>,
     waiting: Vec<BuiltSurface>,
     ready: HashMap<Drawn, Loaded>,
-    levels: Option<BuiltLevels>,
+    levels: Option<BuiltNodes>,
 }
 
 /// Everything that is built of a world.
-type BuiltWorld = (Vec<BuiltSurface>, Option<BuiltLevels>);
+type BuiltWorld = (Vec<BuiltSurface>, Option<BuiltNodes>);
 
 /// The coarsest nodes of a world with levels of detail.
-struct BuiltLevels {
+struct BuiltNodes {
     drawn: DrawnCut,
     nodes: Vec<BuiltNode>,
     known: Arc<KnownNodes>,
@@ -174,7 +174,7 @@ pub(super) fn remove_with_terrain(
     if let Ok((entities, children)) = terrains.get(gone.entity) {
         entities.despawn(&mut commands, children);
     }
-    commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight, LevelState)>();
+    commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight, LodState)>();
 }
 
 /// Cancels a load without slim vertices when a terrain gets them; it is then loaded again with them.
@@ -218,9 +218,9 @@ pub(super) fn start_loading(
     settings: Res<BurrowSettings>,
     mut counter: ResMut<TaskCounter>,
 ) {
-    for (entity, mut terrain, colors, is_slim, has_levels, entities) in &mut terrains {
+    for (entity, mut terrain, colors, is_slim, has_lod, entities) in &mut terrains {
         let is_same_kind = |entities: &&TerrainEntities| {
-            !entities.is_outdated && (entities.is_slim, entities.has_levels) == (is_slim, has_levels)
+            !entities.is_outdated && (entities.is_slim, entities.has_lod) == (is_slim, has_lod)
         };
         let entities_of_kind = entities.filter(is_same_kind);
         if entities_of_kind.is_some_and(|entities| entities.show(terrain.world())) {
@@ -239,15 +239,15 @@ pub(super) fn start_loading(
         }
         model.watch();
         let world = model.snapshot();
-        let task = (!builder.is_idle() || has_levels).then(|| {
+        let task = (!builder.is_idle() || has_lod).then(|| {
             let world = Arc::clone(&world);
-            ThreadTask::start(Threads::Background, move || match has_levels {
-                true => build_levels(&world, &builder),
+            ThreadTask::start(Threads::Background, move || match has_lod {
+                true => build_nodes(&world, &builder),
                 false => (build_world(&world, &builder), None),
             })
         });
         let (waiting, ready) = (Vec::new(), HashMap::default());
-        let loading = Loading { world, is_slim, has_levels, task, waiting, ready, levels: None };
+        let loading = Loading { world, is_slim, has_lod, task, waiting, ready, levels: None };
         commands.entity(entity).try_insert(loading);
     }
 }
@@ -261,16 +261,16 @@ fn build_world(world: &World, builder: &SurfaceBuilder) -> Vec<BuiltSurface> {
 }
 
 /// Builds the coarsest nodes of a world, and what processors make of its edited chunks.
-fn build_levels(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
+fn build_nodes(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
     let _span = info_span!("burrow_load").entered();
     let known = Arc::new(KnownNodes::default());
-    let cut = Cut::coarsest(world.level_grid(u8::MAX));
+    let cut = Cut::coarsest(world.lod_grid(u8::MAX));
     known.learn(world, cut.grid(), cut.nodes());
     let (drawn, updates) = world.draw_cut(cut);
     let chunks: Vec<Drawn> = world.drawn_chunks().map(Drawn::Chunk).collect();
     let build = |&drawn: &Drawn| builder.build((drawn, false), false, || world.draft(drawn));
     let chunks = chunks.par_iter().map(build).collect();
-    (chunks, Some(BuiltLevels { drawn, nodes: builder.build_nodes(updates), known }))
+    (chunks, Some(BuiltNodes { drawn, nodes: builder.build_nodes(updates), known }))
 }
 
 /// The number of attempts to load a terrain whose load panics.
@@ -346,7 +346,7 @@ pub(super) fn finish_loading(
         let mut entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
         let model = terrain.bypass_change_detection();
         match levels {
-            Some(BuiltLevels { drawn, nodes, known }) => {
+            Some(BuiltNodes { drawn, nodes, known }) => {
                 show_nodes(
                     &mut commands,
                     (entity, &loading.world),
@@ -355,11 +355,11 @@ pub(super) fn finish_loading(
                     nodes,
                 );
                 let shown = ShownLevels::of(drawn.cut(), drawn.cut().nodes().count());
-                commands.entity(entity).try_insert((LevelState::new(known), shown));
+                commands.entity(entity).try_insert((LodState::new(known), shown));
                 model.draw_from_now_on(Some(Arc::new(drawn)));
             }
             None => {
-                commands.entity(entity).try_remove::<LevelState>();
+                commands.entity(entity).try_remove::<LodState>();
                 model.draw_from_now_on(None);
                 // Changes that the game made meanwhile are shown next.
                 if entities.show(model.world()) {
@@ -378,12 +378,12 @@ fn show(
     loading: &mut Loading,
 ) -> TerrainEntities {
     let world = Arc::clone(&loading.world);
-    let (version, has_levels) = (world.version(), loading.has_levels);
-    let mut entities = TerrainEntities::new(version, voxel_size, loading.is_slim, has_levels);
+    let (version, has_lod) = (world.version(), loading.has_lod);
+    let mut entities = TerrainEntities::new(version, voxel_size, loading.is_slim, has_lod);
     let with_fields = world.fields().map(|(chunk, _)| chunk);
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     // With levels, tiles come as they are drawn.
-    let tiles = (!has_levels).then(|| world.grid().tiles().map(Drawn::Tile)).into_iter().flatten();
+    let tiles = (!has_lod).then(|| world.grid().tiles().map(Drawn::Tile)).into_iter().flatten();
     for drawn in tiles.chain(chunks.into_iter().map(Drawn::Chunk)) {
         let child = entities.spawn(commands, terrain, &world, drawn);
         if let Some(Loaded { mesh, built }) = loading.ready.remove(&drawn) {

@@ -29,9 +29,9 @@ mod entities;
 mod figures;
 mod heightmap;
 mod inbox;
-mod level_state;
-mod levels;
 mod load;
+mod lod;
+mod lod_state;
 #[cfg(feature = "render")]
 mod materials;
 mod meshes;
@@ -43,12 +43,10 @@ mod places;
 mod processor;
 mod propagate;
 mod query;
-mod reach;
 mod redraw;
 mod reports;
 mod settings;
 mod task;
-mod threads;
 mod times;
 
 pub use components::{
@@ -61,8 +59,8 @@ pub use figures::BurrowFigures;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
-pub(crate) use level_state::WantedTiles;
-pub use level_state::{DetailSource, LevelsOfDetail, ShownLevels};
+pub(crate) use lod_state::WantedTiles;
+pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[cfg(feature = "render")]
 pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
 pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
@@ -81,18 +79,13 @@ pub(crate) use propagate::{Inherited, remove_inherited};
 pub use query::{TerrainHit, Terrains};
 pub use redraw::Redraw;
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
-pub use threads::ThreadSettings;
-pub(crate) use threads::free_later;
-#[cfg(feature = "avian")]
-pub(crate) use threads::panic_message;
-#[cfg(any(feature = "render", feature = "avian", feature = "store"))]
-pub(crate) use threads::{ThreadTask, Threads};
 pub use times::Times;
 
 use bevy::ecs::reflect::ReflectMessage;
 use bevy::prelude::*;
 
 use crate::brush::Brush;
+pub use crate::threads::ThreadSettings;
 
 /// The plugin's system sets in `Update`, in this order.
 ///
@@ -202,17 +195,15 @@ impl Plugin for TerrainPlugin {
                         load::drop_replaced,
                         load::start_loading,
                         places::place_terrains,
-                        levels::find_eyes,
+                        lod::find_eyes,
                         load::finish_loading,
-                        levels::keep_wanted_tiles,
+                        lod::keep_wanted_tiles,
                     )
                         .chain()
                         .in_set(BurrowSystems::Load),
                     (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
                     commit::commit_transactions.in_set(BurrowSystems::Commit),
-                    (levels::begin_level_changes, commit::begin_transactions)
-                        .chain()
-                        .in_set(BurrowSystems::Begin),
+                    (lod::begin_lod_changes, commit::begin_transactions).chain().in_set(BurrowSystems::Begin),
                 ),
             );
         #[cfg(feature = "replicon")]
@@ -222,7 +213,7 @@ impl Plugin for TerrainPlugin {
         );
         app.add_systems(
             First,
-            threads::resize_pools
+            crate::threads::resize_pools
                 .run_if(resource_exists_and_changed::<ThreadSettings>)
                 .after(bevy::ecs::message::MessageUpdateSystems),
         );

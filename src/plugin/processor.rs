@@ -12,7 +12,7 @@ use bevy::prelude::*;
 use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
 use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
-use crate::levels::Node;
+use crate::lod::Node;
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Drawn, DrawnCut, NodeUpdate, SurfaceDraft, Terrain};
 

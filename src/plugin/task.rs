@@ -9,9 +9,9 @@ use super::LoosePieceFound;
 use super::collect::{pieces, pieces_again};
 use super::figures::TaskTimes;
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
-use super::threads::{ThreadTask, Threads};
 use crate::backend::Engine;
 use crate::terrain::{Commit, Drawn, SurfaceDraft, Terrain, Transaction, Unseen};
+use crate::threads::{ThreadTask, Threads};
 
 /// The running task of a terrain.
 #[derive(Component)]

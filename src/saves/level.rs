@@ -16,9 +16,10 @@ use bevy::prelude::*;
 
 use super::components::{WorldStore, hold_now, warn_without_plugin};
 use super::opening::release;
-use crate::plugin::{ThreadTask, Threads, free_later};
-use crate::store::{FormatError, Level, LevelFiles, RestoreLevelError, pack_level, read_level, unpack_level};
+use crate::format::{FormatError, Level, LevelFiles, pack_level, read_level, unpack_level};
+use crate::store::RestoreLevelError;
 use crate::terrain::{Terrain, Version};
+use crate::threads::{ThreadTask, Threads, free_later};
 
 /// A level, packed in one file with the extension `burrow_level`. Its content is checked when it is loaded; that it
 /// fits its ground, when a terrain is made of it.
@@ -31,7 +32,7 @@ impl BurrowLevel {
     /// # Errors
     /// When settings hold numbers that can't be written.
     pub fn new(level: &Level) -> Result<Self, FormatError> {
-        crate::store::write_level(level).map(Self)
+        crate::format::write_level(level).map(Self)
     }
 
     /// A terrain of the level over the ground that it was made on.

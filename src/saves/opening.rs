@@ -12,10 +12,12 @@ use super::closing::{ClosingWorlds, detach};
 use super::components::{HeldHere, LevelId, SavedWorld, Unopened, WorldStore, hold_now};
 use super::level::{BurrowLevel, FindLevel, MakingLevel, StartLevel, Waiting};
 use super::messages::{ClosedBecause, StoreTroubleFound, WorldOpened};
+use crate::format::read_level;
 use crate::ground::Ground;
-use crate::plugin::{Held, ThreadTask, Threads, free_later};
-use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble, read_level};
+use crate::plugin::Held;
+use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble};
 use crate::terrain::{Terrain, TerrainSettings, Version, WorldParts};
+use crate::threads::{ThreadTask, Threads, free_later};
 
 /// How long to wait for a world that is open elsewhere: longer than an exiting server takes to close it.
 const LOCK_WAIT: Duration = Duration::from_secs(15);

@@ -7,14 +7,15 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::StoreError;
-use super::format::level::Level;
-use super::format::portable::SavedRegion;
-use super::format::region::region_key;
 use super::region::Region;
+use crate::format::level::Level;
+use crate::format::portable::SavedRegion;
+use crate::format::region::region_key;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, RegionPos};
-use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldChange, WorldParts, brick_over};
-use crate::volume::{Brick, Fields};
+use crate::lattice::{BrickPos, ChunkPos, RegionPos};
+use crate::terrain::{Patch, RestoreError, Terrain, TerrainSettings, WorldParts, brick_over};
+use crate::volume::{Brick, Fields, NO_FIELDS};
+use crate::world::{Places, State};
 
 /// A level below a world, for [`StoreOptions::level`](super::StoreOptions::level).
 #[derive(Clone)]
@@ -127,27 +128,38 @@ impl BaseLevel {
 
     /// The differences of a region from the level, for chunks of this size; `None` stands for bricks that are pristine
     /// again.
-    pub(super) fn difference(&self, at: RegionPos, now: &Region, chunk_size: u32) -> WorldChange {
+    pub(super) fn difference(&self, at: RegionPos, now: &Region, chunk_size: u32) -> Patch {
         let nothing = SavedRegion::default();
-        let below = self.level.regions.get(&at).unwrap_or(&nothing);
-        let mut change = WorldChange::default();
-        let is_new = |(pos, brick): &(&BrickPos, &Arc<Brick>)| {
-            find(&below.bricks, pos).is_none_or(|old| !Brick::is_same(Some(old), Some(brick)))
-        };
-        let new = now.bricks.iter().filter(is_new).map(|(pos, brick)| (*pos, Some(Arc::clone(brick))));
-        change.bricks.extend(new);
-        let gone = below.bricks.iter().filter(|(pos, _)| !now.bricks.contains_key(pos));
-        change.bricks.extend(gone.map(|(pos, _)| (*pos, None)));
-        change.bricks.sort_unstable_by_key(|(pos, _)| *pos);
+        let region = self.level.regions.get(&at).unwrap_or(&nothing);
         // Fields of other chunks are other fields.
         let is_alike = self.level.settings.chunk_size == chunk_size;
-        let fields = if is_alike { &below.fields[..] } else { &[] };
-        let new = now.fields.iter().filter(|(chunk, own)| find(fields, chunk) != Some(*own));
-        change.fields.extend(new.map(|(chunk, own)| (*chunk, own.clone())));
-        let gone = fields.iter().filter(|(chunk, _)| !now.fields.contains_key(chunk));
-        change.fields.extend(gone.map(|(chunk, _)| (*chunk, Fields::default())));
-        change.fields.sort_unstable_by_key(|(chunk, _)| *chunk);
-        change
+        let below = Below { bricks: &region.bricks, fields: if is_alike { &region.fields } else { &[] } };
+        Patch::between(&below, now, now.places().and(below.places()), 0)
+    }
+}
+
+/// What a level holds in a region: bricks and fields, in order.
+struct Below<'a> {
+    bricks: &'a [(BrickPos, Arc<Brick>)],
+    fields: &'a [(ChunkPos, Fields)],
+}
+
+impl Below<'_> {
+    fn places(&self) -> Places {
+        Places {
+            bricks: self.bricks.iter().map(|(pos, _)| *pos).collect(),
+            chunks: self.fields.iter().map(|(chunk, _)| *chunk).collect(),
+        }
+    }
+}
+
+impl State for Below<'_> {
+    fn brick(&self, pos: BrickPos) -> Option<&Arc<Brick>> {
+        find(self.bricks, &pos)
+    }
+
+    fn fields(&self, chunk: ChunkPos) -> &Fields {
+        find(self.fields, &chunk).unwrap_or(&NO_FIELDS)
     }
 }
 

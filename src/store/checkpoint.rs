@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use glam::IVec3;
 
 use super::base_level::LevelName;
-use super::format::Metadata;
 use super::ground_size::GroundSize;
 use super::mirror::Mirror;
+use crate::format::Metadata;
 use crate::lattice::RegionPos;
 
 /// A world at one frame of the journal, but for the content of its regions.

@@ -3,10 +3,10 @@
 use std::io;
 
 use super::files::{Files, Opening};
-use super::format::FormatError;
-use super::format::frame::{self, Kind, WorldId};
 use super::quarantine;
 use super::segment::{FOLDER, FRAME_LIMIT};
+use crate::format::FormatError;
+use crate::format::frame::{self, Kind, WorldId};
 
 /// The file, and its name while it is not complete.
 const PATHS: [&str; 2] = ["journal/checkpoint", "journal/checkpoint.new"];

@@ -4,18 +4,17 @@ use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use super::checkpoint::Checkpoint;
-use super::checkpoint_copy;
 use super::error::StoreError;
-use super::format;
-use super::format::change::put_change;
-use super::format::frame::{self, Kind};
 use super::ground_size::GroundSize;
-use super::keys;
 use super::mirror::Mirror;
 use super::progress::Work;
 use super::region::Region;
 use super::segment::FRAME_LIMIT;
 use super::writer::{CHECKPOINT_TIME, Message, Writer};
+use super::{checkpoint_copy, keys};
+use crate::format;
+use crate::format::change::put_change;
+use crate::format::frame::{self, Kind};
 use crate::lattice::RegionPos;
 use crate::terrain::SIMULATION;
 

@@ -5,22 +5,21 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use super::checkpoint::Checkpoint;
-use super::checkpoint_copy;
 use super::database::DATABASE;
 use super::error::StoreError;
 use super::files::Files;
-use super::format::bytes::Reader;
-use super::format::change::read_change;
-use super::format::frame::{self, Kind, WorldId};
-use super::format::{self, Batch, FormatError, Metadata};
 use super::keys::{self, Key};
 use super::progress::{Progress, Work};
 use super::segment::{self, Bad, FRAME_LIMIT, Found, Frame, MOST_NUMBER};
 use super::sources::{self, Source};
-use super::unsaved;
+use super::{checkpoint_copy, unsaved};
+use crate::format::bytes::Reader;
+use crate::format::change::read_change;
+use crate::format::frame::{self, Kind, WorldId};
+use crate::format::{self, Batch, FormatError, Metadata};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{TerrainSettings, WorldChange};
+use crate::terrain::{Patch, TerrainSettings};
 
 /// The share of opening after which the database is read, and all files.
 const DATABASE_READ: f32 = 0.08;
@@ -60,7 +59,7 @@ impl RegionRecord {
     }
 
     /// Its content, over a ground.
-    pub fn decode(&self, at: RegionPos, ground: &Ground) -> Result<WorldChange, FormatError> {
+    pub fn decode(&self, at: RegionPos, ground: &Ground) -> Result<Patch, FormatError> {
         let kind = if self.is_change { Kind::RegionChange } else { Kind::Region };
         let payload = frame::open(&self.sealed, kind, self.world, &keys::region(at), FRAME_LIMIT)?.payload;
         if self.is_change {
@@ -71,7 +70,7 @@ impl RegionRecord {
         }
         let (bricks, fields) = format::decode_region(&payload, at, ground)?;
         let bricks = bricks.into_iter().map(|(pos, brick)| (pos, Some(brick))).collect();
-        Ok(WorldChange { bricks, fields, ..WorldChange::default() })
+        Ok(Patch { bricks, fields, ..Patch::default() })
     }
 }
 

@@ -7,8 +7,6 @@ use std::sync::Arc;
 use super::base_level::{BaseLevel, LevelName};
 use super::error::{StoreError, StoreTrouble};
 use super::files::{Files, Folder};
-use super::format::Batch;
-use super::format::frame::WorldId;
 use super::found::Contents;
 use super::keys;
 use super::open_store::take_lock;
@@ -17,6 +15,8 @@ use super::recover::{self, recover};
 use super::segment::{self, Bad};
 use super::shared::apply_game;
 use super::sources::has_world;
+use crate::format::Batch;
+use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
 

@@ -5,9 +5,9 @@ use std::io;
 use std::sync::Arc;
 
 use super::files::{Files, OpenFile, Opening};
-use super::format::frame::WorldId;
 use super::segment::{self, FOLDER};
 use super::unsaved;
+use crate::format::frame::WorldId;
 
 /// The most bytes of a segment. Whole segments are removed, so the log is cut in steps of this.
 const SEGMENT_BYTES: u64 = 1 << 20;

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::error::StoreError;
-use super::format::FormatError;
-use super::format::level::{self, Level, LevelFiles};
-use super::format::limits::Limits;
+use crate::format::FormatError;
+use crate::format::level::{self, Level, LevelFiles};
+use crate::format::limits::Limits;
 use crate::ground::Ground;
 use crate::terrain::{RestoreError, Terrain};
 

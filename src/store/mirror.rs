@@ -2,12 +2,11 @@
 //! world itself.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 use super::base_level::BaseLevel;
 use super::region::Region;
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, RegionPos};
-use crate::terrain::{CommitRecord, LogEntry, LooseSettings, WorldChange, WorldParts};
+use crate::lattice::{ChunkGrid, RegionPos};
+use crate::terrain::{CommitRecord, LogEntry, LooseSettings, Patch, WorldParts};
 use crate::volume::DiggingRules;
 
 /// A world by regions.
@@ -79,25 +78,11 @@ impl Mirror {
         (self.revision, self.hash) = (record.revision, record.hash);
     }
 
-    fn apply_change(&mut self, change: &WorldChange, revision: u64) {
-        let mut touched = BTreeSet::new();
-        for (pos, brick) in &change.bricks {
-            let at = RegionPos::of(*pos);
-            let region = self.regions.entry(at).or_default();
-            match brick {
-                Some(brick) => drop(region.bricks.insert(*pos, Arc::clone(brick))),
-                None => drop(region.bricks.remove(pos)),
-            }
-            touched.insert(at);
-        }
-        for (chunk, fields) in &change.fields {
-            let at = self.region_of(*chunk);
-            let region = self.regions.entry(at).or_default();
-            match fields.is_empty() {
-                false => drop(region.fields.insert(*chunk, fields.clone())),
-                true => drop(region.fields.remove(chunk)),
-            }
-            touched.insert(at);
+    fn apply_change(&mut self, change: &Patch, revision: u64) {
+        let mut touched = Vec::new();
+        for (at, part) in change.by_region(self.grid) {
+            self.regions.entry(at).or_default().apply(part);
+            touched.push(at);
         }
         self.settle(touched, revision);
         self.next_field = self.next_field.max(change.next_field);
@@ -139,11 +124,6 @@ impl Mirror {
         for (at, region) in &mut self.regions {
             region.revision = revisions.get(at).copied().unwrap_or(region.revision);
         }
-    }
-
-    /// The region whose record holds the fields of a chunk.
-    pub fn region_of(&self, chunk: ChunkPos) -> RegionPos {
-        RegionPos::of(BrickPos::of(self.grid.origin(chunk)))
     }
 
     /// Whether anything has changed since the last [`take_dirty`](Self::take_dirty).

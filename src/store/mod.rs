@@ -9,7 +9,6 @@ mod database;
 mod disk;
 mod error;
 mod files;
-pub(crate) mod format;
 mod found;
 mod ground_size;
 mod inspect;
@@ -40,12 +39,6 @@ pub use closing::ClosingStore;
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
 pub use error::{StoreError, StoreTrouble, WorldSize};
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
-pub use format::frame::WorldId;
-pub use format::level::{Level, LevelFiles, pack_level, read_level, unpack_level, write_level};
-pub use format::portable::{
-    PortableHead, PortableWorld, SavedRegion, read_portable, read_portable_head, write_portable,
-};
-pub use format::{Batch, FormatError, Metadata};
 pub use inspect::{WorldCheck, WorldInfo, check, check_in, inspect, inspect_in, read_world, replay};
 pub use levels::{RestoreLevelError, load_level, read_level_files, save_level};
 pub use open_store::{Opened, Store};

@@ -11,7 +11,6 @@ use super::closing::{ClosingStore, StoreThread};
 use super::database::DATABASE;
 use super::error::{StoreError, StoreTrouble, WorldSize};
 use super::files::{Files, Folder, Lock};
-use super::format::frame::WorldId;
 use super::found::Contents;
 use super::journal::Journal;
 use super::mirror::Mirror;
@@ -25,8 +24,9 @@ use super::shared::{GameChange, GameData, SavePoint, Shared, apply_game};
 use super::sources::has_world;
 use super::unsaved;
 use super::writer::{Answer, Content, Given, Message, Writer};
+use crate::format::frame::WorldId;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Terrain, TerrainSettings, Version, WorldChange};
+use crate::terrain::{CommitRecord, LogEntry, Patch, Terrain, TerrainSettings, Version};
 
 /// The file that is locked while a world is open.
 const LOCK: &str = "lock";
@@ -172,7 +172,7 @@ impl Store {
         writer.save_all()?;
         let mut store = Self::start(writer, shared, world, terrain)?;
         if !entries.is_empty() {
-            let change = WorldChange::default();
+            let change = Patch::default();
             store.append(vec![CommitRecord { revision, hash, entries, change }])?;
             store.flush()?;
         }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::error::StoreError;
-use super::format::frame::WorldId;
-use super::format::portable::{PortableWorld, read_portable, write_portable};
-use super::format::{FormatError, Metadata};
+use crate::format::frame::WorldId;
+use crate::format::portable::{PortableWorld, read_portable, write_portable};
+use crate::format::{FormatError, Metadata};
 use crate::ground::Ground;
 use crate::terrain::{SIMULATION, Terrain, TerrainSettings};
 

@@ -9,7 +9,6 @@ use rayon::prelude::*;
 use super::base_level::BaseLevel;
 use super::checkpoint::Checkpoint;
 use super::error::{StoreError, StoreTrouble};
-use super::format::Batch;
 use super::found::Contents;
 use super::ground_size::GroundSize;
 use super::keys;
@@ -18,11 +17,12 @@ use super::options::{BaseChanged, StoreOptions};
 use super::progress::{Progress, Work};
 use super::segment::{self, Frame};
 use super::shared::{GameData, apply_game};
+use crate::format::Batch;
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, RegionPos};
 use crate::terrain::{
-    CommitRecord, LogEntry, Meshing, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
-    WorldChange, WorldParts,
+    CommitRecord, LogEntry, Meshing, Patch, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
+    WorldParts,
 };
 use crate::volume::{DiggingRules, Field, Fields};
 
@@ -363,7 +363,7 @@ fn load_regions(
     bricks.retain(|(_, brick)| brick.is_some());
     fields.retain(|(_, fields)| !fields.is_empty());
     let next_field = metadata.next_field.max(below.change.next_field);
-    let mut change = WorldChange { bricks, fields, next_field };
+    let mut change = Patch { bricks, fields, next_field };
     if checkpoint.metadata.ground != ground.hash() {
         fit_fields(&mut change, grid);
     }
@@ -383,7 +383,7 @@ fn load_regions(
 }
 
 /// Cuts fields off where their chunk ends on a ground of another size: the last chunk has one column more than others.
-fn fit_fields(change: &mut WorldChange, grid: ChunkGrid) {
+fn fit_fields(change: &mut Patch, grid: ChunkGrid) {
     for (chunk, fields) in &mut change.fields {
         let own = grid.chunk_samples(*chunk).intersection(grid.edit_bounds());
         let own = own.filter(|_| grid.has_tile(chunk.tile()));
@@ -496,7 +496,7 @@ fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), 
             // Its fields are those of the other world.
             LogEntry::Change => {
                 let bricks = record.change.bricks.clone();
-                terrain.apply_change(WorldChange { bricks, ..WorldChange::default() }, None)?;
+                terrain.apply_change(Patch { bricks, ..Patch::default() }, None)?;
             }
         }
     }
@@ -506,7 +506,7 @@ fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), 
 }
 
 /// The cells along x and z that edited samples of bricks need.
-fn reach(change: &WorldChange) -> Option<GroundSize> {
+fn reach(change: &Patch) -> Option<GroundSize> {
     let bounds = change.bricks.iter().filter_map(|(pos, brick)| brick.as_ref()?.edited_bounds(*pos));
     let most = bounds.map(|bounds| bounds.max).reduce(IVec3::max)?;
     let cells = |at: i32| u32::try_from(at).unwrap_or_default();
@@ -552,7 +552,7 @@ mod tests {
     use super::super::{SimulatedDisk, Store};
     use super::*;
     use crate::brush::{Brush, Shape};
-    use crate::store::format::frame::WorldId;
+    use crate::format::frame::WorldId;
 
     /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,
     /// and with other hashes.

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::lattice::{BrickPos, ChunkPos};
-use crate::volume::{Brick, Fields};
+use crate::volume::{Brick, Fields, NO_FIELDS};
+use crate::world::{Patch, Places, State};
 
 /// The content of a region's record.
 #[derive(Clone, Debug, Default)]
@@ -23,5 +24,39 @@ impl Region {
     /// Whether it holds neither bricks nor fields.
     pub fn is_empty(&self) -> bool {
         self.bricks.is_empty() && self.fields.is_empty()
+    }
+
+    /// The positions at which it holds something.
+    pub fn places(&self) -> Places {
+        Places {
+            bricks: self.bricks.keys().copied().collect(),
+            chunks: self.fields.keys().copied().collect(),
+        }
+    }
+
+    /// Puts the parts of a patch in place.
+    pub fn apply(&mut self, patch: Patch) {
+        for (pos, brick) in patch.bricks {
+            match brick {
+                Some(brick) => drop(self.bricks.insert(pos, brick)),
+                None => drop(self.bricks.remove(&pos)),
+            }
+        }
+        for (chunk, fields) in patch.fields {
+            match fields.is_empty() {
+                false => drop(self.fields.insert(chunk, fields)),
+                true => drop(self.fields.remove(&chunk)),
+            }
+        }
+    }
+}
+
+impl State for Region {
+    fn brick(&self, pos: BrickPos) -> Option<&Arc<Brick>> {
+        self.bricks.get(&pos)
+    }
+
+    fn fields(&self, chunk: ChunkPos) -> &Fields {
+        self.fields.get(&chunk).unwrap_or(&NO_FIELDS)
     }
 }

@@ -1,7 +1,6 @@
 //! Salvages records of a damaged database by searching for their magic number in the whole file.
 
-use super::format::FormatError;
-use super::format::frame;
+use crate::format::{FormatError, frame};
 
 /// How often the bytes of a file may be looked at: records that lie in one another are none, but each has to be tried.
 const MOST_PASSES: usize = 8;

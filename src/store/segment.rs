@@ -11,9 +11,9 @@ use std::ops::Range;
 
 use super::base_level::BaseLevel;
 use super::files::Files;
-use super::format::FormatError;
-use super::format::frame::{self, Kind, WorldId};
 use super::reading::{is_refused, read_file};
+use crate::format::FormatError;
+use crate::format::frame::{self, Kind, WorldId};
 use crate::ground::Ground;
 use crate::terrain::SIMULATION;
 

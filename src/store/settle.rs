@@ -8,12 +8,10 @@ use super::error::StoreTrouble;
 use super::files::{Files, Opening};
 use super::found::Contents;
 use super::journal::Segment;
-use super::keys;
-use super::quarantine;
 use super::reading::read_file;
 use super::recover::Recovered;
 use super::segment::{self, Found};
-use super::unsaved;
+use super::{keys, quarantine, unsaved};
 use crate::lattice::RegionPos;
 
 /// A journal that can continue.

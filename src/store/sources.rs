@@ -6,13 +6,12 @@ use super::checkpoint::Checkpoint;
 use super::database::{self, DATABASE, DatabaseError, UNFINISHED};
 use super::error::StoreError;
 use super::files::{Files, Opening};
-use super::format::FormatError;
-use super::format::frame::{self, Kind, WorldId};
 use super::keys::{self, Key};
-use super::quarantine;
 use super::reading::{FileBytes, is_refused, read_file};
-use super::salvage;
 use super::segment::{self, FRAME_LIMIT};
+use super::{quarantine, salvage};
+use crate::format::FormatError;
+use crate::format::frame::{self, Kind, WorldId};
 
 /// Files in quarantine that are looked at, the latest first.
 const MOST_KEPT: usize = 8;

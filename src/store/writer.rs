@@ -10,8 +10,6 @@ use rustc_hash::FxHashMap;
 use super::checkpoint::Checkpoint;
 use super::error::{StoreError, StoreTrouble};
 use super::files::{Files, Lock};
-use super::format::Batch;
-use super::format::frame::WorldId;
 use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
@@ -19,8 +17,10 @@ use super::region_file::RegionFile;
 use super::segment::{FRAME_LIMIT, base};
 use super::shared::{GameChange, SavePoint, Shared, apply_game};
 use super::unsaved;
+use crate::format::Batch;
+use crate::format::frame::WorldId;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, TerrainSettings, WorldChange, WorldParts};
+use crate::terrain::{CommitRecord, LogEntry, Patch, TerrainSettings, WorldParts};
 
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
@@ -367,7 +367,7 @@ impl Writer {
         self.state.commits += 1;
         // Edits lead to the same bricks again.
         if !record.entries.contains(&LogEntry::Change) {
-            record.change = WorldChange::default();
+            record.change = Patch::default();
         }
         self.state.pending.push(record);
     }

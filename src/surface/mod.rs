@@ -6,16 +6,17 @@
 //! - [`block`]: marching cubes over up to 8x8x8 cells of one chunk; [`plain`] is the same by the book.
 //! - [`tile`]: the heightmap's triangles outside the mask, rings included (rule 3).
 //! - [`mesh`]: vertex and index buffers, local to a chunk or tile; [`indices`] has 16 or 32 bits each.
-//! - [`level`]: the nodes of a quadtree cut, coarser ones included (rules 7 to 9).
+//! - [`lod`]: the nodes of a quadtree cut, coarser ones included (rules 7 to 9).
 //! - [`seams`]: the validator: is everything drawn together closed?
 
 pub mod block;
 pub mod cases;
 pub(crate) mod cell_outline;
+mod chunk_surface;
 mod crossings;
 pub mod indices;
 mod layer_bits;
-pub mod level;
+pub mod lod;
 pub mod mask;
 pub mod mesh;
 pub(crate) mod meshed_blocks;
@@ -31,6 +32,8 @@ pub mod tile;
 pub mod vertex;
 pub(crate) mod window;
 
+pub use chunk_surface::ChunkSurface;
+pub(crate) use chunk_surface::{FreshPart, PartKey};
 pub use indices::Indices;
 pub use mask::{Mask, MaskView};
 pub use mesh::{MaterialMix, SurfaceMesh, Vertex};

@@ -3,19 +3,17 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::drawn_cut::DrawnCut;
-use super::field_log::FieldNews;
 use super::history::{HistoryReceipt, Restored, UndoDelta};
 use super::log::RecordDraft;
-use super::put::ChangeError;
 use super::receipt::Receipt;
-use super::redraw::MeshUpdates;
-use super::stages::Stages;
-use super::surface::ChunkSurface;
-use super::world::World;
+use super::replacement::ChangeError;
+use super::resolve::{FieldNews, Resolved, patch_of};
 use crate::lattice::{ChunkPos, TilePos};
+use crate::redraw::{DrawnCut, MeshUpdates, Stages};
+use crate::surface::ChunkSurface;
 use crate::surface::tile::Rings;
 use crate::volume::UniformBricks;
+use crate::world::{Patch, World};
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
@@ -75,6 +73,49 @@ pub(super) struct Installed {
 }
 
 impl Commit {
+    /// The commit of what a transaction's work leads to.
+    pub(super) fn new(ticket: u64, is_cut: bool, resolved: Resolved) -> Self {
+        let Resolved {
+            changes,
+            sample_hash,
+            uniform,
+            next_field,
+            receipts,
+            step,
+            put,
+            news,
+            whole,
+            meshes,
+            stages,
+        } = resolved;
+        Self {
+            ticket,
+            changes,
+            sample_hash,
+            uniform,
+            next_field,
+            receipts,
+            step,
+            put,
+            record: None,
+            news,
+            whole,
+            copy: None,
+            drawn_cut: meshes.drawn_cut.clone(),
+            is_cut,
+            surfaces: meshes.chunks.clone(),
+            outdated: meshes.outdated.clone(),
+            rings: meshes.tiles.iter().map(|(tile, update)| (*tile, update.kept_rings())).collect(),
+            meshes,
+            stages,
+        }
+    }
+
+    /// The bricks and fields that it leads to, as its [record](super::CommitRecord) lists them.
+    pub fn change(&self) -> Patch {
+        patch_of(&self.changes, self.whole.as_deref(), self.next_field)
+    }
+
     /// Hash of every edited sample, once this is committed: equal for equal edits of equal samples, whatever ran them.
     pub fn sample_hash(&self) -> u64 {
         self.sample_hash
@@ -116,7 +157,7 @@ impl Commit {
     pub(super) fn install(self, world: &mut World) -> Installed {
         let mut replaced = self.changes;
         replaced.iter_mut().for_each(|own| own.change.swap(world));
-        replaced.retain(|own| !own.change.bricks.is_empty());
+        replaced.retain(|own| !own.change.patch.bricks.is_empty());
         if let Some(uniform) = self.uniform {
             world.set_uniform(uniform);
         }

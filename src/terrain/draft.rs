@@ -5,14 +5,12 @@ use std::sync::Arc;
 use super::model::Terrain;
 use super::queue::{Queue, Taken, Together, WorkLimits};
 use super::receipt::Receipt;
-use super::record::WorldChange;
-use super::settings::{TerrainError, TerrainSettings};
-use super::transaction::{Transaction, Work};
-use super::unmeshed::Meshing;
-use super::world::{World, unique};
+use super::transaction::Transaction;
+use super::work::Work;
 use crate::brush::Edit;
 use crate::lattice::BrickPos;
 use crate::volume::Brick;
+use crate::world::{Meshing, Patch, TerrainError, TerrainSettings, World, unique};
 
 /// The changes that edits would make.
 #[derive(Clone, Debug, Default)]
@@ -20,25 +18,11 @@ pub struct Draft {
     /// A receipt for each edit.
     pub receipts: Vec<Receipt>,
     /// The changes.
-    pub change: WorldChange,
+    pub change: Patch,
     /// The [hash](World::hash) that the world would have.
     pub hash: u64,
     /// The [sum of the hashes of all regions](World::regions_hash) that the world would have.
     pub regions_hash: u64,
-}
-
-/// Two changes, one after the other, as one.
-fn merged(earlier: WorldChange, later: WorldChange) -> WorldChange {
-    fn fill_in<K: Copy + Ord, V>(later: &mut Vec<(K, V)>, earlier: Vec<(K, V)>) {
-        // Stable: of two with the same key the later one comes first.
-        later.extend(earlier);
-        later.sort_by_key(|own| own.0);
-        later.dedup_by_key(|own| own.0);
-    }
-    let WorldChange { mut bricks, mut fields, next_field } = later;
-    fill_in(&mut bricks, earlier.bricks);
-    fill_in(&mut fields, earlier.fields);
-    WorldChange { bricks, fields, next_field }
 }
 
 impl Terrain {
@@ -56,7 +40,7 @@ impl Terrain {
         }
         let mut world = Arc::clone(&self.world);
         let (mut receipts, mut regions_hash) = (Vec::new(), world.sample_hash);
-        let mut change = WorldChange { next_field: world.next_field, ..WorldChange::default() };
+        let mut change = Patch { next_field: world.next_field, ..Patch::default() };
         // All of them are one transaction, unless there is a reset among them.
         while let Some((Taken::Edits(edits), _)) = queue.take() {
             let transaction = self.transaction(unique(), Work::Edits(edits));
@@ -70,7 +54,7 @@ impl Terrain {
             let mut commit = transaction.run();
             regions_hash = commit.sample_hash();
             receipts.append(&mut commit.receipts);
-            change = merged(change, commit.change());
+            change.then(commit.change());
             if queue.len() > 0 {
                 let mut next = World::clone(&world);
                 commit.install(&mut next);

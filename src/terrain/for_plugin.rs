@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use super::commit::Commit;
-use super::drawn_cut::DrawnCut;
 use super::history::{DeferredDrop, HistoryStep};
 use super::model::{StaleCommit, Terrain};
 use super::queue::{Request, Submission};
 use super::receipt::Receipt;
-use super::transaction::Work;
 use super::unseen::Unseen;
-use super::world::Version;
+use super::work::Work;
+use crate::redraw::DrawnCut;
+use crate::world::Version;
 
 impl Terrain {
     /// Whether a transaction that the plugin began is running.

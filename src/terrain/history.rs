@@ -8,12 +8,11 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::change::{Change, ChangedBrick};
-use super::loose::{LoosePiece, ReturnedPiece};
 use super::record::CommitRecord;
-use super::world::World;
 use crate::lattice::LatticeBox;
+use crate::loose::{LoosePiece, ReturnedPiece};
 use crate::volume::MaterialCounts;
+use crate::world::{Change, Patch, World, brick_bytes};
 
 /// One step through a terrain's history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -126,14 +125,15 @@ impl UndoDelta {
         group: u64,
         (tags, pieces): (Vec<u64>, Vec<(u64, LoosePiece)>),
     ) -> Self {
-        let bounds = change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
+        let bounds = change.patch.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
         Self { change, bounds, brick_bytes: replaced_bytes, group, tags, pieces }
     }
 
-    /// Adds what later edits of the same group replaced; returns those bricks that earlier ones had replaced already.
-    fn extend(&mut self, later: Self) -> Vec<ChangedBrick> {
-        let (bytes, left) = self.change.absorb(later.change);
-        self.brick_bytes += bytes;
+    /// Adds what later edits of the same group replaced; returns what earlier ones had replaced already.
+    fn extend(&mut self, later: Self) -> Patch {
+        let left = self.change.absorb(later.change);
+        let left_bytes = left.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));
+        self.brick_bytes += later.brick_bytes.saturating_sub(left_bytes.sum());
         self.bounds = self.bounds.into_iter().chain(later.bounds).reduce(LatticeBox::union);
         self.tags.reserve_exact(later.tags.len());
         self.tags.extend(later.tags);
@@ -155,7 +155,7 @@ impl UndoDelta {
 #[derive(Default)]
 pub(crate) struct DeferredDrop {
     steps: Vec<Arc<UndoDelta>>,
-    bricks: Vec<Vec<ChangedBrick>>,
+    parts: Vec<Patch>,
     pub(super) records: Vec<CommitRecord>,
     pub(super) copy: Option<Arc<World>>,
 }
@@ -164,8 +164,8 @@ impl DeferredDrop {
     /// Returns `true` if there is nothing to drop.
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
-        let Self { steps, bricks, records, copy } = self;
-        steps.is_empty() && bricks.is_empty() && records.is_empty() && copy.is_none()
+        let Self { steps, parts, records, copy } = self;
+        steps.is_empty() && parts.is_empty() && records.is_empty() && copy.is_none()
     }
 
     /// Adds what a change replaced.
@@ -254,7 +254,7 @@ impl UndoStack {
         // A transaction that undoes this step holds it too; then no edit can join it any more.
         if let Some(latest) = latest.and_then(Arc::get_mut) {
             self.step_bytes -= latest.bytes();
-            dropped.bricks.push(latest.extend(replaced));
+            dropped.parts.push(latest.extend(replaced));
             self.step_bytes += latest.bytes();
         } else if replaced.group > self.last_dropped {
             self.keep(HistoryStep::Undo, replaced);

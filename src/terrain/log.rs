@@ -3,14 +3,12 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::change::brick_bytes;
-use super::commit::Commit;
-use super::loose::LooseSettings;
-use super::model::Terrain;
-use super::record::{CommitRecord, LogEntry, WorldChange};
-use super::transaction::Work;
-use super::world::World;
+use super::receipt::Receipt;
+use super::record::{CommitRecord, LogEntry};
+use super::work::Work;
+use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
+use crate::world::{Patch, World, brick_bytes};
 
 /// Rules and settings of loose pieces.
 type Terms = (Option<Arc<DiggingRules>>, Option<LooseSettings>);
@@ -28,20 +26,20 @@ pub(super) struct RecordDraft {
     /// The terms of the first and of the last edit that was applied. Entries say how those in between differ.
     terms: Option<[Terms; 2]>,
     entries: Vec<LogEntry>,
-    change: WorldChange,
+    change: Patch,
     /// Bytes that the record may hold alone.
     bytes: usize,
 }
 
 impl RecordDraft {
-    /// The record of a commit, by what it was asked for.
-    pub fn new(work: &Work, commit: &Commit) -> Self {
+    /// The record of a commit, by what it was asked for, what was answered, and what changes.
+    pub fn new(work: &Work, receipts: &[Receipt], change: Patch) -> Self {
         let (mut terms, mut entries) = (None::<[Terms; 2]>, Vec::new());
         match work {
             Work::Edits(submissions) => {
                 // With room for the first terms, if those before were others.
                 entries.reserve_exact(submissions.len() + 2);
-                for (submission, receipt) in submissions.iter().zip(&commit.receipts) {
+                for (submission, receipt) in submissions.iter().zip(receipts) {
                     let (Ok(edit), Ok(_)) = (&submission.edit, &receipt.outcome) else { continue };
                     let own = (submission.terms.rules.clone(), submission.terms.loose);
                     let first = match terms.take() {
@@ -61,36 +59,15 @@ impl RecordDraft {
             Work::Step(..) => entries.push(LogEntry::Change),
             Work::Cut(_) => {}
         }
-        let change = commit.change();
         let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
         let bytes = bytes_of(&entries, &change) + room;
         Self { terms, entries, change, bytes }
     }
 }
 
-impl Commit {
-    /// The bricks and fields that it leads to, as its [record](CommitRecord) lists them.
-    pub fn change(&self) -> WorldChange {
-        if let Some(whole) = &self.whole {
-            return whole.all_parts();
-        }
-        let (mut bricks, mut fields) = (Vec::new(), Vec::new());
-        // Of several groups the last one holds.
-        for change in self.changes.iter().rev().map(|own| &own.change) {
-            bricks.extend(change.bricks.iter().cloned());
-            fields.extend(change.fields.iter().cloned());
-        }
-        bricks.sort_by_key(|(pos, _)| *pos);
-        bricks.dedup_by_key(|(pos, _)| *pos);
-        fields.sort_by_key(|(chunk, _)| *chunk);
-        fields.dedup_by_key(|(chunk, _)| *chunk);
-        WorldChange { bricks, fields, next_field: self.next_field }
-    }
-}
-
 /// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main
 /// thread.
-fn bytes_of(entries: &[LogEntry], change: &WorldChange) -> usize {
+fn bytes_of(entries: &[LogEntry], change: &Patch) -> usize {
     let rules = entries.iter().map(rule_bytes);
     let bricks = change.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));
     let fields = change.fields.iter().map(|(_, fields)| fields.bytes());
@@ -125,7 +102,7 @@ pub(super) struct CommitLog {
 }
 
 impl CommitLog {
-    fn new(limit: usize) -> Self {
+    pub fn new(limit: usize) -> Self {
         let (records, sizes) = Default::default();
         Self { records, sizes, bytes: 0, limit, terms: None, has_gap: false }
     }
@@ -144,7 +121,7 @@ impl CommitLog {
     }
 
     /// Records new terms, if they differ from the previous ones.
-    fn enter_terms(&mut self, world: &World, terms: Terms) {
+    pub fn enter_terms(&mut self, world: &World, terms: Terms) {
         // The next edit logs them.
         if self.has_gap && self.records.is_empty() {
             return;
@@ -152,11 +129,40 @@ impl CommitLog {
         let entries: Vec<LogEntry> = changed_terms(self.terms.as_ref(), &terms).collect();
         if !entries.is_empty() {
             self.terms = Some(terms);
-            let change = WorldChange { next_field: world.next_field, ..WorldChange::default() };
+            let change = Patch { next_field: world.next_field, ..Patch::default() };
             let bytes = bytes_of(&entries, &change);
             let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
             self.push(record, bytes, &mut Vec::new());
         }
+    }
+
+    /// Sets the most bytes that records may hold; the oldest are dropped if they hold more.
+    pub fn set_limit(&mut self, limit: usize) {
+        self.limit = limit;
+        self.trim(&mut Vec::new());
+    }
+
+    /// The records since the last call, in order. A gap shows in their revisions.
+    pub fn take(&mut self) -> Vec<CommitRecord> {
+        self.has_gap &= self.records.is_empty();
+        self.sizes.clear();
+        self.bytes = 0;
+        std::mem::take(&mut self.records).into()
+    }
+
+    /// Whether no record waits.
+    pub fn is_empty(&self) -> bool {
+        self.records.is_empty()
+    }
+
+    /// Whether the records follow this revision, and one of them sets another ground.
+    #[cfg(feature = "store")]
+    pub fn sets_ground_after(&self, revision: u64) -> bool {
+        let sets_ground =
+            |record: &CommitRecord| record.entries.iter().any(|entry| matches!(entry, LogEntry::Ground(_)));
+        let first = self.records.front();
+        first.is_some_and(|first| first.revision == revision.saturating_add(first.is_commit().into()))
+            && self.records.iter().any(sets_ground)
     }
 
     fn push(&mut self, record: CommitRecord, bytes: usize, dropped: &mut Vec<CommitRecord>) {
@@ -181,68 +187,5 @@ impl CommitLog {
         }
         // The dropped records may have held the current terms, so these are logged again.
         self.terms = None;
-    }
-}
-
-impl Terrain {
-    /// Keeps a record of each commit until it is [taken](Self::take_log); `None` keeps none and
-    /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps, the
-    /// oldest are dropped. A reader that finds a gap between [revisions](CommitRecord::revision), or whose
-    /// last record does not have the [world's revision](super::World::revision), has to read [all of the
-    /// world](Self::parts).
-    ///
-    /// Rules and settings of loose pieces are logged with the first edit that obeys them, or once nothing
-    /// waits.
-    pub fn keep_log(&mut self, bytes: Option<usize>) {
-        match (&mut self.log, bytes) {
-            (_, None) => self.log = None,
-            (Some(log), Some(limit)) => {
-                log.limit = limit;
-                log.trim(&mut Vec::new());
-            }
-            (None, Some(limit)) => {
-                self.log = Some(CommitLog::new(limit));
-                // Its commit would hold no record.
-                self.abandon();
-            }
-        }
-        self.log_terms();
-    }
-
-    /// The records of the commits since the last call, in order; each is returned once.
-    pub fn take_log(&mut self) -> Vec<CommitRecord> {
-        let Some(log) = &mut self.log else { return Vec::new() };
-        // The caller sees the gap in the revisions.
-        log.has_gap &= log.records.is_empty();
-        log.sizes.clear();
-        log.bytes = 0;
-        std::mem::take(&mut log.records).into()
-    }
-
-    /// Returns `true` if there is a record to [take](Self::take_log).
-    pub fn has_log(&self) -> bool {
-        self.log.as_ref().is_some_and(|log| !log.records.is_empty())
-    }
-
-    /// Whether the records that wait follow this revision, and one of them sets another ground: then the world is another one than before,
-    /// and the terrain is the same.
-    #[cfg(feature = "store")]
-    pub(crate) fn log_sets_ground_after(&self, revision: u64) -> bool {
-        let Some(log) = &self.log else { return false };
-        let sets_ground =
-            |record: &CommitRecord| record.entries.iter().any(|entry| matches!(entry, LogEntry::Ground(_)));
-        let first = log.records.front();
-        first.is_some_and(|first| first.revision == revision.saturating_add(first.is_commit().into()))
-            && log.records.iter().any(sets_ground)
-    }
-
-    /// Records the terms of later edits in the log, unless waiting edits obey other terms.
-    pub(super) fn log_terms(&mut self) {
-        if self.is_busy() || self.queue.len() > 0 {
-            return;
-        }
-        if let Some(log) = &mut self.log {
-            log.enter_terms(&self.world, (self.rules.clone(), self.loose));
-        }
     }
 }

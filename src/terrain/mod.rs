@@ -13,87 +13,59 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod by_brick;
-mod change;
 mod commit;
-mod dirty;
 mod draft;
-mod draft_group;
-mod drawn_cut;
-mod field_log;
 #[cfg(feature = "plugin")]
 mod for_plugin;
-mod ground;
-mod groups;
-mod heights;
 mod history;
-mod inspect;
-mod known_nodes;
+mod keep_log;
 #[cfg(test)]
-mod level_laws;
-mod level_meshes;
-mod levels;
+mod lod_laws;
 mod log;
-mod loose;
 mod model;
 #[cfg(test)]
 mod order;
-mod put;
-mod query;
 mod queue;
-mod ray;
 mod receipt;
 mod record;
-mod redraw;
-mod regions;
+mod replace;
+mod replacement;
 mod replay;
-mod reset;
-mod restore;
+mod resolve;
 mod run;
-mod settings;
-mod stages;
 mod steps;
 mod submit;
-mod surface;
-mod surface_draft;
-mod tiles;
 mod transaction;
-mod triangles;
-mod unmeshed;
 #[cfg(feature = "plugin")]
 mod unseen;
-mod world;
+mod work;
 
+pub use crate::loose::{LoosePiece, LooseSettings, PieceFate, PieceId, ReturnedPiece, Run};
+#[cfg(feature = "plugin")]
+pub(crate) use crate::redraw::SurfaceDraft;
+pub use crate::redraw::{
+    ChooseCut, DrawnCut, GroundFacts, KnownNodes, MeshUpdates, NodeUpdate, Stages, TileUpdate,
+};
+pub use crate::surface::ChunkSurface;
+#[cfg(feature = "store")]
+pub(crate) use crate::world::brick_over;
+#[cfg(any(feature = "plugin", test))]
+pub(crate) use crate::world::unique;
+pub use crate::world::{
+    Drawn, Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, Version, World,
+};
 pub use commit::Commit;
 pub use draft::Draft;
-pub use drawn_cut::{ChooseCut, DrawnCut, NodeUpdate};
-pub use field_log::FieldNews;
-#[cfg(feature = "store")]
-pub(crate) use ground::brick_over;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
-pub use known_nodes::KnownNodes;
-pub use level_meshes::GroundFacts;
-pub use loose::{LoosePiece, LooseSettings, PieceFate, PieceId, ReturnedPiece, Run};
 pub use model::{StaleCommit, Terrain};
-pub use put::ChangeError;
-pub use query::{RayHit, Span};
 #[cfg(feature = "plugin")]
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
-pub use record::{CommitRecord, LogEntry, SIMULATION, WorldChange, WorldParts};
-pub use redraw::MeshUpdates;
+pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
+pub use replacement::ChangeError;
 pub use replay::{ReplayError, RestoreError};
-pub use settings::{TerrainError, TerrainSettings};
-pub use stages::Stages;
-pub use surface::ChunkSurface;
-#[cfg(feature = "plugin")]
-pub(crate) use surface_draft::SurfaceDraft;
-pub use surface_draft::TileUpdate;
+pub use resolve::FieldNews;
 pub use transaction::Transaction;
-pub use unmeshed::Meshing;
 #[cfg(feature = "plugin")]
 pub(crate) use unseen::Unseen;
-#[cfg(any(feature = "plugin", test))]
-pub(crate) use world::unique;
-pub use world::{Drawn, Memory, Version, World};

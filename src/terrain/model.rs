@@ -5,23 +5,22 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::commit::Commit;
-use super::drawn_cut::{ChooseCut, DrawnCut};
 use super::history::{DeferredDrop, HistoryReceipt, Restored, UndoStack};
 use super::log::CommitLog;
-use super::loose::LooseSettings;
-use super::put::ChangeError;
 use super::queue::{Queue, Request, Taken};
 use super::receipt::Receipt;
-use super::settings::{TerrainError, TerrainSettings};
-use super::transaction::{Transaction, Work};
-use super::unmeshed::Meshing;
+use super::replacement::ChangeError;
+use super::transaction::Transaction;
 #[cfg(feature = "plugin")]
 use super::unseen::Unseen;
-use super::world::{World, unique};
+use super::work::Work;
 use crate::backend::Engine;
 use crate::ground::Ground;
 use crate::lattice::LatticeBox;
+use crate::loose::LooseSettings;
+use crate::redraw::{ChooseCut, DrawnCut};
 use crate::volume::{DiggingRules, RulesError};
+use crate::world::{Meshing, TerrainError, TerrainSettings, World, unique};
 
 /// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
 pub(super) const UNDO_BUDGET: usize = 64 << 20;
@@ -386,5 +385,21 @@ impl Terrain {
     pub(crate) fn begin_cut_for(&mut self, choose: Arc<ChooseCut>, is_plugins: bool) -> Option<Transaction> {
         self.drawn_cut.as_ref()?;
         self.begin_work(Work::Cut(choose), is_plugins)
+    }
+
+    /// Sets which surfaces later transactions build. [`Meshing::Never`] drops all surfaces,
+    /// for terrains that are never shown. A plugin that shows the terrain does not notice changes
+    /// then.
+    pub fn set_meshing(&mut self, meshing: Meshing) {
+        if meshing == Meshing::Never && self.meshing != meshing {
+            self.abandon();
+            Arc::make_mut(&mut self.world).forget_surfaces();
+        }
+        self.meshing = meshing;
+    }
+
+    /// The surfaces that transactions make.
+    pub fn meshing(&self) -> Meshing {
+        self.meshing
     }
 }

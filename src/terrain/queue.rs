@@ -7,12 +7,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::history::HistoryStep;
-use super::loose::LooseSettings;
-use super::put::Put;
 use super::receipt::Rejection;
+use super::replacement::Put;
 use crate::brush::{Edit, Kind};
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
+use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
 
 /// Limits of a terrain's work, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].

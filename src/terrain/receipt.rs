@@ -1,8 +1,8 @@
 //! Receipts: the result of a brush.
 
-use super::loose::LoosePiece;
 use crate::brush::BrushError;
 use crate::lattice::{ChunkPos, LatticeBox};
+use crate::loose::LoosePiece;
 use crate::volume::{FieldId, MaterialCounts, Refused, Scenario};
 
 /// The result of a brush. Each submitted brush gets exactly one receipt.

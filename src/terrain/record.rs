@@ -2,26 +2,15 @@
 
 use std::sync::Arc;
 
-use super::loose::LooseSettings;
 use crate::brush::Edit;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkPos};
-use crate::volume::{Brick, DiggingRules, Fields};
+use crate::loose::LooseSettings;
+use crate::volume::DiggingRules;
+use crate::world::Patch;
 
 /// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was
 /// written under another number can't be replayed.
 pub const SIMULATION: u32 = 1;
-
-/// Parts of a world that take the place of others.
-#[derive(Clone, Debug, Default)]
-pub struct WorldChange {
-    /// Bricks in order, each position once; `None` is a pristine one.
-    pub bricks: Vec<(BrickPos, Option<Arc<Brick>>)>,
-    /// All fields of each chunk whose fields change, by chunk.
-    pub fields: Vec<(ChunkPos, Fields)>,
-    /// The greatest name that any field has had.
-    pub next_field: u64,
-}
 
 /// One item of a commit. Items of one commit apply in order.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +39,7 @@ pub struct CommitRecord {
     /// The items of the commit, in order. Rejected edits are left out; a commit of such edits alone has no entry.
     pub entries: Vec<LogEntry>,
     /// What changed.
-    pub change: WorldChange,
+    pub change: Patch,
 }
 
 impl CommitRecord {
@@ -67,7 +56,7 @@ impl CommitRecord {
 #[derive(Clone, Debug, Default)]
 pub struct WorldParts {
     /// Every stored brick, and all fields.
-    pub change: WorldChange,
+    pub change: Patch,
     /// Cells along the side of the chunks that the fields belong to.
     pub chunk_size: u32,
     /// Its revision.

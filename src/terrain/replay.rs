@@ -1,18 +1,17 @@
 //! Creates a terrain from saved data: from parts, or by replaying records.
 
-use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use super::model::Terrain;
-use super::put::{ChangeError, Put, check_number};
 use super::queue::WorkLimits;
 use super::receipt::Receipt;
-use super::record::{CommitRecord, LogEntry, WorldChange, WorldParts};
-use super::settings::{TerrainError, TerrainSettings};
-use super::unmeshed::Meshing;
+use super::record::{CommitRecord, LogEntry, WorldParts};
+use super::replacement::ChangeError;
+use super::resolve::world_of;
 use crate::ground::Ground;
-use crate::lattice::{ChunkGrid, ChunkPos};
-use crate::volume::{DiggingRules, FieldId, Fields, RulesError};
+use crate::volume::{DiggingRules, RulesError};
+use crate::world::{Patch, TerrainError, TerrainSettings};
 
 /// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -92,17 +91,17 @@ impl Terrain {
     ) -> Result<Self, RestoreError> {
         let mut terrain = Self::new(ground, settings)?;
         let WorldParts { mut change, chunk_size, revision, rules, loose } = parts;
-        check_number(revision)?;
         if chunk_size != settings.chunk_size {
             change.fields.clear();
             change.cover(terrain.world.grid());
         }
-        terrain.meshing = Meshing::Never;
-        terrain.put_now(Put { change, hash: None, counts: false, ground: None })?;
-        terrain.meshing = Meshing::All;
+        let ground = terrain.world.shared_ground();
+        let made = || world_of(ground, settings.chunk_size as i32, change, revision);
+        // Unwind safe: nothing else sees what it makes.
+        let world = catch_unwind(AssertUnwindSafe(made)).unwrap_or(Err(ChangeError::Panicked))?;
+        terrain.world = Arc::new(world);
         terrain.set_rules(rules.unwrap_or_default())?;
         terrain.loose = loose;
-        Arc::make_mut(&mut terrain.world).revision = revision;
         Ok(terrain)
     }
 
@@ -156,38 +155,12 @@ impl Terrain {
         }
         if record.entries.is_empty() {
             // All of its edits were rejected.
-            self.apply_change(WorldChange::default(), Some(record.hash))?;
+            self.apply_change(Patch::default(), Some(record.hash))?;
         }
         let receipts = self.finish();
         match receipts.iter().any(|receipt| receipt.outcome.is_err()) {
             true => Err(ReplayError::Rejected(record.revision)),
             false => Ok(receipts),
         }
-    }
-}
-
-impl WorldChange {
-    /// Extends fields over edited samples that no field contains; new fields get unused names.
-    /// Returns whether there were any.
-    pub(crate) fn cover(&mut self, grid: ChunkGrid) -> bool {
-        let mut fields: BTreeMap<ChunkPos, Fields> = std::mem::take(&mut self.fields).into_iter().collect();
-        let (mut next, mut has_grown) = (self.next_field, false);
-        for (pos, brick) in &self.bricks {
-            let Some(edited) = brick.as_ref().and_then(|brick| brick.edited_bounds(*pos)) else { continue };
-            for chunk in grid.chunks_of(edited) {
-                let Some(own) = grid.chunk_samples(chunk).intersection(edited) else { continue };
-                let fields = fields.entry(chunk).or_default();
-                if fields.iter().any(|field| field.bounds.encloses(own)) {
-                    continue;
-                }
-                has_grown = true;
-                fields.absorb(own, || {
-                    next = next.saturating_add(1);
-                    FieldId(next)
-                });
-            }
-        }
-        (self.fields, self.next_field) = (fields.into_iter().collect(), next);
-        has_grown
     }
 }

@@ -13,22 +13,20 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
 use super::commit::Commit;
-use super::drawn_cut::ChooseCut;
 use super::history::{HistoryReceipt, HistoryRejection};
-use super::levels;
 use super::log::RecordDraft;
-use super::put::{self, ChangeError};
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
-use super::redraw::MeshUpdates;
-use super::stages::Stages;
-use super::transaction::{Transaction, Work};
-use super::world::World;
-use super::{groups, reset, restore};
+use super::replacement::ChangeError;
+use super::resolve::{self, Resolved};
+use super::transaction::Transaction;
+use super::work::Work;
 use crate::backend::{Compute, Cpu, Engine};
-use crate::brush::Kind;
 use crate::edits::reach;
 use crate::lattice::{BrickPos, ItemCost};
+use crate::redraw;
+use crate::redraw::{ChooseCut, Scene, Stages};
+use crate::world::World;
 
 /// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for
 /// more would take too long.
@@ -62,27 +60,28 @@ impl Transaction {
         let backend = self.engine.as_ref().map_or(&Cpu as &dyn Compute, Engine::compute);
         #[cfg(test)]
         panic_if_marked(&self.work);
+        let scene = self.scene(backend);
         let run = || match &self.work {
-            Work::Edits(submissions) => match &submissions[..] {
-                [own @ Submission { edit: Ok(edit), .. }] if edit.kind() == Kind::Reset => {
-                    reset::commit(self, own, edit, backend)
-                }
-                all => groups::edit(self, all, backend),
-            },
-            Work::Step(step, target) => restore::step(self, *step, target, backend),
-            Work::Put(parts) => put::put(self, parts, backend),
-            Work::Cut(choose) => self.cut(choose.as_ref()),
+            Work::Edits(submissions) => resolve::edits(scene, submissions),
+            Work::Step(step, target) => resolve::step(scene, *step, target),
+            Work::Put(parts) => resolve::parts(scene, parts),
+            Work::Cut(choose) => cut(scene, choose.as_ref()),
         };
         // A large one runs on a thread of the pool: entering the pool for each stage would take longer.
-        let commit = if self.is_large() { rayon::scope(|_| run()) } else { run() };
+        let mut resolved = if self.is_large() { rayon::scope(|_| run()) } else { run() };
         // Terrain and transaction hold the world. If others do too, the commit changes a copy, which is made here.
-        let is_changed = !matches!(self.work, Work::Cut(_)) && commit.whole.is_none();
+        let is_changed = !matches!(self.work, Work::Cut(_)) && resolved.whole.is_none();
         let is_shared = Arc::strong_count(&self.world) > 2 && is_changed;
-        let mut stages = commit.stages;
         let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
-        let copy = Stages::time(&mut stages.whole, copy);
-        let record = self.is_logged.then(|| RecordDraft::new(&self.work, &commit));
-        Commit { copy, record, stages, ..commit }
+        let copy = Stages::time(&mut resolved.stages.whole, copy);
+        let commit = self.commit(resolved);
+        let record = self.is_logged.then(|| RecordDraft::new(&self.work, &commit.receipts, commit.change()));
+        Commit { copy, record, ..commit }
+    }
+
+    /// The commit of what its work leads to.
+    fn commit(&self, resolved: Resolved) -> Commit {
+        Commit::new(self.ticket, matches!(self.work, Work::Cut(_)), resolved)
     }
 
     /// Returns `true` if it may reach enough bricks for several threads.
@@ -96,7 +95,7 @@ impl Transaction {
                 ItemCost::Lookup
                     .is_shared(usize::try_from(bricks.fold(0, u64::saturating_add)).unwrap_or(usize::MAX))
             }
-            Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.bricks.len()),
+            Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.patch.bricks.len()),
             Work::Put(put) => {
                 let bricks =
                     if put.ground.is_some() { self.world.bricks.len() } else { put.change.bricks.len() };
@@ -104,16 +103,6 @@ impl Transaction {
             }
             Work::Cut(_) => true,
         }
-    }
-
-    /// Computes the commit that leads to another cut.
-    fn cut(&self, choose: &ChooseCut) -> Commit {
-        let mut meshes = MeshUpdates::default();
-        if let Some(drawn) = &self.drawn_cut {
-            let (after, nodes) = levels::change_cut(&self.world, drawn, choose);
-            (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
-        }
-        self.commit(Vec::new(), self.world.sample_hash, meshes)
     }
 
     /// Computes the commit of a transaction that panicked. Runs it once more, because the panic may not have come from
@@ -160,23 +149,34 @@ impl Transaction {
 
     /// The commit that changes nothing and rejects all edits, or the step.
     pub(super) fn rejected(&self) -> Commit {
-        let commit = self.commit(Vec::new(), self.world.sample_hash, MeshUpdates::default());
-        match &self.work {
+        let nothing = Resolved::nothing(&self.world);
+        let resolved = match &self.work {
             Work::Edits(submissions) => {
                 let rejected = |own: &Submission| Receipt {
                     tag: own.tag,
                     outcome: Err(own.edit.as_ref().err().cloned().unwrap_or(Rejection::Panicked)),
                 };
-                Commit { receipts: submissions.iter().map(rejected).collect(), ..commit }
+                Resolved { receipts: submissions.iter().map(rejected).collect(), ..nothing }
             }
             Work::Step(step, _) => {
                 let outcome = Err(HistoryRejection::Panicked);
-                Commit { step: Some(HistoryReceipt { step: *step, outcome }), ..commit }
+                Resolved { step: Some(HistoryReceipt { step: *step, outcome }), ..nothing }
             }
-            Work::Put(_) => Commit { put: Some(Err(ChangeError::Panicked)), ..commit },
-            Work::Cut(_) => commit,
-        }
+            Work::Put(_) => Resolved { put: Some(Err(ChangeError::Panicked)), ..nothing },
+            Work::Cut(_) => nothing,
+        };
+        self.commit(resolved)
     }
+}
+
+/// What leads to another cut.
+fn cut(scene: Scene, choose: &ChooseCut) -> Resolved {
+    let mut resolved = Resolved::nothing(scene.world);
+    if let Some(drawn) = scene.cut {
+        let (after, nodes) = redraw::change_cut(scene.world, drawn, choose);
+        (resolved.meshes.drawn_cut, resolved.meshes.nodes) = (Some(after), nodes);
+    }
+    resolved
 }
 
 /// The tag of an edit that panics in tests has this bit.

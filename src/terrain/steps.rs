@@ -2,7 +2,7 @@
 
 use super::history::{DeferredDrop, History, HistoryReceipt, HistoryRejection, HistoryStep};
 use super::model::Terrain;
-use super::world::Memory;
+use crate::world::Memory;
 
 impl Terrain {
     /// Queues an undo: once its turn comes, after everything that was submitted before, it undoes the last group of

@@ -5,8 +5,8 @@ use std::borrow::Borrow;
 use super::model::Terrain;
 use super::queue::{Together, WorkLimits};
 use super::receipt::{Receipt, Rejection};
-use super::world::unique;
 use crate::brush::{Brush, Edit};
+use crate::world::unique;
 
 impl Terrain {
     /// Queues a brush as a separate step of undo, unless it is part of a [stroke](Brush::stroke). An invalid brush is

@@ -3,28 +3,10 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::commit::Commit;
-use super::drawn_cut::{ChooseCut, DrawnCut};
-use super::history::{HistoryStep, UndoDelta};
-use super::put::Put;
-use super::queue::Submission;
-use super::redraw::MeshUpdates;
-use super::stages::Stages;
-use super::unmeshed::Meshing;
-use super::world::World;
-use crate::backend::Engine;
-
-/// The work of a transaction.
-#[derive(Clone)]
-pub(super) enum Work {
-    Edits(Arc<[Submission]>),
-    /// A step, and what it puts in place.
-    Step(HistoryStep, Arc<UndoDelta>),
-    /// Parts are replaced.
-    Put(Arc<Put>),
-    /// Another cut is drawn.
-    Cut(Arc<ChooseCut>),
-}
+use super::work::Work;
+use crate::backend::{Compute, Engine};
+use crate::redraw::{DrawnCut, Scene};
+use crate::world::{Meshing, World};
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit;
 /// a terrain takes one of them.
@@ -71,28 +53,8 @@ impl Transaction {
         self.len() == 0
     }
 
-    /// A commit of changes and of what is drawn then.
-    pub(super) fn commit(&self, changes: Vec<UndoDelta>, sample_hash: u64, meshes: MeshUpdates) -> Commit {
-        Commit {
-            ticket: self.ticket,
-            changes,
-            sample_hash,
-            uniform: None,
-            next_field: self.world.next_field,
-            receipts: Vec::new(),
-            step: None,
-            put: None,
-            record: None,
-            news: Vec::new(),
-            whole: None,
-            copy: None,
-            drawn_cut: meshes.drawn_cut.clone(),
-            is_cut: matches!(self.work, Work::Cut(_)),
-            surfaces: meshes.chunks.clone(),
-            outdated: meshes.outdated.clone(),
-            rings: meshes.tiles.iter().map(|(tile, update)| (*tile, update.kept_rings())).collect(),
-            meshes,
-            stages: Stages::default(),
-        }
+    /// The world that it applies to, and how it is drawn.
+    pub(super) fn scene<'a>(&'a self, backend: &'a dyn Compute) -> Scene<'a> {
+        Scene { world: &self.world, meshing: self.meshing, cut: self.drawn_cut.as_ref(), backend }
     }
 }

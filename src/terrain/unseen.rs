@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::commit::Commit;
-use super::field_log::FieldNews;
-use super::world::{Drawn, Version, World};
+use super::resolve::FieldNews;
 use crate::lattice::ChunkPos;
+use crate::world::{Drawn, Version, World};
 
 /// Changes of a world that is shown.
 pub(crate) struct Unseen {

@@ -14,13 +14,11 @@ use super::service::Service;
 use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 use super::trouble::{SharingTrouble, SharingTroubleFound};
 use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
-use crate::plugin::{
-    BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned, ThreadTask, Threads,
-    free_later,
-};
+use crate::plugin::{BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{
     Applied, HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain,
 };
+use crate::threads::{ThreadTask, Threads, free_later};
 
 /// Which of an app's shared terrains is shared: a connection carries one ground.
 #[derive(Resource, Default)]

@@ -10,8 +10,9 @@ use super::service::Service;
 use super::trouble::SharingTrouble;
 use crate::brush::Edit;
 use crate::net::{self, Client, Kick, Lane, ShownChange, Stamps};
-use crate::plugin::{LoosePieceFound, LoosePieceReturned, ThreadTask, Threads};
+use crate::plugin::{LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{HistoryStep, Terrain, TerrainError, TerrainSettings, Version, World};
+use crate::threads::{ThreadTask, Threads};
 use crate::volume::DiggingRules;
 
 /// Most edits that wait for the server's answer.

@@ -15,10 +15,10 @@ use super::messages::{BulkLane, FromPlayer, OrderLane, Served};
 use super::players::{Players, Said};
 use super::service::Authorised;
 use crate::net::{self, Kick, Lane, Server, ServerEvent, ServerSettings, ToClient};
-use crate::plugin::{ThreadTask, Threads};
 use crate::saves::{AbandonedStores, ClosingWorlds, EXIT_WAIT, ReadWorld, SavedWorld, WorldReader};
 use crate::store::{Progress, Store, StoreError, StoreTrouble};
 use crate::terrain::Terrain;
+use crate::threads::{ThreadTask, Threads};
 
 /// The server of a shared world: insert it in the server's app. Its [`Server`] owns a terrain that is not
 /// drawn; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like all other players.

@@ -48,6 +48,9 @@ pub(crate) struct Absorbed {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Fields(Vec<Field>);
 
+/// The fields of a chunk without any.
+pub(crate) static NO_FIELDS: Fields = Fields(Vec::new());
+
 impl Fields {
     /// Fields that were saved. `None` if two have the same name, or one has an empty box.
     pub fn restored(mut fields: Vec<Field>) -> Option<Self> {

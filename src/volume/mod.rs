@@ -18,7 +18,7 @@ pub(crate) use brick::{
 };
 pub use counts::MaterialCounts;
 pub(crate) use counts::{VoxelOutcome, for_runs};
-pub(crate) use field::Absorbed;
+pub(crate) use field::{Absorbed, NO_FIELDS};
 pub use field::{Field, FieldId, Fields, Scenario};
 pub use layers::Layers;
 pub use rules::{DiggingRules, Refused, RulesError};

@@ -23,7 +23,7 @@ mod debug_views;
 #[path = "../../examples/shared/holes.rs"]
 mod holes;
 mod landscape;
-mod levels;
+mod lod;
 #[path = "../../examples/custom_material/map.rs"]
 mod map;
 #[path = "../../examples/shared/offscreen.rs"]
@@ -70,7 +70,7 @@ fn levels_look_as_approved() {
     };
     let Some(mut studio) = Studio::open(add) else { return };
     let mut album = Album::default();
-    levels::shoot(&mut studio, &mut album);
+    lod::shoot(&mut studio, &mut album);
     album.close();
 }
 

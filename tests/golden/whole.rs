@@ -16,7 +16,7 @@ use image::Rgb;
 use crate::album::{Album, keep};
 use crate::holes::{self, Holes};
 use crate::landscape::hills;
-use crate::levels::{mountains, settle, watch_levels};
+use crate::lod::{mountains, settle, watch_levels};
 use crate::map::MapMaterial;
 use crate::studio::Studio;
 
@@ -43,12 +43,12 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let is_all = std::env::var("BURROW_COMBINATIONS").is_ok_and(|value| value == "all");
     studio.app.world_mut().resource_mut::<ClearColor>().0 = Color::linear_rgb(1.0, 0.0, 1.0);
     let (mut pictures, mut ground, mut control) = (0, 0, None);
-    for has_levels in [false, true] {
-        if has_levels && !is_all {
+    for has_lod in [false, true] {
+        if has_lod && !is_all {
             continue;
         }
         for dress in DRESSES.into_iter().filter(|&dress| is_all || dress != Dress::Look(GroundQuality::Low)) {
-            set_up(studio, dress, has_levels);
+            set_up(studio, dress, has_lod);
             for (prepass, name) in PREPASSES.into_iter().enumerate() {
                 for (msaa, has_shadows) in
                     [(Msaa::Off, true), (Msaa::Off, false), (Msaa::Sample4, true), (Msaa::Sample4, false)]
@@ -61,7 +61,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
                     set_camera(studio, prepass, msaa);
                     studio.one::<DirectionalLight>().shadow_maps_enabled = has_shadows;
                     let what =
-                        format!("{dress:?}, {name}, {msaa:?}, shadows {has_shadows}, levels {has_levels}");
+                        format!("{dress:?}, {name}, {msaa:?}, shadows {has_shadows}, levels {has_lod}");
                     let found = look(studio, &what);
                     pictures += 1;
                     ground += found.ground;
@@ -82,13 +82,13 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
 }
 
 /// A terrain that is dug, one that is small, turned and of small voxels, and a loose piece.
-fn set_up(studio: &mut Studio, dress: Dress, has_levels: bool) {
+fn set_up(studio: &mut Studio, dress: Dress, has_lod: bool) {
     close(studio);
-    let ground = if has_levels { mountains() } else { hills(256) };
+    let ground = if has_lod { mountains() } else { hills(256) };
     let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
     let terrain = spawn(studio, terrain, dress);
-    let middle = if has_levels { 2048.0 } else { 128.0 };
-    if has_levels {
+    let middle = if has_lod { 2048.0 } else { 128.0 };
+    if has_lod {
         watch_levels(studio, 4000.0);
     }
     let place = |studio: &mut Studio, dx: f32, dz: f32, up: f32| {
@@ -99,7 +99,7 @@ fn set_up(studio: &mut Studio, dress: Dress, has_levels: bool) {
     let pit = place(studio, 0.0, 0.0, 0.0);
     let eye = place(studio, 20.0, -64.0, 22.0);
     studio.look(eye, pit);
-    if has_levels {
+    if has_lod {
         studio.until("levels", |app| {
             let world = app.world_mut();
             world.query::<&ShownLevels>().iter(world).any(|shown| shown.progress() > 0.0)

@@ -11,7 +11,7 @@ use bevy_burrow::net::{
     ToClient,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{World, WorldChange};
+use bevy_burrow::terrain::{Patch, World};
 use bevy_burrow::volume::{FieldId, Fields};
 use fastrand::Rng;
 use glam::{IVec3, Vec2, Vec3};
@@ -88,8 +88,7 @@ impl Reference {
                     self.terms += 1;
                 }
                 Entry::Parts { change, by } => {
-                    let restored =
-                        self.terrain.apply_change(WorldChange::clone(&change), None).expect("they fit");
+                    let restored = self.terrain.apply_change(Patch::clone(&change), None).expect("they fit");
                     if let Some((by, _)) = by {
                         self.undone.entry(by).or_default().push(restored);
                     }

@@ -12,7 +12,7 @@ use bevy_burrow::net::{
     RegionHashes, Server, Stamps, Terms, ToClient, ToServer, Welcome, region_hash, touched_regions,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Meshing, SIMULATION, WorldChange};
+use bevy_burrow::terrain::{Meshing, Patch, SIMULATION};
 use bevy_burrow::volume::Fields;
 use glam::IVec3;
 
@@ -348,7 +348,7 @@ impl Follower {
         let own = world.fields().map(|(chunk, _)| chunk).filter(touches);
         let mut fields: BTreeMap<_, _> = own.map(|chunk| (chunk, Fields::default())).collect();
         fields.extend(content.fields.iter().cloned());
-        let change = WorldChange {
+        let change = Patch {
             bricks: bricks.into_iter().collect(),
             fields: fields.into_iter().collect(),
             next_field: content.next_field,

@@ -9,7 +9,7 @@ use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{ClientId, Entries, Entry, Lane, Rate, Server, ServerSettings, ToClient, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
-use bevy_burrow::terrain::WorldChange;
+use bevy_burrow::terrain::Patch;
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -131,7 +131,7 @@ fn quiet_play() -> Play {
 }
 
 /// The server changes parts of the world, and one bot receives different parts.
-fn lie_about_parts(play: &mut Play, mut damage: impl FnMut(&mut WorldChange) + 'static) {
+fn lie_about_parts(play: &mut Play, mut damage: impl FnMut(&mut Patch) + 'static) {
     let mut other = terrain(&play.ground);
     other.apply([sphere(40.0, 40.0)]);
     play.server.put(other.parts().change).expect("it fits");

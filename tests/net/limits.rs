@@ -13,7 +13,7 @@ use bevy_burrow::net::{
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
-use bevy_burrow::terrain::{SIMULATION, WorldChange};
+use bevy_burrow::terrain::{Patch, SIMULATION};
 use glam::{DVec3, IVec3, Vec2, Vec3};
 
 use crate::follower::terrain;
@@ -648,7 +648,7 @@ fn the_order_lane_keeps_within_its_window() {
     let window = play.server.settings().window as usize;
     let (mut silent, mut longest) = (0, 0);
     for part in bricks.chunks(bricks.len() / 6) {
-        let change = WorldChange { bricks: part.to_vec(), ..WorldChange::default() };
+        let change = Patch { bricks: part.to_vec(), ..Patch::default() };
         play.server.put(change).expect("it is below the limit of a message");
     }
     for _ in 0..100 {

@@ -1,7 +1,7 @@
 //! The cost of many players: bytes for each edit and client, and the server's time.
 //!
 //! ```text
-//! cargo test --release --no-default-features --features net --test net -- --ignored --nocapture load
+//! cargo test --release --no-default-features --features net,store --test net -- --ignored --nocapture load
 //! ```
 
 use std::sync::Arc;

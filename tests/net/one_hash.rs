@@ -1,7 +1,7 @@
 //! One order of edits of all operations has one hash, with one thread and with many, in any transactions, and on a GPU.
 //!
 //! ```text
-//! BURROW_EDITS=100000 cargo test --release --no-default-features --features cuda,net --test net -- --nocapture one_hash
+//! BURROW_EDITS=100000 cargo test --release --no-default-features --features cuda,net,store --test net -- --nocapture one_hash
 //! ```
 
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 //! edits, and the gain from reconnecting, with the attackers and without.
 //!
 //! ```text
-//! BURROW_SIEGE=300 cargo test --release --no-default-features --features net --test net siege -- --nocapture
+//! BURROW_SIEGE=300 cargo test --release --no-default-features --features net,store --test net siege -- --nocapture
 //! ```
 
 use std::collections::BTreeMap;

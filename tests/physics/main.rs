@@ -8,7 +8,7 @@ mod debris;
 mod edges;
 mod holding;
 mod layers;
-mod levels;
+mod lod;
 mod matter;
 mod placement;
 #[cfg(feature = "replicon")]

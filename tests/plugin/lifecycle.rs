@@ -239,7 +239,7 @@ impl Expected {
                     let at = Vec3::new(10.0 + 20.0 * number as f32, 5.0, 30.0);
                     Brush::dig(Shape::sphere(at, 4.0 + rng.u32(0..4) as f32))
                 }));
-                let level = bevy_burrow::store::Level::of(&plain);
+                let level = bevy_burrow::format::Level::of(&plain);
                 plain = level.terrain(Arc::clone(&ground)).expect("its own ground");
             }
             _ => {}
@@ -444,7 +444,7 @@ impl Life {
             }
             #[cfg(feature = "store")]
             Load::StartLevel => {
-                let level = bevy_burrow::store::Level::of(&self.expected.plain);
+                let level = bevy_burrow::format::Level::of(&self.expected.plain);
                 let level = BurrowLevel::new(&level).expect("it can be written");
                 let world = self.stage.app.world_mut();
                 let level = world.resource_mut::<Assets<BurrowLevel>>().add(level);
@@ -803,9 +803,8 @@ impl Life {
             let model = world.get::<Terrain>(terrain).expect("it is there");
             let is_held = world.entity(terrain).contains::<Held>();
             let shown = world.get::<ShownLevels>(terrain);
-            let has_levels = world.entity(terrain).contains::<LevelsOfDetail>();
-            let levels =
-                !has_levels || shown.is_some_and(|shown| shown.waiting == 0 && !shown.nodes.is_empty());
+            let has_lod = world.entity(terrain).contains::<LevelsOfDetail>();
+            let levels = !has_lod || shown.is_some_and(|shown| shown.waiting == 0 && !shown.nodes.is_empty());
             !is_held && levels && model.queued() == 0 && !model.is_busy() && is_ready(stage)
         });
     }

@@ -13,9 +13,9 @@ mod gates;
 mod heightmaps;
 mod history;
 mod holes;
-mod levels;
 mod lifecycle;
 mod loading;
+mod lod;
 #[cfg(feature = "examples")]
 mod looks;
 mod loose;

@@ -5,8 +5,9 @@
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
+use bevy_burrow::format::Level;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{Level, Store, StoreOptions};
+use bevy_burrow::store::{Store, StoreOptions};
 
 use crate::saved::{
     Folder, Heard, app, app_with, dig, dig_now, empty, exit, flat, hash, hash_in, heard, model, run_until,

@@ -5,10 +5,11 @@
 use std::path::PathBuf;
 
 use bevy::prelude::*;
+use bevy_burrow::format::Level;
 use bevy_burrow::plugin::Held;
 use bevy_burrow::prelude::*;
 use bevy_burrow::saves::OpeningWorld;
-use bevy_burrow::store::{Level, Store, StoreOptions};
+use bevy_burrow::store::{Store, StoreOptions};
 
 use crate::saved::{
     Folder, Heard, app, dig, dig_now, empty, exit, ground, hash, hash_in, heard, listen, model, run_until,

@@ -5,8 +5,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use bevy::prelude::*;
+use bevy_burrow::format::{Level, pack_level, write_level};
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{Level, StoreError, StoreOptions, load_level, pack_level, save_level, write_level};
+use bevy_burrow::store::{StoreError, StoreOptions, load_level, save_level};
 
 use crate::saved::{
     Folder, Heard, app, dig, ground, hash, hear, run_until, run_until_applied, run_until_opened,

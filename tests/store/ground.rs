@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use bevy_burrow::format::WorldId;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store, StoreTrouble, WorldId, from_bytes, inspect_in, to_bytes};
+use bevy_burrow::store::{SimulatedDisk, Store, StoreTrouble, from_bytes, inspect_in, to_bytes};
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{ChangeError, Drawn, Meshing};
 use fastrand::Rng;

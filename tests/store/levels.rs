@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use bevy_burrow::format::Level;
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseChanged, BaseLevel, Files, Level, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
-    check_in, from_bytes, inspect_in, to_bytes,
+    BaseChanged, BaseLevel, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble, check_in,
+    from_bytes, inspect_in, to_bytes,
 };
-use bevy_burrow::terrain::{Meshing, WorldChange};
+use bevy_burrow::terrain::{Meshing, Patch};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -44,7 +45,7 @@ pub fn restore_brick(world: &mut Terrain, rng: &mut Rng) {
     let mut places: Vec<_> = world.world().bricks().map(|(pos, _)| pos).collect();
     places.sort_unstable();
     if let Some(pos) = rng.choice(places) {
-        let change = WorldChange { bricks: vec![(pos, None)], ..WorldChange::default() };
+        let change = Patch { bricks: vec![(pos, None)], ..Patch::default() };
         world.apply_change(change, None).expect("a brick of its own");
     }
 }

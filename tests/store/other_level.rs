@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
+use bevy_burrow::format::Level;
 use bevy_burrow::lattice::{BrickPos, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseChanged, BaseLevel, DiskImage, Level, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
+    BaseChanged, BaseLevel, DiskImage, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
     check_in, inspect_in,
 };
-use bevy_burrow::terrain::{Meshing, WorldChange};
+use bevy_burrow::terrain::{Meshing, Patch};
 use bevy_burrow::volume::Brick;
 use fastrand::Rng;
 
@@ -20,7 +21,7 @@ use crate::worlds::any_random_brush;
 
 type Bricks = BTreeMap<BrickPos, Arc<Brick>>;
 
-fn bricks(change: WorldChange) -> Bricks {
+fn bricks(change: Patch) -> Bricks {
     change.bricks.into_iter().filter_map(|(pos, brick)| Some((pos, brick?))).collect()
 }
 
@@ -32,12 +33,12 @@ fn is_same(one: Option<&Arc<Brick>>, other: Option<&Arc<Brick>>, pos: BrickPos) 
 }
 
 /// The bricks in which a world differs from its level.
-fn own_bricks(world: &Terrain, level: &BaseLevel) -> WorldChange {
+fn own_bricks(world: &Terrain, level: &BaseLevel) -> Patch {
     let (now, below) = (bricks(world.parts().change), bricks(level.level().parts().change));
     let all: BTreeSet<BrickPos> = now.keys().chain(below.keys()).copied().collect();
     let is_own = |pos: &BrickPos| !is_same(now.get(pos), below.get(pos), *pos);
     let own = all.into_iter().filter(is_own).map(|pos| (pos, now.get(&pos).cloned()));
-    WorldChange { bricks: own.collect(), ..WorldChange::default() }
+    Patch { bricks: own.collect(), ..Patch::default() }
 }
 
 /// The expected world on another level: that level with the world's own bricks on it.
@@ -265,7 +266,7 @@ fn commits_behind_the_last_checkpoint_are_made_again() {
                 let all: BTreeSet<BrickPos> = before.keys().chain(after.keys()).copied().collect();
                 let is_undone = |pos: &BrickPos| !is_same(before.get(pos), after.get(pos), *pos);
                 let undone = all.into_iter().filter(is_undone).map(|pos| (pos, after.get(&pos).cloned()));
-                let change = WorldChange { bricks: undone.collect(), ..WorldChange::default() };
+                let change = Patch { bricks: undone.collect(), ..Patch::default() };
                 expected.apply_change(change, None).expect("its own bricks");
             }
             save(&mut store, &mut world).expect("the thread runs");

@@ -10,7 +10,7 @@ use bevy_burrow::ground::{
 };
 use bevy_burrow::lattice::{BrickPos, ChunkPos, LatticeBox};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{WorldChange, WorldParts};
+use bevy_burrow::terrain::{Patch, WorldParts};
 use fastrand::Rng;
 use glam::{IVec3, Quat, Vec2, Vec3};
 
@@ -392,7 +392,7 @@ pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
 }
 
 /// The change that makes a terrain's world what these parts were saved of.
-pub fn change_towards(terrain: &Terrain, parts: &WorldParts) -> WorldChange {
+pub fn change_towards(terrain: &Terrain, parts: &WorldParts) -> Patch {
     let (mut change, now) = (parts.change.clone(), terrain.parts().change);
     let gone = |pos: &BrickPos| parts.change.bricks.binary_search_by_key(pos, |own| own.0).is_err();
     change.bricks.extend(now.bricks.iter().filter(|(pos, _)| gone(pos)).map(|(pos, _)| (*pos, None)));

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use bevy::prelude::*;
 use bevy::render::settings::RenderResources;
 use bevy_burrow::debug::{BurrowDebug, SeamWires};
-use bevy_burrow::levels::{Cut, Node};
+use bevy_burrow::lod::{Cut, Node};
 use bevy_burrow::plugin::BurrowEngine;
 use bevy_burrow::terrain::World as Model;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -83,7 +83,7 @@ fn play(options: &Options, renderer: Option<RenderResources>) -> Result<Report> 
 /// A cut with everything that was dug and built at full detail, and what is next to it, so that levels of detail meet where
 /// nobody dug.
 fn edited_in_full(world: &Model) -> Cut {
-    let grid = world.level_grid(u8::MAX);
+    let grid = world.lod_grid(u8::MAX);
     let near = |Node { level, x, z }: Node| {
         (-1..=1).flat_map(move |dz| (-1..=1).map(move |dx| Node { level, x: x + dx, z: z + dz }))
     };

@@ -396,7 +396,7 @@ mod tests {
         let edit = Edit::quantize(&brush.with_tag(u64::MAX).with_stroke(u64::MAX)).expect("valid");
         let bytes = serde_json::to_vec(&edit).expect("valid");
         assert_eq!(serde_json::from_slice::<Edit>(&bytes).expect("the same"), edit);
-        #[cfg(feature = "store")]
+        #[cfg(feature = "format")]
         assert!(postcard::to_stdvec(&edit).expect("valid").len() < 100);
     }
 }

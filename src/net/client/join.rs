@@ -12,7 +12,7 @@ use super::outbox::Outbox;
 use super::{Client, ClientEvent, MOST_NUMBER};
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
-use crate::terrain::WorldChange;
+use crate::terrain::Patch;
 
 /// The progress of a join.
 pub(super) enum Stage {
@@ -213,7 +213,7 @@ impl Client {
         }
     }
 
-    fn put(&mut self, change: WorldChange) {
+    fn put(&mut self, change: Patch) {
         if self.replica.put(change).is_err() {
             self.figures.malformed += 1;
         }

@@ -32,10 +32,10 @@ use super::price::{UNDO, UNDO_BYTES, cost};
 use super::replica::{Replica, ShownChange};
 use super::stamps::Stamps;
 use crate::brush::Edit;
+use crate::format::WorldId;
 use crate::ground::Ground;
 use crate::lattice::{LatticeBox, RegionPos};
-use crate::store::WorldId;
-use crate::terrain::{ChangeError, Receipt, SIMULATION, TerrainError, TerrainSettings, World, WorldChange};
+use crate::terrain::{ChangeError, Patch, Receipt, SIMULATION, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
@@ -175,7 +175,7 @@ impl Client {
     ///
     /// # Errors
     /// When the parts do not fit the ground or the chunk size.
-    pub fn begin_with(&mut self, change: WorldChange) -> Result<(), ChangeError> {
+    pub fn begin_with(&mut self, change: Patch) -> Result<(), ChangeError> {
         self.replica.put(change)?;
         // It is in no order, so the server has to compare.
         self.epoch = Some(Epoch { world: WorldId(0), run: 0, number: 0 });
@@ -646,6 +646,6 @@ impl Client {
 }
 
 /// A box around all bricks of a change.
-fn reach(change: &WorldChange) -> Option<LatticeBox> {
+fn reach(change: &Patch) -> Option<LatticeBox> {
     change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union)
 }

@@ -11,7 +11,7 @@ use crate::net::encoding::entry_bytes;
 use crate::net::message::{Entry, Refusal, RegionHashes, ToClient};
 use crate::net::price::{MOST_UNDO_BYTES, UNDO, UNDO_BYTES};
 use crate::net::regions::{Steps, touched_regions};
-use crate::terrain::{ChangeError, Receipt, Rejection, WorldChange};
+use crate::terrain::{ChangeError, Patch, Receipt, Rejection};
 
 impl Server {
     /// Applies entries, as much as one call may.
@@ -121,7 +121,7 @@ impl Server {
         receipts
     }
 
-    fn touch(&mut self, change: &WorldChange, steps: Steps) {
+    fn touch(&mut self, change: &Patch, steps: Steps) {
         let number = self.applied + 1;
         for region in touched_regions(self.terrain.world().grid(), change) {
             self.touched.insert(region);
@@ -130,7 +130,7 @@ impl Server {
         self.sums.add(self.terrain.world(), steps);
     }
 
-    fn put_parts(&mut self, number: u64, change: &WorldChange) {
+    fn put_parts(&mut self, number: u64, change: &Patch) {
         let steps = Steps::of(self.terrain.world(), change);
         match self.terrain.apply_change(change.clone(), None) {
             Ok(_) => self.touch(change, steps),

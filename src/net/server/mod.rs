@@ -18,11 +18,13 @@ mod apply;
 mod events;
 mod join;
 mod kept;
+#[cfg(feature = "store")]
 mod keys;
 mod order_log;
 mod own_numbers;
 mod players;
 mod receive;
+#[cfg(feature = "store")]
 mod save;
 mod sender;
 mod session;
@@ -43,9 +45,9 @@ use super::never_shown;
 use super::regions::RegionSums;
 use super::stamps::Stamps;
 use crate::brush::Edit;
+use crate::format::{FormatError, WorldId};
 use crate::lattice::RegionPos;
-use crate::store::{FormatError, WorldId};
-use crate::terrain::{LooseSettings, Terrain, WorldChange};
+use crate::terrain::{LooseSettings, Patch, Terrain};
 use crate::volume::{DiggingRules, RulesError};
 pub use events::{ServerEvent, ServerFigures};
 use kept::Kept;
@@ -156,12 +158,8 @@ pub struct Server {
     /// When fetches were answered last.
     fetched: Duration,
     durable: u64,
-    /// Revisions of a store, and the numbers that are durable with them.
-    saved: VecDeque<(u64, u64)>,
-    /// The revision of the last commit that was handed over.
-    saved_revision: u64,
-    /// The last number that was handed over to a store.
-    saved_number: u64,
+    #[cfg(feature = "store")]
+    saving: save::Saving,
     outgoing: Vec<Outgoing>,
     events: VecDeque<ServerEvent>,
     figures: ServerFigures,
@@ -224,9 +222,8 @@ impl Server {
             kept: None,
             fetched: Duration::ZERO,
             durable: number,
-            saved: VecDeque::new(),
-            saved_revision: 0,
-            saved_number: number,
+            #[cfg(feature = "store")]
+            saving: save::Saving::at(0, number),
             outgoing: Vec::new(),
             events: VecDeque::new(),
             figures: ServerFigures::default(),
@@ -259,6 +256,14 @@ impl Server {
     /// Everything up to this number is saved.
     pub fn durable(&self) -> u64 {
         self.durable
+    }
+
+    /// Enters that everything up to this number is saved, and tells clients so: for those who save in another way.
+    pub fn set_durable(&mut self, number: u64) {
+        if number > self.durable && number <= self.applied {
+            self.durable = number;
+            self.send_to_all(&ToClient::Durable { number });
+        }
     }
 
     /// Its statistics.
@@ -380,7 +385,7 @@ impl Server {
     ///
     /// # Errors
     /// When they take more bytes than a message may; split them then.
-    pub fn put(&mut self, change: WorldChange) -> Result<(), FormatError> {
+    pub fn put(&mut self, change: Patch) -> Result<(), FormatError> {
         let entry = Entry::Parts { by: None, change: Arc::new(change) };
         let (length, limit) = (entry_bytes(&entry) as u64, MOST_TO_CLIENT as u64 / 2);
         if length > limit {

@@ -2,29 +2,24 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::keys::{RESERVED, prefix};
 use crate::net::message::{ClientId, MOST_OWN_JUMP};
-use crate::store::Store;
-
-/// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its world holds.
-const KEY: &str = "own/";
 
 /// The most players whose numbers are remembered, in addition to those that are connected.
 const MOST_SEEN: usize = 1 << 16;
 
 /// No player has numbers beyond this one, so that counting on can never overflow.
-const MOST_OWN: u64 = u64::MAX / 2;
+pub(super) const MOST_OWN: u64 = u64::MAX / 2;
 
 /// The most players whose numbers are saved: the most recent ones.
-const MOST_SAVED: usize = 1024;
+pub(super) const MOST_SAVED: usize = 1024;
 
 /// The last edit of a player that the world holds.
 #[derive(Clone, Copy)]
-struct Applied {
+pub(super) struct Applied {
     /// Its number at the player.
-    own: u64,
+    pub own: u64,
     /// That in the order.
-    number: u64,
+    pub number: u64,
 }
 
 /// How a player's number relates to earlier ones.
@@ -50,12 +45,18 @@ struct Seen {
 pub struct OwnNumbers {
     seen: BTreeMap<ClientId, Seen>,
     uses: u64,
-    applied: BTreeMap<ClientId, Applied>,
+    pub(super) applied: BTreeMap<ClientId, Applied>,
     /// Players whose last edit that is applied is another than the one that is saved.
-    changed: BTreeSet<ClientId>,
+    pub(super) changed: BTreeSet<ClientId>,
 }
 
 impl OwnNumbers {
+    /// How many players' numbers are known.
+    #[cfg(all(test, feature = "store"))]
+    pub fn players(&self) -> usize {
+        self.seen.len()
+    }
+
     /// The last number that was seen.
     pub fn last(&self, client: ClientId) -> u64 {
         self.seen.get(&client).map_or(0, |seen| seen.own)
@@ -114,79 +115,11 @@ impl OwnNumbers {
     pub fn last_applied(&self, client: ClientId) -> u64 {
         self.applied.get(&client).map_or(0, |last| last.number)
     }
-
-    /// Sends changed numbers to a store.
-    pub fn save(&mut self, store: &mut Store) {
-        for client in std::mem::take(&mut self.changed) {
-            let key = format!("{RESERVED}{KEY}{}", client.0);
-            match self.applied.get(&client) {
-                Some(Applied { own, number }) => {
-                    store.put(key, [own.to_le_bytes(), number.to_le_bytes()].concat());
-                }
-                None => store.remove(key),
-            }
-        }
-    }
-
-    /// The numbers in a store.
-    pub fn open(store: &Store) -> Self {
-        let mut numbers = Self::default();
-        let prefix = format!("{}{KEY}", prefix(store));
-        for (key, bytes) in store.game_data().range(prefix.clone()..) {
-            let Some(id) = key.strip_prefix(&prefix) else { break };
-            if let Ok(id) = id.parse()
-                && let Some((own, number)) = bytes.split_first_chunk()
-                && let Ok(number) = number.try_into()
-            {
-                let [own, number] = [*own, number].map(u64::from_le_bytes);
-                // One beyond the limit was never an honest player's.
-                if own <= MOST_OWN {
-                    numbers.note(ClientId(id), own);
-                    numbers.applied.insert(ClientId(id), Applied { own, number });
-                }
-            }
-        }
-        numbers
-    }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use crate::ground::Ground;
-    use crate::store::{SimulatedDisk, StoreOptions};
-    use crate::terrain::{Terrain, TerrainSettings};
-
-    #[test]
-    fn a_store_keeps_the_numbers_of_those_who_dug_last() {
-        let ground = Ground::flat(16, 16, 8.0).expect("a valid ground");
-        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
-        let disk = Arc::new(SimulatedDisk::new());
-        let mut store = Store::create_in(disk, &mut terrain, StoreOptions::default()).expect("a new world");
-        let mut numbers = OwnNumbers::default();
-        let most = MOST_SAVED as u64;
-        (1..=most).for_each(|id| numbers.apply(ClientId(id), 10 * id, id));
-        numbers.save(&mut store);
-        assert!(numbers.changed.is_empty());
-        numbers.apply(ClientId(1), 77, most + 1);
-        numbers.apply(ClientId(5000), 3, most + 2);
-        numbers.apply(ClientId::SERVER, 4, most + 3);
-        numbers.save(&mut store);
-        let key = |id: &str| format!("{RESERVED}own{id}");
-        store.put(key("er"), [0; 16]);
-        store.put(key("/nobody"), [0; 16]);
-        store.put(key("/6000"), [0; 15]);
-        store.put(key("/6001"), [0; 17]);
-        store.put(key("/6002"), [255; 16]);
-        store.put(format!("{RESERVED}number"), [0; 8]);
-        let again = OwnNumbers::open(&store);
-        assert_eq!(again.seen.len(), MOST_SAVED);
-        for (id, own) in [(1, 77), (2, 0), (3, 30), (most, 10 * most), (5000, 3), (6000, 0), (u64::MAX, 0)] {
-            assert_eq!(again.last(ClientId(id)), own, "{id}");
-        }
-    }
 
     #[test]
     fn what_came_is_not_new_again_and_nothing_jumps_far() {

@@ -7,12 +7,12 @@ use super::own_numbers::OwnNumber;
 use super::session::Fetch;
 use super::{Later, Server, UndoRequest};
 use crate::brush::Edit;
+use crate::format::bricks::is_possible;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
 use crate::net::message::{ClientId, Kick, MOST_REGIONS, Refusal, ToClient, ToServer};
 use crate::net::price::{UNDO, cost};
 use crate::net::stamps::StampId;
-use crate::store::format::bricks::is_possible;
 
 /// The cost of a greeting in the count of flooding. The greetings that are [answered](super::players) in a second cost
 /// more work.

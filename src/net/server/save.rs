@@ -1,10 +1,33 @@
 //! Saves a server's world, so that a restarted server continues from it.
 
+use std::collections::VecDeque;
+
 use super::keys::{NUMBER, RESERVED, prefix};
-use super::own_numbers::OwnNumbers;
-use super::{Server, ServerSettings, ToClient};
+use super::own_numbers::{Applied, MOST_OWN, OwnNumbers};
+use super::{Server, ServerSettings};
+use crate::net::message::ClientId;
 use crate::store::{Store, StoreError};
 use crate::terrain::Terrain;
+
+/// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its world holds.
+const KEY: &str = "own/";
+
+/// What a server has passed to its store.
+pub(super) struct Saving {
+    /// Revisions that are not yet durable, each with the number of the last entry up to it.
+    waiting: VecDeque<(u64, u64)>,
+    /// The revision of the last commit.
+    revision: u64,
+    /// The number of the last entry.
+    number: u64,
+}
+
+impl Saving {
+    /// Everything up to a revision and a number has been passed on.
+    pub fn at(revision: u64, number: u64) -> Self {
+        Self { waiting: VecDeque::new(), revision, number }
+    }
+}
 
 impl Server {
     /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or one that a store
@@ -17,9 +40,10 @@ impl Server {
             .map(u64::from_le_bytes);
         // Numbers near the end of their range were never given.
         let number = number.filter(|number| *number < u64::MAX / 2).unwrap_or_default();
-        let server = Self::at(terrain, store.world_id(), number, settings);
-        let own_numbers = OwnNumbers::open(store);
-        Self { saved_revision: store.revision(), own_numbers, ..server }
+        let mut server = Self::at(terrain, store.world_id(), number, settings);
+        server.own_numbers = OwnNumbers::open(store);
+        server.saving = Saving::at(store.revision(), number);
+        server
     }
 
     /// Passes new commits to the store, and reports to clients what has become durable. Call it after each
@@ -29,28 +53,98 @@ impl Server {
     /// # Errors
     /// When the store's thread has ended.
     pub fn save(&mut self, store: &mut Store) -> Result<(), StoreError> {
-        if self.saved_number != self.applied {
+        if self.saving.number != self.applied {
             store.put(format!("{RESERVED}{NUMBER}"), self.applied.to_le_bytes());
             self.own_numbers.save(store);
             store.follow(&mut self.terrain)?;
-            self.saved_number = self.applied;
+            self.saving.number = self.applied;
             // Without a commit among the records, they are certainly saved once the next commit is.
             let revision = store.revision();
-            let is_later = revision > self.saved_revision;
-            self.saved.push_back((revision.saturating_add((!is_later).into()), self.applied));
-            self.saved_revision = revision;
+            let is_later = revision > self.saving.revision;
+            self.saving.waiting.push_back((revision.saturating_add((!is_later).into()), self.applied));
+            self.saving.revision = revision;
         }
-        while let Some((_, number)) = self.saved.pop_front_if(|(revision, _)| *revision <= store.durable()) {
+        while let Some((_, number)) =
+            self.saving.waiting.pop_front_if(|(revision, _)| *revision <= store.durable())
+        {
             self.set_durable(number);
         }
         Ok(())
     }
+}
 
-    /// Enters that everything up to this number is saved, and tells clients so: for those who save in another way.
-    pub fn set_durable(&mut self, number: u64) {
-        if number > self.durable && number <= self.applied {
-            self.durable = number;
-            self.send_to_all(&ToClient::Durable { number });
+impl OwnNumbers {
+    /// Sends changed numbers to a store.
+    pub fn save(&mut self, store: &mut Store) {
+        for client in std::mem::take(&mut self.changed) {
+            let key = format!("{RESERVED}{KEY}{}", client.0);
+            match self.applied.get(&client) {
+                Some(Applied { own, number }) => {
+                    store.put(key, [own.to_le_bytes(), number.to_le_bytes()].concat());
+                }
+                None => store.remove(key),
+            }
+        }
+    }
+
+    /// The numbers in a store.
+    pub fn open(store: &Store) -> Self {
+        let mut numbers = Self::default();
+        let prefix = format!("{}{KEY}", prefix(store));
+        for (key, bytes) in store.game_data().range(prefix.clone()..) {
+            let Some(id) = key.strip_prefix(&prefix) else { break };
+            if let Ok(id) = id.parse()
+                && let Some((own, number)) = bytes.split_first_chunk()
+                && let Ok(number) = number.try_into()
+            {
+                let [own, number] = [*own, number].map(u64::from_le_bytes);
+                // One beyond the limit was never an honest player's.
+                if own <= MOST_OWN {
+                    numbers.note(ClientId(id), own);
+                    numbers.applied.insert(ClientId(id), Applied { own, number });
+                }
+            }
+        }
+        numbers
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::ground::Ground;
+    use crate::net::server::own_numbers::MOST_SAVED;
+    use crate::store::{SimulatedDisk, StoreOptions};
+    use crate::terrain::TerrainSettings;
+
+    #[test]
+    fn a_store_keeps_the_numbers_of_those_who_dug_last() {
+        let ground = Ground::flat(16, 16, 8.0).expect("a valid ground");
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+        let disk = Arc::new(SimulatedDisk::new());
+        let mut store = Store::create_in(disk, &mut terrain, StoreOptions::default()).expect("a new world");
+        let mut numbers = OwnNumbers::default();
+        let most = MOST_SAVED as u64;
+        (1..=most).for_each(|id| numbers.apply(ClientId(id), 10 * id, id));
+        numbers.save(&mut store);
+        assert!(numbers.changed.is_empty());
+        numbers.apply(ClientId(1), 77, most + 1);
+        numbers.apply(ClientId(5000), 3, most + 2);
+        numbers.apply(ClientId::SERVER, 4, most + 3);
+        numbers.save(&mut store);
+        let key = |id: &str| format!("{RESERVED}own{id}");
+        store.put(key("er"), [0; 16]);
+        store.put(key("/nobody"), [0; 16]);
+        store.put(key("/6000"), [0; 15]);
+        store.put(key("/6001"), [0; 17]);
+        store.put(key("/6002"), [255; 16]);
+        store.put(format!("{RESERVED}number"), [0; 8]);
+        let again = OwnNumbers::open(&store);
+        assert_eq!(again.players(), MOST_SAVED);
+        for (id, own) in [(1, 77), (2, 0), (3, 30), (most, 10 * most), (5000, 3), (6000, 0), (u64::MAX, 0)] {
+            assert_eq!(again.last(ClientId(id)), own, "{id}");
         }
     }
 }

@@ -1,30 +1,25 @@
 //! Strokes that can be undone: the parts that each replaced, and their new content.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::lattice::{BrickPos, ChunkPos};
+use crate::lattice::BrickPos;
 use crate::net::message::ClientId;
-use crate::terrain::{World, WorldChange};
-use crate::volume::{Brick, Fields};
-
-type Stored = Option<Arc<Brick>>;
-
-/// The old and the new content of a part.
-struct Replaced<T> {
-    before: T,
-    after: T,
-}
+use crate::terrain::{Patch, World};
+use crate::volume::Brick;
+use crate::world::{Overlay, State};
 
 /// Edits of a player that are undone together.
 struct Stroke {
     /// Counts strokes of all players.
     number: u64,
     label: Option<u64>,
-    bricks: BTreeMap<BrickPos, Replaced<Stored>>,
-    fields: BTreeMap<ChunkPos, Replaced<Fields>>,
+    /// The content that its edits replaced.
+    before: Overlay,
+    /// The new content, at the same positions.
+    after: Overlay,
     /// Whether another player changed its result between its edits.
     is_touched: bool,
     bytes: usize,
@@ -54,17 +49,17 @@ impl Strokes {
     }
 
     /// Records an edit's changes of this world. Consecutive edits with equal labels are one stroke.
-    pub fn record(&mut self, player: ClientId, label: Option<u64>, world: &World, change: &WorldChange) {
+    pub fn record(&mut self, player: ClientId, label: Option<u64>, world: &World, change: &Patch) {
         let strokes = self.players.entry(player).or_default();
         let goes_on = label.is_some() && strokes.back().is_some_and(|stroke| stroke.label == label);
         if !goes_on {
             let number = self.next;
             self.next += 1;
             self.order.push_back((number, player));
-            let (bricks, fields) = Default::default();
+            let (before, after) = Default::default();
             let bytes = size_of::<Stroke>();
             self.bytes += bytes;
-            strokes.push_back(Stroke { number, label, bricks, fields, is_touched: false, bytes });
+            strokes.push_back(Stroke { number, label, before, after, is_touched: false, bytes });
         }
         if let Some(stroke) = strokes.back_mut() {
             self.bytes -= stroke.bytes;
@@ -88,7 +83,7 @@ impl Strokes {
     }
 
     /// Removes the last stroke of a player, and returns the change that undoes it in this world.
-    pub fn undo(&mut self, player: ClientId, world: &World) -> Result<WorldChange, NoUndo> {
+    pub fn undo(&mut self, player: ClientId, world: &World) -> Result<Patch, NoUndo> {
         let strokes = self.players.get_mut(&player).ok_or(NoUndo::Nothing)?;
         let stroke = strokes.pop_back().ok_or(NoUndo::Nothing)?;
         if strokes.is_empty() {
@@ -101,50 +96,43 @@ impl Strokes {
 }
 
 impl Stroke {
-    fn add(&mut self, world: &World, change: &WorldChange) {
-        for (pos, after) in &change.bricks {
-            let now = world.brick(*pos);
-            self.bytes += size(after.as_ref());
-            if let Some(own) = self.bricks.get_mut(pos) {
-                self.is_touched |= !Brick::is_same(own.after.as_ref(), now);
-                self.bytes -= size(own.after.as_ref());
-                own.after = after.clone();
-            } else {
-                self.bytes += ENTRY + size(now);
-                self.bricks.insert(*pos, Replaced { before: now.cloned(), after: after.clone() });
-            }
-        }
-        for (chunk, after) in &change.fields {
-            self.bytes += after.bytes();
-            if let Some(own) = self.fields.get_mut(chunk) {
-                self.bytes -= own.after.bytes();
-                own.after = after.clone();
-            } else {
-                let before = world.fields_of(*chunk).cloned().unwrap_or_default();
-                self.bytes += ENTRY + before.bytes();
-                self.fields.insert(*chunk, Replaced { before, after: after.clone() });
-            }
-        }
+    fn add(&mut self, world: &World, change: &Patch) {
+        let is_other = |(pos, _): &(BrickPos, Option<Arc<Brick>>)| {
+            let own = self.after.bricks.get(pos);
+            own.is_some_and(|own| !Brick::is_same(own.as_ref(), world.brick(*pos)))
+        };
+        self.is_touched |= change.bricks.iter().any(is_other);
+        self.bytes -= self.bytes_at(change);
+        self.before.keep(change.inverse(world));
+        self.after.lay(change);
+        self.bytes += self.bytes_at(change);
+    }
+
+    /// Bytes of what it holds at the positions of a change.
+    fn bytes_at(&self, change: &Patch) -> usize {
+        let sides = [&self.before, &self.after];
+        let bricks = change.bricks.iter().filter_map(|(pos, _)| {
+            let [before, after] = sides.map(|side| side.bricks.get(pos));
+            Some(ENTRY + size(before?.as_ref()) + size(after?.as_ref()))
+        });
+        let fields = change.fields.iter().filter_map(|(chunk, _)| {
+            let [before, after] = sides.map(|side| side.fields.get(chunk));
+            Some(ENTRY + before?.bytes() + after?.bytes())
+        });
+        bricks.chain(fields).sum()
     }
 
     /// The change that undoes it, if its result is still unchanged. Fields that others have changed since stay: they
     /// also contain the replaced parts.
-    fn undone(&self, world: &World) -> Option<WorldChange> {
-        let is_there = |(pos, own): (&BrickPos, &Replaced<Stored>)| {
-            Brick::is_same(own.after.as_ref(), world.brick(*pos))
-        };
-        if self.is_touched || !self.bricks.iter().all(is_there) {
+    fn undone(&self, world: &World) -> Option<Patch> {
+        let is_there =
+            |(pos, own): (&BrickPos, &Option<Arc<Brick>>)| Brick::is_same(own.as_ref(), world.brick(*pos));
+        if self.is_touched || !self.after.bricks.iter().all(is_there) {
             return None;
         }
-        let fields = self.fields.iter().filter(|(chunk, own)| match world.fields_of(**chunk) {
-            Some(now) => *now == own.after,
-            None => own.after.is_empty(),
-        });
-        Some(WorldChange {
-            bricks: self.bricks.iter().map(|(pos, own)| (*pos, own.before.clone())).collect(),
-            fields: fields.map(|(chunk, own)| (*chunk, own.before.clone())).collect(),
-            next_field: world.next_field(),
-        })
+        let mut undone = self.before.patch(world.next_field());
+        undone.fields.retain(|(chunk, _)| self.after.fields.get(chunk) == Some(State::fields(world, *chunk)));
+        Some(undone)
     }
 }
 

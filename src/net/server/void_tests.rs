@@ -189,9 +189,9 @@ fn void_parts_are_mended() {
     let pristine = play.agreed();
     let mut other = terrain(&play.ground);
     other.apply([Brush::dig(Shape::sphere(Vec3::new(40.0, 20.0, 40.0), 5.0))]);
-    let WorldChange { bricks, fields, next_field } = other.parts().change;
+    let Patch { bricks, fields, next_field } = other.parts().change;
     for is_known in [false, true] {
-        let change = WorldChange { bricks: bricks.clone(), fields: fields.clone(), next_field };
+        let change = Patch { bricks: bricks.clone(), fields: fields.clone(), next_field };
         play.server.put(change).expect("it is short");
         if is_known {
             play.deliver();

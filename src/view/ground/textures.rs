@@ -10,7 +10,7 @@ use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 use super::bake::{Baked, Meter, bake};
 use super::fit::{ArrayMismatch, GroundTexturesError, is_anisotropic, layers};
 use super::look::GroundLook;
-use crate::plugin::{ThreadTask, Threads};
+use crate::threads::{ThreadTask, Threads};
 
 /// Which textures the ground is drawn with. Insert it before the first [`GroundLook`](super::GroundLook), or change it
 /// at any time.

@@ -6,9 +6,9 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
+use bevy_burrow::format::Level;
 use bevy_burrow::net::{Kick, Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::Level;
 use bevy_burrow::together::{GroundServer, SharedTerrain, SharingTrouble, WhatBecame};
 use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;

@@ -1,0 +1,48 @@
+//! The formats of worlds that are saved or sent, as pure conversions to and from bytes: no files, no threads, no clocks.
+//!
+//! | file | encodes |
+//! | --- | --- |
+//! | [`frame`] | the envelope of every part: checksum, schema, world, key |
+//! | [`region`], [`bricks`], [`fields`] | a region's record |
+//! | [`predict`], [`residuals`] | densities of bricks |
+//! | [`batch`], [`edits`], [`change`] | commits, for journals |
+//! | [`metadata`] | a world without its regions |
+//! | [`portable`] | a whole world as one file |
+//! | [`level`] | a designer's level: a folder of files, or one packed file |
+//! | [`container`], [`bytes`], [`plain`], [`limits`] | shared by the others |
+//!
+//! Reading any bytes gives the written content or a [`FormatError`]: nothing panics, and memory is bounded by the
+//! length of the input and by limits that the caller sets. Equal content always gives equal bytes.
+
+pub(crate) mod batch;
+pub(crate) mod bricks;
+pub(crate) mod bytes;
+pub(crate) mod change;
+pub(crate) mod container;
+pub(crate) mod edits;
+pub(crate) mod error;
+pub(crate) mod fields;
+pub(crate) mod frame;
+pub(crate) mod ids;
+pub(crate) mod level;
+pub(crate) mod limits;
+pub(crate) mod metadata;
+pub(crate) mod plain;
+pub(crate) mod portable;
+pub(crate) mod predict;
+pub(crate) mod region;
+pub(crate) mod residuals;
+
+pub use batch::Batch;
+pub use error::FormatError;
+pub use ids::WorldId;
+pub use level::{Level, LevelFiles, pack_level, read_level, unpack_level, write_level};
+pub use metadata::Metadata;
+pub use portable::{
+    PortableHead, PortableWorld, SavedRegion, read_portable, read_portable_head, write_portable,
+};
+#[cfg(any(feature = "net", feature = "store"))]
+pub(crate) use region::{decode_region, encode_region};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,97 @@
+//! Stored files of each schema: they can still be read, and are still written with the same bytes.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::{IVec3, Vec3};
+
+use super::{compare, worlds};
+use crate::brush::{Brush, Shape};
+use crate::format::level::{LEVEL_JSON, Level, LevelFiles, read_level, write_level};
+use crate::format::portable::{PortableWorld, read_portable, write_portable};
+use crate::ground::{Ground, MaterialId};
+use crate::lattice::LatticeBox;
+use crate::terrain::{LooseSettings, Terrain, TerrainSettings};
+use crate::volume::DiggingRules;
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/store/schema_1")
+}
+
+/// Stairs, the same on every machine.
+fn ground() -> Arc<Ground> {
+    let height = |x: i32, z: i32| f64::from((x * 7 + z * 13) % 32) / 4.0 + f64::from(x / 16);
+    Arc::new(Ground::from_fn(96, 80, height).expect("valid heights"))
+}
+
+/// A world with something of everything.
+fn world() -> Terrain {
+    let mut terrain = worlds::terrain(&ground());
+    let box_of = |low: i32, high: i32| LatticeBox { min: IVec3::splat(low), max: IVec3::splat(high) };
+    let rules = DiggingRules::default().with_hardness(MaterialId(2), 9).with_bedrock(-30);
+    terrain.set_rules(rules.with_protected(box_of(60, 70))).expect("valid rules");
+    terrain.set_loose(Some(LooseSettings { crumbs: 30, ..LooseSettings::default() }));
+    let at = Vec3::new(40.0, 5.0, 30.0);
+    let ball = Shape::sphere(at, 4.5);
+    worlds::apply(
+        &mut terrain,
+        [
+            Brush::dig(Shape::sphere(at, 14.0)).with_tag(3),
+            Brush::add(ball, MaterialId(2)).with_stroke(8),
+            Brush::paint(Shape::sphere(at + 20.0, 6.0), MaterialId(4)),
+            Brush::raise(Shape::sphere(Vec3::new(64.0, 8.0, 64.0), 6.0), 2.0),
+            Brush::dig(Shape::cuboid(at + 3.0, Vec3::new(2.0, 9.0, 1.5))),
+        ],
+    );
+    terrain.undo();
+    worlds::apply(&mut terrain, [Brush::dig(Shape::sphere(Vec3::new(20.0, 1.0, 60.0), 3.0))]);
+    terrain
+}
+
+fn written() -> (PortableWorld, Vec<u8>, LevelFiles) {
+    let (ground, mut terrain) = (ground(), world());
+    let game = [("spawn".to_owned(), vec![1, 2, 3])].into();
+    let level = Level::new(terrain.parts(), TerrainSettings::default().voxel_size, game, &ground);
+    let portable = worlds::portable(&mut terrain, &ground);
+    let file = write_portable(&portable).unwrap();
+    (portable, file, write_level(&level).expect("a valid level"))
+}
+
+/// Writes the files again: only while a schema is not released yet.
+#[test]
+#[ignore = "writes the fixtures"]
+fn write_fixtures() {
+    let (_, file, level) = written();
+    std::fs::create_dir_all(folder().join("level")).unwrap();
+    std::fs::write(folder().join("world.burrow"), file).unwrap();
+    level.iter().for_each(|(name, bytes)| std::fs::write(folder().join("level").join(name), bytes).unwrap());
+}
+
+#[test]
+fn worlds_of_schema_1_can_be_read() {
+    let (ground, (expected, written, _)) = (ground(), written());
+    let file = std::fs::read(folder().join("world.burrow")).unwrap();
+    let read = read_portable(&file, &ground).unwrap();
+    assert!(compare::portables(&read, &expected));
+    assert_eq!(written, file, "what is written today differs from schema 1: it needs a new number");
+    let restored = Terrain::restore(Arc::clone(&ground), &read.metadata.settings, read.parts()).unwrap();
+    assert_eq!(restored.world().hash(), read.metadata.hash);
+}
+
+#[test]
+fn levels_of_schema_1_can_be_read() {
+    let (ground, (_, _, written)) = (ground(), written());
+    let mut files = LevelFiles::new();
+    for entry in std::fs::read_dir(folder().join("level")).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        let mut bytes = std::fs::read(entry.path()).unwrap();
+        if name == LEVEL_JSON {
+            // Checkouts may change the ends of lines.
+            bytes.retain(|&byte| byte != b'\r');
+        }
+        files.insert(name, bytes);
+    }
+    assert_eq!(files, written, "what is written today differs from schema 1: it needs a new number");
+    read_level(&files, &ground).unwrap();
+}

@@ -1,0 +1,55 @@
+//! The log of a terrain: what it keeps, and who takes it.
+
+use super::log::CommitLog;
+use super::model::Terrain;
+use super::record::CommitRecord;
+
+impl Terrain {
+    /// Keeps a record of each commit until it is [taken](Self::take_log); `None` keeps none and
+    /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps, the
+    /// oldest are dropped. A reader that finds a gap between [revisions](CommitRecord::revision), or whose
+    /// last record does not have the [world's revision](super::World::revision), has to read [all of the
+    /// world](Self::parts).
+    ///
+    /// Rules and settings of loose pieces are logged with the first edit that obeys them, or once nothing
+    /// waits.
+    pub fn keep_log(&mut self, bytes: Option<usize>) {
+        match (&mut self.log, bytes) {
+            (_, None) => self.log = None,
+            (Some(log), Some(limit)) => log.set_limit(limit),
+            (None, Some(limit)) => {
+                self.log = Some(CommitLog::new(limit));
+                // Its commit would hold no record.
+                self.abandon();
+            }
+        }
+        self.log_terms();
+    }
+
+    /// The records of the commits since the last call, in order; each is returned once.
+    pub fn take_log(&mut self) -> Vec<CommitRecord> {
+        self.log.as_mut().map(CommitLog::take).unwrap_or_default()
+    }
+
+    /// Returns `true` if there is a record to [take](Self::take_log).
+    pub fn has_log(&self) -> bool {
+        self.log.as_ref().is_some_and(|log| !log.is_empty())
+    }
+
+    /// Whether the records that wait follow this revision, and one of them sets another ground: then the world is another one than before,
+    /// and the terrain is the same.
+    #[cfg(feature = "store")]
+    pub(crate) fn log_sets_ground_after(&self, revision: u64) -> bool {
+        self.log.as_ref().is_some_and(|log| log.sets_ground_after(revision))
+    }
+
+    /// Records the terms of later edits in the log, unless waiting edits obey other terms.
+    pub(super) fn log_terms(&mut self) {
+        if self.is_busy() || self.queue.len() > 0 {
+            return;
+        }
+        if let Some(log) = &mut self.log {
+            log.enter_terms(&self.world, (self.rules.clone(), self.loose));
+        }
+    }
+}

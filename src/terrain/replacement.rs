@@ -1,0 +1,80 @@
+//! Parts that take the place of others, and why they may not.
+
+use std::sync::Arc;
+
+use crate::ground::Ground;
+use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
+use crate::world::Patch;
+
+/// The reason why parts were not replaced; nothing changed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChangeError {
+    /// Bricks come twice or out of order.
+    #[error("the brick {0:?} is repeated or out of order: sort bricks by position")]
+    Order(BrickPos),
+    /// A brick, or one of its edited samples, lies outside the world.
+    #[error("the brick {0:?} extends beyond the world")]
+    OutsideWorld(BrickPos),
+    /// A brick has a pristine sample that is solid where this ground is air, or vice versa.
+    #[error("the brick {0:?} was made on a different ground")]
+    OtherGround(BrickPos),
+    /// Fields of a chunk reach out of it, it comes twice, or one of its fields has the name of another.
+    #[error("the fields of chunk {0:?} extend beyond it, are repeated, or share a name")]
+    Fields(ChunkPos),
+    /// A revision or the name of a field is so great that no others could follow.
+    #[error("{0} is too large for a revision or the name of a field")]
+    Number(u64),
+    /// The world would not have the hash that was expected.
+    #[error("the world would have the hash {found:#018x}, not {expected:#018x}")]
+    Hash {
+        /// The hash that it would have.
+        found: u64,
+        /// The expected hash.
+        expected: u64,
+    },
+    /// The ground has another size, in cells.
+    #[error("the new ground has {found:?} cells, but the world has {expected:?}")]
+    GroundSize {
+        /// Width and depth of the new one.
+        found: (i32, i32),
+        /// Those of the world's.
+        expected: (i32, i32),
+    },
+    /// Too much work [waits](crate::terrain::WorkLimits::waiting).
+    #[error("the queue is full: try again once waiting work is done")]
+    Overloaded,
+    /// It panicked.
+    #[error("replacing parts panicked: this is a bug in bevy_burrow")]
+    Panicked,
+}
+
+/// The replacement parts.
+#[derive(Debug)]
+pub(super) struct Put {
+    pub change: Patch,
+    /// The hash that the world must have afterwards.
+    pub hash: Option<u64>,
+    /// Whether its receipt counts voxels.
+    pub counts: bool,
+    /// Another ground below all edits; nothing else changes then.
+    pub ground: Option<Arc<Ground>>,
+}
+
+impl Put {
+    /// Returns `true` if it certainly changes nothing.
+    pub fn is_empty(&self) -> bool {
+        self.change.is_empty() && self.ground.is_none()
+    }
+
+    /// Returns `true` if it certainly changes none of these samples.
+    pub fn misses(&self, samples: LatticeBox) -> bool {
+        let misses = |pos: &BrickPos| pos.samples().intersection(samples).is_none();
+        self.ground.is_none() && self.change.bricks.iter().all(|(pos, _)| misses(pos))
+    }
+}
+
+/// Checks that a revision or the name of a field leaves room for those that follow.
+pub(super) fn check_number(number: u64) -> Result<u64, ChangeError> {
+    if number > u64::MAX / 2 { Err(ChangeError::Number(number)) } else { Ok(number) }
+}

@@ -1,0 +1,71 @@
+//! What the work of a transaction leads to.
+
+use std::sync::Arc;
+
+use super::field_log::FieldNews;
+use crate::lattice::ChunkPos;
+use crate::redraw::{MeshUpdates, Stages};
+use crate::terrain::history::{HistoryReceipt, Restored, UndoDelta};
+use crate::terrain::receipt::Receipt;
+use crate::terrain::replacement::ChangeError;
+use crate::volume::UniformBricks;
+use crate::world::{Patch, World};
+
+/// What the work of a transaction leads to: the parts that change, how they are drawn, and the answers.
+pub(crate) struct Resolved {
+    /// The parts that groups of edits change, in order, or a step through history.
+    pub changes: Vec<UndoDelta>,
+    /// Hash of all samples afterwards.
+    pub sample_hash: u64,
+    /// The pool of uniform bricks, if it has grown.
+    pub uniform: Option<UniformBricks>,
+    /// The greatest name that any field has had afterwards.
+    pub next_field: u64,
+    pub receipts: Vec<Receipt>,
+    /// The receipt of a step through history.
+    pub step: Option<HistoryReceipt>,
+    /// The receipt of replaced parts.
+    pub put: Option<Result<Restored, ChangeError>>,
+    /// Changes of fields.
+    pub news: Vec<(ChunkPos, FieldNews)>,
+    /// The world that takes the place of the one that was there, if all of it changes.
+    pub whole: Option<Arc<World>>,
+    pub meshes: MeshUpdates,
+    pub stages: Stages,
+}
+
+impl Resolved {
+    /// Nothing changes.
+    pub fn nothing(world: &World) -> Self {
+        Self::new(world, Vec::new(), world.sample_hash, MeshUpdates::default())
+    }
+
+    /// These parts change, and this is drawn then.
+    pub fn new(world: &World, changes: Vec<UndoDelta>, sample_hash: u64, meshes: MeshUpdates) -> Self {
+        Self {
+            changes,
+            sample_hash,
+            uniform: None,
+            next_field: world.next_field,
+            receipts: Vec::new(),
+            step: None,
+            put: None,
+            news: Vec::new(),
+            whole: None,
+            meshes,
+            stages: Stages::default(),
+        }
+    }
+}
+
+/// The bricks and fields that changes in order lead to, or those of another world.
+pub(crate) fn patch_of(changes: &[UndoDelta], whole: Option<&World>, next_field: u64) -> Patch {
+    if let Some(whole) = whole {
+        return whole.all_parts();
+    }
+    let mut changes = changes.iter().map(|own| own.change.patch.clone());
+    let mut patch = changes.next().unwrap_or_default();
+    changes.for_each(|later| patch.then(later));
+    patch.next_field = next_field;
+    patch
+}

@@ -1,0 +1,38 @@
+//! The world at one revision: ground, bricks, fields, mask and the surfaces that were meshed from them; and queries.
+//!
+//! | file | what it holds |
+//! | --- | --- |
+//! | `state` | the committed world |
+//! | `patch` | what differs between two states |
+//! | `change` | what a commit swaps |
+//! | `parts`, `regions` | bricks and fields, as they are saved, compared and sent |
+//! | `unmeshed` | surfaces that are made when they are asked for |
+//! | `query`, `ray`, `triangles`, `inspect`, `heights` | heights, rays, debug views, export |
+//! | `memory` | the bytes that it takes |
+//! | `settings` | voxel size and chunk size |
+
+mod change;
+mod heights;
+mod inspect;
+mod memory;
+mod parts;
+mod patch;
+mod query;
+mod ray;
+mod regions;
+mod settings;
+mod state;
+mod triangles;
+mod unmeshed;
+
+pub(crate) use change::{Change, brick_bytes, replaced_bytes};
+pub use memory::Memory;
+pub(crate) use parts::{brick_over, columns_of};
+pub use patch::Patch;
+pub(crate) use patch::{ChangedBrick, Overlay, Places, State};
+pub use query::{RayHit, Span};
+pub use settings::{TerrainError, TerrainSettings};
+pub(crate) use state::unique;
+pub use state::{Drawn, Version, World};
+pub use unmeshed::Meshing;
+pub(crate) use unmeshed::{UnmeshedChunk, blocks_of};
