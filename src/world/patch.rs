@@ -118,7 +118,6 @@ impl Patch {
     }
 
     /// The parts of it in each region. Fields belong to the region of the lowest corner of their chunk.
-    #[cfg(any(feature = "store", test))]
     pub(crate) fn by_region(&self, grid: ChunkGrid) -> BTreeMap<RegionPos, Self> {
         let mut regions = BTreeMap::<RegionPos, Self>::new();
         let new = || Self { next_field: self.next_field, ..Self::default() };

@@ -56,6 +56,7 @@ impl World {
 
     /// The number to add to its region's [hash](Self::region_hash), wrapping around, when a brick is replaced: only
     /// samples that differ are hashed. `None` stands for a pristine brick.
+    #[cfg_attr(not(feature = "net"), allow(dead_code))]
     pub(crate) fn hash_step(&self, pos: BrickPos, new: Option<&Arc<Brick>>) -> u64 {
         let old = self.brick(pos);
         let edited = [old, new].map(|brick| brick.map_or(&layers::NONE, |brick| brick.edited()));
