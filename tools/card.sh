@@ -7,9 +7,10 @@
 #                               holes, and compared with the pictures of the machine that packed; OUT/report.txt has the rest
 #   FRAMES=1 DIR/run.sh [OUT]   also measures the times of frames
 #
-# It fails if ground is missing in any picture, or if a picture differs by more than 0.03 FLIP.
+# It fails if ground is missing in any picture, if a golden scene differs by more than 0.03 FLIP, or a picture of the digger by more
+# than 0.05: renderers round mip levels and the edges of shadows otherwise, and bodies of physics land a millimetre apart.
 set -euo pipefail
-[ "${1:-}" = pack ] || { sed -n '2,12s/^# \{0,1\}//p' "$0"; exit 2; }
+[ "${1:-}" = pack ] || { sed -n '2,13s/^# \{0,1\}//p' "$0"; exit 2; }
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH="$HOME/.cargo/bin:$PATH"
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$HOME/.cache/bevy_burrow/target}"
@@ -50,7 +51,7 @@ step() {
 }
 step digger bin/digger --headless --width 640 --height 360 --out "$out/digger"
 step low bin/digger --headless --low --width 640 --height 360 --out "$out/low"
-step compare env BURROW_COMPARE="software:$out/low" bin/golden --ignored --nocapture two_renderers
+step compare env BURROW_FLIP=0.05 BURROW_COMPARE="software:$out/low" bin/golden --ignored --nocapture two_renderers
 step golden bin/golden --nocapture --test-threads 1
 if [ -n "${FRAMES:-}" ]; then
     step frames bin/frame_times 0 2560 1440
