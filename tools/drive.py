@@ -189,6 +189,11 @@ def fits(stage):
             wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
             if wide > 2 and high > 2:
                 raise Failed(f"{one!r} is over {other!r}: {a} {b}")
+            # Boxes are apart, or one is within the other.
+            c, d = a[4:], b[4:]
+            both = [max(c[0], d[0]), max(c[1], d[1]), min(c[2], d[2]), min(c[3], d[3])]
+            if both[2] - both[0] > 2 and both[3] - both[1] > 2 and both not in (c, d):
+                raise Failed(f"the box of {one!r} is over that of {other!r}: {c} {d}")
     if not found:
         raise Failed("no text is to be seen")
     if stage.takes_all:
@@ -440,7 +445,9 @@ def digger(stage):
             # Who loses the keyboard is paused.
             stage.focus("Digger")
             menu.rest()
+            stage.page_mark = stage.mark()
             menu.choose("Multiplayer", "Paused Together")
+            fits(stage)
             since = guest.mark()
             menu.choose("Stop hosting", "Playing None")
             guest.wait(r"^hint The host can.t be reached", since)
@@ -465,9 +472,10 @@ def digger(stage):
     menu.rest()
     picture(stage, "title", see=(60, 50, 35, 40))
     pages()
-    since = stage.mark()
+    since = stage.page_mark = stage.mark()
     menu.choose("Play")
     page("Playing None", since)
+    fits(stage)
     if world() != "world 1":
         raise Failed(f"the first world is {world()!r}")
     if stage.takes_all:

@@ -102,5 +102,7 @@ pub fn style() -> Arc<Style> {
         look.expansion = 0.0;
     }
     widgets.inactive.bg_stroke = Stroke::NONE;
+    // Of check boxes and the rails of sliders, which stand out from a card.
+    widgets.inactive.bg_fill = SLATE_LIGHT;
     Arc::new(style)
 }
