@@ -697,7 +697,8 @@ def main():
     if not binary.exists():
         print(f"{binary} is not there: build it first, or name it with --binary", file=sys.stderr)
         return 1
-    command = [str(binary), "--width", str(size[0]), "--height", str(size[1]), "--out", str(args.out), "--tell"]
+    logical = [str(round(side / args.scale)) for side in size]
+    command = [str(binary), "--width", logical[0], "--height", logical[1], "--out", str(args.out), "--tell"]
     print(f"{args.play}: {binary}", flush=True)
     # A signal to stop also ends the program and the display.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
