@@ -202,7 +202,7 @@ def fits(stage):
         stage.shoot(f"{len(stage.shots):02}_{page.group(1)}_{page.group(2)}")
 
 
-@play("480x270")
+@play("400x225")
 def digger(stage):
     """Every menu page, every tool, saved worlds, settings that survive, and a guest on the same machine."""
     menu, player = Menu(stage), Player(stage)
@@ -489,7 +489,7 @@ def digger(stage):
     together()
 
 
-@play("800x600", "--cells", "128")
+@play("800x600", "--cells", "96")
 def sculpt(stage):
     """Every operation and shape, a held stroke and its undo, questions, save, open, quit with unsaved work."""
     tool = r"^tool operation=(\w+) shape=(\w+) radius=([\d.]+)"

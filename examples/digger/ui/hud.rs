@@ -419,10 +419,11 @@ fn show_keys(
     mut slots: Query<(&SlotKey, &mut Text)>,
 ) {
     use Action as A;
-    let lines = [A::Use, A::Build, A::Grow, A::Help, A::Headlamp, A::Undo, A::Pause].map(|action| {
-        let what = if action == A::Grow { texts::BRUSH_SIZE } else { action.label() };
-        format!("{}  {what}", settings.bindings.first(action, &labels))
-    });
+    let lines =
+        [A::Use, A::Build, A::Grow, A::NextMaterial, A::Help, A::Headlamp, A::Undo, A::Pause].map(|action| {
+            let what = if action == A::Grow { texts::BRUSH_SIZE } else { action.label() };
+            format!("{}  {what}", settings.bindings.first(action, &labels))
+        });
     list.0 = lines.join("\n");
     for (slot, mut text) in &mut slots {
         // A slot has room for a short label only.
