@@ -189,6 +189,11 @@ def fits(stage):
             wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
             if wide > 2 and high > 2:
                 raise Failed(f"{one!r} is over {other!r}: {a} {b}")
+            # Boxes are apart, or one is within the other.
+            c, d = a[4:], b[4:]
+            both = [max(c[0], d[0]), max(c[1], d[1]), min(c[2], d[2]), min(c[3], d[3])]
+            if both[2] - both[0] > 2 and both[3] - both[1] > 2 and both not in (c, d):
+                raise Failed(f"the box of {one!r} is over that of {other!r}: {c} {d}")
     if not found:
         raise Failed("no text is to be seen")
     if stage.takes_all:
@@ -197,7 +202,7 @@ def fits(stage):
         stage.shoot(f"{len(stage.shots):02}_{page.group(1)}_{page.group(2)}")
 
 
-@play("480x270")
+@play("400x225")
 def digger(stage):
     """Every menu page, every tool, saved worlds, settings that survive, and a guest on the same machine."""
     menu, player = Menu(stage), Player(stage)
@@ -440,7 +445,9 @@ def digger(stage):
             # Who loses the keyboard is paused.
             stage.focus("Digger")
             menu.rest()
+            stage.page_mark = stage.mark()
             menu.choose("Multiplayer", "Paused Together")
+            fits(stage)
             since = guest.mark()
             menu.choose("Stop hosting", "Playing None")
             guest.wait(r"^hint The host can.t be reached", since)
@@ -468,6 +475,9 @@ def digger(stage):
     since = stage.mark()
     menu.choose("Play")
     page("Playing None", since)
+    # The title was there for some frames more.
+    stage.page_mark = stage.lines().index("page Playing None", since)
+    fits(stage)
     if world() != "world 1":
         raise Failed(f"the first world is {world()!r}")
     if stage.takes_all:
@@ -479,7 +489,7 @@ def digger(stage):
     together()
 
 
-@play("800x600", "--cells", "128")
+@play("800x600", "--cells", "96")
 def sculpt(stage):
     """Every operation and shape, a held stroke and its undo, questions, save, open, quit with unsaved work."""
     tool = r"^tool operation=(\w+) shape=(\w+) radius=([\d.]+)"
@@ -689,7 +699,8 @@ def main():
     if not binary.exists():
         print(f"{binary} is not there: build it first, or name it with --binary", file=sys.stderr)
         return 1
-    command = [str(binary), "--width", str(size[0]), "--height", str(size[1]), "--out", str(args.out), "--tell"]
+    logical = [str(round(side / args.scale)) for side in size]
+    command = [str(binary), "--width", logical[0], "--height", logical[1], "--out", str(args.out), "--tell"]
     print(f"{args.play}: {binary}", flush=True)
     # A signal to stop also ends the program and the display.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))

@@ -228,7 +228,9 @@ pub(super) fn bar(
 pub(super) fn ask(context: &egui::Context, files: &mut Files) {
     let Some(question) = files.question.clone() else { return };
     let (text, answers) = (question.text(), question.answers());
-    Modal::new(Id::new("burrow question")).frame(theme::card()).show(context, |ui| {
+    // Nothing behind it shines through.
+    let frame = theme::card().fill(theme::NIGHT);
+    Modal::new(Id::new("burrow question")).frame(frame).show(context, |ui| {
         ui.set_style(theme::style());
         ui.set_width(320.0);
         ui.label(RichText::new(text).color(BRIGHT).size(14.0));

@@ -120,6 +120,8 @@ impl Screen {
         self.frame(vec![Event::PointerMoved(at)]);
         self.frame(vec![Self::button(at, true)]);
         self.frame(vec![Self::button(at, false)]);
+        // A section takes a moment to open.
+        (0..8).for_each(|_| self.frame(Vec::new()));
     }
 
     /// Drags a slider past its lower or upper end.

@@ -19,7 +19,7 @@ pub const SCROLL_BAR: f32 = 10.0;
 /// Distance from the window's border to a column.
 pub const GAP: f32 = 12.0;
 
-const NIGHT: Color32 = Color32::from_rgb(23, 26, 31);
+pub const NIGHT: Color32 = Color32::from_rgb(23, 26, 31);
 pub const SLATE: Color32 = Color32::from_rgb(38, 43, 51);
 const SLATE_LIGHT: Color32 = Color32::from_rgb(52, 59, 70);
 const EDGE: Color32 = Color32::from_rgb(58, 65, 76);
@@ -102,5 +102,7 @@ pub fn style() -> Arc<Style> {
         look.expansion = 0.0;
     }
     widgets.inactive.bg_stroke = Stroke::NONE;
+    // Of check boxes and the rails of sliders, which stand out from a card.
+    widgets.inactive.bg_fill = SLATE_LIGHT;
     Arc::new(style)
 }

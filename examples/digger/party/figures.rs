@@ -181,7 +181,7 @@ fn switch_lamps(
     }
 }
 
-/// Puts names over heads.
+/// Puts names over heads, but not over menus.
 fn show_names(
     state: Res<State<GameState>>,
     scale: Res<UiScale>,
@@ -194,7 +194,7 @@ fn show_names(
     for (name, mut node, mut shown, size) in &mut names {
         let place = figures.get(name.0).ok().map(|place| place.translation + Vec3::Y * NAME_HEIGHT);
         let place = place.filter(|place| place.distance(eye.translation) < NAME_DISTANCE);
-        let place = place.filter(|_| *state.get() != GameState::Title);
+        let place = place.filter(|_| *state.get() == GameState::Playing);
         let on_screen = place.and_then(|place| camera.world_to_viewport(&view, place).ok());
         let visibility = if on_screen.is_some() { Visibility::Visible } else { Visibility::Hidden };
         shown.set_if_neq(visibility);

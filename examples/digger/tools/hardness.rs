@@ -102,7 +102,7 @@ mod tests {
         for (material, depth, power, tag, hint) in [
             (ROCK, 4.0, 100, FIRST_PLAYER_TAG, ""),
             (GOLD, 4.0, 100, FIRST_PLAYER_TAG, "This tool is too weak for gold."),
-            (GOLD, 4.0, 115, FIRST_PLAYER_TAG, "gold is hard. Keep digging."),
+            (GOLD, 4.0, 115, FIRST_PLAYER_TAG, "The gold is hard. Keep digging."),
             (ROCK, 50.0, 255, FIRST_PLAYER_TAG, "Bedrock can't be broken."),
             // A script's brush.
             (ROCK, 50.0, 255, 0, ""),

@@ -136,7 +136,7 @@ fn spawn_hud(mut commands: Commands, images: Res<Images>) {
         let hint = Node { max_width: percent(46), ..padded() };
         let hint = (HintBox, widgets::panel(hint), Visibility::Hidden);
         hud.spawn((place(top), children![(hint, children![(Hints, widgets::paragraph("", 18.0, GOLD))])]));
-        let lower_left = place(Node { left: px(14), bottom: px(12), ..padded() });
+        let lower_left = place(Node { left: px(8), bottom: px(12), ..padded() });
         hud.spawn((widgets::panel(lower_left), children![(KeyList, text("", 13.0, GREY))]));
         let bottom =
             Node { width: percent(100), bottom: px(12), align_items: AlignItems::Center, ..column(px(6)) };
@@ -419,8 +419,11 @@ fn show_keys(
     mut slots: Query<(&SlotKey, &mut Text)>,
 ) {
     use Action as A;
-    let lines = [A::Use, A::Build, A::Grow, A::Help, A::Headlamp, A::Undo, A::Pause]
-        .map(|action| format!("{}  {}", settings.bindings.first(action, &labels), action.label()));
+    let lines =
+        [A::Use, A::Build, A::Grow, A::NextMaterial, A::Help, A::Headlamp, A::Undo, A::Pause].map(|action| {
+            let what = if action == A::Grow { texts::BRUSH_SIZE } else { action.label() };
+            format!("{}  {what}", settings.bindings.first(action, &labels))
+        });
     list.0 = lines.join("\n");
     for (slot, mut text) in &mut slots {
         // A slot has room for a short label only.

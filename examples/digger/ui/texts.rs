@@ -43,7 +43,7 @@ pub const HELP_GAMEPAD: &str =
     "A gamepad's left stick walks and selects menu items. Its right stick looks around.";
 #[rustfmt::skip]
 pub const HELP_KEYS: [&str; 14] = [
-    "walk", "run", "jump", "use the tool; hold to repeat", "build with the chosen material", "brush size",
+    "walk", "run", "jump", "use the tool; hold to repeat", "build with the chosen material", BRUSH_SIZE,
     "choose a material", "build shape", "next tool", "previous tool", "headlamp", "undo, redo",
     "terrain panel", "pause",
 ];
@@ -77,7 +77,7 @@ pub const BEDROCK: &str = "bedrock";
 /// The directions of the compass, clockwise from north.
 pub const COMPASS: [&str; 8] = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 texts! {
-    CORE_SAMPLE = "Under the crosshair", HEADLAMP_ON = "headlamp", SAVING = "saving", SOMEBODY = "somebody",
+    BRUSH_SIZE = "brush size", CORE_SAMPLE = "Under the crosshair", HEADLAMP_ON = "headlamp", SAVING = "saving", SOMEBODY = "somebody",
     TOO_FAR = "Too far away. Move closer.", UNBREAKABLE = "Bedrock can't be broken.",
     BROUGHT_BACK = "You are back on solid ground.",
     HOST_LOST = "The host can't be reached. What you dig meanwhile is sent later.",
@@ -133,7 +133,7 @@ pub fn too_hard(material: &str) -> String {
 }
 
 pub fn hard(material: &str) -> String {
-    format!("{material} is hard. Keep digging.")
+    format!("The {material} is hard. Keep digging.")
 }
 
 pub fn debt(amount: i64, material: &str) -> String {

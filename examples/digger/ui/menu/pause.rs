@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 
 use super::question::Question;
-use super::{quit, spawn_common_buttons};
+use super::{go_to, quit, spawn_common_buttons};
 use crate::player::game_state::{GameState, MenuPage};
 use crate::player::input::{Action, ActionSystems, Actions};
 use crate::ui::texts;
@@ -29,8 +29,9 @@ fn open(mut commands: Commands) {
     super::spawn_page(&mut commands, MenuPage::Menu, texts::PAUSED, 330.0, |column| {
         column.spawn(widgets::button(0, texts::RESUME, WIDTH)).observe(change_to(GameState::Playing));
         spawn_common_buttons(column, 1, WIDTH);
-        column.spawn(widgets::button(4, texts::MAIN_MENU, WIDTH)).observe(change_to(GameState::Title));
-        column.spawn(widgets::button(5, texts::SAVE_AND_QUIT, WIDTH)).observe(quit);
+        column.spawn(widgets::button(4, texts::MULTIPLAYER, WIDTH)).observe(go_to(MenuPage::Together));
+        column.spawn(widgets::button(5, texts::MAIN_MENU, WIDTH)).observe(change_to(GameState::Title));
+        column.spawn(widgets::button(6, texts::SAVE_AND_QUIT, WIDTH)).observe(quit);
     });
 }
 
