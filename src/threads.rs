@@ -12,6 +12,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::thread;
+use std::time::Duration;
 
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
@@ -199,6 +200,11 @@ impl<T: Send + 'static> ThreadTask<T> {
         self.result.get().try_recv().ok()
     }
 
+    /// The result if it is there within a time, like [`check`](Self::check).
+    pub fn check_within(&mut self, time: Duration) -> Option<thread::Result<T>> {
+        if time.is_zero() { self.check() } else { self.result.get().recv_timeout(time).ok() }
+    }
+
     /// Waits for the result, on another thread than the main one; `None` if the work panicked, or the result was taken.
     pub fn wait(mut self) -> Option<T> {
         self.result.get().recv().ok()?.ok()
@@ -213,7 +219,7 @@ impl<T: Send + 'static> ThreadTask<T> {
 #[cfg(test)]
 mod tests {
     use std::sync::mpsc::channel;
-    use std::time::{Duration, Instant};
+    use std::time::Instant;
 
     use bevy::prelude::*;
 

@@ -1,5 +1,7 @@
 //! Starts transactions, and commits each of them whole in one frame.
 
+use std::time::Duration;
+
 use bevy::camera::visibility::VisibilityClass;
 use bevy::diagnostic::Diagnostics;
 use bevy::ecs::system::SystemParam;
@@ -15,6 +17,7 @@ use super::lod_state::{LodState, ShownLevels, WantedTiles, Watchers};
 use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface};
 use super::reports::{Report, Reports};
+use super::same_frame::SameFrame;
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
@@ -43,6 +46,7 @@ pub(super) fn begin_transactions(
     mut figures: ResMut<BurrowFigures>,
     mut history: HistoryMessages,
     mut counter: ResMut<TaskCounter>,
+    mut same_frame: ResMut<SameFrame>,
 ) {
     let start = Instant::now();
     for (entity, mut terrain, entities, colors, is_slim, levels) in &mut terrains {
@@ -54,6 +58,7 @@ pub(super) fn begin_transactions(
         if terrain.queued() == 0 || !entities.show(terrain.world()) || entities.is_slim != is_slim {
             continue;
         }
+        let work = terrain.waiting_work();
         let transaction = terrain.begin_for(true);
         send_history(entity, &mut terrain, &mut history);
         let Some(transaction) = transaction else { continue };
@@ -66,6 +71,7 @@ pub(super) fn begin_transactions(
         builder.revision += 1;
         let task = InFlight::transaction(counter.next(), entity, transaction, engine, builder);
         commands.entity(entity).try_insert(task);
+        same_frame.note(entity, work);
     }
     figures.measure(start.elapsed());
 }
@@ -90,50 +96,78 @@ pub(super) struct CommitMessages<'w> {
     found: MessageWriter<'w, LoosePieceFound>,
 }
 
-/// Commits what is done: each transaction whole, as many as the frame's budget of swaps allows, and at least one.
-pub(super) fn commit_transactions(
-    settings: Res<BurrowSettings>,
-    mut terrains: Query<(
-        Entity,
-        &mut Terrain,
-        &mut TerrainEntities,
-        &mut InFlight,
-        Option<(&mut LodState, Option<&mut ShownLevels>, &Watchers)>,
-    )>,
-    mut display: Display,
-    mut messages: CommitMessages,
-) {
-    // The oldest first: a task that had to wait for the budget is next.
+/// All that it takes to commit.
+#[derive(SystemParam)]
+pub(super) struct Commits<'w, 's> {
+    pub settings: Res<'w, BurrowSettings>,
+    pub terrains: Query<
+        'w,
+        's,
+        (
+            Entity,
+            &'static mut Terrain,
+            &'static mut TerrainEntities,
+            &'static mut InFlight,
+            Option<(&'static mut LodState, Option<&'static mut ShownLevels>, &'static Watchers)>,
+        ),
+    >,
+    display: Display<'w, 's>,
+    messages: CommitMessages<'w>,
+}
+
+impl Commits<'_, '_> {
+    /// Whether anything is drawn: a server has no meshes.
+    pub fn has_meshes(&self) -> bool {
+        self.display.assets.is_some()
+    }
+
+    /// Adds to the time of the main thread in this frame.
+    pub fn measure(&mut self, took: Duration) {
+        self.display.figures.measure(took);
+    }
+
+    /// Commits tasks that are done, by number and terrain: each transaction whole, as many as the frame's budget of swaps allows,
+    /// and at least one.
+    pub fn commit(&mut self, mut done: Vec<(u64, Entity)>) {
+        if done.is_empty() {
+            return;
+        }
+        // The oldest first: a task that had to wait for the budget is next.
+        done.sort_unstable();
+        let _span = info_span!("burrow_commit").entered();
+        let Self { settings, terrains, display, messages } = self;
+        start_measuring(&mut display.commands);
+        let mut swapped = 0;
+        for (_, entity) in done {
+            let Ok((_, terrain, entities, mut task, levels)) = terrains.get_mut(entity) else { continue };
+            let swaps = match &task.done {
+                Some(Ok(output)) => output.swaps(),
+                _ => 0,
+            };
+            if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
+                continue;
+            }
+            let Some(output) = task.done.take() else { continue };
+            let ticket = task.ticket;
+            display.commands.entity(entity).try_remove::<InFlight>();
+            if commit((entity, ticket), terrain, entities, levels, output.ok(), display, messages) {
+                swapped += swaps;
+            }
+        }
+        stop_measuring(&mut display.commands);
+    }
+}
+
+/// Commits what is done.
+pub(super) fn commit_transactions(mut commits: Commits, mut same_frame: ResMut<SameFrame>) {
+    same_frame.begin();
     let mut done: Vec<(u64, Entity)> = Vec::new();
-    for (entity, _, _, mut task, _) in &mut terrains {
+    for (entity, _, _, mut task, _) in &mut commits.terrains {
         if task.is_done() {
             done.push((task.number, entity));
         }
     }
-    if done.is_empty() {
-        return;
-    }
-    done.sort_unstable();
-    let _span = info_span!("burrow_commit").entered();
-    start_measuring(&mut display.commands);
-    let mut swapped = 0;
-    for (_, entity) in done {
-        let Ok((_, terrain, entities, mut task, levels)) = terrains.get_mut(entity) else { continue };
-        let swaps = match &task.done {
-            Some(Ok(output)) => output.swaps(),
-            _ => 0,
-        };
-        if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
-            continue;
-        }
-        let Some(output) = task.done.take() else { continue };
-        let ticket = task.ticket;
-        display.commands.entity(entity).try_remove::<InFlight>();
-        if commit((entity, ticket), terrain, entities, levels, output.ok(), &mut display, &mut messages) {
-            swapped += swaps;
-        }
-    }
-    stop_measuring(&mut display.commands);
+    commits.commit(done);
 }
 
 /// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait in

@@ -45,6 +45,7 @@ mod propagate;
 mod query;
 mod redraw;
 mod reports;
+mod same_frame;
 mod settings;
 mod task;
 mod times;
@@ -152,6 +153,7 @@ impl Plugin for TerrainPlugin {
             .init_resource::<SurfaceProcessors>()
             .init_resource::<inbox::Inbox>()
             .init_resource::<reports::Reported>()
+            .init_resource::<same_frame::SameFrame>()
             .init_resource::<WantedTiles>()
             .add_message::<Brush>()
             .register_type::<Brush>()
@@ -220,9 +222,13 @@ impl Plugin for TerrainPlugin {
         // In every frame, whatever the game gates.
         app.add_systems(Last, (inbox::keep_requests, places::find_external_places))
             // They read terrains, which systems in `Update` and `Last` change.
-            .add_systems(PostUpdate, (diagnostics::measure_frame, engine::trim_engines))
+            .add_systems(
+                PostUpdate,
+                (diagnostics::measure_frame.after(same_frame::CommitSameFrame), engine::trim_engines),
+            )
             // Terrains that were spawned before the plugin was added.
             .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
+        same_frame::add(app);
         diagnostics::register(app);
         propagate::add(app);
     }

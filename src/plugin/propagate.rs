@@ -12,10 +12,12 @@ use std::marker::PhantomData;
 use bevy::camera::visibility::RenderLayers;
 use bevy::ecs::query::QueryFilter;
 use bevy::ecs::relationship::Relationship;
+use bevy::ecs::system::SystemChangeTick;
 #[cfg(feature = "render")]
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::prelude::*;
 
+use super::same_frame::{PropagateSameFrame, SameFrame};
 use super::{BurrowSystems, Chunk, GroundPiece, Tile};
 use crate::terrain::Terrain;
 
@@ -110,6 +112,7 @@ type Inactive<C> = (With<Terrain>, Or<(Without<C>, With<Overruled<C>>)>);
 /// Propagates a component of a terrain to its tiles and chunks.
 pub(crate) fn propagate_to_ground<C: Component + Clone>(app: &mut App) {
     propagate::<C, ChildOf, Or<(With<Tile>, With<Chunk>)>>(app);
+    app.add_systems(PostUpdate, insert_on_spawned::<C>.in_set(PropagateSameFrame));
 }
 
 /// Propagates a component of a terrain to its pieces.
@@ -154,6 +157,23 @@ fn insert_on_new<C: Component + Clone, R: Relationship, F: QueryFilter>(
 ) {
     for (entity, link) in &new {
         if let Ok(component) = terrains.get(link.get()) {
+            commands.entity(entity).try_insert((component.clone(), Inherited::<C>::default()));
+        }
+    }
+}
+
+/// The same for tiles and chunks that a commit has spawned after [`BurrowSystems::Propagate`].
+fn insert_on_spawned<C: Component + Clone>(
+    mut commands: Commands,
+    same_frame: Res<SameFrame>,
+    ticks: SystemChangeTick,
+    new: Query<(Entity, Ref<ChildOf>), (Or<(With<Tile>, With<Chunk>)>, Added<ChildOf>, Without<C>)>,
+    terrains: Query<&C, Active<C>>,
+) {
+    for (entity, link) in &new {
+        if same_frame.has_spawned(link.added(), &ticks)
+            && let Ok(component) = terrains.get(link.parent())
+        {
             commands.entity(entity).try_insert((component.clone(), Inherited::<C>::default()));
         }
     }

@@ -1,5 +1,7 @@
 //! Settings, as resources and components.
 
+use std::time::Duration;
+
 use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
 
@@ -38,11 +40,22 @@ pub struct BurrowSettings {
     ///
     /// It holds for meshes that are built after a change; see [`Redraw`](super::Redraw).
     pub mesh_usages: RenderAssetUsages,
+    /// How long a frame waits, in `PostUpdate`, for small transactions that began in it, so that a brush is seen in the frame
+    /// in which it was sent. What takes longer is seen in a later frame. 0.3 ms; 0 never waits. An app without
+    /// `Assets<Mesh>`, such as a server, never waits.
+    ///
+    /// Order and content of edits are the same in any case.
+    pub same_frame: Duration,
 }
 
 impl Default for BurrowSettings {
     fn default() -> Self {
-        Self { swaps_per_frame: 256, loads_per_frame: 256, mesh_usages: RenderAssetUsages::RENDER_WORLD }
+        Self {
+            swaps_per_frame: 256,
+            loads_per_frame: 256,
+            mesh_usages: RenderAssetUsages::RENDER_WORLD,
+            same_frame: Duration::from_micros(300),
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The background task of a terrain: it runs a transaction, and builds the surfaces that the next commit shows.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -109,10 +110,21 @@ impl InFlight {
 
     /// Whether the task is done.
     pub fn is_done(&mut self) -> bool {
+        self.is_done_within(Duration::ZERO)
+    }
+
+    /// Whether the task is done, or will be within a time, for which this waits.
+    pub fn is_done_within(&mut self, time: Duration) -> bool {
         if self.done.is_none() {
-            self.done = self.task.check().map(|done| done.map_err(|_| TaskPanicked));
+            self.done = self.task.check_within(time).map(|done| done.map_err(|_| TaskPanicked));
         }
         self.done.is_some()
+    }
+
+    /// Whether its result is a transaction that cut off no piece of ground. Pieces are announced when debris can be made of
+    /// them, so that they are never gone for a frame.
+    pub fn is_plain(&self) -> bool {
+        matches!(&self.done, Some(Ok(TaskOutput { change: Change::Transaction(_), pieces, .. })) if pieces.is_empty())
     }
 }
 

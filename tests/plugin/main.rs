@@ -33,6 +33,7 @@ mod queries;
 mod receipts;
 mod reflection;
 mod replacing;
+mod same_frame;
 mod saved;
 mod saved_changes;
 mod saved_lifecycle;
