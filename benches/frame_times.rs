@@ -1,6 +1,7 @@
 //! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT
-//! [horizon] [passes]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with levels of
-//! detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full detail.
+//! [horizon] [moving] [passes]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with
+//! levels of detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full detail.
+//! With `moving`, a terrain of 4096 tiles is drawn while a child of it moves and while nothing does.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
 //! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
@@ -88,6 +89,10 @@ fn main() {
         horizon((width, height), seconds as usize * 60);
         return;
     }
+    if is_asked("moving") {
+        moving((width, height));
+        return;
+    }
     if frames == 0 {
         Walk::new(Backend::Cpu, (width, height), Scene::Landscape).compare_materials(FRAMES_OF_ROUND);
         return;
@@ -169,6 +174,7 @@ impl Walk {
         });
         let ground = match scene {
             Scene::Horizon { .. } => mountains(),
+            Scene::ManyTiles => many_tiles(),
             Scene::Landscape | Scene::Plain => ground(),
         };
         let path = path(&ground);
@@ -197,7 +203,7 @@ impl Walk {
         let plain = world.resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default());
         let plain = (MeshMaterial3d(plain), SlimVertices);
         match scene {
-            Scene::Landscape => world.spawn((terrain, GroundLook::default())),
+            Scene::Landscape | Scene::ManyTiles => world.spawn((terrain, GroundLook::default())),
             Scene::Plain => world.spawn((terrain, plain)),
             Scene::Horizon { view_distance } => {
                 world.spawn((terrain, plain, LevelsOfDetail { view_distance, ..default() }))
@@ -391,8 +397,44 @@ enum Scene {
     Landscape,
     /// The real landscape with a plain material.
     Plain,
+    /// 4096 tiles with a look.
+    ManyTiles,
     /// Mountains to the horizon with levels of detail and a plain material.
     Horizon { view_distance: f32 },
+}
+
+/// Draws a terrain of many tiles, in turns while a child of it moves and while it stays.
+fn moving(size: (u32, u32)) {
+    let mut walk = Walk::new(Backend::Cpu, size, Scene::ManyTiles);
+    let world = walk.app.world_mut();
+    let mut tiles = world.query_filtered::<(), With<Tile>>();
+    let tiles = tiles.iter(world).count();
+    let mut terrains = world.query_filtered::<Entity, With<Terrain>>();
+    let terrain = terrains.single(world).expect("one terrain");
+    let child = world.spawn((Transform::default(), Visibility::default(), ChildOf(terrain))).id();
+    for _ in 0..WARM_UP {
+        walk.frame(0, false);
+    }
+    let mut times = [Vec::new(), Vec::new()];
+    for round in 0..20 {
+        let moves = round % 2 == 1;
+        for number in 0..FRAMES_OF_ROUND / 2 {
+            if moves && let Some(mut place) = walk.app.world_mut().get_mut::<Transform>(child) {
+                place.translation.x += 0.1;
+            }
+            // The camera does not move, so that frames differ by nothing else.
+            let took = walk.frame(1, false);
+            if number >= FIRST_FRAMES {
+                times[usize::from(moves)].push(took);
+            }
+        }
+    }
+    println!("{tiles} tiles");
+    let [still, moving] = times;
+    let still = report("nothing moves below the terrain", still);
+    let moving = report("a child of the terrain moves", moving);
+    let [p50, p99] = [0, 1].map(|at| moving[at] / still[at]);
+    println!("moving over still: p50 {p50:.3}, p99 {p99:.3}");
 }
 
 /// Draws scenes with a plain material, each less the frame with nothing in sight.
@@ -453,6 +495,12 @@ fn horizon(size: (u32, u32), frames: usize) {
 fn mountains() -> Ground {
     let source = NoiseSource::new(&mountains::heights()).expect("valid noise");
     Ground::from_source(16_384, 16_384, source).expect("a valid size")
+}
+
+/// Mountains of 64 x 64 tiles.
+fn many_tiles() -> Ground {
+    let source = NoiseSource::new(&mountains::heights()).expect("valid noise");
+    Ground::from_source(2048, 2048, source).expect("a valid size")
 }
 
 /// The landscape of the examples.

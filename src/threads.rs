@@ -199,6 +199,11 @@ impl<T: Send + 'static> ThreadTask<T> {
         self.result.get().try_recv().ok()
     }
 
+    /// Waits for the result, on another thread than the main one; `None` if the work panicked, or the result was taken.
+    pub fn wait(mut self) -> Option<T> {
+        self.result.get().recv().ok()?.ok()
+    }
+
     /// The result once it is there; resumes the panic if the work panicked.
     pub fn finish(&mut self) -> Option<T> {
         self.check().map(|result| result.unwrap_or_else(|panic| resume_unwind(panic)))

@@ -16,6 +16,7 @@ import json
 import os
 import pathlib
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -28,11 +29,12 @@ SKIPPED = 77
 PLAYS = {}
 
 
-def play(size):
-    """Enters a play under the name of its function, with the size of its window: as small as its widgets allow."""
+def play(size, *arguments):
+    """Enters a play under the name of its function, with the size of its window, as small as its widgets allow, and arguments for the
+    program. In software the time of a frame depends on how much ground it shows."""
 
     def enter(function):
-        PLAYS[function.__name__] = (function, size)
+        PLAYS[function.__name__] = (function, size, arguments)
         return function
 
     return enter
@@ -158,12 +160,11 @@ class Player:
         found = self.stage.wait(pattern, since)
         self.stage.xdo("mouseup", 1)
         self.stage.rest()
-        self.stage.rest()
         return found
 
     def take(self, key, tool):
         since = self.stage.mark()
-        tap(self.stage, key)
+        self.stage.xdo("key", "--delay", 0, key)
         self.stage.wait(r"^tool " + tool, since)
 
 
@@ -401,6 +402,13 @@ def digger(stage):
         check_game(left, "after a restart")
         stage.say("settings and the game survive a restart")
 
+    def see_the_same(guest):
+        deadline = time.monotonic() + stage.patience
+        while stage.last(r"^ground .*").group(0) != guest.last(r"^ground .*").group(0):
+            if time.monotonic() > deadline:
+                raise Failed("host and guest see different ground")
+            time.sleep(0.1)
+
     def together():
         """Hosts the world from the menu, and a guest joins it from another program's menu."""
         to_title()
@@ -427,17 +435,31 @@ def digger(stage):
             digger.turn(0, 800)
             digger.look_down(5.4)
             digger.use(blows)
-            deadline = time.monotonic() + stage.patience
-            while stage.last(r"^ground .*").group(0) != guest.last(r"^ground .*").group(0):
-                if time.monotonic() > deadline:
-                    raise Failed("host and guest see different ground")
-                time.sleep(0.1)
+            see_the_same(guest)
+            stage.say("a guest joined from the menu and dug, and both see the same")
+            # Who loses the keyboard is paused.
+            stage.focus("Digger")
+            menu.rest()
+            menu.choose("Multiplayer", "Paused Together")
+            since = guest.mark()
+            menu.choose("Stop hosting", "Playing None")
+            guest.wait(r"^hint The host can.t be reached", since)
+            pause()
+            menu.choose("Multiplayer", "Paused Together")
+            since = stage.mark()
+            menu.choose("Host this world", "Playing None")
+            stage.wait(r"^game .*players=2 ", since)
+            guest.focus("Digger")
+            theirs.rest()
+            theirs.turn_to("Playing None", "Escape")
+            digger.use(blows)
+            see_the_same(guest)
+            stage.say("the host begins anew, and the guest returns and digs")
         finally:
             guest.close()
-        stage.say("a guest joined from the menu and dug, and both see the same")
 
     stage.wait(r"^painted")
-    stage.say(f"the land is painted {stage.since_start():.1f} s after the start")
+    stage.say("the land is painted")
     stage.wait(r"^ready")
     stage.focus("Digger")
     menu.rest()
@@ -457,7 +479,7 @@ def digger(stage):
     together()
 
 
-@play("800x600")
+@play("800x600", "--cells", "128")
 def sculpt(stage):
     """Every operation and shape, a held stroke and its undo, questions, save, open, quit with unsaved work."""
     tool = r"^tool operation=(\w+) shape=(\w+) radius=([\d.]+)"
@@ -470,7 +492,7 @@ def sculpt(stage):
 
     def press_key(key, pattern):
         since = stage.mark()
-        tap(stage, key)
+        stage.xdo("key", "--delay", 0, key)
         return stage.wait(pattern, since)
 
     def dig(x, y):
@@ -482,7 +504,7 @@ def sculpt(stage):
         """Until no receipt comes any more."""
         while True:
             since = stage.mark()
-            for _ in range(4):
+            for _ in range(2):
                 stage.rest()
             if not any(line.startswith("stroke ") for line in stage.lines()[since:]):
                 return
@@ -565,16 +587,20 @@ def sculpt(stage):
         stage.wait(rf"^tool .*shape={shape} ", since)
         dig(middle[0] + 20, middle[1])
     press_key("0", r"^tool operation=Stamp ")
+    # Each operation has rows of its own above the shapes.
+    stage.rest()
     since = stage.mark()
     stage.click(*stage.middle("Box"))
     stage.wait(r"^tool .*shape=Box ", since)
     since = stage.mark()
     stage.click(*stage.middle("Torus"))
     stage.rest()
+    stage.rest()
     if any(line.startswith("tool ") for line in stage.lines()[since:]):
         raise Failed("a stamp takes a torus")
     stage.say("each shape works, and a torus can't be a stamp")
     press_key("1", r"^tool operation=Dig ")
+    stage.rest()
 
     before = float(stage.last(tool).group(3))
     since = stage.mark()
@@ -641,12 +667,13 @@ def main():
     parser.add_argument("--binary", type=pathlib.Path, help="the example's program")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/drive"), help="folder for pictures and log")
     parser.add_argument("--size", help="of the window, in pixels; each play has its own")
+    parser.add_argument("--scale", type=float, default=1, help="of the display and of the texts, for pictures")
     parser.add_argument("--patience", type=float, default=300, help="seconds to wait for each thing")
     parser.add_argument("--pictures", action="store_true", help="take a picture of every page, and play no further")
     parser.add_argument("arguments", nargs="*", help="for the program, after --")
     args = parser.parse_args()
     if args.list:
-        for name, (function, _) in sorted(PLAYS.items()):
+        for name, (function, *_) in sorted(PLAYS.items()):
             print(f"{name:10} {function.__doc__}")
         return 0
     if args.play is None:
@@ -655,7 +682,7 @@ def main():
     if missing:
         print(f"SKIPPED: nothing was driven, as {' and '.join(missing)} is not installed", file=sys.stderr)
         return SKIPPED
-    act, size = PLAYS[args.play]
+    act, size, arguments = PLAYS[args.play]
     size = tuple(map(int, (args.size or size).split("x")))
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", "target"))
     binary = args.binary or target / "release" / "examples" / args.play
@@ -668,7 +695,7 @@ def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     start = time.monotonic()
     try:
-        stage = Stage(command + args.arguments, args.out, size, args.patience)
+        stage = Stage(command + [*arguments, *args.arguments], args.out, size, args.patience, scale=args.scale)
     except (Failed, OSError) as error:
         print(f"FAILED: {error}", file=sys.stderr)
         return 1
@@ -685,7 +712,9 @@ def main():
     finally:
         stage.close()
     print(f"{args.play}: all of it happened, {len(stage.shots)} pictures in {args.out}")
-    print(f"{args.play}: {time.monotonic() - start:.0f} s, {stage.frames()} frames")
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    busy = used.ru_utime + used.ru_stime
+    print(f"{args.play}: {time.monotonic() - start:.0f} s, {busy:.0f} s of processor time, {stage.frames()} frames")
     return 0
 
 

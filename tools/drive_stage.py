@@ -1,5 +1,6 @@
 """What tools/drive.py plays on: a program in a window of its own display, with hands and eyes."""
 
+import json
 import os
 import re
 import shutil
@@ -18,10 +19,12 @@ class Failed(Exception):
 class Stage:
     """A program in a window of its own display."""
 
-    def __init__(self, command, out, size, patience, beside=None):
-        """`beside` another stage, a second program has a window on the same display, and settings and worlds of its own."""
-        self.out, self.size, self.patience = out, size, patience
+    def __init__(self, command, out, size, patience, beside=None, scale=1):
+        """`beside` another stage, a second program has a window on the same display, and settings and worlds of its own. `scale` is that
+        of the display and of the settings."""
+        self.out, self.size, self.patience, self.scale = out, size, patience, scale
         self.shots = []
+        self.pointer = None
         self.said, self.frame_count, self.unread = [], 0, b""
         self.log = out / "log.txt"
         self.server = self.program = self.written = self.read = None
@@ -37,7 +40,8 @@ class Stage:
         out.mkdir(parents=True, exist_ok=True)
         display = beside.env["DISPLAY"][1:] if beside else self.open_display()
         self.screen = beside.screen if beside else out / "Xvfb_screen0"
-        self.env = dict(os.environ, DISPLAY=f":{display}", WINIT_UNIX_BACKEND="x11", WINIT_X11_SCALE_FACTOR="1")
+        self.env = dict(os.environ, DISPLAY=f":{display}", WINIT_UNIX_BACKEND="x11",
+                        WINIT_X11_SCALE_FACTOR=str(self.scale))
         self.env.pop("WAYLAND_DISPLAY", None)
         # Settings and worlds of whoever plays here by hand stay as they are.
         for variable, folder in (("XDG_CONFIG_HOME", "config"), ("XDG_DATA_HOME", "data")):
@@ -54,7 +58,8 @@ class Stage:
         """Settings with which a renderer in software is as fast as may be, for programs that have settings."""
         file = self.out.resolve() / "config" / "bevy_burrow" / "digger.json"
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text('{ "quality": "low", "view_distance": 200, "day_minutes": 0 }')
+        settings = {"quality": "low", "view_distance": 200, "day_minutes": 0, "ui_scale": self.scale}
+        file.write_text(json.dumps(settings))
 
     def run(self):
         """Starts the program, or starts it again: what it says goes on in the same log."""
@@ -161,8 +166,12 @@ class Stage:
         self.xdo("windowfocus", self.window)
 
     def move(self, x, y):
-        self.xdo("mousemove", round(x), round(y))
-        self.rest()
+        """Moves the pointer there, unless it is there already."""
+        place = round(x), round(y)
+        if place != self.pointer:
+            self.pointer = place
+            self.xdo("mousemove", *place)
+            self.rest()
 
     def rest(self, seconds=0.6):
         """Two frames' time: in software a frame may take a second. Where the program does not tell, some time."""
@@ -185,18 +194,17 @@ class Stage:
         self.rest()
 
     def click(self, x, y, button=1):
-        """A short click: however slow frames are, the button is seen as pressed in one of them only."""
+        """A short click: however slow frames are, the button is seen as pressed in one of them only. What it leads to is for the caller
+        to wait for."""
         self.move(x, y)
         self.xdo("click", "--delay", 0, button)
-        self.rest()
 
     def drag(self, a, b, steps=6):
         self.move(*a)
         self.press()
         for step in range(1, steps + 1):
             t = step / steps
-            self.xdo("mousemove", round(a[0] + (b[0] - a[0]) * t), round(a[1] + (b[1] - a[1]) * t))
-            self.rest()
+            self.move(a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t)
         self.release()
 
     def key(self, name):
@@ -262,4 +270,4 @@ class Stage:
         return time.monotonic() - self.started
 
     def say(self, text):
-        print(f"  {text}", flush=True)
+        print(f"  {self.since_start():5.0f} s, {self.frames():4} frames: {text}", flush=True)

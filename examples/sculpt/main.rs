@@ -71,6 +71,9 @@ struct Options {
     /// Height of the window or the pictures, in pixels.
     #[arg(long, default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=8192))]
     height: u32,
+    /// Cells along the sides of the level.
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(64..=4096))]
+    cells: u32,
     /// Image to stamp: a PNG of plain grey with 8 or 16 bits, 2 to 256 samples a side; white is high.
     #[arg(long, value_name = "FILE")]
     stamp: Option<PathBuf>,
@@ -117,7 +120,7 @@ fn editor(app: &mut App, options: &Options) {
         BurrowPlugins,
         BurrowPanelPlugin,
         BurrowDebugPlugin,
-        scene::ScenePlugin,
+        scene::ScenePlugin(options.cells),
         stroke::StrokePlugin,
         journal::JournalPlugin,
     ));

@@ -13,25 +13,34 @@ use bevy::render::renderer::RenderAdapterInfo;
 use bevy_burrow::prelude::*;
 use software::draws_in_software;
 
-/// Cells along the landscape's sides.
-const SIDE: u32 = 256;
 const SKY: Color = Color::srgb(0.62, 0.74, 0.88);
 
-/// The centre of the level and of the script's edits, at which the camera looks at first.
-pub const MIDDLE: Vec3 = Vec3::new(128.0, 0.0, 128.0);
+/// A level with so many cells along its sides.
+#[derive(Resource, Clone, Copy)]
+pub struct ScenePlugin(pub u32);
 
-pub struct ScenePlugin;
+impl ScenePlugin {
+    /// The centre of the level and of the script's edits, at which the camera looks at first.
+    pub fn middle(self) -> Vec3 {
+        Vec3::new(0.5, 0.0, 0.5) * self.0 as f32
+    }
+}
 
 impl Plugin for ScenePlugin {
     fn build(&self, app: &mut App) {
         app.add_plugins(FreeCameraPlugin)
+            .insert_resource(*self)
             .insert_resource(ClearColor(SKY))
             .insert_resource(GlobalAmbientLight { brightness: 900.0, ..default() })
             .add_systems(Startup, (landscape, sun_and_camera));
     }
 }
 
-fn landscape(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) -> Result {
+fn landscape(
+    mut commands: Commands,
+    scene: Res<ScenePlugin>,
+    adapter: Option<Res<RenderAdapterInfo>>,
+) -> Result {
     let is_plain = draws_in_software(adapter.as_deref());
     let noise = NoiseHeights {
         seed: 4,
@@ -43,7 +52,7 @@ fn landscape(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) ->
     };
     let grass = MaterialRule { overlay: MaterialId(1), slope: (0.0, 0.7), slope_fade: 0.35, ..default() };
     let rules = MaterialControl::Rules { base: MaterialId(0), rules: vec![grass] };
-    let ground = Ground::from_noise(SIDE, SIDE, &noise)?.with_materials(&rules)?;
+    let ground = Ground::from_noise(scene.0, scene.0, &noise)?.with_materials(&rules)?;
     let terrain = Terrain::new(ground, &TerrainSettings::default())?;
     let quality = if is_plain { GroundQuality::Low } else { GroundQuality::High };
     let look = GroundLook { quality, ..default() };
@@ -51,7 +60,8 @@ fn landscape(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) ->
     Ok(())
 }
 
-fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) {
+fn sun_and_camera(mut commands: Commands, scene: Res<ScenePlugin>, adapter: Option<Res<RenderAdapterInfo>>) {
+    let middle = scene.middle();
     let is_plain = draws_in_software(adapter.as_deref());
     commands.spawn((
         DirectionalLight { illuminance: 9_000.0, shadow_maps_enabled: !is_plain, ..default() },
@@ -68,6 +78,6 @@ fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>
         // The mouse wheel changes the brush size.
         FreeCamera { scroll_factor: 0.0, ..flight::free_camera(24.0, 80.0) },
         // All of the level is in view.
-        Transform::from_translation(MIDDLE + Vec3::new(-70.0, 150.0, 190.0)).looking_at(MIDDLE, Vec3::Y),
+        Transform::from_translation(middle + Vec3::new(-70.0, 150.0, 190.0)).looking_at(middle, Vec3::Y),
     ));
 }

@@ -10,7 +10,7 @@ use bevy_burrow::panel::{BrushTool, PanelAction, ToolAlign, ToolOperation, ToolS
 use bevy_burrow::prelude::*;
 
 use crate::photo::{Photographer, wait_until};
-use crate::scene::MIDDLE;
+use crate::scene::ScenePlugin;
 use crate::stroke::Aim;
 use crate::{Options, offscreen, stamps};
 
@@ -121,8 +121,9 @@ impl Stage {
         });
         app.update();
         let camera = app.world_mut().query_filtered::<Entity, With<Camera3d>>().single(app.world())?;
-        let place = MIDDLE + Vec3::new(-26.0, 62.0, 58.0);
-        let place = Transform::from_translation(place).looking_at(MIDDLE + Vec3::Y * 4.0, Vec3::Y);
+        let middle = ScenePlugin(options.cells).middle();
+        let place = middle + Vec3::new(-26.0, 62.0, 58.0);
+        let place = Transform::from_translation(place).looking_at(middle + Vec3::Y * 4.0, Vec3::Y);
         app.world_mut().entity_mut(camera).insert(place);
         let photographer = Photographer::new(&mut app, camera, (options.width, options.height));
         Ok(Self { app, camera, photographer, folder: options.out.clone(), strokes: 0 })
@@ -171,7 +172,7 @@ impl Stage {
         let world = self.app.world_mut();
         let mut terrains = world.query::<(Entity, &Terrain)>();
         let (entity, terrain) = terrains.iter(world).next()?;
-        let place = MIDDLE + Vec3::new(offset.x, 500.0, offset.y);
+        let place = world.resource::<ScenePlugin>().middle() + Vec3::new(offset.x, 500.0, offset.y);
         let hit = terrain.world().raycast(place.as_dvec3(), bevy::math::DVec3::NEG_Y, 1000.0)?;
         let aim = TerrainHit {
             terrain: entity,

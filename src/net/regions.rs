@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use rustc_hash::FxHashMap;
 use xxhash_rust::xxh3::Xxh3Default;
 
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, RegionPos};
@@ -10,7 +11,52 @@ use crate::terrain::{Patch, World};
 /// The hash of a region in marks and tables: of its [samples](World::region_hash), and of the names of the fields in
 /// all chunks that reach into it. 0 for a pristine region.
 pub fn region_hash(world: &World, region: RegionPos) -> u64 {
-    let samples = world.region_hash(region);
+    hash_with_names(world, region, world.region_hash(region))
+}
+
+/// The hashes of regions' samples, which are kept up to date with each change. Otherwise all bricks of the regions that changed
+/// would be hashed at once, at each mark.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RegionSums(FxHashMap<RegionPos, u64>);
+
+/// By how much the hashes of regions grow.
+pub(super) struct Steps(FxHashMap<RegionPos, u64>);
+
+impl Steps {
+    /// Those of a change before it is applied to a world.
+    pub fn of(world: &World, change: &Patch) -> Self {
+        let mut steps = FxHashMap::<RegionPos, u64>::default();
+        for (pos, brick) in &change.bricks {
+            let sum = steps.entry(RegionPos::of(*pos)).or_default();
+            *sum = sum.wrapping_add(world.hash_step(*pos, brick.as_ref()));
+        }
+        Self(steps)
+    }
+}
+
+impl RegionSums {
+    /// Adds the steps of a change that was applied. Of regions that were not asked for before, all of the world is hashed.
+    pub fn add(&mut self, world: &World, steps: Steps) {
+        for (region, step) in steps.0 {
+            let known = self.0.entry(region).and_modify(|hash| *hash = hash.wrapping_add(step));
+            known.or_insert_with(|| world.region_hash(region));
+        }
+    }
+
+    /// The [hash](region_hash) of a region of the world as it is now.
+    pub fn hash(&mut self, world: &World, region: RegionPos) -> u64 {
+        let samples = *self.0.entry(region).or_insert_with(|| world.region_hash(region));
+        hash_with_names(world, region, samples)
+    }
+
+    /// Forgets all, because the world is another one.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+}
+
+/// The [hash](region_hash) of a region whose samples have a hash that is known.
+fn hash_with_names(world: &World, region: RegionPos, samples: u64) -> u64 {
     let (mut names, mut is_empty) = (Xxh3Default::new(), true);
     names.update(&samples.to_le_bytes());
     for chunk in chunks_of(world.grid(), region) {
@@ -80,13 +126,20 @@ mod tests {
         for mut terrain in terrains() {
             let pristine = hashes(terrain.world());
             assert!(pristine.values().all(|hash| *hash == 0));
+            let mut sums = RegionSums::default();
             for _ in 0..30 {
                 let at = Vec3::new(rng.f32() * 200.0, rng.f32() * 30.0, rng.f32() * 200.0);
                 let before = hashes(terrain.world());
                 terrain.submit(&Brush::dig(Shape::sphere(at, 1.0 + 9.0 * rng.f32())));
                 let commit = terrain.begin().expect("an edit").run();
                 let change = commit.change();
+                let steps = Steps::of(terrain.world(), &change);
                 terrain.commit(commit).expect("its own commit");
+                sums.add(terrain.world(), steps);
+                for region in before.keys().copied() {
+                    let hash = region_hash(terrain.world(), region);
+                    assert_eq!(sums.hash(terrain.world(), region), hash, "{region:?} at {at}");
+                }
                 let touched = touched_regions(terrain.world().grid(), &change);
                 for (region, hash) in hashes(terrain.world()) {
                     assert!(hash == before[&region] || touched.contains(&region), "{region:?} at {at}");

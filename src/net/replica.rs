@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::message::{Entry, Terms};
 use super::never_shown;
-use super::regions::{chunks_of, touched_regions};
+use super::regions::{RegionSums, Steps, chunks_of, touched_regions};
 use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
@@ -62,6 +62,8 @@ pub(super) struct Replica {
     /// The world after the order's entries. It is never meshed.
     confirmed: Terrain,
     pending: VecDeque<Pending>,
+    /// The hashes of its regions.
+    sums: RegionSums,
     /// The shown content where it differs from the confirmed one.
     predicted: Overlay,
     /// The sum of the hashes of all regions of the shown world.
@@ -98,6 +100,7 @@ impl Replica {
         Ok(Self {
             confirmed,
             pending,
+            sums: RegionSums::default(),
             predicted,
             samples,
             more: 0,
@@ -129,6 +132,11 @@ impl Replica {
     /// The hash of the shown world after all returned changes.
     pub fn shown_hash(&self) -> u64 {
         World::hash_of(self.world().ground().hash(), self.samples)
+    }
+
+    /// The [hash](super::region_hash) of a region of the confirmed world.
+    pub fn region_hash(&mut self, region: RegionPos) -> u64 {
+        self.sums.hash(self.confirmed.world(), region)
     }
 
     /// Times that pending edits were worked out.
@@ -238,8 +246,10 @@ impl Replica {
             let change = commit.change();
             self.before.keep(change.inverse(self.confirmed.world()));
             applied.regions.append(&mut touched_regions(self.world().grid(), &change));
+            let steps = Steps::of(self.confirmed.world(), &change);
             // It is the one under way.
             applied.receipts.extend(self.confirmed.commit(commit).unwrap_or_default());
+            self.sums.add(self.confirmed.world(), steps);
         }
         applied
     }
@@ -290,6 +300,7 @@ impl Replica {
         let settings = TerrainSettings { chunk_size, voxel_size: self.confirmed.voxel_size() };
         self.confirmed = Terrain::restore(self.confirmed.world().shared_ground(), &settings, parts)?;
         never_shown(&mut self.confirmed);
+        self.sums.clear();
         self.is_outdated = true;
         self.shown = None;
         Ok(())

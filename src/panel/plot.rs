@@ -2,10 +2,11 @@
 
 use std::collections::VecDeque;
 
-use bevy_egui::egui::{Align2, Color32, CornerRadius, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2};
+use bevy_egui::egui::{Color32, CornerRadius, Pos2, Rect, Sense, Ui, Vec2};
+use egui_plot::Plot;
 
-use super::theme::{BRIGHT, FAINT, SLATE};
-use super::widgets::note;
+use super::theme::SLATE;
+use super::widgets::figure;
 
 /// Number of values in a line chart.
 const KEPT: usize = 180;
@@ -27,8 +28,8 @@ impl Line {
     }
 }
 
-/// Draws a line chart over the full width, the newest value at the right. The vertical range is from 0 to the
-/// largest value or `least_top`. Shows `label` at the left and `now` at the right.
+/// Draws a line chart over the full width, the newest value at the right, below a line with `label` and `now`. The vertical range is from
+/// 0 to the largest value or `least_top`.
 pub fn line(
     ui: &mut Ui,
     values: impl ExactSizeIterator<Item = f32>,
@@ -37,36 +38,28 @@ pub fn line(
     label: &str,
     now: &str,
 ) {
-    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 40.0), Sense::hover());
-    note(ui, label, rect);
-    let painter = ui.painter_at(rect);
-    painter.rect_filled(rect, CornerRadius::same(5), SLATE.gamma_multiply(0.7));
-    let values: Vec<f32> = values.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 }).collect();
-    let top = values.iter().copied().fold(least_top, f32::max).max(f32::MIN_POSITIVE);
-    let inner = rect.shrink2(Vec2::new(2.0, 3.0));
-    let step = inner.width() / (KEPT - 1) as f32;
-    let start = inner.right() - step * values.len().saturating_sub(1) as f32;
-    let points: Vec<Pos2> = values
-        .iter()
-        .enumerate()
-        .map(|(at, value)| {
-            Pos2::new(start + step * at as f32, inner.bottom() - inner.height() * 0.52 * value / top)
-        })
-        .collect();
-    // Fill the area below with one thin line per value, since it need not be convex.
-    for point in &points {
-        painter.vline(
-            point.x,
-            point.y..=inner.bottom(),
-            Stroke::new(step.max(1.0), color.gamma_multiply(0.16)),
-        );
-    }
-    if points.len() > 1 {
-        painter.line(points, Stroke::new(1.5, color));
-    }
-    let small = FontId::proportional(11.0);
-    painter.text(rect.min + Vec2::new(7.0, 4.0), Align2::LEFT_TOP, label, small.clone(), FAINT);
-    painter.text(Pos2::new(rect.right() - 7.0, rect.top() + 4.0), Align2::RIGHT_TOP, now, small, BRIGHT);
+    figure(ui, label, now);
+    let first = KEPT - values.len().min(KEPT);
+    let height = |value: f32| if value.is_finite() { f64::from(value.max(0.0)) } else { 0.0 };
+    let points: Vec<[f64; 2]> =
+        values.enumerate().map(|(at, value)| [(first + at) as f64, height(value)]).collect();
+    Plot::new(label)
+        .height(28.0)
+        .include_x(0.0)
+        .include_x((KEPT - 1) as f64)
+        .include_y(0.0)
+        .include_y(least_top)
+        .set_margin_fraction(Vec2::ZERO)
+        .show_axes(false)
+        .show_grid(false)
+        .show_x(false)
+        .show_y(false)
+        .sense(Sense::hover())
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .show(ui, |plot| {
+            plot.line(egui_plot::Line::new(label, points).color(color).width(1.5).fill(0.0).fill_alpha(0.16));
+        });
 }
 
 /// Draws a stacked bar.

@@ -3,8 +3,9 @@
 use std::ops::RangeInclusive;
 
 use bevy_egui::egui::{
-    Align, Align2, Button, Color32, Context, CornerRadius, CursorIcon, FontId, Id, Layout, Pos2, Rect,
-    Response, RichText, Sense, Slider, SliderClamping, Stroke, StrokeKind, Ui, Vec2, emath::Numeric,
+    Align, Align2, Button, CollapsingHeader, Color32, Context, CornerRadius, CursorIcon, FontId, Id, Layout,
+    Pos2, Rect, Response, RichText, Sense, Slider, SliderClamping, Stroke, StrokeKind, Ui, Vec2,
+    emath::Numeric,
 };
 
 use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
@@ -45,32 +46,10 @@ pub fn title(ui: &mut Ui, name: &str, is_open: bool) -> bool {
 
 /// A section whose heading opens and closes it.
 pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl FnOnce(&mut Ui)) {
-    let id = Id::new(("burrow section", name));
-    let mut is_open = ui.data(|data| data.get_temp(id)).unwrap_or(is_open_at_first);
-    ui.add_space(4.0);
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 20.0), Sense::click());
-    note(ui, name, rect);
-    let response = response.on_hover_cursor(CursorIcon::PointingHand);
-    if response.clicked() {
-        is_open = !is_open;
-        ui.data_mut(|data| data.insert_temp(id, is_open));
-    }
-    let color = if response.hovered() { BRIGHT } else { FAINT };
-    let painter = ui.painter();
-    let font = FontId::proportional(11.0);
-    let text = painter.text(rect.left_center(), Align2::LEFT_CENTER, name.to_uppercase(), font, color);
-    painter.hline(text.right() + 8.0..=rect.right() - 16.0, rect.center().y, Stroke::new(1.0, SLATE));
-    let tip = Pos2::new(rect.right() - 5.0, rect.center().y);
-    let (a, b) = if is_open {
-        (Vec2::new(-4.0, -2.0), Vec2::new(4.0, -2.0))
-    } else {
-        (Vec2::new(2.0, -4.0), Vec2::new(2.0, 4.0))
-    };
-    let point = if is_open { Vec2::new(0.0, 2.5) } else { Vec2::new(-2.5, 0.0) };
-    painter.line(vec![tip + a, tip + point, tip + b], Stroke::new(1.5, color));
-    if is_open {
-        content(ui);
-    }
+    let heading = RichText::new(name.to_uppercase()).color(FAINT).size(11.0);
+    let header = CollapsingHeader::new(heading).id_salt(name).default_open(is_open_at_first);
+    let header = header.show_unindented(ui, content).header_response;
+    note(ui, name, header.rect);
 }
 
 /// A grid of tiles with `columns` per row, of which some can't be chosen; returns which one was clicked.
@@ -126,14 +105,13 @@ fn frame_tile(ui: &Ui, rect: Rect, response: &Response, is_chosen: bool) -> Colo
 
 /// A row of text options, one of them chosen; returns which one was clicked.
 pub fn choice(ui: &mut Ui, names: &[&str], chosen: usize) -> Option<usize> {
-    let width = (ui.available_width() - 6.0 * (names.len().max(1) - 1) as f32) / names.len().max(1) as f32;
+    let width = share(ui, names.len());
     let mut clicked = None;
     ui.horizontal(|ui| {
         for (at, name) in names.iter().enumerate() {
-            let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 24.0), Sense::click());
-            note(ui, name, rect);
-            let color = frame_tile(ui, rect, &response, at == chosen);
-            ui.painter().text(rect.center(), Align2::CENTER_CENTER, name, FontId::proportional(12.0), color);
+            let option = Button::selectable(at == chosen, RichText::new(*name).size(12.0));
+            let response = ui.add_sized([width, 24.0], option.truncate());
+            note(ui, name, response.rect);
             if response.clicked() {
                 clicked = Some(at);
             }
@@ -222,22 +200,8 @@ pub fn figure_in(ui: &mut Ui, name: &str, value: impl Into<String>, color: Color
 
 /// A labelled switch.
 pub fn switch(ui: &mut Ui, name: &str, is_on: &mut bool) -> Response {
-    let (rect, mut response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 20.0), Sense::click());
-    if response.clicked() {
-        *is_on = !*is_on;
-        response.mark_changed();
-    }
-    note(ui, name, rect);
-    let painter = ui.painter();
-    let color = if response.hovered() { BRIGHT } else { TEXT };
-    painter.text(rect.left_center(), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
-    let track = Rect::from_min_max(
-        Pos2::new(rect.right() - 28.0, rect.center().y - 7.0),
-        rect.right_center() + Vec2::new(0.0, 7.0),
-    );
-    let (fill, x) = if *is_on { (ACCENT, track.right() - 7.0) } else { (SLATE, track.left() + 7.0) };
-    painter.rect_filled(track, CornerRadius::same(7), fill);
-    painter.circle_filled(Pos2::new(x, track.center().y), 5.0, if *is_on { BRIGHT } else { FAINT });
+    let response = ui.checkbox(is_on, name);
+    note(ui, name, response.rect);
     response
 }
 

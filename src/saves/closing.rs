@@ -9,6 +9,7 @@ use bevy::ecs::query::Allow;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
+use super::abandoned::AbandonedStores;
 use super::components::{EXIT_WAIT, SavedWorld, Unopened, WorldStore};
 use super::messages::{ClosedBecause, StoreTroubleFound, WorldClosed, WorldOpened};
 use super::opening::OpeningWorld;
@@ -26,26 +27,37 @@ struct Closing {
 
 /// Worlds that are being closed.
 #[derive(Resource, Default)]
-pub(super) struct ClosingWorlds(Vec<Closing>);
+pub(crate) struct ClosingWorlds {
+    worlds: Vec<Closing>,
+    abandoned: AbandonedStores,
+}
 
 impl ClosingWorlds {
     pub fn close(&mut self, terrain: Entity, path: PathBuf, because: ClosedBecause, store: Store) {
-        self.0.push(Closing { terrain, path, because, store: store.close() });
+        self.worlds.push(Closing { terrain, path, because, store: store.close() });
+    }
+
+    #[cfg(feature = "replicon")]
+    /// Where the owner of a store that belongs to no terrain leaves it when it is dropped.
+    pub fn abandoned(&self) -> &AbandonedStores {
+        &self.abandoned
     }
 
     /// Waits until all are closed, or up to a moment.
     pub fn wait(&self, end: Instant) {
-        for Closing { path, store, .. } in &self.0 {
+        for Closing { path, store, .. } in &self.worlds {
             if let Err(why) = store.wait(end.saturating_duration_since(Instant::now())) {
                 error!("not everything is saved in {}: {why}", path.display());
             }
         }
+        self.abandoned.wait(end);
     }
 }
 
 /// An app that ends before they are closed waits for them, unless the disk does not answer.
 impl Drop for ClosingWorlds {
     fn drop(&mut self) {
+        self.abandoned.end();
         self.wait(Instant::now() + EXIT_WAIT);
     }
 }
@@ -113,10 +125,11 @@ pub(super) fn tell_closed(
     mut closed: MessageWriter<WorldClosed>,
     mut troubles: MessageWriter<StoreTroubleFound>,
 ) {
-    if closing.0.is_empty() {
+    closing.abandoned.poll();
+    if closing.worlds.is_empty() {
         return;
     }
-    closing.0.retain(|Closing { terrain, path, because, store }| {
+    closing.worlds.retain(|Closing { terrain, path, because, store }| {
         // Its last troubles come before its end.
         let outcome = store.outcome();
         for trouble in store.take_troubles() {

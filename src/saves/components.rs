@@ -14,7 +14,7 @@ use crate::store::{BaseChanged, SavePoint, Store, StoreOptions};
 use crate::terrain::Terrain;
 
 /// The longest time that an exiting app waits for the disk.
-pub(super) const EXIT_WAIT: Duration = Duration::from_secs(10);
+pub(crate) const EXIT_WAIT: Duration = Duration::from_secs(10);
 
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
 /// it; the terrain itself they leave out.

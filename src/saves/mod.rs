@@ -17,6 +17,8 @@
 //! # let _ = continue_game;
 //! ```
 
+#[cfg_attr(not(feature = "replicon"), allow(dead_code, reason = "servers abandon stores"))]
+mod abandoned;
 mod closing;
 mod components;
 mod level;
@@ -24,7 +26,11 @@ mod messages;
 mod opening;
 mod saving;
 
-pub(crate) use closing::detach;
+#[cfg(feature = "replicon")]
+pub(crate) use abandoned::AbandonedStores;
+pub(crate) use closing::{ClosingWorlds, detach};
+#[cfg(feature = "replicon")]
+pub(crate) use components::EXIT_WAIT;
 pub use components::{SavedWorld, WorldStore};
 pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
 pub use messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldClosed, WorldOpened, WorldSaved};
@@ -51,7 +57,7 @@ impl Plugin for SavePlugin {
             .add_message::<WorldSaved>()
             .add_message::<WorldClosed>()
             .add_message::<StoreTroubleFound>()
-            .init_resource::<closing::ClosingWorlds>()
+            .init_resource::<ClosingWorlds>()
             .insert_resource(components::SavesWorlds)
             .add_observer(opening::begin_anew)
             .add_observer(opening::give_up)

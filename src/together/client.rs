@@ -15,7 +15,9 @@ use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 use super::trouble::{SharingTrouble, SharingTroubleFound};
 use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
 use crate::plugin::{BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned};
-use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain};
+use crate::terrain::{
+    Applied, HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain,
+};
 use crate::threads::{ThreadTask, Threads, free_later};
 
 /// Which of an app's shared terrains is shared: a connection carries one ground.
@@ -363,9 +365,10 @@ impl Answers<'_> {
             }
             ClientEvent::Confirmed { tag, receipt } => {
                 link.answer(tag);
-                if let Some(receipt) = receipt.clone() {
-                    self.applied.write(BrushApplied { terrain: Some(terrain), receipt });
-                }
+                // What it changed is not known if the player was away: what is not known is not counted.
+                let unknown = || Receipt { tag, outcome: Ok(Applied::default()) };
+                let known = receipt.clone().unwrap_or_else(unknown);
+                self.applied.write(BrushApplied { terrain: Some(terrain), receipt: known });
                 self.edited.write(edited(tag, WhatBecame::Confirmed(receipt)));
             }
             ClientEvent::Refused { tag, why } => {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use bevy::ecs::message::MessageCursor;
@@ -14,13 +15,16 @@ use super::messages::{BulkLane, FromPlayer, OrderLane, Served};
 use super::players::{Players, Said};
 use super::service::Authorised;
 use crate::net::{self, Kick, Lane, Server, ServerEvent, ServerSettings, ToClient};
-use crate::saves::{ReadWorld, SavedWorld, WorldReader};
+use crate::saves::{AbandonedStores, ClosingWorlds, EXIT_WAIT, ReadWorld, SavedWorld, WorldReader};
 use crate::store::{Progress, Store, StoreError, StoreTrouble};
 use crate::terrain::Terrain;
 use crate::threads::{ThreadTask, Threads};
 
 /// The server of a shared world: insert it in the server's app. Its [`Server`] owns a terrain that is not
 /// drawn; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like all other players.
+///
+/// Replacing or removing it saves what is not saved yet and closes its world, without a wait of the main thread; an app that exits
+/// waits for this at most ten seconds.
 #[derive(Resource)]
 pub struct GroundServer {
     work: Work,
@@ -32,6 +36,10 @@ pub struct GroundServer {
     /// The messages of players that were read.
     read: MessageCursor<FromClient<FromPlayer>>,
     data: BTreeMap<String, Vec<u8>>,
+    /// Where its store goes when it is dropped; `None` before its first frame in an app.
+    closing: Option<AbandonedStores>,
+    /// Whether the app has waited in vain for the disk already.
+    has_timed_out: bool,
 }
 
 /// The state of the server.
@@ -95,7 +103,9 @@ impl GroundServer {
     /// [`Server::open`] to make the server.
     pub fn with_store(server: Server, store: Store) -> Self {
         let data = store.game_data().clone();
-        Self { data, ..Self::working(Work::Here(Box::new(Parts { server, store: Some(store) }))) }
+        let mut ground = Self::working(Work::Here(Box::new(Parts { server, store: Some(store) })));
+        ground.data = data;
+        ground
     }
 
     fn working(work: Work) -> Self {
@@ -108,6 +118,8 @@ impl GroundServer {
             players: Players::default(),
             read: MessageCursor::default(),
             data: BTreeMap::new(),
+            closing: None,
+            has_timed_out: false,
         }
     }
 
@@ -164,15 +176,16 @@ impl GroundServer {
         super::players::number(client, id).unwrap_or(net::ClientId::SERVER)
     }
 
-    /// Waits until all requests are done and saved, before the app ends. A world that is still being read has nothing
-    /// to save.
+    /// Waits until all requests are done and saved, but no longer than ten seconds. An app that exits does this. A world that is still
+    /// being read has nothing to save.
     pub fn finish(&mut self) {
-        let deadline = Instant::now() + Duration::from_secs(10);
+        let deadline = Instant::now() + EXIT_WAIT;
         while let Work::UnderWay(_) = self.work {
             if let Some(parts) = self.take_parts(|_| {}) {
                 self.work = Work::Here(parts);
             } else if Instant::now() > deadline {
                 error!("the last edits are not saved: the server is still busy");
+                self.has_timed_out = true;
                 return;
             } else {
                 std::thread::sleep(Duration::from_millis(1));
@@ -183,8 +196,10 @@ impl GroundServer {
             self.waiting.drain(..).for_each(|request| request(parts, now));
             self.players.forget_waiting();
             parts.advance(now);
-            if let Some(Err(why)) = parts.store.as_mut().map(Store::flush) {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if let Some(Err(why)) = parts.store.as_mut().map(|store| store.flush_within(left)) {
                 error!("the last edits are not saved: {why}");
+                self.has_timed_out = matches!(why, StoreError::TimedOut);
             }
         }
     }
@@ -217,6 +232,42 @@ impl GroundServer {
             },
         }
         None
+    }
+}
+
+/// Whoever drops it does not wait: on another thread what was asked for is done, and the store is closed. An app that exits waits for
+/// that.
+impl Drop for GroundServer {
+    fn drop(&mut self) {
+        let work = std::mem::replace(&mut self.work, Work::Gone);
+        let (waiting, now) = (std::mem::take(&mut self.waiting), self.start.elapsed());
+        // What is being read has nothing to save yet, so no exit waits for it.
+        let has_to_save = matches!(work, Work::Here(_) | Work::UnderWay(_)) && !self.has_timed_out;
+        let (closed, closing) = channel();
+        Threads::Background.spawn(move || {
+            let Some(mut parts) = work.wait() else { return };
+            waiting.into_iter().for_each(|request| request(&mut parts, now));
+            parts.advance(now);
+            if let Some(store) = parts.store.take() {
+                // An error means that nobody waits for it.
+                let _ = closed.send(store.close());
+            }
+        });
+        if let Some(stores) = self.closing.take().filter(|_| has_to_save) {
+            stores.add(closing);
+        }
+    }
+}
+
+impl Work {
+    /// Waits for the server, on another thread than the main one; `None` if there is none.
+    fn wait(self) -> Option<Box<Parts>> {
+        match self {
+            Self::Here(parts) => Some(parts),
+            Self::UnderWay(task) => task.wait(),
+            Self::Opening(task, _) => task.wait()?.ok().map(|(parts, _)| parts),
+            Self::Gone => None,
+        }
     }
 }
 
@@ -272,6 +323,7 @@ impl GroundServer {
 /// Passes messages of players to the server, and sends its messages to them.
 pub(super) fn serve(
     mut ground: ResMut<GroundServer>,
+    closing: Option<Res<ClosingWorlds>>,
     messages: Res<Messages<FromClient<FromPlayer>>>,
     clients: Query<Option<&NetworkId>, Authorised>,
     mut order: MessageWriter<ToClients<OrderLane>>,
@@ -280,6 +332,9 @@ pub(super) fn serve(
     mut leave: MessageWriter<DisconnectRequest>,
 ) {
     let ground = &mut *ground;
+    if ground.closing.is_none() {
+        ground.closing = closing.map(|closing| closing.abandoned().clone());
+    }
     ground.receive(&messages, &clients);
     for client in ground.players.take_replaced(&clients) {
         let targets = SendTargets::Single(client.into());

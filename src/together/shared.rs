@@ -80,16 +80,16 @@ fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lif
 pub enum WhatBecame {
     /// It is shown as the player's machine predicts it.
     Predicted(Receipt),
-    /// The server has ordered it; this is what it came to for all. `None` where the player was away when that happened: then there is no
-    /// [`BrushApplied`](crate::plugin::BrushApplied) either.
+    /// The server has ordered it, with this result for all players. `None` if the player was disconnected at that moment, so that the
+    /// result is not known; the [`BrushApplied`](crate::plugin::BrushApplied) then has an empty outcome.
     Confirmed(Option<Receipt>),
     /// It was refused, and is no longer shown. `None` if it could not be sent, or the player was disconnected when it
     /// was refused.
     Refused(Option<Refusal>),
 }
 
-/// The result of an edit on a [`SharedTerrain`]. A [`BrushApplied`](crate::plugin::BrushApplied) follows for edits that
-/// are confirmed or refused, so inventories need nothing else.
+/// The result of an edit on a [`SharedTerrain`]. Each edit that is confirmed or refused has exactly one
+/// [`BrushApplied`](crate::plugin::BrushApplied) as well, so inventories need nothing else.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct GroundEdited {
     /// The terrain.

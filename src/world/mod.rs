@@ -17,6 +17,8 @@ mod inspect;
 mod memory;
 mod meshes;
 mod parts;
+// Some of it is for saving, some for sending.
+#[cfg_attr(not(all(feature = "store", feature = "net")), allow(dead_code))]
 mod patch;
 mod query;
 mod ray;
@@ -31,6 +33,7 @@ pub use memory::Memory;
 pub(crate) use meshes::NewSurfaces;
 pub(crate) use parts::{brick_over, columns_of};
 pub use patch::Patch;
+#[cfg_attr(not(feature = "net"), allow(unused_imports))]
 pub(crate) use patch::{ChangedBrick, Overlay, Places, State};
 pub use query::{RayHit, Span};
 pub use settings::{TerrainError, TerrainSettings};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::parts::columns_of;
 use super::state::World;
 use crate::lattice::{BrickPos, RegionPos};
-use crate::volume::Brick;
+use crate::volume::{Brick, Layers, layers};
 
 impl World {
     /// The regions that hold bricks, in order.
@@ -52,5 +52,26 @@ impl World {
             brick.hash(pos.origin().y, brick.edited(), &columns_of(pos))
         };
         self.bricks_in(region).map(hash).fold(0, u64::wrapping_add)
+    }
+
+    /// The number to add to its region's [hash](Self::region_hash), wrapping around, when a brick is replaced: only
+    /// samples that differ are hashed. `None` stands for a pristine brick.
+    #[cfg_attr(not(feature = "net"), allow(dead_code))]
+    pub(crate) fn hash_step(&self, pos: BrickPos, new: Option<&Arc<Brick>>) -> u64 {
+        let old = self.brick(pos);
+        let edited = [old, new].map(|brick| brick.map_or(&layers::NONE, |brick| brick.edited()));
+        let mut differ = Brick::differences([old, new].map(|brick| brick.map(Arc::as_ref)));
+        for (layer, bits) in differ.iter_mut().enumerate() {
+            *bits |= edited[0][layer] ^ edited[1][layer];
+        }
+        let columns = columns_of(pos);
+        let [old, new] = [old, new].map(|brick| {
+            let of = |brick: &Arc<Brick>| {
+                let own: Layers = std::array::from_fn(|layer| differ[layer] & brick.edited()[layer]);
+                brick.hash(pos.origin().y, &own, &columns)
+            };
+            brick.map_or(0, of)
+        });
+        new.wrapping_sub(old)
     }
 }

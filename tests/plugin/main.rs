@@ -41,6 +41,8 @@ mod saved_moments;
 mod saved_or_shared;
 mod saved_troubles;
 mod saves;
+#[cfg(feature = "replicon")]
+mod served;
 mod server;
 mod several_terrains;
 mod shown;

@@ -35,7 +35,6 @@ fn let_friends_in(app: &mut App, entity: Entity, path: &Path) {
 }
 
 fn play_alone_again(app: &mut App, entity: Entity, path: &Path) {
-    app.world_mut().resource_mut::<GroundServer>().finish();
     app.world_mut().remove_resource::<GroundServer>();
     app.world_mut().resource_mut::<Heard>().opened.clear();
     app.world_mut().entity_mut(entity).remove::<SharedTerrain>().insert((terrain(), saved(path)));

@@ -3,7 +3,6 @@
 use std::fmt;
 use std::net::{AddrParseError, IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::str::FromStr;
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use bevy::prelude::*;
@@ -86,10 +85,6 @@ pub fn own_address() -> Option<IpAddr> {
 #[derive(Resource, Clone, Copy, Debug)]
 pub struct OwnNumber(pub u64);
 
-/// Servers that save the last of their worlds.
-#[derive(Resource, Default)]
-struct Closing(Vec<JoinHandle<()>>);
-
 /// Seconds until a guest tries to connect.
 #[derive(Resource)]
 struct NextTry(f32);
@@ -106,10 +101,6 @@ impl Plugin for ConnectionPlugin {
             .add_observer(close)
             .add_observer(tell_other_version)
             .add_systems(OnExit(ClientState::Connected), announce_loss)
-            .add_systems(
-                Last,
-                finish_closing.run_if(on_message::<AppExit>).run_if(resource_exists::<Closing>),
-            )
             .add_systems(
                 Update,
                 (connect.run_if(in_state(ClientState::Disconnected)), follow_host, serve_unsaved),
@@ -197,22 +188,8 @@ fn serve_unsaved(
 
 fn close(_: On<Remove, SharedTerrain>, mut commands: Commands) {
     commands.remove_resource::<NextTry>();
-    commands.queue(|world: &mut World| {
-        udp::leave(world);
-        if let Some(mut server) = world.remove_resource::<GroundServer>() {
-            // It waits for the disk.
-            let closing = std::thread::spawn(move || server.finish());
-            world.get_resource_or_init::<Closing>().0.push(closing);
-        }
-    });
-}
-
-/// Waits for what is saved by servers that were left, before the app ends.
-fn finish_closing(mut closing: ResMut<Closing>) {
-    for server in closing.0.drain(..) {
-        // One that panicked has said so.
-        let _ = server.join();
-    }
+    commands.remove_resource::<GroundServer>();
+    commands.queue(udp::leave);
 }
 
 /// Connects a guest, again and again.

@@ -18,6 +18,9 @@ use crate::world::particles::{Burst, ParticleKind};
 /// Hits that wait for their receipts. If there are more, the oldest is forgotten.
 const MAX_PENDING: usize = 64;
 
+/// Seconds of blows that all miss, after which a hint says why.
+const MISSES: f32 = 1.0;
+
 /// Turns uses of tools into brushes.
 pub struct DiggingPlugin;
 
@@ -88,9 +91,17 @@ fn dig(
     shake.add(if used.tool == Tool::Drill { 0.12 } else { 0.3 });
 }
 
-/// Tells the player why nothing happens.
-fn tell_reach(used: On<ToolUsed>, mut hints: MessageWriter<Hint>) {
-    if used.aim.is_none() && !matches!(used.tool, Tool::Bomb | Tool::Ball) {
+/// Tells the player why nothing happens. At the edge of the reach some blows hit and others don't: only when none has hit for a while,
+/// the player needs the hint.
+fn tell_reach(
+    used: On<ToolUsed>,
+    time: Res<Time>,
+    mut hints: MessageWriter<Hint>,
+    mut missing: Local<Option<f32>>,
+) {
+    if used.aim.is_some() || matches!(used.tool, Tool::Bomb | Tool::Ball) {
+        *missing = None;
+    } else if time.elapsed_secs() - *missing.get_or_insert(time.elapsed_secs()) >= MISSES {
         hints.write(Hint(texts::TOO_FAR.into()));
     }
 }

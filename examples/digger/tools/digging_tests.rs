@@ -1,5 +1,8 @@
 //! Tests of digging, building and painting.
 
+use std::time::Duration;
+
+use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::brush::shapes::Sphere;
 
 use super::*;
@@ -66,6 +69,29 @@ fn brushes_are_as_large_as_the_inventory_allows_and_reserve_their_material() {
         assert!((0..60).contains(&left) && radii[0] > 4.0, "{left}: {radii:?}");
         assert_eq!(drain_hints(&mut app).len(), 1);
     }
+}
+
+#[test]
+fn the_hint_that_something_is_too_far_away_waits_until_no_blow_has_hit_for_a_while() {
+    // Ten blows a second; a letter says whether one hits.
+    let hints = |blows: &str| -> Vec<usize> {
+        let mut app = app();
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)));
+        let blow = |(at, letter): (usize, char)| {
+            app.update();
+            let aim = Aim { point: Vec3::splat(10.0), direction: Vec3::NEG_Y, normal: Vec3::Y };
+            let (eye, direction, tool) = (Vec3::ZERO, aim.direction, Tool::Pickaxe);
+            let aim = (letter == 'h').then_some(aim);
+            app.world_mut().trigger(ToolUsed { tool, aim, eye, direction });
+            (!drain_hints(&mut app).is_empty()).then_some(at)
+        };
+        blows.chars().enumerate().filter_map(blow).collect()
+    };
+    assert!(hints(&"mmmmmmmmh".repeat(9)).is_empty(), "digging at the edge of the reach");
+    let told = hints(&"m".repeat(20));
+    assert!(told.len() > 5 && (9..=11).contains(&told[0]), "{told:?}");
+    let again = hints(&format!("{}h{}", "m".repeat(12), "m".repeat(8)));
+    assert!(again.iter().all(|at| *at < 12), "a blow that hits begins anew: {again:?}");
 }
 
 #[test]

@@ -628,7 +628,7 @@ impl Client {
         if matches!(self.stage, Stage::Following) {
             self.marks.touch(applied.regions);
             if matches!(batch.last(), Some(Entry::Mark)) {
-                self.marks.mark(epoch.number, self.replica.world());
+                self.marks.mark(epoch.number, &mut self.replica);
             }
         }
         self.finish_log();

@@ -7,8 +7,7 @@ use super::super::message::{Entry, MOST_REGIONS, RegionContent, RegionHashes, To
 use super::join::Stage;
 use super::{Client, ClientEvent};
 use crate::lattice::{BrickPos, LatticeBox, RegionPos};
-use crate::net::regions::region_hash;
-use crate::terrain::World;
+use crate::net::replica::Replica;
 
 /// The most marks that wait for the other side.
 const MOST_MARKS: usize = 256;
@@ -40,10 +39,10 @@ impl Marks {
         self.touched.append(&mut regions);
     }
 
-    /// Records the hashes of a world at a mark.
-    pub fn mark(&mut self, number: u64, world: &World) {
+    /// Records the hashes of the confirmed world at a mark.
+    pub fn mark(&mut self, number: u64, replica: &mut Replica) {
         let touched = std::mem::take(&mut self.touched);
-        let hashes = touched.into_iter().map(|region| (region, region_hash(world, region))).collect();
+        let hashes = touched.into_iter().map(|region| (region, replica.region_hash(region))).collect();
         self.ours.insert(number, hashes);
         while self.ours.len() > MOST_MARKS {
             self.ours.pop_first();
@@ -64,7 +63,7 @@ impl Marks {
     }
 
     /// Compares marks that both sides have; returns how many, and the regions that differ.
-    fn compare(&mut self, world: &World) -> (u64, BTreeSet<RegionPos>) {
+    fn compare(&mut self, replica: &mut Replica) -> (u64, BTreeSet<RegionPos>) {
         let (mut count, mut differing) = (0, BTreeSet::new());
         let both: Vec<u64> =
             self.theirs.keys().filter(|number| self.ours.contains_key(number)).copied().collect();
@@ -78,8 +77,9 @@ impl Marks {
                 // A region that was not touched here before the mark is unchanged since, unless it was touched later:
                 // then the next mark compares it.
                 let own = ours.get(&region).copied();
-                let own = own
-                    .or_else(|| (!self.is_touched_after(number, region)).then(|| region_hash(world, region)));
+                let own = own.or_else(|| {
+                    (!self.is_touched_after(number, region)).then(|| replica.region_hash(region))
+                });
                 if own.is_some_and(|own| own != hash) {
                     differing.insert(region);
                 }
@@ -144,7 +144,7 @@ impl Client {
         if !matches!(self.stage, Stage::Following) || self.repair.is_some() {
             return;
         }
-        let (count, mut differing) = self.marks.compare(self.replica.world());
+        let (count, mut differing) = self.marks.compare(&mut self.replica);
         self.figures.marks += count;
         differing.append(&mut self.doubtful);
         if differing.is_empty() {

@@ -10,7 +10,7 @@ use crate::lattice::RegionPos;
 use crate::net::encoding::entry_bytes;
 use crate::net::message::{Entry, Refusal, RegionHashes, ToClient};
 use crate::net::price::{MOST_UNDO_BYTES, UNDO, UNDO_BYTES};
-use crate::net::regions::{region_hash, touched_regions};
+use crate::net::regions::{Steps, touched_regions};
 use crate::terrain::{ChangeError, Patch, Receipt, Rejection};
 
 impl Server {
@@ -111,25 +111,27 @@ impl Server {
             {
                 self.strokes.record(player, label, self.terrain.world(), &change);
             }
+            let steps = Steps::of(self.terrain.world(), &change);
             // This terrain is waiting for it.
             receipts.extend(self.terrain.commit(commit).unwrap_or_default());
-            self.touch(&change);
+            self.touch(&change, steps);
         }
         receipts
     }
 
-    fn touch(&mut self, change: &Patch) {
+    fn touch(&mut self, change: &Patch, steps: Steps) {
         let number = self.applied + 1;
         for region in touched_regions(self.terrain.world().grid(), change) {
             self.touched.insert(region);
             self.changed.insert(region, number);
-            self.known_hashes.remove(&region);
         }
+        self.sums.add(self.terrain.world(), steps);
     }
 
     fn put_parts(&mut self, number: u64, change: &Arc<Patch>) {
+        let steps = Steps::of(self.terrain.world(), change);
         match self.terrain.apply_change(Arc::clone(change), None) {
-            Ok(_) => self.touch(change),
+            Ok(_) => self.touch(change, steps),
             Err(ChangeError::Panicked | ChangeError::Overloaded) => self.void(number),
             // Nothing changed, and the same holds on all machines.
             Err(_) => {}
@@ -149,11 +151,10 @@ impl Server {
         self.send_to_all(&ToClient::Hashes { number, regions });
     }
 
-    /// The present hashes of regions; known ones are not computed again.
+    /// The present hashes of regions.
     pub(super) fn hashes_of(&mut self, regions: BTreeSet<RegionPos>) -> RegionHashes {
-        let (world, known) = (self.terrain.world(), &mut self.known_hashes);
-        let mut hash = |region| *known.entry(region).or_insert_with(|| region_hash(world, region));
-        regions.into_iter().map(|region| (region, hash(region))).collect()
+        let (world, sums) = (self.terrain.world(), &mut self.sums);
+        regions.into_iter().map(|region| (region, sums.hash(world, region))).collect()
     }
 
     /// Undoes a stroke in the present world, which contains all entries ordered before; returns the work.

@@ -1,21 +1,19 @@
 //! Clients that join, reconnect, or have a different world.
 
 use std::collections::BTreeSet;
+use std::ops::Bound;
 use std::sync::Arc;
 use std::time::Duration;
 
 use glam::IVec3;
 
 use super::kept::Kept;
-use super::sender::{Snapshot, region_bytes};
+use super::sender::Snapshot;
 use super::session::{Fetch, Stage};
 use super::{Server, ServerEvent};
 use crate::lattice::RegionPos;
 use crate::net::message::{ClientId, Epoch, Hello, Join, Kick, Lane, RegionHashes, ToClient, Welcome};
 use crate::net::regions::{region_hash, regions_of};
-
-/// The number of regions that are encoded to estimate the bytes of all regions.
-const MEASURED: usize = 16;
 
 /// The shortest interval between answers to fetches: each one keeps a state of the world, whose index is copied once it
 /// changes.
@@ -136,14 +134,14 @@ impl Server {
 
     /// The messages with all entries after a number, if the log has them and they take fewer bytes than the regions
     /// that changed since.
-    fn entries_after(&self, number: u64) -> Option<(Join, Bulk)> {
+    fn entries_after(&mut self, number: u64) -> Option<(Join, Bulk)> {
         let messages = self.log.after(number)?;
         let bytes: usize = messages.iter().map(|message| message.len()).sum();
         // A few entries are sent in any case.
         if bytes > super::FULL_MESSAGE {
             let changed = self.changed.iter().filter(|(_, at)| **at > number);
             let changed: Vec<RegionPos> = changed.map(|(region, _)| *region).collect();
-            if bytes > bytes_of(&(0, self.terrain.snapshot()), &changed) {
+            if bytes > self.encodings.estimate(&(0, self.terrain.snapshot()), &changed) {
                 return None;
             }
         }
@@ -162,18 +160,28 @@ impl Server {
 
     /// The table of all regions. The world is kept for the client until it continues.
     fn compare(&mut self, client: ClientId) -> (u64, (Join, Bulk)) {
-        let ((number, world), terms) = self.keep();
-        let (new, same): (BTreeSet<RegionPos>, BTreeSet<RegionPos>) = regions_of(&world)
+        let (world, terms) = self.keep();
+        let table = match self.kept.as_ref().and_then(|kept| kept.table.clone()) {
+            Some(table) => table,
+            None => self.table(&world),
+        };
+        self.kept.iter_mut().for_each(|kept| kept.table = Some(Arc::clone(&table)));
+        let number = world.0;
+        if let Some(session) = self.sessions.get_mut(&client) {
+            session.compared = Some(world);
+        }
+        (number, (Join::Compare { terms: Box::new(terms) }, Bulk::Messages(vec![table])))
+    }
+
+    /// The hashes of all regions of a world, in a message.
+    fn table(&mut self, (number, world): &Snapshot) -> Arc<[u8]> {
+        let (new, same): (BTreeSet<RegionPos>, BTreeSet<RegionPos>) = regions_of(world)
             .into_iter()
-            .partition(|region| self.changed.get(region).is_some_and(|at| *at > number));
-        let new = new.into_iter().map(|region| (region, region_hash(&world, region)));
+            .partition(|region| self.changed.get(region).is_some_and(|at| at > number));
+        let new = new.into_iter().map(|region| (region, region_hash(world, region)));
         let mut regions: RegionHashes = self.hashes_of(same).into_iter().chain(new).collect();
         regions.sort_unstable_by_key(|(region, _)| *region);
-        let table = ToClient::Table { number, regions }.to_bytes();
-        if let Some(session) = self.sessions.get_mut(&client) {
-            session.compared = Some((number, world));
-        }
-        (number, (Join::Compare { terms: Box::new(terms) }, Bulk::Messages(vec![table.into()])))
+        ToClient::Table { number: *number, regions }.to_bytes().into()
     }
 
     /// Answers fetches, with one world for each client at a time: those of another one wait until its regions are sent.
@@ -229,25 +237,27 @@ impl Server {
         }
     }
 
-    /// Sends data of the bulk lanes, within their limits.
+    /// Sends data of the bulk lanes, within their limits. The first client for which there was no time is the first of
+    /// the next call.
     pub(super) fn send_bulk(&mut self, now: Duration) {
-        for (client, session) in &mut self.sessions {
-            let bucket = &mut self.players.player(*client).bulk;
-            while let Some(piece) = session.bulk.next_piece(bucket, now) {
-                let message = ToClient::Piece(piece).to_bytes();
-                self.figures.bulk_bytes += message.len() as u64;
-                self.outgoing.push((*client, Lane::Bulk, message));
+        self.encodings.refill();
+        let first = self.first_bulk;
+        let turns = [(Bound::Included(first), Bound::Unbounded), (Bound::Unbounded, Bound::Excluded(first))];
+        for turn in turns {
+            for (client, session) in self.sessions.range_mut(turn) {
+                let was_short = self.encodings.is_short();
+                let bucket = &mut self.players.player(*client).bulk;
+                while let Some(piece) = session.bulk.next_piece(bucket, now, &mut self.encodings) {
+                    let message = ToClient::Piece(piece).to_bytes();
+                    self.figures.bulk_bytes += message.len() as u64;
+                    self.outgoing.push((*client, Lane::Bulk, message));
+                }
+                if self.encodings.is_short() && !was_short {
+                    self.first_bulk = *client;
+                }
             }
         }
     }
-}
-
-/// Estimates the bytes of regions in messages from some of them.
-fn bytes_of(world: &Snapshot, regions: &[RegionPos]) -> usize {
-    let step = regions.len().div_ceil(MEASURED).max(1);
-    let some: Vec<RegionPos> = regions.iter().step_by(step).copied().collect();
-    let bytes: usize = some.iter().map(|region| region_bytes(world, *region, 0).len()).sum();
-    bytes * regions.len() / some.len().max(1)
 }
 
 /// The distance from a position to the middle of a region.

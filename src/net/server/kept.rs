@@ -4,6 +4,7 @@
 //! at about the same time share one, and clients that make no progress lose theirs, so few worlds are kept for any
 //! number of clients.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::Server;
@@ -17,6 +18,8 @@ const SHARED: Duration = Duration::from_secs(1);
 pub struct Kept {
     pub world: Snapshot,
     pub terms: Terms,
+    /// The message with the hashes of its regions, once a client has needed it.
+    pub table: Option<Arc<[u8]>>,
     since: Duration,
 }
 
@@ -39,7 +42,7 @@ impl Server {
                 loose: self.terrain.loose().copied(),
                 next_field: self.terrain.world().next_field(),
             };
-            Kept { world: (number, self.terrain.snapshot()), terms, since: now }
+            Kept { world: (number, self.terrain.snapshot()), terms, table: None, since: now }
         });
         (kept.world.clone(), kept.terms.clone())
     }

@@ -38,11 +38,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use glam::IVec3;
-use rustc_hash::FxHashMap;
 
 use super::encoding::{OrderWriter, entry_bytes};
 use super::message::{ClientId, Entry, Epoch, Kick, Lane, MOST_TO_CLIENT, ToClient};
 use super::never_shown;
+use super::regions::RegionSums;
 use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::format::{FormatError, WorldId};
@@ -54,6 +54,7 @@ use kept::Kept;
 use order_log::OrderLog;
 use own_numbers::OwnNumbers;
 use players::Players;
+use sender::Encodings;
 use session::Session;
 pub use settings::{Reach, ServerSettings, UndoPolicy};
 use strokes::Strokes;
@@ -142,8 +143,10 @@ pub struct Server {
     touched: BTreeSet<RegionPos>,
     /// The number at which each region changed last, as far as this run knows.
     changed: BTreeMap<RegionPos, u64>,
-    /// Hashes of regions that have not changed since they were computed.
-    known_hashes: FxHashMap<RegionPos, u64>,
+    sums: RegionSums,
+    encodings: Encodings,
+    /// The client whose bulk lane comes first.
+    first_bulk: ClientId,
     last_mark: Duration,
     /// The number of the last mark.
     marked: u64,
@@ -208,7 +211,9 @@ impl Server {
             strokes: Strokes::new(settings.undo_bytes),
             touched: BTreeSet::new(),
             changed: BTreeMap::new(),
-            known_hashes: FxHashMap::default(),
+            sums: RegionSums::default(),
+            encodings: Encodings::default(),
+            first_bulk: ClientId(0),
             last_mark: Duration::ZERO,
             marked: number,
             sessions: BTreeMap::new(),

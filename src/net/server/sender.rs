@@ -76,6 +76,54 @@ pub fn region_bytes((number, world): &Snapshot, pos: RegionPos, left: u32) -> Ve
     ToClient::Region(RegionContent { number: *number, pos, left, next_field, bricks, fields }).to_bytes()
 }
 
+/// How many regions may still be encoded in this call, of all clients together, and how many bytes they take: each takes
+/// milliseconds, which no number of clients may add up to a long tick.
+#[derive(Debug, Default)]
+pub struct Encodings {
+    left: usize,
+    is_short: bool,
+    count: usize,
+    bytes: usize,
+}
+
+impl Encodings {
+    /// For another call.
+    pub fn refill(&mut self) {
+        (self.left, self.is_short) = (Self::MOST, false);
+    }
+
+    /// Regions in a call: at 60 calls a second, 480, of some 20 to 100 KB each.
+    const MOST: usize = 8;
+
+    /// Whether a region was not encoded since the last refill because too many others were.
+    pub fn is_short(&self) -> bool {
+        self.is_short
+    }
+
+    fn begin(&mut self) -> bool {
+        self.is_short |= self.left == 0;
+        self.left = self.left.saturating_sub(1);
+        !self.is_short
+    }
+
+    fn note(&mut self, bytes: usize) {
+        // The latest ones count most.
+        if self.count >= 64 {
+            (self.count, self.bytes) = (self.count / 2, self.bytes / 2);
+        }
+        (self.count, self.bytes) = (self.count + 1, self.bytes + bytes);
+    }
+
+    /// Estimates the bytes of regions in messages from those that were encoded. If there were none, some are.
+    pub fn estimate(&mut self, world: &Snapshot, regions: &[RegionPos]) -> usize {
+        if self.count == 0 {
+            let step = regions.len().div_ceil(Self::MOST).max(1);
+            regions.iter().step_by(step).for_each(|region| self.note(region_bytes(world, *region, 0).len()));
+        }
+        self.bytes / self.count.max(1) * regions.len()
+    }
+}
+
 /// The bulk lane of a client: limited in bytes a second, and in unacknowledged bytes by the window.
 pub struct BulkSender {
     jobs: VecDeque<Job>,
@@ -167,10 +215,15 @@ impl BulkSender {
         bytes <= self.sent
     }
 
-    /// The next piece that may be sent.
-    pub fn next_piece(&mut self, bucket: &mut Bucket, now: Duration) -> Option<Vec<u8>> {
+    /// The next piece that may be sent, with at most as many regions encoded as `encodings` allows.
+    pub fn next_piece(
+        &mut self,
+        bucket: &mut Bucket,
+        now: Duration,
+        encodings: &mut Encodings,
+    ) -> Option<Vec<u8>> {
         if self.at == self.stream.len() {
-            let message = self.next_message()?;
+            let message = self.next_message(encodings)?;
             self.stream.clear();
             self.at = 0;
             put_message(&mut self.stream, &message);
@@ -190,12 +243,16 @@ impl BulkSender {
         Some(piece)
     }
 
-    fn next_message(&mut self) -> Option<Arc<[u8]>> {
+    fn next_message(&mut self, encodings: &mut Encodings) -> Option<Arc<[u8]>> {
+        if matches!(self.jobs.front(), Some(Job::Region { .. })) && !encodings.begin() {
+            return None;
+        }
         match self.jobs.pop_front()? {
             Job::Message(bytes) => Some(bytes),
             Job::Image(image) => Some(ToClient::Image(image).to_bytes().into()),
             Job::Region { pos, left } => {
-                let bytes = region_bytes(self.world.as_ref()?, pos, left).into();
+                let bytes: Arc<[u8]> = region_bytes(self.world.as_ref()?, pos, left).into();
+                encodings.note(bytes.len());
                 self.regions -= 1;
                 if self.regions == 0 {
                     self.world = None;

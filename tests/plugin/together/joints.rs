@@ -3,6 +3,7 @@
 
 use std::sync::mpsc::channel;
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy_burrow::format::Level;
@@ -11,8 +12,10 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::together::{GroundServer, SharedTerrain, SharingTrouble, WhatBecame};
 use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;
+use bevy_replicon::test_app::TestClientEntity;
 
 use super::{Party, dug, ground, large_ground, other_ground, player, server, settings};
+use crate::stage::dig;
 
 /// The network id of clients that connect from now on.
 #[derive(Resource)]
@@ -30,8 +33,29 @@ impl Party {
         party
     }
 
+    /// A round in which the server hears a player, and the player does not hear the server.
+    fn round_to_server(&mut self, player: usize) {
+        let app = &mut self.players[player].0.app;
+        app.update();
+        let client = *app.world().resource::<TestClientEntity>();
+        let said: Vec<_> = app.world_mut().resource_mut::<ClientMessages>().drain_sent().collect();
+        let mut heard = self.server.world_mut().resource_mut::<ServerMessages>();
+        said.into_iter().for_each(|(channel, bytes)| heard.insert_received(*client, channel, bytes));
+        self.server.update();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+
     /// Asks the server for something.
     fn ask<T: Send + 'static>(&mut self, what: impl FnOnce(&mut Server) -> T + Send + Sync + 'static) -> T {
+        self.ask_in(Self::round, what)
+    }
+
+    /// Asks the server for something, with such rounds until it answers.
+    fn ask_in<T: Send + 'static>(
+        &mut self,
+        round: impl Fn(&mut Self),
+        what: impl FnOnce(&mut Server) -> T + Send + Sync + 'static,
+    ) -> T {
         let (sender, receiver) = channel();
         let sender = Mutex::new(sender);
         self.server.world_mut().resource_mut::<GroundServer>().with(move |server| {
@@ -40,7 +64,7 @@ impl Party {
             let _ = sender.lock().unwrap_or_else(PoisonError::into_inner).send(answer);
         });
         loop {
-            self.round();
+            round(self);
             if let Ok(answer) = receiver.try_recv() {
                 return answer;
             }
@@ -81,6 +105,32 @@ fn bytes_to_join(level: &Terrain, begins: Terrain, is_asset: bool) -> u64 {
 fn copy_of(terrain: &Terrain, mut pristine: Terrain) -> Terrain {
     pristine.apply_change(terrain.parts().change, None).expect("it is the same ground");
     pristine
+}
+
+#[test]
+fn a_dig_that_was_ordered_while_its_player_was_away_is_answered_once() {
+    let mut party = Party::with_ids();
+    // Who comes again can't get old entries, and compares regions.
+    let settings = ServerSettings { log_bytes: 0, ..settings() };
+    party.server.insert_resource(GroundServer::new(Server::new(ground(), settings)));
+    party.join();
+    party.all_join();
+    let height = party.height_at(0, 30.0, 30.0);
+    party.send(0, dig(30.0, height, 30.0, 4.0).with_tag(7));
+    let start = Instant::now();
+    while party.ask_in(|party| party.round_to_server(0), |server| server.epoch().number) == 0 {
+        assert!(start.elapsed() < super::PATIENCE, "the dig never reaches the server");
+    }
+    party.disconnect(0);
+    party.outcomes(0);
+    assert_eq!(party.players[0].0.tags(), [0; 0]);
+    party.reconnect(0);
+    party.rounds_until("it is answered", Party::agrees);
+    assert_eq!(party.outcomes(0), [WhatBecame::Confirmed(None)]);
+    let receipts = party.players[0].0.receipts();
+    let outcomes: Vec<_> =
+        receipts.iter().map(|applied| (applied.receipt.tag, &applied.receipt.outcome)).collect();
+    assert_eq!(outcomes, [(7, &Ok(Applied::default()))], "what is not known is not counted");
 }
 
 #[test]
