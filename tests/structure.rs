@@ -22,7 +22,6 @@ const UPWARD: &[(&str, &str)] = &[];
 const CIRCLES: &[&[&str]] = &[
     &["panel/files.rs", "panel/level.rs"],
     &["panel/operations.rs", "panel/tool.rs"],
-    &["saves/closing.rs", "saves/level.rs", "saves/opening.rs", "saves/saving.rs"],
     &["together/client.rs", "together/shared.rs"],
     &["together/players.rs", "together/server.rs", "together/service.rs"],
 ];
