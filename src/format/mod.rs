@@ -41,7 +41,7 @@ pub use metadata::Metadata;
 pub use portable::{
     PortableHead, PortableWorld, SavedRegion, read_portable, read_portable_head, write_portable,
 };
-#[cfg(any(feature = "net", feature = "store"))]
+#[cfg(any(feature = "net", feature = "store", test))]
 pub(crate) use region::{decode_region, encode_region};
 
 #[cfg(test)]

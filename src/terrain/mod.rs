@@ -15,6 +15,8 @@
 
 mod commit;
 mod draft;
+#[cfg(feature = "net")]
+mod for_net;
 #[cfg(feature = "plugin")]
 mod for_plugin;
 mod history;
