@@ -20,17 +20,7 @@ const UPWARD: &[(&str, &str)] = &[];
 
 /// Circles of files that still exist: all files of each, in alphabetical order.
 const CIRCLES: &[&[&str]] = &[
-    &["brush/line.rs", "brush/request.rs"],
-    &[
-        "ground/strata/in_brick.rs",
-        "ground/strata/of_ground.rs",
-        "ground/strata/records.rs",
-        "ground/strata/steep.rs",
-        "ground/world.rs",
-    ],
     &["panel/files.rs", "panel/level.rs"],
-    &["panel/operations.rs", "panel/tool.rs"],
-    &["saves/closing.rs", "saves/level.rs", "saves/opening.rs", "saves/saving.rs"],
     &["together/client.rs", "together/shared.rs"],
     &["together/players.rs", "together/server.rs", "together/service.rs"],
 ];

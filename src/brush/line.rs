@@ -2,11 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use serde::de::IgnoredAny;
-use serde::{Deserialize, Serialize};
+use serde::de::{Error, IgnoredAny};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Brush, FULL_POWER, Operation, Roughness, Shape, is_default};
 use crate::ground::MaterialId;
+
+impl Serialize for Brush {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Line::from(self.clone()).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Brush {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Line::deserialize(deserializer)?.try_into().map_err(Error::custom)
+    }
+}
 
 /// A [`Brush`] in its written form, without fields that may be left out.
 #[derive(Serialize, Deserialize)]

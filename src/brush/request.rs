@@ -5,9 +5,7 @@ use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 #[cfg(feature = "plugin")]
 use glam::Mat3A;
 use glam::{Quat, Vec3};
-use serde::{Deserialize, Serialize};
 
-use super::line::Line;
 use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
@@ -35,8 +33,7 @@ use crate::ground::MaterialId;
 /// `power`, `tag` and `stroke` may be left out; other fields are refused.
 ///
 /// With the feature `plugin` it is reflected as such a line, and so can be sent by Bevy's remote protocol.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Line", into = "Line")]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "plugin",
     derive(bevy::reflect::Reflect),

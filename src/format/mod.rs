@@ -2,14 +2,14 @@
 //!
 //! | file | encodes |
 //! | --- | --- |
-//! | [`frame`] | the envelope of every part: checksum, schema, world, key |
-//! | [`region`], [`bricks`], [`fields`] | a region's record |
-//! | [`predict`], [`residuals`] | densities of bricks |
-//! | [`batch`], [`edits`], [`change`] | commits, for journals |
-//! | [`metadata`] | a world without its regions |
-//! | [`portable`] | a whole world as one file |
-//! | [`level`] | a designer's level: a folder of files, or one packed file |
-//! | [`container`], [`bytes`], [`plain`], [`limits`] | shared by the others |
+//! | `frame` | the envelope of every part: checksum, schema, world, key |
+//! | `region`, `bricks`, `fields` | a region's record |
+//! | `predict`, `residuals` | densities of bricks |
+//! | `batch`, `edits`, `change` | commits, for journals |
+//! | `metadata` | a world without its regions |
+//! | `portable` | a whole world as one file |
+//! | `level` | a designer's level: a folder of files, or one packed file |
+//! | `container`, `bytes`, `plain`, `limits` | shared by the others |
 //!
 //! Reading any bytes gives the written content or a [`FormatError`]: nothing panics, and memory is bounded by the
 //! length of the input and by limits that the caller sets. Equal content always gives equal bytes.
@@ -41,7 +41,7 @@ pub use metadata::Metadata;
 pub use portable::{
     PortableHead, PortableWorld, SavedRegion, read_portable, read_portable_head, write_portable,
 };
-#[cfg(any(feature = "net", feature = "store"))]
+#[cfg(any(feature = "net", feature = "store", test))]
 pub(crate) use region::{decode_region, encode_region};
 
 #[cfg(test)]

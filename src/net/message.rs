@@ -34,7 +34,7 @@ use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
-use crate::terrain::{LooseSettings, Patch};
+use crate::terrain::{LooseSettings, Order, Patch};
 use crate::volume::{Brick, DiggingRules, Fields};
 
 /// The version of the protocol. It changes whenever the encoding of messages does.
@@ -100,6 +100,19 @@ pub enum Entry {
     },
     /// Changes nothing. The hashes of regions that were touched since the previous mark are compared here.
     Mark,
+}
+
+impl Entry {
+    /// What it asks of a terrain; `None` for a mark.
+    pub(crate) fn order(&self) -> Option<Order> {
+        match self {
+            Self::Edit { edit, .. } => Some(Order::Edit(edit.clone())),
+            Self::Rules(rules) => Some(Order::Rules(rules.clone())),
+            Self::Loose(loose) => Some(Order::Loose(*loose)),
+            Self::Parts { change, .. } => Some(Order::Parts { change: Arc::clone(change), hash: None }),
+            Self::Mark => None,
+        }
+    }
 }
 
 /// Entries with consecutive numbers.

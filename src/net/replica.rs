@@ -193,17 +193,12 @@ impl Replica {
         let next_field = self.world().next_field();
         self.is_outdated |= self.is_apart && entries.iter().any(|entry| own(entry).is_some());
         for entry in entries {
-            match entry {
-                Entry::Rules(rules) => {
-                    // The server checked them.
-                    let _ = self.confirmed.set_rules(rules.as_deref().cloned().unwrap_or_default());
+            if let Some(order) = entry.order() {
+                // The server checked rules.
+                let outcome = self.confirmed.submit_order(order);
+                if let Entry::Parts { .. } = entry {
+                    submitted.push(outcome.is_ok());
                 }
-                Entry::Loose(loose) => self.confirmed.set_loose(*loose),
-                Entry::Edit { edit, .. } => self.confirmed.submit_edit(edit),
-                Entry::Parts { change, .. } => {
-                    submitted.push(self.confirmed.submit_change(Patch::clone(change), None));
-                }
-                Entry::Mark => {}
             }
             match own(entry) {
                 // What is shown contains it already.
@@ -228,7 +223,8 @@ impl Replica {
         let mut applied = self.run();
         let mut receipts = self.confirmed.take_change_receipts().into_iter();
         for submitted in submitted {
-            let restored = submitted.and_then(|()| receipts.next().unwrap_or(Err(ChangeError::Panicked)));
+            let receipt = submitted.then(|| receipts.next()).flatten();
+            let restored = receipt.unwrap_or(Err(ChangeError::Panicked));
             applied.is_void |= matches!(restored, Err(ChangeError::Panicked | ChangeError::Overloaded));
             applied.restored.push(restored.ok());
         }

@@ -38,12 +38,13 @@ mod terrain_controls;
 mod texts;
 mod theme;
 mod tool;
+mod tool_operation;
 mod widgets;
 mod world_column;
 
-pub use operations::ToolOperation;
 pub use state::{BurrowPanel, PanelAction, PanelInput, PanelPlaces, keyboard_is_free, pointer_is_free};
 pub use tool::{BrushTool, StampImage, ToolAlign, ToolShape};
+pub use tool_operation::ToolOperation;
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;

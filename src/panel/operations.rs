@@ -2,38 +2,9 @@
 
 use bevy::prelude::*;
 
-use super::{BrushTool, ToolShape, texts};
+use super::{BrushTool, ToolOperation, ToolShape, texts};
 use crate::brush::{Operation, Stamp};
 use crate::plugin::TerrainHit;
-
-/// The operation of a [`BrushTool`].
-#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[reflect(Default)]
-pub enum ToolOperation {
-    /// Removes ground.
-    #[default]
-    Dig,
-    /// Fills its shape with ground.
-    Add,
-    /// Changes the material of the ground.
-    Paint,
-    /// Smooths bumps and edges.
-    Smooth,
-    /// Accentuates bumps and edges.
-    Sharpen,
-    /// Flattens the ground to a plane that is tangent to the surface at the brush.
-    Flatten,
-    /// Levels the ground at height [`BrushTool::level`].
-    Level,
-    /// Moves the surface outwards by [`BrushTool::amount`].
-    Raise,
-    /// Moves the surface inwards by [`BrushTool::amount`].
-    Lower,
-    /// Presses the image [`BrushTool::stamp`] onto the ground, with a height of [`BrushTool::amount`].
-    Stamp,
-    /// Cuts slopes into terraces of height [`BrushTool::step`].
-    Terrace,
-}
 
 /// A setting that only some operations use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,8 +5,8 @@ use std::sync::{Arc, LazyLock};
 use bevy::prelude::*;
 
 use super::lengths::RADIUS;
-use super::operations::ToolOperation;
 use super::texts;
+use super::tool_operation::ToolOperation;
 use crate::brush::{Brush, FULL_POWER, Roughness, Shape};
 use crate::ground::{GreyImage, MaterialId};
 use crate::plugin::TerrainHit;

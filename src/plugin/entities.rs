@@ -276,7 +276,7 @@ pub(crate) fn trigger_if_alive<'a, E: EntityEvent<Trigger<'a>: Default>>(command
 
 /// Whether a chunk has no field and draws nothing.
 pub(super) fn is_empty(world: &World, chunk: ChunkPos) -> bool {
-    world.fields_of(chunk).is_none() && !world.may_draw(chunk)
+    world.fields_of(chunk).is_none() && !world.meshes.may_draw(chunk)
 }
 
 /// Records which surface an entity shows, and runs the actions that come with it.

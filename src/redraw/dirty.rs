@@ -165,11 +165,14 @@ pub(crate) fn grown_into(cells: u64, dx: i32, dz: i32) -> u64 {
 
 /// Adds to the blocks that a transaction draws all others of the chunks whose surface is not kept.
 pub(crate) fn complete(world: &World, view: &WorldView, blocks: &mut Vec<Block>) {
-    if world.unmeshed.is_empty() {
+    if world.meshes.unmeshed.is_empty() {
         return;
     }
-    let chunks: FxHashSet<ChunkPos> =
-        blocks.iter().map(|block| block.chunk).filter(|chunk| world.unmeshed.contains_key(chunk)).collect();
+    let chunks: FxHashSet<ChunkPos> = blocks
+        .iter()
+        .map(|block| block.chunk)
+        .filter(|chunk| world.meshes.unmeshed.contains_key(chunk))
+        .collect();
     blocks.extend(chunks.into_iter().flat_map(|chunk| blocks_of(world, view.mask, chunk)));
     blocks.sort_unstable_by_key(|block| (block.brick, block.chunk));
     blocks.dedup();

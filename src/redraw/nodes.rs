@@ -222,7 +222,7 @@ impl<'a> State<'a> {
         if !rows.is_empty() {
             let ys = rows.start.div_euclid(size)..=(rows.end - 1).div_euclid(size);
             let places = ys.map(|y| ChunkPos { x: tile.x, y, z: tile.z });
-            chunks.extend(places.filter(|chunk| self.world.may_draw(*chunk)));
+            chunks.extend(places.filter(|chunk| self.world.meshes.may_draw(*chunk)));
         }
         chunks.extend(self.new_over(tile).iter().flat_map(|new| &new.chunks).map(|(chunk, _)| *chunk));
         chunks.sort_unstable();

@@ -77,7 +77,7 @@ impl World {
             Drawn::Tile(_) => SurfaceDraft::Nothing,
             Drawn::Chunk(chunk) => {
                 let unmeshed = || self.unmeshed(chunk).map(|chunk| SurfaceDraft::Unmeshed(Arc::new(chunk)));
-                let kept = self.surfaces.get(&chunk).cloned().map(SurfaceDraft::Chunk);
+                let kept = self.meshes.surfaces.get(&chunk).cloned().map(SurfaceDraft::Chunk);
                 kept.or_else(unmeshed).unwrap_or(SurfaceDraft::Nothing)
             }
         }
@@ -149,7 +149,7 @@ mod tests {
                 assert!(*draft.surface() == mesh, "{drawn:?} after {number} digs");
                 assert_eq!(draft.is_empty(), mesh.is_empty());
             }
-            for (&tile, rings) in &world.rings {
+            for (&tile, rings) in &world.meshes.rings {
                 let view = world.view();
                 assert!(!rings.is_empty());
                 assert!(**rings == Rings::new(&view, tile, &tile::borders(&view, tile)), "{tile:?}");

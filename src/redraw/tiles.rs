@@ -136,7 +136,7 @@ fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePo
         let mut patches: Vec<(i32, i32)> = touched.iter().map(|&(_, patch)| patch).collect();
         patches.sort_unstable();
         let rings = |borders: &Borders| {
-            Arc::new(match world.rings.get(&tile) {
+            Arc::new(match world.meshes.rings.get(&tile) {
                 Some(old) => old.updated(view, tile, borders, &patches),
                 // They are kept from now on.
                 None => Rings::new(view, tile, borders),

@@ -20,7 +20,7 @@ use crate::surface::block::Block;
 use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
 use crate::surface::{ChunkSurface, FreshPart, Mask, PartKey};
-use crate::world::{Meshing, World};
+use crate::world::{Meshing, NewSurfaces, World};
 
 /// New meshes of a commit, which replace old ones. An empty one means that nothing is drawn there any more.
 #[derive(Clone, Debug, Default)]
@@ -36,6 +36,17 @@ pub struct MeshUpdates {
     pub(crate) drawn_cut: Option<Arc<DrawnCut>>,
     /// Chunks that change without being meshed.
     pub(crate) outdated: Vec<ChunkPos>,
+}
+
+impl MeshUpdates {
+    /// What the world keeps of it.
+    pub(crate) fn kept(&self) -> NewSurfaces {
+        NewSurfaces {
+            chunks: self.chunks.clone(),
+            rings: self.tiles.iter().map(|(tile, update)| (*tile, update.kept_rings())).collect(),
+            outdated: self.outdated.clone(),
+        }
+    }
 }
 
 /// A world as it is drawn, and what draws it.
@@ -203,9 +214,9 @@ fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn Mes
     };
     let update = |chunk: ChunkPos, numbers: &[u32]| {
         let nothing = ChunkSurface::default();
-        let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
+        let old = world.meshes.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
         // For a chunk without a kept surface, an empty surface counts as a change.
-        let empty = || world.unmeshed.contains_key(&chunk).then(ChunkSurface::default);
+        let empty = || world.meshes.unmeshed.contains_key(&chunk).then(ChunkSurface::default);
         Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh)).or_else(empty)?)))
     };
     if !ItemCost::Lookup.is_shared(blocks.len()) {

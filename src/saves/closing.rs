@@ -11,9 +11,9 @@ use bevy::prelude::*;
 
 use super::abandoned::AbandonedStores;
 use super::components::{EXIT_WAIT, SavedWorld, Unopened, WorldStore};
+use super::follow::follow_same;
 use super::messages::{ClosedBecause, StoreTroubleFound, WorldClosed, WorldOpened};
-use super::opening::OpeningWorld;
-use super::saving::follow_same;
+use super::reading::OpeningWorld;
 use crate::store::{ClosingStore, Store, StoreError};
 use crate::terrain::Terrain;
 

@@ -21,9 +21,13 @@
 mod abandoned;
 mod closing;
 mod components;
+mod follow;
+mod holding;
 mod level;
+mod making;
 mod messages;
 mod opening;
+mod reading;
 mod saving;
 
 #[cfg(feature = "replicon")]
@@ -34,8 +38,8 @@ pub(crate) use components::EXIT_WAIT;
 pub use components::{SavedWorld, WorldStore};
 pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
 pub use messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldClosed, WorldOpened, WorldSaved};
-pub use opening::OpeningWorld;
-pub(crate) use opening::{ReadWorld, WorldReader};
+pub use reading::OpeningWorld;
+pub(crate) use reading::{ReadWorld, WorldReader};
 
 use bevy::prelude::*;
 
@@ -63,8 +67,8 @@ impl Plugin for SavePlugin {
             .add_observer(opening::give_up)
             .add_observer(opening::read_anew)
             .add_observer(opening::wait_for_terrain)
-            .add_observer(level::give_up)
-            .add_observer(level::make_anew)
+            .add_observer(making::give_up)
+            .add_observer(making::make_anew)
             .add_observer(closing::close)
             .add_observer(closing::close_with_component)
             .add_observer(closing::follow_discarded)
@@ -74,7 +78,7 @@ impl Plugin for SavePlugin {
                 (
                     (
                         opening::follow_changed,
-                        level::start_levels,
+                        making::start_levels,
                         opening::finish_opening,
                         opening::start_opening,
                         opening::warn_of_no_terrain,

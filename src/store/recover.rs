@@ -21,10 +21,10 @@ use crate::format::Batch;
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, RegionPos};
 use crate::terrain::{
-    CommitRecord, LogEntry, Meshing, Patch, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
+    CommitRecord, Meshing, Order, Patch, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
     WorldParts,
 };
-use crate::volume::{DiggingRules, Field, Fields};
+use crate::volume::{Field, Fields};
 
 /// The shares of opening after which a world is recovered: as it is on the disk, and as one that has to be saved whole.
 const RECOVERED: f32 = 0.97;
@@ -483,25 +483,20 @@ fn replay(
     Ok(Replayed { terrain, game, records, frame: last, commits, refused })
 }
 
-/// Replays a record on a world that differs from the one it was made on.
+/// Replays a record on a world that differs from the one it was made on. Edits that this world rejects are left out.
 fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), ReplayError> {
-    for entry in &record.entries {
-        match entry {
-            LogEntry::Rules(rules) => {
-                terrain.set_rules(rules.as_deref().map_or_else(DiggingRules::default, Clone::clone))?;
-            }
-            LogEntry::Loose(settings) => terrain.set_loose(*settings),
-            LogEntry::Edit(edit) => terrain.submit_edit(edit),
-            LogEntry::Ground(ground) => terrain.set_ground(Arc::clone(ground))?,
-            // Its fields are those of the other world.
-            LogEntry::Change => {
-                let bricks = record.change.bricks.clone();
-                terrain.apply_change(Patch { bricks, ..Patch::default() }, None)?;
-            }
+    let orders = record.orders().map(|order| match order {
+        // Its fields are those of the other world.
+        Order::Parts { change, .. } => {
+            let bricks = change.bricks.clone();
+            Order::Parts { change: Arc::new(Patch { bricks, ..Patch::default() }), hash: None }
         }
+        order => order,
+    });
+    // Without an entry, all of its edits were rejected.
+    if !record.entries.is_empty() {
+        terrain.obey(orders)?;
     }
-    // Edits that this world rejects are left out.
-    terrain.apply::<crate::brush::Brush>([]);
     Ok(())
 }
 

@@ -8,12 +8,10 @@ use super::log::RecordDraft;
 use super::receipt::Receipt;
 use super::replacement::ChangeError;
 use super::resolve::{FieldNews, Resolved, patch_of};
-use crate::lattice::{ChunkPos, TilePos};
+use crate::lattice::ChunkPos;
 use crate::redraw::{DrawnCut, MeshUpdates, Stages};
-use crate::surface::ChunkSurface;
-use crate::surface::tile::Rings;
 use crate::volume::UniformBricks;
-use crate::world::{Patch, World};
+use crate::world::{NewSurfaces, Patch, World};
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
@@ -32,10 +30,8 @@ pub struct Commit {
     /// Its record, where a log is kept.
     pub(super) record: Option<RecordDraft>,
     pub(super) news: Vec<(ChunkPos, FieldNews)>,
-    pub(super) surfaces: Vec<(ChunkPos, Arc<ChunkSurface>)>,
-    pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
-    /// Chunks that change without being meshed.
-    pub(super) outdated: Vec<ChunkPos>,
+    /// The surfaces that the world keeps: the meshes may be taken away before.
+    pub(super) kept: NewSurfaces,
     /// The cut that is drawn afterwards, if it changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Returns `true` if it changes only what is drawn.
@@ -54,8 +50,8 @@ impl fmt::Debug for Commit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Commit")
             .field("ticket", &self.ticket)
-            .field("chunks", &self.surfaces.len())
-            .field("tiles", &self.rings.len())
+            .field("chunks", &self.kept.chunks.len())
+            .field("tiles", &self.kept.rings.len())
             .field("stages", &self.stages)
             .finish_non_exhaustive()
     }
@@ -103,9 +99,7 @@ impl Commit {
             copy: None,
             drawn_cut: meshes.drawn_cut.clone(),
             is_cut,
-            surfaces: meshes.chunks.clone(),
-            outdated: meshes.outdated.clone(),
-            rings: meshes.tiles.iter().map(|(tile, update)| (*tile, update.kept_rings())).collect(),
+            kept: meshes.kept(),
             meshes,
             stages,
         }
@@ -161,25 +155,7 @@ impl Commit {
         if let Some(uniform) = self.uniform {
             world.set_uniform(uniform);
         }
-        for chunk in self.outdated {
-            world.surfaces.remove(&chunk);
-            world.unmeshed.insert(chunk, ());
-        }
-        for (chunk, surface) in self.surfaces {
-            world.unmeshed.remove(&chunk);
-            if surface.is_empty() {
-                world.surfaces.remove(&chunk);
-            } else {
-                world.surfaces.insert(chunk, surface);
-            }
-        }
-        for (tile, rings) in self.rings {
-            if rings.is_empty() {
-                world.rings.remove(&tile);
-            } else {
-                world.rings.insert(tile, rings);
-            }
-        }
+        world.meshes.apply(self.kept);
         world.shrink();
         world.next_field = self.next_field;
         world.revision += 1;

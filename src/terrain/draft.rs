@@ -8,9 +8,7 @@ use super::receipt::Receipt;
 use super::transaction::Transaction;
 use super::work::Work;
 use crate::brush::Edit;
-use crate::lattice::BrickPos;
-use crate::volume::Brick;
-use crate::world::{Meshing, Patch, TerrainError, TerrainSettings, World, unique};
+use crate::world::{Meshing, Patch, World, unique};
 
 /// The changes that edits would make.
 #[derive(Clone, Debug, Default)]
@@ -64,29 +62,6 @@ impl Terrain {
         let hash = World::hash_of(self.world.ground().hash(), regions_hash);
         Draft { receipts, change, hash, regions_hash }
     }
-
-    /// A terrain with the same world, rules and settings, in which nothing waits. Both share the world until one of them changes.
-    ///
-    /// # Errors
-    /// Never, as this one has the same settings.
-    pub fn fork(&self) -> Result<Self, TerrainError> {
-        let chunk_size = self.world.grid().size() as u32;
-        let settings = TerrainSettings { chunk_size, voxel_size: self.voxel_size() };
-        let mut fork = Self::new(self.world.shared_ground(), &settings)?;
-        fork.world = Arc::clone(&self.world);
-        (fork.rules, fork.loose) = (self.rules.clone(), self.loose);
-        Ok(fork)
-    }
-
-    /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as they are.
-    pub fn share_bricks<'a>(&mut self, bricks: impl IntoIterator<Item = (BrickPos, &'a Arc<Brick>)>) {
-        for (pos, brick) in bricks {
-            let Some(own) = self.world.bricks.get(&pos) else { continue };
-            if !Arc::ptr_eq(own, brick) && Brick::is_same(Some(own), Some(brick)) {
-                Arc::make_mut(&mut self.world).bricks.insert(pos, Arc::clone(brick));
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -97,7 +72,7 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::{Ground, MaterialId, NoiseHeights};
-    use crate::terrain::LooseSettings;
+    use crate::terrain::{LooseSettings, TerrainSettings};
     use crate::volume::DiggingRules;
 
     fn terrain() -> Terrain {
@@ -162,29 +137,5 @@ mod tests {
         let draft = terrain.draft(&[]);
         assert_eq!((draft.receipts.len(), draft.hash), (0, terrain.world().hash()));
         assert!(draft.change.bricks.is_empty() && draft.change.fields.is_empty());
-    }
-
-    #[test]
-    fn equal_bricks_are_shared_and_others_stay() {
-        let mut rng = Rng::with_seed(1);
-        let edits = edits(&mut rng, 8);
-        let (mut a, mut b) = (terrain(), terrain());
-        for own in [&mut a, &mut b] {
-            own.submit_edits(&edits);
-            own.finish();
-        }
-        b.submit_edits(&edits[2..3]);
-        b.finish();
-        let hash = a.world().hash();
-        let parts = b.parts();
-        a.share_bricks(parts.change.bricks.iter().filter_map(|(pos, brick)| Some((*pos, brick.as_ref()?))));
-        assert_eq!(a.world().hash(), hash);
-        let is_shared = |pos| {
-            let [own, other] = [&a, &b].map(|terrain| terrain.world().brick(pos));
-            own.zip(other).is_some_and(|(own, other)| Arc::ptr_eq(own, other))
-        };
-        let shared = a.world().bricks().filter(|(pos, _)| is_shared(*pos));
-        let (shared, all) = (shared.count(), a.world().bricks().count());
-        assert!(shared > all / 2, "{shared} of {all}");
     }
 }

@@ -15,6 +15,8 @@
 
 mod commit;
 mod draft;
+#[cfg(feature = "net")]
+mod for_net;
 #[cfg(feature = "plugin")]
 mod for_plugin;
 mod history;
@@ -23,8 +25,9 @@ mod keep_log;
 mod lod_laws;
 mod log;
 mod model;
-#[cfg(test)]
 mod order;
+#[cfg(test)]
+mod order_laws;
 mod queue;
 mod receipt;
 mod record;
@@ -58,6 +61,7 @@ pub use commit::Commit;
 pub use draft::Draft;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
 pub use model::{StaleCommit, Terrain};
+pub use order::{Order, OrderError};
 #[cfg(feature = "plugin")]
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;

@@ -393,7 +393,7 @@ impl Terrain {
     pub fn set_meshing(&mut self, meshing: Meshing) {
         if meshing == Meshing::Never && self.meshing != meshing {
             self.abandon();
-            Arc::make_mut(&mut self.world).forget_surfaces();
+            Arc::make_mut(&mut self.world).meshes.forget();
         }
         self.meshing = meshing;
     }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::order::Order;
 use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::loose::LooseSettings;
@@ -49,6 +50,23 @@ impl CommitRecord {
         let changes =
             |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change | LogEntry::Ground(_));
         self.entries.is_empty() || self.entries.iter().any(changes)
+    }
+}
+
+impl CommitRecord {
+    /// The orders that it was made of. Its change stands for steps through history; without any entry, all of its edits
+    /// were rejected.
+    pub(crate) fn orders(&self) -> impl Iterator<Item = Order> {
+        let hash = Some(self.hash);
+        let nothing = self.entries.is_empty().then(|| Order::Parts { change: Arc::default(), hash });
+        let order = move |entry: &LogEntry| match entry {
+            LogEntry::Rules(rules) => Order::Rules(rules.clone()),
+            LogEntry::Loose(settings) => Order::Loose(*settings),
+            LogEntry::Edit(edit) => Order::Edit(edit.clone()),
+            LogEntry::Change => Order::Parts { change: Arc::new(self.change.clone()), hash },
+            LogEntry::Ground(ground) => Order::Ground(Arc::clone(ground)),
+        };
+        self.entries.iter().map(order).chain(nothing)
     }
 }
 

@@ -16,11 +16,15 @@ impl Terrain {
     ///
     /// # Errors
     /// [`ChangeError::Overloaded`] where too much work waits.
-    pub fn submit_change(&mut self, change: Patch, hash: Option<u64>) -> Result<(), ChangeError> {
+    pub fn submit_change(
+        &mut self,
+        change: impl Into<Arc<Patch>>,
+        hash: Option<u64>,
+    ) -> Result<(), ChangeError> {
         if !self.queue.has_room_for_step() {
             return Err(ChangeError::Overloaded);
         }
-        self.queue.push_put(Put { change, hash, counts: true, ground: None });
+        self.queue.push_put(Put { change: change.into(), hash, counts: true, ground: None });
         Ok(())
     }
 
@@ -28,9 +32,13 @@ impl Terrain {
     ///
     /// # Errors
     /// When the parts are invalid; then nothing has changed.
-    pub fn apply_change(&mut self, change: Patch, hash: Option<u64>) -> Result<Restored, ChangeError> {
+    pub fn apply_change(
+        &mut self,
+        change: impl Into<Arc<Patch>>,
+        hash: Option<u64>,
+    ) -> Result<Restored, ChangeError> {
         self.abandon();
-        self.put_now(Put { change, hash, counts: true, ground: None })
+        self.put_now(Put { change: change.into(), hash, counts: true, ground: None })
     }
 
     fn put_now(&mut self, put: Put) -> Result<Restored, ChangeError> {
@@ -82,6 +90,6 @@ impl Terrain {
         if found != expected {
             return Err(ChangeError::GroundSize { found, expected });
         }
-        Ok(Put { change: Patch::default(), hash: None, counts: false, ground: Some(ground) })
+        Ok(Put { change: Arc::default(), hash: None, counts: false, ground: Some(ground) })
     }
 }

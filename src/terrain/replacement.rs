@@ -52,7 +52,7 @@ pub enum ChangeError {
 /// The replacement parts.
 #[derive(Debug)]
 pub(super) struct Put {
-    pub change: Patch,
+    pub change: Arc<Patch>,
     /// The hash that the world must have afterwards.
     pub hash: Option<u64>,
     /// Whether its receipt counts voxels.

@@ -4,14 +4,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use super::model::Terrain;
+use super::order::OrderError;
 use super::queue::WorkLimits;
 use super::receipt::Receipt;
-use super::record::{CommitRecord, LogEntry, WorldParts};
+use super::record::{CommitRecord, WorldParts};
 use super::replacement::ChangeError;
 use super::resolve::world_of;
 use crate::ground::Ground;
-use crate::volume::{DiggingRules, RulesError};
-use crate::world::{Patch, TerrainError, TerrainSettings};
+use crate::volume::RulesError;
+use crate::world::{TerrainError, TerrainSettings};
 
 /// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -60,6 +61,15 @@ pub enum ReplayError {
     /// Bricks or fields are invalid.
     #[error(transparent)]
     Parts(#[from] ChangeError),
+}
+
+impl From<OrderError> for ReplayError {
+    fn from(why: OrderError) -> Self {
+        match why {
+            OrderError::Rules(why) => Self::Rules(why),
+            OrderError::Parts(why) => Self::Parts(why),
+        }
+    }
 }
 
 impl Terrain {
@@ -126,7 +136,7 @@ impl Terrain {
             return Err(ReplayError::Revision { at, found: record.revision });
         }
         let limits = std::mem::replace(&mut self.queue.limits, WorkLimits::UNBOUNDED);
-        let receipts = self.replay_entries(record);
+        let receipts = self.replay_orders(record);
         self.queue.limits = limits;
         let (receipts, at) = (receipts?, self.world.revision);
         if record.revision != at {
@@ -139,25 +149,8 @@ impl Terrain {
         Ok(receipts)
     }
 
-    fn replay_entries(&mut self, record: &CommitRecord) -> Result<Vec<Receipt>, ReplayError> {
-        for entry in &record.entries {
-            match entry {
-                LogEntry::Rules(rules) => {
-                    self.set_rules(rules.as_deref().map_or_else(DiggingRules::default, Clone::clone))?;
-                }
-                LogEntry::Loose(settings) => self.set_loose(*settings),
-                LogEntry::Edit(edit) => self.submit_edit(edit),
-                LogEntry::Ground(ground) => self.set_ground(Arc::clone(ground))?,
-                LogEntry::Change => {
-                    self.apply_change(record.change.clone(), Some(record.hash))?;
-                }
-            }
-        }
-        if record.entries.is_empty() {
-            // All of its edits were rejected.
-            self.apply_change(Patch::default(), Some(record.hash))?;
-        }
-        let receipts = self.finish();
+    fn replay_orders(&mut self, record: &CommitRecord) -> Result<Vec<Receipt>, ReplayError> {
+        let receipts = self.obey(record.orders())?;
         match receipts.iter().any(|receipt| receipt.outcome.is_err()) {
             true => Err(ReplayError::Rejected(record.revision)),
             false => Ok(receipts),

@@ -3,6 +3,7 @@
 use std::borrow::Borrow;
 
 use super::model::Terrain;
+use super::order::{Order, OrderError};
 use super::queue::{Together, WorkLimits};
 use super::receipt::{Receipt, Rejection};
 use crate::brush::{Brush, Edit};
@@ -75,6 +76,46 @@ impl Terrain {
             Ok(()) => self.queue_edit(tag, edit, stroke, together),
             Err(rejection) => self.answer(Receipt { tag, outcome: Err(rejection) }),
         }
+    }
+
+    /// Submits an order. Rules and settings hold for edits that are submitted later; everything else is queued, and
+    /// answered like what is submitted by [`submit_edit`](Self::submit_edit), [`submit_undo`](Self::submit_undo),
+    /// [`submit_change`](Self::submit_change) and [`submit_ground`](Self::submit_ground).
+    ///
+    /// # Errors
+    /// When rules are invalid, when a ground has another size, or when there is no room for parts or a ground.
+    pub fn submit_order(&mut self, order: Order) -> Result<(), OrderError> {
+        match order {
+            Order::Edit(edit) => self.submit_edit(&edit),
+            Order::Undo => self.submit_undo(),
+            Order::Redo => self.submit_redo(),
+            Order::Parts { change, hash } => self.submit_change(change, hash)?,
+            Order::Ground(ground) => self.submit_ground(ground)?,
+            Order::Rules(rules) => self.set_rules(rules.as_deref().cloned().unwrap_or_default())?,
+            Order::Loose(settings) => self.set_loose(settings),
+        }
+        Ok(())
+    }
+
+    /// Obeys orders at once, after everything that waits; returns the receipts of the edits.
+    ///
+    /// # Errors
+    /// When an order can't be submitted, or parts or a ground among them do not fit; those before may be obeyed then.
+    pub(crate) fn obey(
+        &mut self,
+        orders: impl IntoIterator<Item = Order>,
+    ) -> Result<Vec<Receipt>, OrderError> {
+        self.abandon();
+        let mut replacements = 0;
+        for order in orders {
+            replacements += usize::from(matches!(order, Order::Parts { .. } | Order::Ground(_)));
+            self.submit_order(order)?;
+        }
+        let receipts = self.finish();
+        // Theirs are the last.
+        let others = self.change_receipts.len().saturating_sub(replacements);
+        self.change_receipts.split_off(others).into_iter().try_for_each(|receipt| receipt.map(drop))?;
+        Ok(receipts)
     }
 
     /// Returns `true` if there is room for an edit. `None` stands for an invalid edit, which is queued too and gets its

@@ -54,8 +54,8 @@ impl Unseen {
     /// The changes of a commit to the world at this version. They are read from its lists, because the game may have
     /// taken its meshes.
     pub(super) fn of(commit: &Commit, before: Version) -> Self {
-        let tiles = commit.rings.iter().map(|(tile, _)| Drawn::Tile(*tile));
-        let chunks = commit.surfaces.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));
+        let tiles = commit.kept.rings.iter().map(|(tile, _)| Drawn::Tile(*tile));
+        let chunks = commit.kept.chunks.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));
         Self { drawn: tiles.chain(chunks).collect(), fields: commit.news.clone(), ..Self::nothing(before) }
     }
 

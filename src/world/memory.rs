@@ -47,15 +47,16 @@ impl World {
             memory.samples += Brick::BYTES;
             memory.materials += brick.bytes() - Brick::BYTES;
         }
-        for surface in self.surfaces.values() {
+        for surface in self.meshes.surfaces.values() {
             let (mesh, parts) = surface.bytes();
             memory.meshes += mesh;
             memory.parts += parts;
         }
-        memory.parts += self.rings.values().map(|rings| rings.bytes()).sum::<usize>();
-        memory.index += table_bytes(&self.bricks) + table_bytes(&self.surfaces) + table_bytes(&self.rings);
+        memory.parts += self.meshes.rings.values().map(|rings| rings.bytes()).sum::<usize>();
+        memory.index +=
+            table_bytes(&self.bricks) + table_bytes(&self.meshes.surfaces) + table_bytes(&self.meshes.rings);
         memory.index += table_bytes(&self.fields) + table_bytes(&self.stacks) + table_bytes(&self.uniform);
-        memory.index += table_bytes(&self.unmeshed);
+        memory.index += table_bytes(&self.meshes.unmeshed);
         memory.index += self.fields.values().map(Fields::bytes).sum::<usize>();
         memory.index += self.stacks.values().map(|stack| stack.capacity() * size_of::<i32>()).sum::<usize>();
         memory

@@ -6,7 +6,7 @@
 //! | `patch` | what differs between two states |
 //! | `change` | what a commit swaps |
 //! | `parts`, `regions` | bricks and fields, as they are saved, compared and sent |
-//! | `unmeshed` | surfaces that are made when they are asked for |
+//! | `meshes`, `unmeshed` | surfaces that are kept, and surfaces that are made when they are asked for |
 //! | `query`, `ray`, `triangles`, `inspect`, `heights` | heights, rays, debug views, export |
 //! | `memory` | the bytes that it takes |
 //! | `settings` | voxel size and chunk size |
@@ -15,6 +15,7 @@ mod change;
 mod heights;
 mod inspect;
 mod memory;
+mod meshes;
 mod parts;
 // Some of it is for saving, some for sending.
 #[cfg_attr(not(all(feature = "store", feature = "net")), allow(dead_code))]
@@ -29,6 +30,7 @@ mod unmeshed;
 
 pub(crate) use change::{Change, brick_bytes, replaced_bytes};
 pub use memory::Memory;
+pub(crate) use meshes::NewSurfaces;
 pub(crate) use parts::{brick_over, columns_of};
 pub use patch::Patch;
 #[cfg_attr(not(feature = "net"), allow(unused_imports))]

@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
+use super::meshes::Meshes;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash, shrink_if_sparse};
 use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
-use crate::surface::{ChunkSurface, Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh, block};
+use crate::surface::{Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh, block};
 use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 
 /// The pool of uniform bricks is not cleaned up while it holds fewer kinds.
@@ -53,13 +54,7 @@ pub struct World {
     pub(crate) stacks: FxHashMap<(i32, i32), Vec<i32>>,
     pub(crate) fields: FxHashMap<ChunkPos, Fields>,
     pub(crate) mask: Mask,
-    pub(crate) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
-    /// Chunks that may draw something and whose surface is not kept: a table without values, counted and shrunk like
-    /// the others.
-    pub(crate) unmeshed: FxHashMap<ChunkPos, ()>,
-    /// The rings of tiles that bordered on the mask when they were last drawn; some are empty. Other rings
-    /// are built when they are needed.
-    pub(crate) rings: FxHashMap<TilePos, Arc<Rings>>,
+    pub(crate) meshes: Meshes,
     pub(crate) uniform: UniformBricks,
     /// With this many kinds, unused ones are removed from the pool.
     many_kinds: usize,
@@ -107,9 +102,7 @@ impl World {
             stacks: FxHashMap::default(),
             fields: FxHashMap::default(),
             mask: Mask::default(),
-            surfaces: FxHashMap::default(),
-            unmeshed: FxHashMap::default(),
-            rings: FxHashMap::default(),
+            meshes: Meshes::default(),
             uniform: UniformBricks::default(),
             many_kinds: FEW_KINDS,
             sample_hash: 0,
@@ -189,12 +182,12 @@ impl World {
     /// The chunks that draw something, in no order. Of a world that was [restored](crate::terrain::Terrain::restore), or whose
     /// terrain [never meshes](crate::terrain::Meshing::Never), some may turn out to draw nothing.
     pub fn drawn_chunks(&self) -> impl Iterator<Item = ChunkPos> {
-        self.maybe_drawn()
+        self.meshes.maybe_drawn()
     }
 
     /// The rings of a tile as it is drawn now: kept since the last edit nearby, or made from the undug ground.
     pub(crate) fn tile_rings(&self, tile: TilePos, borders: &Borders) -> Arc<Rings> {
-        match self.rings.get(&tile) {
+        match self.meshes.rings.get(&tile) {
             Some(rings) => Arc::clone(rings),
             None if self.ground.steep_cells().is_some() || borders.has_bordering() => {
                 Arc::new(Rings::new(&self.view(), tile, borders))
@@ -211,7 +204,12 @@ impl World {
     /// The mesh of a chunk, relative to its lowest lattice point; empty where it draws nothing.
     pub fn chunk_mesh(&self, chunk: ChunkPos) -> SurfaceMesh {
         let made = || self.unmeshed(chunk).map(|chunk| chunk.surface().mesh().clone());
-        self.surfaces.get(&chunk).map(|surface| surface.mesh().clone()).or_else(made).unwrap_or_default()
+        self.meshes
+            .surfaces
+            .get(&chunk)
+            .map(|surface| surface.mesh().clone())
+            .or_else(made)
+            .unwrap_or_default()
     }
 
     /// Where a mesh is placed: the lattice point that its positions count from.
@@ -255,9 +253,7 @@ impl World {
         shrink_if_sparse(&mut self.bricks);
         shrink_if_sparse(&mut self.stacks);
         shrink_if_sparse(&mut self.fields);
-        shrink_if_sparse(&mut self.surfaces);
-        shrink_if_sparse(&mut self.rings);
-        shrink_if_sparse(&mut self.unmeshed);
+        self.meshes.shrink();
         self.mask.shrink_if_sparse();
     }
 }

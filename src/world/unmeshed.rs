@@ -111,22 +111,6 @@ pub(crate) fn blocks_of(world: &World, mask: MaskView, chunk: ChunkPos) -> Vec<B
 impl World {
     /// The complete input for the surface of a chunk; `None` unless it is one whose surface is not kept.
     pub(crate) fn unmeshed(&self, chunk: ChunkPos) -> Option<UnmeshedChunk> {
-        self.unmeshed.contains_key(&chunk).then(|| UnmeshedChunk::new(self, chunk))
-    }
-
-    /// The chunks that draw something and those that may, as their surface is not kept: in no order.
-    pub(crate) fn maybe_drawn(&self) -> impl Iterator<Item = ChunkPos> {
-        self.surfaces.keys().chain(self.unmeshed.keys()).copied()
-    }
-
-    /// Returns `true` if the chunk draws something, or may do so.
-    pub(crate) fn may_draw(&self, chunk: ChunkPos) -> bool {
-        self.surfaces.contains_key(&chunk) || self.unmeshed.contains_key(&chunk)
-    }
-
-    /// Forgets all surfaces; they are made when they are asked for.
-    pub(crate) fn forget_surfaces(&mut self) {
-        self.unmeshed.extend(std::mem::take(&mut self.surfaces).into_keys().map(|chunk| (chunk, ())));
-        self.rings = Default::default();
+        self.meshes.unmeshed.contains_key(&chunk).then(|| UnmeshedChunk::new(self, chunk))
     }
 }

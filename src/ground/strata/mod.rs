@@ -4,15 +4,18 @@
 //! the first one that holds it; where none does, of what its column has ([`ColumnMaterial`](super::ColumnMaterial)).
 //! All of the model asks the same function: receipts, rules, queries, loose pieces, and the vertices that are drawn.
 //!
-//! The function is computed with integers (`records`), for a brick at a time (`in_brick`), and has equal
+//! The function is computed with integers (`records`, `conditions`), for a brick at a time (`in_brick`), and has equal
 //! results on every machine and on the GPU.
 
+mod below;
 mod check;
+mod conditions;
 mod in_brick;
 mod of_ground;
 mod presets;
 mod records;
 mod steep;
+mod steep_cells;
 #[cfg(test)]
 mod tests;
 mod value_noise;
@@ -25,14 +28,14 @@ use serde::{Deserialize, Serialize};
 use super::material::MaterialId;
 use crate::lattice::LatticeBox;
 
-pub(crate) use of_ground::Below;
+pub(crate) use below::Below;
 pub(crate) use records::StrataRecords;
 #[cfg(all(test, feature = "cuda"))]
 pub(crate) use records::{BED, FILL, POCKET, VEIN};
 #[cfg(feature = "cuda")]
 pub(crate) use records::{BeddingRecord, StratumRecord};
-pub(crate) use steep::SteepCells;
 pub(in crate::ground) use steep::steep_word;
+pub(crate) use steep_cells::SteepCells;
 
 /// Most strata of a ground.
 pub const MAX_STRATA: usize = 32;

@@ -5,35 +5,15 @@ use std::sync::Arc;
 use glam::IVec3;
 use rayon::prelude::*;
 
+use super::conditions::LoneVoxel;
 use super::in_brick::{self, ones};
-use super::records::LoneVoxel;
 use super::steep::Steep;
-use super::{OwnMaterials, SteepCells, Strata, StrataRecords};
+use super::{Below, OwnMaterials, SteepCells, Strata, StrataRecords};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::ground::{ColumnMaterial, GroundError};
 use crate::lattice::hash::hash_words;
 use crate::lattice::{BrickPos, Column, LIMIT, ONE, ceil};
-
-/// What a ground has in addition to the materials of its columns.
-#[derive(Clone, PartialEq)]
-pub(crate) struct Below {
-    own: OwnMaterials,
-    /// The material of the highest solid voxel of each column, row-major: what the undug surface shows.
-    tops: Box<[MaterialId]>,
-    /// Cells whose tops do not show all materials of their face, if there are any.
-    steep: Option<Box<SteepCells>>,
-}
-
-impl Below {
-    pub(crate) fn bytes(&self) -> usize {
-        let own = match &self.own {
-            OwnMaterials::Strata { given, records } => given.bytes() + records.bytes(),
-            OwnMaterials::Function { function, .. } => size_of_val(&**function),
-        };
-        own + size_of_val(&*self.tops) + self.steep.as_ref().map_or(0, |steep| steep.bytes())
-    }
-}
 
 impl Ground {
     /// This ground with strata. Voxels outside every stratum keep their material from

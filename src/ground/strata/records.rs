@@ -1,15 +1,12 @@
-//! Strata as integers, and which of them hold a voxel. `kernels/strata.cuh` computes the same.
+//! Strata as integers.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bytemuck::{Pod, Zeroable};
-use glam::IVec2;
-
 use super::value_noise::{ValueNoise, both_within, exceeded_by};
 use super::{Interval, Strata, Stratum, StratumBody, StratumBounds};
-use crate::ground::world::Ground;
 use crate::lattice::hash::{hash_words, mix};
 use crate::lattice::{Column, LatticeBox, ONE};
+use bytemuck::{Pod, Zeroable};
 
 /// Shapes, as numbers.
 pub(crate) const FILL: u32 = 0;
@@ -62,9 +59,9 @@ pub(crate) struct BeddingRecord {
 /// A stratum's conditions on a column.
 #[derive(Clone, Debug)]
 pub(super) struct ColumnCondition {
-    /// Squares of the slope, as [`Ground::squared_slope`] gives it.
-    slope: Option<[u64; 2]>,
-    bounds: StratumBounds,
+    /// Squares of the slope, as [`squared_slope`](crate::ground::Ground::squared_slope) gives it.
+    pub slope: Option<[u64; 2]>,
+    pub bounds: StratumBounds,
 }
 
 /// The strata of a ground, ready to be asked.
@@ -75,7 +72,7 @@ pub(crate) struct StrataRecords {
     pub strata: Vec<StratumRecord>,
     pub bedding: BeddingRecord,
     /// The conditions of strata on columns, by the bits of [`StratumRecord::condition`].
-    conditions: Vec<ColumnCondition>,
+    pub(super) conditions: Vec<ColumnCondition>,
     /// Hash of all of it.
     pub hash: u64,
 }
@@ -183,24 +180,6 @@ impl ColumnCondition {
         stratum.has_column_condition().then(|| Self { slope, bounds: stratum.bounds.clone() })
     }
 
-    /// Returns `true` if the stratum may be in this column of the world.
-    #[inline]
-    pub(super) fn admits(&self, ground: &Ground, column: Column) -> bool {
-        self.admits_slope(ground, column, || ground.squared_slope(column))
-    }
-
-    /// Like [`Self::admits`], given the square of the column's slope.
-    fn admits_slope(&self, ground: &Ground, column: Column, squared_slope: impl FnOnce() -> u64) -> bool {
-        let is_inside = match &self.bounds {
-            StratumBounds::World => true,
-            StratumBounds::Box(LatticeBox { min, max }) => {
-                (min.x..=max.x).contains(&column.x) && (min.z..=max.z).contains(&column.z)
-            }
-            StratumBounds::Image(image) => ground.stretched(image, column).grey() >= 32_768.0,
-        };
-        is_inside && self.slope.is_none_or(|[from, to]| (from..to).contains(&squared_slope()))
-    }
-
     fn words(&self) -> Vec<u64> {
         let [from, to] = self.slope.unwrap_or([0, u64::MAX]);
         let mut words = vec![from, to];
@@ -250,64 +229,9 @@ impl StrataRecords {
         Self { id, strata, bedding, conditions, hash }
     }
 
-    /// Returns `true` if a column of the world fulfils the condition with this bit.
-    #[inline]
-    pub fn meets(&self, ground: &Ground, column: Column, condition: u32) -> bool {
-        let own = self.conditions.get(condition.trailing_zeros() as usize);
-        own.is_none_or(|own| own.admits(ground, column))
-    }
-
-    /// The conditions that a column of the world fulfils: a bit each.
-    #[cfg(feature = "cuda")]
-    pub fn conditions_of(&self, ground: &Ground, column: Column) -> u32 {
-        let is_met = |(bit, own): (u32, &ColumnCondition)| u32::from(own.admits(ground, column)) << bit;
-        (0..).zip(&self.conditions).map(is_met).sum()
-    }
-
     /// Bytes of memory that it takes.
     pub fn bytes(&self) -> usize {
         let conditions = self.conditions.capacity() * size_of::<ColumnCondition>();
         size_of::<Self>() + self.strata.capacity() * size_of::<StratumRecord>() + conditions
     }
-
-    /// Returns `true` if a stratum holds the voxel, by definition and without data on its brick; `in_brick` must agree.
-    pub fn holds(&self, record: &StratumRecord, ground: &Ground, voxel: LoneVoxel) -> bool {
-        let LoneVoxel { column, y, depth, squared_slope } = voxel;
-        let (place, at) = (IVec2::new(column.x, column.z), column.at(y));
-        let height = y * ONE;
-        let flat = |noise: ValueNoise| noise.flat_within(noise.flat_corners(place), place);
-        let moved = if record.rough == 0 { 0 } else { record.moved(flat(record.roughness())) };
-        let is_admitted = || {
-            let own = self.conditions.get(record.condition.trailing_zeros() as usize);
-            own.is_none_or(|own| own.admits_slope(ground, column, || squared_slope))
-        };
-        (record.depth[0]..record.depth[1]).contains(&(depth + moved))
-            && (record.height[0]..record.height[1]).contains(&(height + moved))
-            && (record.ys[0]..record.ys[1]).contains(&y)
-            && is_admitted()
-            && match record.body {
-                BED => {
-                    let fold = self.bedding.fold_at(flat(self.bedding.noise()));
-                    record
-                        .is_in_bed(i64::from(height + moved) + self.bedding.dip_at(column) + i64::from(fold))
-                }
-                VEIN => {
-                    let is_within = |noise: ValueNoise| noise.at(at).abs() < record.limit;
-                    is_within(record.noise()) && is_within(record.second_noise())
-                }
-                POCKET => record.noise().at(at) > record.limit,
-                _ => true,
-            }
-    }
-}
-
-/// A voxel in a column of the world, with everything that strata depend on.
-#[derive(Clone, Copy)]
-pub(crate) struct LoneVoxel {
-    pub column: Column,
-    pub y: i32,
-    /// As strata count it, in 1/256 voxel: 0 above the surface.
-    pub depth: i32,
-    /// As [`Ground::squared_slope`] gives it.
-    pub squared_slope: u64,
 }

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::steep_cells::SteepCells;
 use crate::ground::GroundError;
 use crate::ground::world::Ground;
 use crate::lattice::{Column, ceil};
@@ -11,19 +12,6 @@ use crate::lattice::{Column, ceil};
 /// Each level is a vertex on every line, and a voxel whose material is computed. Faces of one cell's width that are
 /// higher are no cliffs but errors in the data, such as a void of a survey, whose height has no bound.
 pub(in crate::ground) const MAX_FACE_LEVELS: u32 = 64;
-
-/// The steep cells of a ground, one bit each.
-///
-/// A cell is steep if two lattice levels or more separate the ends of one of its sides or of its diagonal, and not all
-/// voxels along these lines, its columns' tops included, are of the same material. A cell with more than
-/// [`MAX_FACE_LEVELS`] on such a line is not: it shows its corners' materials, as a ground without strata does.
-#[derive(Clone, PartialEq)]
-pub(crate) struct SteepCells {
-    /// Words along x.
-    across: usize,
-    /// Row-major words of 8x8 cells: bit `z * 8 + x`, as in the mask.
-    words: Vec<u64>,
-}
 
 impl SteepCells {
     /// The steep cells of a ground, found in parallel; `None` if there are none.
@@ -42,17 +30,6 @@ impl SteepCells {
         });
         let has_any = words.par_iter().any(|&word| word != 0);
         Ok(has_any.then_some(Self { across, words }))
-    }
-
-    /// The steep ones of the 8x8 cells from (8 x, 8 z) on; there are none beyond the rim.
-    pub fn word(&self, (x, z): (i32, i32)) -> u64 {
-        let inside = |at: i32| usize::try_from(at).ok();
-        let place = inside(x).filter(|&x| x < self.across).zip(inside(z));
-        place.and_then(|(x, z)| self.words.get(z * self.across + x)).copied().unwrap_or_default()
-    }
-
-    pub(super) fn bytes(&self) -> usize {
-        size_of::<Self>() + size_of_val(self.words.as_slice())
     }
 }
 

@@ -3,7 +3,7 @@
 use fastrand::Rng;
 use glam::IVec3;
 
-use super::records::LoneVoxel;
+use super::conditions::LoneVoxel;
 use super::*;
 use crate::ground::{ColumnMaterial, GreyImage, Ground, MaterialControl, NoiseHeights};
 use crate::lattice::{Column, ONE};

@@ -40,12 +40,10 @@ impl Server {
         let Some(Ordered { entry, .. }) = self.waiting.pop_front() else { return 0 };
         let number = self.applied + 1;
         match entry {
-            Entry::Rules(rules) => {
-                // They were checked when they were ordered.
-                let rules = rules.map(|rules| (*rules).clone()).unwrap_or_default();
-                self.terrain.set_rules(rules).unwrap_or_default();
+            Entry::Rules(_) | Entry::Loose(_) => {
+                // Rules were checked when they were ordered.
+                entry.order().map_or(Ok(()), |order| self.terrain.submit_order(order)).unwrap_or_default();
             }
-            Entry::Loose(loose) => self.terrain.set_loose(loose),
             Entry::Parts { by, change } => {
                 self.put_parts(number, &change);
                 if let Some((client, own)) = by {
@@ -130,9 +128,9 @@ impl Server {
         self.sums.add(self.terrain.world(), steps);
     }
 
-    fn put_parts(&mut self, number: u64, change: &Patch) {
+    fn put_parts(&mut self, number: u64, change: &Arc<Patch>) {
         let steps = Steps::of(self.terrain.world(), change);
-        match self.terrain.apply_change(change.clone(), None) {
+        match self.terrain.apply_change(Arc::clone(change), None) {
             Ok(_) => self.touch(change, steps),
             Err(ChangeError::Panicked | ChangeError::Overloaded) => self.void(number),
             // Nothing changed, and the same holds on all machines.

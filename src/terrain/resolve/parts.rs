@@ -97,7 +97,7 @@ pub(crate) fn world_of(
 ) -> Result<World, ChangeError> {
     check_number(revision)?;
     let mut world = World::new(ground, chunk_size);
-    let put = Put { change: parts, hash: None, counts: false, ground: None };
+    let put = Put { change: Arc::new(parts), hash: None, counts: false, ground: None };
     let scene = Scene { world: &world, meshing: Meshing::Never, cut: None, backend: &Cpu };
     let resolved = replaced(scene, &put)?;
     // What it replaces is pristine.
@@ -122,7 +122,7 @@ fn on_ground(before: &World, ground: &Arc<Ground>) -> Result<Resolved, ChangeErr
 }
 
 fn replaced(scene: Scene, put: &Put) -> Result<Resolved, ChangeError> {
-    let (world, change, mut stages) = (scene.world, &put.change, Stages::default());
+    let (world, change, mut stages) = (scene.world, &*put.change, Stages::default());
     check_order(&change.bricks)?;
     let next_field = check_fields(world, change)?;
     let all = change.bricks.par_iter().with_min_len(64);

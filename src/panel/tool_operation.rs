@@ -1,0 +1,32 @@
+//! The operations of the panel.
+
+use bevy::prelude::*;
+
+/// The operation of a [`BrushTool`](super::BrushTool).
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Default)]
+pub enum ToolOperation {
+    /// Removes ground.
+    #[default]
+    Dig,
+    /// Fills its shape with ground.
+    Add,
+    /// Changes the material of the ground.
+    Paint,
+    /// Smooths bumps and edges.
+    Smooth,
+    /// Accentuates bumps and edges.
+    Sharpen,
+    /// Flattens the ground to a plane that is tangent to the surface at the brush.
+    Flatten,
+    /// Levels the ground at height [`BrushTool::level`](super::BrushTool::level).
+    Level,
+    /// Moves the surface outwards by [`BrushTool::amount`](super::BrushTool::amount).
+    Raise,
+    /// Moves the surface inwards by [`BrushTool::amount`](super::BrushTool::amount).
+    Lower,
+    /// Presses the image [`BrushTool::stamp`](super::BrushTool::stamp) onto the ground, with a height of [`BrushTool::amount`](super::BrushTool::amount).
+    Stamp,
+    /// Cuts slopes into terraces of height [`BrushTool::step`](super::BrushTool::step).
+    Terrace,
+}

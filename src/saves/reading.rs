@@ -1,0 +1,181 @@
+//! Reads a world from its folder, on another thread.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy::platform::time::Instant;
+use bevy::prelude::*;
+
+use super::components::{LevelId, SavedWorld};
+use super::level::BurrowLevel;
+use crate::format::read_level;
+use crate::ground::Ground;
+use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble};
+use crate::terrain::{Terrain, TerrainSettings, Version, WorldParts};
+use crate::threads::{ThreadTask, Threads, free_later};
+
+/// How long to wait for a world that is open elsewhere: longer than an exiting server takes to close it.
+const LOCK_WAIT: Duration = Duration::from_secs(15);
+/// The interval of attempts to open it, and the time after which a trouble is reported.
+const LOCK_TRY: Duration = Duration::from_millis(50);
+const LOCK_TOLD: Duration = Duration::from_secs(2);
+
+/// The world of a [`SavedWorld`] is being read; the plugin inserts it and takes it away.
+#[derive(Component)]
+pub struct OpeningWorld {
+    pub(super) reader: Arc<WorldReader>,
+    /// `None` between two tries.
+    task: Option<ThreadTask<Result<Found, StoreError>>>,
+    /// The version of the terrain that the world replaces.
+    pub(super) version: Version,
+    since: Instant,
+    tried: Instant,
+    told: bool,
+}
+
+impl OpeningWorld {
+    /// The progress of reading, 0 to 1, for a progress bar.
+    pub fn progress(&self) -> f32 {
+        self.reader.progress.share()
+    }
+
+    pub(super) fn new(reader: WorldReader, version: Version) -> Self {
+        let now = Instant::now();
+        let (reader, task) = (Arc::new(reader), None);
+        let mut opening = Self { reader, task, version, since: now, tried: now, told: false };
+        opening.begin();
+        opening
+    }
+
+    fn begin(&mut self) {
+        let reader = Arc::clone(&self.reader);
+        self.tried = Instant::now();
+        self.task = Some(ThreadTask::start(Threads::Background, move || reader.try_read()));
+    }
+
+    /// The world once it is read, or the error. A world that is open elsewhere is tried again, without a waiting
+    /// thread.
+    pub(super) fn poll(&mut self) -> Option<Result<Found, StoreError>> {
+        let Some(task) = &mut self.task else {
+            if self.tried.elapsed() >= LOCK_TRY {
+                self.begin();
+            }
+            return None;
+        };
+        let panicked = |_| Err(StoreError::Unreadable("reading it has panicked".into()));
+        let outcome = task.check()?.unwrap_or_else(panicked);
+        if matches!(outcome, Err(StoreError::Locked(_))) && self.since.elapsed() < LOCK_WAIT {
+            self.task = None;
+            return None;
+        }
+        Some(outcome)
+    }
+
+    /// Whether it should be told now that somebody else has the world open.
+    pub(super) fn tells_of_lock(&mut self) -> bool {
+        let is_late = self.task.is_none() && self.since.elapsed() >= LOCK_TOLD;
+        is_late && !std::mem::replace(&mut self.told, true)
+    }
+}
+
+/// What was read for nobody is neither closed nor freed by whoever drops this.
+impl Drop for OpeningWorld {
+    fn drop(&mut self) {
+        if let Some(Ok(Ok(found))) = self.task.take().and_then(|mut task| task.check()) {
+            let ReadWorld { store, terrain, .. } = found.world();
+            drop(store.close());
+            free_later(terrain);
+        }
+    }
+}
+
+/// A world that was read or made.
+pub(crate) struct ReadWorld {
+    pub store: Store,
+    pub terrain: Terrain,
+    pub troubles: Vec<StoreTrouble>,
+}
+
+/// The result of reading.
+pub(super) enum Found {
+    /// An existing world.
+    Old(ReadWorld),
+    /// There was none, and it was made of the terrain.
+    New(ReadWorld),
+}
+
+impl Found {
+    pub fn world(self) -> ReadWorld {
+        match self {
+            Self::Old(world) | Self::New(world) => world,
+        }
+    }
+}
+
+/// Reads a world, on another thread.
+pub(crate) struct WorldReader {
+    pub(super) saved: SavedWorld,
+    /// The folder, wherever the process is by the time that it is read.
+    folder: Folder,
+    level: Option<(BurrowLevel, String)>,
+    ground: Arc<Ground>,
+    pub(super) id: LevelId,
+    /// What is made where there is no world yet.
+    parts: WorldParts,
+    pub progress: Progress,
+}
+
+impl WorldReader {
+    /// Of this world, with the ground and the sizes of this terrain; a new world begins as the terrain is, on a level and its path if
+    /// there is one. Rules and settings of loose pieces that the terrain has hold for a world that was saved as well.
+    pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
+        let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
+        let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));
+        Self { saved, folder, level, ground, id, parts, progress: Progress::default() }
+    }
+
+    /// Reads the world, or creates it. Waits while another process has it open.
+    pub fn read(self) -> Result<ReadWorld, StoreError> {
+        let start = Instant::now();
+        loop {
+            match self.try_read() {
+                Err(StoreError::Locked(_)) if start.elapsed() < LOCK_WAIT => std::thread::sleep(LOCK_TRY),
+                other => return other.map(Found::world),
+            }
+        }
+    }
+
+    /// Reads the world, or makes one, unless somebody has it open.
+    fn try_read(&self) -> Result<Found, StoreError> {
+        let Self { saved, folder, level, ground, id, parts, progress } = self;
+        // One that can't be read was told of when the terrain was made of it.
+        let level = level.as_ref();
+        let level =
+            level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, ground).ok()?, path)));
+        let options = StoreOptions { level, progress: Some(progress.clone()), ..saved.options() };
+        if !Store::is_in(folder.path()) {
+            let settings = TerrainSettings { chunk_size: id.chunk_size, voxel_size: id.voxel_size };
+            let mut terrain = Terrain::restore(Arc::clone(ground), &settings, parts.clone())?;
+            match Store::create(folder.path(), &mut terrain, options.clone()) {
+                // Somebody made it in between.
+                Err(StoreError::Exists(_)) => {}
+                created => {
+                    let (store, troubles) = (created?, Vec::new());
+                    return Ok(Found::New(ReadWorld { store, terrain, troubles }));
+                }
+            }
+        }
+        let (store, opened) = Store::open(folder.path(), Arc::clone(ground), options)?;
+        let (mut terrain, troubles) = (opened.terrain, opened.troubles);
+        // A new version of the game may have other rules than the one that saved the world.
+        if let Some(rules) = parts.rules.clone().filter(|rules| terrain.rules() != Some(rules))
+            && let Err(why) = terrain.set_rules(rules)
+        {
+            error!("the rules of the terrain do not hold for its saved world: {why}");
+        }
+        if parts.loose.is_some() && parts.loose.as_ref() != terrain.loose() {
+            terrain.set_loose(parts.loose);
+        }
+        Ok(Found::Old(ReadWorld { store, terrain, troubles }))
+    }
+}
