@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bevy::camera::visibility::VisibilityClass;
 use bevy::diagnostic::Diagnostics;
-use bevy::ecs::system::SystemParam;
+use bevy::ecs::system::{SystemChangeTick, SystemParam};
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
@@ -168,6 +168,32 @@ pub(super) fn commit_transactions(mut commits: Commits, mut same_frame: ResMut<S
         }
     }
     commits.commit(done);
+}
+
+/// Commits the small transactions that began in this frame and are done in time.
+pub(super) fn commit_begun(mut commits: Commits, mut same_frame: ResMut<SameFrame>, ticks: SystemChangeTick) {
+    let begun = same_frame.bypass_change_detection().take();
+    let most = commits.settings.same_frame;
+    if begun.is_empty() || !commits.has_meshes() || most.is_zero() {
+        return;
+    }
+    let start = Instant::now();
+    let mut done = Vec::new();
+    for (entity, work) in begun {
+        // A brick takes a microsecond or two.
+        if u128::from(work) > most.as_micros() {
+            continue;
+        }
+        let Ok((_, _, _, mut task, _)) = commits.terrains.get_mut(entity) else { continue };
+        if task.is_done_within(most.saturating_sub(start.elapsed())) && task.is_plain() {
+            done.push((task.number, entity));
+        }
+    }
+    commits.measure(start.elapsed());
+    if !done.is_empty() {
+        same_frame.commit(ticks.this_run());
+        commits.commit(done);
+    }
 }
 
 /// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait in

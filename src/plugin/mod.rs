@@ -229,6 +229,7 @@ impl Plugin for TerrainPlugin {
             // Terrains that were spawned before the plugin was added.
             .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
         same_frame::add(app);
+        app.add_systems(PostUpdate, commit::commit_begun.in_set(same_frame::CommitSameFrame));
         diagnostics::register(app);
         propagate::add(app);
     }

@@ -1,18 +1,16 @@
 //! Commits small transactions in the frame in which they began: a player sees the hole in the frame of the click.
 //!
 //! A transaction that begins in `Update` runs beside the game's other systems. In `PostUpdate`, before Bevy's systems for assets,
-//! transforms and visibility, the frame waits for it for at most [`BurrowSettings::same_frame`]. If it is not done by then, it is committed
+//! transforms and visibility, the frame waits for it for at most [`BurrowSettings::same_frame`](super::BurrowSettings::same_frame). If it is not done by then, it is committed
 //! like any other: in `Update` of a later frame.
 
 use bevy::asset::AssetEventSystems;
 use bevy::camera::visibility::VisibilitySystems;
 use bevy::ecs::change_detection::Tick;
 use bevy::ecs::system::SystemChangeTick;
-use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::commit::Commits;
-use super::{BurrowSettings, BurrowSystems};
+use super::BurrowSystems;
 
 /// The transactions that began in this frame.
 #[derive(Resource, Default)]
@@ -29,12 +27,24 @@ pub(super) struct SameFrame {
 impl SameFrame {
     /// Records that transactions are committed in this frame.
     pub fn begin(&mut self) {
-        self.commits = true;
+        (self.commits, self.propagates) = (true, false);
     }
 
     /// Records that a transaction of a terrain began.
     pub fn note(&mut self, terrain: Entity, work: u64) {
         self.begun.push((terrain, work));
+    }
+
+    /// Takes the terrains whose transactions began, with their work: none if commits are gated.
+    pub fn take(&mut self) -> Vec<(Entity, u64)> {
+        let begun = std::mem::take(&mut self.begun);
+        self.since = None;
+        if std::mem::take(&mut self.commits) { begun } else { Vec::new() }
+    }
+
+    /// Records that a commit spawns entities after this tick.
+    pub fn commit(&mut self, tick: Tick) {
+        self.since = self.propagates.then_some(tick);
     }
 
     /// Whether an entity that got its parent at this tick was spawned by a commit of this frame.
@@ -65,35 +75,5 @@ pub(super) fn add(app: &mut App) {
     .add_systems(
         Update,
         (|mut same_frame: ResMut<SameFrame>| same_frame.propagates = true).in_set(BurrowSystems::Propagate),
-    )
-    .add_systems(PostUpdate, commit_begun.in_set(CommitSameFrame));
-}
-
-/// Commits the small transactions that began in this frame and are done in time.
-fn commit_begun(mut commits: Commits, mut same_frame: ResMut<SameFrame>, ticks: SystemChangeTick) {
-    let SameFrame { begun, commits: may_commit, propagates, since } = &mut *same_frame;
-    let begun = std::mem::take(begun);
-    let (may_commit, propagates) = (std::mem::take(may_commit), std::mem::take(propagates));
-    *since = None;
-    let BurrowSettings { same_frame: most, .. } = *commits.settings;
-    if begun.is_empty() || !may_commit || !commits.has_meshes() || most.is_zero() {
-        return;
-    }
-    let start = Instant::now();
-    let mut done = Vec::new();
-    for (entity, work) in begun {
-        // A brick takes a microsecond or two.
-        if u128::from(work) > most.as_micros() {
-            continue;
-        }
-        let Ok((_, _, _, mut task, _)) = commits.terrains.get_mut(entity) else { continue };
-        if task.is_done_within(most.saturating_sub(start.elapsed())) && task.is_plain() {
-            done.push((task.number, entity));
-        }
-    }
-    commits.measure(start.elapsed());
-    if !done.is_empty() {
-        *since = propagates.then(|| ticks.this_run());
-        commits.commit(done);
-    }
+    );
 }
