@@ -238,15 +238,16 @@
 //!
 //! | modules | subject |
 //! | --- | --- |
+//! | `threads` | thread pools of the plugin |
 //! | [`lattice`], [`lod`], [`ground`] | coordinates, levels of detail, the pristine world |
 //! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
 //! | [`surface`], [`dense`] | marching cubes, heightmap and their seam; a mesher of plain arrays |
 //! | [`backend`] | engines on CPU and GPU |
 //! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
-//! | [`terrain`] | transactions, history, the commit log; exports what the three above have for games |
+//! | [`terrain`] | orders, transactions, history, the commit log; exports what the three above have for games |
 //! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
-//! | `plugin`, `view`, `saves`, `together`, `physics`, `debug`, `panel` | everything that uses Bevy |
+//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `debug`, `panel` | everything else that uses Bevy |
 //!
 //! # How the seam closes
 //!

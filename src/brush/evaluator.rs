@@ -1,4 +1,4 @@
-//! From lattice samples to signed distances.
+//! Evaluates an edit's signed distance at points of the lattice.
 
 use std::ops::Range;
 
@@ -121,7 +121,7 @@ impl Evaluator {
     }
 }
 
-/// From a shape's home to a coordinate, in voxels.
+/// From a shape's origin to a coordinate, in voxels.
 #[inline(always)]
 fn voxels(at: i64, origin_voxel: i32) -> i32 {
     (at - i64::from(origin_voxel)).clamp(-FARTHEST, FARTHEST) as i32

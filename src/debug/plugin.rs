@@ -12,7 +12,7 @@ use super::lines::{Layer, LineBuffer};
 use super::views::{self, Dirty, Place};
 use super::{BurrowDebug, DebugView};
 use crate::lattice::BrickPos;
-use crate::plugin::{BrushApplied, HistoryMoved};
+use crate::plugin::{BrushApplied, CommitSameFrame, HistoryMoved};
 use crate::terrain::{DrawnCut, Terrain, Version};
 
 /// The shortest time between two drawings of a view while the world changes.
@@ -32,7 +32,7 @@ impl Plugin for BurrowDebugPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<BurrowDebug>()
             .init_resource::<DirtyBricks>()
-            .add_systems(PostUpdate, note_dirty.before(draw))
+            .add_systems(PostUpdate, note_dirty.after(CommitSameFrame).before(draw))
             .add_systems(
                 PostUpdate,
                 draw.after(TransformSystems::Propagate)

@@ -19,11 +19,11 @@ pub fn region_hash(world: &World, region: RegionPos) -> u64 {
 #[derive(Clone, Debug, Default)]
 pub(super) struct RegionSums(FxHashMap<RegionPos, u64>);
 
-/// By how much the hashes of regions grow.
+/// Changes of regions' hashes.
 pub(super) struct Steps(FxHashMap<RegionPos, u64>);
 
 impl Steps {
-    /// Those of a change before it is applied to a world.
+    /// The changes of hashes that a patch causes; call it before the patch is applied.
     pub fn of(world: &World, change: &Patch) -> Self {
         let mut steps = FxHashMap::<RegionPos, u64>::default();
         for (pos, brick) in &change.bricks {

@@ -52,7 +52,8 @@ use bevy_egui::egui::{self, Align2, Color32, Id, LayerId, Order, ScrollArea, Ui,
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
 
 use crate::plugin::{
-    BrushApplied, BurrowFigures, BurrowSettings, BurrowSystems, LooseGround, MaterialColors, Redo, Undo,
+    BrushApplied, BurrowFigures, BurrowSettings, BurrowSystems, CommitSameFrame, LooseGround, MaterialColors,
+    Redo, Undo,
 };
 use crate::terrain::Terrain;
 use crate::view::GroundLook;
@@ -88,7 +89,6 @@ impl Plugin for BurrowPanelPlugin {
             .add_systems(
                 Update,
                 (
-                    survey::follow_frames,
                     survey::count_terrain,
                     survey::finish_seam_check,
                     picture::finish,
@@ -103,6 +103,8 @@ impl Plugin for BurrowPanelPlugin {
                     .chain()
                     .after(BurrowSystems::Begin),
             )
+            // After the last of the plugin's work in a frame.
+            .add_systems(PostUpdate, survey::follow_frames.after(CommitSameFrame))
             .add_systems(EguiPrimaryContextPass, draw);
     }
 }

@@ -17,7 +17,7 @@ texts! {
     POWER = "Power",
     POWER_HELP = "How hard a material this brush can dig, where the terrain has digging rules",
     IMAGE = "Image", RIDGE = "Ridge", STRENGTH = "Strength", FALLOFF = "Falloff",
-    FALLOFF_HELP = "Over this width the effect fades out, from the border inwards", AMOUNT = "Amount",
+    FALLOFF_HELP = "Width over which the effect fades in, from the border inwards", AMOUNT = "Amount",
     HEIGHT = "Height", STEP = "Step",
 }
 pub const HALF_SIZES: [&str; 3] = ["Half width", "Half height", "Half depth"];
@@ -97,7 +97,7 @@ texts! {
 texts! {
     DIAGNOSTICS = "Diagnostics", TRANSACTION = "transaction", PERCENTILES = "p50, p95, p99",
     SWAPPED = "meshes swapped per frame", FRAME = "frame", MAIN_THREAD = "main-thread time", QUEUE = "Queue",
-    BRUSHES = "Brushes", COMMITS = "Commits", LEVELS = "Squares by level",
+    BRUSHES = "Brushes", COMMITS = "Commits", LEVELS = "Nodes by level of detail",
 }
 #[rustfmt::skip]
 pub const MEMORY: [&str; 6] = [

@@ -2,10 +2,10 @@
 
 use std::ops::RangeInclusive;
 
+use bevy_egui::egui::collapsing_header::{CollapsingState, paint_default_icon};
 use bevy_egui::egui::{
-    Align, Align2, Button, CollapsingHeader, Color32, Context, CornerRadius, CursorIcon, FontId, Id, Layout,
-    Pos2, Rect, Response, RichText, Sense, Slider, SliderClamping, Stroke, StrokeKind, Ui, Vec2,
-    emath::Numeric,
+    Align, Align2, Button, Color32, Context, CornerRadius, CursorIcon, FontId, Id, Label, Layout, Pos2, Rect,
+    Response, RichText, Sense, Slider, SliderClamping, Stroke, StrokeKind, Ui, Vec2, emath::Numeric,
 };
 
 use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
@@ -47,9 +47,17 @@ pub fn title(ui: &mut Ui, name: &str, is_open: bool) -> bool {
 /// A section whose heading opens and closes it.
 pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl FnOnce(&mut Ui)) {
     let heading = RichText::new(name.to_uppercase()).color(FAINT).size(11.0);
-    let header = CollapsingHeader::new(heading).id_salt(name).default_open(is_open_at_first);
-    let header = header.show_unindented(ui, content).header_response;
-    note(ui, name, header.rect);
+    let id = Id::new(("burrow section", name));
+    let mut state = CollapsingState::load_with_default_open(ui.ctx(), id, is_open_at_first);
+    let header = ui.horizontal(|ui| {
+        state.show_toggle_button(ui, paint_default_icon);
+        ui.add(Label::new(heading).selectable(false).sense(Sense::click()))
+    });
+    if header.inner.on_hover_cursor(CursorIcon::PointingHand).clicked() {
+        state.toggle(ui);
+    }
+    note(ui, name, header.response.rect);
+    state.show_body_unindented(ui, content);
 }
 
 /// A grid of tiles with `columns` per row, of which some can't be chosen; returns which one was clicked.

@@ -84,7 +84,7 @@ use avian3d::physics_transform::PhysicsTransformSystems;
 use avian3d::prelude::{PhysicsSchedule, PhysicsStepSystems, PhysicsSystems};
 use bevy::prelude::*;
 
-use crate::plugin::{BeforeLoad, BurrowSystems, SurfaceProcessors};
+use crate::plugin::{BeforeLoad, BurrowSystems, CommitSameFrame, SurfaceProcessors};
 
 /// Colliders for terrains. Requires avian's `PhysicsPlugins` and the crate's `BurrowPlugins`.
 ///
@@ -174,7 +174,10 @@ impl Plugin for TerrainPhysicsPlugin {
                 Update,
                 (upkeep::finish, upkeep::update).chain().in_set(TerrainPhysicsSystems::Upkeep),
             )
-            .add_systems(PostUpdate, hold::hold_bodies.in_set(TerrainPhysicsSystems::Hold))
+            .add_systems(
+                PostUpdate,
+                hold::hold_bodies.in_set(TerrainPhysicsSystems::Hold).after(CommitSameFrame),
+            )
             .add_systems(
                 FixedPreUpdate,
                 (wake::wake, wake::find_buried, wake::lift_before_steps)

@@ -128,7 +128,7 @@ impl Commits<'_, '_> {
 
     /// Commits tasks that are done, by number and terrain: each transaction whole, as many as the frame's budget of swaps allows,
     /// and at least one.
-    pub fn commit(&mut self, mut done: Vec<(u64, Entity)>) {
+    pub fn commit(&mut self, mut done: Vec<(u64, Entity)>, swapped: &mut usize) {
         if done.is_empty() {
             return;
         }
@@ -137,21 +137,20 @@ impl Commits<'_, '_> {
         let _span = info_span!("burrow_commit").entered();
         let Self { settings, terrains, display, messages } = self;
         start_measuring(&mut display.commands);
-        let mut swapped = 0;
         for (_, entity) in done {
             let Ok((_, terrain, entities, mut task, levels)) = terrains.get_mut(entity) else { continue };
             let swaps = match &task.done {
                 Some(Ok(output)) => output.swaps(),
                 _ => 0,
             };
-            if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
+            if *swapped > 0 && *swapped + swaps > settings.swaps_per_frame {
                 continue;
             }
             let Some(output) = task.done.take() else { continue };
             let ticket = task.ticket;
             display.commands.entity(entity).try_remove::<InFlight>();
             if commit((entity, ticket), terrain, entities, levels, output.ok(), display, messages) {
-                swapped += swaps;
+                *swapped += swaps;
             }
         }
         stop_measuring(&mut display.commands);
@@ -167,14 +166,21 @@ pub(super) fn commit_transactions(mut commits: Commits, mut same_frame: ResMut<S
             done.push((task.number, entity));
         }
     }
-    commits.commit(done);
+    commits.commit(done, &mut same_frame.swapped);
 }
 
 /// Commits the small transactions that began in this frame and are done in time.
-pub(super) fn commit_begun(mut commits: Commits, mut same_frame: ResMut<SameFrame>, ticks: SystemChangeTick) {
+pub(super) fn commit_begun(
+    mut commits: Commits,
+    mut same_frame: ResMut<SameFrame>,
+    ticks: SystemChangeTick,
+    exits: Option<Res<Messages<AppExit>>>,
+) {
     let begun = same_frame.bypass_change_detection().take();
     let most = commits.settings.same_frame;
-    if begun.is_empty() || !commits.has_meshes() || most.is_zero() {
+    // A game that ends has no `Update` any more in which it could note what belongs to the edit.
+    let ends = exits.is_some_and(|exits| !exits.is_empty());
+    if begun.is_empty() || !commits.has_meshes() || most.is_zero() || ends {
         return;
     }
     let start = Instant::now();
@@ -192,7 +198,7 @@ pub(super) fn commit_begun(mut commits: Commits, mut same_frame: ResMut<SameFram
     commits.measure(start.elapsed());
     if !done.is_empty() {
         same_frame.commit(ticks.this_run());
-        commits.commit(done);
+        commits.commit(done, &mut same_frame.swapped);
     }
 }
 

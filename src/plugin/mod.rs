@@ -79,6 +79,7 @@ pub use propagate::TerrainPropagatePlugin;
 pub(crate) use propagate::{Inherited, remove_inherited};
 pub use query::{TerrainHit, Terrains};
 pub use redraw::Redraw;
+pub(crate) use same_frame::CommitSameFrame;
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 pub use times::Times;
 
@@ -224,12 +225,12 @@ impl Plugin for TerrainPlugin {
             // They read terrains, which systems in `Update` and `Last` change.
             .add_systems(
                 PostUpdate,
-                (diagnostics::measure_frame.after(same_frame::CommitSameFrame), engine::trim_engines),
+                (diagnostics::measure_frame, engine::trim_engines).after(CommitSameFrame),
             )
             // Terrains that were spawned before the plugin was added.
             .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
         same_frame::add(app);
-        app.add_systems(PostUpdate, commit::commit_begun.in_set(same_frame::CommitSameFrame));
+        app.add_systems(PostUpdate, commit::commit_begun.in_set(CommitSameFrame));
         diagnostics::register(app);
         propagate::add(app);
     }

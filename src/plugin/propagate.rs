@@ -112,7 +112,8 @@ type Inactive<C> = (With<Terrain>, Or<(Without<C>, With<Overruled<C>>)>);
 /// Propagates a component of a terrain to its tiles and chunks.
 pub(crate) fn propagate_to_ground<C: Component + Clone>(app: &mut App) {
     propagate::<C, ChildOf, Or<(With<Tile>, With<Chunk>)>>(app);
-    app.add_systems(PostUpdate, insert_on_spawned::<C>.in_set(PropagateSameFrame));
+    app.init_resource::<SameFrame>()
+        .add_systems(PostUpdate, insert_on_spawned::<C>.in_set(PropagateSameFrame));
 }
 
 /// Propagates a component of a terrain to its pieces.
@@ -124,7 +125,7 @@ pub(super) fn propagate_to_pieces<C: Component + Clone>(app: &mut App) {
 fn propagate<C: Component + Clone, R: Relationship, F: QueryFilter + 'static>(app: &mut App) {
     app.add_systems(
         Update,
-        (remove_inherited::<C, R>, insert_on_new::<C, R, F>, insert_changed::<C, R, F>)
+        (remove_inherited::<C, R>, insert_changed::<C, R, F>, insert_on_new::<C, R, F>)
             .chain()
             .in_set(PropagateSteps::Propagate),
     );
@@ -179,14 +180,15 @@ fn insert_on_spawned<C: Component + Clone>(
     }
 }
 
-/// Inserts a component that is new or changed into all entities but those that are new themselves.
+/// Inserts a component that is new or changed into all entities but those that are new themselves, and have not inherited it yet.
 fn insert_changed<C: Component + Clone, R: Relationship, F: QueryFilter>(
     mut commands: Commands,
     terrains: Query<(&C, &R::RelationshipTarget), (Active<C>, Or<(Changed<C>, Added<Source<C, R>>)>)>,
-    links: Query<Ref<R>, F>,
+    links: Query<(Ref<R>, Has<Inherited<C>>), F>,
 ) {
     for (component, sources) in &terrains {
-        for entity in sources.iter().filter(|&entity| links.get(entity).is_ok_and(|link| !link.is_added())) {
+        let has_it = |(link, inherits): (Ref<R>, bool)| inherits || !link.is_added();
+        for entity in sources.iter().filter(|&entity| links.get(entity).is_ok_and(has_it)) {
             commands.entity(entity).try_insert((component.clone(), Inherited::<C>::default()));
         }
     }

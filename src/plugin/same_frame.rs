@@ -17,6 +17,8 @@ use super::BurrowSystems;
 pub(super) struct SameFrame {
     /// Terrains whose transaction began, and its work in bricks.
     begun: Vec<(Entity, u64)>,
+    /// Meshes that commits have swapped in this frame.
+    pub swapped: usize,
     /// Whether the systems of [`BurrowSystems::Commit`] and [`BurrowSystems::Propagate`] ran: a game may gate them.
     commits: bool,
     propagates: bool,
@@ -27,7 +29,7 @@ pub(super) struct SameFrame {
 impl SameFrame {
     /// Records that transactions are committed in this frame.
     pub fn begin(&mut self) {
-        (self.commits, self.propagates) = (true, false);
+        (self.commits, self.propagates, self.swapped) = (true, false, 0);
     }
 
     /// Records that a transaction of a terrain began.
@@ -55,7 +57,7 @@ impl SameFrame {
 
 /// The commit in `PostUpdate`.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct CommitSameFrame;
+pub(crate) struct CommitSameFrame;
 
 /// After it, entities that it spawned inherit what tiles and chunks have from their terrain.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]

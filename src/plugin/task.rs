@@ -11,7 +11,7 @@ use super::collect::{pieces, pieces_again};
 use super::figures::TaskTimes;
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use crate::backend::Engine;
-use crate::terrain::{Commit, Drawn, SurfaceDraft, Terrain, Transaction, Unseen};
+use crate::terrain::{Commit, Drawn, HistoryReceipt, SurfaceDraft, Terrain, Transaction, Unseen};
 use crate::threads::{ThreadTask, Threads};
 
 /// The running task of a terrain.
@@ -121,10 +121,17 @@ impl InFlight {
         self.done.is_some()
     }
 
-    /// Whether its result is a transaction that cut off no piece of ground. Pieces are announced when debris can be made of
-    /// them, so that they are never gone for a frame.
+    /// Whether its result is a transaction with edits or a step through history, and no piece of ground breaks off or comes
+    /// back. Debris is made and removed in `Update`: earlier, a piece would be nowhere for a frame, or twice. Other players'
+    /// edits come as parts, and their pieces besides.
     pub fn is_plain(&self) -> bool {
-        matches!(&self.done, Some(Ok(TaskOutput { change: Change::Transaction(_), pieces, .. })) if pieces.is_empty())
+        let Some(Ok(TaskOutput { change: Change::Transaction(commit), pieces, .. })) = &self.done else {
+            return false;
+        };
+        let returns_none =
+            |step: &HistoryReceipt| step.outcome.as_ref().is_ok_and(|step| step.returned.is_empty());
+        let is_own = commit.step().map_or(!commit.receipts().is_empty(), returns_none);
+        is_own && pieces.is_empty()
     }
 }
 

@@ -163,7 +163,7 @@ pub(crate) fn grown_into(cells: u64, dx: i32, dz: i32) -> u64 {
     }
 }
 
-/// Adds to the blocks that a transaction draws all others of the chunks whose surface is not kept.
+/// Adds the other blocks of each touched chunk whose surface is not kept.
 pub(crate) fn complete(world: &World, view: &WorldView, blocks: &mut Vec<Block>) {
     if world.meshes.unmeshed.is_empty() {
         return;

@@ -6,7 +6,7 @@
 //! | `updates` | chunks and tiles that change, and their meshes |
 //! | `tiles`, `source` | tiles; what a mesh is made from |
 //! | `cut`, `nodes` | the cut that is drawn, and the nodes that change |
-//! | `node_facts`, `known_nodes` | what the choice of a cut looks at |
+//! | `node_facts`, `known_nodes` | facts about nodes by which a cut is chosen |
 //! | `stages` | how long each stage took |
 
 mod by_brick;

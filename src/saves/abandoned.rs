@@ -27,7 +27,7 @@ struct Abandoned {
 }
 
 impl AbandonedStores {
-    /// Adds a store that will come, or none if the sender is dropped.
+    /// Adds a store that arrives later; nothing if the sender is dropped.
     pub fn add(&self, coming: Receiver<ClosingStore>) {
         let abandoned = Abandoned { coming, store: None };
         let mut state = self.lock();
@@ -44,13 +44,13 @@ impl AbandonedStores {
         self.lock().stores.retain_mut(|abandoned| !abandoned.is_done());
     }
 
-    /// Waits until all are closed, or until a moment, once.
+    /// Waits once, until all stores are closed or the deadline passes.
     pub fn wait(&self, end: Instant) {
         let stores = std::mem::take(&mut self.lock().stores);
         stores.into_iter().for_each(|abandoned| abandoned.wait(end));
     }
 
-    /// From now on whoever adds a store waits for it.
+    /// From now on, adding a store blocks until it is closed.
     pub fn end(&self) {
         self.lock().has_ended = true;
     }
@@ -89,7 +89,7 @@ impl Abandoned {
             let _ = store.wait(left());
         }
         if !self.is_done() {
-            error!("a world that is no longer served is not saved after {} s", EXIT_WAIT.as_secs());
+            error!("a world that is no longer served was not saved within {} s", EXIT_WAIT.as_secs());
         }
     }
 }

@@ -19,7 +19,7 @@ pub(super) fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     let followed = store.follow(terrain.bypass_change_detection());
     match followed {
         Err(why) if !std::mem::replace(&mut world.has_failed, true) => {
-            error!("nothing is saved in {} any more: {why}", world.saved.path.display());
+            error!("saving to {} has stopped: {why}", world.saved.path.display());
         }
         _ => {}
     }

@@ -1,4 +1,4 @@
-//! Makes terrains of levels.
+//! Builds terrains from levels.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::threads::{ThreadTask, Threads, free_later};
 /// How long a level is waited for before that is logged.
 const TOLD: Duration = Duration::from_secs(10);
 
-/// A level is no longer wanted.
+/// Stops building a terrain when its `StartLevel` is removed.
 pub(super) fn give_up(gone: On<Remove, StartLevel>, mut commands: Commands) {
     commands.entity(gone.entity).try_remove::<(MakingLevel, Waiting)>();
     release(&mut commands, gone.entity);

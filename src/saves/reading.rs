@@ -115,7 +115,7 @@ impl Found {
 /// Reads a world, on another thread.
 pub(crate) struct WorldReader {
     pub(super) saved: SavedWorld,
-    /// The folder, wherever the process is by the time that it is read.
+    /// The absolute folder: the process may change its working directory before it is read.
     folder: Folder,
     level: Option<(BurrowLevel, String)>,
     ground: Arc<Ground>,
@@ -126,8 +126,8 @@ pub(crate) struct WorldReader {
 }
 
 impl WorldReader {
-    /// Of this world, with the ground and the sizes of this terrain; a new world begins as the terrain is, on a level and its path if
-    /// there is one. Rules and settings of loose pieces that the terrain has hold for a world that was saved as well.
+    /// A reader for this saved world. If there is none yet, it is created from the terrain, on the level if one is given. The
+    /// terrain's rules and loose settings also hold in a world that exists.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
         let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));
@@ -148,7 +148,7 @@ impl WorldReader {
     /// Reads the world, or makes one, unless somebody has it open.
     fn try_read(&self) -> Result<Found, StoreError> {
         let Self { saved, folder, level, ground, id, parts, progress } = self;
-        // One that can't be read was told of when the terrain was made of it.
+        // An unreadable level was reported when the terrain was built from it.
         let level = level.as_ref();
         let level =
             level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, ground).ok()?, path)));
@@ -157,7 +157,7 @@ impl WorldReader {
             let settings = TerrainSettings { chunk_size: id.chunk_size, voxel_size: id.voxel_size };
             let mut terrain = Terrain::restore(Arc::clone(ground), &settings, parts.clone())?;
             match Store::create(folder.path(), &mut terrain, options.clone()) {
-                // Somebody made it in between.
+                // Another process created it meanwhile.
                 Err(StoreError::Exists(_)) => {}
                 created => {
                     let (store, troubles) = (created?, Vec::new());

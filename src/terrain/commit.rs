@@ -36,7 +36,7 @@ pub struct Commit {
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Returns `true` if it changes only what is drawn.
     pub(super) is_cut: bool,
-    /// The world that takes the place of the one that was there, if all of it changes.
+    /// The new world, if all of it is replaced.
     pub(super) whole: Option<Arc<World>>,
     /// The world that this changes, if it is held elsewhere too.
     pub(super) copy: Option<Arc<World>>,

@@ -9,7 +9,7 @@ use crate::loose::LooseSettings;
 use crate::volume::{DiggingRules, RulesError};
 use crate::world::Patch;
 
-/// What can be asked of a terrain. A log that is replayed, a server and its clients speak this to a terrain:
+/// A request to a terrain, as replayed logs, servers and clients make it:
 /// [`Terrain::submit_order`](super::Terrain::submit_order).
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -20,7 +20,7 @@ pub enum Order {
     Undo,
     /// Redoes the step that was undone last.
     Redo,
-    /// Parts take the place of others.
+    /// Replaces parts of the world.
     Parts {
         /// The parts.
         change: Arc<Patch>,
@@ -35,7 +35,7 @@ pub enum Order {
     Loose(Option<LooseSettings>),
 }
 
-/// Why an order was not submitted or not obeyed.
+/// Why an order was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrderError {

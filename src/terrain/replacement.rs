@@ -1,4 +1,4 @@
-//! Parts that take the place of others, and why they may not.
+//! Parts that replace others, and their errors.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::world::Patch;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChangeError {
-    /// Bricks come twice or out of order.
+    /// A brick is repeated or out of order.
     #[error("the brick {0:?} is repeated or out of order: sort bricks by position")]
     Order(BrickPos),
     /// A brick, or one of its edited samples, lies outside the world.

@@ -169,7 +169,7 @@ impl Transaction {
     }
 }
 
-/// What leads to another cut.
+/// Resolves a new cut.
 fn cut(scene: Scene, choose: &ChooseCut) -> Resolved {
     let mut resolved = Resolved::nothing(scene.world);
     if let Some(drawn) = scene.cut {

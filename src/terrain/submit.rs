@@ -97,7 +97,7 @@ impl Terrain {
         Ok(())
     }
 
-    /// Obeys orders at once, after everything that waits; returns the receipts of the edits.
+    /// Carries out orders at once, after everything that waits; returns the receipts of the edits.
     ///
     /// # Errors
     /// When an order can't be submitted, or parts or a ground among them do not fit; those before may be obeyed then.

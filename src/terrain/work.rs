@@ -11,7 +11,7 @@ use crate::redraw::ChooseCut;
 #[derive(Clone)]
 pub(super) enum Work {
     Edits(Arc<[Submission]>),
-    /// A step, and what it puts in place.
+    /// A step through history and the content that it restores.
     Step(HistoryStep, Arc<UndoDelta>),
     /// Parts are replaced.
     Put(Arc<Put>),

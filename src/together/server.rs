@@ -38,7 +38,7 @@ pub struct GroundServer {
     data: BTreeMap<String, Vec<u8>>,
     /// Where its store goes when it is dropped; `None` before its first frame in an app.
     closing: Option<AbandonedStores>,
-    /// Whether the app has waited in vain for the disk already.
+    /// Whether an exit has already timed out while it waited for the disk.
     has_timed_out: bool,
 }
 

@@ -108,7 +108,7 @@ impl Patch {
         }
     }
 
-    /// What restores a state to which this is applied.
+    /// The patch that undoes this one on a state.
     pub(crate) fn inverse(&self, of: &impl State) -> Self {
         Self {
             bricks: self.bricks.iter().map(|(pos, _)| (*pos, of.brick(*pos).cloned())).collect(),
@@ -132,7 +132,7 @@ impl Patch {
         regions
     }
 
-    /// Swaps these bricks and fields with those of a world; a second swap restores it. Names are never given back.
+    /// Swaps these bricks and fields with those of a world; a second swap restores it. Names of fields are never reused.
     pub(crate) fn swap(&mut self, world: &mut World) {
         for (pos, brick) in &mut self.bricks {
             let (key, y) = (pos.stack(), pos.0.y);
@@ -213,7 +213,7 @@ impl Overlay {
         }
     }
 
-    /// Forgets what equals a state at these positions.
+    /// Removes entries that equal a state's.
     pub fn forget(&mut self, state: &impl State, at: &Places) {
         for pos in &at.bricks {
             if self.bricks.get(pos).is_some_and(|own| Brick::is_same(own.as_ref(), state.brick(*pos))) {

@@ -5,6 +5,7 @@ use bevy_burrow::panel::{BrushTool, PanelPlaces, ToolOperation, ToolShape};
 use bevy_burrow::prelude::*;
 use bevy_egui::EguiContext;
 use bevy_egui::egui::Id;
+use bevy_egui::egui::collapsing_header::CollapsingState;
 use image::{Rgb, RgbImage};
 
 use crate::album::{Album, flip_anywhere};
@@ -48,7 +49,10 @@ fn unfold(studio: &mut Studio, sections: &[(&str, bool)]) {
     for mut context in world.query::<&mut EguiContext>().iter_mut(world) {
         for (name, is_open) in sections {
             let id = Id::new(("burrow section", *name));
-            context.get_mut().data_mut(|data| data.insert_temp(id, *is_open));
+            let context = context.get_mut();
+            let mut state = CollapsingState::load_with_default_open(context, id, !is_open);
+            state.set_open(*is_open);
+            state.store(context);
         }
     }
 }

@@ -107,7 +107,7 @@ fn heights_and_spans_in_world_space_are_those_of_the_model() {
 
 #[test]
 fn ground_is_ready_when_no_edit_is_pending() {
-    let mut stage = Stage::drawing();
+    let mut stage = Stage::drawing().without_waiting();
     let settings = TerrainSettings { chunk_size: 16, voxel_size: VOXEL };
     stage.spawn_at(Terrain::new(hills(), &settings).expect("valid settings"), PLACE);
     let around = |x: f32, z: f32| {
@@ -237,7 +237,7 @@ fn where_terrains_overlap_the_topmost_one_and_the_nearest_one_answer() {
 
 #[test]
 fn ground_of_a_turned_terrain_is_not_ready_where_an_edit_is_pending() {
-    let mut stage = Stage::drawing();
+    let mut stage = Stage::drawing().without_waiting();
     let place = Transform::from_rotation(Quat::from_rotation_y(std::f32::consts::FRAC_PI_4));
     stage.app.world_mut().spawn((crate::stage::level(1.0), place));
     stage.settle();
@@ -257,7 +257,7 @@ fn ground_of_a_turned_terrain_is_not_ready_where_an_edit_is_pending() {
 
 #[test]
 fn nothing_is_ready_without_a_terrain_or_for_nan_corners() {
-    let mut stage = Stage::drawing();
+    let mut stage = Stage::drawing().without_waiting();
     let everywhere = |terrains: &Terrains| terrains.is_ready(Vec3::NEG_INFINITY, Vec3::INFINITY);
     assert!(!ask(&mut stage, everywhere), "there is none");
     stage.show(crate::stage::level(1.0));

@@ -21,7 +21,7 @@ fn many_brushes_in_one_frame_make_one_transaction() {
 
 #[test]
 fn brushes_that_come_while_a_transaction_runs_make_the_next_one() {
-    let mut stage = Stage::drawing();
+    let mut stage = Stage::drawing().without_waiting();
     let terrain = stage.show(steep());
     stage.send(dig(20.0, 4.0, 20.0, 4.0).with_tag(0));
     stage.frame();

@@ -106,7 +106,7 @@ fn another_terrain_with_another_voxel_size_is_shown_in_its_own() {
 
 #[test]
 fn a_commit_does_not_go_into_another_terrain_on_the_same_entity() {
-    let mut stage = Stage::drawing();
+    let mut stage = Stage::drawing().without_waiting();
     let terrain = stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
     stage.frame();
@@ -128,7 +128,7 @@ fn nothing_is_left_of_a_terrain_whose_component_is_removed() {
 
 #[test]
 fn a_terrain_removed_during_a_transaction_works_on_another_entity() {
-    let mut stage = Stage::drawing();
+    let mut stage = Stage::drawing().without_waiting();
     let first = stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0).with_tag(1));
     stage.frame();
@@ -154,7 +154,7 @@ fn a_terrain_removed_during_a_transaction_works_on_another_entity() {
 
 #[test]
 fn terrains_swapped_during_their_transactions_continue() {
-    let mut stage = Stage::drawing();
+    let mut stage = Stage::drawing().without_waiting();
     let (first, second) = (stage.spawn(steep()), stage.spawn_at(level(1.0), Vec3::X * 500.0));
     stage.settle();
     stage.send_to(first, dig(30.0, 4.0, 30.0, 6.0).with_tag(1));
@@ -221,7 +221,9 @@ fn a_terrain_that_is_replaced_while_it_loads_is_never_shown() {
 #[test]
 fn tiles_of_another_terrain_are_not_shown_in_the_scale_of_a_new_one() {
     for replace in WAYS {
-        let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 1, ..default() });
+        let mut stage = Stage::drawing()
+            .with_settings(BurrowSettings { loads_per_frame: 1, ..default() })
+            .without_waiting();
         let terrain = stage.show(level(1.0));
         stage.send(dig(30.0, 8.0, 30.0, 4.0));
         stage.frame();

@@ -144,4 +144,51 @@ fn ground_that_breaks_off_is_gone_when_its_debris_is_there() {
     assert_eq!((stage.hash(terrain), stage.recorded::<LoosePieceFound>().len()), (hash, 0));
     stage.frames_until("it is committed", |stage| stage.hash(terrain) != hash);
     assert_eq!(stage.recorded::<LoosePieceFound>().len(), 1);
+    // Nor does it come back before its debris can be removed.
+    let hash = stage.hash(terrain);
+    stage.write(Undo::default());
+    stage.frame();
+    assert_eq!(stage.hash(terrain), hash);
+    stage.frames_until("it is undone", |stage| stage.hash(terrain) != hash);
+}
+
+#[test]
+fn a_chunk_that_is_new_follows_its_terrain_in_the_next_frame() {
+    let (mut stage, terrain) = stage(true);
+    stage.send(dig(30.0, 8.0, 30.0, 4.0));
+    stage.frame();
+    assert!(!layers(&mut stage).is_empty());
+    stage.app.world_mut().entity_mut(terrain).insert(RenderLayers::layer(5));
+    stage.frame();
+    assert!(layers(&mut stage).iter().all(|layers| *layers == Some(RenderLayers::layer(5))));
+}
+
+#[test]
+fn the_budget_of_swaps_holds_for_all_commits_of_a_frame() {
+    let settings = BurrowSettings { swaps_per_frame: 1, ..settings(true) };
+    let mut stage = Stage::drawing().with_settings(settings);
+    stage.show(level(1.0));
+    stage.spawn_at(level(1.0), Vec3::new(100.0, 0.0, 0.0));
+    stage.settle();
+    for round in 0..4 {
+        let mut commits = stage.figures().commits;
+        for x in [0.0, 100.0] {
+            stage.send(dig(x + 20.0 + 8.0 * round as f32, 8.0, 30.0, 4.0));
+        }
+        for _ in 0..2 {
+            stage.frame();
+            assert_eq!(stage.figures().commits, commits + 1);
+            commits += 1;
+        }
+    }
+}
+
+#[test]
+fn an_app_that_exits_leaves_an_edit_to_its_next_start() {
+    let (mut stage, terrain) = stage(true);
+    let hash = stage.hash(terrain);
+    stage.send(dig(30.0, 8.0, 30.0, 4.0));
+    stage.write(AppExit::Success);
+    stage.frame();
+    assert_eq!(stage.hash(terrain), hash);
 }

@@ -117,6 +117,12 @@ impl Stage {
         self
     }
 
+    /// Makes each transaction end in a later frame than that in which it begins.
+    pub fn without_waiting(mut self) -> Self {
+        self.app.world_mut().resource_mut::<BurrowSettings>().same_frame = Duration::ZERO;
+        self
+    }
+
     /// Spawns a terrain at the world's origin.
     pub fn spawn(&mut self, terrain: Terrain) -> Entity {
         self.spawn_at(terrain, Vec3::ZERO)

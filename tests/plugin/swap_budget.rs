@@ -8,7 +8,8 @@ use crate::stage::{Stage, dig, level};
 const SECOND: Vec3 = Vec3::new(100.0, 0.0, 0.0);
 
 fn pair(swaps_per_frame: usize) -> (Stage, [Entity; 2]) {
-    let mut stage = Stage::drawing().with_settings(BurrowSettings { swaps_per_frame, ..default() });
+    let mut stage =
+        Stage::drawing().with_settings(BurrowSettings { swaps_per_frame, ..default() }).without_waiting();
     let terrains = [stage.spawn(level(1.0)), stage.spawn_at(level(1.0), SECOND)];
     stage.settle();
     (stage, terrains)
@@ -56,7 +57,9 @@ fn commits_within_the_budget_are_shown_in_one_frame() {
 #[test]
 fn constantly_dug_terrains_do_not_starve_another_one() {
     for waiting in 0..3 {
-        let mut stage = Stage::drawing().with_settings(BurrowSettings { swaps_per_frame: 1, ..default() });
+        let mut stage = Stage::drawing()
+            .with_settings(BurrowSettings { swaps_per_frame: 1, ..default() })
+            .without_waiting();
         let terrains = [0.0, 1.0, 2.0].map(|index| {
             let terrain = stage.spawn_at(level(1.0), SECOND * index);
             stage.settle();

@@ -258,7 +258,7 @@ impl Server {
         self.durable
     }
 
-    /// Enters that everything up to this number is saved, and tells clients so: for those who save in another way.
+    /// Marks all entries up to this number as saved, and tells clients so: for games that save in another way.
     pub fn set_durable(&mut self, number: u64) {
         if number > self.durable && number <= self.applied {
             self.durable = number;

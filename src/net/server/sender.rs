@@ -76,8 +76,8 @@ pub fn region_bytes((number, world): &Snapshot, pos: RegionPos, left: u32) -> Ve
     ToClient::Region(RegionContent { number: *number, pos, left, next_field, bricks, fields }).to_bytes()
 }
 
-/// How many regions may still be encoded in this call, of all clients together, and how many bytes they take: each takes
-/// milliseconds, which no number of clients may add up to a long tick.
+/// The number of regions that may still be encoded in this call, for all clients together: each takes milliseconds, so this
+/// bounds a tick. Also the bytes that they take.
 #[derive(Debug, Default)]
 pub struct Encodings {
     left: usize,
@@ -87,7 +87,7 @@ pub struct Encodings {
 }
 
 impl Encodings {
-    /// For another call.
+    /// Resets what is left for another call.
     pub fn refill(&mut self) {
         (self.left, self.is_short) = (Self::MOST, false);
     }

@@ -1,6 +1,6 @@
 //! The vertex of a lattice edge of any length (rules 8 and 9).
 //!
-//! A vertex depends on heights, edits and its edge alone, so no change of levels moves one. Where nodes of different
+//! A vertex depends on heights, edits and its edge alone, so changing the level of detail moves none. Where nodes of different
 //! levels meet, vertices of edges of different lengths may lie at the same place; there, all of them are the vertex of
 //! the shortest.
 
@@ -76,7 +76,7 @@ impl Edge {
         [Self { length, ..self }, Self { p: self.p + AXES[self.axis] * length, length, ..self }]
     }
 
-    /// Of the two halves of an edge with a crossing, one has a crossing.
+    /// The half of a crossed edge that is itself crossed.
     #[cfg(test)]
     pub fn half(self, view: &LodView) -> Self {
         let [low, high] = self.halves();

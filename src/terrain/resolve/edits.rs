@@ -85,7 +85,7 @@ fn merged<'a>(earlier: &[Group], last: &'a [DraftedBrick]) -> Cow<'a, [DraftedBr
     Cow::Owned(merged.into_list())
 }
 
-/// What edits lead to, in order.
+/// Resolves edits, in order.
 pub(crate) fn edits(scene: Scene, submissions: &[Submission]) -> Resolved {
     match submissions {
         [own @ Submission { edit: Ok(edit), .. }] if edit.kind() == Kind::Reset => reset(scene, own, edit),

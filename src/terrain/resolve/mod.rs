@@ -1,4 +1,4 @@
-//! From what was asked to what changes: edits, steps through history, replaced parts, another ground.
+//! Resolves work into changes: edits, steps through history, replaced parts, another ground.
 
 mod draft_group;
 mod edits;

@@ -75,7 +75,7 @@ impl NewBrick {
     }
 }
 
-/// What replaced parts lead to.
+/// Resolves replaced parts.
 pub(crate) fn parts(scene: Scene, put: &Put) -> Resolved {
     let start = Instant::now();
     let resolved = match &put.ground {
@@ -106,7 +106,7 @@ pub(crate) fn world_of(
     Ok(world)
 }
 
-/// The same edits on another ground.
+/// Rebuilds the world with its edits on another ground.
 fn on_ground(before: &World, ground: &Arc<Ground>) -> Result<Resolved, ChangeError> {
     let mut parts = before.all_parts();
     for (pos, brick) in &mut parts.bricks {

@@ -22,7 +22,7 @@ use crate::terrain::receipt::{Applied, ChunkScenario, Receipt, Rejection};
 use crate::volume::{Brick, Field, Fields, Scenario, layers, pristine_layers};
 use crate::world::{Change, Patch, World, columns_of, replaced_bytes};
 
-/// What a reset leads to.
+/// Resolves a reset.
 pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resolved {
     let (world, start, mut stages) = (scene.world, Instant::now(), Stages::default());
     let tag = submission.tag;

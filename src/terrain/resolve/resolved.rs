@@ -1,4 +1,4 @@
-//! What the work of a transaction leads to.
+//! The result of a transaction's work.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::terrain::replacement::ChangeError;
 use crate::volume::UniformBricks;
 use crate::world::{Patch, World};
 
-/// What the work of a transaction leads to: the parts that change, how they are drawn, and the answers.
+/// The result of a transaction's work: the parts that change, how they are drawn, and the answers.
 pub(crate) struct Resolved {
     /// The parts that groups of edits change, in order, or a step through history.
     pub changes: Vec<UndoDelta>,
@@ -28,7 +28,7 @@ pub(crate) struct Resolved {
     pub put: Option<Result<Restored, ChangeError>>,
     /// Changes of fields.
     pub news: Vec<(ChunkPos, FieldNews)>,
-    /// The world that takes the place of the one that was there, if all of it changes.
+    /// The new world, if all of it is replaced.
     pub whole: Option<Arc<World>>,
     pub meshes: MeshUpdates,
     pub stages: Stages,

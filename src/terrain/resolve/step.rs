@@ -54,7 +54,7 @@ pub(crate) fn place(
     Placed { meshes, news: news.collect() }
 }
 
-/// What a step through history leads to.
+/// Resolves a step through history.
 pub(crate) fn step(scene: Scene, step: HistoryStep, target: &UndoDelta) -> Resolved {
     let (world, start, mut stages) = (scene.world, Instant::now(), Stages::default());
     let (change, mut bricks) = (target.change.clone(), Vec::with_capacity(target.change.patch.bricks.len()));
