@@ -53,10 +53,11 @@ pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl Fn
         state.show_toggle_button(ui, paint_default_icon);
         ui.add(Label::new(heading).selectable(false).sense(Sense::click()))
     });
-    if header.inner.on_hover_cursor(CursorIcon::PointingHand).clicked() {
+    let label = header.inner.on_hover_cursor(CursorIcon::PointingHand);
+    if label.clicked() {
         state.toggle(ui);
     }
-    note(ui, name, header.response.rect);
+    note(ui, name, label.rect);
     state.show_body_unindented(ui, content);
 }
 
