@@ -40,6 +40,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let closed = ["Terrain", "Diagnostics"].map(|name| (name, false));
     let open = ["Fill", "Digging rules", "Loose pieces", "Look", "Settings"].map(|name| (name, true));
     unfold(studio, &[&closed[..], &open[..]].concat());
+    // Sections take a moment to open and to close.
+    (0..60).for_each(|_| studio.app.update());
     photograph(studio, album, "panel_settings", &SETTINGS);
 }
 

@@ -320,6 +320,10 @@ impl Life {
     /// A life in an app that is changed before there is a terrain.
     fn with(load: Load, seed: u64, change: impl FnOnce(&mut App)) -> Self {
         let mut stage = load.stage().recording::<HistoryMoved>();
+        // Half of them commit small transactions in the frame in which they begin.
+        if seed % 2 == 1 {
+            stage = stage.with_settings(BurrowSettings::default());
+        }
         #[cfg(feature = "render")]
         stage.app.init_asset::<StandardMaterial>();
         stage

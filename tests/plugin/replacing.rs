@@ -63,7 +63,7 @@ fn a_model_that_the_game_edits_while_it_loads_is_shown_whole() {
 
 #[test]
 fn brushes_under_way_keep_their_receipts_when_the_game_edits_the_model() {
-    let mut stage = Stage::drawing();
+    let mut stage = Stage::drawing().without_waiting();
     let terrain = stage.show(steep());
     for brush in random_brushes(16, 10) {
         stage.send(brush);
