@@ -105,10 +105,14 @@ fn main() {
         let mut medians = [[0.0; 2]; 2];
         for (pass, is_digging) in [true, false].into_iter().enumerate() {
             let (mut all, mut terrain, mut both) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut brushed, mut at_once) = (0, 0);
             let (start, before) = (Instant::now(), walk.figures());
             walk.next_brush = start;
             for number in 0..frames {
+                let brush = walk.next_brush;
                 all.push(walk.frame(number, is_digging));
+                brushed += usize::from(walk.next_brush != brush);
+                at_once += usize::from(walk.next_brush != brush && walk.is_committed());
                 terrain.push(walk.figures().main_thread);
                 let physics = walk.app.world().resource::<PhysicsFigures>().main_thread;
                 both.push(walk.figures().main_thread + physics);
@@ -121,6 +125,9 @@ fn main() {
                 after.commits - before.commits,
                 (after.brushes - before.brushes) as f64 / start.elapsed().as_secs_f64(),
             );
+            if is_digging {
+                println!("    frames with brushes: {brushed}, of which {at_once} show all of them");
+            }
             medians[pass] = report("    frames", all);
             report("    the plugin in these: brushes, commits, starts", terrain);
             report("    the same and what it does for physics", both);
@@ -341,6 +348,13 @@ impl Walk {
         let world = self.app.world_mut();
         let mut levels = world.query::<&ShownLevels>();
         levels.iter(world).flat_map(|shown| &shown.nodes).sum()
+    }
+
+    /// Whether all brushes are committed.
+    fn is_committed(&mut self) -> bool {
+        let world = self.app.world_mut();
+        let mut terrains = world.query::<&Terrain>();
+        terrains.iter(world).all(|terrain| terrain.queued() == 0 && !terrain.is_busy())
     }
 
     fn figures(&self) -> BurrowFigures {

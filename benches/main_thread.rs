@@ -24,6 +24,9 @@ struct Times {
     idle: Vec<Duration>,
     busy: Vec<Duration>,
     systems: Vec<Duration>,
+    /// Digs, and those of them that were committed in the frame in which they were sent.
+    digs: usize,
+    at_once: usize,
     transactions: Vec<Duration>,
 }
 
@@ -53,11 +56,13 @@ impl Times {
         self.idle.extend((0..3).map(|_| frame(app).0));
         let commits = app.world().resource::<BurrowFigures>().commits;
         app.world_mut().write_message(Brush::dig(Shape::sphere(at, 4.0)));
-        loop {
+        self.digs += 1;
+        for number in 0.. {
             let (took, figures) = frame(app);
             self.busy.push(took);
             self.systems.push(figures.main_thread);
             if figures.commits > commits {
+                self.at_once += usize::from(number == 0);
                 return self.transactions.push(figures.last_transaction);
             }
             std::thread::sleep(Duration::from_micros(200));
@@ -88,6 +93,7 @@ fn main() {
             report("whole frame, with a brush, a transaction or a commit", times.busy);
             report("the plugin's systems in such a frame", times.systems);
         }
+        println!("chunks of {size}: {} of {} digs seen in their own frame", times.at_once, times.digs);
         report(&format!("transaction and Bevy meshes, chunks of {size}"), times.transactions);
     }
 }

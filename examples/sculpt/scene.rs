@@ -15,7 +15,7 @@ use software::draws_in_software;
 
 const SKY: Color = Color::srgb(0.62, 0.74, 0.88);
 
-/// A level with so many cells along its sides.
+/// A square level; the number is the cells along each side.
 #[derive(Resource, Clone, Copy)]
 pub struct ScenePlugin(pub u32);
 

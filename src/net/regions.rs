@@ -14,8 +14,8 @@ pub fn region_hash(world: &World, region: RegionPos) -> u64 {
     hash_with_names(world, region, world.region_hash(region))
 }
 
-/// The hashes of regions' samples, which are kept up to date with each change. Otherwise all bricks of the regions that changed
-/// would be hashed at once, at each mark.
+/// The hashes of regions' samples, kept up to date with each patch. Otherwise a mark would hash all bricks of the regions that
+/// changed since the last one, in one tick.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RegionSums(FxHashMap<RegionPos, u64>);
 
@@ -35,7 +35,7 @@ impl Steps {
 }
 
 impl RegionSums {
-    /// Adds the steps of a change that was applied. Of regions that were not asked for before, all of the world is hashed.
+    /// Adds the steps of a patch that was applied. A region that was not known yet is hashed whole.
     pub fn add(&mut self, world: &World, steps: Steps) {
         for (region, step) in steps.0 {
             let known = self.0.entry(region).and_modify(|hash| *hash = hash.wrapping_add(step));
@@ -49,7 +49,7 @@ impl RegionSums {
         hash_with_names(world, region, samples)
     }
 
-    /// Forgets all, because the world is another one.
+    /// Forgets all hashes, for another world.
     pub fn clear(&mut self) {
         self.0.clear();
     }

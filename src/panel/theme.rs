@@ -102,7 +102,7 @@ pub fn style() -> Arc<Style> {
         look.expansion = 0.0;
     }
     widgets.inactive.bg_stroke = Stroke::NONE;
-    // Of check boxes and the rails of sliders, which stand out from a card.
+    // Of check boxes and the rails of sliders, which stand out from the column behind them.
     widgets.inactive.bg_fill = SLATE_LIGHT;
     Arc::new(style)
 }

@@ -40,6 +40,13 @@ pub(super) struct TaskTimes {
 }
 
 impl BurrowFigures {
+    /// The shortest of the last four transactions: one that was slow by chance says little about the next.
+    pub(super) fn usual_transaction(&self) -> Duration {
+        let latest = self.transactions.iter();
+        let older = latest.len().saturating_sub(4);
+        latest.skip(older).min().unwrap_or_default()
+    }
+
     /// Counts a commit: its brushes, and how long it took in its task and on the main thread.
     pub(super) fn count(&mut self, brushes: u64, transaction: Duration, commit: Duration) {
         self.commits += 1;

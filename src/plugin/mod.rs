@@ -117,7 +117,9 @@ pub enum BurrowSystems {
     Load,
     /// Brush, undo and redo messages are checked and queued. Send them before this set to have them in this frame's transaction.
     Collect,
-    /// Finished transactions are committed: meshes, entities, receipts, events.
+    /// Finished transactions are committed: meshes, entities, receipts, events. Small ones that begin in this frame are committed
+    /// in `PostUpdate`, if this set runs: see [`BurrowSettings::same_frame`]. Systems in `Update` read their messages in the next
+    /// frame, before anything of it is saved.
     Commit,
     /// Queued brushes start as transactions.
     Begin,

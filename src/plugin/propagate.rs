@@ -163,7 +163,8 @@ fn insert_on_new<C: Component + Clone, R: Relationship, F: QueryFilter>(
     }
 }
 
-/// The same for tiles and chunks that a commit has spawned after [`BurrowSystems::Propagate`].
+/// Inserts the component on tiles and chunks that a commit spawned after [`BurrowSystems::Propagate`], and that have none of their
+/// own.
 fn insert_on_spawned<C: Component + Clone>(
     mut commands: Commands,
     same_frame: Res<SameFrame>,

@@ -1,13 +1,14 @@
 //! Commits small transactions in the frame in which they began: a player sees the hole in the frame of the click.
 //!
-//! A transaction that begins in `Update` runs beside the game's other systems. In `PostUpdate`, before Bevy's systems for assets,
-//! transforms and visibility, the frame waits for it for at most [`BurrowSettings::same_frame`](super::BurrowSettings::same_frame). If it is not done by then, it is committed
-//! like any other: in `Update` of a later frame.
+//! A transaction that begins in `Update` runs while the game's other systems do. In `PostUpdate`, before Bevy's systems for
+//! assets, transforms and visibility, the frame waits for at most [`same_frame`](super::BurrowSettings::same_frame). A
+//! transaction that is not done by then is committed like any other: in `Update` of a later frame.
 
 use bevy::asset::AssetEventSystems;
 use bevy::camera::visibility::VisibilitySystems;
 use bevy::ecs::change_detection::Tick;
 use bevy::ecs::system::SystemChangeTick;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::BurrowSystems;
@@ -15,8 +16,8 @@ use super::BurrowSystems;
 /// The transactions that began in this frame.
 #[derive(Resource, Default)]
 pub(super) struct SameFrame {
-    /// Terrains whose transaction began, and its work in bricks.
-    begun: Vec<(Entity, u64)>,
+    /// Terrains whose transaction began, its work in bricks, and when.
+    begun: Vec<(Entity, u64, Instant)>,
     /// Meshes that commits have swapped in this frame.
     pub swapped: usize,
     /// Whether the systems of [`BurrowSystems::Commit`] and [`BurrowSystems::Propagate`] ran: a game may gate them.
@@ -34,11 +35,11 @@ impl SameFrame {
 
     /// Records that a transaction of a terrain began.
     pub fn note(&mut self, terrain: Entity, work: u64) {
-        self.begun.push((terrain, work));
+        self.begun.push((terrain, work, Instant::now()));
     }
 
-    /// Takes the terrains whose transactions began, with their work: none if commits are gated.
-    pub fn take(&mut self) -> Vec<(Entity, u64)> {
+    /// Takes the terrains whose transactions began, with work and time: none if commits are gated.
+    pub fn take(&mut self) -> Vec<(Entity, u64, Instant)> {
         let begun = std::mem::take(&mut self.begun);
         self.since = None;
         if std::mem::take(&mut self.commits) { begun } else { Vec::new() }

@@ -41,8 +41,8 @@ pub struct BurrowSettings {
     /// It holds for meshes that are built after a change; see [`Redraw`](super::Redraw).
     pub mesh_usages: RenderAssetUsages,
     /// How long a frame waits, in `PostUpdate`, for small transactions that began in it, so that a brush is seen in the frame
-    /// in which it was sent. What takes longer is seen in a later frame. 0.3 ms; 0 never waits. An app without
-    /// `Assets<Mesh>`, such as a server, never waits.
+    /// in which it was sent. What takes longer is seen in a later frame, and where the latest transactions all took longer, the
+    /// frame does not wait. 0.3 ms; 0 never waits. An app without `Assets<Mesh>`, such as a server, never waits.
     ///
     /// Order and content of edits are the same in any case.
     pub same_frame: Duration,

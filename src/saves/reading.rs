@@ -71,14 +71,14 @@ impl OpeningWorld {
         Some(outcome)
     }
 
-    /// Whether it should be told now that somebody else has the world open.
+    /// Returns `true` once, when it should be reported that another process has the world open.
     pub(super) fn tells_of_lock(&mut self) -> bool {
         let is_late = self.task.is_none() && self.since.elapsed() >= LOCK_TOLD;
         is_late && !std::mem::replace(&mut self.told, true)
     }
 }
 
-/// What was read for nobody is neither closed nor freed by whoever drops this.
+/// A world that is no longer wanted is closed and freed on another thread.
 impl Drop for OpeningWorld {
     fn drop(&mut self) {
         if let Some(Ok(Ok(found))) = self.task.take().and_then(|mut task| task.check()) {
@@ -120,7 +120,7 @@ pub(crate) struct WorldReader {
     level: Option<(BurrowLevel, String)>,
     ground: Arc<Ground>,
     pub(super) id: LevelId,
-    /// What is made where there is no world yet.
+    /// The content of a world that does not exist yet.
     parts: WorldParts,
     pub progress: Progress,
 }

@@ -365,7 +365,7 @@ impl Answers<'_> {
             }
             ClientEvent::Confirmed { tag, receipt } => {
                 link.answer(tag);
-                // What it changed is not known if the player was away: what is not known is not counted.
+                // If the player was away, its effect is not known here, and nothing is counted.
                 let unknown = || Receipt { tag, outcome: Ok(Applied::default()) };
                 let known = receipt.clone().unwrap_or_else(unknown);
                 self.applied.write(BrushApplied { terrain: Some(terrain), receipt: known });

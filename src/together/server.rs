@@ -235,8 +235,8 @@ impl GroundServer {
     }
 }
 
-/// Whoever drops it does not wait: on another thread what was asked for is done, and the store is closed. An app that exits waits for
-/// that.
+/// Dropping it does not block: another thread finishes the requests that wait and closes the store. An app that exits waits for
+/// that thread.
 impl Drop for GroundServer {
     fn drop(&mut self) {
         let work = std::mem::replace(&mut self.work, Work::Gone);

@@ -46,7 +46,7 @@ impl Saved {
 
     fn serve(&self) -> GroundServer {
         let mut terrain = terrain();
-        // Whoever drops the store itself waits for long.
+        // Dropping the store itself takes long.
         let options = StoreOptions { close_timeout: Duration::from_secs(60), ..StoreOptions::default() };
         let store =
             Store::create_in(Arc::new(self.disk.clone()), &mut terrain, options).expect("a new world");
@@ -128,7 +128,7 @@ fn nobody_who_replaces_or_removes_a_server_waits_for_its_disk() {
         app.update();
         returned.send(()).expect("the thread waits");
         assert!(gate.join().expect("no panic"), "it has waited for the disk");
-        assert_eq!(saved.value_once_closed(), Some(vec![7]), "what was put last is saved");
+        assert_eq!(saved.value_once_closed(), Some(vec![7]), "the last value is saved");
         app.update();
     }
 }

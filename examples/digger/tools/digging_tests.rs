@@ -91,7 +91,7 @@ fn the_hint_that_something_is_too_far_away_waits_until_no_blow_has_hit_for_a_whi
     let told = hints(&"m".repeat(20));
     assert!(told.len() > 5 && (9..=11).contains(&told[0]), "{told:?}");
     let again = hints(&format!("{}h{}", "m".repeat(12), "m".repeat(8)));
-    assert!(again.iter().all(|at| *at < 12), "a blow that hits begins anew: {again:?}");
+    assert!(again.iter().all(|at| *at < 12), "a blow that hits starts the wait again: {again:?}");
 }
 
 #[test]

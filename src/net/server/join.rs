@@ -161,11 +161,7 @@ impl Server {
     /// The table of all regions. The world is kept for the client until it continues.
     fn compare(&mut self, client: ClientId) -> (u64, (Join, Bulk)) {
         let (world, terms) = self.keep();
-        let table = match self.kept.as_ref().and_then(|kept| kept.table.clone()) {
-            Some(table) => table,
-            None => self.table(&world),
-        };
-        self.kept.iter_mut().for_each(|kept| kept.table = Some(Arc::clone(&table)));
+        let table = self.table(&world);
         let number = world.0;
         if let Some(session) = self.sessions.get_mut(&client) {
             session.compared = Some(world);
@@ -173,15 +169,20 @@ impl Server {
         (number, (Join::Compare { terms: Box::new(terms) }, Bulk::Messages(vec![table])))
     }
 
-    /// The hashes of all regions of a world, in a message.
+    /// The hashes of all regions of the kept world, in a message.
     fn table(&mut self, (number, world): &Snapshot) -> Arc<[u8]> {
+        if let Some(table) = self.kept.as_ref().and_then(|kept| kept.table.clone()) {
+            return table;
+        }
         let (new, same): (BTreeSet<RegionPos>, BTreeSet<RegionPos>) = regions_of(world)
             .into_iter()
             .partition(|region| self.changed.get(region).is_some_and(|at| at > number));
         let new = new.into_iter().map(|region| (region, region_hash(world, region)));
         let mut regions: RegionHashes = self.hashes_of(same).into_iter().chain(new).collect();
         regions.sort_unstable_by_key(|(region, _)| *region);
-        ToClient::Table { number: *number, regions }.to_bytes().into()
+        let table: Arc<[u8]> = ToClient::Table { number: *number, regions }.to_bytes().into();
+        self.kept.iter_mut().for_each(|kept| kept.table = Some(Arc::clone(&table)));
+        table
     }
 
     /// Answers fetches, with one world for each client at a time: those of another one wait until its regions are sent.

@@ -76,12 +76,13 @@ pub fn region_bytes((number, world): &Snapshot, pos: RegionPos, left: u32) -> Ve
     ToClient::Region(RegionContent { number: *number, pos, left, next_field, bricks, fields }).to_bytes()
 }
 
-/// The number of regions that may still be encoded in this call, for all clients together: each takes milliseconds, so this
-/// bounds a tick. Also the bytes that they take.
+/// How many regions may still be encoded in this call, for all clients together: each takes milliseconds, so this bounds a
+/// tick.
 #[derive(Debug, Default)]
 pub struct Encodings {
     left: usize,
     is_short: bool,
+    /// The latest regions that were encoded, and their bytes.
     count: usize,
     bytes: usize,
 }

@@ -110,7 +110,7 @@ fn copy_of(terrain: &Terrain, mut pristine: Terrain) -> Terrain {
 #[test]
 fn a_dig_that_was_ordered_while_its_player_was_away_is_answered_once() {
     let mut party = Party::with_ids();
-    // Who comes again can't get old entries, and compares regions.
+    // A client that returns can't get old entries, and compares regions.
     let settings = ServerSettings { log_bytes: 0, ..settings() };
     party.server.insert_resource(GroundServer::new(Server::new(ground(), settings)));
     party.join();
@@ -130,7 +130,7 @@ fn a_dig_that_was_ordered_while_its_player_was_away_is_answered_once() {
     let receipts = party.players[0].0.receipts();
     let outcomes: Vec<_> =
         receipts.iter().map(|applied| (applied.receipt.tag, &applied.receipt.outcome)).collect();
-    assert_eq!(outcomes, [(7, &Ok(Applied::default()))], "what is not known is not counted");
+    assert_eq!(outcomes, [(7, &Ok(Applied::default()))], "an unknown effect is not counted");
 }
 
 #[test]

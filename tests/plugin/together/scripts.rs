@@ -108,7 +108,7 @@ fn check_answers(party: &mut Party, player: usize, asked: &BTreeSet<u64>, what: 
     assert_eq!(BTreeSet::from_iter(applied), *asked, "{what}: answers of player {player}");
     assert!(
         said.iter().all(|tag| asked.contains(tag)),
-        "{what}: player {player} was told of a dig of nobody"
+        "{what}: player {player} got an answer to a dig that nobody sent"
     );
 }
 
