@@ -407,9 +407,8 @@ pub mod prelude {
         WorldClosed, WorldOpened, WorldSaved, WorldStore,
     };
     pub use crate::terrain::{
-        Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,
-        PieceFate, PieceId, Receipt, Rejection, Restored, ReturnedPiece, ScenarioCounts, Span, Terrain,
-        TerrainSettings,
+        Applied, Asked, History, LoosePiece, LooseSettings, Order, PieceFate, PieceId, Receipt, Rejection,
+        ReturnedPiece, ScenarioCounts, Span, Terrain, TerrainSettings,
     };
     #[cfg(feature = "render")]
     pub use crate::view::{

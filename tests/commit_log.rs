@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{
-    ChangeError, CommitRecord, Drawn, LogEntry, Meshing, Patch, ReplayError, RestoreError, SIMULATION, World,
+    CommitRecord, Drawn, LogEntry, Meshing, PartsError, Patch, ReplayError, RestoreError, SIMULATION, World,
 };
 use bevy_burrow::volume::Brick;
 use fastrand::Rng;
@@ -157,11 +157,16 @@ fn a_world_can_be_put_in_place_of_another() {
         let before = (to.world().hash(), meshes(to.world()));
         let hash = from.world().hash();
         if hash != before.0 {
-            let wrong = to.apply_change(change.clone(), Some(hash ^ 1));
-            assert!(matches!(wrong, Err(ChangeError::Hash { found, .. }) if found == hash), "{wrong:?}");
+            let wrong = to.apply_one(Order::parts(change.clone(), Some(hash ^ 1))).outcome;
+            assert!(
+                matches!(wrong, Err(Rejection::Parts(PartsError::Hash { found, .. })) if found == hash),
+                "{wrong:?}"
+            );
             assert!((to.world().hash(), meshes(to.world())) == before, "world {index}");
         }
-        to.apply_change(change, Some(hash)).unwrap_or_else(|why| panic!("world {index}: {why}"));
+        to.apply_one(Order::parts(change, Some(hash)))
+            .outcome
+            .unwrap_or_else(|why| panic!("world {index}: {why}"));
         assert!(meshes(to.world()) == meshes(from.world()), "world {index}");
         assert!(to.world().check_seams().is_flawless(), "world {index}");
         assert_eq!(to.history(), History::default());
@@ -250,10 +255,10 @@ fn rules_are_logged_where_they_bind() {
 
 fn kinds_of(record: &CommitRecord) -> Vec<&'static str> {
     let kind = |entry: &LogEntry| match entry {
-        LogEntry::Rules(None) => "no rules",
-        LogEntry::Rules(Some(_)) => "rules",
-        LogEntry::Loose(_) => "loose",
-        LogEntry::Edit(_) => "edit",
+        LogEntry::Order(Order::Rules(None)) => "no rules",
+        LogEntry::Order(Order::Rules(Some(_))) => "rules",
+        LogEntry::Order(Order::Loose(_)) => "loose",
+        LogEntry::Order(Order::Edit(_)) => "edit",
         _ => "change",
     };
     record.entries.iter().map(kind).collect()
@@ -281,13 +286,19 @@ fn parts_that_do_not_fit_are_errors_and_change_nothing() {
         bricks: parts.change.bricks.iter().take(1).cycle().take(2).cloned().collect(),
         ..Patch::default()
     };
-    assert!(matches!(terrain.apply_change(twice, None), Err(ChangeError::Order(_))));
+    assert!(matches!(
+        terrain.apply_one(Order::parts(twice, None)).outcome,
+        Err(Rejection::Parts(PartsError::Order(_)))
+    ));
     let far = BrickPos(IVec3::new(400, 1, 3));
     let outside = Patch { bricks: vec![(far, parts.change.bricks[0].1.clone())], ..Patch::default() };
-    assert_eq!(terrain.apply_change(outside, None), Err(ChangeError::OutsideWorld(far)));
+    assert_eq!(
+        terrain.apply_one(Order::parts(outside, None)).outcome,
+        Err(PartsError::OutsideWorld(far).into())
+    );
     let higher = Arc::new(Ground::flat(64, 64, 11.0).expect("valid"));
     let restored = Terrain::restore(higher, &TerrainSettings::default(), parts);
-    assert!(matches!(restored, Err(RestoreError::Parts(ChangeError::OtherGround(_)))));
+    assert!(matches!(restored, Err(RestoreError::Parts(PartsError::OtherGround(_)))));
     assert_eq!(terrain.world().hash(), hash);
 }
 

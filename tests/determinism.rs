@@ -335,7 +335,7 @@ fn edits_sent_as_json_make_the_same_world() {
             let sent = serde_json::to_string(&edit).expect("an edit can be written");
             let received: Edit = serde_json::from_str(&sent).expect("an edit can be read back");
             assert_eq!(received, edit, "{sent}");
-            there.submit_edit(&received);
+            there.submit(&received);
         }
         if let Some(transaction) = there.begin() {
             let answers = there.commit(transaction.run()).expect("no other commit");

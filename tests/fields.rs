@@ -254,7 +254,7 @@ fn fifth_scenario_each_chunk_has_a_scenario_of_its_own() {
 
     let mut counts = ScenarioCounts::default();
     for applied in [applied, again] {
-        counts.count(&Receipt { tag: 0, outcome: Ok(applied) });
+        counts.count(&Receipt::of_edit(0, Ok(applied)));
     }
     assert_eq!(counts, ScenarioCounts { created: 1, changed: 2, extended: 1, merged: 0, split: 2 });
     check_laws(terrain.world(), "trenches");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy_burrow::lattice::{BrickPos, ChunkPos, LatticeBox};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{ChangeError, Patch, RestoreError, WorldParts};
+use bevy_burrow::terrain::{PartsError, Patch, RestoreError, WorldParts};
 use bevy_burrow::volume::{Brick, Field, FieldId, Fields};
 use glam::{IVec3, Vec3};
 
@@ -20,10 +20,10 @@ fn dig(x: f32) -> Brush {
 }
 
 /// The result of a change; if it is refused, nothing has changed, and the terrain still works.
-fn put(change: Patch) -> Result<(), ChangeError> {
+fn put(change: Patch) -> Result<(), Rejection> {
     let mut terrain = terrain();
     let (before, next) = (terrain.parts().change, terrain.world().hash());
-    let outcome = terrain.apply_change(change, None).map(drop);
+    let outcome = terrain.apply_one(Order::parts(change, None)).outcome.map(drop);
     if outcome.is_err() {
         let after = terrain.parts().change;
         assert_eq!(terrain.world().hash(), next);
@@ -66,7 +66,7 @@ fn bricks_lie_in_the_world_whatever_their_numbers() {
                 if axis == IVec3::Y && at.unsigned_abs() < 100 {
                     continue;
                 }
-                assert_eq!(put(bricks([(wrong, brick)])), Err(ChangeError::OutsideWorld(wrong)));
+                assert_eq!(put(bricks([(wrong, brick)])), Err(PartsError::OutsideWorld(wrong).into()));
             }
         }
     }
@@ -86,12 +86,12 @@ fn a_brick_of_any_position_can_be_made() {
 #[test]
 fn fields_are_those_of_one_chunk_with_names_of_their_own() {
     let beyond = fields([(chunk(0), vec![field(7, 0, 40)])]);
-    assert_eq!(put(beyond), Err(ChangeError::Fields(chunk(0))));
+    assert_eq!(put(beyond), Err(PartsError::Fields(chunk(0)).into()));
     let twice = fields([(chunk(0), vec![field(7, 1, 4)]), (chunk(0), vec![field(8, 5, 6)])]);
-    assert_eq!(put(twice), Err(ChangeError::Fields(chunk(0))));
+    assert_eq!(put(twice), Err(PartsError::Fields(chunk(0)).into()));
     let namesakes =
         fields([(chunk(0), vec![field(7, 1, 4)]), (ChunkPos { y: 1, ..chunk(0) }, vec![field(7, 33, 34)])]);
-    assert!(matches!(put(namesakes), Err(ChangeError::Fields(_))));
+    assert!(matches!(put(namesakes), Err(Rejection::Parts(PartsError::Fields(_)))));
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn a_new_field_never_gets_the_name_of_another() {
     let next = terrain.parts().change.next_field + 1;
     let bounds = LatticeBox { min: IVec3::new(33, 1, 33), max: IVec3::new(34, 2, 34) };
     let own = Field { bounds, ..field(next, 0, 0) };
-    terrain.apply_change(fields([(chunk, vec![own])]), None).expect("a valid field");
+    terrain.apply_one(Order::parts(fields([(chunk, vec![own])]), None)).outcome.expect("a valid field");
     terrain.apply([Brush::dig(Shape::sphere(Vec3::new(56.0, 10.0, 56.0), 3.0))]);
     let names: Vec<u64> = terrain.world().fields_of(chunk).expect("two").iter().map(|own| own.id.0).collect();
     assert_eq!(names, [next, next + 1]);
@@ -112,20 +112,20 @@ fn a_new_field_never_gets_the_name_of_another() {
 fn numbers_that_count_can_always_go_on() {
     for greatest in [u64::MAX, u64::MAX / 2 + 1] {
         let name = Patch { next_field: greatest, ..Patch::default() };
-        assert_eq!(put(name), Err(ChangeError::Number(greatest)));
+        assert_eq!(put(name), Err(PartsError::Number(greatest).into()));
         let name = fields([(chunk(0), vec![field(greatest, 1, 4)])]);
-        assert_eq!(put(name), Err(ChangeError::Number(greatest)));
+        assert_eq!(put(name), Err(PartsError::Number(greatest).into()));
         for chunk_size in [16, 32] {
             let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
             let ground = || Ground::flat(64, 64, 10.0).expect("valid");
             let parts = WorldParts { revision: greatest, ..terrain().parts() };
             let refused = Terrain::restore(ground(), &settings, parts).err();
-            assert_eq!(refused, Some(RestoreError::Parts(ChangeError::Number(greatest))));
+            assert_eq!(refused, Some(RestoreError::Parts(PartsError::Number(greatest))));
             let mut parts = terrain().parts();
             parts.change.next_field = greatest;
             assert!(matches!(
                 Terrain::restore(ground(), &settings, parts),
-                Err(RestoreError::Parts(ChangeError::Number(_)))
+                Err(RestoreError::Parts(PartsError::Number(_)))
             ));
         }
     }
@@ -134,7 +134,7 @@ fn numbers_that_count_can_always_go_on() {
     let mut terrain = terrain();
     let (of, all) = terrain.parts().change.fields[0].clone();
     let busy: Vec<Field> = all.iter().map(|field| Field { revision: u64::MAX, ..*field }).collect();
-    terrain.apply_change(fields([(of, busy)]), None).expect("valid fields");
+    terrain.apply_one(Order::parts(fields([(of, busy)]), None)).outcome.expect("valid fields");
     for x in [20.0, 24.0] {
         assert!(terrain.apply([dig(x)])[0].outcome.is_ok());
     }
@@ -145,7 +145,7 @@ fn fields_that_are_put_alone_clear_history_too() {
     let mut terrain = terrain();
     let (of, all) = terrain.parts().change.fields[0].clone();
     let renamed: Vec<Field> = all.iter().map(|own| Field { id: FieldId(own.id.0 + 9), ..*own }).collect();
-    terrain.apply_change(fields([(of, renamed)]), None).expect("valid fields");
+    terrain.apply_one(Order::parts(fields([(of, renamed)]), None)).outcome.expect("valid fields");
     assert_eq!(terrain.history(), History::default());
 }
 

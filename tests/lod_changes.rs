@@ -155,11 +155,11 @@ fn after_each_commit_what_is_drawn_is_closed_and_as_if_made_from_scratch() {
             let is_edit = rng.u32(0..3) > 0;
             let transaction = if is_edit {
                 if rng.u32(0..6) == 0 {
-                    terrain.submit_undo();
+                    terrain.submit(Order::Undo);
                 } else if rng.u32(0..6) == 0 {
                     let change = worlds::change_towards(&terrain, &saved[rng.usize(0..saved.len())]);
                     saved.push(terrain.parts());
-                    terrain.submit_change(change, None).expect("there is room");
+                    terrain.submit(Order::parts(change, None));
                 } else {
                     let count = rng.usize(1..3);
                     for _ in 0..count {

@@ -39,7 +39,7 @@ fn follows(record: &CommitRecord, at: u64) -> bool {
 
 /// Returns `true` if it is a commit, and not only a change of rules and settings.
 fn is_commit(record: &CommitRecord) -> bool {
-    let of_commit = |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change);
+    let of_commit = |entry: &LogEntry| matches!(entry, LogEntry::Order(Order::Edit(_)) | LogEntry::Change);
     record.entries.is_empty() || record.entries.iter().any(of_commit)
 }
 
@@ -109,11 +109,13 @@ fn rules_are_logged_once_nothing_waits_even_if_that_was_a_step_without_effect() 
     let mut terrain = flat();
     terrain.keep_log(Some(PLENTY));
     drop(terrain.take_log());
-    terrain.submit_undo();
+    terrain.submit(Order::Undo);
     terrain.set_rules(rules()).expect("valid");
     assert!(terrain.begin().is_none());
     let records = terrain.take_log();
-    assert!(matches!(&records[..], [record] if matches!(record.entries[..], [LogEntry::Rules(Some(_))])));
+    assert!(
+        matches!(&records[..], [record] if matches!(record.entries[..], [LogEntry::Order(Order::Rules(Some(_)))]))
+    );
 }
 
 #[test]
@@ -178,8 +180,8 @@ struct Held {
 /// One random thing that a game may do.
 fn act(terrain: &mut Terrain, rng: &mut Rng, held: &mut Held) {
     match rng.u32(0..24) {
-        0 => terrain.submit_undo(),
-        1 => terrain.submit_redo(),
+        0 => terrain.submit(Order::Undo),
+        1 => terrain.submit(Order::Redo),
         2 => terrain.set_rules(if rng.bool() { rules() } else { DiggingRules::default() }).expect("valid"),
         3 => {
             let loose = LooseSettings { largest: 4096, crumbs: rng.u32(0..40), debris: rng.u32(0..400) };
@@ -196,7 +198,7 @@ fn act(terrain: &mut Terrain, rng: &mut Rng, held: &mut Held) {
             let parts = &held.saved[rng.usize(0..held.saved.len())];
             let change = change_towards(terrain, parts);
             // Edits that wait change the world in between.
-            terrain.submit_change(change, None).expect("there is room");
+            terrain.submit(Order::parts(change, None));
         }
         9 => terrain.abandon(),
         10 => terrain.set_meshing(if rng.bool() { Meshing::Never } else { Meshing::All }),

@@ -545,7 +545,7 @@ fn names<'a>(pieces: impl IntoIterator<Item = &'a LoosePiece>) -> Vec<PieceId> {
     names
 }
 
-fn returned(restored: &Restored) -> Vec<PieceId> {
+fn returned(restored: &Applied) -> Vec<PieceId> {
     let mut names: Vec<PieceId> = restored.returned.iter().map(|piece| piece.id).collect();
     names.sort_unstable();
     names
@@ -580,14 +580,14 @@ fn an_undo_brings_back_the_pieces_of_its_edits_and_a_redo_cuts_them_off_again() 
         for (pieces, [gained, fallen]) in done.iter().rev() {
             let restored = terrain.undo().outcome.expect("it can be undone");
             assert_eq!(returned(&restored), names(pieces), "world {index}");
-            assert!(restored.loose.is_empty());
+            assert!(restored.cut_again.is_empty());
             let back: i64 = restored.returned.iter().map(|piece| total(&piece.materials)).sum();
             assert_eq!(back, *fallen, "world {index}");
             assert_eq!(total(&restored.added) - total(&restored.removed) - back, *gained, "world {index}");
         }
         for (pieces, [gained, _]) in &done {
             let restored = terrain.redo().outcome.expect("it can be redone");
-            let again: Vec<LoosePiece> = restored.loose.into_iter().map(|(_, piece)| piece).collect();
+            let again: Vec<LoosePiece> = restored.cut_again.into_iter().map(|(_, piece)| piece).collect();
             assert_eq!(&again, pieces, "world {index}: with names and meshes");
             assert!(restored.returned.is_empty());
             assert_eq!(total(&restored.removed) - total(&restored.added) - voxels(pieces), *gained);

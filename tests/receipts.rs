@@ -110,7 +110,7 @@ fn a_thousand_receipts_balance_with_the_world() {
             let before = terrain.snapshot();
             let receipts = terrain.apply([&brush]);
             let after = terrain.world();
-            let [Receipt { tag: 0, outcome: Ok(applied) }] = receipts.as_slice() else {
+            let [Receipt { asked: Asked::Edit, tag: 0, outcome: Ok(applied) }] = receipts.as_slice() else {
                 // The edit's reach may end outside the world, although its enlarged box meets it.
                 assert_eq!(receipts[0].outcome, Err(Rejection::OutsideWorld), "{what}");
                 assert_eq!(after.hash(), before.hash(), "{what}");
@@ -282,7 +282,7 @@ fn queued_edits_get_their_receipts_before_later_ones() {
         terrain.submit(&Brush::dig(at(tag as f32 * 4.0)).with_tag(tag));
         if tag % 3 == 1 {
             let edit = Edit::quantize(&Brush::dig(at(3.0)).with_tag(100 + tag)).expect("a valid brush");
-            terrain.submit_edit(&edit);
+            terrain.submit(&edit);
         }
     }
     let transaction = terrain.begin().expect("queued edits");

@@ -188,7 +188,7 @@ fn resets_among_other_edits_apply_in_order_in_one_step_of_undo() {
         // Another machine replays the log, or puts the draft in place.
         let mut put = terrain(&ground, chunk_size);
         put.apply([first.clone()]);
-        put.apply_change(draft.change, Some(draft.hash)).expect("it fits");
+        put.apply_one(Order::parts(draft.change, Some(draft.hash))).outcome.expect("it fits");
         assert!(put.world().check_seams().is_flawless());
         let mut replayed = terrain(&ground, chunk_size);
         replayed.apply([first.clone()]);

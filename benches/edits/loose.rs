@@ -219,12 +219,10 @@ pub fn section() {
     one_thread(|| {
         let mut terrain = landscape(32);
         Places::new(200).iter().for_each(|at| drop(terrain.apply([dig(at, RADIUS)])));
-        for (name, submit) in
-            [("undone", Terrain::submit_undo as fn(&mut Terrain)), ("redone", Terrain::submit_redo)]
-        {
+        for (name, order) in [("undone", Order::Undo), ("redone", Order::Redo)] {
             let mut played = Played::default();
             for _ in 0..200 {
-                submit(&mut terrain);
+                terrain.submit(&order);
                 let commit = terrain.begin().expect("there is a step").run();
                 played.stages.push(commit.stages);
                 let start = std::time::Instant::now();

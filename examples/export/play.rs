@@ -38,7 +38,7 @@ pub fn play(terrain: &mut Terrain, edits: &[ScriptedEdit], batch: usize) -> Play
 
 /// Runs one transaction. Nothing else changes this terrain, so the commit is never stale.
 fn transact(terrain: &mut Terrain, edits: &[ScriptedEdit]) -> Vec<Receipt> {
-    terrain.submit_edits(edits.iter().map(|scripted| &scripted.edit));
+    terrain.submit_all(edits.iter().map(|scripted| &scripted.edit));
     let commit = terrain.begin().map(|transaction| transaction.run());
     commit.and_then(|commit| terrain.commit(commit).ok()).unwrap_or_default()
 }

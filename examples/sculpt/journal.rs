@@ -1,7 +1,5 @@
 //! Prints a line to standard output for every event, so that a script can follow and check the example.
 
-#[path = "../shared/steps.rs"]
-mod steps;
 #[path = "../shared/tell.rs"]
 mod told;
 
@@ -65,7 +63,7 @@ fn print_receipts(mut receipts: MessageReader<BrushApplied>, terrains: Query<&Te
 
 fn print_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>) {
     for HistoryMoved { terrain, receipt } in moves.read() {
-        let name = steps::name(receipt.step);
+        let name = receipt.asked;
         let terrain = terrain.and_then(|terrain| terrains.get(terrain).ok());
         let hash = terrain.map_or(0, |terrain| terrain.world().hash());
         match &receipt.outcome {

@@ -1,8 +1,5 @@
 //! Prints a line for each receipt, and a summary at the end.
 
-#[path = "../shared/steps.rs"]
-mod steps;
-
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
@@ -75,7 +72,7 @@ fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut report: ResMut<
 fn enter_steps(mut moves: MessageReader<HistoryMoved>, mut report: ResMut<Report>) {
     for HistoryMoved { receipt, .. } in moves.read() {
         report.answered += 1;
-        let name = steps::name(receipt.step);
+        let name = receipt.asked;
         match &receipt.outcome {
             Ok(restored) if !report.quiet => {
                 say(format_args!(

@@ -12,7 +12,7 @@ use super::edits::{EditSequence, put_edit, read_edit};
 use super::error::FormatError;
 use super::plain;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Patch};
+use crate::terrain::{CommitRecord, LogEntry, Order, Patch};
 use crate::volume::DiggingRules;
 
 const RULES: u8 = 0;
@@ -36,7 +36,7 @@ impl Batch {
         self.commits.is_empty() && self.game.is_empty()
     }
 
-    /// Its bytes. Those of a commit that sets another [ground](LogEntry::Ground) can't be read again: a log ends there.
+    /// Its bytes. Those of a commit that sets another [ground](Order::Ground) can't be read again: a log ends there.
     pub fn encode(&self) -> Vec<u8> {
         let (mut bytes, mut edits) = (Vec::new(), EditSequence::default());
         put_number(&mut bytes, self.commits.len() as u64);
@@ -44,7 +44,7 @@ impl Batch {
         put_number(&mut bytes, revision);
         for commit in &self.commits {
             match &*commit.entries {
-                [LogEntry::Edit(edit)] if commit.revision == revision.wrapping_add(1) => {
+                [LogEntry::Order(Order::Edit(edit))] if commit.revision == revision.wrapping_add(1) => {
                     let at = bytes.len();
                     put_edit(&mut bytes, edit, &mut edits);
                     if let Some(head) = bytes.get_mut(at) {
@@ -78,7 +78,7 @@ impl Batch {
             let mut commit = match head {
                 0 => read_commit(&mut reader, revision, &mut edits, ground)?,
                 odd if odd & 1 == 1 => {
-                    let entries = vec![LogEntry::Edit(edits.read(head >> 1, &mut reader)?)];
+                    let entries = vec![LogEntry::Order(Order::Edit(edits.read(head >> 1, &mut reader)?))];
                     let (revision, change) = (revision.wrapping_add(1), Patch::default());
                     CommitRecord { revision, hash: 0, entries, change }
                 }
@@ -109,26 +109,28 @@ fn put_commit(to: &mut Vec<u8>, commit: &CommitRecord, before: u64, edits: &mut 
     put_number(to, commit.entries.len() as u64);
     for entry in &commit.entries {
         match entry {
-            LogEntry::Rules(rules) => {
+            LogEntry::Order(Order::Rules(rules)) => {
                 to.push(RULES);
                 put_bytes(to, &plain::to_bytes(&rules.as_deref()));
             }
-            LogEntry::Loose(loose) => {
+            LogEntry::Order(Order::Loose(loose)) => {
                 to.push(LOOSE);
                 put_bytes(to, &plain::to_bytes(loose));
             }
-            LogEntry::Edit(edit) => {
+            LogEntry::Order(Order::Edit(edit)) => {
                 to.push(EDIT);
                 put_edit(to, edit, edits);
             }
             LogEntry::Change => to.push(CHANGE),
-            LogEntry::Ground(ground) => {
+            LogEntry::Order(Order::Ground(ground)) => {
                 to.push(GROUND);
                 to.extend_from_slice(&ground.hash().to_le_bytes());
             }
+            // The log keeps these as changes.
+            LogEntry::Order(Order::Undo | Order::Redo | Order::Parts { .. }) => to.push(CHANGE),
         }
     }
-    if commit.entries.contains(&LogEntry::Change) {
+    if commit.has_change() {
         put_change(to, &commit.change);
     }
 }
@@ -146,18 +148,21 @@ fn read_commit(
         entries.push(match reader.byte()? {
             RULES => {
                 let rules: Option<DiggingRules> = plain::from_bytes(reader.bytes()?, "set of rules")?;
-                LogEntry::Rules(rules.map(Arc::new))
+                LogEntry::Order(Order::Rules(rules.map(Arc::new)))
             }
-            LOOSE => LogEntry::Loose(plain::from_bytes(reader.bytes()?, "search for loose pieces")?),
-            EDIT => LogEntry::Edit(read_edit(reader, edits)?),
+            LOOSE => {
+                let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
+                LogEntry::Order(Order::Loose(loose))
+            }
+            EDIT => LogEntry::Order(Order::Edit(read_edit(reader, edits)?)),
             CHANGE => LogEntry::Change,
             GROUND => return Err(FormatError::Invalid("commit: it sets another ground, which no log holds")),
             _ => return Err(FormatError::Invalid("entry of a commit")),
         });
     }
-    let change = match entries.contains(&LogEntry::Change) {
-        true => read_change(reader, ground)?,
-        false => Patch::default(),
-    };
-    Ok(CommitRecord { revision, hash: 0, entries, change })
+    let mut commit = CommitRecord { revision, hash: 0, entries, change: Patch::default() };
+    if commit.has_change() {
+        commit.change = read_change(reader, ground)?;
+    }
+    Ok(commit)
 }

@@ -17,6 +17,7 @@ use crate::format::fields::{point, put_point};
 use crate::format::{FormatError, WorldId, decode_region, encode_region, plain};
 use crate::ground::{GreyImage, Ground};
 use crate::lattice::RegionPos;
+use crate::terrain::Order;
 use crate::volume::DiggingRules;
 
 const HELLO: u8 = 0;
@@ -428,17 +429,21 @@ fn no_image() -> Option<Arc<GreyImage>> {
 }
 
 fn put_entry(to: &mut Vec<u8>, entry: &Entry, sequence: &mut EditSequence) {
-    match entry {
-        Entry::Edit { author, own, edit } => put_edit(to, &[author.0, *own], edit, sequence),
-        Entry::Rules(rules) => {
+    let Entry::Order { by, order } = entry else { return to.push(MARK) };
+    match order {
+        Order::Edit(edit) => {
+            let (author, own) = by.unwrap_or((ClientId::SERVER, 0));
+            put_edit(to, &[author.0, own], edit, sequence);
+        }
+        Order::Rules(rules) => {
             to.push(RULES);
             put_bytes(to, &plain::to_bytes(&rules.as_deref()));
         }
-        Entry::Loose(loose) => {
+        Order::Loose(loose) => {
             to.push(LOOSE);
             put_bytes(to, &plain::to_bytes(loose));
         }
-        Entry::Parts { by, change } => {
+        Order::Parts { change, .. } => {
             to.extend([PARTS, by.is_some().into()]);
             if let Some((client, own)) = by {
                 put_number(to, client.0);
@@ -446,7 +451,8 @@ fn put_entry(to: &mut Vec<u8>, entry: &Entry, sequence: &mut EditSequence) {
             }
             put_change(to, change);
         }
-        Entry::Mark => to.push(MARK),
+        // Steps through history are sent as the parts that they restore, and all machines have one ground.
+        Order::Undo | Order::Redo | Order::Ground(_) => to.push(MARK),
     }
 }
 
@@ -524,21 +530,24 @@ fn read_entry(
     sequence: &mut EditSequence,
 ) -> Result<(Entry, Option<StampId>), FormatError> {
     let entry = match reader.byte()? {
-        RULES => Entry::Rules(read_rules(reader.bytes()?)?.map(Arc::new)),
-        LOOSE => Entry::Loose(plain::from_bytes(reader.bytes()?, "search for loose pieces")?),
+        RULES => Entry::of_server(Order::Rules(read_rules(reader.bytes()?)?.map(Arc::new))),
+        LOOSE => {
+            let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
+            Entry::of_server(Order::Loose(loose))
+        }
         PARTS => {
             let by = match flag(reader)? {
                 true => Some((ClientId(reader.number()?), reader.number()?)),
                 false => None,
             };
-            Entry::Parts { by, change: Arc::new(read_change(reader, ground)?) }
+            Entry::Order { by, order: Order::parts(read_change(reader, ground)?, None) }
         }
         MARK => Entry::Mark,
         head => {
             let from = |reader: &mut Reader| Ok((ClientId(reader.number()?), reader.number()?));
             let ReadEdit { before: (author, own), edit, missing } =
                 read_edit(reader, head, stamps, sequence, from)?;
-            return Ok((Entry::Edit { author, own, edit }, missing));
+            return Ok((Entry::of(author, own, Order::Edit(edit)), missing));
         }
     };
     Ok((entry, None))

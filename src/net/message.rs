@@ -78,39 +78,49 @@ pub enum Lane {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Entry {
-    /// An edit of a client, under the rules and settings of earlier entries.
-    Edit {
-        /// The client that sent it.
-        author: ClientId,
-        /// The number that it had there.
-        own: u64,
-        /// The edit. Its tag is 0 and it has no stroke: these concern its author and the server.
-        edit: Edit,
-    },
-    /// Later edits obey these rules.
-    Rules(Option<Arc<DiggingRules>>),
-    /// Later edits search for loose pieces with these settings.
-    Loose(Option<LooseSettings>),
-    /// Parts that replace others: restored by an undo, or set by the game's server.
-    Parts {
-        /// The client that asked for it, and the number that it had there.
+    /// Something that is asked of the world: an edit, other rules or settings of loose pieces, or parts that replace others.
+    Order {
+        /// The client that asked for it, and the number that it had there. `None` for the game's server; an edit of the
+        /// game's server has [`ClientId::SERVER`] here.
         by: Option<(ClientId, u64)>,
-        /// The parts.
-        change: Arc<Patch>,
+        /// The order. The tag of an edit is 0 and it has no stroke: these concern its author and the server.
+        order: Order,
     },
     /// Changes nothing. The hashes of regions that were touched since the previous mark are compared here.
     Mark,
 }
 
 impl Entry {
+    /// An order of a client.
+    pub fn of(author: ClientId, own: u64, order: Order) -> Self {
+        Self::Order { by: Some((author, own)), order }
+    }
+
+    /// An order of the game's server.
+    pub fn of_server(order: Order) -> Self {
+        Self::Order { by: None, order }
+    }
+
     /// What it asks of a terrain; `None` for a mark.
-    pub(crate) fn order(&self) -> Option<Order> {
+    pub fn order(&self) -> Option<&Order> {
+        if let Self::Order { order, .. } = self { Some(order) } else { None }
+    }
+
+    /// The edit, if it is one.
+    pub fn edit(&self) -> Option<&Edit> {
+        self.order().and_then(Order::edit)
+    }
+
+    /// The parts that replace others.
+    pub fn parts(&self) -> Option<&Arc<Patch>> {
+        if let Some(Order::Parts { change, .. }) = self.order() { Some(change) } else { None }
+    }
+
+    /// The number that it had at a client, if that asked for it.
+    pub(crate) fn number_of(&self, client: Option<ClientId>) -> Option<u64> {
         match self {
-            Self::Edit { edit, .. } => Some(Order::Edit(edit.clone())),
-            Self::Rules(rules) => Some(Order::Rules(rules.clone())),
-            Self::Loose(loose) => Some(Order::Loose(*loose)),
-            Self::Parts { change, .. } => Some(Order::Parts { change: Arc::clone(change), hash: None }),
-            Self::Mark => None,
+            Self::Order { by: Some((author, own)), .. } if Some(*author) == client => Some(*own),
+            _ => None,
         }
     }
 }

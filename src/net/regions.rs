@@ -103,7 +103,7 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
-    use crate::terrain::{Terrain, TerrainSettings};
+    use crate::terrain::{Order, Terrain, TerrainSettings};
     use crate::volume::{Field, FieldId, Fields};
 
     /// With chunks that fit into regions, and with others.
@@ -159,7 +159,7 @@ mod tests {
             let renamed = fields.iter().map(|field| Field { id: FieldId(field.id.0 + 70), ..*field });
             let renamed = Fields::restored(renamed.collect()).expect("names that differ");
             let change = Patch { fields: vec![(chunk, renamed)], next_field: 100, ..Patch::default() };
-            terrain.apply_change(change, Some(hash)).expect("it fits");
+            terrain.apply_one(Order::parts(change, Some(hash))).outcome.expect("it fits");
             let own = BrickPos::of(fields.iter().next().expect("a field").bounds.min);
             assert_ne!(hashes(terrain.world())[&RegionPos::of(own)], before[&RegionPos::of(own)]);
         }

@@ -13,7 +13,7 @@ use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{
-    ChangeError, Patch, Receipt, RestoreError, Restored, Terrain, TerrainError, TerrainSettings, World,
+    Asked, Order, Patch, Receipt, Rejection, RestoreError, Terrain, TerrainError, TerrainSettings, World,
     WorldParts,
 };
 use crate::volume::{Brick, Fields};
@@ -47,10 +47,8 @@ struct Pending {
 /// The results of applied entries.
 #[derive(Debug, Default)]
 pub(super) struct Applied {
-    /// A receipt for each edit among them, in order.
+    /// A receipt for each edit and each replacement of parts among them, in order.
     pub receipts: Vec<Receipt>,
-    /// The changes by replaced parts among them, in order; `None` for those that could not be replaced.
-    pub restored: Vec<Option<Restored>>,
     /// The regions that changed.
     pub regions: BTreeSet<RegionPos>,
     /// Whether an entry failed here that may succeed on other machines.
@@ -189,16 +187,13 @@ impl Replica {
     pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
         // Those may be among them.
         self.is_outdated |= self.appended > 0;
-        let (mut submitted, mut is_own, mut is_foreign) = (Vec::new(), false, false);
+        let (mut is_own, mut is_foreign) = (false, false);
         let next_field = self.world().next_field();
         self.is_outdated |= self.is_apart && entries.iter().any(|entry| own(entry).is_some());
         for entry in entries {
             if let Some(order) = entry.order() {
                 // The server checked rules.
-                let outcome = self.confirmed.submit_order(order);
-                if let Entry::Parts { .. } = entry {
-                    submitted.push(outcome.is_ok());
-                }
+                self.confirmed.submit(order);
             }
             match own(entry) {
                 // What is shown contains it already.
@@ -210,26 +205,18 @@ impl Replica {
                     self.is_outdated = true;
                     self.pending.retain(|pending| pending.own != number);
                 }
-                None => match entry {
-                    Entry::Edit { .. } | Entry::Parts { .. } => is_foreign = true,
-                    Entry::Rules(_) | Entry::Loose(_) => {
-                        self.is_outdated = true;
-                        self.shown = None;
-                    }
-                    Entry::Mark => {}
-                },
+                None if entry.edit().is_some() || entry.parts().is_some() => is_foreign = true,
+                None if entry.order().is_some() => {
+                    self.is_outdated = true;
+                    self.shown = None;
+                }
+                None => {}
             }
         }
-        let mut applied = self.run();
-        let mut receipts = self.confirmed.take_change_receipts().into_iter();
-        for submitted in submitted {
-            let receipt = submitted.then(|| receipts.next()).flatten();
-            let restored = receipt.unwrap_or(Err(ChangeError::Panicked));
-            applied.is_void |= matches!(restored, Err(ChangeError::Panicked | ChangeError::Overloaded));
-            applied.restored.push(restored.ok());
-        }
+        let applied = self.run();
         // A deterministic failure happens on all machines; the pending edits are predicted again.
-        self.is_outdated |= applied.receipts.iter().any(|receipt| receipt.outcome.is_err());
+        let is_rejected = |receipt: &Receipt| receipt.asked == Asked::Edit && receipt.outcome.is_err();
+        self.is_outdated |= applied.receipts.iter().any(is_rejected);
         if is_foreign && !self.is_outdated {
             self.is_apart = !is_own && self.reads_nothing_of_before(next_field);
             self.is_outdated = !self.is_apart;
@@ -240,7 +227,7 @@ impl Replica {
 
     /// Runs all that is submitted.
     fn run(&mut self) -> Applied {
-        let mut applied = Applied { receipts: self.confirmed.take_answered(), ..Applied::default() };
+        let mut applied = Applied { receipts: self.confirmed.take_receipts(), ..Applied::default() };
         while let Some(transaction) = self.confirmed.begin() {
             let commit = transaction.run();
             let change = commit.change();
@@ -251,6 +238,8 @@ impl Replica {
             applied.receipts.extend(self.confirmed.commit(commit).unwrap_or_default());
             self.sums.add(self.confirmed.world(), steps);
         }
+        let mut parts = applied.receipts.iter().filter(|receipt| receipt.asked == Asked::Parts);
+        applied.is_void = parts.any(Receipt::is_local_failure);
         applied
     }
 
@@ -275,12 +264,14 @@ impl Replica {
     ///
     /// # Errors
     /// When they do not fit.
-    pub fn put(&mut self, change: Patch) -> Result<Applied, ChangeError> {
-        self.confirmed.submit_change(change, None)?;
+    pub fn put(&mut self, change: Patch) -> Result<Applied, Rejection> {
+        self.confirmed.submit(Order::parts(change, None));
         let applied = self.run();
         self.is_outdated = true;
-        // It was the only one.
-        self.confirmed.take_change_receipts().pop().unwrap_or(Err(ChangeError::Panicked)).map(|_| applied)
+        match applied.receipts.iter().find_map(|receipt| receipt.outcome.as_ref().err()) {
+            None => Ok(applied),
+            Some(why) => Err(why.clone()),
+        }
     }
 
     /// Continues from another position of an order with the terms there, either with the present world or from the
@@ -362,7 +353,7 @@ impl Replica {
                 self.is_outdated |= self.appended > 0;
                 let updated = self.update_all();
                 if let (Some(shown), Some(ShownChange { change, hash })) = (&mut self.shown, &updated.0)
-                    && shown.apply_change(change.clone(), Some(*hash)).is_err()
+                    && shown.apply_one(Order::parts(change.clone(), Some(*hash))).outcome.is_err()
                 {
                     self.shown = None;
                 }
@@ -390,8 +381,8 @@ impl Replica {
         let edits: Vec<Edit> = self.pending.iter().skip(from).map(|pending| pending.edit.clone()).collect();
         (self.drafts, self.drafted) = (self.drafts + 1, self.drafted + edits.len() as u64);
         self.appended = 0;
-        shown.submit_edits(&edits);
-        let mut receipts = shown.take_answered();
+        shown.submit_all(&edits);
+        let mut receipts = shown.take_receipts();
         let mut change = Patch::default();
         while let Some(transaction) = shown.begin() {
             let commit = transaction.run();
@@ -414,7 +405,8 @@ impl Replica {
     fn fork_shown(&self) -> Option<Terrain> {
         let mut shown = self.confirmed.fork().ok()?;
         never_shown(&mut shown);
-        shown.apply_change(self.predicted.patch(self.next_field), Some(self.shown_hash())).ok()?;
+        let predicted = Order::parts(self.predicted.patch(self.next_field), Some(self.shown_hash()));
+        shown.apply_one(predicted).outcome.ok()?;
         Some(shown)
     }
 

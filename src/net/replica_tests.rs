@@ -10,7 +10,7 @@ use super::*;
 use crate::brush::{Brush, Shape, Stamp};
 use crate::ground::{GreyImage, MaterialId};
 use crate::net::ClientId;
-use crate::terrain::LooseSettings;
+use crate::terrain::{Asked, LooseSettings, Order};
 use crate::volume::DiggingRules;
 
 const SIDE: u32 = 72;
@@ -65,11 +65,12 @@ fn turn(rng: &mut Rng, reference: &Terrain) -> Entry {
     match rng.u32(0..4) {
         0 => {
             let rules = DiggingRules::default().with_unbreakable(MaterialId(rng.u8(0..4)));
-            Entry::Rules(rng.bool().then(|| Arc::new(rules.with_hardness(MaterialId(2), 180))))
+            let rules = rules.with_hardness(MaterialId(2), 180);
+            Entry::of_server(Order::Rules(rng.bool().then(|| Arc::new(rules))))
         }
         1 => {
             let loose = LooseSettings { largest: 2000, crumbs: rng.u32(0..40), debris: rng.u32(0..400) };
-            Entry::Loose(rng.bool().then_some(loose))
+            Entry::of_server(Order::Loose(rng.bool().then_some(loose)))
         }
         2 => Entry::Mark,
         _ => {
@@ -81,35 +82,18 @@ fn turn(rng: &mut Rng, reference: &Terrain) -> Entry {
             let fields = world.fields().take(1).map(|(chunk, _)| (chunk, Fields::default())).collect();
             let bricks = bricks.into_iter().map(|pos| (pos, None)).collect();
             let change = Patch { bricks, fields, next_field: world.next_field() };
-            Entry::Parts { by: None, change: Arc::new(change) }
+            Entry::of_server(Order::parts(change, None))
         }
     }
 }
 
 fn obey(terrain: &mut Terrain, entry: &Entry) {
-    match entry {
-        Entry::Edit { edit, .. } => {
-            terrain.submit_edit(edit);
-            while let Some(transaction) = terrain.begin() {
-                terrain.commit(transaction.run()).expect("it waits for it");
-            }
-        }
-        Entry::Rules(rules) => {
-            terrain.set_rules(rules.as_deref().cloned().unwrap_or_default()).expect("valid rules");
-        }
-        Entry::Loose(loose) => terrain.set_loose(*loose),
-        Entry::Parts { change, .. } => {
-            terrain.apply_change(Patch::clone(change), None).expect("they fit");
-        }
-        Entry::Mark => {}
-    }
+    let receipts = terrain.apply(entry.order());
+    assert!(receipts.iter().all(|receipt| receipt.asked == Asked::Edit || receipt.outcome.is_ok()));
 }
 
 fn own_number(entry: &Entry) -> Option<u64> {
-    match entry {
-        Entry::Edit { author: OWN, own, .. } => Some(*own),
-        _ => None,
-    }
+    entry.edit().and_then(|_| entry.number_of(Some(OWN)))
 }
 
 fn fields(world: &World) -> BTreeMap<ChunkPos, Fields> {
@@ -172,7 +156,7 @@ impl Play {
         let is_quiet = batch.iter().all(is_echo);
         let applied = self.replica.apply(batch, own_number);
         self.given += batch.len();
-        let edits = batch.iter().filter(|entry| matches!(entry, Entry::Edit { .. })).count();
+        let edits = batch.iter().filter(|entry| entry.edit().is_some()).count();
         assert_eq!(applied.receipts.len(), edits);
         assert!(!applied.is_void);
         if is_quiet && !was_outdated && applied.receipts.iter().all(|receipt| receipt.outcome.is_ok()) {
@@ -187,7 +171,7 @@ impl Play {
         self.alone += usize::from(self.replica.can_append());
         if let (Some(ShownChange { change, hash }), _) = self.replica.update() {
             self.apart += usize::from(!was_outdated && has_pending);
-            self.shown.apply_change(change, Some(hash)).expect("it fits");
+            self.shown.apply_one(Order::parts(change, Some(hash))).outcome.expect("it fits");
         }
         while self.obeyed < self.given {
             obey(&mut self.reference, &self.order[self.obeyed]);
@@ -243,7 +227,7 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
             // In some rounds others dig much, in some nobody does.
             if rng.u64(0..6) < round % 4 {
                 let edit = edit(&mut rng, &image, others);
-                play.order.push(Entry::Edit { author: ClientId(2), own, edit });
+                play.order.push(Entry::of(ClientId(2), own, Order::Edit(edit)));
             }
             if round % 3 > 0 && rng.u32(0..6) == 0 {
                 let turn = turn(&mut rng, &play.reference);
@@ -260,7 +244,7 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
                 if rng.u32(0..8) == 0 {
                     assert_eq!(play.replica.take_back(own), Some(edit));
                 } else {
-                    play.order.push(Entry::Edit { author: OWN, own, edit });
+                    play.order.push(Entry::of(OWN, own, Order::Edit(edit)));
                 }
             }
             if round % 2 == 1 {
@@ -281,9 +265,9 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
         play.check();
         let whole = play.replica.whole(play.shown.world());
         let mut other = terrain(&ground());
-        obey(&mut other, &Entry::Edit { author: OWN, own: 0, edit: edit(&mut rng, &image, NEAR) });
+        obey(&mut other, &Entry::of(OWN, 0, Order::Edit(edit(&mut rng, &image, NEAR))));
         let ShownChange { change, hash } = play.replica.whole(other.world());
-        other.apply_change(change, Some(hash)).expect("it fits");
+        other.apply_one(Order::parts(change, Some(hash))).outcome.expect("it fits");
         assert_eq!((hash, other.world().hash()), (whole.hash, play.shown.world().hash()));
         assert_eq!(fields(other.world()), fields(play.shown.world()));
         (quiet, apart) = (quiet + play.quiet, apart + play.apart);

@@ -388,7 +388,7 @@ fn a_rejection_is_seen_until_a_brush_is_accepted() {
         (Err(Rejection::OutsideWorld), true),
         (Ok(Applied::default()), false),
     ] {
-        app.world_mut().write_message(BrushApplied { terrain: None, receipt: Receipt { tag: 0, outcome } });
+        app.world_mut().write_message(BrushApplied { terrain: None, receipt: Receipt::of_edit(0, outcome) });
         // The message stays until there is another result.
         for _ in 0..3 {
             app.update();
@@ -402,7 +402,7 @@ fn a_rejection_is_seen_until_a_brush_is_accepted() {
 /// Whether the panel shows a rejection after a frame in which this terrain, if any, rejects a brush.
 fn is_rejected(app: &mut App, by: Option<Entity>) -> bool {
     if by.is_some() {
-        let receipt = Receipt { tag: 0, outcome: Err(Rejection::OutsideWorld) };
+        let receipt = Receipt::of_edit(0, Err(Rejection::OutsideWorld));
         app.world_mut().write_message(BrushApplied { terrain: by, receipt });
     }
     app.update();

@@ -15,10 +15,7 @@ use super::{
 };
 use crate::brush::{Brush, BrushError, Edit, reaches};
 use crate::lattice::ChunkGrid;
-use crate::terrain::{
-    HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, ReturnedPiece, Terrain, Together,
-    unique,
-};
+use crate::terrain::{Asked, Order, Receipt, Rejection, Request, ReturnedPiece, Terrain, Together, unique};
 use crate::threads::free_later;
 
 /// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected at
@@ -39,15 +36,15 @@ pub(super) fn collect_brushes(
         if loose.is_some() && loose.as_ref() != terrain.loose() {
             terrain.set_loose(loose);
         }
-        if terrain.has_answered() {
-            let answered = terrain.take_answered();
+        if terrain.has_receipts(is_edit) {
+            let answered = terrain.take_receipts_of(is_edit);
             found.write_batch(pieces(entity, &answered));
             let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
             answers.write_batch(answered.into_iter().map(applied));
         }
     }
     let mut reject = |brush: &Brush, terrain, rejection| {
-        answers.write(BrushApplied { terrain, receipt: Receipt { tag: brush.tag, outcome: Err(rejection) } });
+        answers.write(BrushApplied { terrain, receipt: Receipt::of_edit(brush.tag, Err(rejection)) });
     };
     // Brushes of one frame are undone together.
     let together = Together::Batch(unique());
@@ -59,11 +56,14 @@ pub(super) fn collect_brushes(
             let Some(place) = places.of(entity).filter(is_usable) else { continue };
             match Effect::of(brush, &place, terrain.world().grid()) {
                 Effect::Taken(edit) => {
-                    match (outbox, terrain.admit(Some(&edit))) {
-                        (Some(mut outbox), _) => outbox.edits.push(edit),
-                        (None, Ok(())) => terrain.queue_edit(brush.tag, Ok(edit), brush.stroke, together),
-                        (None, Err(rejection)) => reject(brush, Some(entity), rejection),
-                    }
+                    let queued = match outbox {
+                        Some(mut outbox) => {
+                            outbox.orders.push(Order::Edit(edit));
+                            Ok(())
+                        }
+                        None => queue(&mut terrain, edit.into(), together),
+                    };
+                    queued.unwrap_or_else(|rejection| reject(brush, Some(entity), rejection));
                     unanswered = None;
                 }
                 Effect::Refused(error) => {
@@ -93,19 +93,31 @@ pub(super) fn collect_brushes(
                 if let Err(error) = &edit {
                     warn_of_invalid(entity, error, &reports);
                 }
-                let edit = edit.map_err(Rejection::from);
-                match (outbox, terrain.admit(edit.as_ref().ok()), edit) {
-                    (Some(mut outbox), _, Ok(edit)) => outbox.edits.push(edit),
-                    (Some(_), _, Err(rejection)) | (None, Err(rejection), _) => {
-                        reject(brush, Some(entity), rejection);
+                let queued = match (outbox, edit) {
+                    (Some(mut outbox), Ok(edit)) => {
+                        outbox.orders.push(Order::Edit(edit));
+                        Ok(())
                     }
-                    (None, Ok(()), edit) => terrain.queue_edit(brush.tag, edit, brush.stroke, together),
-                }
+                    (Some(_), Err(error)) => Err(error.into()),
+                    (None, edit) => queue(&mut terrain, Request::of_edit(brush, edit), together),
+                };
+                queued.unwrap_or_else(|rejection| reject(brush, Some(entity), rejection));
             }
             _ => reject(brush, Some(entity), Rejection::TerrainGone),
         }
     }
     figures.begin_frame(start.elapsed());
+}
+
+/// Queues an edit if there is room for it.
+fn queue(terrain: &mut Terrain, request: Request, together: Together) -> Result<(), Rejection> {
+    terrain.admit(&request)?;
+    terrain.queue_order(request, together)
+}
+
+/// Whether the plugin reports an order's receipt as [`BrushApplied`].
+fn is_edit(asked: Asked) -> bool {
+    asked == Asked::Edit
 }
 
 /// Logs the first brush that a terrain cannot apply. Receipts say it of each.
@@ -175,16 +187,15 @@ pub(super) fn collect_steps(
 ) {
     let start = Instant::now();
     let (undos, redos) = requests.take_steps();
-    let undos = undos.into_iter().map(|Undo { terrain }| (HistoryStep::Undo, terrain));
-    let redos = redos.into_iter().map(|Redo { terrain }| (HistoryStep::Redo, terrain));
+    let undos = undos.into_iter().map(|Undo { terrain }| (Order::Undo, terrain));
+    let redos = redos.into_iter().map(|Redo { terrain }| (Order::Redo, terrain));
     for (step, target) in undos.chain(redos) {
         let mut is_taken = false;
         let mut submit = |mut terrain: Mut<Terrain>, outbox: Option<Mut<EditOutbox>>| {
             is_taken = true;
-            match (outbox, step) {
-                (Some(mut outbox), step) => outbox.steps.push(step),
-                (None, HistoryStep::Undo) => terrain.submit_undo(),
-                (None, HistoryStep::Redo) => terrain.submit_redo(),
+            match outbox {
+                Some(mut outbox) => outbox.orders.push(step.clone()),
+                None => terrain.submit(&step),
             }
         };
         match target {
@@ -194,7 +205,7 @@ pub(super) fn collect_steps(
             None => terrains.iter_mut().for_each(|(_, terrain, outbox)| submit(terrain, outbox)),
         }
         if !is_taken {
-            messages.moved.write(gone(target, step));
+            messages.moved.write(gone(target, step.asked()));
         }
     }
     // Results of steps that the queue had no room for, and of steps that the game took itself.
@@ -219,11 +230,8 @@ pub(crate) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Ite
 }
 
 /// The pieces that a redo cut off again.
-pub(super) fn pieces_again(
-    terrain: Entity,
-    receipt: &HistoryReceipt,
-) -> impl Iterator<Item = LoosePieceFound> {
-    let pieces = receipt.outcome.iter().flat_map(|restored| &restored.loose);
+pub(super) fn pieces_again(terrain: Entity, receipt: &Receipt) -> impl Iterator<Item = LoosePieceFound> {
+    let pieces = receipt.outcome.iter().flat_map(|applied| &applied.cut_again);
     pieces.map(move |(tag, piece)| LoosePieceFound { terrain, tag: *tag, piece: piece.clone(), mesh: None })
 }
 
@@ -259,13 +267,13 @@ pub(super) fn send_history(
     entity: Entity,
     terrain: &mut Mut<Terrain>,
     messages: &mut HistoryMessages,
-) -> Vec<HistoryReceipt> {
-    if !terrain.has_history_receipts() {
+) -> Vec<Receipt> {
+    if !terrain.has_receipts(Asked::is_step) {
         return Vec::new();
     }
-    let receipts = terrain.take_history_receipts();
+    let receipts = terrain.take_receipts_of(Asked::is_step);
     for receipt in &receipts {
-        let returned = receipt.outcome.iter().flat_map(|restored| &restored.returned);
+        let returned = receipt.outcome.iter().flat_map(|applied| &applied.returned);
         let message = |piece: &ReturnedPiece| LoosePieceReturned { terrain: entity, piece: piece.clone() };
         messages.returned.write_batch(returned.map(message));
         messages.moved.write(HistoryMoved { terrain: Some(entity), receipt: receipt.clone() });
@@ -273,8 +281,8 @@ pub(super) fn send_history(
     receipts
 }
 
-fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
-    HistoryMoved { terrain, receipt: HistoryReceipt { step, outcome: Err(HistoryRejection::TerrainGone) } }
+fn gone(terrain: Option<Entity>, step: Asked) -> HistoryMoved {
+    HistoryMoved { terrain, receipt: Receipt::of(step, Err(Rejection::TerrainGone)) }
 }
 
 /// Answers brushes and steps that wait in a terrain that is removed or replaced, and clears its queue.
@@ -288,15 +296,17 @@ pub(super) fn answer_removed(
     mut messages: HistoryMessages,
 ) {
     let Ok(mut terrain) = terrains.get_mut(gone.entity) else { return };
-    let answered = terrain.take_answered().into_iter();
+    let answered = terrain.take_receipts_of(is_edit).into_iter();
     answers.write_batch(answered.map(|receipt| BrushApplied { terrain: Some(gone.entity), receipt }));
     send_history(gone.entity, &mut terrain, &mut messages);
-    let answer = |tag| BrushApplied {
-        terrain: Some(gone.entity),
-        receipt: Receipt { tag, outcome: Err(Rejection::TerrainGone) },
-    };
-    answers.write_batch(terrain.unanswered().map(answer));
-    messages.moved.write_batch(terrain.unanswered_steps().map(|step| self::gone(Some(gone.entity), step)));
+    for (asked, tag) in terrain.unanswered() {
+        if is_edit(asked) {
+            let receipt = Receipt::of_edit(tag, Err(Rejection::TerrainGone));
+            answers.write(BrushApplied { terrain: Some(gone.entity), receipt });
+        } else if asked.is_step() {
+            messages.moved.write(self::gone(Some(gone.entity), asked));
+        }
+    }
     terrain.forget();
     let world = terrain.snapshot();
     commands.queue(move |_: &mut World| free_later(world));

@@ -24,7 +24,7 @@ use super::{
     LoosePieceFound, MaterialColors, SlimVertices,
 };
 use crate::lattice::ChunkPos;
-use crate::terrain::{Drawn, FieldNews, Receipt, Rejection, Terrain, World as TerrainWorld};
+use crate::terrain::{Asked, Drawn, FieldNews, Receipt, Rejection, Terrain, World as TerrainWorld};
 use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
@@ -279,7 +279,7 @@ fn commit(
     if !waste.is_empty() {
         free_later(waste);
     }
-    let is_step = terrain.has_history_receipts();
+    let is_step = terrain.has_receipts(Asked::is_step);
     send_history(entity, &mut terrain, &mut messages.history);
     // Another world is loaded like a new terrain; until then the old one is shown.
     if !is_whole {

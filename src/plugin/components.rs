@@ -4,10 +4,9 @@ use bevy::ecs::component::{Component, ComponentId, Mutable, RequiredComponentsRe
 use bevy::prelude::*;
 
 use super::places::TerrainPlace;
-use crate::brush::Edit;
 use crate::lattice::{ChunkPos, TilePos};
 use crate::lod::Node;
-use crate::terrain::{HistoryStep, Terrain};
+use crate::terrain::{Order, Terrain};
 use crate::volume;
 
 /// The model itself is the component; see [`Terrain`]. What it requires is there in any order of plugins and spawns.
@@ -186,14 +185,12 @@ impl From<&volume::Field> for Field {
 pub struct Held;
 
 /// Collects the edits, undos and redos of this terrain instead of applying them, so that for example a server can
-/// decide about them. The system that inserts this takes the lists, answers their items, and applies the results with
-/// [`Terrain::submit_change`].
+/// decide about them. The system that inserts this takes the list, answers its items, and applies the results with
+/// [`Terrain::submit`] and [`Order::Parts`].
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct EditOutbox {
-    /// Edits, in the order in which they were asked for.
-    pub edits: Vec<Edit>,
-    /// Undos and redos, which come behind the edits of their frame.
-    pub steps: Vec<HistoryStep>,
+    /// What was asked for, in order. Undos and redos come behind the edits of their frame.
+    pub orders: Vec<Order>,
 }
 
 /// The meshes of this terrain have vertices of 32 bytes: positions, normals, materials; no colours and no depth in the ground,

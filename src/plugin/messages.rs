@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use super::MaterialColors;
 use super::meshes::{MeshBuilder, VertexExtras};
 use crate::brush::Brush;
-use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, ReturnedPiece, Terrain};
+use crate::terrain::{LoosePiece, Receipt, ReturnedPiece, Terrain};
 
 /// A brush in world space. It edits every terrain that it reaches, hidden ones too.
 ///
@@ -82,7 +82,7 @@ pub struct HistoryMoved {
     /// The terrain; `None` if there is none at all.
     pub terrain: Option<Entity>,
     /// The undone or redone step and its changes; bounds are in voxels of the terrain.
-    pub receipt: HistoryReceipt,
+    pub receipt: Receipt,
 }
 
 /// A brush cut off a piece of ground, on a terrain with [`LooseGround`](super::LooseGround). A piece that vanishes or breaks

@@ -11,7 +11,7 @@ use super::collect::{pieces, pieces_again};
 use super::figures::TaskTimes;
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use crate::backend::Engine;
-use crate::terrain::{Commit, Drawn, HistoryReceipt, SurfaceDraft, Terrain, Transaction, Unseen};
+use crate::terrain::{Asked, Commit, Drawn, Receipt, SurfaceDraft, Terrain, Transaction, Unseen};
 use crate::threads::{ThreadTask, Threads};
 
 /// The running task of a terrain.
@@ -82,7 +82,7 @@ impl InFlight {
             let _span = info_span!("burrow_mesh").entered();
             let surfaces = builder.build_all(tiles.chain(chunks).collect(), drawn_cut.as_deref());
             let nodes = builder.build_nodes(updates.nodes);
-            let again = commit.step().into_iter().flat_map(|step| pieces_again(terrain, step));
+            let again = commit.receipts().iter().flat_map(|receipt| pieces_again(terrain, receipt));
             let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).chain(again).collect();
             if let Some(mesh_builder) = &builder.mesh_builder {
                 pieces.iter_mut().for_each(|piece| piece.build_mesh(mesh_builder));
@@ -128,9 +128,15 @@ impl InFlight {
         let Some(Ok(TaskOutput { change: Change::Transaction(commit), pieces, .. })) = &self.done else {
             return false;
         };
-        let returns_none =
-            |step: &HistoryReceipt| step.outcome.as_ref().is_ok_and(|step| step.returned.is_empty());
-        let is_own = commit.step().map_or(!commit.receipts().is_empty(), returns_none);
+        let is_own = |receipt: &Receipt| match receipt.asked {
+            Asked::Edit => true,
+            Asked::Undo | Asked::Redo => {
+                receipt.outcome.as_ref().is_ok_and(|applied| applied.returned.is_empty())
+            }
+            _ => false,
+        };
+        let receipts = commit.receipts();
+        let is_own = !receipts.is_empty() && receipts.iter().all(is_own);
         is_own && pieces.is_empty()
     }
 }

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::base_level::BaseLevel;
 use super::region::Region;
 use crate::lattice::{ChunkGrid, RegionPos};
-use crate::terrain::{CommitRecord, LogEntry, LooseSettings, Patch, WorldParts};
+use crate::terrain::{CommitRecord, LogEntry, LooseSettings, Order, Patch, WorldParts};
 use crate::volume::DiggingRules;
 
 /// A world by regions.
@@ -69,8 +69,8 @@ impl Mirror {
     pub fn apply(&mut self, record: &CommitRecord) {
         for entry in &record.entries {
             match entry {
-                LogEntry::Rules(rules) => self.rules = rules.as_deref().cloned(),
-                LogEntry::Loose(loose) => self.loose = *loose,
+                LogEntry::Order(Order::Rules(rules)) => self.rules = rules.as_deref().cloned(),
+                LogEntry::Order(Order::Loose(loose)) => self.loose = *loose,
                 _ => {}
             }
         }

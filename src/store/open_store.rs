@@ -26,7 +26,7 @@ use super::unsaved;
 use super::writer::{Answer, Content, Given, Message, Writer};
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Patch, Terrain, TerrainSettings, Version};
+use crate::terrain::{CommitRecord, LogEntry, Order, Patch, Terrain, TerrainSettings, Version};
 
 /// The file that is locked while a world is open.
 const LOCK: &str = "lock";
@@ -151,8 +151,8 @@ impl Store {
         let is_whole = revision == 0 && mirror.is_as_level() && data.is_empty();
         let mut entries = Vec::new();
         if is_whole {
-            entries.extend(terms.0.map(|rules| LogEntry::Rules(Some(Arc::new(rules)))));
-            entries.extend(terms.1.map(|loose| LogEntry::Loose(Some(loose))));
+            entries.extend(terms.0.map(|rules| LogEntry::Order(Order::Rules(Some(Arc::new(rules))))));
+            entries.extend(terms.1.map(|loose| LogEntry::Order(Order::Loose(Some(loose)))));
         }
         let frame = u64::from(!is_whole);
         let shared = Arc::new(Shared::default());

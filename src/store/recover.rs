@@ -21,8 +21,8 @@ use crate::format::Batch;
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, RegionPos};
 use crate::terrain::{
-    CommitRecord, Meshing, Order, Patch, ReplayError, RestoreError, Terrain, TerrainSettings, WorkLimits,
-    WorldParts,
+    Asked, CommitRecord, Meshing, Order, Patch, ReplayError, RestoreError, Terrain, TerrainSettings,
+    WorkLimits, WorldParts,
 };
 use crate::volume::{Field, Fields};
 
@@ -495,7 +495,11 @@ fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), 
     });
     // Without an entry, all of its edits were rejected.
     if !record.entries.is_empty() {
-        terrain.obey(orders)?;
+        let receipts = terrain.apply(orders);
+        let mut others = receipts.iter().filter(|receipt| receipt.asked != Asked::Edit);
+        if let Some(why) = others.find_map(|receipt| receipt.outcome.as_ref().err()) {
+            return Err(ReplayError::of(why, record.revision));
+        }
     }
     Ok(())
 }

@@ -20,7 +20,7 @@ use super::unsaved;
 use crate::format::Batch;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Patch, TerrainSettings, WorldParts};
+use crate::terrain::{CommitRecord, LogEntry, Order, Patch, TerrainSettings, WorldParts};
 
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
@@ -366,7 +366,7 @@ impl Writer {
         self.mirror.apply(&record);
         self.state.commits += 1;
         // Edits lead to the same bricks again.
-        if !record.entries.contains(&LogEntry::Change) {
+        if !record.has_change() {
             record.change = Patch::default();
         }
         self.state.pending.push(record);
@@ -484,7 +484,7 @@ impl Writer {
 /// The ground that a commit set, if it is one that did.
 fn new_ground(record: &CommitRecord) -> Option<Arc<Ground>> {
     record.entries.iter().rev().find_map(|entry| match entry {
-        LogEntry::Ground(ground) => Some(Arc::clone(ground)),
+        LogEntry::Order(Order::Ground(ground)) => Some(Arc::clone(ground)),
         _ => None,
     })
 }

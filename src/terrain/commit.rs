@@ -3,10 +3,9 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::history::{HistoryReceipt, Restored, UndoDelta};
+use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
-use super::replacement::ChangeError;
 use super::resolve::{FieldNews, Resolved, patch_of};
 use crate::lattice::ChunkPos;
 use crate::redraw::{DrawnCut, MeshUpdates, Stages};
@@ -24,9 +23,6 @@ pub struct Commit {
     pub(super) uniform: Option<UniformBricks>,
     pub(super) next_field: u64,
     pub(super) receipts: Vec<Receipt>,
-    pub(super) step: Option<HistoryReceipt>,
-    /// The receipt of the parts that it replaces.
-    pub(super) put: Option<Result<Restored, ChangeError>>,
     /// Its record, where a log is kept.
     pub(super) record: Option<RecordDraft>,
     pub(super) news: Vec<(ChunkPos, FieldNews)>,
@@ -60,10 +56,6 @@ impl fmt::Debug for Commit {
 /// The result of installing a commit.
 pub(super) struct Installed {
     pub receipts: Vec<Receipt>,
-    /// The receipt of a step through history, if the commit was one.
-    pub step: Option<HistoryReceipt>,
-    /// The receipt of the parts that it replaced.
-    pub put: Option<Result<Restored, ChangeError>>,
     /// The replaced parts of each group, if it replaced any.
     pub replaced: Vec<UndoDelta>,
 }
@@ -71,19 +63,8 @@ pub(super) struct Installed {
 impl Commit {
     /// The commit of what a transaction's work leads to.
     pub(super) fn new(ticket: u64, is_cut: bool, resolved: Resolved) -> Self {
-        let Resolved {
-            changes,
-            sample_hash,
-            uniform,
-            next_field,
-            receipts,
-            step,
-            put,
-            news,
-            whole,
-            meshes,
-            stages,
-        } = resolved;
+        let Resolved { changes, sample_hash, uniform, next_field, receipts, news, whole, meshes, stages } =
+            resolved;
         Self {
             ticket,
             changes,
@@ -91,8 +72,6 @@ impl Commit {
             uniform,
             next_field,
             receipts,
-            step,
-            put,
             record: None,
             news,
             whole,
@@ -135,16 +114,10 @@ impl Commit {
         self.whole.is_some()
     }
 
-    /// The receipts of its edits.
+    /// The receipts of its orders.
     #[cfg(feature = "plugin")]
     pub(crate) fn receipts(&self) -> &[Receipt] {
         &self.receipts
-    }
-
-    /// The receipt of its step through history, if it is one.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn step(&self) -> Option<&HistoryReceipt> {
-        self.step.as_ref()
     }
 
     /// Makes this the world.
@@ -159,7 +132,7 @@ impl Commit {
         world.shrink();
         world.next_field = self.next_field;
         world.revision += 1;
-        Installed { receipts: self.receipts, step: self.step, put: self.put, replaced }
+        Installed { receipts: self.receipts, replaced }
     }
 }
 
@@ -185,7 +158,7 @@ mod tests {
 
     /// Digs once more; returns whether the task's copy became the world, and the dropped world.
     fn dig_on(terrain: &mut Terrain, meanwhile: impl FnOnce(&mut Terrain)) -> (bool, Option<Arc<World>>) {
-        terrain.submit(&dig(40.0));
+        terrain.submit(dig(40.0));
         let commit = terrain.begin().expect("something waits").run();
         let copy = commit.copy.as_ref().map(Arc::as_ptr);
         meanwhile(terrain);

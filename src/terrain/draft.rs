@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::model::Terrain;
-use super::queue::{Queue, Taken, Together, WorkLimits};
+use super::queue::{Queue, Together, WorkLimits};
 use super::receipt::Receipt;
 use super::transaction::Transaction;
 use super::work::Work;
@@ -32,16 +32,14 @@ impl Terrain {
         queue.limits = WorkLimits::UNBOUNDED;
         let together = Together::Batch(unique());
         for edit in edits {
-            let checked = edit.check().map(|()| edit.clone()).map_err(Into::into);
-            let terms = (self.rules.clone(), self.loose);
-            queue.push_edit(self.world.grid(), edit.tag(), checked, together, terms);
+            queue.push(self.world.grid(), edit.into(), together, (self.rules.clone(), self.loose));
         }
         let mut world = Arc::clone(&self.world);
         let (mut receipts, mut regions_hash) = (Vec::new(), world.sample_hash);
         let mut change = Patch { next_field: world.next_field, ..Patch::default() };
         // All of them are one transaction, unless there is a reset among them.
-        while let Some((Taken::Edits(edits), _)) = queue.take() {
-            let transaction = self.transaction(unique(), Work::Edits(edits));
+        while let Some((edits, _)) = queue.take() {
+            let transaction = self.transaction(unique(), Work::Orders(edits, None));
             let transaction = Transaction {
                 meshing: Meshing::Never,
                 drawn_cut: None,
@@ -72,7 +70,7 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::{Ground, MaterialId, NoiseHeights};
-    use crate::terrain::{LooseSettings, TerrainSettings};
+    use crate::terrain::{LooseSettings, Order, TerrainSettings};
     use crate::volume::DiggingRules;
 
     fn terrain() -> Terrain {
@@ -109,7 +107,7 @@ mod tests {
             let (mut edited, mut put) = (terrain(), terrain());
             for own in [&mut edited, &mut put] {
                 let mut rng = Rng::with_seed(round);
-                own.submit_edits(edits(&mut rng, 6));
+                own.submit_all(edits(&mut rng, 6));
                 own.finish();
                 if round % 3 == 0 {
                     own.set_loose(Some(LooseSettings::default()));
@@ -121,11 +119,11 @@ mod tests {
             let before = state(&put);
             let draft = put.draft(&edits);
             assert_eq!(state(&put), before, "a draft changes nothing");
-            edited.submit_edits(&edits);
+            edited.submit_all(&edits);
             let receipts = edited.finish();
             assert_eq!(draft.receipts, receipts);
             assert_eq!(draft.hash, edited.world().hash());
-            put.apply_change(draft.change, Some(draft.hash)).expect("it fits");
+            put.apply_one(Order::parts(draft.change, Some(draft.hash))).outcome.expect("it fits");
             assert_eq!(state(&put), state(&edited));
             assert!(put.world().check_seams().is_flawless());
         }

@@ -3,12 +3,10 @@
 use std::sync::Arc;
 
 use super::commit::Commit;
-use super::history::{DeferredDrop, HistoryStep};
+use super::history::DeferredDrop;
 use super::model::{StaleCommit, Terrain};
-use super::queue::{Request, Submission};
-use super::receipt::Receipt;
+use super::receipt::{Asked, Receipt};
 use super::unseen::Unseen;
-use super::work::Work;
 use crate::redraw::DrawnCut;
 use crate::world::Version;
 
@@ -25,36 +23,23 @@ impl Terrain {
         self.queue.clear();
     }
 
-    /// Tags of all brushes without a receipt, in order.
-    pub(crate) fn unanswered(&self) -> impl Iterator<Item = u64> {
-        self.submissions_in_flight().chain(self.queue.edits()).map(|submission| submission.tag)
+    /// What has no receipt yet, in order: its kind, and the tags of edits.
+    pub(crate) fn unanswered(&self) -> impl Iterator<Item = (Asked, u64)> {
+        let in_flight = self.in_flight.iter().flat_map(|waiting| waiting.work.submissions());
+        in_flight.chain(self.queue.iter()).map(|own| (own.asked(), own.tag))
     }
 
-    fn submissions_in_flight(&self) -> impl Iterator<Item = &Submission> {
-        self.in_flight.iter().flat_map(|waiting| match &waiting.work {
-            Work::Edits(submissions) => &submissions[..],
-            Work::Step(..) | Work::Put(_) | Work::Cut(_) => &[],
-        })
+    /// Whether there are receipts of such orders to take.
+    pub(crate) fn has_receipts(&self, is_wanted: impl Fn(Asked) -> bool) -> bool {
+        self.receipts.iter().any(|receipt| is_wanted(receipt.asked))
     }
 
-    /// All steps through history without a receipt, in order.
-    pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
-        let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
-            Work::Step(step, _) => Some(step),
-            Work::Edits(_) | Work::Put(_) | Work::Cut(_) => None,
-        });
-        let queued = self.queue.iter().filter_map(|request| match request {
-            Request::Step(step) => Some(*step),
-            Request::Edit(_) | Request::Put(_) => None,
-        });
-        in_flight.chain(queued)
-    }
-
-    /// How many [changes](Terrain::submit_change) have no receipt yet.
-    #[cfg(feature = "replicon")]
-    pub(crate) fn waiting_changes(&self) -> usize {
-        let in_flight = self.in_flight.iter().filter(|waiting| matches!(waiting.work, Work::Put(_)));
-        in_flight.count() + self.queue.iter().filter(|request| matches!(request, Request::Put(_))).count()
+    /// Takes the receipts of such orders; the others stay.
+    pub(crate) fn take_receipts_of(&mut self, is_wanted: impl Fn(Asked) -> bool) -> Vec<Receipt> {
+        let all = std::mem::take(&mut self.receipts).into_iter();
+        let (taken, kept) = all.partition(|receipt| is_wanted(receipt.asked));
+        self.receipts = kept;
+        Vec::from(taken)
     }
 
     /// From now on the plugin shows this world, and wants to know what else is committed to it.
@@ -99,9 +84,7 @@ impl Terrain {
         old.abandon();
         self.queue.take_over(&mut old.queue);
         self.queue.change_terms((&old.rules, &old.loose), (&self.rules, &self.loose));
-        self.answered.append(&mut old.answered);
-        self.step_receipts.append(&mut old.step_receipts);
-        self.change_receipts.append(&mut old.change_receipts);
+        self.receipts.append(&mut old.receipts);
         if let Some(engine) = old.engine() {
             self.set_engine(engine.clone());
         }
@@ -109,15 +92,18 @@ impl Terrain {
         self.set_meshing(old.meshing());
     }
 
-    /// Commits a transaction that the plugin began and shows. The caller may drop the returned data on another thread.
+    /// Commits a transaction that the plugin began and shows. Returns the receipts of edits; the others are kept until they
+    /// are taken. The caller may drop the other data on another thread.
     pub(crate) fn commit_shown(
         &mut self,
         commit: Commit,
     ) -> Result<(Vec<Receipt>, DeferredDrop), StaleCommit> {
-        let done = self.install(commit)?;
+        let (mut receipts, dropped) = self.install(commit)?;
+        let others = receipts.extract_if(.., |receipt| receipt.asked != Asked::Edit);
+        others.for_each(|receipt| self.answer(receipt));
         if let Some(unseen) = &mut self.unseen {
             *unseen = Unseen::nothing(self.world.version());
         }
-        Ok(done)
+        Ok((receipts, dropped))
     }
 }

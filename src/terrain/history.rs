@@ -8,19 +8,36 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::receipt::{Asked, Receipt, Rejection};
 use super::record::CommitRecord;
 use crate::lattice::LatticeBox;
-use crate::loose::{LoosePiece, ReturnedPiece};
-use crate::volume::MaterialCounts;
+use crate::loose::LoosePiece;
 use crate::world::{Change, Patch, World, brick_bytes};
 
-/// One step through a terrain's history.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum HistoryStep {
-    /// Undoes the last group of edits: a stroke, or edits that were submitted together.
+/// A direction through a terrain's history.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Step {
     Undo,
-    /// Repeats the step that was undone last.
     Redo,
+}
+
+impl Step {
+    /// The step that an order takes, if it is one.
+    pub fn of(asked: Asked) -> Option<Self> {
+        match asked {
+            Asked::Undo => Some(Self::Undo),
+            Asked::Redo => Some(Self::Redo),
+            _ => None,
+        }
+    }
+
+    /// The receipt where there is nothing to do.
+    pub fn nothing(self) -> Receipt {
+        match self {
+            Self::Undo => Receipt::of(Asked::Undo, Err(Rejection::NothingToUndo)),
+            Self::Redo => Receipt::of(Asked::Redo, Err(Rejection::NothingToRedo)),
+        }
+    }
 }
 
 /// Statistics of a terrain's history.
@@ -32,74 +49,6 @@ pub struct History {
     pub redos: usize,
     /// Bytes that history alone holds. What it shares with the world is not counted.
     pub bytes: usize,
-}
-
-/// The result of a step. Each submitted step gets exactly one.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
-pub struct HistoryReceipt {
-    /// Undo or redo.
-    pub step: HistoryStep,
-    /// Its changes, or the reason why there were none.
-    pub outcome: Result<Restored, HistoryRejection>,
-}
-
-/// What a step through history changed.
-///
-/// Inventories that follow receipts must follow this too. Voxels of loose pieces count in `removed` and `added` here, although
-/// a receipt's `removed` leaves them out: what an inventory has to give for an undo is `added` less the materials of
-/// `returned`, and what it gets from a redo is `removed` less those of `loose`.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Restored {
-    /// The tags of the undone or redone brushes, in order, without those that had changed nothing.
-    pub tags: Vec<u64>,
-    /// Box around all samples that changed.
-    pub bounds: Option<LatticeBox>,
-    /// Voxels that are air now, by the material they had.
-    pub removed: MaterialCounts,
-    /// Voxels that are solid now, by the material they have.
-    pub added: MaterialCounts,
-    /// Solid voxels whose material changed, by the new one.
-    pub painted: MaterialCounts,
-    /// The pieces that had been cut off, and that are ground again: an undo brings them back.
-    pub returned: Vec<ReturnedPiece>,
-    /// The pieces that a redo took out of the ground again, as receipts had listed them, each with the tag of its brush.
-    pub loose: Vec<(u64, LoosePiece)>,
-}
-
-/// The reason why a step changed nothing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum HistoryRejection {
-    /// Nothing was edited, everything was undone, or the budget of bytes was exceeded.
-    #[error("there is nothing to undo")]
-    NothingToUndo,
-    /// Nothing was undone since the last edit, or the budget of bytes was exceeded.
-    #[error("there is nothing to redo")]
-    NothingToRedo,
-    /// The terrain was removed before the step's turn came, or the entity never had one.
-    #[error("the terrain no longer exists")]
-    TerrainGone,
-    /// Too much work [waits](super::WorkLimits::waiting).
-    #[error("the queue is full: try again once waiting work is done")]
-    Overloaded,
-    /// The terrain is shared, and its server does not do the step.
-    #[error("the server refuses the step")]
-    Refused,
-    /// The step panicked. World and history are unchanged.
-    #[error("the step panicked: this is a bug in bevy_burrow")]
-    Panicked,
-}
-
-impl HistoryStep {
-    /// The answer where there is nothing to do.
-    pub(super) fn nothing(self) -> HistoryReceipt {
-        let why = match self {
-            Self::Undo => HistoryRejection::NothingToUndo,
-            Self::Redo => HistoryRejection::NothingToRedo,
-        };
-        HistoryReceipt { step: self, outcome: Err(why) }
-    }
 }
 
 /// The parts that a group of edits or a step through history installs; after the commit, the parts that it replaced.
@@ -194,18 +143,18 @@ impl UndoStack {
         Self { undo: VecDeque::new(), redo: VecDeque::new(), budget, step_bytes: 0, last_dropped: 0 }
     }
 
-    fn list(&mut self, step: HistoryStep) -> &mut VecDeque<Arc<UndoDelta>> {
+    fn list(&mut self, step: Step) -> &mut VecDeque<Arc<UndoDelta>> {
         match step {
-            HistoryStep::Undo => &mut self.undo,
-            HistoryStep::Redo => &mut self.redo,
+            Step::Undo => &mut self.undo,
+            Step::Redo => &mut self.redo,
         }
     }
 
     /// The parts that the next undo or redo installs.
-    pub fn next(&self, step: HistoryStep) -> Option<&Arc<UndoDelta>> {
+    pub fn next(&self, step: Step) -> Option<&Arc<UndoDelta>> {
         match step {
-            HistoryStep::Undo => self.undo.back(),
-            HistoryStep::Redo => self.redo.back(),
+            Step::Undo => self.undo.back(),
+            Step::Redo => self.redo.back(),
         }
     }
 
@@ -257,7 +206,7 @@ impl UndoStack {
             dropped.parts.push(latest.extend(replaced));
             self.step_bytes += latest.bytes();
         } else if replaced.group > self.last_dropped {
-            self.keep(HistoryStep::Undo, replaced);
+            self.keep(Step::Undo, replaced);
         } else {
             dropped.add(replaced);
         }
@@ -267,7 +216,7 @@ impl UndoStack {
     /// Records a committed step that installed `used`; the parts that it replaced are the step in the other direction.
     pub fn record_step(
         &mut self,
-        step: HistoryStep,
+        step: Step,
         used: &Arc<UndoDelta>,
         replaced: UndoDelta,
         dropped: &mut DeferredDrop,
@@ -278,14 +227,14 @@ impl UndoStack {
             self.step_bytes -= used.bytes();
         }
         let other = match step {
-            HistoryStep::Undo => HistoryStep::Redo,
-            HistoryStep::Redo => HistoryStep::Undo,
+            Step::Undo => Step::Redo,
+            Step::Redo => Step::Undo,
         };
         self.keep(other, replaced);
         self.trim(dropped);
     }
 
-    fn keep(&mut self, step: HistoryStep, replaced: UndoDelta) {
+    fn keep(&mut self, step: Step, replaced: UndoDelta) {
         self.step_bytes += replaced.bytes();
         self.list(step).push_back(Arc::new(replaced));
     }

@@ -8,7 +8,7 @@ use fastrand::Rng;
 use glam::{IVec3, Vec3};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{Commit, Terrain, TerrainSettings, World};
+use super::{Commit, Order, Terrain, TerrainSettings, World};
 use crate::brush::{Brush, Shape};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, Column, SNAP};
@@ -309,7 +309,7 @@ fn a_running_transaction_draws_what_is_drawn_after_it() {
         let mut rng = Rng::with_seed(!index);
         for turn in 0..4 {
             if turn == 3 {
-                terrain.submit_undo();
+                terrain.submit(Order::Undo);
             } else {
                 for _ in 0..rng.u32(1..4) {
                     let brush = corner_brush(&mut rng, terrain.world().ground(), &cut);

@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::order::Order;
+use super::queue::Submission;
 use super::receipt::Receipt;
 use super::record::{CommitRecord, LogEntry};
-use super::work::Work;
 use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
 use crate::world::{Patch, World, brick_bytes};
@@ -15,8 +16,11 @@ type Terms = (Option<Arc<DiggingRules>>, Option<LooseSettings>);
 
 /// The entries that lead from some terms to others; without terms before, all of them.
 fn changed_terms(before: Option<&Terms>, after: &Terms) -> impl Iterator<Item = LogEntry> + use<> {
-    let rules = before.is_none_or(|before| before.0 != after.0).then(|| LogEntry::Rules(after.0.clone()));
-    let loose = before.is_none_or(|before| before.1 != after.1).then_some(LogEntry::Loose(after.1));
+    let rules = before
+        .is_none_or(|before| before.0 != after.0)
+        .then(|| LogEntry::Order(Order::Rules(after.0.clone())));
+    let loose =
+        before.is_none_or(|before| before.1 != after.1).then_some(LogEntry::Order(Order::Loose(after.1)));
     rules.into_iter().chain(loose)
 }
 
@@ -32,32 +36,28 @@ pub(super) struct RecordDraft {
 }
 
 impl RecordDraft {
-    /// The record of a commit, by what it was asked for, what was answered, and what changes.
-    pub fn new(work: &Work, receipts: &[Receipt], change: Patch) -> Self {
-        let (mut terms, mut entries) = (None::<[Terms; 2]>, Vec::new());
-        match work {
-            Work::Edits(submissions) => {
-                // With room for the first terms, if those before were others.
-                entries.reserve_exact(submissions.len() + 2);
-                for (submission, receipt) in submissions.iter().zip(receipts) {
-                    let (Ok(edit), Ok(_)) = (&submission.edit, &receipt.outcome) else { continue };
-                    let own = (submission.terms.rules.clone(), submission.terms.loose);
-                    let first = match terms.take() {
-                        Some([first, last]) => {
-                            entries.extend(changed_terms(Some(&last), &own));
-                            first
-                        }
-                        None => own.clone(),
-                    };
-                    terms = Some([first, own]);
-                    entries.push(LogEntry::Edit(edit.clone()));
-                }
+    /// The record of a commit, by the orders, their receipts, and what changes.
+    pub fn new(submissions: &[Submission], receipts: &[Receipt], change: Patch) -> Self {
+        // With room for the first terms, if those before were others.
+        let (mut terms, mut entries) = (None::<[Terms; 2]>, Vec::with_capacity(submissions.len() + 2));
+        for (submission, receipt) in submissions.iter().zip(receipts) {
+            let (Ok(order), Ok(_)) = (&submission.order, &receipt.outcome) else { continue };
+            if let Order::Undo | Order::Redo | Order::Parts { .. } = order {
+                entries.push(LogEntry::Change);
+                continue;
             }
-            Work::Put(put) => {
-                entries.push(put.ground.clone().map_or(LogEntry::Change, LogEntry::Ground));
+            if let Order::Edit(_) = order {
+                let own = (submission.terms.rules.clone(), submission.terms.loose);
+                let first = match terms.take() {
+                    Some([first, last]) => {
+                        entries.extend(changed_terms(Some(&last), &own));
+                        first
+                    }
+                    None => own.clone(),
+                };
+                terms = Some([first, own]);
             }
-            Work::Step(..) => entries.push(LogEntry::Change),
-            Work::Cut(_) => {}
+            entries.push(LogEntry::Order(order.clone()));
         }
         let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
         let bytes = bytes_of(&entries, &change) + room;
@@ -81,7 +81,7 @@ fn bytes_of(entries: &[LogEntry], change: &Patch) -> usize {
 /// Bytes of the rules that an entry holds.
 fn rule_bytes(entry: &LogEntry) -> usize {
     match entry {
-        LogEntry::Rules(Some(rules)) => rules.bytes(),
+        LogEntry::Order(Order::Rules(Some(rules))) => rules.bytes(),
         _ => 0,
     }
 }
@@ -158,8 +158,9 @@ impl CommitLog {
     /// Whether the records follow this revision, and one of them sets another ground.
     #[cfg(feature = "store")]
     pub fn sets_ground_after(&self, revision: u64) -> bool {
-        let sets_ground =
-            |record: &CommitRecord| record.entries.iter().any(|entry| matches!(entry, LogEntry::Ground(_)));
+        let sets_ground = |record: &CommitRecord| {
+            record.entries.iter().any(|entry| matches!(entry, LogEntry::Order(Order::Ground(_))))
+        };
         let first = self.records.front();
         first.is_some_and(|first| first.revision == revision.saturating_add(first.is_commit().into()))
             && self.records.iter().any(sets_ground)

@@ -28,11 +28,10 @@ mod model;
 mod order;
 #[cfg(test)]
 mod order_laws;
+mod parts_error;
 mod queue;
 mod receipt;
 mod record;
-mod replace;
-mod replacement;
 mod replay;
 mod resolve;
 mod run;
@@ -59,15 +58,15 @@ pub use crate::world::{
 };
 pub use commit::Commit;
 pub use draft::Draft;
-pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
+pub use history::History;
 pub use model::{StaleCommit, Terrain};
-pub use order::{Order, OrderError};
+pub use order::{Order, Request};
+pub use parts_error::PartsError;
 #[cfg(feature = "plugin")]
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
-pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
+pub use receipt::{Applied, Asked, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
-pub use replacement::ChangeError;
 pub use replay::{ReplayError, RestoreError};
 pub use resolve::FieldNews;
 pub use transaction::Transaction;

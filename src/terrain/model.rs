@@ -5,11 +5,11 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::commit::Commit;
-use super::history::{DeferredDrop, HistoryReceipt, Restored, UndoStack};
+use super::history::{DeferredDrop, Step, UndoStack};
 use super::log::CommitLog;
-use super::queue::{Queue, Request, Taken};
-use super::receipt::Receipt;
-use super::replacement::ChangeError;
+use super::order::Order;
+use super::queue::Queue;
+use super::receipt::{Receipt, Rejection};
 use super::transaction::Transaction;
 #[cfg(feature = "plugin")]
 use super::unseen::Unseen;
@@ -24,17 +24,6 @@ use crate::world::{Meshing, TerrainError, TerrainSettings, World, unique};
 
 /// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
 pub(super) const UNDO_BUDGET: usize = 64 << 20;
-
-/// The most untaken receipts that are kept; then the oldest are dropped.
-const KEPT_ANSWERS: usize = 1 << 16;
-
-/// Keeps one more receipt.
-fn keep<T>(answers: &mut VecDeque<T>, answer: T) {
-    if answers.len() == KEPT_ANSWERS {
-        answers.pop_front();
-    }
-    answers.push_back(answer);
-}
 
 /// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -60,12 +49,10 @@ pub struct Terrain {
     voxel_size: f32,
     pub(super) queue: Queue,
     pub(super) in_flight: Option<InFlight>,
-    pub(super) answered: VecDeque<Receipt>,
+    pub(super) receipts: VecDeque<Receipt>,
     pub(super) rules: Option<Arc<DiggingRules>>,
     pub(super) loose: Option<LooseSettings>,
     pub(super) undo_stack: UndoStack,
-    pub(super) step_receipts: VecDeque<HistoryReceipt>,
-    pub(super) change_receipts: VecDeque<Result<Restored, ChangeError>>,
     pub(super) log: Option<CommitLog>,
     pub(super) meshing: Meshing,
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
@@ -110,12 +97,10 @@ impl Terrain {
             voxel_size: settings.voxel_size,
             queue: Queue::default(),
             in_flight: None,
-            answered: VecDeque::new(),
+            receipts: VecDeque::new(),
             rules: None,
             loose: None,
             undo_stack: UndoStack::new(UNDO_BUDGET),
-            step_receipts: VecDeque::new(),
-            change_receipts: VecDeque::new(),
             log: None,
             meshing: Meshing::default(),
             drawn_cut: None,
@@ -181,7 +166,7 @@ impl Terrain {
         self.loose.as_ref()
     }
 
-    /// Brushes, and steps through history, that wait for their transaction.
+    /// The number of orders that wait for their transaction.
     pub fn queued(&self) -> usize {
         self.queue.len()
     }
@@ -191,8 +176,8 @@ impl Terrain {
         self.in_flight.is_some()
     }
 
-    /// Makes one transaction of what is queued: of the brushes up to the first step through history, as many as the
-    /// [limits](Self::set_work_limits) allow, or of such a step.
+    /// Makes one transaction of what is queued: of the edits up to the first other order, as many as the
+    /// [limits](Self::set_work_limits) allow, or of such an order.
     /// `None` when nothing waits, or when one is under way already. Run it anywhere, then hand its commit to
     /// [`commit`](Self::commit).
     ///
@@ -207,21 +192,19 @@ impl Terrain {
             return None;
         }
         let (work, estimate) = loop {
-            let Some(taken) = self.queue.take() else {
+            let Some((orders, estimate)) = self.queue.take() else {
                 // Steps that found nothing may have been the last that waited.
                 self.log_terms();
                 return None;
             };
-            match taken {
-                (Taken::Edits(edits), estimate) => break (Work::Edits(edits), estimate),
-                (Taken::Put(put), estimate) => break (Work::Put(put), estimate),
-                (Taken::Step(step), estimate) => match self.undo_stack.next(step) {
-                    Some(target) => break (Work::Step(step, Arc::clone(target)), estimate),
-                    None => {
-                        self.queue.finish(estimate);
-                        self.answer_step(step.nothing());
-                    }
-                },
+            let step = orders.first().and_then(|first| Step::of(first.asked()));
+            let target = step.and_then(|step| self.undo_stack.next(step)).cloned();
+            match step.filter(|_| target.is_none()) {
+                None => break (Work::Orders(orders, target), estimate),
+                Some(step) => {
+                    self.queue.finish(estimate);
+                    self.answer(step.nothing());
+                }
             }
         };
         Some(self.start(work, estimate, is_plugins))
@@ -276,7 +259,7 @@ impl Terrain {
             self.drawn_cut = Some(drawn);
         }
         // The world stays as it is.
-        if let Work::Cut(_) = done.work {
+        if done.work.is_cut() {
             return Ok(Default::default());
         }
         let mut copy = commit.copy.take();
@@ -294,71 +277,49 @@ impl Terrain {
         let record = commit.record.take();
         let installed = commit.install(Arc::make_mut(&mut self.world));
         self.queue.finish(done.estimate);
-        installed.step.into_iter().for_each(|receipt| self.answer_step(receipt));
         let mut dropped = DeferredDrop::default();
         if let Some(log) = &mut self.log {
             log.enter(&self.world, record.unwrap_or_default(), &mut dropped.records);
         }
         self.log_terms();
         dropped.copy = copy;
+        let order = done.work.submissions().first().and_then(|first| first.order.as_ref().ok());
+        let replaces_parts = order.is_some_and(Order::replaces_parts);
         // Undo steps recorded before the replacement refer to parts that no longer exist.
-        if let (Work::Put(put), Some(Ok(_))) = (&done.work, &installed.put)
-            && !put.is_empty()
-        {
+        if replaces_parts && installed.receipts.iter().all(|receipt| receipt.outcome.is_ok()) {
             self.undo_stack.clear(&mut dropped);
         }
         for replaced in installed.replaced {
-            match &done.work {
-                Work::Edits(_) => self.undo_stack.record(replaced, &mut dropped),
-                Work::Step(step, used) => self.undo_stack.record_step(*step, used, replaced, &mut dropped),
-                Work::Put(_) | Work::Cut(_) => dropped.add(replaced),
+            match (order.and_then(|order| Step::of(order.asked())), done.work.target()) {
+                (Some(step), Some(used)) => self.undo_stack.record_step(step, used, replaced, &mut dropped),
+                _ if replaces_parts => dropped.add(replaced),
+                _ => self.undo_stack.record(replaced, &mut dropped),
             }
         }
-        if let Some(receipt) = installed.put {
-            keep(&mut self.change_receipts, receipt);
-        }
         Ok((installed.receipts, dropped))
-    }
-
-    /// Keeps the receipt of a brush until it is taken.
-    pub(super) fn answer(&mut self, receipt: Receipt) {
-        keep(&mut self.answered, receipt);
-    }
-
-    /// Keeps the receipt of a step until it is taken.
-    pub(super) fn answer_step(&mut self, receipt: HistoryReceipt) {
-        keep(&mut self.step_receipts, receipt);
     }
 
     /// Abandons the running transaction, for example because its task was lost. Its work is queued again, in
     /// front.
     pub fn abandon(&mut self) {
         let Some(lost) = self.in_flight.take() else { return };
-        match lost.work {
-            Work::Edits(submissions) => self.queue.put_back(submissions.iter().cloned().map(Request::Edit)),
-            Work::Step(step, _) => self.queue.put_back(std::iter::once(Request::Step(step))),
-            Work::Put(put) => self.queue.put_back(std::iter::once(Request::Put(put))),
-            // It was not queued either.
-            Work::Cut(_) => {}
-        }
+        // A new cut was not queued either.
+        self.queue.put_back(lost.work.submissions());
     }
 
     /// Whether no queued or running edit changes these samples. A queued step counts as reaching everything in the
     /// history. Loose pieces are not predicted: a piece may reach farther than the edit that cuts it off.
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
-        let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
-            Work::Edits(submissions) => submissions.iter().all(|submission| submission.misses(bounds)),
-            Work::Step(_, target) => target.bounds.is_none_or(|own| own.intersection(bounds).is_none()),
-            Work::Put(put) => put.misses(bounds),
-            Work::Cut(_) => true,
+        let misses = |order: &Result<Order, Rejection>, step: &dyn Fn() -> bool| {
+            order.as_ref().map_or(true, |order| order.misses(bounds, step))
+        };
+        let in_flight = self.in_flight.iter().all(|waiting| {
+            let own = waiting.work.target().and_then(|target| target.bounds);
+            let step = || own.is_some_and(|own| own.intersection(bounds).is_some());
+            waiting.work.submissions().iter().all(|own| misses(&own.order, &step))
         });
-        let mut queued = self.queue.iter();
-        in_flight
-            && queued.all(|request| match request {
-                Request::Edit(submission) => submission.misses(bounds),
-                Request::Step(_) => !self.undo_stack.reaches(bounds),
-                Request::Put(put) => put.misses(bounds),
-            })
+        let step = || self.undo_stack.reaches(bounds);
+        in_flight && self.queue.iter().all(|own| misses(&own.order, &step))
     }
 
     /// The cut that is drawn; `None` if all of the world is drawn in full detail.

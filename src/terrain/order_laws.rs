@@ -10,10 +10,12 @@ use std::sync::Arc;
 use fastrand::Rng;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::history::{HistoryReceipt, HistoryRejection, HistoryStep};
 use super::queue::Together;
 use super::run::PANICS;
-use super::{LooseSettings, Receipt, Rejection, Terrain, TerrainSettings, Transaction, WorkLimits, unique};
+use super::{
+    Asked, LooseSettings, Order, Receipt, Rejection, Request, Terrain, TerrainSettings, Transaction,
+    WorkLimits, unique,
+};
 use crate::brush::{Brush, Edit};
 use crate::ground::Ground;
 use crate::volume::DiggingRules;
@@ -24,7 +26,7 @@ use crate::worlds;
 enum Ask {
     /// A brush, sent in a frame.
     Brush(Brush, usize),
-    Step(HistoryStep),
+    Step(Asked),
     Rules(DiggingRules),
     Loose(Option<LooseSettings>),
 }
@@ -33,8 +35,8 @@ fn script(rng: &mut Rng, ground: &Ground) -> Vec<Ask> {
     let (mut frame, mut stroke) = (0, 0);
     let count = rng.u64(4..24);
     let ask = |tag: u64| match rng.u32(0..20) {
-        0..=2 => Ask::Step(HistoryStep::Undo),
-        3 => Ask::Step(HistoryStep::Redo),
+        0..=2 => Ask::Step(Asked::Undo),
+        3 => Ask::Step(Asked::Redo),
         4 => Ask::Rules(if rng.bool() { worlds::random_rules(rng, ground) } else { DiggingRules::default() }),
         5 => {
             let settings = LooseSettings { largest: 3000, crumbs: 6, debris: 400 };
@@ -58,6 +60,10 @@ fn script(rng: &mut Rng, ground: &Ground) -> Vec<Ask> {
     (1..=count).map(ask).collect()
 }
 
+fn order_of(step: Asked) -> Order {
+    if step == Asked::Undo { Order::Undo } else { Order::Redo }
+}
+
 /// A script in short: what was sent in which frame, of which stroke.
 fn in_short(script: &[Ask]) -> String {
     let word = |ask: &Ask| match ask {
@@ -77,7 +83,7 @@ fn in_short(script: &[Ask]) -> String {
 struct Said {
     /// By tag.
     receipts: BTreeMap<u64, Receipt>,
-    steps: Vec<HistoryReceipt>,
+    steps: Vec<Receipt>,
     hash: u64,
     history: super::History,
 }
@@ -85,6 +91,10 @@ struct Said {
 impl Said {
     fn hear(&mut self, receipts: Vec<Receipt>) {
         for receipt in receipts {
+            if receipt.asked != Asked::Edit {
+                self.steps.push(receipt);
+                continue;
+            }
             let tag = receipt.tag;
             assert!(self.receipts.insert(tag, receipt).is_none(), "two receipts for {tag:#x}");
         }
@@ -105,16 +115,13 @@ fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rn
         match ask {
             Ask::Brush(brush, frame) => {
                 let together = *frames.entry(*frame).or_insert_with(|| Together::Batch(unique()));
-                let edit = Edit::quantize(brush).map_err(Rejection::from);
-                match terrain.admit(edit.as_ref().ok()) {
-                    Ok(()) => terrain.queue_edit(brush.tag, edit, brush.stroke, together),
-                    Err(rejection) => {
-                        said.hear(vec![Receipt { tag: brush.tag, outcome: Err(rejection) }]);
-                    }
+                let request = Request::from(brush);
+                match terrain.admit(&request) {
+                    Ok(()) => terrain.queue_order(request, together).expect("no rules"),
+                    Err(rejection) => said.hear(vec![Receipt::of_edit(brush.tag, Err(rejection))]),
                 }
             }
-            Ask::Step(HistoryStep::Undo) => terrain.submit_undo(),
-            Ask::Step(HistoryStep::Redo) => terrain.submit_redo(),
+            Ask::Step(step) => terrain.submit(order_of(*step)),
             Ask::Rules(rules) => terrain.set_rules(rules.clone()).expect("valid rules"),
             Ask::Loose(settings) => terrain.set_loose(*settings),
         }
@@ -149,8 +156,7 @@ fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rn
         said.hear(terrain.commit(commit).expect("it is waited for"));
     }
     assert_eq!((terrain.queued(), terrain.waiting_work()), (0, 0));
-    said.hear(terrain.take_answered());
-    said.steps = terrain.take_history_receipts();
+    said.hear(terrain.take_receipts());
     (said.hash, said.history) = (terrain.world().hash(), terrain.history());
     check_log(&mut terrain);
     (taken, said)
@@ -189,7 +195,7 @@ fn by_the_book(mut terrain: Terrain, script: &[Ask]) -> (BTreeMap<u64, Receipt>,
                 let is_open = open.is_some_and(|(open, is_last)| open == key && is_last);
                 let is_same = open.is_some_and(|(open, _)| open == key);
                 let receipt = if brush.tag & PANICS != 0 && Edit::quantize(brush).is_ok() {
-                    Receipt { tag: brush.tag, outcome: Err(Rejection::Panicked) }
+                    Receipt::of_edit(brush.tag, Err(Rejection::Panicked))
                 } else {
                     // Each edit is its own step.
                     terrain.apply([Brush { stroke: None, ..brush.clone() }]).remove(0)
@@ -208,16 +214,12 @@ fn by_the_book(mut terrain: Terrain, script: &[Ask]) -> (BTreeMap<u64, Receipt>,
             Ask::Step(step) => {
                 open = None;
                 let (from, to) = match step {
-                    HistoryStep::Undo => (&mut past, &mut future),
-                    HistoryStep::Redo => (&mut future, &mut past),
+                    Asked::Undo => (&mut past, &mut future),
+                    _ => (&mut future, &mut past),
                 };
                 let group = from.pop();
                 for _ in group.iter().flatten() {
-                    let receipt = match step {
-                        HistoryStep::Undo => terrain.undo(),
-                        HistoryStep::Redo => terrain.redo(),
-                    };
-                    assert!(receipt.outcome.is_ok());
+                    assert!(terrain.apply_one(order_of(*step)).outcome.is_ok());
                 }
                 to.extend(group.clone());
                 steps.push(group);
@@ -255,7 +257,7 @@ fn nothing_depends_on_when_transactions_begin() {
         let asked = script.iter().filter(|ask| matches!(ask, Ask::Brush(..))).count();
         assert_eq!(said.receipts.len(), asked, "script {index}: each brush is answered once");
         overloaded += asked - said.receipts.values().filter(|receipt| is_taken(receipt)).count();
-        let was_overloaded = |receipt: &HistoryReceipt| receipt.outcome == Err(HistoryRejection::Overloaded);
+        let was_overloaded = |receipt: &Receipt| receipt.outcome == Err(Rejection::Overloaded);
         let steps =
             |said: Said| said.steps.into_iter().filter(|step| !was_overloaded(step)).collect::<Vec<_>>();
 

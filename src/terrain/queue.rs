@@ -1,4 +1,4 @@
-//! The queue: edits and steps through history that wait for their transaction.
+//! The queue: orders that wait for their transaction.
 //!
 //! Rules, loose settings and the group of an edit are fixed when it is submitted, so the result does not depend on when
 //! transactions begin.
@@ -6,12 +6,10 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::history::HistoryStep;
-use super::receipt::Rejection;
-use super::replacement::Put;
-use crate::brush::{Edit, Kind};
-use crate::edits::reach;
-use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
+use super::order::{Order, Request};
+use super::receipt::{Asked, Rejection};
+use crate::brush::Edit;
+use crate::lattice::ChunkGrid;
 use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
 
@@ -45,19 +43,6 @@ impl Default for WorkLimits {
     }
 }
 
-/// The fixed work of an edit, in bricks.
-const EDIT: u64 = 20;
-/// The work that a step through history counts as, in bricks.
-const STEP: u64 = 200;
-/// How many times as much work a brick is for an operation that reads a stencil around each sample.
-const LOOKS_AROUND: u64 = 4;
-
-/// The work of an edit, in bricks.
-fn work_of(grid: ChunkGrid, edit: &Edit) -> u64 {
-    let weight = if edit.kind() == Kind::Sculpt { LOOKS_AROUND } else { 1 };
-    EDIT + weight * reach(grid, edit).map_or(0, |reach| BrickPos::range(reach).volume())
-}
-
 /// The reason why consecutive edits are one step of undo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Together {
@@ -89,48 +74,42 @@ impl Terms {
     }
 }
 
-/// An edit that was submitted.
+/// An order that was submitted, and what was fixed then.
 #[derive(Clone, Debug)]
 pub(crate) struct Submission {
     pub tag: u64,
-    pub edit: Result<Edit, Rejection>,
+    /// Only edits are rejected before their turn comes.
+    pub order: Result<Order, Rejection>,
     pub(super) terms: Terms,
     work: u64,
 }
 
 impl Submission {
+    /// The edit, if it is a valid one.
+    pub(super) fn edit(&self) -> Option<&Edit> {
+        self.order.as_ref().ok().and_then(Order::edit)
+    }
+
+    /// The kind of its order.
+    pub(super) fn asked(&self) -> Asked {
+        self.order.as_ref().map_or(Asked::Edit, Order::asked)
+    }
+
     /// Returns `true` if it belongs to the same group, under the same rules and loose settings.
     pub(super) fn goes_with(&self, other: &Self) -> bool {
         self.terms.is_same(&other.terms)
     }
 
-    /// Returns `true` if it certainly changes none of these samples.
-    pub(super) fn misses(&self, samples: LatticeBox) -> bool {
-        self.edit.as_ref().map_or(true, |edit| edit.reach().intersection(samples).is_none())
+    /// Whether it is a transaction of its own.
+    fn is_alone(&self) -> bool {
+        self.order.as_ref().is_ok_and(Order::is_alone)
     }
 }
 
-/// Requests that wait for their transaction.
-#[expect(clippy::large_enum_variant, reason = "almost all are edits")]
-pub(super) enum Request {
-    Edit(Submission),
-    Step(HistoryStep),
-    Put(Arc<Put>),
-}
-
-impl Request {
-    fn work(&self) -> u64 {
-        match self {
-            Self::Edit(submission) => submission.work,
-            Self::Step(_) | Self::Put(_) => STEP,
-        }
-    }
-}
-
-/// Requests in order, and the work of these and of the transaction under way.
+/// Orders that wait, and the work of these and of the transaction under way.
 #[derive(Default)]
 pub(super) struct Queue {
-    requests: VecDeque<Request>,
+    submissions: VecDeque<Submission>,
     pub limits: WorkLimits,
     work: u64,
     /// The group of the latest edit, while another edit may join it.
@@ -139,41 +118,26 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    /// Queues an edit that is valid or not.
-    pub fn push_edit(
+    /// Queues an order. An edit joins the group of the one before it if both belong `together`; edits after any other
+    /// order begin a new group.
+    pub fn push(
         &mut self,
         grid: ChunkGrid,
-        tag: u64,
-        edit: Result<Edit, Rejection>,
+        request: Request,
         together: Together,
         (rules, loose): (Option<Arc<DiggingRules>>, Option<LooseSettings>),
     ) {
+        let (work, is_edit) = (request.work(grid), request.asked() == Asked::Edit);
+        let together = request.stroke.map_or(together, Together::Stroke);
         let group = match self.open {
             Some((open, group)) if open == together => group,
-            _ => {
-                self.groups += 1;
-                self.groups
-            }
+            _ => self.groups + 1,
         };
-        self.open = Some((together, group));
-        let work = edit.as_ref().map_or(EDIT, |edit| work_of(grid, edit));
+        self.groups = self.groups.max(group);
+        self.open = is_edit.then_some((together, group));
         self.work += work;
-        let terms = Terms { group, rules, loose };
-        self.requests.push_back(Request::Edit(Submission { tag, edit, terms, work }));
-    }
-
-    /// Queues a step. Edits after it begin a new group.
-    pub fn push_step(&mut self, step: HistoryStep) {
-        self.close_group();
-        self.work += STEP;
-        self.requests.push_back(Request::Step(step));
-    }
-
-    /// Queues replacement parts. Edits after them begin a new group.
-    pub fn push_put(&mut self, put: Put) {
-        self.close_group();
-        self.work += STEP;
-        self.requests.push_back(Request::Put(Arc::new(put)));
+        let Request { tag, order, .. } = request;
+        self.submissions.push_back(Submission { tag, order, terms: Terms { group, rules, loose }, work });
     }
 
     /// Makes the next edit begin a new group.
@@ -181,18 +145,9 @@ impl Queue {
         self.open = None;
     }
 
-    /// Returns `true` if there is room for an edit, valid or not.
-    pub fn has_room(&self, grid: ChunkGrid, edit: Option<&Edit>) -> bool {
-        self.fits(edit.map_or(EDIT, |edit| work_of(grid, edit)))
-    }
-
-    /// Returns `true` if there is room for a step.
-    pub fn has_room_for_step(&self) -> bool {
-        self.fits(STEP)
-    }
-
-    fn fits(&self, more: u64) -> bool {
-        self.work == 0 || self.work.saturating_add(more) <= self.limits.waiting
+    /// Returns `true` if there is room for this much work.
+    pub fn has_room(&self, work: u64) -> bool {
+        self.work == 0 || self.work.saturating_add(work) <= self.limits.waiting
     }
 
     /// The work of everything that waits, the running transaction included.
@@ -205,67 +160,46 @@ impl Queue {
         self.work = self.work.saturating_sub(work);
     }
 
-    /// Takes the next step, or edits up to the first step and to the limit of a transaction; and their work.
-    pub fn take(&mut self) -> Option<(Taken, u64)> {
-        let single = match self.requests.front()? {
-            Request::Edit(_) => None,
-            Request::Step(step) => Some(Taken::Step(*step)),
-            Request::Put(put) => Some(Taken::Put(Arc::clone(put))),
-        };
-        if let Some(single) = single {
-            self.requests.pop_front();
-            return Some((single, STEP));
-        }
+    /// Takes the orders of the next transaction, and their work: edits up to its limit, or one order that is a
+    /// transaction of its own.
+    pub fn take(&mut self) -> Option<(Arc<[Submission]>, u64)> {
+        let is_single = self.submissions.front()?.is_alone();
         let mut work = 0_u64;
-        // A reset is a transaction of its own.
-        let is_reset = |request: &Request| match request {
-            Request::Edit(own) => own.edit.as_ref().is_ok_and(|edit| edit.kind() == Kind::Reset),
-            Request::Step(_) | Request::Put(_) => false,
+        let is_taken = |own: &&Submission| {
+            let fits = work == 0 || work.saturating_add(own.work) <= self.limits.transaction;
+            let is_apart = work != 0 && (is_single || own.is_alone());
+            work += if fits { own.work } else { 0 };
+            fits && !is_apart
         };
-        let is_single = self.requests.front().is_some_and(is_reset);
-        let is_taken = |request: &&Request| {
-            let fits = work == 0 || work.saturating_add(request.work()) <= self.limits.transaction;
-            let is_alone = work != 0 && (is_single || is_reset(request));
-            work += if fits { request.work() } else { 0 };
-            fits && !is_alone && matches!(request, Request::Edit(_))
-        };
-        let count = self.requests.iter().take_while(is_taken).count();
-        let edits = self.requests.drain(..count).filter_map(|request| match request {
-            Request::Edit(submission) => Some(submission),
-            Request::Step(_) | Request::Put(_) => None,
-        });
-        let edits: Arc<[Submission]> = edits.collect();
+        let count = self.submissions.iter().take_while(is_taken).count();
+        let taken: Arc<[Submission]> = self.submissions.drain(..count).collect();
         // Frees what a flood of edits needed.
-        if self.requests.is_empty() {
-            self.requests.shrink_to(1);
+        if self.submissions.is_empty() {
+            self.submissions.shrink_to(1);
         }
-        let work = edits.iter().map(|submission| submission.work).sum();
-        Some((Taken::Edits(edits), work))
+        let work = taken.iter().map(|submission| submission.work).sum();
+        Some((taken, work))
     }
 
-    /// Returns requests that were taken but not done to the front of the queue.
-    pub fn put_back(&mut self, requests: impl DoubleEndedIterator<Item = Request>) {
-        requests.rev().for_each(|request| self.requests.push_front(request));
+    /// Returns orders that were taken but not done to the front of the queue.
+    pub fn put_back(&mut self, submissions: &[Submission]) {
+        submissions.iter().rev().for_each(|own| self.submissions.push_front(own.clone()));
     }
 
-    /// Takes over the requests and limits of another queue; this queue is empty.
+    /// Takes over the orders and limits of another queue; this queue is empty.
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub fn take_over(&mut self, other: &mut Self) {
         *self = Self { limits: other.limits, ..std::mem::take(other) };
     }
 
-    /// Replaces the rules and loose settings of waiting edits that have these ones.
+    /// Replaces the rules and loose settings of waiting orders that have these ones.
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub fn change_terms(
         &mut self,
         (old_rules, old_loose): (&Option<Arc<DiggingRules>>, &Option<LooseSettings>),
         (rules, loose): (&Option<Arc<DiggingRules>>, &Option<LooseSettings>),
     ) {
-        let edits = self.requests.iter_mut().filter_map(|request| match request {
-            Request::Edit(submission) => Some(&mut submission.terms),
-            Request::Step(_) | Request::Put(_) => None,
-        });
-        for terms in edits {
+        for Submission { terms, .. } in &mut self.submissions {
             let is_old = match (&terms.rules, old_rules) {
                 (Some(own), Some(old)) => Arc::ptr_eq(own, old),
                 (own, old) => own.is_none() && old.is_none(),
@@ -276,32 +210,17 @@ impl Queue {
         }
     }
 
-    /// Drops all requests.
+    /// Drops all orders.
     #[cfg(feature = "plugin")]
     pub fn clear(&mut self) {
         *self = Self { limits: self.limits, groups: self.groups, ..Self::default() };
     }
 
     pub fn len(&self) -> usize {
-        self.requests.len()
+        self.submissions.len()
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &Request> {
-        self.requests.iter()
+    pub fn iter(&self) -> impl Iterator<Item = &Submission> {
+        self.submissions.iter()
     }
-
-    /// The edits among them.
-    pub fn edits(&self) -> impl Iterator<Item = &Submission> {
-        self.requests.iter().filter_map(|request| match request {
-            Request::Edit(submission) => Some(submission),
-            Request::Step(_) | Request::Put(_) => None,
-        })
-    }
-}
-
-/// The work of a transaction.
-pub(super) enum Taken {
-    Edits(Arc<[Submission]>),
-    Step(HistoryStep),
-    Put(Arc<Put>),
 }

@@ -1,41 +1,117 @@
-//! Receipts: the result of a brush.
+//! Receipts: what came of an order.
 
+use std::fmt;
+
+use super::parts_error::PartsError;
 use crate::brush::BrushError;
 use crate::lattice::{ChunkPos, LatticeBox};
-use crate::loose::LoosePiece;
-use crate::volume::{FieldId, MaterialCounts, Refused, Scenario};
+use crate::loose::{LoosePiece, ReturnedPiece};
+use crate::volume::{FieldId, MaterialCounts, Refused, RulesError, Scenario};
 
-/// The result of a brush. Each submitted brush gets exactly one receipt.
+/// What came of an order. Each brush, step through history, replacement of parts and ground that was submitted gets exactly
+/// one; rules and settings of loose pieces get one only if they are invalid.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct Receipt {
-    /// The brush's tag.
+    /// What was asked for.
+    pub asked: Asked,
+    /// The tag of the brush; 0 for everything else.
     pub tag: u64,
     /// What it changed, or why it was rejected.
     pub outcome: Result<Applied, Rejection>,
 }
 
-/// What a brush changed. A brush that changed nothing, such as a dig in the air, leaves all of this empty.
+impl Receipt {
+    /// The receipt of an edit.
+    pub fn of_edit(tag: u64, outcome: Result<Applied, Rejection>) -> Self {
+        Self { asked: Asked::Edit, tag, outcome }
+    }
+
+    /// The receipt of anything else.
+    pub fn of(asked: Asked, outcome: Result<Applied, Rejection>) -> Self {
+        Self { asked, tag: 0, outcome }
+    }
+
+    /// Whether the order failed for a reason that other machines may not have.
+    #[cfg(feature = "net")]
+    pub(crate) fn is_local_failure(&self) -> bool {
+        let why = self.outcome.as_ref().err();
+        matches!(why, Some(Rejection::Panicked | Rejection::Overloaded | Rejection::TerrainGone))
+    }
+}
+
+/// The kinds of [orders](super::Order), as receipts name them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Asked {
+    /// An edit.
+    Edit,
+    /// An undo.
+    Undo,
+    /// A redo.
+    Redo,
+    /// A replacement of parts of the world.
+    Parts,
+    /// Another ground.
+    Ground,
+    /// Other rules.
+    Rules,
+    /// Other settings of loose pieces.
+    Loose,
+}
+
+impl fmt::Display for Asked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Edit => "edit",
+            Self::Undo => "undo",
+            Self::Redo => "redo",
+            Self::Parts => "parts",
+            Self::Ground => "ground",
+            Self::Rules => "rules",
+            Self::Loose => "loose settings",
+        })
+    }
+}
+
+impl Asked {
+    /// Whether it is a step through history.
+    pub fn is_step(self) -> bool {
+        matches!(self, Self::Undo | Self::Redo)
+    }
+}
+
+/// What an order changed. An order that changed nothing, such as a dig in the air, leaves all of this empty.
+///
+/// Inventories that follow receipts must follow those of undos and redos too. There, voxels of loose pieces count in `removed`
+/// and `added`, although an edit's `removed` leaves them out: what an inventory has to give for an undo is `added` less the
+/// materials of `returned`, and what it gets from a redo is `removed` less those of `cut_again`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Applied {
-    /// The scenario in each chunk whose samples changed; more than one chunk is the paper's fifth scenario.
+    /// The scenario in each chunk whose samples changed, of an edit; more than one chunk is the paper's fifth scenario.
     pub chunks: Vec<ChunkScenario>,
     /// Box around all samples that changed.
     pub bounds: Option<LatticeBox>,
-    /// Voxels dug away, by material.
+    /// Voxels dug away, by the material they had.
     pub removed: MaterialCounts,
-    /// Voxels filled, by material.
+    /// Voxels filled, by the material they have.
     pub added: MaterialCounts,
     /// Solid voxels whose material changed, by the new one.
     pub painted: MaterialCounts,
     /// Voxels that the terrain's [`DiggingRules`](crate::volume::DiggingRules) kept from changing, by reason.
     pub refused: Refused,
-    /// Pieces of ground that it cut off, where the terrain [looks for them](super::Terrain::set_loose). Those that are gone
+    /// Pieces of ground that an edit cut off, where the terrain [looks for them](super::Terrain::set_loose). Those that are gone
     /// are not among `removed`.
     pub loose: Vec<LoosePiece>,
     /// Whether the search for loose pieces ended at its [budget](super::LooseSettings) before it had looked everywhere. Pieces
     /// that it did not find stay as ground.
     pub has_unsearched: bool,
+    /// The tags of the undone or redone brushes, in order, without those that had changed nothing.
+    pub tags: Vec<u64>,
+    /// The pieces that had been cut off, and that are ground again: an undo brings them back.
+    pub returned: Vec<ReturnedPiece>,
+    /// The pieces that a redo took out of the ground again, as receipts had listed them, each with the tag of its brush.
+    pub cut_again: Vec<(u64, LoosePiece)>,
 }
 
 impl Applied {
@@ -56,27 +132,39 @@ pub struct ChunkScenario {
     pub field: FieldId,
 }
 
-/// Why a brush was rejected. A rejected brush changes nothing.
+/// Why an order was rejected. A rejected order changes nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Rejection {
     /// The brush itself is not valid.
     #[error(transparent)]
     Brush(#[from] BrushError),
-    /// The terrain was removed before its turn came, or the entity never had one.
-    #[error("the terrain is gone")]
-    TerrainGone,
+    /// The rules are not valid.
+    #[error(transparent)]
+    Rules(#[from] RulesError),
+    /// The parts or the ground do not fit the world.
+    #[error(transparent)]
+    Parts(#[from] PartsError),
     /// The brush reaches no column of the world.
     #[error("the brush lies outside the world")]
     OutsideWorld,
+    /// Nothing was edited, everything was undone, or the history exceeded its budget of bytes.
+    #[error("there is nothing to undo")]
+    NothingToUndo,
+    /// Nothing was undone since the last edit, or the history exceeded its budget of bytes.
+    #[error("there is nothing to redo")]
+    NothingToRedo,
+    /// The terrain was removed before its turn came, or the entity never had one.
+    #[error("the terrain no longer exists")]
+    TerrainGone,
     /// Too much work is [waiting](super::WorkLimits::waiting).
-    #[error("too much work waits already")]
+    #[error("the queue is full: try again once waiting work is done")]
     Overloaded,
     /// The authority over a shared terrain, usually a server, refused it.
     #[error("the server refused it")]
     Refused,
-    /// Applying it panicked. The others of its transaction were applied without it.
-    #[error("applying the brush panicked; this is a bug of the plugin's")]
+    /// Applying it panicked. World and history are unchanged, and the others of its transaction were applied without it.
+    #[error("applying it panicked: this is a bug in bevy_burrow")]
     Panicked,
 }
 

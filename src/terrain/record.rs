@@ -3,8 +3,6 @@
 use std::sync::Arc;
 
 use super::order::Order;
-use crate::brush::Edit;
-use crate::ground::Ground;
 use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
 use crate::world::Patch;
@@ -17,16 +15,18 @@ pub const SIMULATION: u32 = 1;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LogEntry {
-    /// From here on edits obey these rules.
-    Rules(Option<Arc<DiggingRules>>),
-    /// From here on loose pieces are searched for like this.
-    Loose(Option<LooseSettings>),
-    /// An edit that was applied.
-    Edit(Edit),
+    /// An order that was carried out, under the rules and settings of the orders before it: an edit, another ground, or rules and
+    /// settings for what follows.
+    Order(Order),
     /// A step through history, or replaced parts: the record's [change](CommitRecord::change) contains them.
     Change,
-    /// Another ground was [set](super::Terrain::set_ground) below all edits.
-    Ground(Arc<Ground>),
+}
+
+impl LogEntry {
+    /// Whether it changes the world, and not only what later edits obey.
+    fn is_commit(&self) -> bool {
+        !matches!(self, Self::Order(Order::Rules(_) | Order::Loose(_)))
+    }
 }
 
 /// A commit: the requests and their results.
@@ -47,24 +47,26 @@ impl CommitRecord {
     /// Whether it is a commit. Otherwise it only holds rules and settings for later edits, and the revision does not
     /// change.
     pub fn is_commit(&self) -> bool {
-        let changes =
-            |entry: &LogEntry| matches!(entry, LogEntry::Edit(_) | LogEntry::Change | LogEntry::Ground(_));
-        self.entries.is_empty() || self.entries.iter().any(changes)
+        self.entries.is_empty() || self.entries.iter().any(LogEntry::is_commit)
     }
-}
 
-impl CommitRecord {
+    /// Whether its [change](Self::change) counts: a step through history or replaced parts. Edits lead to theirs again.
+    pub fn has_change(&self) -> bool {
+        let is_change = |entry: &LogEntry| match entry {
+            LogEntry::Change => true,
+            LogEntry::Order(order) => matches!(order, Order::Undo | Order::Redo | Order::Parts { .. }),
+        };
+        self.entries.iter().any(is_change)
+    }
+
     /// The orders that it was made of. Its change stands for steps through history; without any entry, all of its edits
     /// were rejected.
     pub(crate) fn orders(&self) -> impl Iterator<Item = Order> {
         let hash = Some(self.hash);
         let nothing = self.entries.is_empty().then(|| Order::Parts { change: Arc::default(), hash });
         let order = move |entry: &LogEntry| match entry {
-            LogEntry::Rules(rules) => Order::Rules(rules.clone()),
-            LogEntry::Loose(settings) => Order::Loose(*settings),
-            LogEntry::Edit(edit) => Order::Edit(edit.clone()),
+            LogEntry::Order(order) => order.clone(),
             LogEntry::Change => Order::Parts { change: Arc::new(self.change.clone()), hash },
-            LogEntry::Ground(ground) => Order::Ground(Arc::clone(ground)),
         };
         self.entries.iter().map(order).chain(nothing)
     }

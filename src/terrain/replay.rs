@@ -4,11 +4,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use super::model::Terrain;
-use super::order::OrderError;
+use super::parts_error::PartsError;
 use super::queue::WorkLimits;
-use super::receipt::Receipt;
+use super::receipt::{Receipt, Rejection};
 use super::record::{CommitRecord, WorldParts};
-use super::replacement::ChangeError;
 use super::resolve::world_of;
 use crate::ground::Ground;
 use crate::volume::RulesError;
@@ -26,7 +25,10 @@ pub enum RestoreError {
     Rules(#[from] RulesError),
     /// Bricks or fields are invalid.
     #[error(transparent)]
-    Parts(#[from] ChangeError),
+    Parts(#[from] PartsError),
+    /// It panicked.
+    #[error("restoring the world panicked: this is a bug in bevy_burrow")]
+    Panicked,
 }
 
 /// An error of replaying a record. The terrain may then hold a part of the record, and should be dropped.
@@ -52,22 +54,24 @@ pub enum ReplayError {
         /// The record's.
         expected: u64,
     },
-    /// An edit was rejected that had been applied.
-    #[error("an edit of revision {0} is rejected, although the record says that it was applied")]
+    /// An order was rejected that had been applied.
+    #[error("an order of revision {0} is rejected, although the record says that it was applied")]
     Rejected(u64),
     /// The rules are invalid.
     #[error(transparent)]
     Rules(#[from] RulesError),
     /// Bricks or fields are invalid.
     #[error(transparent)]
-    Parts(#[from] ChangeError),
+    Parts(#[from] PartsError),
 }
 
-impl From<OrderError> for ReplayError {
-    fn from(why: OrderError) -> Self {
+impl ReplayError {
+    /// The error of a record of which an order was rejected.
+    pub(crate) fn of(why: &Rejection, revision: u64) -> Self {
         match why {
-            OrderError::Rules(why) => Self::Rules(why),
-            OrderError::Parts(why) => Self::Parts(why),
+            Rejection::Rules(why) => Self::Rules(why.clone()),
+            Rejection::Parts(why) => Self::Parts(why.clone()),
+            _ => Self::Rejected(revision),
         }
     }
 }
@@ -108,7 +112,7 @@ impl Terrain {
         let ground = terrain.world.shared_ground();
         let made = || world_of(ground, settings.chunk_size as i32, change, revision);
         // Unwind safe: nothing else sees what it makes.
-        let world = catch_unwind(AssertUnwindSafe(made)).unwrap_or(Err(ChangeError::Panicked))?;
+        let world = catch_unwind(AssertUnwindSafe(made)).map_err(|_| RestoreError::Panicked)??;
         terrain.world = Arc::new(world);
         terrain.set_rules(rules.unwrap_or_default())?;
         terrain.loose = loose;
@@ -116,7 +120,7 @@ impl Terrain {
     }
 
     /// Applies a record of a [log](Self::take_log) at once, after everything that waits, and compares the
-    /// world with it: its revision, and its hash. Returns the receipts of its edits. A log that this terrain
+    /// world with it: its revision, and its hash. Returns the receipts of its orders. A log that this terrain
     /// keeps records it too.
     ///
     /// Fields of steps and of parts belong to the chunk size of the terrain that they were logged by, which this one
@@ -150,10 +154,10 @@ impl Terrain {
     }
 
     fn replay_orders(&mut self, record: &CommitRecord) -> Result<Vec<Receipt>, ReplayError> {
-        let receipts = self.obey(record.orders())?;
-        match receipts.iter().any(|receipt| receipt.outcome.is_err()) {
-            true => Err(ReplayError::Rejected(record.revision)),
-            false => Ok(receipts),
+        let receipts = self.apply(record.orders());
+        match receipts.iter().find_map(|receipt| receipt.outcome.as_ref().err()) {
+            None => Ok(receipts),
+            Some(why) => Err(ReplayError::of(why, record.revision)),
         }
     }
 }

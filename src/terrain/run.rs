@@ -13,11 +13,10 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
 use super::commit::Commit;
-use super::history::{HistoryReceipt, HistoryRejection};
 use super::log::RecordDraft;
+use super::order::Order;
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
-use super::replacement::ChangeError;
 use super::resolve::{self, Resolved};
 use super::transaction::Transaction;
 use super::work::Work;
@@ -62,47 +61,40 @@ impl Transaction {
         panic_if_marked(&self.work);
         let scene = self.scene(backend);
         let run = || match &self.work {
-            Work::Edits(submissions) => resolve::edits(scene, submissions),
-            Work::Step(step, target) => resolve::step(scene, *step, target),
-            Work::Put(parts) => resolve::parts(scene, parts),
+            Work::Orders(submissions, target) => resolve::orders(scene, submissions, target.as_deref()),
             Work::Cut(choose) => cut(scene, choose.as_ref()),
         };
         // A large one runs on a thread of the pool: entering the pool for each stage would take longer.
         let mut resolved = if self.is_large() { rayon::scope(|_| run()) } else { run() };
         // Terrain and transaction hold the world. If others do too, the commit changes a copy, which is made here.
-        let is_changed = !matches!(self.work, Work::Cut(_)) && resolved.whole.is_none();
+        let is_changed = !self.work.is_cut() && resolved.whole.is_none();
         let is_shared = Arc::strong_count(&self.world) > 2 && is_changed;
         let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
         let copy = Stages::time(&mut resolved.stages.whole, copy);
         let commit = self.commit(resolved);
-        let record = self.is_logged.then(|| RecordDraft::new(&self.work, &commit.receipts, commit.change()));
+        let record = self
+            .is_logged
+            .then(|| RecordDraft::new(self.work.submissions(), &commit.receipts, commit.change()));
         Commit { copy, record, ..commit }
     }
 
     /// The commit of what its work leads to.
     fn commit(&self, resolved: Resolved) -> Commit {
-        Commit::new(self.ticket, matches!(self.work, Work::Cut(_)), resolved)
+        Commit::new(self.ticket, self.work.is_cut(), resolved)
     }
 
     /// Returns `true` if it may reach enough bricks for several threads.
     fn is_large(&self) -> bool {
-        match &self.work {
-            Work::Edits(submissions) => {
-                let edits = submissions.iter().filter_map(|submission| submission.edit.as_ref().ok());
-                let bricks = edits
-                    .filter_map(|edit| reach(self.world.grid, edit))
-                    .map(|reach| BrickPos::range(reach).volume());
-                ItemCost::Lookup
-                    .is_shared(usize::try_from(bricks.fold(0, u64::saturating_add)).unwrap_or(usize::MAX))
+        let bricks = |own: &Submission| match &own.order {
+            Ok(Order::Edit(edit)) => {
+                reach(self.world.grid, edit).map_or(0, |reach| BrickPos::range(reach).volume())
             }
-            Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.patch.bricks.len()),
-            Work::Put(put) => {
-                let bricks =
-                    if put.ground.is_some() { self.world.bricks.len() } else { put.change.bricks.len() };
-                ItemCost::Lookup.is_shared(bricks)
-            }
-            Work::Cut(_) => true,
-        }
+            Ok(Order::Parts { change, .. }) => change.bricks.len() as u64,
+            Ok(Order::Ground(_)) => self.world.bricks.len() as u64,
+            _ => self.work.target().map_or(0, |target| target.change.patch.bricks.len() as u64),
+        };
+        let bricks = self.work.submissions().iter().map(bricks).fold(0, u64::saturating_add);
+        self.work.is_cut() || ItemCost::Lookup.is_shared(usize::try_from(bricks).unwrap_or(usize::MAX))
     }
 
     /// Computes the commit of a transaction that panicked. Runs it once more, because the panic may not have come from
@@ -111,20 +103,22 @@ impl Transaction {
         if let Ok(commit) = self.attempt() {
             return commit;
         }
-        let Work::Edits(all) = &self.work else { return self.rejected() };
-        let mut submissions = all.to_vec();
+        let mut submissions = self.work.submissions().to_vec();
+        if submissions.is_empty() || self.work.edits().count() < submissions.len() {
+            return self.rejected();
+        }
         // This many are known to run together.
         let mut fine = 0;
         for found in 1..=MOST_FAULTS {
             let fault = self.first_fault(&submissions, fine);
             let rejected = if found == MOST_FAULTS { fault..submissions.len() } else { fault..fault + 1 };
             for own in submissions.iter_mut().take(rejected.end).skip(rejected.start) {
-                if own.edit.is_ok() {
-                    own.edit = Err(Rejection::Panicked);
+                if own.order.is_ok() {
+                    own.order = Err(Rejection::Panicked);
                 }
             }
             fine = fault + 1;
-            self.work = Work::Edits(submissions.as_slice().into());
+            self.work = Work::Orders(submissions.as_slice().into(), None);
             if let Ok(commit) = self.attempt() {
                 return commit;
             }
@@ -138,7 +132,7 @@ impl Transaction {
         let mut faulty = submissions.len();
         while faulty > fine + 1 {
             let middle = fine.midpoint(faulty);
-            let work = Work::Edits(submissions[..middle].into());
+            let work = Work::Orders(submissions[..middle].into(), None);
             match (Self { work, ..self.clone() }).attempt() {
                 Ok(_) => fine = middle,
                 Err(Panicked) => faulty = middle,
@@ -147,25 +141,15 @@ impl Transaction {
         fine.min(submissions.len().saturating_sub(1))
     }
 
-    /// The commit that changes nothing and rejects all edits, or the step.
+    /// The commit that changes nothing and rejects all orders.
     pub(super) fn rejected(&self) -> Commit {
-        let nothing = Resolved::nothing(&self.world);
-        let resolved = match &self.work {
-            Work::Edits(submissions) => {
-                let rejected = |own: &Submission| Receipt {
-                    tag: own.tag,
-                    outcome: Err(own.edit.as_ref().err().cloned().unwrap_or(Rejection::Panicked)),
-                };
-                Resolved { receipts: submissions.iter().map(rejected).collect(), ..nothing }
-            }
-            Work::Step(step, _) => {
-                let outcome = Err(HistoryRejection::Panicked);
-                Resolved { step: Some(HistoryReceipt { step: *step, outcome }), ..nothing }
-            }
-            Work::Put(_) => Resolved { put: Some(Err(ChangeError::Panicked)), ..nothing },
-            Work::Cut(_) => nothing,
+        let rejected = |own: &Submission| Receipt {
+            asked: own.asked(),
+            tag: own.tag,
+            outcome: Err(own.order.as_ref().err().cloned().unwrap_or(Rejection::Panicked)),
         };
-        self.commit(resolved)
+        let receipts = self.work.submissions().iter().map(rejected).collect();
+        self.commit(Resolved { receipts, ..Resolved::nothing(&self.world) })
     }
 }
 
@@ -186,9 +170,7 @@ pub(super) const PANICS: u64 = 1 << 63;
 /// Panics for an edit that is marked, but not once it is rejected for that.
 #[cfg(test)]
 fn panic_if_marked(work: &Work) {
-    if let Work::Edits(submissions) = work
-        && submissions.iter().any(|own| own.tag & PANICS != 0 && own.edit.is_ok())
-    {
+    if work.submissions().iter().any(|own| own.tag & PANICS != 0 && own.order.is_ok()) {
         // Without a message: thousands do.
         std::panic::resume_unwind(Box::new("a marked edit"));
     }

@@ -1,40 +1,10 @@
 //! A terrain's steps through its history.
 
-use super::history::{DeferredDrop, History, HistoryReceipt, HistoryRejection, HistoryStep};
+use super::history::{DeferredDrop, History};
 use super::model::Terrain;
 use crate::world::Memory;
 
 impl Terrain {
-    /// Queues an undo: once its turn comes, after everything that was submitted before, it undoes the last group of
-    /// edits that changed the world. Its [`HistoryReceipt`] reports the result. If there is [no
-    /// room](Self::set_work_limits) for it, the receipt is available at once.
-    ///
-    /// Groups are decided when edits are submitted, not when their transactions begin: brushes of one
-    /// [stroke](crate::brush::Brush::stroke) that follow each other, those that one call of [`apply`](Self::apply) or
-    /// [`submit_all`](Self::submit_all) was given, or a single brush. One that changed nothing is no step.
-    ///
-    /// Afterwards everything equals the state before that group, bit by bit: [`World::hash`](super::World::hash),
-    /// samples, materials, fields with their names, boxes and revisions, mask, meshes and rings. The exceptions are
-    /// [`World::revision`](super::World::revision), which counts this as one more commit, and the names that fields
-    /// will get from then on: none is ever used for two.
-    pub fn submit_undo(&mut self) {
-        self.submit_step(HistoryStep::Undo);
-    }
-
-    /// Queues a redo of the step that was undone last. An edit that changes something in between clears the steps that
-    /// could be redone.
-    pub fn submit_redo(&mut self) {
-        self.submit_step(HistoryStep::Redo);
-    }
-
-    fn submit_step(&mut self, step: HistoryStep) {
-        if self.queue.has_room_for_step() {
-            self.queue.push_step(step);
-        } else {
-            self.answer_step(HistoryReceipt { step, outcome: Err(HistoryRejection::Overloaded) });
-        }
-    }
-
     /// The steps that can be undone and redone, and their memory.
     pub fn history(&self) -> History {
         self.undo_stack.figures()
@@ -82,36 +52,6 @@ impl Terrain {
     pub fn memory(&self) -> Memory {
         Memory { undo: self.undo_stack.figures().bytes, ..self.world.memory() }
     }
-
-    /// Undoes the last group of edits at once, after everything that waits; like [`apply`](Self::apply) for brushes.
-    pub fn undo(&mut self) -> HistoryReceipt {
-        self.step(HistoryStep::Undo)
-    }
-
-    /// Redoes at once the step that was undone last, after everything that waits.
-    pub fn redo(&mut self) -> HistoryReceipt {
-        self.step(HistoryStep::Redo)
-    }
-
-    fn step(&mut self, step: HistoryStep) -> HistoryReceipt {
-        self.abandon();
-        self.queue.push_step(step);
-        let receipts = self.finish();
-        receipts.into_iter().for_each(|receipt| self.answer(receipt));
-        // It was the last one.
-        self.step_receipts.pop_back().unwrap_or_else(|| step.nothing())
-    }
-
-    /// Receipts of steps through history that were submitted, in order; each is returned once. If they are not
-    /// taken, the latest 65,536 are kept.
-    pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
-        std::mem::take(&mut self.step_receipts).into()
-    }
-
-    /// Returns `true` if there is a receipt to [take](Self::take_history_receipts).
-    pub fn has_history_receipts(&self) -> bool {
-        !self.step_receipts.is_empty()
-    }
 }
 
 #[cfg(test)]
@@ -121,8 +61,8 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
-    use crate::terrain::TerrainSettings;
     use crate::terrain::model::UNDO_BUDGET;
+    use crate::terrain::{Order, Rejection, TerrainSettings};
 
     fn terrain() -> Terrain {
         let ground = Ground::flat(64, 64, 8.0).expect("valid");
@@ -170,7 +110,7 @@ mod tests {
         clear_meanwhile(&mut terrain);
         let after = terrain.world().hash();
         assert_eq!((terrain.undo_budget(), counts(&terrain)), (1 << 30, (1, 0)));
-        terrain.submit_undo();
+        terrain.submit(Order::Undo);
         clear_meanwhile(&mut terrain);
         assert_eq!((terrain.world().hash(), counts(&terrain)), (before, (0, 1)));
         assert!(terrain.redo().outcome.is_ok());
@@ -193,11 +133,11 @@ mod tests {
     fn steps_that_wait_when_history_is_forgotten_find_nothing() {
         let mut terrain = terrain();
         terrain.apply([dig(20.0)]);
-        terrain.submit_undo();
+        terrain.submit(Order::Undo);
         terrain.clear_history();
         assert!(terrain.begin().is_none());
-        let receipts = terrain.take_history_receipts();
+        let receipts = terrain.take_receipts();
         let outcomes: Vec<_> = receipts.into_iter().map(|receipt| receipt.outcome).collect();
-        assert_eq!(outcomes, [Err(HistoryRejection::NothingToUndo)]);
+        assert_eq!(outcomes, [Err(Rejection::NothingToUndo)]);
     }
 }

@@ -40,12 +40,9 @@ impl Transaction {
         self.ticket
     }
 
-    /// Number of its edits; steps through history and changes of the cut hold none.
+    /// Number of its edits; other orders and changes of the cut hold none.
     pub fn len(&self) -> usize {
-        match &self.work {
-            Work::Edits(submissions) => submissions.len(),
-            Work::Step(..) | Work::Put(_) | Work::Cut(_) => 0,
-        }
+        self.work.edits().count()
     }
 
     /// Returns `true` if it holds no edit.

@@ -2,19 +2,38 @@
 
 use std::sync::Arc;
 
-use super::history::{HistoryStep, UndoDelta};
+use super::history::UndoDelta;
 use super::queue::Submission;
-use super::replacement::Put;
+use super::receipt::Asked;
 use crate::redraw::ChooseCut;
 
 /// The work of a transaction.
 #[derive(Clone)]
 pub(super) enum Work {
-    Edits(Arc<[Submission]>),
-    /// A step through history and the content that it restores.
-    Step(HistoryStep, Arc<UndoDelta>),
-    /// Parts are replaced.
-    Put(Arc<Put>),
+    /// Edits in order, or one other order; of a step through history also the content that it restores.
+    Orders(Arc<[Submission]>, Option<Arc<UndoDelta>>),
     /// Another cut is drawn.
     Cut(Arc<ChooseCut>),
+}
+
+impl Work {
+    /// The orders; none for another cut.
+    pub fn submissions(&self) -> &[Submission] {
+        if let Self::Orders(submissions, _) = self { submissions } else { &[] }
+    }
+
+    /// Whether it only draws another cut.
+    pub fn is_cut(&self) -> bool {
+        matches!(self, Self::Cut(_))
+    }
+
+    /// The edits and rejected edits among the orders.
+    pub fn edits(&self) -> impl Iterator<Item = &Submission> {
+        self.submissions().iter().filter(|own| own.asked() == Asked::Edit)
+    }
+
+    /// The content that a step through history restores.
+    pub fn target(&self) -> Option<&Arc<UndoDelta>> {
+        if let Self::Orders(_, target) = self { target.as_ref() } else { None }
+    }
 }

@@ -8,16 +8,14 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy_replicon::prelude::{ClientId, FromClient};
 
-use super::link::{Ask, Link, MOST_PENDING, PieceMessage, Standing, Worked};
+use super::link::{Link, MOST_PENDING, PieceMessage, Standing, Worked};
 use super::messages::{BulkLane, FromPlayer, OrderLane};
 use super::service::Service;
 use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 use super::trouble::{SharingTrouble, SharingTroubleFound};
 use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
 use crate::plugin::{BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned};
-use crate::terrain::{
-    Applied, HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored, Terrain,
-};
+use crate::terrain::{Applied, Asked, Order, Receipt, Rejection, Terrain};
 use crate::threads::{ThreadTask, Threads, free_later};
 
 /// Which of an app's shared terrains is shared: a connection carries one ground.
@@ -139,12 +137,11 @@ pub(super) fn send(
 }
 
 /// Empties a list of what a player asked for.
-fn take_asks(mut outbox: Mut<EditOutbox>) -> Vec<Ask> {
-    if outbox.edits.is_empty() && outbox.steps.is_empty() {
+fn take_asks(mut outbox: Mut<EditOutbox>) -> Vec<Order> {
+    if outbox.orders.is_empty() {
         return Vec::new();
     }
-    let EditOutbox { edits, steps } = std::mem::take(&mut *outbox);
-    edits.into_iter().map(Ask::Edit).chain(steps.into_iter().map(Ask::Step)).collect()
+    std::mem::take(&mut outbox.orders)
 }
 
 /// The turn of the terrain that is shared, in a frame.
@@ -160,7 +157,7 @@ impl Turn<'_, '_> {
         service: Service,
         (shared, is_changed): (&mut SharedTerrain, bool),
         terrain: &mut Terrain,
-        asks: Vec<Ask>,
+        asks: Vec<Order>,
         messages: &mut MessageWriter<FromPlayer>,
     ) -> Option<SharingTrouble> {
         let ground = super::messages::GroundId::of(terrain.world());
@@ -221,14 +218,14 @@ impl Turn<'_, '_> {
         let mut room = MOST_PENDING.saturating_sub(client.pending());
         for ask in std::mem::take(&mut link.asks) {
             match ask {
-                Ask::Edit(edit) if !is_refused && room > 0 => {
+                Order::Edit(edit) if !is_refused && room > 0 => {
                     link.is_full = false;
                     room -= 1;
                     client.dig(edit);
                 }
-                Ask::Step(HistoryStep::Undo) if !is_refused => client.undo(None),
+                Order::Undo if !is_refused => client.undo(None),
                 ask => {
-                    let is_full = !is_refused && matches!(ask, Ask::Edit(_));
+                    let is_full = !is_refused && ask.edit().is_some();
                     if is_full && !std::mem::replace(&mut link.is_full, true) {
                         self.answers.warn(self.entity, SharingTrouble::TooManyPending(MOST_PENDING));
                     }
@@ -277,11 +274,9 @@ pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>
             changes.clear();
         }
         for ShownChange { change, hash } in changes {
-            // One that finds no room comes again with all others.
-            match terrain.submit_change(change, Some(hash)) {
-                Ok(()) => display.submitted += 1,
-                Err(_) => display.is_broken = true,
-            }
+            // One that finds no room is rejected, and comes again with all others.
+            terrain.submit(Order::parts(change, Some(hash)));
+            display.submitted += 1;
         }
         display.compare(terrain.world(), client.shown_hash());
         let broken = (display.is_broken && display.is_idle()).then(|| terrain.snapshot());
@@ -316,30 +311,25 @@ impl Answers<'_> {
     }
 
     /// Answers something that is not sent to a server.
-    fn refuse(&mut self, terrain: Entity, ask: Ask, link: Option<&mut Link>) {
-        match ask {
-            Ask::Edit(edit) => {
+    fn refuse(&mut self, terrain: Entity, ask: Order, link: Option<&mut Link>) {
+        let why = match &ask {
+            Order::Edit(edit) => {
                 link.into_iter().for_each(|link| link.answer(edit.tag()));
-                self.refused(terrain, edit.tag(), None);
+                return self.refused(terrain, edit.tag(), None);
             }
-            Ask::Step(step) => {
-                link.into_iter().for_each(|link| link.undos = link.undos.saturating_sub(1));
-                let why = match step {
-                    HistoryStep::Undo => HistoryRejection::Refused,
-                    // Others may have dug there: the player digs again.
-                    HistoryStep::Redo => HistoryRejection::NothingToRedo,
-                };
-                self.stepped(terrain, step, Err(why));
-            }
-        }
+            Order::Undo => Rejection::Refused,
+            // Others may have dug there: the player digs again.
+            _ => Rejection::NothingToRedo,
+        };
+        link.into_iter().for_each(|link| link.undos = link.undos.saturating_sub(1));
+        self.stepped(terrain, ask.asked(), Err(why));
     }
 
     /// Answers what waits, and drops the link.
     fn close(&mut self, terrain: Entity, link: Option<Link>, messages: &mut MessageWriter<FromPlayer>) {
         let Some(link) = link else { return };
         link.tags.iter().for_each(|tag| self.refused(terrain, *tag, None));
-        (0..link.undos)
-            .for_each(|_| self.stepped(terrain, HistoryStep::Undo, Err(HistoryRejection::Refused)));
+        (0..link.undos).for_each(|_| self.stepped(terrain, Asked::Undo, Err(Rejection::Refused)));
         if link.greeted.is_some() {
             messages.write(FromPlayer::Left(link.run));
         }
@@ -348,13 +338,13 @@ impl Answers<'_> {
     }
 
     fn refused(&mut self, terrain: Entity, tag: u64, why: Option<Refusal>) {
-        let receipt = Receipt { tag, outcome: Err(Rejection::Refused) };
+        let receipt = Receipt::of_edit(tag, Err(Rejection::Refused));
         self.applied.write(BrushApplied { terrain: Some(terrain), receipt });
         self.edited.write(GroundEdited { terrain, tag, outcome: WhatBecame::Refused(why) });
     }
 
-    fn stepped(&mut self, terrain: Entity, step: HistoryStep, outcome: Result<Restored, HistoryRejection>) {
-        self.moved.write(HistoryMoved { terrain: Some(terrain), receipt: HistoryReceipt { step, outcome } });
+    fn stepped(&mut self, terrain: Entity, step: Asked, outcome: Result<Applied, Rejection>) {
+        self.moved.write(HistoryMoved { terrain: Some(terrain), receipt: Receipt::of(step, outcome) });
     }
 
     fn tell(&mut self, terrain: Entity, link: &mut Link, event: ClientEvent) {
@@ -366,7 +356,7 @@ impl Answers<'_> {
             ClientEvent::Confirmed { tag, receipt } => {
                 link.answer(tag);
                 // If the player was away, its effect is not known here, and nothing is counted.
-                let unknown = || Receipt { tag, outcome: Ok(Applied::default()) };
+                let unknown = || Receipt::of_edit(tag, Ok(Applied::default()));
                 let known = receipt.clone().unwrap_or_else(unknown);
                 self.applied.write(BrushApplied { terrain: Some(terrain), receipt: known });
                 self.edited.write(edited(tag, WhatBecame::Confirmed(receipt)));
@@ -385,17 +375,17 @@ impl Answers<'_> {
             ClientEvent::UndoRefused(why) => {
                 link.undos = link.undos.saturating_sub(1);
                 let outcome = match why {
-                    Some(Refusal::Nothing) => HistoryRejection::NothingToUndo,
-                    _ => HistoryRejection::Refused,
+                    Some(Refusal::Nothing) => Rejection::NothingToUndo,
+                    _ => Rejection::Refused,
                 };
                 if let Some(why) = why.filter(|why| *why != Refusal::Nothing) {
                     self.warn(terrain, SharingTrouble::UndoRefused(why));
                 }
-                self.stepped(terrain, HistoryStep::Undo, Err(outcome));
+                self.stepped(terrain, Asked::Undo, Err(outcome));
             }
             ClientEvent::Undone(restored) => {
                 link.undos = link.undos.saturating_sub(1);
-                self.stepped(terrain, HistoryStep::Undo, Ok(restored.unwrap_or_default()));
+                self.stepped(terrain, Asked::Undo, Ok(restored.unwrap_or_default()));
             }
             event => {
                 link.is_playable |= event == ClientEvent::Playable;
@@ -426,9 +416,9 @@ pub(super) fn send_last(
         let Some(client) = link.client.as_mut().filter(|_| link.greeted.is_some()) else { continue };
         for ask in link.asks.drain(..) {
             match ask {
-                Ask::Edit(edit) => client.dig(edit),
-                Ask::Step(HistoryStep::Undo) => client.undo(None),
-                Ask::Step(HistoryStep::Redo) => {}
+                Order::Edit(edit) => client.dig(edit),
+                Order::Undo => client.undo(None),
+                _ => {}
             }
         }
         let run = link.run;

@@ -8,21 +8,14 @@ use bevy::platform::time::Instant;
 use super::messages::GroundId;
 use super::service::Service;
 use super::trouble::SharingTrouble;
-use crate::brush::Edit;
 use crate::net::{self, Client, Kick, Lane, ShownChange, Stamps};
 use crate::plugin::{LoosePieceFound, LoosePieceReturned};
-use crate::terrain::{HistoryStep, Terrain, TerrainError, TerrainSettings, Version, World};
+use crate::terrain::{Asked, Order, Terrain, TerrainError, TerrainSettings, Version, World};
 use crate::threads::{ThreadTask, Threads};
 use crate::volume::DiggingRules;
 
 /// Most edits that wait for the server's answer.
 pub(super) const MOST_PENDING: usize = 1 << 16;
-
-/// What a player asked for. One list holds all of it, in order.
-pub(super) enum Ask {
-    Edit(Edit),
-    Step(HistoryStep),
-}
 
 /// What a shared terrain knows of its server.
 pub(super) struct Link {
@@ -40,7 +33,8 @@ pub(super) struct Link {
     /// The server of this invitation has sent the player away.
     pub kicked: Option<(Kick, u64)>,
     pub inbox: Vec<(Lane, Vec<u8>)>,
-    pub asks: Vec<Ask>,
+    /// What the player asked for and the client has not got yet, in order.
+    pub asks: Vec<Order>,
     /// Whether the limit of waiting edits is reached, so that no more are taken.
     pub is_full: bool,
     /// Tags of edits, and the number of undos, that are asked for and not answered.
@@ -162,12 +156,12 @@ impl Link {
     }
 
     /// Records a request of the player.
-    pub fn ask(&mut self, ask: Ask) {
-        match &ask {
-            Ask::Edit(edit) => self.tags.push_back(edit.tag()),
-            Ask::Step(_) => self.undos += 1,
+    pub fn ask(&mut self, order: Order) {
+        match order.edit() {
+            Some(edit) => self.tags.push_back(edit.tag()),
+            None => self.undos += 1,
         }
-        self.asks.push(ask);
+        self.asks.push(order);
     }
 
     /// Records that an edit with this tag was answered.
@@ -212,13 +206,18 @@ impl Standing {
     }
 }
 
+/// Whether an order is a change of what is shown, which only the link submits.
+fn is_change(asked: Asked) -> bool {
+    matches!(asked, Asked::Parts | Asked::Ground)
+}
+
 impl Display {
     /// Of a terrain, in which changes of an earlier link may still wait.
     fn of(terrain: &mut Terrain) -> Self {
-        drop(terrain.take_change_receipts());
+        drop(terrain.take_receipts_of(is_change));
         Self {
             version: terrain.world().version(),
-            submitted: terrain.waiting_changes() as u64,
+            submitted: terrain.unanswered().filter(|(asked, _)| is_change(*asked)).count() as u64,
             answered: 0,
             is_broken: false,
             whole: None,
@@ -236,9 +235,9 @@ impl Display {
             self.hold_pieces();
         }
         self.version = version;
-        let receipts = terrain.take_change_receipts();
+        let receipts = terrain.take_receipts_of(is_change);
         self.answered += receipts.len() as u64;
-        if receipts.iter().any(Result::is_err) {
+        if receipts.iter().any(|receipt| receipt.outcome.is_err()) {
             self.is_broken = true;
             self.hold_pieces();
         }

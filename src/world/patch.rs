@@ -21,6 +21,18 @@ pub struct Patch {
     pub next_field: u64,
 }
 
+impl PartialEq for Patch {
+    /// Equal samples at equal positions, and equal fields.
+    fn eq(&self, other: &Self) -> bool {
+        let is_same = |(own, other): (&ChangedBrick, &ChangedBrick)| {
+            own.0 == other.0 && Brick::is_same(own.1.as_ref(), other.1.as_ref())
+        };
+        (self.next_field, &self.fields) == (other.next_field, &other.fields)
+            && self.bricks.len() == other.bricks.len()
+            && self.bricks.iter().zip(&other.bricks).all(is_same)
+    }
+}
+
 /// Bricks and fields by position: those of a world, of a region, or of an [`Overlay`].
 pub(crate) trait State {
     /// A stored brick; `None` where it is pristine.

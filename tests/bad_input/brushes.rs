@@ -162,7 +162,7 @@ fn any_json_is_an_edit_or_an_error() {
         accepted[number].set(accepted[number].get() + 1);
         prop_assert!(edit.check().is_ok());
         let mut terrain = small_terrain();
-        terrain.submit_edit(&edit);
+        terrain.submit(&edit);
         let receipts = terrain.begin().map(|transaction| transaction.run()).map(|commit| terrain.commit(commit));
         prop_assert!(matches!(receipts, Some(Ok(ref receipts)) if receipts.len() == 1 && receipts[0].tag == 9));
         prop_assert!(terrain.world().check_seams().is_flawless(), "{}", json);

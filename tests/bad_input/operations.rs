@@ -92,7 +92,7 @@ proptest! {
         prop_assert_eq!(&serde_json::to_string(&edit).expect("edits are written"), &json);
         // Ground that was moved far is moved again.
         let mut terrain = small_terrain();
-        (0..3).for_each(|_| terrain.submit_edit(&edit));
+        (0..3).for_each(|_| terrain.submit(&edit));
         terrain.submit(&Brush::smooth(Shape::sphere(Vec3::new(7.0, 9.0, 6.0), 5.0), 1.0));
         let commit = terrain.begin().map(|transaction| transaction.run());
         let receipts = commit.and_then(|commit| terrain.commit(commit).ok()).unwrap_or_default();

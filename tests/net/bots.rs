@@ -11,7 +11,7 @@ use bevy_burrow::net::{
     ToClient,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Patch, World};
+use bevy_burrow::terrain::World;
 use bevy_burrow::volume::{FieldId, Fields};
 use fastrand::Rng;
 use glam::{IVec3, Vec2, Vec3};
@@ -37,8 +37,8 @@ pub struct Reference {
     pub loose: usize,
     /// Edits of players: the number in the order, the player, and the player's number.
     pub done: Vec<(u64, ClientId, u64)>,
-    /// Restored parts, by the player that asked for the undo.
-    pub undone: BTreeMap<ClientId, Vec<Restored>>,
+    /// Applied parts, by the player that asked for the undo.
+    pub undone: BTreeMap<ClientId, Vec<Applied>>,
     pub terms: usize,
 }
 
@@ -69,8 +69,8 @@ impl Reference {
                 continue;
             }
             match entry {
-                Entry::Edit { author, own, edit } => {
-                    self.terrain.submit_edit(&edit);
+                Entry::Order { by: Some((author, own)), order: order @ Order::Edit(_) } => {
+                    self.terrain.submit(order);
                     while let Some(transaction) = self.terrain.begin() {
                         for receipt in self.terrain.commit(transaction.run()).expect("it waits for it") {
                             self.loose += receipt.outcome.map_or(0, |applied| applied.loose.len());
@@ -78,17 +78,12 @@ impl Reference {
                     }
                     self.done.push((number, author, own));
                 }
-                Entry::Rules(rules) => {
-                    let rules = rules.as_deref().cloned().unwrap_or_default();
-                    self.terrain.set_rules(rules).expect("valid rules");
+                Entry::Order { order: order @ (Order::Rules(_) | Order::Loose(_)), .. } => {
+                    assert_eq!(self.terrain.apply([order]), [], "valid rules");
                     self.terms += 1;
                 }
-                Entry::Loose(loose) => {
-                    self.terrain.set_loose(loose);
-                    self.terms += 1;
-                }
-                Entry::Parts { change, by } => {
-                    let restored = self.terrain.apply_change(Patch::clone(&change), None).expect("they fit");
+                Entry::Order { by, order } => {
+                    let restored = self.terrain.apply_one(order).outcome.expect("they fit");
                     if let Some((by, _)) = by {
                         self.undone.entry(by).or_default().push(restored);
                     }
@@ -133,8 +128,8 @@ pub struct Bot {
     pub bytes: [u64; 2],
     /// Undos that were requested.
     pub undos: u64,
-    /// Restored parts.
-    pub undone: Vec<Restored>,
+    /// Applied parts.
+    pub undone: Vec<Applied>,
     /// How many tags were answered.
     pub answered: u64,
     /// Tags of edits that are not answered.
@@ -223,7 +218,7 @@ impl Bot {
 
     fn look(&mut self, frame: u64, now: Duration) {
         for ShownChange { change, hash } in self.client.take_shown() {
-            self.shown.apply_change(change, Some(hash)).expect("it fits");
+            self.shown.apply_one(Order::parts(change, Some(hash))).outcome.expect("it fits");
         }
         for event in self.client.take_events() {
             let name = match event {
@@ -259,8 +254,7 @@ impl Bot {
                 }
                 ClientEvent::Undone(restored) => {
                     // The reference keeps no list of the pieces that games were notified of.
-                    self.undone
-                        .extend(restored.map(|restored| Restored { returned: Vec::new(), ..restored }));
+                    self.undone.extend(restored.map(|restored| Applied { returned: Vec::new(), ..restored }));
                     "undone"
                 }
                 ClientEvent::UndoRefused(_) => "not undone",

@@ -279,18 +279,9 @@ impl Follower {
     /// Applies an entry.
     fn apply(&mut self, entry: Entry) {
         match entry {
-            Entry::Edit { author, own, edit } => {
-                self.terrain.submit_edit(&edit);
-                self.confirmed.extend((author == self.id).then_some(own));
-            }
-            Entry::Rules(rules) => {
-                let rules = rules.map(|rules| (*rules).clone()).unwrap_or_default();
-                self.terrain.set_rules(rules).expect("valid rules");
-            }
-            Entry::Loose(loose) => self.terrain.set_loose(loose),
-            Entry::Parts { by, change } => {
+            Entry::Order { by, order } => {
                 self.confirmed.extend(by.filter(|(by, _)| *by == self.id).map(|(_, own)| own));
-                self.terrain.submit_change((*change).clone(), None).expect("room");
+                self.terrain.submit(order);
             }
             Entry::Mark => {
                 let world = self.terrain.world();
@@ -353,7 +344,7 @@ impl Follower {
             fields: fields.into_iter().collect(),
             next_field: content.next_field,
         };
-        self.terrain.apply_change(change, None).expect("a valid region");
+        self.terrain.apply_one(Order::parts(change, None)).outcome.expect("a valid region");
     }
 
     /// Makes later fields have the same names as on the server.

@@ -7,7 +7,7 @@ use allocation_counter::measure;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    BulkReader, ClientId, Entries, Entry, Epoch, Hello, Kick, Lane, PROTOCOL, Rate, Reach, Refusal, Server,
+    BulkReader, ClientId, Entries, Epoch, Hello, Kick, Lane, PROTOCOL, Rate, Reach, Refusal, Server,
     ServerSettings, Stamps, ToClient, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
@@ -175,12 +175,12 @@ fn messages_of_every_kind_come_back_from_their_bytes() {
         tags[1][usize::from(bytes[0])] += 1;
         let ToClient::Entries(Entries { entries: own, .. }) = &message else { continue };
         for entry in own {
-            entries[match entry {
-                Entry::Edit { .. } => 0,
-                Entry::Rules(_) => 1,
-                Entry::Loose(_) => 2,
-                Entry::Parts { .. } => 3,
-                _ => 4,
+            entries[match entry.order() {
+                Some(Order::Edit(_)) => 0,
+                Some(Order::Rules(_)) => 1,
+                Some(Order::Loose(_)) => 2,
+                Some(_) => 3,
+                None => 4,
             }] += 1;
         }
     }

@@ -137,7 +137,7 @@ fn lie_about_parts(play: &mut Play, mut damage: impl FnMut(&mut Patch) + 'static
     play.server.put(other.parts().change).expect("it fits");
     lie(play, move |entries| {
         for entry in entries {
-            if let Entry::Parts { change, .. } = entry {
+            if let Entry::Order { order: Order::Parts { change, .. }, .. } = entry {
                 damage(Arc::make_mut(change));
                 return Lie::Told;
             }

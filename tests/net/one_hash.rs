@@ -54,7 +54,7 @@ fn play(ground: &Arc<Ground>, script: &[Turn], longest: u64, engine: &Engine) ->
     let mut waiting = 0;
     for turn in script {
         match turn {
-            Turn::Edit(edit) => terrain.submit_edit(edit),
+            Turn::Edit(edit) => terrain.submit(edit),
             Turn::Rules(rules) => terrain.set_rules(rules.clone()).expect("valid rules"),
             Turn::Loose(loose) => terrain.set_loose(*loose),
         }

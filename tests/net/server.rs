@@ -102,7 +102,7 @@ fn entries_go_out_before_the_server_applies_them_and_without_labels() {
     else {
         panic!("no entries")
     };
-    let [Entry::Edit { author: ClientId(1), own: 1, edit }] = &entries.entries[..] else {
+    let [Entry::Order { by: Some((ClientId(1), 1)), order: Order::Edit(edit) }] = &entries.entries[..] else {
         panic!("{entries:?}")
     };
     assert_eq!((edit.tag(), edit.stroke()), (0, None));

@@ -86,7 +86,7 @@ fn random_dig(rng: &mut Rng) -> Edit {
 
 fn dug(ground: &Arc<Ground>, digs: u32, rng: &mut Rng) -> Terrain {
     let mut terrain = terrain(ground);
-    (0..digs).for_each(|_| terrain.submit_edit(&random_dig(rng)));
+    (0..digs).for_each(|_| terrain.submit(&random_dig(rng)));
     while let Some(transaction) = terrain.begin() {
         terrain.commit(transaction.run()).expect("it waits for it");
     }
@@ -338,7 +338,7 @@ fn quick(side: u32, digs: u32) -> (Server, Arc<Ground>) {
     for _ in 0..digs {
         let at = Vec3::new(rng.f32() * side as f32, rng.f32() * 8.0 - 6.0, rng.f32() * side as f32);
         let brush = Brush::dig(Shape::sphere(at, 4.0 + rng.f32() * 4.0));
-        dug.submit_edit(&Edit::quantize(&brush).expect("a valid brush"));
+        dug.submit(&Edit::quantize(&brush).expect("a valid brush"));
     }
     while let Some(transaction) = dug.begin() {
         dug.commit(transaction.run()).expect("it waits for it");
@@ -490,7 +490,7 @@ fn who_begins_with_the_level_gets_only_what_differs() {
             server.take_outgoing().into_iter().for_each(|(_, lane, message)| client.receive(lane, message));
             client.advance(now);
             for change in client.take_shown() {
-                shown.apply_change(change.change, Some(change.hash)).expect("it fits");
+                shown.apply_one(Order::parts(change.change, Some(change.hash))).outcome.expect("it fits");
             }
         }
         assert!(client.has_joined());

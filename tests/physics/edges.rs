@@ -99,7 +99,7 @@ fn walls_rise_with_another_ground() {
     assert_eq!(middle(&mut stage), 8.0);
     let higher = Ground::flat(64, 64, 900.0).expect("valid ground");
     let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("it is there");
-    model.set_ground(higher).expect("the same size");
+    model.apply_one(Order::Ground(higher.into())).outcome.expect("the same size");
     stage.frames_until("the walls rise", |stage| middle(stage) == 900.0);
 }
 

@@ -58,7 +58,7 @@ pub fn follow(
             let own = restored.returned.iter().filter(|piece| piece.fate == fate);
             own.map(|piece| piece.materials.total() as i64).sum()
         };
-        let cut = |fate| voxels(restored.loose.iter().map(|(_, piece)| piece), fate);
+        let cut = |fate| voxels(restored.cut_again.iter().map(|(_, piece)| piece), fate);
         let [crumbs, debris] =
             [PieceFate::Removed, PieceFate::BrokeOff].map(|fate| cut(fate) - returned(fate));
         owned.inventory += restored.removed.total() as i64 - restored.added.total() as i64 - crumbs - debris;

@@ -21,17 +21,19 @@ fn frames_show_what_was_undone_and_redone() {
     let last = states.len() - 1;
     assert_eq!(stage.terrain(terrain).history().undos, last);
     for (step, expected) in
-        (0..last).rev().map(|at| (HistoryStep::Undo, at)).chain((1..=last).map(|at| (HistoryStep::Redo, at)))
+        (0..last).rev().map(|at| (Asked::Undo, at)).chain((1..=last).map(|at| (Asked::Redo, at)))
     {
         match step {
-            HistoryStep::Undo => stage.write(Undo { terrain: Some(terrain) }),
-            HistoryStep::Redo => stage.write(Redo { terrain: Some(terrain) }),
+            Asked::Undo => stage.write(Undo { terrain: Some(terrain) }),
+            _ => stage.write(Redo { terrain: Some(terrain) }),
         }
         stage.frames_until("the step is reported", |stage| {
             let is_whole = stage.is_settled();
             let recorded = stage.recorded::<HistoryMoved>();
             assert_eq!(recorded.is_empty(), !is_whole, "it is reported in the frame of its commit");
-            assert!(recorded.iter().all(|moved| moved.receipt.outcome.is_ok() && moved.receipt.step == step));
+            assert!(
+                recorded.iter().all(|moved| moved.receipt.outcome.is_ok() && moved.receipt.asked == step)
+            );
             is_whole
         });
         assert_eq!(stage.hash(terrain), states[expected]);
@@ -59,13 +61,10 @@ fn steps_come_after_the_brushes_of_their_frame() {
         stage.write(ALL);
         stage.settle();
         let steps: Vec<_> = stage.recorded::<HistoryMoved>().into_iter().map(|moved| moved.receipt).collect();
-        let outcomes: Vec<_> = steps.iter().map(|receipt| (receipt.step, receipt.outcome.is_ok())).collect();
+        let outcomes: Vec<_> = steps.iter().map(|receipt| (receipt.asked, receipt.outcome.is_ok())).collect();
         // Undo comes before redo, whichever was sent first.
-        let nothing = Err(HistoryRejection::NothingToUndo);
-        assert_eq!(
-            outcomes,
-            [(HistoryStep::Undo, true), (HistoryStep::Undo, false), (HistoryStep::Redo, true)]
-        );
+        let nothing = Err(Rejection::NothingToUndo);
+        assert_eq!(outcomes, [(Asked::Undo, true), (Asked::Undo, false), (Asked::Redo, true)]);
         assert_eq!(steps[1].outcome, nothing);
         let restored = steps[2].outcome.as_ref().expect("it was redone");
         let dug: u64 =
@@ -82,7 +81,7 @@ fn every_step_is_answered_by_every_terrain_that_it_is_for() {
     stage.frames(2);
     let recorded = stage.recorded::<HistoryMoved>();
     let [HistoryMoved { terrain: None, receipt }] = &recorded[..] else { panic!("{recorded:?}") };
-    assert_eq!(receipt.outcome, Err(HistoryRejection::TerrainGone));
+    assert_eq!(receipt.outcome, Err(Rejection::TerrainGone));
 
     let (a, b) = (stage.show(level(1.0)), stage.spawn_at(level(1.0), Vec3::X * 500.0));
     stage.settle();
@@ -96,7 +95,7 @@ fn every_step_is_answered_by_every_terrain_that_it_is_for() {
     let of =
         |terrain| recorded.iter().find(|moved| moved.terrain == Some(terrain)).map(|m| &m.receipt.outcome);
     assert!(of(a).is_some_and(|outcome| outcome.is_ok()));
-    assert_eq!(of(b), Some(&Err(HistoryRejection::NothingToUndo)));
+    assert_eq!(of(b), Some(&Err(Rejection::NothingToUndo)));
 
     // One terrain that is despawned while a step waits, and one that is despawned already.
     stage.send(dig(20.0, 8.0, 20.0, 4.0));
@@ -110,6 +109,6 @@ fn every_step_is_answered_by_every_terrain_that_it_is_for() {
         .into_iter()
         .map(|moved| (moved.terrain, moved.receipt.outcome))
         .collect();
-    let gone = || (Some(a), Err(HistoryRejection::TerrainGone));
+    let gone = || (Some(a), Err(Rejection::TerrainGone));
     assert_eq!(recorded, [gone(), gone()]);
 }

@@ -205,7 +205,7 @@ const EVENTS: [Event; 25] = [
 #[derive(Clone, Debug)]
 enum Request {
     Brush(Brush),
-    Step(HistoryStep),
+    Step(Asked),
     /// A game's own edit, which is done at once.
     Own(Brush),
 }
@@ -544,7 +544,7 @@ impl Life {
         Some(parent.map_or(GlobalTransform::IDENTITY, |parent| GlobalTransform::from(*parent)) * local)
     }
 
-    fn step(&mut self, step: HistoryStep) {
+    fn step(&mut self, step: Asked) {
         if !self.is_alive() {
             return;
         }
@@ -556,8 +556,8 @@ impl Life {
         self.expected.requests.push(Request::Step(step));
         let terrain = Some(self.terrain);
         match step {
-            HistoryStep::Undo => self.stage.write(Undo { terrain }),
-            HistoryStep::Redo => self.stage.write(Redo { terrain }),
+            Asked::Undo => self.stage.write(Undo { terrain }),
+            _ => self.stage.write(Redo { terrain }),
         }
     }
 
@@ -645,8 +645,8 @@ impl Life {
                 self.sent.push(brush.tag);
                 self.stage.send(brush.transformed(Quat::IDENTITY, Vec3::X * 9000.0, 1.0));
             }
-            Event::Undo => self.step(HistoryStep::Undo),
-            Event::Redo => self.step(HistoryStep::Redo),
+            Event::Undo => self.step(Asked::Undo),
+            Event::Redo => self.step(Asked::Redo),
             Event::OwnEdit => {
                 self.settle();
                 let brush = self.brush();
@@ -851,12 +851,12 @@ impl Life {
                 Request::Brush(brush) | Request::Own(brush) => {
                     plain.apply([brush]);
                 }
-                Request::Step(HistoryStep::Undo) => {
+                Request::Step(Asked::Undo) => {
                     plain.undo();
                 }
                 // Others may have dug there: who shares a terrain digs again.
-                Request::Step(HistoryStep::Redo) if self.load.is_shared() => {}
-                Request::Step(HistoryStep::Redo) => {
+                Request::Step(_) if self.load.is_shared() => {}
+                Request::Step(_) => {
                     plain.redo();
                 }
             }

@@ -191,7 +191,7 @@ impl Story {
             1 => {
                 self.ground = 1 - self.ground;
                 let ground = Arc::clone(&self.grounds[self.ground]);
-                self.terrain.set_ground(ground).expect("it has the same size");
+                self.terrain.apply_one(Order::Ground(ground)).outcome.expect("it has the same size");
             }
             // Records are lost.
             2 => {

@@ -7,7 +7,7 @@ use bevy_burrow::format::WorldId;
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreTrouble, from_bytes, inspect_in, to_bytes};
 use bevy_burrow::surface::SurfaceMesh;
-use bevy_burrow::terrain::{ChangeError, Drawn, Meshing};
+use bevy_burrow::terrain::{Drawn, Meshing, PartsError};
 use fastrand::Rng;
 
 use crate::play::{act, check_opened, count, open, options, save, state, terrain};
@@ -47,7 +47,7 @@ fn a_world_on_another_ground_is_as_if_it_was_read_there() {
         let (first, mut expected) = (read_over(&before, &world), read_over(&after, &world));
         let revision = world.world().revision();
         world.keep_log(Some(usize::MAX));
-        world.set_ground(Arc::clone(&after)).expect("it has the same size");
+        world.apply_one(Order::Ground(Arc::clone(&after))).outcome.expect("it has the same size");
         assert_same(&world, &expected, seed);
         assert_ne!(world.world().hash(), first.world().hash());
         assert_eq!(world.world().revision(), revision + 1);
@@ -72,8 +72,8 @@ fn a_world_on_another_ground_is_as_if_it_was_read_there() {
         let mut there = first;
         let hash = there.world().hash();
         let old = drawn(&there);
-        there.set_ground(after).expect("it has the same size");
-        there.set_ground(before).expect("it has the same size");
+        there.apply_one(Order::Ground(after)).outcome.expect("it has the same size");
+        there.apply_one(Order::Ground(before)).outcome.expect("it has the same size");
         assert!(there.world().hash() == hash && drawn(&there) == old, "seed {seed}");
     }
 }
@@ -84,24 +84,30 @@ fn a_ground_waits_its_turn() {
     let [mut queued, mut at_once] = [(); 2].map(|()| terrain(&before));
     let brushes: Vec<Brush> = (0..8).map(|_| any_random_brush(&mut rng, &after)).collect();
     queued.submit_all(&brushes[..4]);
-    queued.submit_ground(Arc::clone(&after)).expect("it has the same size");
+    queued.submit(Order::Ground(Arc::clone(&after)));
     queued.submit_all(&brushes[4..]);
     assert_eq!(queued.world().ground().hash(), before.hash());
+    let mut receipts = Vec::new();
     while let Some(transaction) = queued.begin() {
-        queued.commit(transaction.run()).expect("the one under way");
+        receipts.extend(queued.commit(transaction.run()).expect("the one under way"));
     }
     at_once.apply(&brushes[..4]);
-    at_once.set_ground(after).expect("it has the same size");
+    at_once.apply_one(Order::Ground(after)).outcome.expect("it has the same size");
     at_once.apply(&brushes[4..]);
     assert_same(&queued, &at_once, 3);
-    assert!(matches!(&queued.take_change_receipts()[..], [Ok(_)]));
+    let kinds: Vec<Asked> = receipts.iter().map(|receipt| receipt.asked).collect();
+    assert_eq!(kinds, [[Asked::Edit; 4].as_slice(), &[Asked::Ground], &[Asked::Edit; 4]].concat());
+    assert!(receipts[4].outcome.is_ok());
 
     // One of another size is refused, and nothing changes.
-    let (now, version) = (state(&queued), queued.world().version());
+    let now = queued.world().hash();
     let other = Arc::new(Ground::flat(20, 70, 0.0).expect("valid"));
-    let refused = [queued.set_ground(Arc::clone(&other)), queued.submit_ground(other)];
-    assert!(refused.iter().all(|own| matches!(own, Err(ChangeError::GroundSize { .. }))));
-    assert_eq!((state(&queued), queued.world().version()), (now, version));
+    let refused = queued.apply_one(Order::Ground(other)).outcome;
+    assert!(matches!(refused, Err(Rejection::Parts(PartsError::GroundSize { .. }))), "{refused:?}");
+    assert_eq!(
+        (queued.world().hash(), queued.world().ground().hash()),
+        (now, at_once.world().ground().hash())
+    );
 }
 
 #[test]
@@ -116,9 +122,9 @@ fn a_saved_world_goes_on_on_its_new_ground() {
         let mut acknowledged = 0;
         for turn in 0..40 {
             match turn {
-                15 => world.set_ground(Arc::clone(&grounds[1])).expect("it has the same size"),
+                15 => assert!(world.apply_one(Order::Ground(Arc::clone(&grounds[1]))).outcome.is_ok()),
                 30 if seed % 2 == 0 => {
-                    world.set_ground(Arc::clone(&grounds[0])).expect("it has the same size")
+                    assert!(world.apply_one(Order::Ground(Arc::clone(&grounds[0]))).outcome.is_ok());
                 }
                 _ => act(&mut world, &mut rng),
             }

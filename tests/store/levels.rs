@@ -46,7 +46,7 @@ pub fn restore_brick(world: &mut Terrain, rng: &mut Rng) {
     places.sort_unstable();
     if let Some(pos) = rng.choice(places) {
         let change = Patch { bricks: vec![(pos, None)], ..Patch::default() };
-        world.apply_change(change, None).expect("a brick of its own");
+        world.apply_one(Order::parts(change, None)).outcome.expect("a brick of its own");
     }
 }
 
@@ -174,7 +174,7 @@ fn a_world_on_a_level_keeps_its_edits_on_another_ground() {
         save(&mut store, &mut world).expect("the thread runs");
         // While it is running, too.
         let image = disk.image();
-        world.set_ground(Arc::clone(&after)).expect("it has the same size");
+        world.apply_one(Order::Ground(Arc::clone(&after))).outcome.expect("it has the same size");
         store.checkpoint().expect("the disk works");
         save(&mut store, &mut world).expect("the thread runs");
         drop(store);

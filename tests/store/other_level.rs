@@ -45,7 +45,7 @@ fn own_bricks(world: &Terrain, level: &BaseLevel) -> Patch {
 fn by_hand(world: &Terrain, ground: &Arc<Ground>, from: &BaseLevel, to: &BaseLevel) -> Terrain {
     let mut moved = to.level().terrain(Arc::clone(ground)).expect("its own ground");
     moved.set_meshing(Meshing::Never);
-    moved.apply_change(own_bricks(world, from), None).expect("its own bricks");
+    moved.apply_one(Order::parts(own_bricks(world, from), None)).outcome.expect("its own bricks");
     moved
 }
 
@@ -267,7 +267,7 @@ fn commits_behind_the_last_checkpoint_are_made_again() {
                 let is_undone = |pos: &BrickPos| !is_same(before.get(pos), after.get(pos), *pos);
                 let undone = all.into_iter().filter(is_undone).map(|pos| (pos, after.get(&pos).cloned()));
                 let change = Patch { bricks: undone.collect(), ..Patch::default() };
-                expected.apply_change(change, None).expect("its own bricks");
+                expected.apply_one(Order::parts(change, None)).outcome.expect("its own bricks");
             }
             save(&mut store, &mut world).expect("the thread runs");
         }

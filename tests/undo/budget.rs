@@ -25,8 +25,8 @@ fn history_takes_the_reported_bytes_and_stays_within_its_budget() {
         let mut most = 0;
         for _ in 0..40 {
             match rng.u32(0..6) {
-                0 => terrain.submit_undo(),
-                1 => terrain.submit_redo(),
+                0 => terrain.submit(Order::Undo),
+                1 => terrain.submit(Order::Redo),
                 _ => terrain.submit(&any_brush(&mut rng, ground.ground(), chunk_size)),
             }
             while let Some(transaction) = terrain.begin() {
@@ -46,7 +46,7 @@ fn history_takes_the_reported_bytes_and_stays_within_its_budget() {
         let freed = measure(|| terrain.set_undo_budget(0));
         assert_eq!(-freed.bytes_current, history.bytes as i64, "world {index}: {history:?}");
         assert_eq!(terrain.history(), Default::default());
-        assert!(terrain.undo().outcome == Err(HistoryRejection::NothingToUndo));
+        assert!(terrain.undo().outcome == Err(Rejection::NothingToUndo));
     }
     assert!(full > 3, "old steps were dropped in {full} worlds only");
 }

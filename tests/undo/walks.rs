@@ -25,7 +25,7 @@ fn walks_through_history_restore_the_earlier_states() {
             let now = State::of(terrain.world());
             match rng.u32(0..5) {
                 0 | 1 if !past.is_empty() => {
-                    terrain.submit_undo();
+                    terrain.submit(Order::Undo);
                     displayed.play(&mut terrain);
                     future.push(now);
                     let expected = past.pop().expect("there is a past");
@@ -33,7 +33,7 @@ fn walks_through_history_restore_the_earlier_states() {
                     moved += 1;
                 }
                 2 if !future.is_empty() => {
-                    terrain.submit_redo();
+                    terrain.submit(Order::Redo);
                     displayed.play(&mut terrain);
                     past.push(now);
                     let expected = future.pop().expect("there is a future");

@@ -185,7 +185,7 @@ fn log_history(mut steps: MessageReader<HistoryMoved>) {
         match &receipt.outcome {
             Ok(restored) => println!(
                 "history {:?} removed={} added={}",
-                receipt.step,
+                receipt.asked,
                 restored.removed.total(),
                 restored.added.total()
             ),

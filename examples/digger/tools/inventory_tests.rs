@@ -41,9 +41,9 @@ impl Game {
         self.apply_history(&receipt)
     }
 
-    fn apply_history(&mut self, receipt: &HistoryReceipt) -> bool {
+    fn apply_history(&mut self, receipt: &Receipt) -> bool {
         let Ok(restored) = &receipt.outcome else { return false };
-        self.inventory.apply_history(receipt.step, &restored.tags);
+        self.inventory.apply_history(receipt.asked, &restored.tags);
         true
     }
 

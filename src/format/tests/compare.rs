@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::format::Batch;
 use crate::format::portable::{PortableWorld, SavedRegion};
 use crate::lattice::{BrickPos, RegionPos};
-use crate::terrain::{CommitRecord, LogEntry, Patch, WorldParts};
+use crate::terrain::{CommitRecord, Patch, WorldParts};
 use crate::volume::Brick;
 
 pub fn bricks(a: &Brick, b: &Brick) -> bool {
@@ -36,7 +36,7 @@ pub fn parts(a: &WorldParts, b: &WorldParts) -> bool {
 }
 
 fn commits(a: &CommitRecord, b: &CommitRecord) -> bool {
-    let has_change = a.entries.contains(&LogEntry::Change);
+    let has_change = a.has_change();
     (a.revision, a.hash) == (b.revision, b.hash)
         && a.entries == b.entries
         && (!has_change || changes(&a.change, &b.change))

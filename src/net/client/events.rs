@@ -2,7 +2,7 @@
 
 use super::super::message::{ClientId, Kick, Refusal};
 use crate::lattice::RegionPos;
-use crate::terrain::{LoosePiece, Receipt, Restored, ReturnedPiece};
+use crate::terrain::{Applied, LoosePiece, Receipt, ReturnedPiece};
 
 /// What a game may want to know.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub enum ClientEvent {
     },
     /// An undo by this client succeeded, with the restored parts. They have no tags, because the order does not contain
     /// tags of edits. Inventories should follow this. `None` if the client was disconnected when it happened.
-    Undone(Option<Restored>),
+    Undone(Option<Applied>),
     /// An undo was refused. `None` if the request could not be sent, or the client was disconnected when it was
     /// refused.
     UndoRefused(Option<Refusal>),

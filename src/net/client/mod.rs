@@ -35,7 +35,7 @@ use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;
 use crate::lattice::{LatticeBox, RegionPos};
-use crate::terrain::{ChangeError, Patch, Receipt, SIMULATION, TerrainError, TerrainSettings, World};
+use crate::terrain::{Order, Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
@@ -175,7 +175,7 @@ impl Client {
     ///
     /// # Errors
     /// When the parts do not fit the ground or the chunk size.
-    pub fn begin_with(&mut self, change: Patch) -> Result<(), ChangeError> {
+    pub fn begin_with(&mut self, change: Patch) -> Result<(), Rejection> {
         self.replica.put(change)?;
         // It is in no order, so the server has to compare.
         self.epoch = Some(Epoch { world: WorldId(0), run: 0, number: 0 });
@@ -342,7 +342,7 @@ impl Client {
         self.inbox.push_back((lane, bytes));
     }
 
-    /// Changes for the shown terrain, in order, for [`Terrain::submit_change`](crate::terrain::Terrain::submit_change);
+    /// Changes for the shown terrain, in order, for [`Terrain::submit`](crate::terrain::Terrain::submit);
     /// each is returned once.
     pub fn take_shown(&mut self) -> Vec<ShownChange> {
         std::mem::take(&mut self.shown)
@@ -536,7 +536,7 @@ impl Client {
     /// that they turn into ground have to be found.
     fn next_batch(&mut self, end: u64, most: usize) -> Vec<Entry> {
         let (mut batch, mut number) = (Vec::new(), self.number());
-        let is_parts = |entry: Option<&Entry>| matches!(entry, Some(Entry::Parts { .. }));
+        let is_parts = |entry: Option<&Entry>| entry.is_some_and(|entry| entry.parts().is_some());
         while number < end
             && batch.len() < most
             && (batch.is_empty() || !is_parts(self.waiting.get(&(number + 1))))
@@ -545,7 +545,7 @@ impl Client {
             number += 1;
             let entry = self.valid(number, entry);
             let is_compared = matches!((&entry, &self.stage), (Entry::Mark, Stage::Following));
-            let is_checked = is_compared || matches!(&entry, Entry::Parts { .. });
+            let is_checked = is_compared || entry.parts().is_some();
             batch.push(entry);
             if is_checked {
                 break;
@@ -557,37 +557,25 @@ impl Client {
     fn apply(&mut self, batch: Vec<Entry>) {
         let Some(mut epoch) = self.epoch else { return };
         let id = self.id;
-        let own = |entry: &Entry| match entry {
-            Entry::Edit { author, own, .. } if Some(*author) == id => Some(*own),
-            _ => None,
-        };
+        let own = |entry: &Entry| entry.edit().and_then(|_| entry.number_of(id));
         let is_told = !self.is_history();
         let tag = |own| Some((own, self.replica.pending_edit(own)?.tag()));
         let tags: BTreeMap<u64, u64> = batch.iter().filter_map(own).filter_map(tag).collect();
         for entry in &batch {
-            match entry {
-                Entry::Edit { .. } => {
-                    own(entry).into_iter().for_each(|own| self.outbox.answer(own, None, self.now))
-                }
-                Entry::Parts { by: Some((by, own)), .. } if Some(*by) == id => {
-                    let cost = UNDO + entry_bytes(entry) as u64 / UNDO_BYTES;
-                    self.outbox.answer(*own, Some(cost), self.now);
-                }
-                _ => {}
+            if let Some(own) = entry.number_of(id) {
+                let cost = entry.parts().map(|_| UNDO + entry_bytes(entry) as u64 / UNDO_BYTES);
+                self.outbox.answer(own, cost, self.now);
             }
         }
-        let ground = match batch.first() {
-            Some(Entry::Parts { change, .. }) => {
-                reach(change).map(|reach| self.ground_pieces(Some(reach))).unwrap_or_default()
-            }
-            _ => BTreeSet::new(),
-        };
+        let reach_of_parts = batch.first().and_then(|first| reach(first.parts()?));
+        let ground = reach_of_parts.map(|reach| self.ground_pieces(Some(reach))).unwrap_or_default();
         let applied = self.replica.apply(&batch, own);
-        let (mut receipts, mut restored) = (applied.receipts.into_iter(), applied.restored.into_iter());
+        let mut receipts = applied.receipts.into_iter();
         for entry in &batch {
             epoch.number += 1;
-            match entry {
-                Entry::Edit { author, edit, .. } => {
+            let Entry::Order { by, order } = entry else { continue };
+            match order {
+                Order::Edit(edit) => {
                     self.reaches.note(epoch.number, edit.reach());
                     let Some(receipt) = receipts.next() else { continue };
                     // Its player may have been here before, in another client.
@@ -599,19 +587,20 @@ impl Client {
                         }
                         None if is_told => {
                             self.confirm_pieces(None, &receipt);
-                            self.events.push(ClientEvent::Others { author: *author, receipt });
+                            let author = by.map_or(ClientId::SERVER, |(author, _)| author);
+                            self.events.push(ClientEvent::Others { author, receipt });
                         }
                         None => {}
                     }
                 }
-                Entry::Parts { by, change } => {
-                    let mut restored = restored.next().flatten();
+                Order::Parts { change, .. } => {
+                    let mut restored = receipts.next().and_then(|receipt| receipt.outcome.ok());
                     let is_missing = restored.is_none();
                     let reach = reach(change);
                     let returned =
                         reach.map(|reach| self.check_pieces(Some(reach), &ground)).unwrap_or_default();
                     restored.iter_mut().for_each(|restored| restored.returned.clone_from(&returned));
-                    if by.is_some_and(|(by, own)| Some(by) == id && self.undos.remove(&own)) {
+                    if entry.number_of(id).is_some_and(|own| self.undos.remove(&own)) {
                         self.events.push(ClientEvent::Undone(restored));
                     }
                     reach.into_iter().for_each(|reach| self.reaches.note(epoch.number, reach));

@@ -1,13 +1,13 @@
 //! Marks: positions of the order at which hashes of regions are compared; and the repair of regions that differ.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::sync::Arc;
 
 use super::super::message::{Entry, MOST_REGIONS, RegionContent, RegionHashes, ToServer};
 use super::join::Stage;
 use super::{Client, ClientEvent};
 use crate::lattice::{BrickPos, LatticeBox, RegionPos};
 use crate::net::replica::Replica;
+use crate::terrain::{Order, Patch};
 
 /// The most marks that wait for the other side.
 const MOST_MARKS: usize = 256;
@@ -196,18 +196,18 @@ impl Client {
         if !self.voids.remove(&number) {
             return entry;
         }
-        match entry {
-            Entry::Edit { author, own, .. } if Some(author) == self.id => {
+        match entry.number_of(self.id) {
+            Some(own) if entry.edit().is_some() => {
                 if let Some(edit) = self.replica.take_back(own) {
                     self.refuse_pieces(own);
                     self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
                 }
             }
-            Entry::Parts { by: Some((by, own)), .. } if Some(by) == self.id && self.undos.remove(&own) => {
+            Some(own) if entry.parts().is_some() && self.undos.remove(&own) => {
                 self.events.push(ClientEvent::UndoRefused(None));
             }
             _ => {}
         }
-        Entry::Parts { by: None, change: Arc::default() }
+        Entry::of_server(Order::parts(Patch::default(), None))
     }
 }

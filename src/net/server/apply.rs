@@ -11,7 +11,7 @@ use crate::net::encoding::entry_bytes;
 use crate::net::message::{Entry, Refusal, RegionHashes, ToClient};
 use crate::net::price::{MOST_UNDO_BYTES, UNDO, UNDO_BYTES};
 use crate::net::regions::{Steps, touched_regions};
-use crate::terrain::{ChangeError, Patch, Receipt, Rejection};
+use crate::terrain::{Order, Patch, Receipt};
 
 impl Server {
     /// Applies entries, as much as one call may.
@@ -39,22 +39,24 @@ impl Server {
         }
         let Some(Ordered { entry, .. }) = self.waiting.pop_front() else { return 0 };
         let number = self.applied + 1;
-        match entry {
-            Entry::Rules(_) | Entry::Loose(_) => {
-                // Rules were checked when they were ordered.
-                entry.order().map_or(Ok(()), |order| self.terrain.submit_order(order)).unwrap_or_default();
-            }
-            Entry::Parts { by, change } => {
-                self.put_parts(number, &change);
-                if let Some((client, own)) = by {
-                    self.own_numbers.apply(client, own, number);
-                }
+        let (by, order) = match entry {
+            Entry::Order { by, order } => (by, order),
+            Entry::Mark => {
+                self.tell_hashes(number);
                 self.applied = number;
-                return change.bricks.len() as u64 + 1;
+                return 1;
             }
-            Entry::Mark => self.tell_hashes(number),
-            Entry::Edit { .. } => {}
+        };
+        if let Order::Parts { change, .. } = order {
+            self.put_parts(number, &change);
+            if let Some((client, own)) = by {
+                self.own_numbers.apply(client, own, number);
+            }
+            self.applied = number;
+            return change.bricks.len() as u64 + 1;
         }
+        // Rules were checked when they were ordered.
+        self.terrain.submit(order);
         self.applied = number;
         1
     }
@@ -64,7 +66,9 @@ impl Server {
         let keeps_strokes = self.settings.undo != UndoPolicy::Nobody;
         let (mut work, mut first) = (0_u64, None);
         let goes_on = |ordered: &&Ordered| {
-            let Entry::Edit { author, .. } = &ordered.entry else { return false };
+            let Entry::Order { by: Some((author, _)), order: Order::Edit(_) } = &ordered.entry else {
+                return false;
+            };
             let stroke = (*author, ordered.labels.1);
             let goes_with = |first| !keeps_strokes || (stroke.1.is_some() && stroke == first);
             let fits = first.is_none_or(|first| goes_with(first) && work + ordered.cost <= most);
@@ -81,7 +85,7 @@ impl Server {
         for (number, Ordered { entry, labels: (tag, label), cost }) in
             (first..).zip(self.waiting.drain(..count))
         {
-            if let Entry::Edit { author, own, edit } = entry {
+            if let Entry::Order { by: Some((author, own)), order: Order::Edit(edit) } = entry {
                 self.own_numbers.apply(author, own, number);
                 stroke = Some((author, label));
                 edits.push(edit.with_labels(tag, label));
@@ -92,7 +96,7 @@ impl Server {
         let receipts = self.transact(&edits, stroke.filter(|_| self.settings.undo != UndoPolicy::Nobody));
         self.applied += count as u64;
         for (number, receipt) in (first..).zip(receipts) {
-            if is_void(&receipt) {
+            if receipt.is_local_failure() {
                 self.void(number);
             }
         }
@@ -101,8 +105,8 @@ impl Server {
 
     /// Applies edits, and records the touched regions.
     fn transact(&mut self, edits: &[Edit], stroke: Option<(super::ClientId, Option<u64>)>) -> Vec<Receipt> {
-        self.terrain.submit_edits(edits);
-        let mut receipts = self.terrain.take_answered();
+        self.terrain.submit_all(edits);
+        let mut receipts = self.terrain.take_receipts();
         while let Some(transaction) = self.terrain.begin() {
             let commit = transaction.run();
             let change = commit.change();
@@ -130,12 +134,13 @@ impl Server {
 
     fn put_parts(&mut self, number: u64, change: &Arc<Patch>) {
         let steps = Steps::of(self.terrain.world(), change);
-        match self.terrain.apply_change(Arc::clone(change), None) {
-            Ok(_) => self.touch(change, steps),
-            Err(ChangeError::Panicked | ChangeError::Overloaded) => self.void(number),
-            // Nothing changed, and the same holds on all machines.
-            Err(_) => {}
+        let receipt = self.terrain.apply_one(Order::parts(Arc::clone(change), None));
+        if receipt.outcome.is_ok() {
+            self.touch(change, steps);
+        } else if receipt.is_local_failure() {
+            self.void(number);
         }
+        // Otherwise nothing changed, and the same holds on all machines.
     }
 
     pub(super) fn void(&mut self, number: u64) {
@@ -165,7 +170,7 @@ impl Server {
             NoUndo::Touched => Refusal::Touched,
         });
         let entry = change.and_then(|change| {
-            let entry = Entry::Parts { by: Some((request.by, request.own)), change: Arc::new(change) };
+            let entry = Entry::of(request.by, request.own, Order::parts(change, None));
             let bytes = entry_bytes(&entry);
             if bytes <= MOST_UNDO_BYTES { Ok((entry, bytes)) } else { Err(Refusal::TooLarge) }
         });
@@ -191,9 +196,4 @@ impl Server {
             self.number(ordered);
         }
     }
-}
-
-/// Whether the edit failed for a reason that other machines may not have.
-fn is_void(receipt: &Receipt) -> bool {
-    matches!(receipt.outcome, Err(Rejection::Panicked | Rejection::Overloaded | Rejection::TerrainGone))
 }

@@ -47,7 +47,7 @@ use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::format::{FormatError, WorldId};
 use crate::lattice::RegionPos;
-use crate::terrain::{LooseSettings, Patch, Terrain};
+use crate::terrain::{LooseSettings, Order, Patch, Terrain};
 use crate::volume::{DiggingRules, RulesError};
 pub use events::{ServerEvent, ServerFigures};
 use kept::Kept;
@@ -105,8 +105,9 @@ impl Later {
     fn is_of(&self, client: ClientId) -> bool {
         match self {
             Self::Undo(request) => request.by == client,
-            Self::Entry(Ordered { entry: Entry::Edit { author, .. }, .. }) => *author == client,
-            Self::Entry(_) => false,
+            Self::Entry(Ordered { entry, .. }) => {
+                entry.edit().is_some() && entry.number_of(Some(client)).is_some()
+            }
         }
     }
 }
@@ -230,10 +231,10 @@ impl Server {
         };
         // What holds already is part of what leads from the pristine world.
         if let (true, Some(rules)) = (is_whole, terms.0) {
-            server.order(Entry::Rules(Some(rules)));
+            server.order(Entry::of_server(Order::Rules(Some(rules))));
         }
         if let (true, Some(loose)) = (is_whole, terms.1) {
-            server.order(Entry::Loose(Some(loose)));
+            server.order(Entry::of_server(Order::Loose(Some(loose))));
         }
         server
     }
@@ -360,13 +361,13 @@ impl Server {
     pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
         rules.check()?;
         let rules = (!rules.is_empty()).then(|| Arc::new(rules));
-        self.order(Entry::Rules(rules));
+        self.order(Entry::of_server(Order::Rules(rules)));
         Ok(())
     }
 
     /// Sets the loose settings of later edits.
     pub fn set_loose(&mut self, loose: Option<LooseSettings>) {
-        self.order(Entry::Loose(loose));
+        self.order(Entry::of_server(Order::Loose(loose)));
     }
 
     /// Orders an edit of the game, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
@@ -386,7 +387,7 @@ impl Server {
     /// # Errors
     /// When they take more bytes than a message may; split them then.
     pub fn put(&mut self, change: Patch) -> Result<(), FormatError> {
-        let entry = Entry::Parts { by: None, change: Arc::new(change) };
+        let entry = Entry::of_server(Order::parts(change, None));
         let (length, limit) = (entry_bytes(&entry) as u64, MOST_TO_CLIENT as u64 / 2);
         if length > limit {
             return Err(FormatError::TooLarge { length, limit });
@@ -397,7 +398,7 @@ impl Server {
 
     fn order_edit(&mut self, author: ClientId, own: u64, edit: Edit, cost: u64) {
         let labels = (edit.tag(), edit.stroke());
-        let entry = Entry::Edit { author, own, edit: edit.with_labels(0, None) };
+        let entry = Entry::of(author, own, Order::Edit(edit.with_labels(0, None)));
         self.enter(Ordered { entry, labels, cost });
     }
 

@@ -91,12 +91,12 @@ mod tests {
     use crate::ground::Ground;
     use crate::net::message::{Entries, ToClient};
     use crate::net::stamps::Stamps;
-    use crate::terrain::LooseSettings;
+    use crate::terrain::{LooseSettings, Order};
 
     /// Every third entry is a mark, and the others are loose settings.
     fn entry(number: u64) -> Entry {
         let loose = LooseSettings { debris: number as u32, ..LooseSettings::default() };
-        if number.is_multiple_of(3) { Entry::Mark } else { Entry::Loose(Some(loose)) }
+        if number.is_multiple_of(3) { Entry::Mark } else { Entry::of_server(Order::Loose(Some(loose))) }
     }
 
     /// Twenty thousand entries after the number 7.

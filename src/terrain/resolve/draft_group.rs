@@ -26,7 +26,7 @@ pub(crate) fn draft_group(
     drafter: &mut Drafter,
     group: &[Submission],
 ) -> (Draft, LoosePieces) {
-    let edits: Vec<&Edit> = group.iter().filter_map(|submission| submission.edit.as_ref().ok()).collect();
+    let edits: Vec<&Edit> = group.iter().filter_map(|submission| submission.edit()).collect();
     let terms = group.first().map(|first| &first.terms);
     let rules = terms.and_then(|terms| terms.rules.as_deref());
     match terms.and_then(|terms| terms.loose.as_ref()) {

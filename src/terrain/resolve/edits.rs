@@ -10,9 +10,8 @@ use web_time::Instant;
 
 use super::draft_group::{Found, LoosePieces, draft_group};
 use super::field_log::{FieldLog, FieldNews};
-use super::reset::reset;
 use super::resolved::Resolved;
-use crate::brush::Kind;
+use crate::brush::Edit;
 use crate::edits::{DraftedBrick, Drafter, EditDelta, EditEffect, MergedBricks, PreparedEdits, latest};
 use crate::lattice::{BrickPos, ChunkPos, ItemCost, parallel_map_into, side_by_side};
 use crate::loose::LoosePiece;
@@ -22,7 +21,7 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::terrain::history::UndoDelta;
 use crate::terrain::queue::Submission;
-use crate::terrain::receipt::{Applied, Receipt, Rejection};
+use crate::terrain::receipt::{Applied, Receipt};
 use crate::volume::{Brick, Fields};
 use crate::world::{Change, ChangedBrick, Patch, World, brick_bytes, replaced_bytes};
 
@@ -87,14 +86,6 @@ fn merged<'a>(earlier: &[Group], last: &'a [DraftedBrick]) -> Cow<'a, [DraftedBr
 
 /// Resolves edits, in order.
 pub(crate) fn edits(scene: Scene, submissions: &[Submission]) -> Resolved {
-    match submissions {
-        [own @ Submission { edit: Ok(edit), .. }] if edit.kind() == Kind::Reset => reset(scene, own, edit),
-        all => edit(scene, all),
-    }
-}
-
-/// Applies edits, in order.
-fn edit(scene: Scene, submissions: &[Submission]) -> Resolved {
     let Scene { world, backend, .. } = scene;
     let (start, mut stages) = (Instant::now(), Stages::default());
     let apply = |work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta])| backend.edit(work, each);
@@ -185,7 +176,7 @@ fn enter<'a>(
         let (mut tags, mut taken) = (Vec::new(), Vec::new());
         receipts.reserve_exact(submissions.len());
         for submission in submissions {
-            let outcome = submission.edit.as_ref().map_err(Rejection::clone).and_then(|edit| {
+            let mut apply = |edit: &Edit| {
                 let (number, effect) = effects.next().unwrap_or_default();
                 let applied = log.enter(edit, effect)?;
                 if !applied.chunks.is_empty() {
@@ -195,8 +186,12 @@ fn enter<'a>(
                 let gone = loose.iter().filter(|piece| piece.is_gone());
                 taken.extend(gone.map(|piece| (submission.tag, piece.clone())));
                 Ok(Applied { loose, has_unsearched, ..applied })
-            });
-            receipts.push(Receipt { tag: submission.tag, outcome });
+            };
+            let outcome = match &submission.order {
+                Ok(order) => order.edit().map_or_else(|| Ok(Applied::default()), &mut apply),
+                Err(rejection) => Err(rejection.clone()),
+            };
+            receipts.push(Receipt::of_edit(submission.tag, outcome));
         }
         tags.shrink_to_fit();
         taken.shrink_to_fit();

@@ -1,4 +1,10 @@
-//! Resolves work into changes: edits, steps through history, replaced parts, another ground.
+//! Resolves orders into changes: edits, steps through history, replaced parts, another ground.
+
+use crate::brush::Kind;
+use crate::redraw::Scene;
+use crate::terrain::history::UndoDelta;
+use crate::terrain::order::Order;
+use crate::terrain::queue::Submission;
 
 mod draft_group;
 mod edits;
@@ -8,8 +14,22 @@ mod reset;
 mod resolved;
 mod step;
 
-pub(crate) use edits::edits;
 pub use field_log::FieldNews;
-pub(crate) use parts::{parts, world_of};
+pub(crate) use parts::world_of;
 pub(crate) use resolved::{Resolved, patch_of};
-pub(crate) use step::step;
+
+/// Resolves the orders of a transaction: edits, or one order of another kind; `target` is the content that a step through
+/// history restores.
+pub(super) fn orders(scene: Scene, submissions: &[Submission], target: Option<&UndoDelta>) -> Resolved {
+    let single = match submissions {
+        [own] => own.order.as_ref().ok().map(|order| (own, order)),
+        _ => None,
+    };
+    match (single, target) {
+        (Some((_, Order::Parts { change, hash })), _) => parts::parts(scene, change, *hash),
+        (Some((_, Order::Ground(ground))), _) => parts::ground(scene, ground),
+        (Some((own, Order::Edit(edit))), _) if edit.kind() == Kind::Reset => reset::reset(scene, own, edit),
+        (Some((_, step)), Some(target)) => step::step(scene, step.asked(), target),
+        _ => edits::edits(scene, submissions),
+    }
+}

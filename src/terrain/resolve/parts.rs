@@ -17,8 +17,9 @@ use crate::redraw::{Scene, Stages, dirty_cells, joined_mask};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::terrain::commit::Commit;
-use crate::terrain::history::{Restored, UndoDelta};
-use crate::terrain::replacement::{ChangeError, Put, check_number};
+use crate::terrain::history::UndoDelta;
+use crate::terrain::parts_error::{PartsError, check_number};
+use crate::terrain::receipt::{Applied, Asked, Receipt};
 use crate::volume::layers::{self, offset};
 use crate::volume::{Brick, Field, FieldId, UniformBricks, pristine_layers};
 use crate::world::{self, Change, Meshing, Patch, World, brick_over, columns_of};
@@ -39,21 +40,21 @@ impl NewBrick {
         pos: BrickPos,
         brick: Option<&Arc<Brick>>,
         counts: bool,
-    ) -> Result<Self, ChangeError> {
+    ) -> Result<Self, PartsError> {
         let mut brick = brick.map(Arc::clone);
         let (bounds, own) = (world.grid.edit_bounds(), pos.samples());
         // Far out, lattice points do not fit 32 bits, and those that wrap around may seem to lie in the world.
         if BrickPos::of(own.min) != pos || own.intersection(bounds).is_none() {
-            return Err(ChangeError::OutsideWorld(pos));
+            return Err(PartsError::OutsideWorld(pos));
         }
         if let Some(new) = &brick {
             let is_inside = |index| bounds.contains(pos.origin() + offset(index));
             if !bounds.encloses(own) && !layers::indices(new.edited()).all(is_inside) {
-                return Err(ChangeError::OutsideWorld(pos));
+                return Err(PartsError::OutsideWorld(pos));
             }
             let pristine = layers::without(&pristine_layers(&world.ground, pos), new.edited());
             if layers::without(new.solid(), new.edited()) != pristine {
-                return Err(ChangeError::OtherGround(pos));
+                return Err(PartsError::OtherGround(pos));
             }
         }
         // One without an edited sample is pristine.
@@ -75,15 +76,28 @@ impl NewBrick {
     }
 }
 
-/// Resolves replaced parts.
-pub(crate) fn parts(scene: Scene, put: &Put) -> Resolved {
+/// Resolves replaced parts; `hash` is the one that the world must have afterwards.
+pub(crate) fn parts(scene: Scene, change: &Patch, hash: Option<u64>) -> Resolved {
+    answered(scene.world, Asked::Parts, || replaced(scene, change, hash, true))
+}
+
+/// Resolves another ground.
+pub(crate) fn ground(scene: Scene, ground: &Arc<Ground>) -> Resolved {
+    answered(scene.world, Asked::Ground, || on_ground(scene.world, ground))
+}
+
+/// Adds the receipt, and the time that it took.
+fn answered(
+    world: &World,
+    asked: Asked,
+    resolve: impl FnOnce() -> Result<(Resolved, Applied), PartsError>,
+) -> Resolved {
     let start = Instant::now();
-    let resolved = match &put.ground {
-        Some(ground) => on_ground(scene.world, ground),
-        None => replaced(scene, put),
+    let (mut resolved, outcome) = match resolve() {
+        Ok((resolved, applied)) => (resolved, Ok(applied)),
+        Err(why) => (Resolved::nothing(world), Err(why.into())),
     };
-    let failed = |error| Resolved { put: Some(Err(error)), ..Resolved::nothing(scene.world) };
-    let mut resolved = resolved.unwrap_or_else(failed);
+    resolved.receipts.push(Receipt::of(asked, outcome));
     resolved.stages.whole = start.elapsed();
     resolved
 }
@@ -94,12 +108,11 @@ pub(crate) fn world_of(
     chunk_size: i32,
     parts: Patch,
     revision: u64,
-) -> Result<World, ChangeError> {
+) -> Result<World, PartsError> {
     check_number(revision)?;
     let mut world = World::new(ground, chunk_size);
-    let put = Put { change: Arc::new(parts), hash: None, counts: false, ground: None };
     let scene = Scene { world: &world, meshing: Meshing::Never, cut: None, backend: &Cpu };
-    let resolved = replaced(scene, &put)?;
+    let (resolved, _) = replaced(scene, &parts, None, false)?;
     // What it replaces is pristine.
     Commit::new(0, false, resolved).install(&mut world);
     world.revision = revision;
@@ -107,32 +120,39 @@ pub(crate) fn world_of(
 }
 
 /// Rebuilds the world with its edits on another ground.
-fn on_ground(before: &World, ground: &Arc<Ground>) -> Result<Resolved, ChangeError> {
+fn on_ground(before: &World, ground: &Arc<Ground>) -> Result<(Resolved, Applied), PartsError> {
+    let size = |ground: &Ground| (ground.width(), ground.depth());
+    let (found, expected) = (size(ground), size(&before.ground));
+    if found != expected {
+        return Err(PartsError::GroundSize { found, expected });
+    }
     let mut parts = before.all_parts();
     for (pos, brick) in &mut parts.bricks {
         *brick = brick.take().map(|brick| brick_over(ground, *pos, brick));
     }
     let world = world_of(Arc::clone(ground), before.grid.size(), parts, before.revision)?;
-    Ok(Resolved {
-        put: Some(Ok(Restored::default())),
-        next_field: world.next_field,
-        whole: Some(Arc::new(world)),
-        ..Resolved::nothing(before)
-    })
+    let (next_field, whole) = (world.next_field, Some(Arc::new(world)));
+    Ok((Resolved { next_field, whole, ..Resolved::nothing(before) }, Applied::default()))
 }
 
-fn replaced(scene: Scene, put: &Put) -> Result<Resolved, ChangeError> {
-    let (world, change, mut stages) = (scene.world, &*put.change, Stages::default());
+/// Replaces parts. Without `counts` the receipt counts no voxels.
+fn replaced(
+    scene: Scene,
+    change: &Patch,
+    hash: Option<u64>,
+    counts: bool,
+) -> Result<(Resolved, Applied), PartsError> {
+    let (world, mut stages) = (scene.world, Stages::default());
     check_order(&change.bricks)?;
     let next_field = check_fields(world, change)?;
     let all = change.bricks.par_iter().with_min_len(64);
-    let all = all.map(|(pos, brick)| NewBrick::new(world, *pos, brick.as_ref(), put.counts));
-    let mut new = Stages::time(&mut stages.edit, || all.collect::<Result<Vec<NewBrick>, ChangeError>>())?;
+    let all = all.map(|(pos, brick)| NewBrick::new(world, *pos, brick.as_ref(), counts));
+    let mut new = Stages::time(&mut stages.edit, || all.collect::<Result<Vec<NewBrick>, PartsError>>())?;
     let delta = new.iter().fold(0u64, |sum, own| sum.wrapping_add(own.hash));
     let sample_hash = world.sample_hash.wrapping_add(delta);
     let found = World::hash_of(world.ground.hash(), sample_hash);
-    if let Some(expected) = put.hash.filter(|&expected| expected != found) {
-        return Err(ChangeError::Hash { found, expected });
+    if let Some(expected) = hash.filter(|&expected| expected != found) {
+        return Err(PartsError::Hash { found, expected });
     }
     let uniform = share_uniform(world, &mut new);
     let mut effect = EditEffect::default();
@@ -158,37 +178,37 @@ fn replaced(scene: Scene, put: &Put) -> Result<Resolved, ChangeError> {
     let Placed { meshes, news } = place(scene, &change, &whole, &changed, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let EditEffect { removed, added, painted, .. } = effect;
-    let restored = Restored { bounds, removed, added, painted, ..Restored::default() };
+    let applied = Applied { bounds, removed, added, painted, ..Applied::default() };
     let delta = UndoDelta::new(change, replaced_bytes, 0, Default::default());
-    Ok(Resolved {
-        put: Some(Ok(restored)),
+    let resolved = Resolved {
         news,
         uniform,
         next_field,
         stages,
         ..Resolved::new(world, vec![delta], sample_hash, meshes)
-    })
+    };
+    Ok((resolved, applied))
 }
 
-fn check_order(bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> Result<(), ChangeError> {
+fn check_order(bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> Result<(), PartsError> {
     let wrong = bricks.windows(2).find(|pair| pair[0].0 >= pair[1].0);
-    wrong.map_or(Ok(()), |pair| Err(ChangeError::Order(pair[1].0)))
+    wrong.map_or(Ok(()), |pair| Err(PartsError::Order(pair[1].0)))
 }
 
 /// Checks the fields of a change; returns the greatest name that a field will have had.
-fn check_fields(world: &World, change: &Patch) -> Result<u64, ChangeError> {
+fn check_fields(world: &World, change: &Patch) -> Result<u64, PartsError> {
     let (mut chunks, mut names) = (FxHashSet::default(), FxHashSet::default());
     let mut greatest = check_number(world.next_field.max(change.next_field))?;
     for (chunk, fields) in &change.fields {
         let own = world.grid.chunk_samples(*chunk).intersection(world.grid.edit_bounds());
         let is_inside = |field: &Field| own.is_some_and(|own| own.encloses(field.bounds));
         if !world.grid.has_tile(chunk.tile()) || !chunks.insert(*chunk) || !fields.iter().all(is_inside) {
-            return Err(ChangeError::Fields(*chunk));
+            return Err(PartsError::Fields(*chunk));
         }
         for FieldId(name) in fields.iter().map(|field| field.id) {
             greatest = greatest.max(check_number(name)?);
             if !names.insert(name) {
-                return Err(ChangeError::Fields(*chunk));
+                return Err(PartsError::Fields(*chunk));
             }
         }
     }

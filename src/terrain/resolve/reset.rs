@@ -27,7 +27,7 @@ pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resol
     let (world, start, mut stages) = (scene.world, Instant::now(), Stages::default());
     let tag = submission.tag;
     if reach(world.grid, edit).is_none() {
-        let receipts = vec![Receipt { tag, outcome: Err(Rejection::OutsideWorld) }];
+        let receipts = vec![Receipt::of_edit(tag, Err(Rejection::OutsideWorld))];
         return Resolved { receipts, ..Resolved::nothing(world) };
     }
     let mut effect = EditEffect::default();
@@ -63,7 +63,7 @@ pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resol
     let applied = Applied { chunks, bounds, removed, added, painted, refused, ..Applied::default() };
     stages.whole = start.elapsed();
     Resolved {
-        receipts: vec![Receipt { tag, outcome: Ok(applied) }],
+        receipts: vec![Receipt::of_edit(tag, Ok(applied))],
         news,
         stages,
         ..Resolved::new(world, vec![delta], sample_hash, meshes)

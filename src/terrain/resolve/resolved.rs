@@ -5,9 +5,8 @@ use std::sync::Arc;
 use super::field_log::FieldNews;
 use crate::lattice::ChunkPos;
 use crate::redraw::{MeshUpdates, Stages};
-use crate::terrain::history::{HistoryReceipt, Restored, UndoDelta};
+use crate::terrain::history::UndoDelta;
 use crate::terrain::receipt::Receipt;
-use crate::terrain::replacement::ChangeError;
 use crate::volume::UniformBricks;
 use crate::world::{Patch, World};
 
@@ -22,10 +21,6 @@ pub(crate) struct Resolved {
     /// The greatest name that any field has had afterwards.
     pub next_field: u64,
     pub receipts: Vec<Receipt>,
-    /// The receipt of a step through history.
-    pub step: Option<HistoryReceipt>,
-    /// The receipt of replaced parts.
-    pub put: Option<Result<Restored, ChangeError>>,
     /// Changes of fields.
     pub news: Vec<(ChunkPos, FieldNews)>,
     /// The new world, if all of it is replaced.
@@ -48,8 +43,6 @@ impl Resolved {
             uniform: None,
             next_field: world.next_field,
             receipts: Vec::new(),
-            step: None,
-            put: None,
             news: Vec::new(),
             whole: None,
             meshes,

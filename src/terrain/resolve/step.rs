@@ -13,7 +13,8 @@ use crate::loose::ReturnedPiece;
 use crate::redraw::{self, MeshUpdates, Scene, Stages, dirty_cells};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::terrain::history::{HistoryReceipt, HistoryStep, Restored, UndoDelta};
+use crate::terrain::history::{Step, UndoDelta};
+use crate::terrain::receipt::{Applied, Asked, Receipt};
 use crate::volume::{Brick, Fields, pristine_layers};
 use crate::world::{Change, replaced_bytes};
 
@@ -55,7 +56,7 @@ pub(crate) fn place(
 }
 
 /// Resolves a step through history.
-pub(crate) fn step(scene: Scene, step: HistoryStep, target: &UndoDelta) -> Resolved {
+pub(crate) fn step(scene: Scene, asked: Asked, target: &UndoDelta) -> Resolved {
     let (world, start, mut stages) = (scene.world, Instant::now(), Stages::default());
     let (change, mut bricks) = (target.change.clone(), Vec::with_capacity(target.change.patch.bricks.len()));
     let (mut effect, mut changed) = (EditEffect::default(), Vec::with_capacity(change.patch.bricks.len()));
@@ -72,21 +73,30 @@ pub(crate) fn step(scene: Scene, step: HistoryStep, target: &UndoDelta) -> Resol
     let Placed { meshes, news } = place(scene, &change, &bricks, &changed, &mut stages);
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let EditEffect { removed, added, painted, .. } = effect;
-    let (mut returned, mut loose) = (Vec::new(), Vec::new());
-    match step {
-        HistoryStep::Undo => {
+    let (mut returned, mut cut_again) = (Vec::new(), Vec::new());
+    match Step::of(asked) {
+        Some(Step::Undo) => {
             returned.extend(target.pieces.iter().map(|(tag, piece)| ReturnedPiece::new(*tag, piece)))
         }
-        HistoryStep::Redo => loose.clone_from(&target.pieces),
+        _ => cut_again.clone_from(&target.pieces),
     }
     let tags = target.tags.clone();
-    let restored = Restored { tags: tags.clone(), bounds, removed, added, painted, returned, loose };
+    let applied = Applied {
+        bounds,
+        removed,
+        added,
+        painted,
+        tags: tags.clone(),
+        returned,
+        cut_again,
+        ..Applied::default()
+    };
     let replaced_bytes = change.patch.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
     let sample_hash = change.sample_hash;
     let delta = UndoDelta::new(change, replaced_bytes, target.group, (tags, target.pieces.clone()));
     stages.whole = start.elapsed();
     Resolved {
-        step: Some(HistoryReceipt { step, outcome: Ok(restored) }),
+        receipts: vec![Receipt::of(asked, Ok(applied))],
         news,
         stages,
         ..Resolved::new(world, vec![delta], sample_hash, meshes)

@@ -103,7 +103,7 @@ fn bytes_to_join(level: &Terrain, begins: Terrain, is_asset: bool) -> u64 {
 
 /// What a terrain holds, in another terrain of the same ground.
 fn copy_of(terrain: &Terrain, mut pristine: Terrain) -> Terrain {
-    pristine.apply_change(terrain.parts().change, None).expect("it is the same ground");
+    pristine.apply_one(Order::parts(terrain.parts().change, None)).outcome.expect("it is the same ground");
     pristine
 }
 

@@ -138,7 +138,7 @@ fn an_undo_that_is_not_allowed_is_not_nothing_to_undo() {
     party.rounds(50);
     let moved = party.players[0].0.recorded::<HistoryMoved>();
     let outcomes: Vec<_> = moved.iter().map(|moved| &moved.receipt.outcome).collect();
-    assert_eq!(outcomes, [&Err(HistoryRejection::Refused)]);
+    assert_eq!(outcomes, [&Err(Rejection::Refused)]);
     assert_eq!(party.troubles(0), [SharingTrouble::UndoRefused(Refusal::Forbidden)]);
     // Where it is allowed, and nothing is there, that is said.
     let mut party = Party::new(1);
@@ -146,7 +146,7 @@ fn an_undo_that_is_not_allowed_is_not_nothing_to_undo() {
     party.players[0].0.write(Undo::default());
     party.rounds(50);
     let moved = party.players[0].0.recorded::<HistoryMoved>();
-    assert_eq!(moved[0].receipt.outcome, Err(HistoryRejection::NothingToUndo));
+    assert_eq!(moved[0].receipt.outcome, Err(Rejection::NothingToUndo));
     assert_eq!(party.troubles(0), []);
 }
 

@@ -150,7 +150,7 @@ fn edits_at_the_ends_of_the_lattice_are_those_of_the_cpu() {
             let world = terrain.world();
             let edits = random_edits(&mut rng, world.ground(), settings.chunk_size);
             compare_edits(&mut device, (world.samples(), world.grid()), &edits, &mut rng);
-            terrain.submit_edits(&edits);
+            terrain.submit_all(&edits);
             terrain.apply(std::iter::empty::<Brush>());
         }
     }

@@ -1,15 +1,11 @@
-//! Parts that replace others, and their errors.
+//! Why parts of a world or its ground can't be replaced.
 
-use std::sync::Arc;
+use crate::lattice::{BrickPos, ChunkPos};
 
-use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::world::Patch;
-
-/// The reason why parts were not replaced; nothing changed.
+/// Why parts of a world or its ground can't be replaced; nothing changed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum ChangeError {
+pub enum PartsError {
     /// A brick is repeated or out of order.
     #[error("the brick {0:?} is repeated or out of order: sort bricks by position")]
     Order(BrickPos),
@@ -41,40 +37,9 @@ pub enum ChangeError {
         /// Those of the world's.
         expected: (i32, i32),
     },
-    /// Too much work [waits](crate::terrain::WorkLimits::waiting).
-    #[error("the queue is full: try again once waiting work is done")]
-    Overloaded,
-    /// It panicked.
-    #[error("replacing parts panicked: this is a bug in bevy_burrow")]
-    Panicked,
-}
-
-/// The replacement parts.
-#[derive(Debug)]
-pub(super) struct Put {
-    pub change: Arc<Patch>,
-    /// The hash that the world must have afterwards.
-    pub hash: Option<u64>,
-    /// Whether its receipt counts voxels.
-    pub counts: bool,
-    /// Another ground below all edits; nothing else changes then.
-    pub ground: Option<Arc<Ground>>,
-}
-
-impl Put {
-    /// Returns `true` if it certainly changes nothing.
-    pub fn is_empty(&self) -> bool {
-        self.change.is_empty() && self.ground.is_none()
-    }
-
-    /// Returns `true` if it certainly changes none of these samples.
-    pub fn misses(&self, samples: LatticeBox) -> bool {
-        let misses = |pos: &BrickPos| pos.samples().intersection(samples).is_none();
-        self.ground.is_none() && self.change.bricks.iter().all(|(pos, _)| misses(pos))
-    }
 }
 
 /// Checks that a revision or the name of a field leaves room for those that follow.
-pub(super) fn check_number(number: u64) -> Result<u64, ChangeError> {
-    if number > u64::MAX / 2 { Err(ChangeError::Number(number)) } else { Ok(number) }
+pub(super) fn check_number(number: u64) -> Result<u64, PartsError> {
+    if number > u64::MAX / 2 { Err(PartsError::Number(number)) } else { Ok(number) }
 }
