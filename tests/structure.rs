@@ -1,8 +1,7 @@
 //! The structure of the source: modules import only lower modules, and files import each other in no circle.
 //!
 //! Imports are read from the source text: `use` declarations and paths, without comments, strings, and code that is
-//! compiled for tests only. Re-exports are followed to the file that defines the item. Known violations are listed in
-//! [`UPWARD`] and [`CIRCLES`]; a test fails if one of them no longer exists, so these lists can only shrink.
+//! compiled for tests only. Re-exports are followed to the file that defines the item.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,16 +12,6 @@ const MODULES: &[&str] = &[
     "threads", "lattice", "lod", "ground", "brush", "volume", "edits", "surface", "dense", "backend",
     "world", "loose", "redraw", "terrain", "format", "store", "net", "plugin", "view", "saves", "plugins",
     "together", "physics", "debug", "panel",
-];
-
-/// Imports of a higher module that still exist: the file, and the module that it imports.
-const UPWARD: &[(&str, &str)] = &[];
-
-/// Circles of files that still exist: all files of each, in alphabetical order.
-const CIRCLES: &[&[&str]] = &[
-    &["panel/files.rs", "panel/level.rs"],
-    &["together/client.rs", "together/shared.rs"],
-    &["together/players.rs", "together/server.rs", "together/service.rs"],
 ];
 
 /// The text of a crate's files, by path below `src`.
@@ -375,28 +364,32 @@ fn crate_of(files: &[(&str, &str)]) -> Sources {
 #[test]
 fn modules_import_only_lower_ones() {
     let found = upward_imports(&library(), MODULES);
-    let known: BTreeSet<(String, String)> =
-        UPWARD.iter().map(|&(file, to)| (file.into(), to.into())).collect();
-    let new: Vec<_> = found.difference(&known).collect();
-    assert!(new.is_empty(), "these files import a higher module: {new:#?}");
-    let gone: Vec<_> = known.difference(&found).collect();
-    assert!(gone.is_empty(), "these imports are gone: remove them from UPWARD: {gone:#?}");
+    assert!(found.is_empty(), "these files import a higher module: {found:#?}");
 }
 
 #[test]
 fn files_import_each_other_in_no_circle() {
     let found = circles(&library());
-    let known: BTreeSet<Vec<String>> =
-        CIRCLES.iter().map(|files| files.iter().map(|&file| file.to_owned()).collect()).collect();
-    let is_part =
-        |circle: &&Vec<String>| known.iter().any(|all| circle.iter().all(|file| all.contains(file)));
-    let new: Vec<_> = found.iter().filter(|circle| !is_part(circle)).collect();
-    assert!(new.is_empty(), "these files import each other in circles: {new:#?}");
-    let gone: Vec<_> = known.difference(&found).collect();
-    assert!(
-        gone.is_empty(),
-        "these circles are gone or smaller: shorten CIRCLES: {gone:#?}, found {found:#?}"
-    );
+    assert!(found.is_empty(), "these files import each other in circles: {found:#?}");
+}
+
+/// The files whose code, without comments and strings, has a word that begins like this.
+fn files_that_name(sources: &Sources, word: &str) -> Vec<String> {
+    let names = |text: &String| tokens(&without_comments(text)).iter().any(|token| token.starts_with(word));
+    sources.iter().filter(|(_, text)| names(text)).map(|(path, _)| path.clone()).collect()
+}
+
+#[test]
+fn only_one_file_names_the_transport() {
+    let found: BTreeSet<String> =
+        ["bevy_replicon", "Replicon"].iter().flat_map(|word| files_that_name(&library(), word)).collect();
+    assert_eq!(found, BTreeSet::from(["together/replicon.rs".to_owned()]));
+    let mut sources = library();
+    sources
+        .get_mut("together/client.rs")
+        .expect("a file")
+        .push_str("\nuse bevy_replicon::prelude::ClientId;\n");
+    assert_eq!(files_that_name(&sources, "bevy_replicon").len(), 2);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bevy::prelude::*;
 
-use super::files::Files;
+use super::open_level::Files;
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::texts;
 use crate::format::Level;

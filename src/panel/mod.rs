@@ -28,6 +28,7 @@ mod files;
 mod lengths;
 mod level;
 mod look_section;
+mod open_level;
 mod operations;
 mod picture;
 mod plot;
@@ -57,7 +58,7 @@ use crate::plugin::{
 };
 use crate::terrain::Terrain;
 use crate::view::GroundLook;
-use files::Files;
+use open_level::Files;
 use state::Note;
 use survey::Survey;
 use terrain_controls::TerrainControls;

@@ -3,7 +3,8 @@
 use bevy::prelude::Entity;
 use bevy_egui::egui::{Color32, RichText, Ui, Vec2};
 
-use super::files::{self, Files};
+use super::files;
+use super::open_level::Files;
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::survey::{Counts, Survey};
 use super::terrain_controls::TerrainControls;

@@ -6,40 +6,18 @@ use bevy::ecs::lifecycle::Discard;
 use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
-use bevy_replicon::prelude::{ClientId, FromClient};
 
 use super::link::{Link, MOST_PENDING, PieceMessage, Standing, Worked};
 use super::messages::{BulkLane, FromPlayer, OrderLane};
+use super::replicon::ToOwnServer;
 use super::service::Service;
 use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
+use super::sharing::Sharing;
 use super::trouble::{SharingTrouble, SharingTroubleFound};
 use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
 use crate::plugin::{BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Applied, Asked, Order, Receipt, Rejection, Terrain};
 use crate::threads::{ThreadTask, Threads, free_later};
-
-/// Which of an app's shared terrains is shared: a connection carries one ground.
-#[derive(Resource, Default)]
-pub(super) struct Sharing {
-    active: Option<Entity>,
-    orders: u64,
-}
-
-impl Sharing {
-    /// The place of a new shared terrain among all.
-    pub fn next_order(&mut self) -> u64 {
-        self.orders += 1;
-        self.orders
-    }
-
-    /// Keeps the terrain that is shared, or takes the one that was inserted first.
-    fn choose(&mut self, all: impl Iterator<Item = (Entity, u64)> + Clone) {
-        let is_there = |entity| all.clone().any(|(other, _)| other == entity);
-        if !self.active.is_some_and(is_there) {
-            self.active = all.clone().min_by_key(|(_, order)| *order).map(|(entity, _)| entity);
-        }
-    }
-}
 
 /// The writers of messages about edits.
 #[derive(SystemParam)]
@@ -402,10 +380,7 @@ impl Answers<'_> {
 const LAST_FRAME: Duration = Duration::from_secs(2);
 
 /// Hands over to the server in this app what its player asked for in the app's last frame, so that it is saved.
-pub(super) fn send_last(
-    mut shared: Query<&mut SharedTerrain>,
-    mut messages: MessageWriter<FromClient<FromPlayer>>,
-) {
+pub(super) fn send_last(mut shared: Query<&mut SharedTerrain>, mut messages: ToOwnServer) {
     for mut shared in &mut shared {
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
         let start = Instant::now();
@@ -422,11 +397,6 @@ pub(super) fn send_last(
             }
         }
         let run = link.run;
-        messages.write_batch(
-            client.take_outgoing().into_iter().map(|bytes| FromClient {
-                client_id: ClientId::Server,
-                message: FromPlayer::Bytes(run, bytes),
-            }),
-        );
+        messages.send(client.take_outgoing().into_iter().map(|bytes| FromPlayer::Bytes(run, bytes)));
     }
 }

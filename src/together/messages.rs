@@ -1,18 +1,10 @@
-//! The messages that carry the bytes of clients and server. Replicon sends each type in a separate channel, reliably
-//! and in order.
+//! The messages that carry the bytes of clients and server. Each type is sent in a separate channel, reliably and in order.
 
 use bevy::prelude::*;
-use bevy_replicon::bytes::Bytes;
-use bevy_replicon::postcard_utils;
-use bevy_replicon::prelude::*;
-use bevy_replicon::shared::message::ctx::{ClientSendCtx, ServerReceiveCtx};
 use serde::{Deserialize, Serialize};
 
-use crate::net::{MOST_TO_SERVER, Server};
+use crate::net::Server;
 use crate::terrain::World;
-
-/// The most bytes of a [`FromPlayer`] in addition to its content.
-const OVERHEAD: usize = 16;
 
 /// From a client to the server.
 #[derive(Message, Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,26 +61,4 @@ impl GroundId {
     pub fn of(world: &World) -> Self {
         Self { hash: world.ground().hash(), chunk_size: world.grid().size() }
     }
-}
-
-pub(super) fn register(app: &mut App) {
-    app.add_client_message_with::<FromPlayer>(Channel::Ordered, write, read)
-        .add_server_message::<OrderLane>(Channel::Ordered)
-        .add_server_message::<BulkLane>(Channel::Ordered)
-        .add_server_message::<Invitation>(Channel::Ordered)
-        // They contain their own version numbers, and do not depend on replicated types.
-        .make_message_independent::<OrderLane>()
-        .make_message_independent::<BulkLane>()
-        .make_message_independent::<Invitation>();
-}
-
-fn write(_: &mut ClientSendCtx, message: &FromPlayer, bytes: &mut Vec<u8>) -> Result<()> {
-    Ok(postcard_utils::to_extend_mut(message, bytes)?)
-}
-
-fn read(_: &mut ServerReceiveCtx, bytes: &mut Bytes) -> Result<FromPlayer> {
-    if bytes.len() > MOST_TO_SERVER + OVERHEAD {
-        return Ok(FromPlayer::TooLong);
-    }
-    Ok(postcard_utils::from_buf(bytes)?)
 }

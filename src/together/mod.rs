@@ -34,10 +34,12 @@ mod client;
 mod link;
 mod messages;
 mod players;
+mod replicon;
 mod saved_or_shared;
 mod server;
 mod service;
 mod shared;
+mod sharing;
 mod trouble;
 
 pub use server::{GroundServer, GroundServerEvent};
@@ -45,7 +47,6 @@ pub use shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
 pub use trouble::{SharingTrouble, SharingTroubleFound};
 
 use bevy::prelude::*;
-use bevy_replicon::prelude::*;
 
 use crate::plugin::{
     BrushApplied, BurrowSystems, FollowCommits, HistoryMoved, LoosePieceFound, LoosePieceReturned,
@@ -69,19 +70,12 @@ use crate::plugin::{
 #[derive(Default)]
 pub struct TogetherPlugin;
 
-/// The error if plugins are missing.
-const NEEDS_REPLICON: &str = "TogetherPlugin does nothing: it needs RepliconPlugins before it, and these need StatesPlugin, which \
-    DefaultPlugins have and MinimalPlugins have not: add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, BurrowPlugins, \
-    TogetherPlugin)), and a transport such as RepliconRenetPlugins";
-
 impl Plugin for TogetherPlugin {
     fn build(&self, app: &mut App) {
-        if !app.is_plugin_added::<RepliconSharedPlugin>() {
-            error!("{NEEDS_REPLICON}");
+        if !replicon::build(app, service::forget_connection) {
             return;
         }
-        messages::register(app);
-        app.init_resource::<client::Sharing>()
+        app.init_resource::<sharing::Sharing>()
             .init_resource::<service::Service>()
             .add_message::<GroundServerEvent>()
             .add_message::<GroundEdited>()
@@ -92,13 +86,11 @@ impl Plugin for TogetherPlugin {
             .add_message::<HistoryMoved>()
             .add_message::<LoosePieceFound>()
             .add_message::<LoosePieceReturned>()
-            .add_observer(service::drop_messages)
             .add_observer(shared::begin)
             .add_observer(shared::end)
             .add_observer(client::close)
             .add_observer(saved_or_shared::close_own_world)
             .add_observer(saved_or_shared::refuse_own_world)
-            .add_systems(OnExit(ClientState::Connected), service::forget_connection)
             .add_systems(
                 Update,
                 (

@@ -2,11 +2,9 @@
 
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
-use bevy_replicon::prelude::*;
-use bevy_replicon::shared::backend::connected_client::NetworkId;
 
 use super::messages::FromPlayer;
-use super::service::Authorised;
+use super::replicon::{Peer, Peers};
 use crate::net;
 
 /// The most bytes of a player's messages that wait while the server is busy. A player that sends more is kicked.
@@ -19,7 +17,7 @@ const MESSAGE_BYTES: usize = 128;
 #[derive(Default)]
 pub(super) struct Players {
     /// Clients that have sent a message.
-    clients: HashMap<net::ClientId, ClientId>,
+    clients: HashMap<net::ClientId, Peer>,
     /// Removed clients: messages from them on the same connection are ignored.
     kicked: HashSet<Entity>,
     /// Those among them whose player has spoken over another connection since, and who were not told so.
@@ -42,30 +40,15 @@ pub(super) enum Said {
     Nothing,
 }
 
-/// The number of a player, from the transport's; `None` if it has none.
-pub(super) fn number(client: ClientId, id: Option<&NetworkId>) -> Option<net::ClientId> {
-    let number = match (client.entity(), id) {
-        (None, _) => 0,
-        (_, Some(id)) => id.get().checked_add(1)?,
-        (Some(entity), None) => entity.to_bits(),
-    };
-    Some(net::ClientId(number)).filter(|number| *number != net::ClientId::SERVER)
-}
-
 impl Players {
-    /// The number of a client that takes part: replicon has authorised it, and it was not kicked.
-    pub fn find(
-        &self,
-        client: ClientId,
-        clients: &Query<Option<&NetworkId>, Authorised>,
-    ) -> Option<net::ClientId> {
-        let Some(entity) = client.entity() else { return number(client, None) };
-        let id = clients.get(entity).ok()?;
-        number(client, id).filter(|_| !self.kicked.contains(&entity))
+    /// The number of a client that takes part and was not kicked.
+    pub fn find(&self, client: Peer, peers: &Peers) -> Option<net::ClientId> {
+        let is_kicked = client.entity().is_some_and(|entity| self.kicked.contains(&entity));
+        peers.number(client).filter(|_| !is_kicked)
     }
 
     /// Handles a message of a player.
-    pub fn hear(&mut self, player: net::ClientId, client: ClientId, message: &FromPlayer) -> Said {
+    pub fn hear(&mut self, player: net::ClientId, client: Peer, message: &FromPlayer) -> Said {
         let said = match message {
             FromPlayer::Left(_) if self.clients.remove(&player).is_some() => Said::Leaves,
             FromPlayer::Left(_) => return Said::Nothing,
@@ -100,7 +83,7 @@ impl Players {
     }
 
     /// The client to which messages for a player are sent.
-    pub fn client(&self, player: net::ClientId) -> Option<ClientId> {
+    pub fn client(&self, player: net::ClientId) -> Option<Peer> {
         self.clients.get(&player).copied()
     }
 
@@ -112,14 +95,14 @@ impl Players {
     }
 
     /// Returns the clients that are still connected, and whose player has spoken over another connection since.
-    pub fn take_replaced(&mut self, clients: &Query<Option<&NetworkId>, Authorised>) -> Vec<Entity> {
-        self.replaced.drain(..).filter(|client| clients.contains(*client)).collect()
+    pub fn take_replaced(&mut self, peers: &Peers) -> Vec<Entity> {
+        self.replaced.drain(..).filter(|client| peers.has(*client)).collect()
     }
 
     /// Forgets players whose clients are gone, or are no longer authorised; returns their numbers.
-    pub fn take_gone(&mut self, clients: &Query<Option<&NetworkId>, Authorised>) -> Vec<net::ClientId> {
-        self.kicked.retain(|client| clients.contains(*client));
-        let is_gone = |client: &ClientId| client.entity().is_some_and(|entity| !clients.contains(entity));
+    pub fn take_gone(&mut self, peers: &Peers) -> Vec<net::ClientId> {
+        self.kicked.retain(|client| peers.has(*client));
+        let is_gone = |client: &Peer| client.entity().is_some_and(|entity| !peers.has(entity));
         self.clients.extract_if(|_, client| is_gone(client)).map(|(player, _)| player).collect()
     }
 }

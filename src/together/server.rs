@@ -1,19 +1,16 @@
-//! The server of a ground in a Bevy app: bytes go through replicon, and edits run on the plugin's threads.
+//! The server of a ground in a Bevy app: edits run on the plugin's threads.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use bevy::ecs::message::MessageCursor;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
-use bevy_replicon::prelude::*;
-use bevy_replicon::shared::backend::connected_client::NetworkId;
 
-use super::messages::{BulkLane, FromPlayer, OrderLane, Served};
+use super::messages::Served;
 use super::players::{Players, Said};
-use super::service::Authorised;
+use super::replicon::{FromPlayers, NetworkId, Peer, Peers, ReadMessages, ToPlayers, number};
 use crate::net::{self, Kick, Lane, Server, ServerEvent, ServerSettings, ToClient};
 use crate::saves::{AbandonedStores, ClosingWorlds, EXIT_WAIT, ReadWorld, SavedWorld, WorldReader};
 use crate::store::{Progress, Store, StoreError, StoreTrouble};
@@ -34,7 +31,7 @@ pub struct GroundServer {
     start: Instant,
     players: Players,
     /// The messages of players that were read.
-    read: MessageCursor<FromClient<FromPlayer>>,
+    read: ReadMessages,
     data: BTreeMap<String, Vec<u8>>,
     /// Where its store goes when it is dropped; `None` before its first frame in an app.
     closing: Option<AbandonedStores>,
@@ -116,7 +113,7 @@ impl GroundServer {
             waiting: Vec::new(),
             start: Instant::now(),
             players: Players::default(),
-            read: MessageCursor::default(),
+            read: ReadMessages::default(),
             data: BTreeMap::new(),
             closing: None,
             has_timed_out: false,
@@ -171,9 +168,9 @@ impl GroundServer {
     ///
     /// The two greatest network ids have no number: [`net::ClientId::SERVER`] is returned, and such clients are not served. A transport
     /// without network ids gives a new number to each connection, so a returning player counts as a new one.
-    pub fn player(client: ClientId, ids: &Query<&NetworkId>) -> net::ClientId {
+    pub fn player(client: Peer, ids: &Query<&NetworkId>) -> net::ClientId {
         let id = client.entity().and_then(|entity| ids.get(entity).ok());
-        super::players::number(client, id).unwrap_or(net::ClientId::SERVER)
+        number(client, id).unwrap_or(net::ClientId::SERVER)
     }
 
     /// Waits until all requests are done and saved, but no longer than ten seconds. An app that exits does this. A world that is still
@@ -284,21 +281,17 @@ impl Parts {
 
 impl GroundServer {
     /// Reads messages of players. Without a world they are dropped: no player was invited.
-    fn receive(
-        &mut self,
-        messages: &Messages<FromClient<FromPlayer>>,
-        clients: &Query<Option<&NetworkId>, Authorised>,
-    ) {
+    fn receive(&mut self, messages: &FromPlayers, peers: &Peers) {
         let is_open = matches!(self.work, Work::Here(_) | Work::UnderWay(_));
         let mut said = Vec::new();
-        for FromClient { client_id, message } in self.read.read(messages) {
+        for (peer, message) in messages.read(&mut self.read) {
             // What was said to another server says nothing to this one: its ground may be another.
             let is_ours = self.served.is_some_and(|served| !message.is_for_another(served.run));
             if is_open
                 && is_ours
-                && let Some(number) = self.players.find(*client_id, clients)
+                && let Some(number) = self.players.find(peer, peers)
             {
-                said.push((number, self.players.hear(number, *client_id, message)));
+                said.push((number, self.players.hear(number, peer, message)));
             }
         }
         for (player, said) in said {
@@ -314,7 +307,7 @@ impl GroundServer {
                 Said::Nothing => {}
             }
         }
-        for player in self.players.take_gone(clients) {
+        for player in self.players.take_gone(peers) {
             self.ask(move |parts, _| parts.server.disconnect(player));
         }
     }
@@ -324,23 +317,19 @@ impl GroundServer {
 pub(super) fn serve(
     mut ground: ResMut<GroundServer>,
     closing: Option<Res<ClosingWorlds>>,
-    messages: Res<Messages<FromClient<FromPlayer>>>,
-    clients: Query<Option<&NetworkId>, Authorised>,
-    mut order: MessageWriter<ToClients<OrderLane>>,
-    mut bulk: MessageWriter<ToClients<BulkLane>>,
+    messages: FromPlayers,
+    peers: Peers,
+    mut to_players: ToPlayers,
     mut events: MessageWriter<GroundServerEvent>,
-    mut leave: MessageWriter<DisconnectRequest>,
 ) {
     let ground = &mut *ground;
     if ground.closing.is_none() {
         ground.closing = closing.map(|closing| closing.abandoned().clone());
     }
-    ground.receive(&messages, &clients);
-    for client in ground.players.take_replaced(&clients) {
-        let targets = SendTargets::Single(client.into());
-        let message = OrderLane(ToClient::Kicked(Kick::ConnectedAgain).to_bytes());
-        order.write(ToClients { targets, message });
-        leave.write(DisconnectRequest { client });
+    ground.receive(&messages, &peers);
+    for client in ground.players.take_replaced(&peers) {
+        to_players.send(client.into(), Lane::Order, ToClient::Kicked(Kick::ConnectedAgain).to_bytes());
+        to_players.disconnect(client);
     }
     let parts = ground.take_parts(|event| {
         events.write(event);
@@ -360,16 +349,13 @@ pub(super) fn serve(
         events.write_batch(store.take_troubles().into_iter().map(GroundServerEvent::Trouble));
     }
     for (player, lane, bytes) in parts.server.take_outgoing() {
-        let Some(client) = ground.players.client(player) else { continue };
-        let targets = SendTargets::Single(client);
-        match lane {
-            Lane::Order => drop(order.write(ToClients { targets, message: OrderLane(bytes) })),
-            Lane::Bulk => drop(bulk.write(ToClients { targets, message: BulkLane(bytes) })),
+        if let Some(client) = ground.players.client(player) {
+            to_players.send(client, lane, bytes);
         }
     }
     for player in kicked {
         if let Some(client) = ground.players.kick(player) {
-            leave.write(DisconnectRequest { client });
+            to_players.disconnect(client);
         }
     }
     ground.work = Work::UnderWay(ThreadTask::start(Threads::Transactions, move || {
@@ -379,11 +365,7 @@ pub(super) fn serve(
 }
 
 /// Handles the requests of the last frame, and saves everything before the app ends.
-pub(super) fn finish_at_exit(
-    mut ground: ResMut<GroundServer>,
-    messages: Res<Messages<FromClient<FromPlayer>>>,
-    clients: Query<Option<&NetworkId>, Authorised>,
-) {
-    ground.receive(&messages, &clients);
+pub(super) fn finish_at_exit(mut ground: ResMut<GroundServer>, messages: FromPlayers, peers: Peers) {
+    ground.receive(&messages, &peers);
     ground.finish();
 }

@@ -2,9 +2,9 @@
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
-use bevy_replicon::prelude::*;
 
 use super::messages::{BulkLane, Invitation, OrderLane, Served};
+use super::replicon::{Connection, Peers, ToPlayers};
 use super::server::GroundServer;
 
 /// The server of the ground that is shared in this app.
@@ -42,7 +42,7 @@ impl Seen {
 pub(super) fn find_service(
     mut service: ResMut<Service>,
     ground: Option<Res<GroundServer>>,
-    state: Res<State<ClientState>>,
+    connection: Connection,
     mut messages: MessageReader<Invitation>,
     mut seen: Local<Seen>,
 ) {
@@ -55,7 +55,7 @@ pub(super) fn find_service(
         messages.clear();
         return;
     }
-    let is_connected = *state.get() == ClientState::Connected;
+    let is_connected = connection.is_open();
     if before.is_some() {
         *service = Service::Unserved;
     } else if is_connected && *service == Service::Apart {
@@ -81,50 +81,23 @@ pub(super) fn forget_connection(
     bulk.clear();
 }
 
-/// A client that takes part in the game: replicon has authorised it.
-pub(super) type Authorised = (With<ConnectedClient>, With<AuthorizedClient>);
-
-/// Invites authorised clients to the served ground, and notifies invited clients when it is no longer served.
+/// Invites clients that take part to the served ground, and notifies invited clients when it is no longer served.
 pub(super) fn invite(
     ground: Option<Res<GroundServer>>,
-    clients: Query<(Entity, Has<AuthorizedClient>), With<ConnectedClient>>,
+    peers: Peers,
     mut invited: Local<HashMap<Entity, Served>>,
-    mut messages: MessageWriter<ToClients<Invitation>>,
+    mut to_players: ToPlayers,
 ) {
     let served = ground.and_then(|ground| ground.served());
-    invited.retain(|client, _| clients.contains(*client));
-    for (client, is_authorised) in &clients {
+    invited.retain(|client, _| peers.is_connected(*client));
+    for (client, is_authorised) in peers.iter() {
         let now = served.filter(|_| is_authorised);
         let before = match now {
             Some(now) => invited.insert(client, now),
             None => invited.remove(&client),
         };
         if now != before {
-            let targets = SendTargets::Single(ClientId::Client(client));
-            messages.write(ToClients { targets, message: Invitation(now) });
+            to_players.invite(client, now);
         }
-    }
-}
-
-/// Drops messages to a client that is gone or no longer authorised. A backend may panic otherwise.
-pub(super) fn drop_messages(
-    gone: On<Remove, AuthorizedClient>,
-    mut invitations: ResMut<Messages<ToClients<Invitation>>>,
-    mut order: ResMut<Messages<ToClients<OrderLane>>>,
-    mut bulk: ResMut<Messages<ToClients<BulkLane>>>,
-) {
-    drop_for(gone.entity, &mut invitations);
-    drop_for(gone.entity, &mut order);
-    drop_for(gone.entity, &mut bulk);
-}
-
-fn drop_for<M: Message>(gone: Entity, messages: &mut Messages<ToClients<M>>)
-where
-    ToClients<M>: Message,
-{
-    let is_for = |targets: &SendTargets| matches!(targets, SendTargets::Single(ClientId::Client(client)) if *client == gone);
-    if messages.get_cursor().read(messages).any(|message| is_for(&message.targets)) {
-        let others: Vec<_> = messages.drain().filter(|message| !is_for(&message.targets)).collect();
-        messages.write_batch(others);
     }
 }

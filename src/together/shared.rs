@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 
 use super::link::Link;
+use super::sharing::Sharing;
 use super::trouble::SharingTrouble;
 use crate::net::{self, ClientEvent, Refusal, Stamps};
 use crate::plugin::EditOutbox;
@@ -68,7 +69,7 @@ impl SharedTerrain {
 
 /// Logs an error if the plugin is missing, because nothing else would show it.
 fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lifecycle::HookContext) {
-    if world.get_resource::<super::client::Sharing>().is_none() {
+    if world.get_resource::<Sharing>().is_none() {
         error!(
             "a SharedTerrain does nothing without TogetherPlugin: add it after RepliconPlugins and BurrowPlugins, before terrains are spawned"
         );
@@ -114,7 +115,7 @@ pub(super) fn begin(
     new: On<Insert, SharedTerrain>,
     mut commands: Commands,
     mut shared: Query<&mut SharedTerrain>,
-    mut sharing: ResMut<super::client::Sharing>,
+    mut sharing: ResMut<Sharing>,
 ) {
     if let Ok(mut shared) = shared.get_mut(new.entity) {
         shared.order = sharing.next_order();
