@@ -23,31 +23,50 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
     b * t + a * (1.0 - t)
 }
 
-/// Dot product of one of four diagonal gradients with the offset from its corner.
-fn gradient_dot(hash: u8, x: f64, z: f64) -> f64 {
-    let flip_sign = |at: f64, bit: u32| f64::from_bits(at.to_bits() ^ u64::from(hash >> bit & 1) << 63);
-    flip_sign(x, 0) + flip_sign(z, 1)
+/// Added to a number of less than 2^51, it leaves the nearest integer in the lowest bits of the sum. Conversions to integers
+/// would do one number at a time.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
+/// The floor of a number, as bits of which the lowest eight are those of the integer, and its fraction.
+fn floor_fract(at: f64) -> (u64, f64) {
+    let shifted = at + ROUND;
+    let nearest = shifted - ROUND;
+    let above = if nearest > at { 1.0 } else { 0.0 };
+    ((shifted - above).to_bits(), at - (nearest - above))
 }
 
-/// The floor of a number, and its fraction.
-fn floor_fract(at: f64) -> (i64, f64) {
-    let whole = at as i64;
-    let whole = whole - i64::from(at < whole as f64);
-    (whole, at - whole as f64)
+/// Dot products of diagonal gradients, one of four by the lowest bits of a hash, with the offsets from their corners.
+fn gradient_dots(hashes: &[u64; LANES], xs: &Lanes, z: f64) -> Lanes {
+    let flip_sign = |at: f64, sign: u64| f64::from_bits(at.to_bits() ^ sign << 63);
+    from_fn(|lane| flip_sign(xs[lane], hashes[lane]) + flip_sign(z, hashes[lane] >> 1))
 }
 
-/// Gradient noise at points of a row.
+/// Gradient noise at points of a row. All loops but the one that looks up hashes work on several columns at once.
 fn perlin(table: &[u8; 256], xs: &Lanes, z: f64) -> Lanes {
     let (row, v) = floor_fract(z);
-    let (north, south, bend) = (row as u8, (row + 1) as u8, fade(v));
+    let (north, south, bend) = (row as u8, (row as u8).wrapping_add(1), fade(v));
+    let (mut columns, mut us) = ([0; LANES], [0.0; LANES]);
+    for lane in 0..LANES {
+        (columns[lane], us[lane]) = floor_fract(xs[lane]);
+    }
     let hash = |own: u8| table[usize::from(own)];
+    let mut corners = [[0; LANES]; 4];
+    for lane in 0..LANES {
+        let column = columns[lane] as u8;
+        let (west, east) = (hash(column), hash(column.wrapping_add(1)));
+        let own = [west ^ north, west ^ south, east ^ north, east ^ south].map(hash);
+        corners.iter_mut().zip(own).for_each(|(corner, hash)| corner[lane] = u64::from(hash));
+    }
+    let easts = us.map(|u| u - 1.0);
+    let dots = |corner: usize| {
+        let xs = if corner < 2 { &us } else { &easts };
+        gradient_dots(&corners[corner], xs, if corner % 2 == 0 { v } else { v - 1.0 })
+    };
+    let [north_west, south_west, north_east, south_east] = [dots(0), dots(1), dots(2), dots(3)];
     from_fn(|lane| {
-        let (column, u) = floor_fract(xs[lane]);
-        let (west, east) = (hash(column as u8), hash((column + 1) as u8));
-        let side = |own: u8, u: f64| {
-            lerp(gradient_dot(hash(own ^ north), u, v), gradient_dot(hash(own ^ south), u, v - 1.0), bend)
-        };
-        (lerp(side(west, u), side(east, u - 1.0), fade(u)) * (2.0 / SQRT_2)).clamp(-1.0, 1.0)
+        let west = lerp(north_west[lane], south_west[lane], bend);
+        let east = lerp(north_east[lane], south_east[lane], bend);
+        (lerp(west, east, fade(us[lane])) * (2.0 / SQRT_2)).clamp(-1.0, 1.0)
     })
 }
 

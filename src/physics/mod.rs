@@ -61,12 +61,14 @@ mod ground;
 mod hold;
 mod hull;
 mod near;
+mod ordered_bvh;
 mod shape;
 mod solids;
 mod sources;
 mod upkeep;
 mod wake;
 mod walking;
+mod welded;
 
 pub use character::{Character, CharacterMotion, CharacterSteering};
 pub use character_plugin::{CharacterPlugin, CharacterSystems};

@@ -1,16 +1,23 @@
 //! The collision shape of a tile or chunk.
 
+use std::sync::OnceLock;
+
 use avian3d::parry::bounding_volume::{Aabb, BoundingSphere};
 use avian3d::parry::mass_properties::MassProperties;
 use avian3d::parry::math::{Pose, Real, Vector};
 use avian3d::parry::partitioning::Bvh;
 use avian3d::parry::query::details::NormalConstraints;
 use avian3d::parry::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
-use avian3d::parry::shape::{CompositeShape, FeatureId, Shape, ShapeType, TriMesh, Triangle, TypedShape};
-use glam::{IVec3, Vec3};
+use avian3d::parry::shape::{
+    CompositeShape, CompositeShapeRef, FeatureId, Shape, ShapeType, TriMesh, Triangle, TypedCompositeShape,
+    TypedShape,
+};
+use glam::Vec3;
 use rustc_hash::FxHashMap;
 
 use super::cone::NormalCone;
+use super::ordered_bvh::ordered_bvh;
+use super::welded::{BORDER, Welded};
 use crate::lattice::SNAP;
 use crate::surface::SurfaceMesh;
 
@@ -24,25 +31,59 @@ use crate::surface::SurfaceMesh;
 /// sides.
 #[derive(Clone, Debug)]
 pub struct GroundShape {
-    mesh: TriMesh,
+    vertices: Vec<Vector>,
+    triangles: Vec<[u32; 3]>,
+    tree: Bvh,
+    /// The triangle of each leaf of the tree.
+    leaves: Vec<u32>,
     /// For each triangle, the neighbours across its sides: a triangle's number, or [`BORDER`] plus an index of `beyond`.
     neighbours: Vec<[u32; 3]>,
     /// Normals of the ground across the border.
     beyond: Vec<Vector>,
+    /// A plain triangle mesh, once it was asked for: to draw the shape, or to scale it.
+    plain: OnceLock<Option<Box<TriMesh>>>,
 }
 
-/// Neighbours from here on are indices of [`GroundShape::beyond`].
-const BORDER: u32 = 1 << 31;
+/// How many triangles after two different ones are searched for their equals.
+const LOOK_AHEAD: usize = 64;
 
 impl GroundShape {
     /// The shape of a surface, in metres; `None` if it has no triangles with an area.
     pub fn new(surface: &SurfaceMesh, voxel_size: f32) -> Option<Self> {
         let welded = Welded::new(surface);
-        let scale = voxel_size / SNAP as f32;
-        let vertices: Vec<Vector> = welded.places.iter().map(|place| place.as_vec3() * scale).collect();
+        if welded.triangles.is_empty() {
+            return None;
+        }
+        let vertices = welded.vertices(voxel_size / SNAP as f32);
         let (neighbours, beyond) = welded.neighbours(&vertices);
-        let mesh = TriMesh::new(vertices, welded.triangles).ok()?;
-        Some(Self { mesh, neighbours, beyond })
+        Some(Self::of(vertices, welded.triangles, neighbours, beyond))
+    }
+
+    fn of(
+        vertices: Vec<Vector>,
+        triangles: Vec<[u32; 3]>,
+        neighbours: Vec<[u32; 3]>,
+        beyond: Vec<Vector>,
+    ) -> Self {
+        let bounds = triangles.iter().map(|triangle| {
+            let [a, b, c] = triangle.map(|corner| vertices[corner as usize]);
+            Aabb::new(a.min(b).min(c), a.max(b).max(c))
+        });
+        let (tree, leaves) = ordered_bvh(&bounds.collect::<Vec<_>>());
+        Self { vertices, triangles, tree, leaves, neighbours, beyond, plain: OnceLock::new() }
+    }
+
+    #[inline]
+    fn triangle(&self, number: u32) -> Triangle {
+        let [a, b, c] = self.triangles[number as usize];
+        let corner = |vertex: u32| self.vertices[vertex as usize];
+        Triangle { a: corner(a), b: corner(b), c: corner(c) }
+    }
+
+    /// The shape as a plain triangle mesh.
+    fn plain(&self) -> Option<&TriMesh> {
+        let build = || TriMesh::new(self.vertices.clone(), self.triangles.clone()).ok().map(Box::new);
+        self.plain.get_or_init(build).as_deref()
     }
 
     /// The number of triangles.
@@ -52,38 +93,70 @@ impl GroundShape {
 
     /// Bytes of all buffers.
     pub fn bytes(&self) -> usize {
-        self.mesh.heap_memory_size()
+        self.tree.heap_memory_size()
+            + size_of_val(self.vertices.as_slice())
+            + size_of_val(self.triangles.as_slice())
+            + size_of_val(self.leaves.as_slice())
             + size_of_val(self.neighbours.as_slice())
             + size_of_val(self.beyond.as_slice())
+            + self.plain.get().and_then(Option::as_ref).map_or(0, |plain| plain.total_memory_size())
     }
 
     /// The box around all triangles that only one of two shapes has, in metres from the origin; `None` if they are equal.
     pub(super) fn difference(old: Option<&Self>, new: Option<&Self>) -> Option<(Vec3, Vec3)> {
         type Corners = [[u32; 3]; 3];
         let corners = |shape: &Self, triangle: usize| -> Corners {
-            let Triangle { a, b, c } = shape.mesh.triangle(triangle as u32);
+            let Triangle { a, b, c } = shape.triangle(triangle as u32);
             [a, b, c].map(|corner| corner.to_array().map(f32::to_bits))
         };
-        let counts = [old, new].map(|shape| shape.map_or(0, Self::triangles));
-        // Both come in the same order, and most edits change few triangles of a part: those before and behind are equal.
-        let (mut front, mut back) = (0, 0);
-        if let (Some(old), Some(new)) = (old, new) {
-            let shorter = counts[0].min(counts[1]);
-            let is_same = |before: usize, after: usize| corners(old, before) == corners(new, after);
-            front = (0..shorter).take_while(|&at| is_same(at, at)).count();
-            let from_end = 1..=shorter - front;
-            back = from_end.take_while(|at| is_same(counts[0] - at, counts[1] - at)).count();
-        }
-        let rest = |shape: Option<&'_ Self>, count: usize| -> Vec<Corners> {
-            let sorted = |shape: &Self, triangle| {
-                let mut corners = corners(shape, triangle);
-                corners.sort_unstable();
-                corners
-            };
-            shape.map_or_else(Vec::new, |shape| (front..count - back).map(|t| sorted(shape, t)).collect())
+        let sorted = |shape: &Self, triangle| {
+            let mut corners = corners(shape, triangle);
+            corners.sort_unstable();
+            corners
         };
+        let counts = [old, new].map(|shape| shape.map_or(0, Self::triangles));
+        // Both come in the same order, and most edits change few triangles of a part: so they are walked through side by side,
+        // and what does not fit is set aside.
+        let (mut gone, mut fresh): (Vec<Corners>, Vec<Corners>) = Default::default();
+        let (mut before, mut after, mut ends) = (0, 0, counts);
+        if let (Some(old), Some(new)) = (old, new) {
+            let is_same = |before, after| corners(old, before) == corners(new, after);
+            while ends[0] > 0 && ends[1] > 0 && is_same(ends[0] - 1, ends[1] - 1) {
+                ends = ends.map(|end| end - 1);
+            }
+            // Where all is different, ever fewer triangles are searched for.
+            let (mut pause, mut next_pause) = (0, 1);
+            while before < ends[0] && after < ends[1] {
+                if is_same(before, after) {
+                    (before, after, pause, next_pause) = (before + 1, after + 1, 0, 1);
+                    continue;
+                }
+                let (mut skipped, mut added) = (1, 1);
+                if pause > 0 {
+                    pause -= 1;
+                } else if let Some(by) =
+                    (1..LOOK_AHEAD).find(|by| before + by < ends[0] && is_same(before + by, after))
+                {
+                    (skipped, added) = (by, 0);
+                } else if let Some(by) =
+                    (1..LOOK_AHEAD).find(|by| after + by < ends[1] && is_same(before, after + by))
+                {
+                    (skipped, added) = (0, by);
+                } else {
+                    (pause, next_pause) = (next_pause, 2 * next_pause);
+                }
+                gone.extend((before..before + skipped).map(|triangle| sorted(old, triangle)));
+                fresh.extend((after..after + added).map(|triangle| sorted(new, triangle)));
+                (before, after) = (before + skipped, after + added);
+            }
+        }
+        let rest = |shape: Option<&Self>, from, to| -> Vec<Corners> {
+            shape.map_or_else(Vec::new, |shape| (from..to).map(|triangle| sorted(shape, triangle)).collect())
+        };
+        gone.extend(rest(old, before, ends[0]));
+        fresh.extend(rest(new, after, ends[1]));
         let mut seen: FxHashMap<Corners, bool> = FxHashMap::default();
-        seen.extend(rest(old, counts[0]).into_iter().map(|corners| (corners, false)));
+        seen.extend(gone.into_iter().map(|corners| (corners, false)));
         let mut found: Option<(Vec3, Vec3)> = None;
         let mut include = |corners: &Corners| {
             for corner in corners.map(|corner| Vec3::from(corner.map(f32::from_bits))) {
@@ -91,7 +164,7 @@ impl GroundShape {
                 found = Some((low.min(corner), high.max(corner)));
             }
         };
-        for corners in rest(new, counts[1]) {
+        for corners in fresh {
             match seen.get_mut(&corners) {
                 Some(is_kept) => *is_kept = true,
                 None => include(&corners),
@@ -109,91 +182,11 @@ impl GroundShape {
             let ((from, to), neighbour) = (sides[number], neighbours[number]);
             let beyond = match neighbour.checked_sub(BORDER) {
                 Some(border) => self.beyond.get(border as usize).copied(),
-                None => self.mesh.triangle(neighbour).normal(),
+                None => self.triangle(neighbour).normal(),
             };
             ((to - from).cross(face).normalize_or_zero(), beyond.unwrap_or(face))
         };
         Some(NormalCone { face, sides: [side(0), side(1), side(2)] })
-    }
-}
-
-/// A surface without repeated vertices and without triangles that have no area.
-struct Welded {
-    places: Vec<IVec3>,
-    normals: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-}
-
-impl Welded {
-    fn new(surface: &SurfaceMesh) -> Self {
-        let mut numbers: FxHashMap<IVec3, u32> = FxHashMap::default();
-        numbers.reserve(surface.vertices.len());
-        let (mut places, mut normals) = (Vec::new(), Vec::new());
-        let welded: Vec<u32> = surface
-            .vertices
-            .iter()
-            .map(|vertex| {
-                *numbers.entry(vertex.position).or_insert_with(|| {
-                    places.push(vertex.position);
-                    normals.push(vertex.normal);
-                    places.len() as u32 - 1
-                })
-            })
-            .collect();
-        let corner = |index: u32| welded.get(index as usize).copied();
-        let has_area = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|corner| places[corner as usize].as_i64vec3());
-            (b - a).cross(c - a) != glam::I64Vec3::ZERO
-        };
-        let triangles =
-            surface.indices.triangles().filter_map(|t| Some([corner(t[0])?, corner(t[1])?, corner(t[2])?]));
-        let triangles = triangles.filter(has_area).collect();
-        Self { places, normals, triangles }
-    }
-
-    /// The neighbours across each triangle's sides, and the normals across the border.
-    fn neighbours(&self, vertices: &[Vector]) -> (Vec<[u32; 3]>, Vec<Vector>) {
-        let sides = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
-        // All sides, sorted by the vertex they start from, with their triangles. Few start from the same one.
-        let mut first = vec![0; vertices.len() + 1];
-        self.triangles.iter().flatten().for_each(|&corner| first[corner as usize + 1] += 1);
-        first.iter_mut().fold(0, |sum, first| {
-            *first += sum;
-            *first
-        });
-        let mut next = first.clone();
-        let mut starting = vec![(0, 0); 3 * self.triangles.len()];
-        for (number, triangle) in self.triangles.iter().enumerate() {
-            for (from, to) in sides(triangle) {
-                starting[next[from as usize]] = (to, number as u32);
-                next[from as usize] += 1;
-            }
-        }
-        let owner = |(from, to): (u32, u32)| {
-            let of_vertex = &starting[first[from as usize]..first[from as usize + 1]];
-            of_vertex.iter().rev().find(|side| side.0 == to).map(|side| side.1)
-        };
-        let mut beyond = Vec::new();
-        let neighbours = self.triangles.iter().map(|triangle| {
-            sides(triangle).map(|(from, to)| {
-                owner((to, from)).unwrap_or_else(|| {
-                    beyond.push(self.across(vertices, triangle, from, to));
-                    BORDER + (beyond.len() as u32 - 1)
-                })
-            })
-        });
-        (neighbours.collect(), beyond)
-    }
-
-    /// The normal across a border: the triangle's own, mirrored at the edge's normal as given by its vertices.
-    fn across(&self, vertices: &[Vector], triangle: &[u32; 3], from: u32, to: u32) -> Vector {
-        let [a, b, c] = triangle.map(|corner| vertices[corner as usize]);
-        let face = (b - a).cross(c - a).normalize_or_zero();
-        let along = (vertices[to as usize] - vertices[from as usize]).normalize_or_zero();
-        let middle = self.normals[from as usize] + self.normals[to as usize];
-        // Across an edge, normals only rotate about the edge.
-        let middle = (middle - along * middle.dot(along)).normalize_or(face);
-        middle * (2.0 * middle.dot(face)) - face
     }
 }
 
@@ -203,7 +196,8 @@ impl CompositeShape for GroundShape {
         number: u32,
         f: &mut dyn FnMut(Option<&Pose>, &dyn Shape, Option<&dyn NormalConstraints>),
     ) {
-        let triangle = self.mesh.triangle(number);
+        let number = self.leaves[number as usize];
+        let triangle = self.triangle(number);
         // Triangles too thin for a normal are skipped.
         if let Some(cone) = self.cone(number, &triangle) {
             f(None, &triangle, Some(&cone));
@@ -211,7 +205,29 @@ impl CompositeShape for GroundShape {
     }
 
     fn bvh(&self) -> &Bvh {
-        self.mesh.bvh()
+        &self.tree
+    }
+}
+
+/// For rays and points, which take each triangle alone.
+impl TypedCompositeShape for GroundShape {
+    type PartShape = Triangle;
+    type PartNormalConstraints = ();
+
+    fn map_typed_part_at<T>(
+        &self,
+        number: u32,
+        mut f: impl FnMut(Option<&Pose>, &Triangle, Option<&()>) -> T,
+    ) -> Option<T> {
+        Some(f(None, &self.triangle(self.leaves[number as usize]), None))
+    }
+
+    fn map_untyped_part_at<T>(
+        &self,
+        number: u32,
+        mut f: impl FnMut(Option<&Pose>, &dyn Shape, Option<&dyn NormalConstraints>) -> T,
+    ) -> Option<T> {
+        Some(f(None, &self.triangle(self.leaves[number as usize]), None))
     }
 }
 
@@ -222,27 +238,35 @@ impl RayCast for GroundShape {
         longest: Real,
         solid: bool,
     ) -> Option<RayIntersection> {
-        self.mesh.cast_local_ray_and_get_normal(ray, longest, solid)
+        let (triangle, mut hit) =
+            CompositeShapeRef(self).cast_local_ray_and_get_normal(ray, longest, solid)?;
+        // As parry numbers the faces of a mesh: back faces follow after front faces.
+        let is_back = hit.feature == FeatureId::Face(1);
+        hit.feature = FeatureId::Face(
+            self.leaves[triangle as usize] + if is_back { self.triangles() as u32 } else { 0 },
+        );
+        Some(hit)
     }
 }
 
 impl PointQuery for GroundShape {
     fn project_local_point(&self, point: Vector, solid: bool) -> PointProjection {
-        self.mesh.project_local_point(point, solid)
+        CompositeShapeRef(self).project_local_point(point, solid).1
     }
 
     fn project_local_point_and_get_feature(&self, point: Vector) -> (PointProjection, FeatureId) {
-        self.mesh.project_local_point_and_get_feature(point)
+        let (triangle, projection) = CompositeShapeRef(self).project_local_point(point, false);
+        (projection, FeatureId::Face(self.leaves[triangle as usize]))
     }
 }
 
 impl Shape for GroundShape {
     fn compute_local_aabb(&self) -> Aabb {
-        self.mesh.local_aabb()
+        self.tree.root_aabb()
     }
 
     fn compute_local_bounding_sphere(&self) -> BoundingSphere {
-        self.mesh.compute_local_bounding_sphere()
+        self.tree.root_aabb().bounding_sphere()
     }
 
     fn clone_dyn(&self) -> Box<dyn Shape> {
@@ -253,8 +277,8 @@ impl Shape for GroundShape {
         // Normals scale inversely.
         let across = Vector::new(scale.y * scale.z, scale.z * scale.x, scale.x * scale.y);
         let beyond = self.beyond.iter().map(|normal| (normal * across).normalize_or_zero()).collect();
-        let (mesh, neighbours) = (self.mesh.clone().scaled(scale), self.neighbours.clone());
-        Some(Box::new(Self { mesh, neighbours, beyond }))
+        let vertices = self.vertices.iter().map(|vertex| *vertex * scale).collect();
+        Some(Box::new(Self::of(vertices, self.triangles.clone(), self.neighbours.clone(), beyond)))
     }
 
     fn mass_properties(&self, _: Real) -> MassProperties {
@@ -266,9 +290,9 @@ impl Shape for GroundShape {
         ShapeType::Custom
     }
 
-    /// A mesh, for debug drawing.
+    /// A mesh, for debug drawing, and for avian where the ground has a scale.
     fn as_typed_shape(&self) -> TypedShape<'_> {
-        TypedShape::TriMesh(&self.mesh)
+        self.plain().map_or(TypedShape::Custom(self), TypedShape::TriMesh)
     }
 
     fn ccd_thickness(&self) -> Real {
@@ -307,7 +331,7 @@ mod tests {
             let shape = GroundShape::new(&world.tile_mesh(tile), 1.0).expect("it has triangles");
             let ridge = (ridge - world.origin(Drawn::Tile(tile)).x) as f32;
             for number in 0..shape.triangles() as u32 {
-                let triangle = shape.mesh.triangle(number);
+                let triangle = shape.triangle(number);
                 let cone = shape.cone(number, &triangle).expect("it has a normal");
                 let Triangle { a, b, c } = triangle;
                 let sides = [(a, b), (b, c), (c, a)].into_iter().zip(cone.sides);
@@ -336,7 +360,7 @@ mod tests {
         let all = |shape: Option<&GroundShape>| -> Vec<Vec<[u32; 3]>> {
             let triangles = shape.into_iter().flat_map(|shape| {
                 (0..shape.triangles() as u32).map(|number| {
-                    let Triangle { a, b, c } = shape.mesh.triangle(number);
+                    let Triangle { a, b, c } = shape.triangle(number);
                     let mut corners = [a, b, c].map(|corner| corner.to_array().map(f32::to_bits)).to_vec();
                     corners.sort_unstable();
                     corners
