@@ -151,7 +151,7 @@ fn commits() -> Result<(), Box<dyn std::error::Error>> {
             let mut spent = Vec::new();
             for number in 0..100 {
                 let place = Vec3::new(60.0 + 4.0 * number as f32, 40.0, 20.0 + 400.0 * f32::from(is_held));
-                terrain.submit(&Brush::dig(Shape::sphere(place, 3.0)));
+                terrain.submit(Brush::dig(Shape::sphere(place, 3.0)));
                 let commit = terrain.begin().ok_or("nothing to do")?.run();
                 let snapshot = is_held.then(|| terrain.snapshot());
                 let start = Instant::now();

@@ -70,7 +70,7 @@ fn the_allocations_of_an_edit_are_bounded() {
         let (x, z) = (100 + i % 10 * 40, 200 + i % 10 * 3);
         let height = terrain.world().ground().height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
         let place = Vec3::new(x as f32, height - 0.3 * (i / 10) as f32, z as f32);
-        terrain.submit(&Brush::dig(Shape::sphere(place, 4.0)));
+        terrain.submit(Brush::dig(Shape::sphere(place, 4.0)));
         let transaction = terrain.begin().expect("a queued brush");
         let (commit, allocations) = count(|| transaction.run());
         let commit = commit.expect("it ran");

@@ -243,9 +243,9 @@ fn rules_are_logged_where_they_bind() {
     let mut terrain = flat();
     terrain.keep_log(Some(PLENTY));
     let rules = || DiggingRules::default().with_unbreakable(MaterialId(0));
-    terrain.submit(&dig(20.0));
+    terrain.submit(dig(20.0));
     terrain.set_rules(rules()).expect("valid");
-    terrain.submit(&dig(30.0));
+    terrain.submit(dig(30.0));
     terrain.apply::<Brush>([]);
     terrain.set_rules(DiggingRules::default()).expect("valid");
     let kinds: Vec<Vec<&str>> = terrain.take_log().iter().map(|record| kinds_of(record)).collect();

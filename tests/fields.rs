@@ -396,8 +396,8 @@ fn a_chain_of_merges_reports_the_surviving_field() {
     };
     let [a, b, c] = [8, 28, 48].map(|x| dig(&mut terrain, pit(x)).chunks[0].field);
     // In one transaction, b absorbs c, then a absorbs b.
-    terrain.submit(&trench(28.0, 48.0));
-    terrain.submit(&trench(8.0, 28.0));
+    terrain.submit(trench(28.0, 48.0));
+    terrain.submit(trench(8.0, 28.0));
     let commit = terrain.begin().expect("queued edits").run();
     let news: Vec<FieldNews> = commit.field_news().iter().map(|&(_, news)| news).collect();
     terrain.commit(commit).expect("no other commit");

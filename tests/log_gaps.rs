@@ -122,11 +122,11 @@ fn rules_are_logged_once_nothing_waits_even_if_that_was_a_step_without_effect() 
 fn a_record_is_replayed_at_once_even_while_a_transaction_is_under_way() {
     let mut leader = flat();
     leader.keep_log(Some(PLENTY));
-    leader.submit(&dig(12.0));
+    leader.submit(dig(12.0));
     leader.apply([dig(20.0)]);
     let records = leader.take_log();
     let mut follower = flat();
-    follower.submit(&dig(12.0));
+    follower.submit(dig(12.0));
     let lost = follower.begin().expect("it waits");
     let last = records.last().expect("a commit");
     // What waits comes first, and makes it another world.
@@ -203,7 +203,7 @@ fn act(terrain: &mut Terrain, rng: &mut Rng, held: &mut Held) {
         9 => terrain.abandon(),
         10 => terrain.set_meshing(if rng.bool() { Meshing::Never } else { Meshing::All }),
         11 => terrain.set_undo_budget(rng.usize(0..200_000)),
-        12 => terrain.submit(&dig(-900.0)),
+        12 => terrain.submit(dig(-900.0)),
         13 => {
             for stale in held.stale.drain(..) {
                 // The work was queued again, and so may even be under way.

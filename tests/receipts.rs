@@ -279,7 +279,7 @@ fn queued_edits_get_their_receipts_before_later_ones() {
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
     let at = |x: f32| Shape::sphere(Vec3::new(x, 10.0, 20.0), 3.0);
     for tag in 0..10 {
-        terrain.submit(&Brush::dig(at(tag as f32 * 4.0)).with_tag(tag));
+        terrain.submit(Brush::dig(at(tag as f32 * 4.0)).with_tag(tag));
         if tag % 3 == 1 {
             let edit = Edit::quantize(&Brush::dig(at(3.0)).with_tag(100 + tag)).expect("a valid brush");
             terrain.submit(&edit);

@@ -45,6 +45,6 @@ pub fn one_field(size: u32, round: u32) -> Terrain {
     let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
     let center = Vec3::splat(size as f32 * 0.5);
     let shape = Shape::cuboid(center, center - 4.0);
-    terrain.submit(&Brush::dig(shape).with_roughness(Roughness::new(8.0, 12.0, round)));
+    terrain.submit(Brush::dig(shape).with_roughness(Roughness::new(8.0, 12.0, round)));
     terrain
 }

@@ -22,7 +22,7 @@ pub fn section() {
         let (mut own, mut peer, mut ratio) = (Sample::default(), Sample::default(), Sample::default());
         let (mut buffer, mut samples) = (SurfaceNetsBuffer::default(), vec![0.0; Chunk::USIZE]);
         for at in Places::new(600).iter() {
-            terrain.submit(&dig(at + Vec3::splat(3.0), 4.0));
+            terrain.submit(dig(at + Vec3::splat(3.0), 4.0));
             let commit = terrain.begin().expect("a queued brush").run();
             let ours = (commit.stages.edit + commit.stages.meshing).as_secs_f64();
             terrain.commit(commit).expect("no other commit");

@@ -83,7 +83,7 @@ fn digs(mut terrains: [Terrain; 2], summit: Vec3) {
         let shape = Shape::sphere(Vec3::new(x, height - round as f32 * 3.0, z), 4.0);
         for at in [(number + round) % 2, (number + round + 1) % 2] {
             let terrain = &mut terrains[at];
-            terrain.submit(&Brush::dig(shape));
+            terrain.submit(Brush::dig(shape));
             let transaction = terrain.begin().expect("a dig waits");
             let start = Instant::now();
             let commit = transaction.run();
@@ -264,7 +264,7 @@ fn flight(mut terrain: Terrain, summit: Vec3) {
         let velocity = Vec3::new(turn.cos(), 0.0, turn.sin()) * 100.0;
         if frame % 3 == 0 {
             let height = terrain.world().height(at.x.into(), at.z.into()).unwrap_or_default() as f32;
-            terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(at.x, height, at.z), 3.0)));
+            terrain.submit(Brush::dig(Shape::sphere(Vec3::new(at.x, height, at.z), 3.0)));
             let transaction = terrain.begin().expect("a dig waits");
             let start = Instant::now();
             let commit = transaction.run();

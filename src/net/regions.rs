@@ -130,7 +130,7 @@ mod tests {
             for _ in 0..30 {
                 let at = Vec3::new(rng.f32() * 200.0, rng.f32() * 30.0, rng.f32() * 200.0);
                 let before = hashes(terrain.world());
-                terrain.submit(&Brush::dig(Shape::sphere(at, 1.0 + 9.0 * rng.f32())));
+                terrain.submit(Brush::dig(Shape::sphere(at, 1.0 + 9.0 * rng.f32())));
                 let commit = terrain.begin().expect("an edit").run();
                 let change = commit.change();
                 let steps = Steps::of(terrain.world(), &change);

@@ -157,7 +157,8 @@ impl Play {
         let applied = self.replica.apply(batch, own_number);
         self.given += batch.len();
         let edits = batch.iter().filter(|entry| entry.edit().is_some()).count();
-        assert_eq!(applied.receipts.len(), edits);
+        let parts = batch.iter().filter(|entry| entry.parts().is_some()).count();
+        assert_eq!(applied.receipts.len(), edits + parts);
         assert!(!applied.is_void);
         if is_quiet && !was_outdated && applied.receipts.iter().all(|receipt| receipt.outcome.is_ok()) {
             let (change, receipts) = self.replica.update();

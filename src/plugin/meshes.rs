@@ -373,7 +373,7 @@ mod tests {
             let mut compared = 0;
             for i in 0..9 {
                 let place = Vec3::new((i * 23 % 71) as f32, (i * 7 % 12) as f32, (i * 31 % 61) as f32);
-                terrain.submit(&Brush::dig(Shape::sphere(place, 3.0 + i as f32)));
+                terrain.submit(Brush::dig(Shape::sphere(place, 3.0 + i as f32)));
                 let commit = terrain.begin().unwrap().run();
                 for (tile, update) in &commit.meshes.tiles {
                     let origin = terrain.world().origin(Drawn::Tile(*tile));

@@ -130,7 +130,11 @@ fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rn
         }
         for _ in 0..rng.u32(0..3) {
             match (under_way.take(), rng.u32(0..8)) {
-                (None, 0..5) => under_way = terrain.begin(),
+                (None, 0..5) => {
+                    under_way = terrain.begin();
+                    // Of steps that found nothing, in turn.
+                    said.hear(terrain.take_receipts());
+                }
                 (Some(transaction), 0..4) => {
                     let commit = run(transaction, rng);
                     said.hear(terrain.commit(commit).expect("it is waited for"));
@@ -142,6 +146,7 @@ fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rn
                 (_, 5) if rng.u32(0..4) == 0 => {
                     let none: [&Brush; 0] = [];
                     assert!(terrain.apply(none).is_empty());
+                    said.hear(terrain.take_receipts());
                 }
                 (other, _) => under_way = other,
             }
@@ -151,7 +156,10 @@ fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rn
         let commit = run(transaction, rng);
         said.hear(terrain.commit(commit).expect("it is waited for"));
     }
-    while let Some(transaction) = terrain.begin() {
+    loop {
+        let transaction = terrain.begin();
+        said.hear(terrain.take_receipts());
+        let Some(transaction) = transaction else { break };
         let commit = run(transaction, rng);
         said.hear(terrain.commit(commit).expect("it is waited for"));
     }

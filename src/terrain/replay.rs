@@ -69,7 +69,7 @@ impl ReplayError {
     /// The error of a record of which an order was rejected.
     pub(crate) fn of(why: &Rejection, revision: u64) -> Self {
         match why {
-            Rejection::Rules(why) => Self::Rules(why.clone()),
+            Rejection::Rules(why) => Self::Rules(*why),
             Rejection::Parts(why) => Self::Parts(why.clone()),
             _ => Self::Rejected(revision),
         }

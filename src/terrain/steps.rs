@@ -106,7 +106,7 @@ mod tests {
         terrain.set_undo_budget(1 << 30);
         terrain.apply([dig(20.0)]);
         let before = terrain.world().hash();
-        terrain.submit(&dig(40.0));
+        terrain.submit(dig(40.0));
         clear_meanwhile(&mut terrain);
         let after = terrain.world().hash();
         assert_eq!((terrain.undo_budget(), counts(&terrain)), (1 << 30, (1, 0)));

@@ -157,8 +157,8 @@ impl Terrain {
     }
 
     /// Receipts that no commit returned, in order; each is returned once. They are of orders that there was no room for, of
-    /// steps through history that found nothing to do, and of orders that waited when [`apply`](Self::apply) was called.
-    /// If they are not taken, the latest 65,536 are kept.
+    /// steps through history that found nothing to do when [`begin`](Self::begin) came to them, and of orders that waited when
+    /// [`apply`](Self::apply) was called. If they are not taken, the latest 65,536 are kept.
     ///
     /// In a Bevy app the plugin takes those of edits and steps, and sends them as messages. Those of parts and grounds are
     /// left here, also if the plugin commits them.

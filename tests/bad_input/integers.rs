@@ -80,7 +80,7 @@ fn meshes_of_arbitrary_chunks_and_tiles_return() {
 fn queries_of_arbitrary_boxes_return() {
     let (mut terrain, evaluator) = (dug(), evaluator());
     terrain.apply([Brush::add(Shape::sphere(Vec3::new(7.0, 40.0, 6.0), 2.0), MaterialId(3))]);
-    terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(2.0, 3.0, 2.0), 1.0)));
+    terrain.submit(Brush::dig(Shape::sphere(Vec3::new(2.0, 3.0, 2.0), 1.0)));
     let everything = terrain.world().drawn().count();
     let (mut ready, mut loose) = ([0; 2], 0);
     let (corners, mut rng) = (points().collect::<Vec<_>>(), Rng::with_seed(5));

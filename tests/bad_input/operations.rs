@@ -93,7 +93,7 @@ proptest! {
         // Ground that was moved far is moved again.
         let mut terrain = small_terrain();
         (0..3).for_each(|_| terrain.submit(&edit));
-        terrain.submit(&Brush::smooth(Shape::sphere(Vec3::new(7.0, 9.0, 6.0), 5.0), 1.0));
+        terrain.submit(Brush::smooth(Shape::sphere(Vec3::new(7.0, 9.0, 6.0), 5.0), 1.0));
         let commit = terrain.begin().map(|transaction| transaction.run());
         let receipts = commit.and_then(|commit| terrain.commit(commit).ok()).unwrap_or_default();
         prop_assert!(receipts.len() == 4 && receipts.iter().all(|receipt| receipt.outcome.is_ok()), "{}", json);

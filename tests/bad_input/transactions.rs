@@ -18,9 +18,9 @@ fn a_stale_commit_is_refused_and_loses_nothing() {
 
     // Edits that are applied at once overtake a running transaction. It is then run again together with them.
     let mut terrain = small_terrain();
-    terrain.submit(&dig(3.0, 1));
+    terrain.submit(dig(3.0, 1));
     let stale = terrain.begin().expect("a queued edit").run();
-    terrain.submit(&dig(7.0, 2));
+    terrain.submit(dig(7.0, 2));
     let receipts = terrain.apply([dig(11.0, 3)]);
     assert_eq!(receipts.iter().map(|receipt| receipt.tag).collect::<Vec<_>>(), [3]);
     assert_eq!(terrain.world().hash(), expected, "running and queued edits were applied as well");
@@ -35,11 +35,11 @@ fn a_stale_commit_is_refused_and_loses_nothing() {
 fn a_cancelled_transaction_is_not_committed_with_its_successor() {
     let dig = |x: f32, tag: u64| Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 6.0), 2.0)).with_tag(tag);
     let mut terrain = small_terrain();
-    terrain.submit(&dig(3.0, 1));
+    terrain.submit(dig(3.0, 1));
     let first = terrain.begin().expect("a queued edit");
     // Its task seems lost, so it is cancelled and run again together with the edits sent since.
     terrain.abandon();
-    terrain.submit(&dig(11.0, 2));
+    terrain.submit(dig(11.0, 2));
     let second = terrain.begin().expect("queued edits");
     assert_eq!(second.len(), 2);
     // The lost transaction finishes after all.
@@ -63,8 +63,8 @@ fn a_cancelled_transaction_is_not_committed_with_its_successor() {
 fn a_commit_of_another_terrain_is_refused() {
     let mut one = small_terrain();
     let mut other = terrain(Ground::flat(30, 30, 2.0).expect("finite heights"), 25);
-    one.submit(&Brush::dig(Shape::sphere(Vec3::new(6.0, 5.0, 6.0), 2.0)));
-    other.submit(&Brush::dig(Shape::sphere(Vec3::new(20.0, 2.0, 20.0), 2.0)));
+    one.submit(Brush::dig(Shape::sphere(Vec3::new(6.0, 5.0, 6.0), 2.0)));
+    other.submit(Brush::dig(Shape::sphere(Vec3::new(20.0, 2.0, 20.0), 2.0)));
     let commit = other.begin().expect("a queued edit").run();
     let before = one.world().hash();
     assert!(one.commit(commit).is_err(), "samples of a world of 30 x 30 cells went into one of 14 x 12");
@@ -85,12 +85,12 @@ fn cancelled_edits_are_queued_again_in_order() {
     assert_eq!(terrain.queued(), 0, "no transaction was running");
 
     for tag in 0..3 {
-        terrain.submit(&brush(tag));
+        terrain.submit(brush(tag));
     }
     let lost = terrain.begin().expect("queued edits");
     assert!(terrain.is_busy() && terrain.queued() == 0);
     for tag in 3..5 {
-        terrain.submit(&brush(tag));
+        terrain.submit(brush(tag));
     }
     assert!(terrain.begin().is_none(), "one at a time");
     assert_eq!(terrain.queued(), 2);
@@ -106,9 +106,9 @@ fn cancelled_edits_are_queued_again_in_order() {
     assert_eq!(tags(&mut terrain), [0, 1, 2, 3, 4]);
 
     // Dropping a computed commit has the same effect.
-    terrain.submit(&brush(7));
+    terrain.submit(brush(7));
     drop(terrain.begin().expect("a queued edit").run());
-    terrain.submit(&brush(8));
+    terrain.submit(brush(8));
     terrain.abandon();
     assert_eq!(tags(&mut terrain), [7, 8]);
     assert!(!terrain.is_busy() && terrain.queued() == 0);

@@ -86,7 +86,7 @@ fn random_dig(rng: &mut Rng) -> Edit {
 
 fn dug(ground: &Arc<Ground>, digs: u32, rng: &mut Rng) -> Terrain {
     let mut terrain = terrain(ground);
-    (0..digs).for_each(|_| terrain.submit(&random_dig(rng)));
+    (0..digs).for_each(|_| terrain.submit(random_dig(rng)));
     while let Some(transaction) = terrain.begin() {
         terrain.commit(transaction.run()).expect("it waits for it");
     }
@@ -338,7 +338,7 @@ fn quick(side: u32, digs: u32) -> (Server, Arc<Ground>) {
     for _ in 0..digs {
         let at = Vec3::new(rng.f32() * side as f32, rng.f32() * 8.0 - 6.0, rng.f32() * side as f32);
         let brush = Brush::dig(Shape::sphere(at, 4.0 + rng.f32() * 4.0));
-        dug.submit(&Edit::quantize(&brush).expect("a valid brush"));
+        dug.submit(Edit::quantize(&brush).expect("a valid brush"));
     }
     while let Some(transaction) = dug.begin() {
         dug.commit(transaction.run()).expect("it waits for it");

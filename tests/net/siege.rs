@@ -136,7 +136,7 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
     let ground = hills(SIDE as u32);
     let mut rng = Rng::with_seed(5);
     let mut dug = terrain(&ground);
-    (0..4000).for_each(|_| dug.submit(&random_dig(&mut rng, 9.0)));
+    (0..4000).for_each(|_| dug.submit(random_dig(&mut rng, 9.0)));
     while let Some(transaction) = dug.begin() {
         dug.commit(transaction.run()).expect("it waits for it");
     }

@@ -147,7 +147,7 @@ fn only_changed_parts_of_a_games_own_edits_are_meshed_again() {
             0 => drop(own.apply([dig(8.0, 8.0, 8.0, 4.0)])),
             1 => drop(own.undo()),
             2 => {
-                own.submit(&dig(20.0, 8.0, 8.0, 3.0));
+                own.submit(dig(20.0, 8.0, 8.0, 3.0));
                 let mut commit = own.begin().expect("a queued brush").run();
                 // The game takes the meshes for itself.
                 drop(std::mem::take(&mut commit.meshes));

@@ -24,7 +24,7 @@ fn a_place_is_ready_unless_an_edit_is_pending_there() {
     // It runs, with another one queued elsewhere.
     let transaction = terrain.begin().expect("a queued edit");
     assert!(!terrain.is_ready(here) && terrain.is_ready(there));
-    terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(35.0, 10.0, 25.0), 2.0)));
+    terrain.submit(Brush::dig(Shape::sphere(Vec3::new(35.0, 10.0, 25.0), 2.0)));
     assert!(!terrain.is_ready(here) && !terrain.is_ready(there));
     let commit = transaction.run();
     assert!(!terrain.is_ready(here), "computed, but not committed");
@@ -40,6 +40,6 @@ fn a_place_is_ready_unless_an_edit_is_pending_there() {
     assert!(terrain.is_ready(here) && terrain.is_ready(there));
 
     // A brush that will be rejected does not count as an edit.
-    terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(10.0, f32::NAN, 10.0), 2.0)));
+    terrain.submit(Brush::dig(Shape::sphere(Vec3::new(10.0, f32::NAN, 10.0), 2.0)));
     assert!(terrain.is_ready(here));
 }

@@ -27,7 +27,7 @@ fn history_takes_the_reported_bytes_and_stays_within_its_budget() {
             match rng.u32(0..6) {
                 0 => terrain.submit(Order::Undo),
                 1 => terrain.submit(Order::Redo),
-                _ => terrain.submit(&any_brush(&mut rng, ground.ground(), chunk_size)),
+                _ => terrain.submit(any_brush(&mut rng, ground.ground(), chunk_size)),
             }
             while let Some(transaction) = terrain.begin() {
                 let commit = transaction.run();

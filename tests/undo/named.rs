@@ -21,7 +21,7 @@ fn history_steps_keep_their_order_among_brushes() {
     terrain.submit(Order::Undo);
     terrain.submit_all([ball(10.0, 10.0, 10.0, 3.0).with_tag(1), ball(12.0, 10.0, 10.0, 3.0).with_tag(2)]);
     terrain.submit(Order::Undo);
-    terrain.submit(&ball(40.0, 10.0, 40.0, 3.0).with_tag(3));
+    terrain.submit(ball(40.0, 10.0, 40.0, 3.0).with_tag(3));
     terrain.submit(Order::Redo);
     terrain.submit(Order::Undo);
     terrain.submit(Order::Undo);

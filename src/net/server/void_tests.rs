@@ -84,7 +84,7 @@ impl Play {
     /// The server applies edits that wait, while its terrain has no room for them: it is to dig in the air.
     fn apply_without_room(&mut self) {
         let (hash, terrain) = (self.server.terrain.world().hash(), &mut self.server.terrain);
-        terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(60.0, 90.0, 60.0), 5.0)));
+        terrain.submit(Brush::dig(Shape::sphere(Vec3::new(60.0, 90.0, 60.0), 5.0)));
         terrain.set_work_limits(WorkLimits { waiting: 1, ..WorkLimits::UNBOUNDED });
         self.server.apply();
         self.server.terrain.set_work_limits(WorkLimits::UNBOUNDED);
