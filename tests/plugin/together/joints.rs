@@ -374,7 +374,7 @@ fn a_game_alone_is_opened_and_closed_again() {
 #[test]
 fn a_terrain_that_is_disabled_for_a_while_misses_nothing() {
     // While it joins, while its edits are under way, and while somebody else digs.
-    for rounds in [0, 1, 2, 3, 5, 8] {
+    for rounds in [1, 2, 3, 5, 8] {
         let mut party = Party::new(1);
         party.all_join();
         party.join_with(dug(ground(), 3), AuthMethod::ProtocolCheck);
