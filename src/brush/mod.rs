@@ -91,9 +91,9 @@ mod blend;
 mod edit;
 mod error;
 mod evaluator;
+mod json;
 #[cfg(test)]
 mod laws;
-mod line;
 mod operation;
 mod quantize;
 mod quantized_operation;

@@ -11,6 +11,7 @@
 
 #[doc(hidden)]
 pub mod block;
+pub(crate) mod brick_window;
 #[doc(hidden)]
 pub mod cases;
 pub(crate) mod cell_outline;
@@ -40,7 +41,6 @@ mod stack;
 pub mod tile;
 #[doc(hidden)]
 pub mod vertex;
-pub(crate) mod window;
 
 pub use chunk_surface::ChunkSurface;
 pub(crate) use chunk_surface::{FreshPart, PartKey};

@@ -72,7 +72,7 @@ pub use receipt::{Applied, Asked, ChunkScenario, Receipt, Rejection, ScenarioCou
 pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
 pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]
-pub use resolve::FieldNews;
+pub use resolve::FieldChange;
 pub use transaction::Transaction;
 #[cfg(feature = "plugin")]
 pub(crate) use unseen::Unseen;
