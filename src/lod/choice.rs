@@ -121,7 +121,7 @@ pub struct LodSettings {
     pub edited_pixels: f32,
     /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing
     /// changes back and forth while an eye moves to and fro.
-    pub stay: f32,
+    pub hysteresis: f32,
     /// The choice also considers where each eye will be in this many seconds; 0.5 by default.
     pub look_ahead: f32,
     /// Nodes farther from all eyes than this many voxels are not split; 8,192 by default.
@@ -136,7 +136,7 @@ impl Default for LodSettings {
             cell_pixels: 12.0,
             error_pixels: 2.0,
             edited_pixels: 4.0,
-            stay: 0.7,
+            hysteresis: 0.7,
             look_ahead: 0.5,
             view_distance: 8192.0,
             most_nodes: 2400,
@@ -152,7 +152,7 @@ impl LodSettings {
         let eyes: Vec<Viewpoint> = eyes.iter().filter(|eye| eye.is_finite()).copied().collect();
         let with_limits = |growth: f32| {
             Cut::new(grid, |node| {
-                let share = if before.is_split(node) { self.stay.clamp(LEAST_STAY, 1.0) } else { 1.0 };
+                let share = if before.is_split(node) { self.hysteresis.clamp(LEAST_STAY, 1.0) } else { 1.0 };
                 self.is_split(grid, node, facts(node), &eyes, [share, growth])
             })
         };
@@ -339,7 +339,12 @@ mod tests {
                     edited_pixels: odd,
                     ..LodSettings::default()
                 },
-                LodSettings { view_distance: odd, look_ahead: odd, stay: odd, ..LodSettings::default() },
+                LodSettings {
+                    view_distance: odd,
+                    look_ahead: odd,
+                    hysteresis: odd,
+                    ..LodSettings::default()
+                },
             ] {
                 for eye in [eye(8000.0, 8000.0), eye(odd, 0.0), Viewpoint { pixels: odd, ..eye(9.0, 9.0) }] {
                     let cut = choice.cut(&Cut::coarsest(world()), &[eye], mountains);

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::node_facts::GroundFacts;
-use crate::lod::{Choice, Cut, LodGrid, Node, NodeFacts, Viewpoint};
+use crate::lod::{Cut, LodGrid, LodSettings, Node, NodeFacts, Viewpoint};
 use crate::world::{Version, World};
 
 /// The number of cached nodes above which some are dropped.
@@ -63,7 +63,7 @@ impl KnownNodes {
         &self,
         world: &World,
         cut: &Cut,
-        choice: &Choice,
+        choice: &LodSettings,
         eyes: &[Viewpoint],
         most: usize,
     ) -> Cut {
