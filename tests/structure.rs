@@ -497,6 +497,35 @@ fn public_items_are_counted_however_they_are_written() {
     assert_eq!(shown_functions(&sources, "a/", "S"), ["one", "four"]);
 }
 
+/// Observers of a component's life that would miss it on a disabled entity: a query in their signature leaves those out.
+fn observers_blind_to_disabled(sources: &Sources) -> Vec<String> {
+    let mut found = Vec::new();
+    for (path, text) in sources {
+        let code = without_comments(text);
+        for function in code.split("fn ").skip(1) {
+            let signature = function.split('{').next().unwrap_or_default();
+            let life = ["Add", "Insert", "Discard", "Remove", "Despawn"];
+            let observes = life.iter().any(|event| signature.contains(&format!(": On<{event},")));
+            let (queries, aware) =
+                (signature.matches("Query<").count(), signature.matches("Allow<Disabled>").count());
+            if observes && queries > aware {
+                let name = function.split('(').next().unwrap_or_default();
+                found.push(format!("{path}: {name}"));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn what_a_disabled_entity_gains_or_loses_is_seen() {
+    assert_eq!(observers_blind_to_disabled(&library()), [""; 0]);
+    let blind = "\nfn forget(\n    gone: On<Remove, Mark>,\n    marks: Query<&Mark>,\n) {}\n";
+    let aware = blind.replace("Query<&Mark>", "Query<&Mark, Allow<Disabled>>");
+    let sources = crate_of(&[("a.rs", blind), ("b.rs", &aware)]);
+    assert_eq!(observers_blind_to_disabled(&sources), ["a.rs: forget"]);
+}
+
 #[test]
 fn imports_are_read_however_they_are_written() {
     let sources = crate_of(&[

@@ -1,6 +1,7 @@
 //! Moves characters and keeps their capsules up to date.
 
 use avian3d::prelude::*;
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::schedule::{InternedScheduleLabel, ScheduleLabel};
 use bevy::ecs::system::SystemParam;
 use bevy::math::Affine3A;
@@ -54,7 +55,7 @@ impl Size {
 /// Inserts the capsule of a new character. [`resize`] handles one that replaces another.
 fn give_collider(
     new: On<Insert, Character>,
-    characters: Query<&Character, Without<Size>>,
+    characters: Query<&Character, (Without<Size>, Allow<Disabled>)>,
     mut commands: Commands,
 ) {
     if let Ok(character) = characters.get(new.entity) {

@@ -5,6 +5,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 use avian3d::collision::collider::EnlargedAabb;
 use avian3d::parry::shape::SharedShape;
 use avian3d::prelude::*;
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -213,8 +214,8 @@ pub(super) fn detach(mut part: EntityWorldMut) {
 /// plugin itself [detached](detach) it, ground is gone, so bodies that sleep on it have to wake.
 pub(super) fn forget(
     gone: On<Remove, GroundBody>,
-    bodies: Query<(&GroundBody, &ChildOf, Option<&ColliderAabb>)>,
-    parts: Query<Has<GroundCollider>>,
+    bodies: Query<(&GroundBody, &ChildOf, Option<&ColliderAabb>), Allow<Disabled>>,
+    parts: Query<Has<GroundCollider>, Allow<Disabled>>,
     colliders: Res<GroundColliders>,
     mut changes: ResMut<GroundChanges>,
     mut figures: ResMut<PhysicsFigures>,

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use avian3d::prelude::*;
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 
 use super::debris_collider;
@@ -291,7 +292,11 @@ fn crumble(
 }
 
 /// Despawns the pieces of a terrain that is removed or replaced.
-fn clear(gone: On<Discard, Terrain>, mut commands: Commands, terrains: Query<&TerrainDebris>) {
+fn clear(
+    gone: On<Discard, Terrain>,
+    mut commands: Commands,
+    terrains: Query<&TerrainDebris, Allow<Disabled>>,
+) {
     for piece in terrains.get(gone.entity).into_iter().flat_map(|pieces| pieces.iter()) {
         commands.entity(piece).try_despawn();
     }

@@ -49,7 +49,7 @@ pub(super) struct EdgeWall;
 type Walls<'w, 's> = Query<'w, 's, (Entity, &'static ChildOf), (With<EdgeWall>, Allow<Disabled>)>;
 
 type Terrains<'w, 's> =
-    Query<'w, 's, (&'static Terrain, &'static EdgeWalls, Option<&'static TerrainContact>)>;
+    Query<'w, 's, (&'static Terrain, &'static EdgeWalls, Option<&'static TerrainContact>), Allow<Disabled>>;
 
 pub(super) fn build(new: On<Insert, EdgeWalls>, commands: Commands, terrains: Terrains, old: Walls) {
     replace(new.entity, commands, &terrains, &old);

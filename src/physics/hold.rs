@@ -2,6 +2,7 @@
 
 use avian3d::physics_transform::PhysicsTransformConfig;
 use avian3d::prelude::*;
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::QueryData;
 use bevy::math::Affine3A;
 use bevy::platform::time::Instant;
@@ -132,13 +133,10 @@ impl BodyItem<'_, '_> {
 /// Restores the motion of a body that is no longer held.
 pub(super) fn restore_motion(
     gone: On<Remove, HeldByGround>,
-    mut bodies: Query<(
-        &HeldByGround,
-        &RigidBody,
-        &mut LinearVelocity,
-        &mut AngularVelocity,
-        Option<&LockedAxes>,
-    )>,
+    mut bodies: Query<
+        (&HeldByGround, &RigidBody, &mut LinearVelocity, &mut AngularVelocity, Option<&LockedAxes>),
+        Allow<Disabled>,
+    >,
     mut commands: Commands,
 ) {
     let Ok((hold, kind, mut velocity, mut spin, locked)) = bodies.get_mut(gone.entity) else { return };

@@ -24,8 +24,9 @@ const FEW: usize = 8;
 /// Balanced trees by their number of leaves.
 static TREES: LazyLock<RwLock<FxHashMap<usize, Arc<Bvh>>>> = LazyLock::new(RwLock::default);
 
-/// A tree over some boxes, and for each of its leaves the number of the box.
-pub(super) fn ordered_bvh(bounds: &[Aabb]) -> (Bvh, Vec<u32>) {
+/// A tree over some boxes, and for each of its leaves the number of the box. `is_heightmap` says that no box lies above another,
+/// which makes it faster.
+pub(super) fn ordered_bvh(bounds: &[Aabb], is_heightmap: bool) -> (Bvh, Vec<u32>) {
     let count = bounds.len();
     if count > LARGEST {
         let tree = Bvh::from_iter(BvhBuildStrategy::Binned, bounds.iter().copied().enumerate());
@@ -33,7 +34,11 @@ pub(super) fn ordered_bvh(bounds: &[Aabb]) -> (Bvh, Vec<u32>) {
     }
     let leaves = Leaves { size: rounded_up(count), used: count };
     let mut centers = Center::all(bounds);
-    leaves.halve(&mut centers, 0..leaves.size);
+    if is_heightmap {
+        centers = along_curve(&centers);
+    } else {
+        leaves.halve(&mut centers, 0..leaves.size);
+    }
     let mut tree = Bvh::clone(&balanced(leaves.size));
     let boxes = (0..leaves.size).map(|leaf| {
         let used = leaves.used_before(leaf);
@@ -73,6 +78,55 @@ impl Center {
         };
         (0..).zip(bounds).map(center).collect()
     }
+}
+
+/// Squares along a side of the plane that a curve runs through.
+const SIDE: usize = 64;
+
+/// For each square, its place along a Hilbert curve.
+static CURVE: LazyLock<[u16; SIDE * SIDE]> = LazyLock::new(|| {
+    let place = |mut x: usize, mut z: usize| {
+        let (mut place, mut half) = (0, SIDE / 2);
+        while half > 0 {
+            let (right, top) = (x & half > 0, z & half > 0);
+            place += half * half * ((3 * usize::from(right)) ^ usize::from(top));
+            if !top {
+                if right {
+                    (x, z) = (SIDE - 1 - x, SIDE - 1 - z);
+                }
+                std::mem::swap(&mut x, &mut z);
+            }
+            half /= 2;
+        }
+        place as u16
+    };
+    std::array::from_fn(|square| place(square % SIDE, square / SIDE))
+});
+
+/// The centres in order of a curve over the plane. Neighbours along it are neighbours in the plane, so halves of the list are
+/// compact regions.
+fn along_curve(centers: &[Center]) -> Vec<Center> {
+    let square = |center: &Center| {
+        let [x, _, z] = center.place.map(|place| place as usize * SIDE / (GRID as usize + 1));
+        CURVE[z * SIDE + x]
+    };
+    let mut keyed: Vec<(u16, Center)> = centers.iter().map(|center| (square(center), *center)).collect();
+    let mut sorted = keyed.clone();
+    // A radix sort by two digits.
+    for shift in [0, 6] {
+        let digit = |key: u16| usize::from(key >> shift) % SIDE;
+        let mut starts = [0; SIDE];
+        keyed.iter().for_each(|(key, _)| starts[digit(*key)] += 1);
+        let mut sum = 0;
+        starts.iter_mut().for_each(|start| sum += std::mem::replace(start, sum));
+        for item in &keyed {
+            let start: &mut usize = &mut starts[digit(item.0)];
+            sorted[*start] = *item;
+            *start += 1;
+        }
+        std::mem::swap(&mut keyed, &mut sorted);
+    }
+    keyed.into_iter().map(|(_, center)| center).collect()
 }
 
 /// The leaves of a tree, of which some are not used, at even intervals.
@@ -150,7 +204,7 @@ mod tests {
                 Aabb::new(low, low + place(rng) / 20.0)
             };
             let all: Vec<Aabb> = (0..count).map(|_| bounds(&mut rng)).collect();
-            let (tree, numbers) = ordered_bvh(&all);
+            let (tree, numbers) = ordered_bvh(&all, count % 2 == 0);
             assert_eq!(tree.leaf_count() as usize, count);
             for _ in 0..20 {
                 let sought = bounds(&mut rng);
@@ -169,11 +223,23 @@ mod tests {
     #[test]
     fn boxes_in_one_place_have_a_tree_too() {
         let bounds = vec![Aabb::new(Vector::ONE, Vector::ONE); 100];
-        let (tree, numbers) = ordered_bvh(&bounds);
+        let (tree, numbers) = ordered_bvh(&bounds, true);
         let mut found: Vec<u32> =
             tree.intersect_aabb(&bounds[0]).map(|leaf| numbers[leaf as usize]).collect();
         found.sort_unstable();
         assert!(found.into_iter().eq(0..100));
+    }
+
+    #[test]
+    fn a_curve_goes_from_square_to_square_through_all_of_them() {
+        let mut squares = vec![None; SIDE * SIDE];
+        for (square, &place) in CURVE.iter().enumerate() {
+            squares[usize::from(place)] = Some([square % SIDE, square / SIDE]);
+        }
+        for pair in squares.windows(2) {
+            let [Some([x, z]), Some([other_x, other_z])] = pair else { panic!("a place is empty: {pair:?}") };
+            assert_eq!(x.abs_diff(*other_x) + z.abs_diff(*other_z), 1, "{pair:?}");
+        }
     }
 
     #[test]

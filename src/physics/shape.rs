@@ -56,12 +56,13 @@ impl GroundShape {
         }
         let vertices = welded.vertices(voxel_size / SNAP as f32);
         let (neighbours, beyond) = welded.neighbours(&vertices);
-        Some(Self::of(vertices, welded.triangles, neighbours, beyond))
+        Some(Self::of(vertices, welded.triangles, welded.is_heightmap, neighbours, beyond))
     }
 
     fn of(
         vertices: Vec<Vector>,
         triangles: Vec<[u32; 3]>,
+        is_heightmap: bool,
         neighbours: Vec<[u32; 3]>,
         beyond: Vec<Vector>,
     ) -> Self {
@@ -69,7 +70,7 @@ impl GroundShape {
             let [a, b, c] = triangle.map(|corner| vertices[corner as usize]);
             Aabb::new(a.min(b).min(c), a.max(b).max(c))
         });
-        let (tree, leaves) = ordered_bvh(&bounds.collect::<Vec<_>>());
+        let (tree, leaves) = ordered_bvh(&bounds.collect::<Vec<_>>(), is_heightmap);
         Self { vertices, triangles, tree, leaves, neighbours, beyond, plain: OnceLock::new() }
     }
 
@@ -278,7 +279,7 @@ impl Shape for GroundShape {
         let across = Vector::new(scale.y * scale.z, scale.z * scale.x, scale.x * scale.y);
         let beyond = self.beyond.iter().map(|normal| (normal * across).normalize_or_zero()).collect();
         let vertices = self.vertices.iter().map(|vertex| *vertex * scale).collect();
-        Some(Box::new(Self::of(vertices, self.triangles.clone(), self.neighbours.clone(), beyond)))
+        Some(Box::new(Self::of(vertices, self.triangles.clone(), false, self.neighbours.clone(), beyond)))
     }
 
     fn mass_properties(&self, _: Real) -> MassProperties {

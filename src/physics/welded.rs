@@ -1,5 +1,7 @@
 //! Surfaces without repeated vertices, and which triangles are neighbours.
 
+use std::cmp::Ordering;
+
 use avian3d::parry::math::Vector;
 use glam::{I64Vec3, IVec3, Vec3};
 
@@ -10,6 +12,8 @@ pub(super) struct Welded {
     places: Vec<IVec3>,
     normals: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
+    /// Whether all triangles are seen from above.
+    pub is_heightmap: bool,
 }
 
 /// Neighbours from here on are indices of the normals across the border.
@@ -45,14 +49,16 @@ impl Welded {
             });
         }
         let corner = |index: u32| welded.get(index as usize).copied();
-        let mut triangles = Vec::with_capacity(surface.indices.len() / 3);
+        let (mut triangles, mut is_heightmap) = (Vec::with_capacity(surface.indices.len() / 3), true);
         for t in surface.indices.triangles() {
             let [Some(a), Some(b), Some(c)] = t.map(corner) else { continue };
-            if has_area([a, b, c].map(|corner| places[corner as usize])) {
+            let area = Area::of([a, b, c].map(|corner| places[corner as usize]));
+            if area != Area::Nothing {
+                is_heightmap &= area == Area::Above;
                 triangles.push([a, b, c]);
             }
         }
-        Self { places, normals, triangles }
+        Self { places, normals, triangles, is_heightmap }
     }
 
     /// The vertices in metres, if a voxel has `SNAP * scale` metres.
@@ -109,10 +115,24 @@ fn hash(place: IVec3) -> u32 {
     ((product >> 64) as u64 ^ product as u64) as u32
 }
 
-fn has_area([a, b, c]: [IVec3; 3]) -> bool {
-    let [b, c] = [b, c].map(|corner| corner.as_i64vec3() - a.as_i64vec3());
-    // Nearly all triangles of ground are seen from above or below.
-    b.x * c.z != b.z * c.x || b.cross(c) != I64Vec3::ZERO
+/// Whether a triangle has an area, and whether it is seen from above.
+#[derive(PartialEq)]
+enum Area {
+    Nothing,
+    Above,
+    Other,
+}
+
+impl Area {
+    fn of([a, b, c]: [IVec3; 3]) -> Self {
+        let [b, c] = [b, c].map(|corner| corner.as_i64vec3() - a.as_i64vec3());
+        match (b.z * c.x).cmp(&(b.x * c.z)) {
+            Ordering::Greater => Self::Above,
+            Ordering::Less => Self::Other,
+            Ordering::Equal if b.cross(c) != I64Vec3::ZERO => Self::Other,
+            Ordering::Equal => Self::Nothing,
+        }
+    }
 }
 
 /// Finds neighbours: triangles with the same side, in opposite directions.

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::lifecycle::Discard;
 use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
@@ -72,9 +73,14 @@ pub(super) fn send(
     service: Res<Service>,
     mut sharing: ResMut<Sharing>,
     mut shared: Query<(Entity, &mut SharedTerrain, Option<&mut EditOutbox>, Option<&mut Terrain>, Has<Held>)>,
+    mut disabled: Query<&mut SharedTerrain, (With<Disabled>, Allow<Disabled>)>,
     mut answers: Answers,
     mut messages: MessageWriter<FromPlayer>,
 ) {
+    for mut shared in &mut disabled {
+        let link = shared.bypass_change_detection().link.as_mut();
+        link.into_iter().for_each(|link| leave_meanwhile(link, *service, &mut messages));
+    }
     let with_terrain = shared.iter().filter(|(_, _, _, terrain, _)| terrain.is_some());
     sharing.choose(with_terrain.map(|(entity, shared, ..)| (entity, shared.order)));
     let active = sharing.active;
@@ -152,10 +158,7 @@ impl Turn<'_, '_> {
             link.rules = terrain.rules().cloned();
             self.answers.warn(self.entity, SharingTrouble::RulesIgnored);
         }
-        if let Some(Worked { client, whole }) = link.task.as_mut().and_then(ThreadTask::finish) {
-            (link.client, link.task) = (Some(client), None);
-            link.display.whole = whole;
-        }
+        link.take_back_client();
         let standing = link.standing(service);
         let follows = match standing {
             Standing::Follows(invitation) => Some(invitation),
@@ -211,6 +214,20 @@ impl Turn<'_, '_> {
                 }
             }
         }
+    }
+}
+
+/// Leaves the server while a terrain is disabled, as nobody reads what the server sends. The terrain joins again once it is enabled,
+/// and what waits for an answer is sent again.
+fn leave_meanwhile(link: &mut Link, service: Service, messages: &mut MessageWriter<FromPlayer>) {
+    if link.greeted.is_none() {
+        return;
+    }
+    link.take_back_client();
+    if let Some(mut client) = link.client.take() {
+        link.facts.has_joined = false;
+        change_server(link, &mut client, None, service, messages);
+        link.client = Some(client);
     }
 }
 
@@ -271,7 +288,7 @@ pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>
 /// Answers what waits for a terrain that is no longer shared, and tells the server.
 pub(super) fn close(
     gone: On<Discard, SharedTerrain>,
-    mut shared: Query<(&mut SharedTerrain, Option<&mut EditOutbox>)>,
+    mut shared: Query<(&mut SharedTerrain, Option<&mut EditOutbox>), Allow<Disabled>>,
     mut answers: Answers,
     mut messages: MessageWriter<FromPlayer>,
 ) {

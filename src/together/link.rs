@@ -150,6 +150,14 @@ impl Link {
         })
     }
 
+    /// Takes the client from a task that has finished.
+    pub fn take_back_client(&mut self) {
+        if let Some(Worked { client, whole }) = self.task.as_mut().and_then(ThreadTask::finish) {
+            (self.client, self.task) = (Some(client), None);
+            self.display.whole = whole;
+        }
+    }
+
     /// Edits that are not answered.
     pub fn unanswered(&self) -> usize {
         self.tags.len()

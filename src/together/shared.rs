@@ -1,5 +1,6 @@
 //! A terrain that a player shares with others, and messages about it.
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 
 use super::link::Link;
@@ -114,7 +115,7 @@ pub struct GroundJoined {
 pub(super) fn begin(
     new: On<Insert, SharedTerrain>,
     mut commands: Commands,
-    mut shared: Query<&mut SharedTerrain>,
+    mut shared: Query<&mut SharedTerrain, Allow<Disabled>>,
     mut sharing: ResMut<Sharing>,
 ) {
     if let Ok(mut shared) = shared.get_mut(new.entity) {

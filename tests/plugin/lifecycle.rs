@@ -817,10 +817,16 @@ impl Life {
     fn settle_shared(&mut self) {
         let (sent, steps, heard) = (self.sent.len(), self.steps_sent, self.steps_heard);
         let mut moved = 0;
-        self.run_until("the server has answered", |stage| {
+        let has_all = self.stage.frames_within(self.patience, |stage| {
             moved += stage.recorded::<HistoryMoved>().len();
             stage.tags().len() >= sent && heard + moved >= steps
         });
+        let (tags, heard) = (self.stage.tags(), heard + moved);
+        let missing: Vec<u64> = self.sent.iter().copied().filter(|tag| !tags.contains(tag)).collect();
+        assert!(
+            has_all,
+            "the server has not answered brushes {missing:?}; {heard} of {steps} steps are answered"
+        );
         self.steps_heard += moved;
     }
 

@@ -5,6 +5,7 @@ use std::sync::mpsc::channel;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_burrow::format::Level;
 use bevy_burrow::net::{Kick, Server, ServerSettings};
@@ -368,4 +369,52 @@ fn a_game_alone_is_opened_and_closed_again() {
     assert_eq!(stage.hash(terrain), opened);
     stage.send(Brush::dig(Shape::sphere(Vec3::new(60.0, 20.0, 60.0), 6.0)));
     stage.frames_until("it is dug alone", |stage| stage.hash(terrain) != opened);
+}
+
+#[test]
+fn a_terrain_that_is_disabled_for_a_while_misses_nothing() {
+    // While it joins, while its edits are under way, and while somebody else digs.
+    for rounds in [0, 1, 2, 3, 5, 8] {
+        let mut party = Party::new(1);
+        party.all_join();
+        party.join_with(dug(ground(), 3), AuthMethod::ProtocolCheck);
+        party.rounds(rounds);
+        let terrain = party.players[1].1;
+        for place in [20.0, 40.0, 60.0] {
+            party.dig_at(1, place, 48.0);
+            party.rounds(rounds);
+            party.world_mut(1).entity_mut(terrain).insert(Disabled);
+            party.dig_at(0, place, 20.0);
+            party.rounds(2 + rounds);
+            party.world_mut(1).entity_mut(terrain).remove::<Disabled>();
+            party.rounds(rounds);
+        }
+        party.rounds_until("both show all digs", |party| {
+            party.agrees()
+                && [20.0, 40.0, 60.0].iter().all(|&x| {
+                    let pristine = ground().world().height(x, 20.0).unwrap_or_default() as f32;
+                    party.height_at(1, x, 20.0) < pristine - 1.0
+                })
+        });
+        let outcomes = party.outcomes(1);
+        let is_answer =
+            |outcome: &&WhatBecame| matches!(outcome, WhatBecame::Confirmed(_) | WhatBecame::Refused(_));
+        assert_eq!(outcomes.iter().filter(is_answer).count(), 3, "{outcomes:?}");
+    }
+}
+
+#[test]
+fn what_waits_in_a_shared_terrain_is_answered_when_it_goes_while_it_is_disabled() {
+    let mut party = Party::new(1);
+    party.all_join();
+    let terrain = party.players[0].1;
+    party.dig_at(0, 40.0, 40.0);
+    party.round();
+    party.world_mut(0).entity_mut(terrain).insert(Disabled);
+    party.world_mut(0).despawn(terrain);
+    party.rounds(3);
+    let outcomes = party.outcomes(0);
+    let is_answer =
+        |outcome: &&WhatBecame| matches!(outcome, WhatBecame::Confirmed(_) | WhatBecame::Refused(_));
+    assert_eq!(outcomes.iter().filter(is_answer).count(), 1, "{outcomes:?}");
 }
