@@ -398,7 +398,7 @@ fn a_terrain_that_is_disabled_for_a_while_misses_nothing() {
         });
         let outcomes = party.outcomes(1);
         let is_answer =
-            |outcome: &&WhatBecame| matches!(outcome, WhatBecame::Confirmed(_) | WhatBecame::Refused(_));
+            |outcome: &&EditOutcome| matches!(outcome, EditOutcome::Confirmed(_) | EditOutcome::Refused(_));
         assert_eq!(outcomes.iter().filter(is_answer).count(), 3, "{outcomes:?}");
     }
 }
@@ -415,6 +415,6 @@ fn what_waits_in_a_shared_terrain_is_answered_when_it_goes_while_it_is_disabled(
     party.rounds(3);
     let outcomes = party.outcomes(0);
     let is_answer =
-        |outcome: &&WhatBecame| matches!(outcome, WhatBecame::Confirmed(_) | WhatBecame::Refused(_));
+        |outcome: &&EditOutcome| matches!(outcome, EditOutcome::Confirmed(_) | EditOutcome::Refused(_));
     assert_eq!(outcomes.iter().filter(is_answer).count(), 1, "{outcomes:?}");
 }
