@@ -325,6 +325,7 @@
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
 //! | `sound` | sound for the digger; needs ALSA's headers on Linux | |
 //! | `examples` | what the examples need: window, UI, PNG | |
+//! | `tools` | a simulated disk and random cuts for tests; not for games | |
 //!
 //! Without any feature only the model is built, without Bevy. Where threads are available, transactions, loads and
 //! textures use their own threads, regardless of the features of Bevy.
@@ -351,6 +352,7 @@ mod edits;
 pub mod format;
 pub mod ground;
 pub mod lattice;
+#[doc(hidden)]
 pub mod lod;
 mod loose;
 #[cfg(feature = "net")]

@@ -325,7 +325,7 @@ fn field_invariants_hold_under_random_edits() {
 
 #[test]
 fn the_field_events_of_a_commit_are_the_difference_of_its_fields() {
-    use bevy_burrow::terrain::FieldNews;
+    use bevy_burrow::terrain::FieldChange;
     use std::collections::BTreeMap;
 
     let fields = |world: &World| -> BTreeMap<FieldId, (ChunkPos, bevy_burrow::volume::Field)> {
@@ -353,15 +353,15 @@ fn the_field_events_of_a_commit_are_the_difference_of_its_fields() {
             let mut named = BTreeSet::new();
             for (chunk, news) in news {
                 let id = match news {
-                    FieldNews::Created(id) => {
+                    FieldChange::Created(id) => {
                         assert!(!before.contains_key(&id) && after.get(&id).is_some_and(|f| f.0 == chunk));
                         id
                     }
-                    FieldNews::Changed(id) => {
+                    FieldChange::Changed(id) => {
                         assert!(before.contains_key(&id) && after.get(&id).is_some_and(|f| f.0 == chunk));
                         id
                     }
-                    FieldNews::Merged { gone, into } => {
+                    FieldChange::Merged { gone, into } => {
                         assert!(
                             before.get(&gone).is_some_and(|f| f.0 == chunk) && !after.contains_key(&gone)
                         );
@@ -371,7 +371,7 @@ fn the_field_events_of_a_commit_are_the_difference_of_its_fields() {
                         );
                         gone
                     }
-                    FieldNews::Removed(id) => {
+                    FieldChange::Removed(id) => {
                         panic!("seed {seed}: {id:?} was removed, but nothing was undone")
                     }
                 };
@@ -387,7 +387,7 @@ fn the_field_events_of_a_commit_are_the_difference_of_its_fields() {
 
 #[test]
 fn a_chain_of_merges_reports_the_surviving_field() {
-    use bevy_burrow::terrain::FieldNews;
+    use bevy_burrow::terrain::FieldChange;
 
     let mut terrain = level(64, 1, 10);
     let pit = |x| ball(x, 10, 30, 2.0);
@@ -399,12 +399,12 @@ fn a_chain_of_merges_reports_the_surviving_field() {
     terrain.submit(trench(28.0, 48.0));
     terrain.submit(trench(8.0, 28.0));
     let commit = terrain.begin().expect("queued edits").run();
-    let news: Vec<FieldNews> = commit.field_news().iter().map(|&(_, news)| news).collect();
+    let news: Vec<FieldChange> = commit.field_news().iter().map(|&(_, news)| news).collect();
     terrain.commit(commit).expect("no other commit");
     let expected = [
-        FieldNews::Changed(a),
-        FieldNews::Merged { gone: b, into: a },
-        FieldNews::Merged { gone: c, into: a },
+        FieldChange::Changed(a),
+        FieldChange::Merged { gone: b, into: a },
+        FieldChange::Merged { gone: c, into: a },
     ];
     assert!(
         news.len() == 3 && expected.iter().all(|line| news.contains(line)),

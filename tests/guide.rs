@@ -228,8 +228,8 @@ fn the_documentation_online_has_every_feature_of_the_library() {
     let online =
         manifest.split("[package.metadata.docs.rs]").nth(1).and_then(|rest| rest.split("\n[").next());
     let online: BTreeSet<&str> = online.expect("a section").split('"').skip(1).step_by(2).collect();
-    // `render`, and `plugin` with it, are on by default; the last three are for examples only.
-    let others = ["default", "render", "plugin", "examples", "gamepad", "sound"];
+    // `render`, and `plugin` with it, are on by default; the last four are for examples and tests only.
+    let others = ["default", "render", "plugin", "examples", "gamepad", "sound", "tools"];
     let expected = &features(&manifest) - &BTreeSet::from(others);
     assert_eq!(online, expected);
 }

@@ -353,7 +353,7 @@ fn every_point_shows_what_a_dig_there_yields() {
     assert!(far < points.iter().sum::<u32>() / 2000, "{far} of {points:?}");
 }
 
-/// Vertices of all that is drawn of a plain with one hole of a column's width, so many voxels deep.
+/// Vertices of all that is drawn of a plain with one hole of a column's width and this depth in voxels.
 fn vertices_around_a_hole(depth: f64, strata: bool) -> usize {
     let height = |x: i32, z: i32| if (x, z) == (16, 16) { 2000.0 - depth } else { 2000.0 };
     let ground = Ground::from_fn(32, 32, height).expect("valid heights");

@@ -14,6 +14,11 @@ const MODULES: &[&str] = &[
     "together", "physics", "debug", "panel",
 ];
 
+/// The most names that the documentation shows in public modules, and functions of `Terrain`. What a game needs is shown; what
+/// only tools and tests need is `#[doc(hidden)]`, or behind the feature `tools`.
+const SHOWN_NAMES: usize = 230;
+const TERRAIN_FUNCTIONS: usize = 37;
+
 /// The text of a crate's files, by path below `src`.
 type Sources = BTreeMap<String, String>;
 
@@ -390,6 +395,106 @@ fn only_one_file_names_the_transport() {
         .expect("a file")
         .push_str("\nuse bevy_replicon::prelude::ClientId;\n");
     assert_eq!(files_that_name(&sources, "bevy_replicon").len(), 2);
+}
+
+/// A public item: the name that it introduces, the block that it is in, such as `impl Terrain`, and whether it is hidden from the
+/// documentation.
+struct PublicItem {
+    name: String,
+    block: String,
+    is_hidden: bool,
+}
+
+/// The public items of a file, at its top level and in its `impl` blocks.
+fn public_items(text: &str) -> Vec<PublicItem> {
+    let tokens = tokens(&without_tests(&without_comments(text)).0);
+    let (mut items, mut blocks, mut head, mut attributes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut at = 0;
+    while at < tokens.len() {
+        match tokens[at].as_str() {
+            "#" => {
+                let end = tokens[at..].iter().position(|token| token == "]").unwrap_or_default();
+                attributes.extend_from_slice(&tokens[at..at + end]);
+                at += end;
+            }
+            "{" => blocks.push(std::mem::take(&mut head).join(" ")),
+            "}" => drop(blocks.pop()),
+            ";" => head.clear(),
+            "pub" if tokens.get(at + 1).is_some_and(|next| next != "(") && blocks.len() < 2 => {
+                let mut names = Vec::new();
+                if tokens[at + 1] == "use" {
+                    at += 2;
+                    read_tree(&tokens, &mut at, &[], &mut names);
+                } else {
+                    let keywords =
+                        ["async", "const", "enum", "fn", "mod", "static", "struct", "trait", "type"];
+                    let name = tokens[at + 1..].iter().position(|token| !keywords.contains(&token.as_str()));
+                    let is_item = name.is_some_and(|name| name > 0);
+                    at += 1 + name.unwrap_or_default();
+                    names.extend(is_item.then(|| (Segments::new(), tokens[at].clone())));
+                }
+                let is_hidden = attributes.iter().any(|token| token == "hidden");
+                let block = blocks.last().cloned().unwrap_or_default();
+                items.extend(names.into_iter().map(|(_, name)| PublicItem {
+                    name,
+                    block: block.clone(),
+                    is_hidden,
+                }));
+                attributes.clear();
+            }
+            word => head.push(word.to_owned()),
+        }
+        if tokens.get(at).is_some_and(|token| matches!(token.as_str(), ";" | "{" | "}")) {
+            attributes.clear();
+            head.clear();
+        }
+        at += 1;
+    }
+    items
+}
+
+/// The names that the documentation of a crate shows in its public modules, as `module::name`.
+fn shown_names(sources: &Sources) -> Vec<String> {
+    let modules = public_items(&sources["lib.rs"]).into_iter().filter(|module| !module.is_hidden);
+    let root =
+        |name: &str| sources.get(&format!("{name}/mod.rs")).or_else(|| sources.get(&format!("{name}.rs")));
+    let names = |module: PublicItem| {
+        let items = root(&module.name).map(|text| public_items(text)).unwrap_or_default();
+        let shown = items.into_iter().filter(|item| !item.is_hidden && item.block.is_empty());
+        shown.map(|item| format!("{}::{}", module.name, item.name)).collect::<Vec<_>>()
+    };
+    modules.flat_map(names).collect()
+}
+
+/// The public functions of a type that the documentation shows.
+fn shown_functions(sources: &Sources, folder: &str, owner: &str) -> Vec<String> {
+    let files = sources.iter().filter(|(path, _)| path.starts_with(folder));
+    let items = files.flat_map(|(_, text)| public_items(text));
+    let block = format!("impl {owner}");
+    items.filter(|item| item.block == block && !item.is_hidden).map(|item| item.name).collect()
+}
+
+#[test]
+fn the_public_surface_does_not_grow_unnoticed() {
+    let sources = library();
+    let (names, functions) = (shown_names(&sources), shown_functions(&sources, "terrain/", "Terrain"));
+    println!("{} names: {}", names.len(), names.join(" "));
+    println!("{} functions: {}", functions.len(), functions.join(" "));
+    assert!(names.len() <= SHOWN_NAMES, "{} names are shown in public modules", names.len());
+    assert!(functions.len() <= TERRAIN_FUNCTIONS, "`Terrain` shows {} functions", functions.len());
+}
+
+#[test]
+fn public_items_are_counted_however_they_are_written() {
+    let lib = "pub mod a;\n#[doc(hidden)]\npub mod b;\nmod c;\npub(crate) mod d;";
+    let a = "pub use x::{A, y::{B, C as D}};\n#[doc(hidden)]\npub use x::E;\n#[cfg(test)]\npub use x::F;\n\
+             /// pub fn no() {}\npub const fn f() {}\npub struct S { pub field: u8 }\npub(crate) struct T;\n\
+             impl S {\n pub fn one(&self) { g() }\n #[doc(hidden)]\n #[must_use]\n pub fn two() {}\n fn three() {}\n\
+             #[must_use]\n pub const fn four() {} }\nimpl T { pub fn five() {} }";
+    let sources =
+        crate_of(&[("lib.rs", lib), ("a/mod.rs", a), ("b.rs", "pub struct G;"), ("c.rs", "pub struct H;")]);
+    assert_eq!(shown_names(&sources), ["a::A", "a::B", "a::D", "a::f", "a::S"]);
+    assert_eq!(shown_functions(&sources, "a/", "S"), ["one", "four"]);
 }
 
 /// Observers of a component's life that would miss it on a disabled entity: a query in their signature leaves those out.

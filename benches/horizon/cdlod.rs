@@ -8,7 +8,7 @@
 //! a level has anywhere. Nodes beyond the view are not drawn. Its morphing costs no triangles and is left out:
 //! with it, ranges would be larger.
 
-use bevy_burrow::lod::{Choice, Cut, LodGrid, Node};
+use bevy_burrow::lod::{Cut, LodGrid, LodSettings, Node};
 use bevy_burrow::terrain::{GroundFacts, World};
 use glam::{Vec2, Vec3, Vec3Swizzles};
 use rayon::prelude::*;
@@ -84,7 +84,7 @@ fn greatest_errors(world: &World, grid: LodGrid) -> Vec<f32> {
 
 /// How far level 0 is drawn: where level 1 begins, its error or its cells are within the limits, and so for the levels
 /// above, each at twice the distance.
-fn first_range(errors: &[f32], choice: &Choice, pixels: f32) -> f32 {
+fn first_range(errors: &[f32], choice: &LodSettings, pixels: f32) -> f32 {
     let by_error = errors.iter().zip(0..).skip(1).map(|(error, level)| {
         let distance = error * pixels / choice.error_pixels;
         distance / (1u64 << (level - 1)) as f32
@@ -104,7 +104,7 @@ fn is_in_view(cut: &Cut, node: Node, eye: Vec3, view: f32) -> bool {
 pub fn compare(world: &World, summit: Vec3) {
     let grid = world.lod_grid(u8::MAX);
     let errors = greatest_errors(world, grid);
-    let first = first_range(&errors, &Choice::default(), super::PIXELS);
+    let first = first_range(&errors, &LodSettings::default(), super::PIXELS);
     println!("\nCDLOD: greatest errors by level {errors:.1?} voxels, so level 0 reaches {first:.0} voxels");
     println!(
         "\n| view, km | meshes | triangles, millions | CDLOD: grids drawn | triangles, millions | ratio |"
@@ -112,7 +112,7 @@ pub fn compare(world: &World, summit: Vec3) {
     println!("| --- | --- | --- | --- | --- | --- |");
     let mut heights = FxHashMap::default();
     for view in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0].map(|km: f32| km * 1000.0) {
-        let choice = Choice { view_distance: view, ..Choice::default() };
+        let choice = LodSettings { view_distance: view, ..LodSettings::default() };
         let cut = super::cut_for(world, &choice, super::eye(summit));
         let nodes: Vec<Node> = cut.nodes().filter(|&node| is_in_view(&cut, node, summit, view)).collect();
         let own: usize = nodes.par_iter().map(|&node| world.node_mesh(&cut, node).indices.len() / 3).sum();

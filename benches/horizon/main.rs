@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bevy_burrow::ground::{GreyImage, Ground, ImageScale, ImageSource, NoiseSource};
-use bevy_burrow::lod::{Choice, Cut, Eye, Node, View};
+use bevy_burrow::lod::{Cut, LodSettings, Node, View, Viewpoint};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{ChooseCut, GroundFacts, KnownNodes, NodeUpdate, World};
 use glam::{Vec2, Vec3, Vec3Swizzles};
@@ -31,7 +31,7 @@ const PIXELS: f32 = 1738.0;
 const VERTEX: usize = 32;
 
 /// The cut that an eye needs, level by level from the coarsest, as the plugin reaches it.
-fn cut_for(world: &World, choice: &Choice, eye: Eye) -> Cut {
+fn cut_for(world: &World, choice: &LodSettings, eye: Viewpoint) -> Cut {
     let (known, mut cut) = (KnownNodes::default(), Cut::coarsest(world.lod_grid(u8::MAX)));
     loop {
         let next = known.next_cut(world, &cut, choice, &[eye], usize::MAX);
@@ -73,7 +73,7 @@ fn digs(mut terrains: [Terrain; 2], summit: Vec3) {
     let mut times = [Vec::new(), Vec::new()];
     for (round, number) in (0..3).flat_map(|round| (0..600).map(move |number| (round, number))) {
         if round == 1 && number == 0 {
-            let cut = cut_for(terrains[0].world(), &Choice::default(), eye(summit));
+            let cut = cut_for(terrains[0].world(), &LodSettings::default(), eye(summit));
             let (drawn, _) = terrains[0].world().draw_cut(cut);
             terrains[0].set_drawn_cut(Some(Arc::new(drawn)));
         }
@@ -117,8 +117,8 @@ fn summit(world: &World, middle: f32) -> Vec3 {
     places.max_by(|a, b| a.y.total_cmp(&b.y)).unwrap_or_default()
 }
 
-fn eye(position: Vec3) -> Eye {
-    Eye { position, velocity: Vec3::ZERO, pixels: PIXELS, view: View::Perspective }
+fn eye(position: Vec3) -> Viewpoint {
+    Viewpoint { position, velocity: Vec3::ZERO, pixels: PIXELS, view: View::Perspective }
 }
 
 /// Directions in which an eye looks.
@@ -147,7 +147,7 @@ fn views(world: &World, summit: Vec3) {
     );
     println!("| --- | --- | --- | --- | --- | --- |");
     for view in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0] {
-        let choice = Choice { view_distance: view * 1000.0, ..Choice::default() };
+        let choice = LodSettings { view_distance: view * 1000.0, ..LodSettings::default() };
         let cut = cut_for(world, &choice, eye(summit));
         let nodes: Vec<Node> = cut.nodes().collect();
         let triangles = |&node: &Node| (node, world.node_mesh(&cut, node).indices.len() / 3);
@@ -184,7 +184,7 @@ fn load(terrain: Terrain, summit: Vec3) {
     let start = Instant::now();
     let (_, first) = world.draw_cut(Cut::coarsest(world.lod_grid(u8::MAX)));
     let first_took = start.elapsed();
-    let cut = cut_for(world, &Choice::default(), eye(summit));
+    let cut = cut_for(world, &LodSettings::default(), eye(summit));
     let chosen = start.elapsed();
     let (drawn, all) = world.draw_cut(cut);
     let took = start.elapsed();
@@ -252,7 +252,7 @@ fn nodes(world: &World, summit: Vec3) {
 fn flight(mut terrain: Terrain, summit: Vec3) {
     const FRAMES: usize = 3600;
     let known = Arc::new(KnownNodes::default());
-    let (drawn, _) = terrain.world().draw_cut(cut_for(terrain.world(), &Choice::default(), eye(summit)));
+    let (drawn, _) = terrain.world().draw_cut(cut_for(terrain.world(), &LodSettings::default(), eye(summit)));
     terrain.set_drawn_cut(Some(Arc::new(drawn)));
     let (mut made, mut digs, mut cuts, mut most_nodes) = (0, Vec::new(), Vec::new(), 0);
     let begin = Instant::now();
@@ -273,9 +273,9 @@ fn flight(mut terrain: Terrain, summit: Vec3) {
             continue;
         }
         let known = Arc::clone(&known);
-        let eyes = [Eye { position: at, velocity, pixels: PIXELS, view: View::Perspective }];
+        let eyes = [Viewpoint { position: at, velocity, pixels: PIXELS, view: View::Perspective }];
         let choose: Arc<ChooseCut> =
-            Arc::new(move |world, cut| known.next_cut(world, cut, &Choice::default(), &eyes, 16));
+            Arc::new(move |world, cut| known.next_cut(world, cut, &LodSettings::default(), &eyes, 16));
         let start = Instant::now();
         let commit = terrain.begin_cut(choose).expect("a cut is drawn").run();
         cuts.push(start.elapsed());

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use bevy_burrow::lod::{Choice, Cut, Eye, Node, NodeFacts, View};
+use bevy_burrow::lod::{Cut, LodSettings, Node, NodeFacts, View, Viewpoint};
 use bevy_burrow::surface::{SeamChecker, SeamReport, SurfaceMesh};
 use bevy_burrow::terrain::World;
 use glam::Vec3;
@@ -40,7 +40,7 @@ impl Levels {
         let cut = match (&args.eye[..], args.random_cut) {
             (&[x, y, z], _) => {
                 let pixels = args.screen_height as f32 / (2.0 * (ANGLE / 2.0).to_radians().tan());
-                let eye = Eye {
+                let eye = Viewpoint {
                     position: Vec3::new(x, y, z),
                     velocity: Vec3::ZERO,
                     pixels,
@@ -50,7 +50,7 @@ impl Levels {
                 let known: RefCell<HashMap<Node, NodeFacts>> = RefCell::default();
                 let facts =
                     |node| *known.borrow_mut().entry(node).or_insert_with(|| world.node_facts(grid, node));
-                Choice::default().cut(&Cut::coarsest(grid), &[eye], facts)
+                LodSettings::default().cut(&Cut::coarsest(grid), &[eye], facts)
             }
             (_, Some(seed)) => Cut::random(grid, seed, SPLIT),
             _ => return None,

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::ClientEvent;
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundEdited, GroundJoined, SharedTerrain, TogetherPlugin, WhatBecame};
+use bevy_burrow::together::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain, TogetherPlugin};
 use bevy_replicon::prelude::*;
 use bevy_replicon_renet::RepliconRenetPlugins;
 use fastrand::Rng;
@@ -153,9 +153,9 @@ fn watch(
 ) {
     for message in edited.read() {
         match message.outcome {
-            WhatBecame::Predicted(_) => seen.predicted += 1,
-            WhatBecame::Confirmed(_) => seen.confirmed += 1,
-            WhatBecame::Refused(_) => seen.refused += 1,
+            EditOutcome::Predicted(_) => seen.predicted += 1,
+            EditOutcome::Confirmed(_) => seen.confirmed += 1,
+            EditOutcome::Refused(_) => seen.refused += 1,
         }
     }
     seen.repaired +=

@@ -22,6 +22,7 @@ mod engine;
 mod settings;
 mod state;
 
+#[doc(hidden)]
 pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::Cpu;
 pub use engine::{Engine, EngineFigures};

@@ -345,7 +345,7 @@ proptest! {
         }
         let _ = Edit::quantize(&brush.transformed(Quat::from_xyzw(0.6, 0.0, 0.0, 0.8), Vec3::ONE, 0.5));
         // A round trip through JSON gives an equal brush, or an equally invalid one.
-        let read = Brush::try_from(line::Line::from(brush.clone())).unwrap();
+        let read = Brush::try_from(json::Line::from(brush.clone())).unwrap();
         match (Edit::quantize(&read), Edit::quantize(&brush)) {
             (Ok(read), Ok(edit)) => prop_assert_eq!(read, edit),
             (read, edit) => prop_assert_eq!(format!("{read:?}"), format!("{edit:?}")),

@@ -91,9 +91,9 @@ mod blend;
 mod edit;
 mod error;
 mod evaluator;
+mod json;
 #[cfg(test)]
 mod laws;
-mod line;
 mod operation;
 mod quantize;
 mod quantized_operation;
@@ -102,6 +102,7 @@ mod reach;
 mod request;
 mod roughness;
 mod sculpt_kernel;
+#[doc(hidden)]
 pub mod shapes;
 mod stamp;
 mod voxel_count;
@@ -109,6 +110,7 @@ mod voxel_count;
 pub use blend::Blend;
 pub use edit::Edit;
 pub use error::BrushError;
+#[doc(hidden)]
 pub use evaluator::Evaluator;
 pub(crate) use operation::Kind;
 pub use operation::Operation;
@@ -128,10 +130,12 @@ use crate::lattice::ONE;
 pub const FULL_POWER: u8 = u8::MAX;
 
 /// Distance outside its shape within which an edit changes samples, in 1/256 voxel (rule 6).
+#[doc(hidden)]
 pub const BAND: i32 = 2 * ONE;
 
 /// Depth inside its shape down to which an edit distinguishes distances, in 1/256 voxel. Surface and normals
 /// need two voxels; the rest is for rough shapes, whose distances change faster than the point moves.
+#[doc(hidden)]
 pub const DEPTH: i32 = 4 * ONE;
 
 /// Returns `true` if the value is the default, which is left out when writing.

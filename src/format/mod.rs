@@ -33,14 +33,18 @@ pub(crate) mod predict;
 pub(crate) mod region;
 pub(crate) mod residuals;
 
+#[doc(hidden)]
 pub use batch::Batch;
 pub use error::FormatError;
 pub use ids::WorldId;
-pub use level::{Level, LevelFiles, pack_level, read_level, unpack_level, write_level};
+#[doc(hidden)]
+pub use level::LevelFiles;
+pub use level::{Level, pack_level, read_level, unpack_level, write_level};
 pub use metadata::Metadata;
-pub use portable::{
-    PortableHead, PortableWorld, SavedRegion, read_portable, read_portable_head, write_portable,
-};
+#[doc(hidden)]
+pub use portable::{PortableHead, SavedRegion, read_portable_head};
+#[doc(hidden)]
+pub use portable::{PortableWorld, read_portable, write_portable};
 #[cfg(any(feature = "net", feature = "store", test))]
 pub(crate) use region::{decode_region, encode_region};
 

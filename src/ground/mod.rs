@@ -24,7 +24,7 @@ mod error;
 mod extent;
 mod grey_image;
 mod image_heights;
-mod import;
+pub mod import;
 mod material;
 mod noise_heights;
 mod noise_params;
@@ -35,9 +35,9 @@ mod pages;
 mod png;
 mod region_hash;
 mod rules;
-mod source;
+pub mod source;
 mod sources;
-mod strata;
+pub mod strata;
 mod world;
 
 #[doc(no_inline)]
@@ -46,25 +46,34 @@ pub use ::noise;
 pub use control::MaterialControl;
 pub use error::{GroundError, ImageError};
 pub use grey_image::{GreyImage, ImageLimits, RawFormat};
-pub use image_heights::{Detail, ImageScale, MAX_VOXELS_PER_SAMPLE};
+#[doc(hidden)]
+pub use image_heights::MAX_VOXELS_PER_SAMPLE;
+pub use image_heights::{Detail, ImageScale};
+#[doc(hidden)]
 pub use import::{
     ElevationGrid, ElevationScale, ElevationTile, HeightFormat, HeightScale, ImportError, ImportNote,
     ImportOptions, ImportReport, RawLayout, Repair, SampleKind, TileEdges, tile_place,
 };
-pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
-pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
+#[doc(hidden)]
+pub use material::OVERLAY_DEPTH;
+pub use material::{ColumnMaterial, MaterialId};
+#[doc(hidden)]
+pub use noise_heights::{MAX_OCTAVES, MAX_SCALE};
+pub use noise_heights::{NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]
 pub(crate) use noise_params::{NoiseFactors, NoiseParams};
 pub(crate) use page::GroundPage;
 pub use rules::MaterialRule;
+#[doc(hidden)]
 pub use source::{ColumnGrid, FunctionSource, HeightSource, ImageSource, InsetSource, NoiseSource};
 #[cfg(all(test, feature = "cuda"))]
 pub(crate) use strata::{BED, FILL, POCKET, VEIN};
-pub use strata::{
-    Bedding, Interval, MAX_COLUMN_CONDITIONS, MAX_STRATA, Strata, Stratum, StratumBody, StratumBounds,
-};
+#[doc(hidden)]
+pub use strata::{Bedding, Interval, Strata, Stratum, StratumBody, StratumBounds};
 #[cfg(feature = "cuda")]
 pub(crate) use strata::{BeddingRecord, StratumRecord};
+#[doc(hidden)]
+pub use strata::{MAX_COLUMN_CONDITIONS, MAX_STRATA};
 pub use world::Ground;
 pub(crate) use world::RowBuffer;
 

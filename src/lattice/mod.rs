@@ -33,15 +33,19 @@ use glam::IVec3;
 pub const ONE: i32 = 256;
 
 /// Fixed-point units per voxel of drawn positions: vertices lie on multiples of 1/4096 voxel (rule 4).
+#[doc(hidden)]
 pub const SNAP: i32 = 4096;
 
 /// Heights, and other vertical lattice coordinates, stay within this many voxels of the origin.
+#[doc(hidden)]
 pub const LIMIT: i32 = 1 << 15;
 
 /// Horizontal lattice coordinates stay within this many voxels of the origin.
+#[doc(hidden)]
 pub const REACH: i32 = 1 << 18;
 
 /// Samples along one side of a brick.
+#[doc(hidden)]
 pub const BRICK: i32 = 8;
 
 /// The lowest lattice y that is not below a height in 1/256 voxel.

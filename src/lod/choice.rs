@@ -21,7 +21,7 @@ const MOST_GROWTHS: u32 = 60;
 
 /// A viewpoint that the level of detail is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Eye {
+pub struct Viewpoint {
     /// Where, in voxels.
     pub position: Vec3,
     /// Voxels a second.
@@ -49,7 +49,7 @@ pub enum View {
     },
 }
 
-impl Eye {
+impl Viewpoint {
     /// The distance of a box from the eye, or, in a parallel view, from its axis.
     pub fn distance(&self, low: Vec3, high: Vec3) -> f32 {
         self.distance_from(self.position, low, high)
@@ -112,7 +112,7 @@ pub struct NodeFacts {
 /// A node is split if its cells are larger than `cell_pixels` and its error larger than `error_pixels`; or if it has
 /// edits and its cells are larger than `edited_pixels`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
+pub struct LodSettings {
     /// The least size of cells, 12 unless set otherwise.
     pub cell_pixels: f32,
     /// The greatest error, 2 unless set otherwise.
@@ -121,7 +121,7 @@ pub struct Choice {
     pub edited_pixels: f32,
     /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing
     /// changes back and forth while an eye moves to and fro.
-    pub stay: f32,
+    pub hysteresis: f32,
     /// The choice also considers where each eye will be in this many seconds; 0.5 by default.
     pub look_ahead: f32,
     /// Nodes farther from all eyes than this many voxels are not split; 8,192 by default.
@@ -130,13 +130,13 @@ pub struct Choice {
     pub most_nodes: usize,
 }
 
-impl Default for Choice {
+impl Default for LodSettings {
     fn default() -> Self {
         Self {
             cell_pixels: 12.0,
             error_pixels: 2.0,
             edited_pixels: 4.0,
-            stay: 0.7,
+            hysteresis: 0.7,
             look_ahead: 0.5,
             view_distance: 8192.0,
             most_nodes: 2400,
@@ -144,15 +144,15 @@ impl Default for Choice {
     }
 }
 
-impl Choice {
+impl LodSettings {
     /// The cut that these eyes need, all together, wherever they look: turning changes nothing. `before` is the one
     /// that they had. Eyes whose numbers are not finite see nothing.
-    pub fn cut(&self, before: &Cut, eyes: &[Eye], facts: impl Fn(Node) -> NodeFacts) -> Cut {
+    pub fn cut(&self, before: &Cut, eyes: &[Viewpoint], facts: impl Fn(Node) -> NodeFacts) -> Cut {
         let grid = before.grid();
-        let eyes: Vec<Eye> = eyes.iter().filter(|eye| eye.is_finite()).copied().collect();
+        let eyes: Vec<Viewpoint> = eyes.iter().filter(|eye| eye.is_finite()).copied().collect();
         let with_limits = |growth: f32| {
             Cut::new(grid, |node| {
-                let share = if before.is_split(node) { self.stay.clamp(LEAST_STAY, 1.0) } else { 1.0 };
+                let share = if before.is_split(node) { self.hysteresis.clamp(LEAST_STAY, 1.0) } else { 1.0 };
                 self.is_split(grid, node, facts(node), &eyes, [share, growth])
             })
         };
@@ -173,7 +173,7 @@ impl Choice {
         grid: LodGrid,
         node: Node,
         facts: NodeFacts,
-        eyes: &[Eye],
+        eyes: &[Viewpoint],
         [share, growth]: [f32; 2],
     ) -> bool {
         let limit = |pixels: f32| pixels.max(LEAST_PIXELS) * share * growth;
@@ -213,9 +213,9 @@ mod tests {
         NodeFacts { heights: [0.0, 300.0], error: rough * node.stride() as f32, has_edits: false }
     }
 
-    fn eye(x: f32, z: f32) -> Eye {
+    fn eye(x: f32, z: f32) -> Viewpoint {
         let (position, velocity) = (Vec3::new(x, 302.0, z), Vec3::ZERO);
-        Eye { position, velocity, pixels: PIXELS, view: View::Perspective }
+        Viewpoint { position, velocity, pixels: PIXELS, view: View::Perspective }
     }
 
     fn world() -> LodGrid {
@@ -226,7 +226,7 @@ mod tests {
     fn nodes_grow_little_with_the_view() {
         let coarsest = Cut::coarsest(world());
         let counts = [512.0, 1024.0, 2048.0, 4096.0, 8192.0, 16_384.0].map(|view_distance| {
-            let choice = Choice { view_distance, ..Choice::default() };
+            let choice = LodSettings { view_distance, ..LodSettings::default() };
             let cut = choice.cut(&coarsest, &[eye(8000.0, 8100.0)], mountains);
             cut.nodes().count()
         });
@@ -239,7 +239,7 @@ mod tests {
     fn limits_grow_until_there_are_few_enough_nodes() {
         let rough = |node| NodeFacts { error: 1e6, ..mountains(node) };
         for most_nodes in [400, 1200] {
-            let choice = Choice { most_nodes, cell_pixels: 1.0, ..Choice::default() };
+            let choice = LodSettings { most_nodes, cell_pixels: 1.0, ..LodSettings::default() };
             let eyes = [eye(4000.0, 4000.0), eye(12_000.0, 9000.0)];
             let cut = choice.cut(&Cut::coarsest(world()), &eyes, rough);
             let count = cut.nodes().count();
@@ -249,22 +249,22 @@ mod tests {
 
     #[test]
     fn the_ground_below_an_eye_is_drawn_in_full() {
-        let cut = Choice::default().cut(&Cut::coarsest(world()), &[eye(5000.0, 9000.0)], mountains);
+        let cut = LodSettings::default().cut(&Cut::coarsest(world()), &[eye(5000.0, 9000.0)], mountains);
         assert_is_cut(&cut);
         let tile = world().chunks().tile_of_cell(crate::lattice::Column::new(5000, 9000));
         assert_eq!(cut.node_at(tile).map(|node| node.level), Some(0));
     }
 
     /// A parallel view straight down, of a picture of this many voxels' height and 1,080 pixels.
-    fn view_from_above(x: f32, z: f32, height: f32) -> Eye {
+    fn view_from_above(x: f32, z: f32, height: f32) -> Viewpoint {
         let view = View::Parallel { axis: Vec3::NEG_Y * 2000.0, radius: height };
         let position = Vec3::new(x, 1500.0, z);
-        Eye { position, velocity: Vec3::ZERO, pixels: 1080.0 / height, view }
+        Viewpoint { position, velocity: Vec3::ZERO, pixels: 1080.0 / height, view }
     }
 
     #[test]
     fn a_parallel_view_is_as_fine_as_its_picture_needs_and_coarse_elsewhere() {
-        let choice = Choice { cell_pixels: 12.0, error_pixels: 0.01, ..Choice::default() };
+        let choice = LodSettings { cell_pixels: 12.0, error_pixels: 0.01, ..LodSettings::default() };
         let mut before = None;
         for height in [40.0, 400.0, 4000.0] {
             let cut =
@@ -294,7 +294,7 @@ mod tests {
             let (position, axis, low) = (place(100.0), place(200.0), place(100.0));
             let high = low + place(30.0).abs();
             let view = View::Parallel { axis, radius: 1.0 };
-            let eye = Eye { position, velocity: Vec3::ZERO, pixels: 1.0, view };
+            let eye = Viewpoint { position, velocity: Vec3::ZERO, pixels: 1.0, view };
             let along = (0..=4000).map(|step| position + axis * (step as f32 / 4000.0));
             let expected = along.map(|at| at.distance(at.clamp(low, high))).fold(f32::INFINITY, f32::min);
             assert!((eye.distance(low, high) - expected).abs() < 0.2, "{eye:?} {low} {high}");
@@ -304,7 +304,7 @@ mod tests {
     proptest! {
         #[test]
         fn an_eye_that_moves_to_and_fro_soon_changes_nothing(x in 200f32..16_000.0, z in 200f32..16_000.0, step in -8f32..8.0) {
-            let choice = Choice { most_nodes: usize::MAX, ..Choice::default() };
+            let choice = LodSettings { most_nodes: usize::MAX, ..LodSettings::default() };
             let mut cut = choice.cut(&Cut::coarsest(world()), &[eye(x, z)], mountains);
             let mut changes = 0;
             for at in [x + step, x].repeat(4) {
@@ -318,9 +318,9 @@ mod tests {
 
         #[test]
         fn several_eyes_see_what_each_would(places in prop::collection::vec((200f32..16_000.0, 200f32..16_000.0), 1..4)) {
-            let choice = Choice { most_nodes: usize::MAX, ..Choice::default() };
+            let choice = LodSettings { most_nodes: usize::MAX, ..LodSettings::default() };
             let coarsest = Cut::coarsest(world());
-            let eyes: Vec<Eye> = places.iter().map(|&(x, z)| eye(x, z)).collect();
+            let eyes: Vec<Viewpoint> = places.iter().map(|&(x, z)| eye(x, z)).collect();
             let all = choice.cut(&coarsest, &eyes, mountains);
             for own in eyes {
                 let cut = choice.cut(&coarsest, &[own], mountains);
@@ -333,10 +333,20 @@ mod tests {
     fn limits_that_make_no_sense_give_a_cut_of_few_nodes() {
         for odd in [f32::NAN, f32::NEG_INFINITY, -5.0, 0.0, f32::INFINITY] {
             for choice in [
-                Choice { cell_pixels: odd, error_pixels: odd, edited_pixels: odd, ..Choice::default() },
-                Choice { view_distance: odd, look_ahead: odd, stay: odd, ..Choice::default() },
+                LodSettings {
+                    cell_pixels: odd,
+                    error_pixels: odd,
+                    edited_pixels: odd,
+                    ..LodSettings::default()
+                },
+                LodSettings {
+                    view_distance: odd,
+                    look_ahead: odd,
+                    hysteresis: odd,
+                    ..LodSettings::default()
+                },
             ] {
-                for eye in [eye(8000.0, 8000.0), eye(odd, 0.0), Eye { pixels: odd, ..eye(9.0, 9.0) }] {
+                for eye in [eye(8000.0, 8000.0), eye(odd, 0.0), Viewpoint { pixels: odd, ..eye(9.0, 9.0) }] {
                     let cut = choice.cut(&Cut::coarsest(world()), &[eye], mountains);
                     let count = cut.nodes().count();
                     assert!(count <= choice.most_nodes, "{count} nodes for {choice:?}, {eye:?}");
@@ -350,7 +360,7 @@ mod tests {
         let flat = |has_edits| move |_| NodeFacts { has_edits, ..NodeFacts::default() };
         let coarsest = Cut::coarsest(world());
         let count = |has_edits| {
-            Choice::default().cut(&coarsest, &[eye(8000.0, 8000.0)], flat(has_edits)).nodes().count()
+            LodSettings::default().cut(&coarsest, &[eye(8000.0, 8000.0)], flat(has_edits)).nodes().count()
         };
         assert_eq!(count(false), coarsest.nodes().count());
         assert!(count(true) > count(false));

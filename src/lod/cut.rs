@@ -34,7 +34,8 @@ impl Cut {
         cut
     }
 
-    /// A cut for tests and experiments, in which each node is split with a chance of `percent`; equal for equal seeds.
+    /// A cut in which each node is split with a chance of `percent`; equal for equal seeds.
+    #[cfg(any(test, feature = "tools"))]
     pub fn random(grid: LodGrid, seed: u64, percent: u64) -> Self {
         Self::new(grid, |node| (hash_node(node, seed) >> 7) % 100 < percent)
     }
@@ -139,6 +140,7 @@ impl Cut {
 }
 
 /// A pseudo-random hash of a node and a seed.
+#[cfg(any(test, feature = "tools"))]
 pub(super) fn hash_node(node: Node, seed: u64) -> u64 {
     let words = [node.level.into(), node.x, node.z].map(|word: i32| u64::from(word.cast_unsigned()));
     let add = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);

@@ -542,7 +542,7 @@ fn read_entry(
             };
             Entry::Order { by, order: Order::parts(read_change(reader, ground)?, None) }
         }
-        MARK => Entry::Mark,
+        MARK => Entry::HashCheck,
         head => {
             let from = |reader: &mut Reader| Ok((ClientId(reader.number()?), reader.number()?));
             let ReadEdit { before: (author, own), edit, missing } =
@@ -689,7 +689,7 @@ mod tests {
 
     /// A message of `count` marks.
     fn marks(count: usize) -> Vec<u8> {
-        ToClient::Entries(Entries { first: 1, entries: vec![Entry::Mark; count] }).to_bytes()
+        ToClient::Entries(Entries { first: 1, entries: vec![Entry::HashCheck; count] }).to_bytes()
     }
 
     fn read(bytes: &[u8]) -> Result<ToClient, FormatError> {

@@ -87,7 +87,7 @@ pub enum Entry {
         order: Order,
     },
     /// Changes nothing. The hashes of regions that were touched since the previous mark are compared here.
-    Mark,
+    HashCheck,
 }
 
 impl Entry {
@@ -406,10 +406,10 @@ pub enum Kick {
     /// The game removed it.
     #[error("kicked")]
     ByGame,
-    /// The same player has connected again, and plays over that connection.
+    /// The player has connected again, and plays over the new connection.
     #[error("the player has connected again")]
     ConnectedAgain,
-    /// The game [does not admit](super::Server::set_admission) the player. The number is the game's own, say of a text that it shows.
+    /// The game [does not admit](super::Server::set_admission) the player. The number has a meaning for the game only, for example which text it shows.
     #[error("refused by the game, reason {0}")]
     Refused(u32),
 }

@@ -59,23 +59,29 @@ mod bucket;
 mod bulk;
 mod client;
 mod encoding;
+#[doc(hidden)]
 pub mod message;
 mod price;
 mod regions;
 mod replica;
-mod server;
+pub mod server;
 mod stamps;
 
 use crate::terrain::{Meshing, Terrain, WorkLimits};
 pub use bucket::Rate;
+#[doc(hidden)]
 pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
+pub use message::{ClientId, Kick, Lane, MOST_TO_SERVER, PROTOCOL, Refusal};
+#[doc(hidden)]
 pub use message::{
-    ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, MOST_OWN_JUMP, MOST_TO_SERVER, PROTOCOL,
-    Refusal, RegionContent, RegionHashes, Terms, ToClient, ToServer, Welcome,
+    Entries, Entry, Epoch, Hello, Join, MOST_OWN_JUMP, RegionContent, RegionHashes, Terms, ToClient,
+    ToServer, Welcome,
 };
+#[doc(hidden)]
 pub use regions::{region_hash, touched_regions};
 pub use replica::ShownChange;
+#[doc(hidden)]
 pub use server::{
     Admission, Outgoing, Permission, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
     UnknownStamp,

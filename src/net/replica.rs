@@ -165,7 +165,7 @@ impl Replica {
         self.pending.iter().map(|pending| (pending.own, &pending.edit))
     }
 
-    /// Numbers the own edits beyond `seen` anew, from the one after `last` on; returns the next number. `last` is not less than `seen`.
+    /// Renumbers the own edits beyond `seen`, from the one after `last` on; returns the next number. `last` is not less than `seen`.
     pub fn renumber(&mut self, seen: u64, last: u64) -> u64 {
         let mut next = last + 1;
         for pending in self.pending.iter_mut().filter(|pending| pending.own > seen) {
@@ -457,7 +457,7 @@ impl Replica {
         (!is_empty).then_some(ShownChange { change, hash })
     }
 
-    /// What is to be put into a world, whatever it holds, so that it is what is to be shown.
+    /// The change that makes any world equal to the one to be shown.
     pub fn whole(&self, shown: &World) -> ShownChange {
         let world = self.confirmed.world();
         let places = Places::of(world).and(self.predicted.places()).and(Places::of(shown));

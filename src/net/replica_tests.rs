@@ -72,7 +72,7 @@ fn turn(rng: &mut Rng, reference: &Terrain) -> Entry {
             let loose = LooseSettings { largest: 2000, crumbs: rng.u32(0..40), debris: rng.u32(0..400) };
             Entry::of_server(Order::Loose(rng.bool().then_some(loose)))
         }
-        2 => Entry::Mark,
+        2 => Entry::HashCheck,
         _ => {
             let world = reference.world();
             let mut bricks: Vec<BrickPos> = world.bricks().map(|(pos, _)| pos).collect();
@@ -151,7 +151,7 @@ impl Play {
         let mut pending: VecDeque<u64> = self.replica.pending().map(|(own, _)| own).collect();
         let is_echo = |entry: &Entry| match own_number(entry) {
             Some(own) => pending.pop_front() == Some(own),
-            None => matches!(entry, Entry::Mark),
+            None => matches!(entry, Entry::HashCheck),
         };
         let is_quiet = batch.iter().all(is_echo);
         let applied = self.replica.apply(batch, own_number);

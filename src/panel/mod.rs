@@ -38,12 +38,13 @@ mod survey;
 mod terrain_controls;
 mod texts;
 mod theme;
-mod tool;
+pub mod tool;
 mod tool_operation;
 mod widgets;
 mod world_column;
 
 pub use state::{BurrowPanel, PanelAction, PanelInput, PanelPlaces, keyboard_is_free, pointer_is_free};
+#[doc(hidden)]
 pub use tool::{BrushTool, StampImage, ToolAlign, ToolShape};
 pub use tool_operation::ToolOperation;
 

@@ -48,13 +48,13 @@
 //! Bodies are ordinary avian bodies, and ground is `RigidBody::Static`. [`GroundContact`] sets its `Friction`,
 //! `Restitution` and `CollisionLayers`, and [`TerrainContact`] those of one terrain.
 
-mod character;
+pub mod character;
 mod character_plugin;
 mod collider_source;
 mod colliders;
 mod columns;
 mod cone;
-mod debris;
+pub mod debris;
 mod edge_walls;
 mod frame;
 mod ground;
@@ -70,14 +70,18 @@ mod wake;
 mod walking;
 mod welded;
 
+#[doc(hidden)]
 pub use character::{Character, CharacterMotion, CharacterSteering};
 pub use character_plugin::{CharacterPlugin, CharacterSystems};
 pub use collider_source::ColliderSource;
+#[doc(hidden)]
 pub use debris::{Debris, DebrisCrumbled, DebrisOf, DebrisPlugin, DebrisSettings, TerrainDebris};
 pub use edge_walls::EdgeWalls;
 pub use ground::{GroundBody, GroundCollider, GroundContact, TerrainContact, TerrainPhysicsDisabled};
 pub use hold::HeldByGround;
+#[doc(hidden)]
 pub use hull::debris_collider;
+#[doc(hidden)]
 pub use shape::GroundShape;
 
 use std::time::Duration;

@@ -24,7 +24,7 @@ use super::{
     LoosePieceFound, MaterialColors, SlimVertices,
 };
 use crate::lattice::ChunkPos;
-use crate::terrain::{Asked, Drawn, FieldNews, Receipt, Rejection, Terrain, World as TerrainWorld};
+use crate::terrain::{Asked, Drawn, FieldChange, Receipt, Rejection, Terrain, World as TerrainWorld};
 use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
@@ -331,7 +331,7 @@ impl Display<'_, '_> {
         (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
         surfaces: Vec<BuiltSurface>,
-        fields: &[(ChunkPos, FieldNews)],
+        fields: &[(ChunkPos, FieldChange)],
         is_step: bool,
     ) {
         let with_fields = fields.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::lattice::{ChunkPos, TilePos};
 use crate::lod::Node;
-use crate::terrain::{Drawn, FieldNews, Terrain, Version, World};
+use crate::terrain::{Drawn, FieldChange, Terrain, Version, World};
 use crate::volume::{self, FieldId};
 
 /// The entities below a terrain, and the world that they show. A terrain has this component once it has loaded.
@@ -194,17 +194,17 @@ impl TerrainEntities {
         &mut self,
         commands: &mut Commands,
         world: &World,
-        news: &[(ChunkPos, FieldNews)],
+        news: &[(ChunkPos, FieldChange)],
     ) {
         for &(chunk, news) in news {
             let field = |id| world.fields_of(chunk).and_then(|fields| fields.get(id));
             match news {
-                FieldNews::Created(id) => {
+                FieldChange::Created(id) => {
                     if let Some(field) = field(id) {
                         self.spawn_field(commands, chunk, field);
                     }
                 }
-                FieldNews::Changed(id) => {
+                FieldChange::Changed(id) => {
                     let Some(field) = field(id) else { continue };
                     match self.living_field(commands, id) {
                         Some(child) => {
@@ -214,12 +214,12 @@ impl TerrainEntities {
                         None => self.spawn_field(commands, chunk, field),
                     }
                 }
-                FieldNews::Removed(id) => {
+                FieldChange::Removed(id) => {
                     let child = self.living_field(commands, id);
                     self.fields.remove(&id);
                     child.into_iter().for_each(|child| commands.entity(child).try_despawn());
                 }
-                FieldNews::Merged { gone, into } => {
+                FieldChange::Merged { gone, into } => {
                     let child = self.living_field(commands, gone);
                     let into = self.living_field(commands, into);
                     self.fields.remove(&gone);

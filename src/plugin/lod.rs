@@ -19,7 +19,7 @@ use super::places::Places;
 use super::processor::BuildSettings;
 use super::task::{InFlight, TaskCounter};
 use super::{BurrowEngine, BurrowFigures, Held, MaterialColors, SlimVertices};
-use crate::lod::{Eye, View};
+use crate::lod::{View, Viewpoint};
 use crate::terrain::{ChooseCut, Terrain};
 
 /// Faster cameras were teleported, and will not continue like this: metres a second.
@@ -99,17 +99,17 @@ impl Lens {
     }
 
     /// Where an eye with this lens is, in the voxels of a terrain; `metres` are those of a voxel.
-    fn eye(self, terrain_from_view: &Affine3A, metres: f32) -> Eye {
+    fn eye(self, terrain_from_view: &Affine3A, metres: f32) -> Viewpoint {
         let velocity = Vec3::ZERO;
         match self {
             Self::Perspective { pixels } => {
                 let position = terrain_from_view.translation.into();
-                Eye { position, velocity, pixels, view: View::Perspective }
+                Viewpoint { position, velocity, pixels, view: View::Perspective }
             }
             Self::Parallel { pixels, near, far, radius } => {
                 let [near, far] = [near, far].map(|place| terrain_from_view.transform_point3(place));
                 let view = View::Parallel { axis: far - near, radius: radius / metres };
-                Eye { position: near, velocity, pixels: pixels * metres, view }
+                Viewpoint { position: near, velocity, pixels: pixels * metres, view }
             }
         }
     }
@@ -150,7 +150,7 @@ pub(super) fn find_eyes(
         if watchers.voxel_size != terrain.voxel_size() {
             *watchers = Watchers { voxel_size: terrain.voxel_size(), ..default() };
         }
-        let mut seen: Vec<(Entity, Eye)> = Vec::new();
+        let mut seen: Vec<(Entity, Viewpoint)> = Vec::new();
         for (viewer, lens, at, own) in &lenses {
             if own.as_ref().is_some_and(|own| !own.intersects(&layers)) {
                 continue;
@@ -180,7 +180,7 @@ fn voxel_metres(place: &GlobalTransform) -> f32 {
 }
 
 /// The velocity of an eye from its previous position, also across a pause without cameras.
-fn velocity(before: &Eye, now: &Eye, seconds: f32, metres: f32, is_after_pause: bool) -> Vec3 {
+fn velocity(before: &Viewpoint, now: &Viewpoint, seconds: f32, metres: f32, is_after_pause: bool) -> Vec3 {
     let way = now.position - before.position;
     if is_after_pause {
         return if way.length() < 1.0 { before.velocity } else { Vec3::ZERO };

@@ -6,7 +6,7 @@ use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
 use crate::lattice::TilePos;
-use crate::lod::{Choice, Cut, Eye, View};
+use crate::lod::{Cut, LodSettings, View, Viewpoint};
 use crate::terrain::{KnownNodes, Version};
 
 /// Draws far ground coarsely: insert it on a terrain's entity, and worlds may be many kilometres wide.
@@ -56,9 +56,15 @@ pub struct LevelsOfDetail {
 
 impl Default for LevelsOfDetail {
     fn default() -> Self {
-        let Choice {
-            cell_pixels, error_pixels, edited_pixels, look_ahead, view_distance, most_nodes, ..
-        } = Choice::default();
+        let LodSettings {
+            cell_pixels,
+            error_pixels,
+            edited_pixels,
+            look_ahead,
+            view_distance,
+            most_nodes,
+            ..
+        } = LodSettings::default();
         Self {
             view_distance,
             error_pixels,
@@ -72,15 +78,15 @@ impl Default for LevelsOfDetail {
 }
 
 impl LevelsOfDetail {
-    pub(super) fn choice(&self, voxel_size: f32) -> Choice {
-        Choice {
+    pub(super) fn choice(&self, voxel_size: f32) -> LodSettings {
+        LodSettings {
             cell_pixels: self.cell_pixels,
             error_pixels: self.error_pixels,
             edited_pixels: self.edited_pixels,
             look_ahead: self.look_ahead,
             view_distance: self.view_distance / voxel_size,
             most_nodes: self.most_nodes,
-            ..Choice::default()
+            ..LodSettings::default()
         }
     }
 }
@@ -132,7 +138,7 @@ impl Default for DetailSource {
 /// The viewpoints of a terrain, in its voxels; without any, the last ones.
 #[derive(Component, Default)]
 pub(super) struct Watchers {
-    pub eyes: Vec<(Entity, Eye)>,
+    pub eyes: Vec<(Entity, Viewpoint)>,
     /// Whether somebody looked in the last frame.
     pub is_current: bool,
     /// The size of the voxels.
@@ -141,7 +147,7 @@ pub(super) struct Watchers {
 
 impl Watchers {
     /// Everybody who looks.
-    pub fn eyes(&self) -> Vec<Eye> {
+    pub fn eyes(&self) -> Vec<Viewpoint> {
         self.eyes.iter().map(|&(_, eye)| eye).collect()
     }
 }
@@ -160,7 +166,7 @@ impl WantedTiles {
 #[derive(Component, Default)]
 pub(super) struct LodState {
     pub known: Arc<KnownNodes>,
-    pub eyes: Vec<Eye>,
+    pub eyes: Vec<Viewpoint>,
     pub settings: Option<LevelsOfDetail>,
     pub shown: Option<Version>,
     /// Whether everything is drawn at its chosen level.
@@ -203,8 +209,8 @@ impl LodState {
     }
 
     /// Whether the choice for these inputs is outdated.
-    pub(super) fn is_outdated(&self, eyes: &[Eye], settings: &LevelsOfDetail, shown: Version) -> bool {
-        let is_near = |(a, b): (&Eye, &Eye)| {
+    pub(super) fn is_outdated(&self, eyes: &[Viewpoint], settings: &LevelsOfDetail, shown: Version) -> bool {
+        let is_near = |(a, b): (&Viewpoint, &Viewpoint)| {
             a.position.distance(b.position) < NEAR
                 && a.pixels == b.pixels
                 && is_same_view(a.view, b.view)

@@ -27,7 +27,7 @@ pub mod diagnostics;
 mod engine;
 mod entities;
 mod figures;
-mod heightmap;
+pub mod heightmap;
 mod inbox;
 mod load;
 mod lod;
@@ -35,7 +35,7 @@ mod lod_state;
 #[cfg(feature = "render")]
 mod materials;
 mod meshes;
-mod messages;
+pub mod messages;
 mod palettes;
 #[cfg(feature = "picking")]
 mod picking;
@@ -50,21 +50,22 @@ mod settings;
 mod task;
 mod times;
 
-pub use components::{
-    Chunk, EditOutbox, Field, GroundPiece, GroundPieces, Held, MaterialColors, MeshBytes, ShownSurface,
-    SlimVertices, Tile,
-};
+pub use components::{Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SlimVertices, Tile};
+#[doc(hidden)]
+pub use components::{GroundPieces, MeshBytes, ShownSurface};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, trigger_if_alive};
 pub use figures::BurrowFigures;
-pub use heightmap::{
-    HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
-};
+#[doc(hidden)]
+pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};
+#[doc(hidden)]
+pub use heightmap::{HeightmapLoader, HeightmapPlugin};
 pub(crate) use lod_state::WantedTiles;
 pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[cfg(feature = "render")]
 pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
 pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
+#[doc(hidden)]
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
     LoosePieceFound, LoosePieceReturned, Redo, TargetedBrush, TerrainReady, Undo,
@@ -81,6 +82,7 @@ pub use query::{TerrainHit, Terrains};
 pub use redraw::Redraw;
 pub(crate) use same_frame::CommitSameFrame;
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
+#[doc(hidden)]
 pub use times::Times;
 
 use bevy::ecs::reflect::ReflectMessage;

@@ -7,9 +7,9 @@ use glam::IVec3;
 
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox};
 use crate::surface::block::Block;
+use crate::surface::brick_window::{self, Window};
 use crate::surface::pristine::{self, PristineStack};
 use crate::surface::vertex::WorldView;
-use crate::surface::window::{self, Window};
 use crate::surface::{Mask, mask};
 
 use rustc_hash::FxHashSet;
@@ -43,7 +43,7 @@ pub(crate) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
             stacks.chunk_by(is_same_stack).filter_map(|stack| at_sheet(world, view, stack, &mut bricks));
         let sheets: Vec<PristineStack> = at_sheet.collect();
         let (mut rest, mut sheets) = (&bricks[..], &sheets[..]);
-        while let Some((count, places)) = window::shared(rest.iter().copied()) {
+        while let Some((count, places)) = brick_window::shared(rest.iter().copied()) {
             let (near, others) = rest.split_at(count);
             let window = Window::new(&view.samples, places);
             for stack in near.chunk_by(|a, b| a.stack() == b.stack()) {

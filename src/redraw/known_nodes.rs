@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::node_facts::GroundFacts;
-use crate::lod::{Choice, Cut, Eye, LodGrid, Node, NodeFacts};
+use crate::lod::{Cut, LodGrid, LodSettings, Node, NodeFacts, Viewpoint};
 use crate::world::{Version, World};
 
 /// The number of cached nodes above which some are dropped.
@@ -59,7 +59,14 @@ impl KnownNodes {
 
     /// One step of `most` meshes at most, or of one change, towards the cut that these eyes need. Nodes that were not drawn
     /// yet, and so are not known, are not split: what is coarse comes first.
-    pub fn next_cut(&self, world: &World, cut: &Cut, choice: &Choice, eyes: &[Eye], most: usize) -> Cut {
+    pub fn next_cut(
+        &self,
+        world: &World,
+        cut: &Cut,
+        choice: &LodSettings,
+        eyes: &[Viewpoint],
+        most: usize,
+    ) -> Cut {
         self.learn(world, cut.grid(), cut.nodes());
         let edited = self.edited(world, cut.grid());
         let target = {

@@ -61,7 +61,7 @@ pub struct WorldStore {
     pub(super) store: Option<Store>,
     /// The component that it was opened for.
     pub(super) saved: SavedWorld,
-    /// The last point that was told as durable.
+    /// The last point that was reported as durable.
     pub(super) told: Option<SavePoint>,
     /// The point that [`SaveNow`](super::SaveNow) waits for; `asked_again` if another was sent since.
     pub(super) asked: Option<SavePoint>,

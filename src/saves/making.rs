@@ -12,7 +12,7 @@ use crate::terrain::Terrain;
 use crate::threads::{ThreadTask, Threads, free_later};
 
 /// How long a level is waited for before that is logged.
-const TOLD: Duration = Duration::from_secs(10);
+const REPORT_AFTER: Duration = Duration::from_secs(10);
 
 /// Stops building a terrain when its `StartLevel` is removed.
 pub(super) fn give_up(gone: On<Remove, StartLevel>, mut commands: Commands) {
@@ -56,7 +56,7 @@ pub(super) fn start_levels(
                     }
                 });
             }
-            Ok(None) if !wait.told && wait.since.elapsed() >= TOLD => {
+            Ok(None) if !wait.told && wait.since.elapsed() >= REPORT_AFTER => {
                 wait.told = true;
                 warn!(
                     "{entity} still waits for its level {:?}: remove its StartLevel to begin without",

@@ -23,7 +23,7 @@ mod closing;
 mod components;
 mod follow;
 mod holding;
-mod level;
+pub mod level;
 mod making;
 mod messages;
 mod opening;
@@ -36,6 +36,7 @@ pub(crate) use closing::{ClosingWorlds, detach};
 #[cfg(feature = "replicon")]
 pub(crate) use components::EXIT_WAIT;
 pub use components::{SavedWorld, WorldStore};
+#[doc(hidden)]
 pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
 pub use messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldClosed, WorldOpened, WorldSaved};
 pub use reading::OpeningWorld;

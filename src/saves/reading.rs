@@ -18,7 +18,7 @@ use crate::threads::{ThreadTask, Threads, free_later};
 const LOCK_WAIT: Duration = Duration::from_secs(15);
 /// The interval of attempts to open it, and the time after which a trouble is reported.
 const LOCK_TRY: Duration = Duration::from_millis(50);
-const LOCK_TOLD: Duration = Duration::from_secs(2);
+const REPORT_LOCK_AFTER: Duration = Duration::from_secs(2);
 
 /// The world of a [`SavedWorld`] is being read; the plugin inserts it and takes it away.
 #[derive(Component)]
@@ -73,7 +73,7 @@ impl OpeningWorld {
 
     /// Returns `true` once, when it should be reported that another process has the world open.
     pub(super) fn tells_of_lock(&mut self) -> bool {
-        let is_late = self.task.is_none() && self.since.elapsed() >= LOCK_TOLD;
+        let is_late = self.task.is_none() && self.since.elapsed() >= REPORT_LOCK_AFTER;
         is_late && !std::mem::replace(&mut self.told, true)
     }
 }

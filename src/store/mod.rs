@@ -6,6 +6,7 @@ mod checkpoint_copy;
 mod checkpointing;
 mod closing;
 mod database;
+#[cfg(any(test, feature = "tools"))]
 mod disk;
 mod error;
 mod files;
@@ -36,11 +37,18 @@ mod writer;
 
 pub use base_level::{BaseLevel, LevelName};
 pub use closing::ClosingStore;
+#[cfg(any(test, feature = "tools"))]
+#[doc(hidden)]
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
 pub use error::{StoreError, StoreTrouble, WorldSize};
+#[doc(hidden)]
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
-pub use inspect::{WorldCheck, WorldInfo, check, check_in, inspect, inspect_in, read_world, replay};
-pub use levels::{RestoreLevelError, load_level, read_level_files, save_level};
+pub use inspect::{WorldCheck, WorldInfo, check, inspect};
+#[doc(hidden)]
+pub use inspect::{check_in, inspect_in, read_world, replay};
+#[doc(hidden)]
+pub use levels::read_level_files;
+pub use levels::{RestoreLevelError, load_level, save_level};
 pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};
 pub use portable::{Imported, from_bytes, to_bytes};

@@ -12,6 +12,7 @@
 
 use std::sync::LazyLock;
 
+use super::brick_window::{self, Window};
 use super::cases::{self, Case};
 use super::crossings::{Crossings, Edge};
 use super::layer_bits::{self, LayerBits, X, Z};
@@ -20,7 +21,6 @@ use super::neighbours::Neighbours;
 use super::padded_samples::PaddedSamples;
 use super::stack::Stack;
 use super::vertex::WorldView;
-use super::window::{self, Window};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
 
 /// A block to be meshed.
@@ -103,7 +103,7 @@ impl Mesher {
     /// other, from below.
     pub fn mesh(&mut self, view: &WorldView, blocks: &[Block], out: &mut Parts) {
         let (mut blocks, mut window) = (blocks, std::mem::take(&mut self.window).emptied());
-        while let Some((count, places)) = window::shared(blocks.iter().map(|block| block.brick)) {
+        while let Some((count, places)) = brick_window::shared(blocks.iter().map(|block| block.brick)) {
             let (near, others) = blocks.split_at(count);
             window = window.moved(&view.samples, places);
             for stack in near.chunk_by(|a, b| stack_of(a.brick) == stack_of(b.brick)) {

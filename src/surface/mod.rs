@@ -9,32 +9,48 @@
 //! - [`lod`]: the nodes of a quadtree cut, coarser ones included (rules 7 to 9).
 //! - [`seams`]: the validator: is everything drawn together closed?
 
+#[doc(hidden)]
 pub mod block;
+pub(crate) mod brick_window;
+#[doc(hidden)]
 pub mod cases;
 pub(crate) mod cell_outline;
 mod chunk_surface;
 mod crossings;
+#[doc(hidden)]
 pub mod indices;
 mod layer_bits;
+#[doc(hidden)]
 pub mod lod;
+#[doc(hidden)]
 pub mod mask;
+#[doc(hidden)]
 pub mod mesh;
 pub(crate) mod meshed_blocks;
 mod neighbours;
 #[cfg(feature = "cuda")]
 mod packed;
 mod padded_samples;
+#[doc(hidden)]
 pub mod plain;
 pub(crate) mod pristine;
+#[doc(hidden)]
 pub mod seams;
 mod stack;
+#[doc(hidden)]
 pub mod tile;
+#[doc(hidden)]
 pub mod vertex;
-pub(crate) mod window;
 
 pub use chunk_surface::ChunkSurface;
 pub(crate) use chunk_surface::{FreshPart, PartKey};
+#[doc(hidden)]
 pub use indices::Indices;
+#[doc(hidden)]
 pub use mask::{Mask, MaskView};
-pub use mesh::{MaterialMix, SurfaceMesh, Vertex};
-pub use seams::{SeamChecker, SeamFault, SeamReport};
+#[doc(hidden)]
+pub use mesh::MaterialMix;
+pub use mesh::{SurfaceMesh, Vertex};
+#[doc(hidden)]
+pub use seams::SeamChecker;
+pub use seams::{SeamFault, SeamReport};

@@ -1,7 +1,7 @@
 //! The bricks around a brick, found once.
 
+use super::brick_window::Window;
 use super::layer_bits::{self, LayerBits};
-use super::window::Window;
 use crate::lattice::BrickPos;
 use crate::volume::Brick;
 

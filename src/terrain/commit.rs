@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
-use super::resolve::{FieldNews, Resolved, patch_of};
+use super::resolve::{FieldChange, Resolved, patch_of};
 use crate::lattice::ChunkPos;
 use crate::redraw::{DrawnCut, MeshUpdates, Stages};
 use crate::volume::UniformBricks;
@@ -25,7 +25,7 @@ pub struct Commit {
     pub(super) receipts: Vec<Receipt>,
     /// Its record, where a log is kept.
     pub(super) record: Option<RecordDraft>,
-    pub(super) news: Vec<(ChunkPos, FieldNews)>,
+    pub(super) news: Vec<(ChunkPos, FieldChange)>,
     /// The surfaces that the world keeps: the meshes may be taken away before.
     pub(super) kept: NewSurfaces,
     /// The cut that is drawn afterwards, if it changes.
@@ -95,7 +95,7 @@ impl Commit {
     }
 
     /// Changes of fields in this commit, by chunk.
-    pub fn field_news(&self) -> &[(ChunkPos, FieldNews)] {
+    pub fn field_news(&self) -> &[(ChunkPos, FieldChange)] {
         &self.news
     }
 

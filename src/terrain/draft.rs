@@ -27,6 +27,7 @@ impl Terrain {
     /// The result of these edits on the last committed world, under the rules and settings of edits that are
     /// submitted now. Nothing changes. It takes as long as their transaction on a terrain that [never
     /// meshes](Meshing::Never).
+    #[doc(hidden)]
     pub fn draft(&self, edits: &[Edit]) -> Draft {
         let mut queue = Queue::default();
         queue.limits = WorkLimits::UNBOUNDED;

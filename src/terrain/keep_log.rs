@@ -32,6 +32,7 @@ impl Terrain {
     }
 
     /// Returns `true` if there is a record to [take](Self::take_log).
+    #[doc(hidden)]
     pub fn has_log(&self) -> bool {
         self.log.as_ref().is_some_and(|log| !log.is_empty())
     }

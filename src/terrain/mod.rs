@@ -45,18 +45,21 @@ mod work;
 pub use crate::loose::{LoosePiece, LooseSettings, PieceFate, PieceId, ReturnedPiece, Run};
 #[cfg(feature = "plugin")]
 pub(crate) use crate::redraw::SurfaceDraft;
+#[doc(hidden)]
 pub use crate::redraw::{
     ChooseCut, DrawnCut, GroundFacts, KnownNodes, MeshUpdates, NodeUpdate, Stages, TileUpdate,
 };
+#[doc(hidden)]
 pub use crate::surface::ChunkSurface;
 #[cfg(feature = "store")]
 pub(crate) use crate::world::brick_over;
 #[cfg(any(feature = "plugin", test))]
 pub(crate) use crate::world::unique;
-pub use crate::world::{
-    Drawn, Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, Version, World,
-};
+#[doc(hidden)]
+pub use crate::world::{Drawn, Version};
+pub use crate::world::{Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, World};
 pub use commit::Commit;
+#[doc(hidden)]
 pub use draft::Draft;
 pub use history::History;
 pub use model::{StaleCommit, Terrain};
@@ -68,7 +71,8 @@ pub use queue::WorkLimits;
 pub use receipt::{Applied, Asked, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
 pub use replay::{ReplayError, RestoreError};
-pub use resolve::FieldNews;
+#[doc(hidden)]
+pub use resolve::FieldChange;
 pub use transaction::Transaction;
 #[cfg(feature = "plugin")]
 pub(crate) use unseen::Unseen;

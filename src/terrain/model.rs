@@ -323,6 +323,7 @@ impl Terrain {
     }
 
     /// The cut that is drawn; `None` if all of the world is drawn in full detail.
+    #[doc(hidden)]
     pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
         self.drawn_cut.as_ref()
     }
@@ -330,6 +331,7 @@ impl Terrain {
     /// Draws the nodes of a cut from now on. With `None`, or with a cut for a world of another size, draws
     /// all of the world in full detail. All meshes have to be made again, with [`World::draw_cut`]. A running
     /// transaction is abandoned, and its work queued again.
+    #[doc(hidden)]
     pub fn set_drawn_cut(&mut self, drawn: Option<Arc<DrawnCut>>) {
         self.abandon();
         self.drawn_cut = drawn.filter(|drawn| self.world.has_cut(drawn.cut()));
@@ -338,6 +340,7 @@ impl Terrain {
     /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](super::MeshUpdates::nodes)
     /// are what has to be drawn. `None` while another transaction is under way, and where all of the world is drawn in
     /// full.
+    #[doc(hidden)]
     #[must_use = "the terrain waits for the commit of its transaction"]
     pub fn begin_cut(&mut self, choose: Arc<ChooseCut>) -> Option<Transaction> {
         self.begin_cut_for(choose, false)
@@ -360,6 +363,7 @@ impl Terrain {
     }
 
     /// The surfaces that transactions make.
+    #[doc(hidden)]
     pub fn meshing(&self) -> Meshing {
         self.meshing
     }

@@ -14,7 +14,7 @@ impl Terrain {
     /// Queues a brush, an edit or any other [order](Order), after everything that was submitted before. An edit is a
     /// separate step of undo, unless it is part of a [stroke](crate::brush::Brush::stroke).
     ///
-    /// The receipt comes with the commit of its transaction. What is invalid is rejected in turn, and what exceeds the
+    /// The receipt comes with the commit of its transaction. An invalid order is rejected in turn, and one that exceeds the
     /// [limits](Self::set_work_limits) [at once](Self::take_receipts). Rules and settings of loose pieces hold at once, for
     /// later edits.
     pub fn submit(&mut self, order: impl Into<Request>) {
@@ -157,7 +157,7 @@ impl Terrain {
     }
 
     /// Receipts that no commit returned, in order; each is returned once. They are of orders that there was no room for, of
-    /// steps through history that found nothing to do when [`begin`](Self::begin) came to them, and of orders that waited when
+    /// steps through history that found nothing to do when [`begin`](Self::begin) took them, and of orders that waited when
     /// [`apply`](Self::apply) was called. If they are not taken, the latest 65,536 are kept.
     ///
     /// In a Bevy app the plugin takes those of edits and steps, and sends them as messages. Those of parts and grounds are

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::commit::Commit;
-use super::resolve::FieldNews;
+use super::resolve::FieldChange;
 use crate::lattice::ChunkPos;
 use crate::world::{Drawn, Version, World};
 
@@ -12,7 +12,7 @@ pub(crate) struct Unseen {
     from: Version,
     to: Version,
     drawn: BTreeSet<Drawn>,
-    fields: Vec<(ChunkPos, FieldNews)>,
+    fields: Vec<(ChunkPos, FieldChange)>,
 }
 
 impl Unseen {
@@ -47,7 +47,7 @@ impl Unseen {
     }
 
     /// Changes of fields, in order.
-    pub fn fields(&self) -> &[(ChunkPos, FieldNews)] {
+    pub fn fields(&self) -> &[(ChunkPos, FieldChange)] {
         &self.fields
     }
 

@@ -12,7 +12,7 @@ use super::link::{Link, MOST_PENDING, PieceMessage, Standing, Worked};
 use super::messages::{BulkLane, FromPlayer, OrderLane};
 use super::replicon::ToOwnServer;
 use super::service::Service;
-use super::shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
+use super::shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
 use super::sharing::Sharing;
 use super::trouble::{SharingTrouble, SharingTroubleFound};
 use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
@@ -335,7 +335,7 @@ impl Answers<'_> {
     fn refused(&mut self, terrain: Entity, tag: u64, why: Option<Refusal>) {
         let receipt = Receipt::of_edit(tag, Err(Rejection::Refused));
         self.applied.write(BrushApplied { terrain: Some(terrain), receipt });
-        self.edited.write(GroundEdited { terrain, tag, outcome: WhatBecame::Refused(why) });
+        self.edited.write(GroundEdited { terrain, tag, outcome: EditOutcome::Refused(why) });
     }
 
     fn stepped(&mut self, terrain: Entity, step: Asked, outcome: Result<Applied, Rejection>) {
@@ -346,7 +346,7 @@ impl Answers<'_> {
         let edited = |tag, outcome| GroundEdited { terrain, tag, outcome };
         match event {
             ClientEvent::Predicted(receipt) => {
-                self.edited.write(edited(receipt.tag, WhatBecame::Predicted(receipt)));
+                self.edited.write(edited(receipt.tag, EditOutcome::Predicted(receipt)));
             }
             ClientEvent::Confirmed { tag, receipt } => {
                 link.answer(tag);
@@ -354,13 +354,13 @@ impl Answers<'_> {
                 let unknown = || Receipt::of_edit(tag, Ok(Applied::default()));
                 let known = receipt.clone().unwrap_or_else(unknown);
                 self.applied.write(BrushApplied { terrain: Some(terrain), receipt: known });
-                self.edited.write(edited(tag, WhatBecame::Confirmed(receipt)));
+                self.edited.write(edited(tag, EditOutcome::Confirmed(receipt)));
             }
             ClientEvent::Refused { tag, why } => {
                 link.answer(tag);
                 self.refused(terrain, tag, why);
             }
-            ClientEvent::Others { .. } => {}
+            ClientEvent::RemoteEdit { .. } => {}
             ClientEvent::PiecesChanged { tag, found, returned } => {
                 let found = found.into_iter().map(|piece| LoosePieceFound::new(terrain, tag, piece));
                 let returned = returned.into_iter().map(|piece| LoosePieceReturned { terrain, piece });

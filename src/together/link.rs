@@ -76,7 +76,7 @@ pub(super) struct Display {
     pub is_broken: bool,
     /// All of it, to be put next.
     pub whole: Option<ShownChange>,
-    /// What happens to pieces once so many changes are answered: the ground changes with these.
+    /// Messages about pieces, each with the number of answered changes at which it is sent: the ground changes with these.
     pub pieces: VecDeque<(u64, PieceMessage)>,
 }
 

@@ -43,7 +43,7 @@ mod sharing;
 mod trouble;
 
 pub use server::{GroundServer, GroundServerEvent};
-pub use shared::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
+pub use shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
 pub use trouble::{SharingTrouble, SharingTroubleFound};
 
 use bevy::prelude::*;

@@ -79,7 +79,7 @@ fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lif
 
 /// The outcome of an edit.
 #[derive(Clone, Debug, PartialEq)]
-pub enum WhatBecame {
+pub enum EditOutcome {
     /// It is shown as the player's machine predicts it.
     Predicted(Receipt),
     /// The server has ordered it, with this result for all players. `None` if the player was disconnected at that moment, so that the
@@ -99,7 +99,7 @@ pub struct GroundEdited {
     /// The tag of the brush.
     pub tag: u64,
     /// The outcome.
-    pub outcome: WhatBecame,
+    pub outcome: EditOutcome,
 }
 
 /// The progress of a [`SharedTerrain`] that joins, or that its player was removed.

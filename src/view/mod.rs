@@ -41,9 +41,11 @@ pub mod ground;
 mod material;
 mod vertex;
 
+#[doc(hidden)]
 pub use ground::{
     GroundArrays, GroundArraysError, GroundLayer, GroundLayerImages, GroundLoading, GroundLook,
     GroundMaterial, GroundPlugin, GroundQuality, GroundTextures, GroundTexturesError,
 };
 pub use material::TerrainMaterialPlugin;
+#[doc(hidden)]
 pub use vertex::prepass_vertex_shader;

@@ -20,7 +20,10 @@ pub use counts::MaterialCounts;
 pub(crate) use counts::{VoxelOutcome, for_runs};
 pub(crate) use field::{Absorbed, NO_FIELDS};
 pub use field::{Field, FieldId, Fields, Scenario};
+#[doc(hidden)]
 pub use layers::Layers;
 pub use rules::{DiggingRules, Refused, RulesError};
+#[doc(hidden)]
+pub use view::Bricks;
+pub use view::SampleView;
 pub(crate) use view::resolve;
-pub use view::{Bricks, SampleView};

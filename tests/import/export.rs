@@ -21,7 +21,7 @@ fn read(bytes: &[u8], format: Option<HeightFormat>, (width, height): (u32, u32))
     let byte_order = Some(bevy_burrow::ground::RawFormat::LittleEndian);
     let raw = RawLayout { size: Some((width, height)), sample, byte_order, ..RawLayout::default() };
     let options = ImportOptions { format, raw, voids: Repair::Keep, ..ImportOptions::default() };
-    ElevationGrid::decode(bytes, &options).expect("what was written is read").0
+    ElevationGrid::decode(bytes, &options).expect("the written file can be read").0
 }
 
 #[test]

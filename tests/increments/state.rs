@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use bevy_burrow::lattice::{ChunkPos, Column};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::mask::cell_sheet;
-use bevy_burrow::terrain::FieldNews;
+use bevy_burrow::terrain::FieldChange;
 use bevy_burrow::volume::Brick;
 
 use crate::bits::mix;
@@ -95,17 +95,19 @@ impl CheckedTerrain {
     }
 
     /// Each edited sample lies in one field of its chunk, fields do not touch, and events report every change of them.
-    pub fn check_fields(&mut self, news: &[(ChunkPos, FieldNews)], what: &str) {
+    pub fn check_fields(&mut self, news: &[(ChunkPos, FieldChange)], what: &str) {
         let world = self.terrain.world();
         for &(chunk, news) in news {
             match news {
-                FieldNews::Created(id) => assert!(self.fields.insert((chunk, id)), "{what}: created twice"),
-                FieldNews::Changed(id) => assert!(self.fields.contains(&(chunk, id)), "{what}: unknown"),
-                FieldNews::Merged { gone, into } => {
+                FieldChange::Created(id) => assert!(self.fields.insert((chunk, id)), "{what}: created twice"),
+                FieldChange::Changed(id) => assert!(self.fields.contains(&(chunk, id)), "{what}: unknown"),
+                FieldChange::Merged { gone, into } => {
                     assert!(self.fields.remove(&(chunk, gone)), "{what}: removed twice");
                     assert!(world.fields_of(chunk).is_some_and(|f| f.get(into).is_some()), "{what}: into");
                 }
-                FieldNews::Removed(id) => assert!(self.fields.remove(&(chunk, id)), "{what}: removed twice"),
+                FieldChange::Removed(id) => {
+                    assert!(self.fields.remove(&(chunk, id)), "{what}: removed twice")
+                }
             }
         }
         let all = world.fields().flat_map(|(chunk, fields)| fields.iter().map(move |f| (chunk, f.id)));

@@ -258,7 +258,7 @@ impl Bot {
                     "undone"
                 }
                 ClientEvent::UndoRefused(_) => "not undone",
-                ClientEvent::Others { .. } => "others",
+                ClientEvent::RemoteEdit { .. } => "others",
                 ClientEvent::Repaired(_) => "repaired",
                 ClientEvent::Kicked(why) => panic!("{:?} was kicked: {why}", self.id),
                 _ => "other",

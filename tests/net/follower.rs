@@ -283,7 +283,7 @@ impl Follower {
                 self.confirmed.extend(by.filter(|(by, _)| *by == self.id).map(|(_, own)| own));
                 self.terrain.submit(order);
             }
-            Entry::Mark => {
+            Entry::HashCheck => {
                 let world = self.terrain.world();
                 let touched = std::mem::take(&mut self.touched).into_iter();
                 let hashes = touched.map(|at| (at, region_hash(world, at))).collect();

@@ -1,6 +1,6 @@
 //! What a terrain may carry, crossed with what may happen to it in each phase of its life. After each event the same laws hold:
 //! every message is answered once, every applied brush has its ground, nothing waits for ever, nothing is left over, seams are
-//! flawless, the world is that of a plain model, and what was dug in a saved world is in its folder.
+//! flawless, the world is that of a plain model, and the folder of a saved world holds every dig.
 //!
 //! [`controls`] puts old faults back on purpose, which has to be found; [`flat`] looks whether anything grows.
 //!
@@ -94,7 +94,7 @@ impl Load {
         phase != Phase::Saving || self.is_saved()
     }
 
-    /// Whether an event means something for it. What a game does to a shared terrain by itself is not in the world that is shared.
+    /// Whether an event means something for it. A game's own changes of a shared terrain are not in the shared world.
     fn allows(self, event: Event) -> bool {
         match event {
             Event::SaveAnew => self.is_saved(),
@@ -302,7 +302,7 @@ struct Life {
 #[cfg(feature = "store")]
 struct Saves {
     folder: std::path::PathBuf,
-    /// Worlds so far.
+    /// The number of worlds.
     count: usize,
     /// Worlds that were open: each with its ground and hash.
     left: Vec<(std::path::PathBuf, Arc<Ground>, u64)>,
@@ -472,7 +472,7 @@ impl Life {
         SavedWorld::new(self.saves.folder.join(self.saves.count.to_string()))
     }
 
-    /// Notes what has to be in the folder of a world that is left, if it is open.
+    /// Records the digs that the folder of an open world must hold after the world is left.
     #[cfg(feature = "store")]
     fn note_saved(&mut self) {
         let entity = self.stage.app.world().entity(self.terrain);
@@ -484,7 +484,7 @@ impl Life {
         }
     }
 
-    /// What was dug in a world is in its folder, once the app has ended.
+    /// Once the app has ended, the folder of each world holds its digs.
     #[cfg(feature = "store")]
     fn check_saved(&self) {
         use bevy_burrow::store::{BaseChanged, Store, StoreOptions};
@@ -567,7 +567,7 @@ impl Life {
         #[cfg(feature = "store")]
         {
             self.note_saved();
-            // A level is for its own ground. A saved world is closed by itself where another level takes the place of its own.
+            // A level is for its own ground. A saved world closes automatically where another level takes the place of its own.
             self.stage.app.world_mut().entity_mut(self.terrain).remove::<StartLevel>();
             if self.rng.bool() {
                 self.stage.app.world_mut().entity_mut(self.terrain).remove::<SavedWorld>();

@@ -33,7 +33,7 @@ fn a_terrain_that_goes_together_with_its_world_holds_no_later_one() {
     game.world_mut().entity_mut(entity).remove::<(Terrain, SavedWorld)>();
     game.update();
     drop(holder);
-    // A level that comes and goes lets the next one go on.
+    // After a level that comes and goes, the next one is loaded.
     let level = game.world().resource::<Assets<BurrowLevel>>().reserve_handle();
     game.world_mut().entity_mut(entity).insert((terrain(), StartLevel(level)));
     (0..10).for_each(|_| game.update());
@@ -73,7 +73,7 @@ fn a_terrain_that_the_game_holds_stays_held_when_its_world_is_open() {
     assert_eq!((heard(&game).ready, heard(&game).answered), (0, 0));
     game.world_mut().entity_mut(entity).remove::<Held>();
     run_until_ready(&mut game);
-    // And one that nobody else holds goes on by itself.
+    // A terrain without another `Held` continues automatically.
     let other = Folder::new("held-not");
     let entity = game.world_mut().spawn((terrain(), saved(&other.0))).id();
     run_until(&mut game, "it goes on", move |world| world.get::<Held>(entity).is_none());
@@ -130,7 +130,7 @@ fn act(mut act: ResMut<Act>, mut commands: Commands, terrain: Single<Entity, Wit
 fn acting(place: usize, frame: u32, then: Option<SavedWorld>) -> App {
     let mut game = App::new();
     game.insert_resource(Act { frame, then });
-    // What a system asks for is done together with what systems nearby ask for, so these are before, beside and after those that open
+    // Commands of a system are applied together with those of systems nearby, so these run before, between and after those that open
     // worlds, and added before and after them.
     match place {
         0 => game.add_systems(Update, act.before_ignore_deferred(BurrowSystems::Load)),
@@ -254,7 +254,7 @@ fn two_terrains_with_one_folder_do_not_write_into_each_other() {
     let second =
         game.world_mut().spawn((terrain(), Transform::from_xyz(500.0, 0.0, 0.0), saved(&folder.0))).id();
     (0..200).for_each(|_| game.update());
-    // It waits for the first, and goes on with its world once that is closed.
+    // It waits for the first, and continues with its world once that is closed.
     assert!(game.world().get::<Held>(second).is_some());
     game.world_mut().despawn(first);
     run_until(&mut game, "the second is opened", |world| world.resource::<Heard>().opened.len() == 2);
@@ -283,7 +283,7 @@ fn a_folder_that_is_removed_while_a_world_is_open_is_told_of_and_written_again()
     let troubles = heard(&game).troubles.clone();
     exit(game);
     match closed {
-        // What was told to be saved is there.
+        // Everything reported as saved is there.
         Ok(_) => assert_eq!(hash_in(&folder.0, terrain()), Ok((2, before)), "{troubles:?}"),
         Err(why) => assert!(!troubles.is_empty(), "{why}"),
     }

@@ -28,7 +28,7 @@ fn what_was_dug_is_there_in_the_next_app() {
     run_until_applied(&mut first, 2);
     run_until_saved(&mut first, 2);
     let before = hash(&first, entity);
-    // As if the process had been killed: nothing is told to end. Nothing is left to be written either.
+    // As if the process had been killed: nothing ends in order. Nothing is left to be written either.
     std::mem::forget(first);
 
     // The lock belongs to the process that is gone; here it is the same one.

@@ -230,13 +230,13 @@ impl Stage {
         &self.app.world().resource::<Receipts>().0
     }
 
-    /// Forgets the receipts so far.
+    /// Forgets all receipts.
     #[cfg(feature = "examples")]
     pub fn forget_receipts(&mut self) {
         self.app.world_mut().resource_mut::<Receipts>().0.clear();
     }
 
-    /// The tags of all receipts so far.
+    /// The tags of all receipts.
     pub fn tags(&self) -> Vec<u64> {
         self.receipts().iter().map(|applied| applied.receipt.tag).collect()
     }

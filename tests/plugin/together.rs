@@ -19,8 +19,8 @@ use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::{Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{
-    GroundEdited, GroundJoined, GroundServer, SharedTerrain, SharingTrouble, SharingTroubleFound,
-    TogetherPlugin, WhatBecame,
+    EditOutcome, GroundEdited, GroundJoined, GroundServer, SharedTerrain, SharingTrouble,
+    SharingTroubleFound, TogetherPlugin,
 };
 use bevy_replicon::prelude::*;
 use bevy_replicon::test_app::{ServerTestAppExt, TestClientEntity};
@@ -211,7 +211,7 @@ impl Party {
         stage.terrain(*terrain).world().hash()
     }
 
-    /// Does each player show the same world as all others, with nothing under way?
+    /// Whether all players show the same world, with nothing under way.
     fn agrees(&self) -> bool {
         let count = self.players.len();
         let state = |player| (self.shared(player).number(), self.terrain_hash(player));
@@ -219,7 +219,7 @@ impl Party {
         (0..count).all(is_settled) && (1..count).all(|player| state(player) == state(0))
     }
 
-    /// Have all joined the world of this hash?
+    /// Whether all players have joined the world of this hash.
     fn all_show(&self, hash: u64) -> bool {
         self.agrees() && (0..self.players.len()).all(|player| self.terrain_hash(player) == hash)
     }
@@ -240,7 +240,7 @@ impl Party {
     }
 
     /// What became of a player's edits since the last call.
-    fn outcomes(&mut self, player: usize) -> Vec<WhatBecame> {
+    fn outcomes(&mut self, player: usize) -> Vec<EditOutcome> {
         let edited = self.players[player].0.recorded::<GroundEdited>();
         edited.into_iter().map(|edited| edited.outcome).collect()
     }

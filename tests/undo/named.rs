@@ -2,7 +2,7 @@
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Asked, FieldNews, Rejection};
+use bevy_burrow::terrain::{Asked, FieldChange, Rejection};
 use glam::{IVec3, Vec3};
 
 fn ball(x: f32, y: f32, z: f32, radius: f32) -> Brush {
@@ -93,12 +93,12 @@ fn restored_fields_keep_their_ids_and_new_fields_get_new_ids() {
     terrain.commit(commit).expect("no other commit");
     assert_eq!(
         news.iter().map(|news| news.1).collect::<Vec<_>>(),
-        [FieldNews::Changed(a), FieldNews::Created(b)]
+        [FieldChange::Changed(a), FieldChange::Created(b)]
     );
     terrain.submit(Order::Redo);
     let commit = terrain.begin().expect("a queued step").run();
     let news: Vec<_> = commit.field_news().iter().map(|news| news.1).collect();
-    assert_eq!(news, [FieldNews::Changed(a), FieldNews::Merged { gone: b, into: a }]);
+    assert_eq!(news, [FieldChange::Changed(a), FieldChange::Merged { gone: b, into: a }]);
     terrain.commit(commit).expect("no other commit");
     (0..3).for_each(|_| assert!(terrain.undo().outcome.is_ok()));
     let c = field(&mut terrain, ball(8.0, 10.0, 8.0, 2.0));

@@ -44,7 +44,7 @@ mod windows;
 #[cfg(test)]
 mod async_copies;
 #[cfg(test)]
-mod emulator;
+mod emulator_process;
 #[cfg(test)]
 mod kernel_tests;
 #[cfg(test)]

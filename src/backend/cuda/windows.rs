@@ -9,7 +9,7 @@ use super::device::Fault;
 use super::layout::NONE;
 use super::lists::{cut, for_each_parallel, map_into};
 use crate::lattice::{BrickPos, LatticeBox};
-use crate::surface::window::{Window, shared};
+use crate::surface::brick_window::{Window, shared};
 use crate::volume::{Brick, SampleView};
 
 /// From this many bricks on, lists are split into slabs.

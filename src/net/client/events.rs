@@ -42,7 +42,7 @@ pub enum ClientEvent {
     /// refused.
     UndoRefused(Option<Refusal>),
     /// An edit of another player or of the server.
-    Others {
+    RemoteEdit {
         /// Its author.
         author: ClientId,
         /// The result. Its tag is 0.

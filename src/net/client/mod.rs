@@ -105,7 +105,7 @@ pub struct Client {
     next_own: u64,
     /// The greatest own number that the server of this world can have seen of this client.
     sent: u64,
-    /// The last own edit whose prediction was told.
+    /// The last own edit whose prediction was reported.
     told: u64,
     /// Edits from before the first welcome.
     early: Vec<Edit>,
@@ -544,7 +544,7 @@ impl Client {
         {
             number += 1;
             let entry = self.valid(number, entry);
-            let is_compared = matches!((&entry, &self.stage), (Entry::Mark, Stage::Following));
+            let is_compared = matches!((&entry, &self.stage), (Entry::HashCheck, Stage::Following));
             let is_checked = is_compared || entry.parts().is_some();
             batch.push(entry);
             if is_checked {
@@ -588,7 +588,7 @@ impl Client {
                         None if is_told => {
                             self.confirm_pieces(None, &receipt);
                             let author = by.map_or(ClientId::SERVER, |(author, _)| author);
-                            self.events.push(ClientEvent::Others { author, receipt });
+                            self.events.push(ClientEvent::RemoteEdit { author, receipt });
                         }
                         None => {}
                     }
@@ -616,7 +616,7 @@ impl Client {
         self.epoch = Some(epoch);
         if matches!(self.stage, Stage::Following) {
             self.marks.touch(applied.regions);
-            if matches!(batch.last(), Some(Entry::Mark)) {
+            if matches!(batch.last(), Some(Entry::HashCheck)) {
                 self.marks.mark(epoch.number, &mut self.replica);
             }
         }

@@ -41,7 +41,7 @@ impl Server {
         let number = self.applied + 1;
         let (by, order) = match entry {
             Entry::Order { by, order } => (by, order),
-            Entry::Mark => {
+            Entry::HashCheck => {
                 self.tell_hashes(number);
                 self.applied = number;
                 return 1;

@@ -473,7 +473,7 @@ impl Server {
         self.now = self.now.max(now);
         let is_due = now.saturating_sub(self.last_mark) >= self.settings.mark;
         if is_due && self.epoch.number > self.marked {
-            self.order(Entry::Mark);
+            self.order(Entry::HashCheck);
             (self.last_mark, self.marked) = (now, self.epoch.number);
         }
         self.apply();

@@ -96,7 +96,7 @@ mod tests {
     /// Every third entry is a mark, and the others are loose settings.
     fn entry(number: u64) -> Entry {
         let loose = LooseSettings { debris: number as u32, ..LooseSettings::default() };
-        if number.is_multiple_of(3) { Entry::Mark } else { Entry::of_server(Order::Loose(Some(loose))) }
+        if number.is_multiple_of(3) { Entry::HashCheck } else { Entry::of_server(Order::Loose(Some(loose))) }
     }
 
     /// Twenty thousand entries after the number 7.

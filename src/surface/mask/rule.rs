@@ -2,10 +2,10 @@
 //! pristine surface crosses over the cell.
 
 use crate::lattice::{BrickPos, ChunkGrid, Column};
+use crate::surface::brick_window::Window;
 use crate::surface::layer_bits::{self, CELLS, LayerBits};
 use crate::surface::neighbours::Neighbours;
 use crate::surface::pristine::PristineStack;
-use crate::surface::window::Window;
 
 /// The cells of a stack of bricks that belong to the mask by rule 2: those `before`, and those over which a corner of a
 /// cube of the sheet is edited. Only these bricks, and those that hold corners of their cells, are looked at. Cells are

@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 use web_time::Instant;
 
 use super::draft_group::{Found, LoosePieces, draft_group};
-use super::field_log::{FieldLog, FieldNews};
+use super::field_log::{FieldChange, FieldLog};
 use super::resolved::Resolved;
 use crate::brush::Edit;
 use crate::edits::{DraftedBrick, Drafter, EditDelta, EditEffect, MergedBricks, PreparedEdits, latest};
@@ -41,7 +41,7 @@ type Effects = (Vec<EditEffect>, LoosePieces);
 /// The changes by edits in addition to bricks and meshes.
 struct Entered {
     receipts: Vec<Receipt>,
-    news: Vec<(ChunkPos, FieldNews)>,
+    news: Vec<(ChunkPos, FieldChange)>,
     next_field: u64,
     groups: Vec<EnteredGroup>,
 }

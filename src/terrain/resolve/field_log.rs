@@ -11,7 +11,7 @@ use crate::world::World;
 
 /// Something that happened to a field in a commit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FieldNews {
+pub enum FieldChange {
     /// It is new.
     Created(FieldId),
     /// Its samples or its box changed.
@@ -86,7 +86,7 @@ impl<'a> FieldLog<'a> {
     }
 
     /// One line for each field that differs from the snapshot.
-    pub fn news(&self) -> Vec<(ChunkPos, FieldNews)> {
+    pub fn news(&self) -> Vec<(ChunkPos, FieldChange)> {
         let (mut news, nothing) = (Vec::new(), Fields::default());
         let before = |chunk| self.world.fields.get(chunk).unwrap_or(&nothing);
         for (chunk, fields) in &self.fields {
@@ -95,29 +95,29 @@ impl<'a> FieldLog<'a> {
         for &(chunk, gone) in self.merged.iter().filter(|(chunk, gone)| before(chunk).get(*gone).is_some()) {
             let next = |field: &FieldId| self.merged_into.get(field).copied();
             let into = std::iter::successors(Some(gone), next).last().unwrap_or(gone);
-            news.push((chunk, FieldNews::Merged { gone, into }));
+            news.push((chunk, FieldChange::Merged { gone, into }));
         }
         news
     }
 }
 
 /// The fields of a chunk that are new or changed.
-fn changes(before: &Fields, after: &Fields) -> impl Iterator<Item = FieldNews> {
+fn changes(before: &Fields, after: &Fields) -> impl Iterator<Item = FieldChange> {
     after.iter().filter_map(|field| match before.get(field.id) {
-        None => Some(FieldNews::Created(field.id)),
-        Some(old) if old != field => Some(FieldNews::Changed(field.id)),
+        None => Some(FieldChange::Created(field.id)),
+        Some(old) if old != field => Some(FieldChange::Changed(field.id)),
         Some(_) => None,
     })
 }
 
 /// One line for each field that differs, when the fields of a chunk are replaced by those of another time.
-pub(crate) fn news_of_replaced(before: &Fields, after: &Fields) -> Vec<FieldNews> {
-    let mut news: Vec<FieldNews> = changes(before, after).collect();
+pub(crate) fn news_of_replaced(before: &Fields, after: &Fields) -> Vec<FieldChange> {
+    let mut news: Vec<FieldChange> = changes(before, after).collect();
     for gone in before.iter().filter(|field| after.get(field.id).is_none()) {
         let into = after.iter().find(|field| field.bounds.encloses(gone.bounds));
         news.push(match into {
-            Some(field) => FieldNews::Merged { gone: gone.id, into: field.id },
-            None => FieldNews::Removed(gone.id),
+            Some(field) => FieldChange::Merged { gone: gone.id, into: field.id },
+            None => FieldChange::Removed(gone.id),
         });
     }
     news

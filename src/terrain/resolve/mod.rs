@@ -14,7 +14,7 @@ mod reset;
 mod resolved;
 mod step;
 
-pub use field_log::FieldNews;
+pub use field_log::FieldChange;
 pub(crate) use parts::world_of;
 pub(crate) use resolved::{Resolved, patch_of};
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::field_log::FieldNews;
+use super::field_log::FieldChange;
 use crate::lattice::ChunkPos;
 use crate::redraw::{MeshUpdates, Stages};
 use crate::terrain::history::UndoDelta;
@@ -22,7 +22,7 @@ pub(crate) struct Resolved {
     pub next_field: u64,
     pub receipts: Vec<Receipt>,
     /// Changes of fields.
-    pub news: Vec<(ChunkPos, FieldNews)>,
+    pub news: Vec<(ChunkPos, FieldChange)>,
     /// The new world, if all of it is replaced.
     pub whole: Option<Arc<World>>,
     pub meshes: MeshUpdates,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use web_time::Instant;
 
-use super::field_log::{FieldNews, news_of_replaced};
+use super::field_log::{FieldChange, news_of_replaced};
 use super::resolved::Resolved;
 use crate::edits::{EditEffect, count_replaced};
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
@@ -21,7 +21,7 @@ use crate::world::{Change, replaced_bytes};
 /// How meshes and fields change when parts are replaced.
 pub(crate) struct Placed {
     pub meshes: MeshUpdates,
-    pub news: Vec<(ChunkPos, FieldNews)>,
+    pub news: Vec<(ChunkPos, FieldChange)>,
 }
 
 /// Draws the world with a change; `bricks` are those of the change with pristine ones made, `changed` says where

@@ -1,4 +1,4 @@
-//! Negative controls: faults that were fixed are put back on purpose, built from public parts, and the laws of the matrix find each.
+//! Negative controls: fixed faults are rebuilt on purpose from public parts, and the laws of the matrix find each of them.
 
 use super::*;
 
@@ -108,7 +108,7 @@ mod of_saved_worlds {
         assert_found(Load::Saved, fault, |life| happen(life, Event::Replace), "nothing is under way");
     }
 
-    /// A new world was made of a copy of the terrain, and took its place later: what was committed in between was lost.
+    /// A new world was made of a copy of the terrain and replaced it later: commits in between were lost.
     #[test]
     fn digs_that_are_lost_when_saving_begins_are_found() {
         /// The copy, and frames until it takes the terrain's place.

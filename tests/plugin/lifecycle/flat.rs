@@ -1,5 +1,5 @@
 //! Nothing grows: entities, components, meshes and memory are the same after many levels, digs and undos, with everything on.
-//! `BURROW_ROUNDS` is the number of rounds, each of which digs, undoes, walks and now and then goes to another level.
+//! `BURROW_ROUNDS` is the number of rounds, each of which digs, undoes, walks and occasionally goes to another level.
 
 use avian3d::prelude::PhysicsPlugins;
 use bevy_burrow::physics::{ColliderSource, DebrisPlugin, TerrainPhysicsPlugin};
@@ -146,7 +146,7 @@ fn nothing_grows_over_many_levels_digs_and_undos() {
     let rounds = variable("BURROW_ROUNDS", 60).next_multiple_of(2 * STAY);
     let mut journey = Journey::new();
     let hash = journey.stage.hash(journey.terrain);
-    // Both levels were there, and what is kept is kept.
+    // Both levels were there, and their folders keep their digs.
     let warm = 2 * STAY.max(rounds / 8 / (2 * STAY) * STAY);
     (0..warm).for_each(|number| journey.round(number));
     let before = journey.census();

@@ -1,9 +1,9 @@
-//! Who takes part: clients that replicon has authorised, and nobody else.
+//! Only clients that replicon has authorised take part.
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
 use bevy_burrow::net::{self, ClientEvent, Kick};
-use bevy_burrow::together::{GroundJoined, GroundServer, SharedTerrain, SharingTrouble, WhatBecame};
+use bevy_burrow::together::{EditOutcome, GroundJoined, GroundServer, SharedTerrain, SharingTrouble};
 use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;
 
@@ -24,19 +24,19 @@ fn who_has_not_logged_in_gets_no_world_and_digs_nothing() {
     party.join_with(ground(), AuthMethod::Custom);
     let client = party.client(1);
     party.server.world_mut().entity_mut(client).insert(AuthorizedClient);
-    party.rounds_until("who has logged in joins", |party| party.shared(1).has_joined());
+    party.rounds_until("the player that has logged in joins", |party| party.shared(1).has_joined());
     party.dig_at(1, 30.0, 30.0);
     party.dig_at(0, 60.0, 60.0);
     let stranger = party.client(0);
     for _ in 0..200 {
         party.server.update();
-        assert!(!is_spoken_to(&party, stranger), "something is sent to who has not logged in");
+        assert!(!is_spoken_to(&party, stranger), "something is sent to a client that has not logged in");
         party.round();
     }
     let dug = party.terrain_hash(1);
-    assert_ne!(dug, ground().world().hash(), "who has logged in digs");
+    assert_ne!(dug, ground().world().hash(), "the player that has logged in digs");
     assert!(!party.shared(0).has_joined() && party.shared(0).number() == 0 && party.shared(0).id().is_none());
-    // The game lets the stranger in, and the dig of before is done.
+    // The game lets the stranger in, and the earlier dig is done.
     party.server.world_mut().entity_mut(stranger).insert(AuthorizedClient);
     party.rounds_until("it joins, and both show the digs of both", |party| {
         party.agrees() && party.terrain_hash(0) != dug
@@ -104,7 +104,7 @@ fn who_is_no_longer_authorised_is_told_and_joins_again_once_it_is() {
     party.dig_at(0, 30.0, 30.0);
     party.rounds(50);
     assert_eq!(party.terrain_hash(1), before, "its digs are not taken");
-    assert!(matches!(party.outcomes(0)[..], [WhatBecame::Refused(None)]));
+    assert!(matches!(party.outcomes(0)[..], [EditOutcome::Refused(None)]));
     party.dig_at(1, 60.0, 60.0);
     party.rounds(50);
     party.server.world_mut().entity_mut(client).insert(AuthorizedClient);
@@ -128,7 +128,7 @@ fn who_is_kicked_stays_out_of_the_ground_while_connected() {
     party.dig_at(0, 30.0, 30.0);
     party.rounds(100);
     assert!(!party.shared(0).has_joined());
-    assert!(matches!(party.outcomes(0)[..], [WhatBecame::Refused(None)]), "digs are answered");
+    assert!(matches!(party.outcomes(0)[..], [EditOutcome::Refused(None)]), "digs are answered");
     assert_eq!((party.terrain_hash(1), party.terrain_hash(0)), (before, before));
     // Over another connection it is asked in again: bans are the game's.
     party.disconnect(0);
@@ -164,7 +164,7 @@ fn who_has_a_network_id_without_a_number_is_not_served() {
     party.server.world_mut().entity_mut(client).insert(NetworkId::new(u64::MAX));
     party.rounds(100);
     party.dig_at(0, 30.0, 30.0);
-    party.rounds_until("the other one goes on", |party| {
+    party.rounds_until("the other one continues", |party| {
         party.shared(0).has_joined() && party.shared(0).pending() == 0
     });
 }

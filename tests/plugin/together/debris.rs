@@ -11,7 +11,7 @@ use bevy_burrow::physics::{
     ColliderSource, Debris, DebrisPlugin, DebrisSettings, PhysicsFigures, TerrainPhysicsPlugin,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundEdited, GroundServer, SharedTerrain, TogetherPlugin, WhatBecame};
+use bevy_burrow::together::{EditOutcome, GroundEdited, GroundServer, SharedTerrain, TogetherPlugin};
 use bevy_replicon::prelude::*;
 
 use super::{Party, settings, terrain};
@@ -118,7 +118,7 @@ fn a_refused_dig_leaves_no_debris() {
     let mut is_refused = false;
     while !is_refused {
         party.round();
-        is_refused = party.outcomes(0).iter().any(|outcome| matches!(outcome, WhatBecame::Refused(_)));
+        is_refused = party.outcomes(0).iter().any(|outcome| matches!(outcome, EditOutcome::Refused(_)));
     }
     party.rounds_until("the ground is back", |party| party.all_show(before));
     party.rounds(60);

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_burrow::net::{ClientEvent, Refusal};
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundEdited, GroundJoined, SharedTerrain, WhatBecame};
+use bevy_burrow::together::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
 use bevy_replicon::prelude::*;
 
 use super::{Party, ground, player, server};
@@ -30,18 +30,18 @@ fn what_one_digs_all_see() {
         let terrain = *terrain;
         stage.assert_whole(terrain, "digging together");
         let edited = stage.recorded::<GroundEdited>();
-        let count = |is_such: fn(&WhatBecame) -> bool| {
+        let count = |is_such: fn(&EditOutcome) -> bool| {
             edited.iter().filter(|edited| is_such(&edited.outcome)).count()
         };
-        assert_eq!(count(|outcome| matches!(outcome, WhatBecame::Predicted(_))), 10);
-        assert_eq!(count(|outcome| matches!(outcome, WhatBecame::Confirmed(Some(_)))), 10);
+        assert_eq!(count(|outcome| matches!(outcome, EditOutcome::Predicted(_))), 10);
+        assert_eq!(count(|outcome| matches!(outcome, EditOutcome::Confirmed(Some(_)))), 10);
         let receipts = stage.receipts();
         assert_eq!(receipts.iter().filter(|receipt| receipt.receipt.outcome.is_ok()).count(), 10);
         let events = stage.recorded::<GroundJoined>();
         let repairs = events.iter().filter(|joined| matches!(joined.event, ClientEvent::Repaired(_)));
         assert_eq!(repairs.count(), 0);
     }
-    // One who comes later sees the same.
+    // A player that joins later sees the same.
     party.join();
     party.rounds_until("the late one agrees", Party::agrees);
 }
@@ -59,10 +59,10 @@ fn what_the_server_refuses_is_gone_again_and_undo_takes_back() {
     });
     let (stage, terrain) = &mut party.players[0];
     assert_eq!(stage.terrain(*terrain).world().hash(), pristine);
-    let edited: Vec<WhatBecame> =
+    let edited: Vec<EditOutcome> =
         stage.recorded::<GroundEdited>().into_iter().map(|edited| edited.outcome).collect();
     assert!(
-        matches!(edited[..], [WhatBecame::Predicted(_), WhatBecame::Refused(Some(Refusal::Forbidden))]),
+        matches!(edited[..], [EditOutcome::Predicted(_), EditOutcome::Refused(Some(Refusal::Forbidden))]),
         "{edited:?}"
     );
     let receipt = stage.receipts().last().expect("an answer").receipt.clone();
@@ -99,7 +99,7 @@ fn a_host_plays_too() {
     stage.assert_whole(terrain, "the host's world");
 }
 
-/// A game may take a while for what is asked for in one frame, and go on asking.
+/// A game may take a while for the requests of one frame, and send more.
 #[test]
 fn undos_and_brushes_of_several_frames_keep_their_order() {
     let mut party = Party::new(1);

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 use bevy_burrow::format::Level;
 use bevy_burrow::net::{Kick, Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundServer, SharedTerrain, SharingTrouble, WhatBecame};
+use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble};
 use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;
 use bevy_replicon::test_app::TestClientEntity;
@@ -84,7 +84,7 @@ impl Party {
     }
 }
 
-/// Bytes that a player gets who joins this level and begins with a terrain, which is held until a level is loaded if `is_asset`.
+/// Bytes that are sent to a player that joins this level and begins with a terrain, which is held until a level is loaded if `is_asset`.
 fn bytes_to_join(level: &Terrain, begins: Terrain, is_asset: bool) -> u64 {
     let mut built = copy_of(level, large_ground());
     built.apply([Brush::dig(Shape::sphere(Vec3::new(200.0, 40.0, 200.0), 8.0))]);
@@ -127,7 +127,7 @@ fn a_dig_that_was_ordered_while_its_player_was_away_is_answered_once() {
     assert_eq!(party.players[0].0.tags(), [0; 0]);
     party.reconnect(0);
     party.rounds_until("it is answered", Party::agrees);
-    assert_eq!(party.outcomes(0), [WhatBecame::Confirmed(None)]);
+    assert_eq!(party.outcomes(0), [EditOutcome::Confirmed(None)]);
     let receipts = party.players[0].0.receipts();
     let outcomes: Vec<_> =
         receipts.iter().map(|applied| (applied.receipt.tag, &applied.receipt.outcome)).collect();
@@ -180,7 +180,7 @@ fn what_a_game_changes_in_a_shared_terrain_is_put_right() {
     }
 }
 
-/// Between a connection and the server's first word nothing is known yet: what is dug then, and was dug before, waits.
+/// Between a connection and the server's first word nothing is known yet: digs of that time and earlier ones wait.
 #[test]
 fn who_comes_back_before_the_ground_is_served_loses_nothing() {
     let mut party = Party::new(1);
@@ -199,7 +199,7 @@ fn who_comes_back_before_the_ground_is_served_loses_nothing() {
     party.server.insert_resource(server());
     party.rounds_until("both digs are done", |party| party.agrees() && party.shared(0).number() >= 2);
     let outcomes = party.outcomes(0);
-    assert!(outcomes.iter().all(|outcome| !matches!(outcome, WhatBecame::Refused(_))), "{outcomes:?}");
+    assert!(outcomes.iter().all(|outcome| !matches!(outcome, EditOutcome::Refused(_))), "{outcomes:?}");
     assert_eq!(party.terrain_hash(0), before, "they were shown all the time");
 }
 
@@ -225,7 +225,7 @@ fn an_undo_that_a_lost_connection_interrupts_is_answered_once() {
         assert_eq!(party.steps(0), 1, "with ids: {has_ids}, after {rounds} rounds");
         let (shown, served) = (party.terrain_hash(0), party.ask(|server| server.terrain().world().hash()));
         assert_eq!(shown, served);
-        assert!(!party.outcomes(0).iter().any(|outcome| matches!(outcome, WhatBecame::Refused(_))));
+        assert!(!party.outcomes(0).iter().any(|outcome| matches!(outcome, EditOutcome::Refused(_))));
     }
 }
 
@@ -270,10 +270,10 @@ fn who_connects_twice_plays_over_the_later_connection() {
     party.all_join();
     party.dig_at(0, 30.0, 30.0);
     party.rounds_until("it is done", |party| party.agrees() && party.shared(0).number() >= 1);
-    // The first connection goes on.
+    // The first connection continues.
     party.join();
     party.rounds_until("the later one joins", |party| party.shared(1).has_joined());
-    party.rounds_until("the earlier one is told", |party| party.shared(0).trouble().is_some());
+    party.rounds_until("the earlier one has a trouble", |party| party.shared(0).trouble().is_some());
     assert_eq!(party.shared(0).trouble(), Some(SharingTrouble::Kicked(Kick::ConnectedAgain)));
     let messages = party.ask(|server| server.figures().messages);
     for turn in 0..10 {
@@ -285,7 +285,7 @@ fn who_connects_twice_plays_over_the_later_connection() {
         party.shared(1).pending() == 0 && party.shared(1).number() >= 11
     });
     assert!(party.shared(1).has_joined() && !party.shared(0).has_joined());
-    assert!(party.outcomes(0).iter().skip(2).all(|outcome| matches!(outcome, WhatBecame::Refused(_))));
+    assert!(party.outcomes(0).iter().skip(2).all(|outcome| matches!(outcome, EditOutcome::Refused(_))));
     assert_eq!(party.ask(|server| server.clients().count()), 1);
     let messages = party.ask(|server| server.figures().messages) - messages;
     assert!(messages < 1000, "both take the place of each other: {messages} messages");
@@ -326,10 +326,10 @@ fn a_host_changes_levels_while_somebody_joins() {
         let host = party.server.world_mut().spawn((large_ground(), SharedTerrain::default())).id();
         party.join_with(large_ground(), AuthMethod::ProtocolCheck);
         party.rounds(rounds);
-        // As with one system: the server, and the terrain beside it.
+        // As with one system: the server, and the terrain next to it.
         party.server.world_mut().entity_mut(host).insert(other_ground());
         let hash = party.serve(dug(other_ground(), 12));
-        party.rounds_until("the player is told", |party| {
+        party.rounds_until("the player has a trouble", |party| {
             matches!(party.shared(0).trouble(), Some(SharingTrouble::OtherGround { .. }))
         });
         let terrain = party.players[0].1;
@@ -344,7 +344,7 @@ fn a_host_changes_levels_while_somebody_joins() {
     }
 }
 
-/// One who opens a game alone to friends, and closes it again, goes on with what is there.
+/// A player that opens a game to friends and closes it again continues with the same ground.
 #[test]
 fn a_game_alone_is_opened_and_closed_again() {
     let mut stage = player();
@@ -398,7 +398,7 @@ fn a_terrain_that_is_disabled_for_a_while_misses_nothing() {
         });
         let outcomes = party.outcomes(1);
         let is_answer =
-            |outcome: &&WhatBecame| matches!(outcome, WhatBecame::Confirmed(_) | WhatBecame::Refused(_));
+            |outcome: &&EditOutcome| matches!(outcome, EditOutcome::Confirmed(_) | EditOutcome::Refused(_));
         assert_eq!(outcomes.iter().filter(is_answer).count(), 3, "{outcomes:?}");
     }
 }
@@ -415,6 +415,6 @@ fn what_waits_in_a_shared_terrain_is_answered_when_it_goes_while_it_is_disabled(
     party.rounds(3);
     let outcomes = party.outcomes(0);
     let is_answer =
-        |outcome: &&WhatBecame| matches!(outcome, WhatBecame::Confirmed(_) | WhatBecame::Refused(_));
+        |outcome: &&EditOutcome| matches!(outcome, EditOutcome::Confirmed(_) | EditOutcome::Refused(_));
     assert_eq!(outcomes.iter().filter(is_answer).count(), 1, "{outcomes:?}");
 }

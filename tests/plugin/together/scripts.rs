@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use bevy::prelude::*;
 use bevy_burrow::net::Server;
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundEdited, GroundServer, SharedTerrain, WhatBecame};
+use bevy_burrow::together::{EditOutcome, GroundEdited, GroundServer, SharedTerrain};
 use fastrand::Rng;
 
 use super::{Party, dug, ground, other_ground, settings};
@@ -62,7 +62,7 @@ fn step(party: &mut Party, rng: &mut Rng, tag: u64, asked: &mut [BTreeSet<u64>])
             let world = party.world_mut(player);
             world.despawn(terrain);
             party.players[player].1 = world.spawn((some_ground(rng), SharedTerrain::default())).id();
-            "spawned anew"
+            "spawned again"
         }
         9 => {
             party.world_mut(player).entity_mut(terrain).insert(some_ground(rng));
@@ -95,7 +95,7 @@ fn check_answers(party: &mut Party, player: usize, asked: &BTreeSet<u64>, what: 
     let edited = party.players[player].0.recorded::<GroundEdited>();
     let mut said: Vec<u64> = edited
         .iter()
-        .filter(|edited| !matches!(edited.outcome, WhatBecame::Predicted(_)))
+        .filter(|edited| !matches!(edited.outcome, EditOutcome::Predicted(_)))
         .map(|edited| edited.tag)
         .collect();
     let mut applied = party.players[player].0.tags();

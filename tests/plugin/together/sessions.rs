@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_burrow::net::{Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundServer, SharedTerrain, SharingTrouble, WhatBecame};
+use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble};
 use bevy_replicon::prelude::*;
 
 use super::{Party, dug, ground, large_ground, other_ground, player, server, settings};
@@ -34,7 +34,7 @@ fn players_who_were_there_before_the_world_was_served_are_let_in() {
     party.rounds(20);
     assert_eq!(party.shared(0).pending(), 1);
     party.server.insert_resource(server());
-    party.rounds_until("both join, and what was dug is done", |party| {
+    party.rounds_until("both join, and their digs are done", |party| {
         party.agrees() && party.terrain_hash(1) != ground().world().hash()
     });
 }
@@ -92,7 +92,7 @@ fn a_host_joins_the_server_that_takes_the_place_of_its_own() {
     stage.frames_until("it has joined again", |stage| has_joined(stage, hash));
 }
 
-/// Leaves after so many rounds, and joins again over the same connection.
+/// Leaves after a number of rounds, and joins again over the same connection.
 fn leaves_and_joins_again(after: usize) {
     let (mut party, hash) = large_party();
     party.rounds(after);
@@ -171,7 +171,7 @@ fn the_next_level_is_joined_whoever_changes_first() {
             party.round();
             party.rounds_until("it is answered", |party| party.shared(0).pending() == 0);
             party.round();
-            assert!(matches!(party.outcomes(0)[..], [WhatBecame::Refused(None)]));
+            assert!(matches!(party.outcomes(0)[..], [EditOutcome::Refused(None)]));
             assert_eq!(party.terrain_hash(0), before);
             party.server.insert_resource(other);
         }
@@ -209,14 +209,14 @@ fn one_of_two_shared_terrains_is_shared() {
     party.rounds(30);
     let first = party.players[0].1;
     assert_eq!(party.troubles(0), [SharingTrouble::AnotherIsShared(first)], "once");
-    // Digs on it are answered, and the first one goes on.
+    // Digs on it are answered, and the first one continues.
     party.send(0, dig(1030.0, 20.0, 30.0, 4.0));
     party.dig_at(0, 30.0, 30.0);
     party.rounds_until("the first one is dug", |party| {
         party.agrees() && party.terrain_hash(0) != ground().world().hash()
     });
     assert_eq!(
-        party.outcomes(0).iter().filter(|outcome| matches!(outcome, WhatBecame::Refused(None))).count(),
+        party.outcomes(0).iter().filter(|outcome| matches!(outcome, EditOutcome::Refused(None))).count(),
         1
     );
     let pristine = ground().world().hash();
@@ -272,7 +272,7 @@ fn nothing_is_sent_to_a_player_that_is_gone() {
             numbers
         };
         let count = connected(&mut party.server);
-        party.rounds_until("the server says who is there", |_| {
+        party.rounds_until("the server lists its players", |_| {
             *count.lock().expect("nobody panics") != usize::MAX
         });
         assert_eq!(*count.lock().expect("nobody panics"), 1, "a ghost is left");

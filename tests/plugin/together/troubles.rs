@@ -5,14 +5,14 @@ use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::{Refusal, Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundServer, SharedTerrain, SharingTrouble, TogetherPlugin, WhatBecame};
+use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble, TogetherPlugin};
 use bevy_replicon::prelude::*;
 
 use super::{Party, ground, player, server_app};
 use crate::stage::{Stage, dig};
 
-fn is_refused(outcomes: &[WhatBecame]) -> bool {
-    outcomes.iter().any(|outcome| matches!(outcome, WhatBecame::Refused(None)))
+fn is_refused(outcomes: &[EditOutcome]) -> bool {
+    outcomes.iter().any(|outcome| matches!(outcome, EditOutcome::Refused(None)))
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn a_lost_connection_is_reported_and_digs_wait_for_the_next_one() {
     party.reconnect(0);
     party.rounds_until("they are done", |party| party.agrees() && party.terrain_hash(1) != hash);
     let confirmed = party.outcomes(0);
-    let is_confirmed = |outcome: &&WhatBecame| matches!(outcome, WhatBecame::Confirmed(_));
+    let is_confirmed = |outcome: &&EditOutcome| matches!(outcome, EditOutcome::Confirmed(_));
     assert_eq!(confirmed.iter().filter(is_confirmed).count(), 5);
     assert_eq!(party.shared(0).trouble(), None);
 }
@@ -204,7 +204,7 @@ fn what_a_host_digs_in_its_last_frame_is_saved() {
             let world = stage.terrain(terrain).world();
             (0..turn).all(|turn| !world.is_solid(DVec3::new(20.0 + 15.0 * f64::from(turn), 5.0, 40.0)))
         };
-        stage.frames_until("what was dug in last frames is there", |stage| depth(stage, turn));
+        stage.frames_until("the digs of the last frames are there", |stage| depth(stage, turn));
         stage.send(dig(20.0 + 15.0 * turn as f32, 5.0, 40.0, 3.0));
         stage.write(AppExit::Success);
         stage.frame();

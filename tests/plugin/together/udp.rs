@@ -106,7 +106,7 @@ fn who_has_no_token_of_the_server_does_not_connect() {
     let mut stranger = stranger_to(address);
     let mut forger = player(address, Key::random(), 1);
     let mut honest = player(address, key, 1);
-    until("who has a token joins", &mut server, &mut honest, |player| shared(player).has_joined());
+    until("the player with a token joins", &mut server, &mut honest, |player| shared(player).has_joined());
     let is_connected = |app: &App| *app.world().resource::<State<ClientState>>() == ClientState::Connected;
     frames_until("a second passes", &mut [&mut server, &mut honest.0, &mut stranger, &mut forger.0], {
         let start = Instant::now();
@@ -176,7 +176,7 @@ fn players_come_back_by_themselves() {
     });
     let shown = player.0.world().get::<Terrain>(player.1).expect("it is there").world();
     for x in [20.0, 70.0] {
-        assert!(!shown.is_solid(DVec3::new(x, 20.0, 40.0)), "what was dug at {x} is lost");
+        assert!(!shown.is_solid(DVec3::new(x, 20.0, 40.0)), "the dig at {x} is lost");
     }
     drop(std::fs::remove_dir_all(&folder));
 }

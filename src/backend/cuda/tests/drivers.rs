@@ -1,7 +1,7 @@
 //! Devices that cannot be opened or not be trusted.
 
 use super::super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
-use super::super::emulator::skip;
+use super::super::emulator_process::skip;
 use super::*;
 use std::ops::Range;
 

@@ -18,7 +18,7 @@ use fastrand::Rng;
 use super::async_copies::AsyncCopies;
 use super::device::Device;
 use super::driver::Card;
-use super::emulator::Emulator;
+use super::emulator_process::Emulator;
 use super::zero_copy::ZeroCopy;
 use super::*;
 use crate::backend::Engine;
