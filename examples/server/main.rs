@@ -46,7 +46,7 @@ use bevy::app::ScheduleRunnerPlugin;
 use bevy::prelude::*;
 use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::WorkLimits;
+use bevy_burrow::terrain::{Meshing, WorkLimits};
 use clap::Parser;
 
 use noise_ground::noise_ground;
@@ -109,7 +109,9 @@ fn make(options: &Options, source: script::Source) -> Result<App> {
     Ok(app)
 }
 
-fn app(options: &Options, source: script::Source, terrain: Terrain) -> App {
+fn app(options: &Options, source: script::Source, mut terrain: Terrain) -> App {
+    // Nothing is shown, so no surfaces are made or kept.
+    terrain.set_meshing(Meshing::Never);
     let period = Duration::try_from_secs_f64(1.0 / options.ticks).unwrap_or(Duration::ZERO);
     let mut app = App::new();
     app.add_plugins(MinimalPlugins.set(ScheduleRunnerPlugin::run_loop(period)))

@@ -1,5 +1,9 @@
 //! From one cut to another in small steps, each of which is a cut too.
 
+use std::collections::BTreeSet;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
 use super::{Cut, Node};
 
 /// One step: some nodes split or merged, and the meshes that change.
@@ -42,24 +46,31 @@ impl Cut {
             return (!all.new.is_empty()).then_some(all);
         }
         let before = self.clone();
-        let mut changed = Vec::new();
-        let mut step = Step::default();
-        while let Some((node, is_split)) = self.next_change(other, &rank) {
-            let undone = self.clone();
+        let mut way = Way::new(self, other, rank);
+        let mut step = DraftStep::default();
+        while let Some((node, is_split)) = way.next(self) {
+            let gone = self.nodes_within(node);
             if is_split {
                 self.split(node);
             } else {
                 self.merge(node);
             }
-            changed.push(node);
-            let longer = self.step_from(&before, &changed);
-            if changed.len() > 1 && longer.mesh_count() > most_meshes {
-                *self = undone;
+            let new = self.nodes_within(node);
+            let mut touched = self.touching(node);
+            touched.retain(|&near| before.contains(near));
+            if !step.new.is_empty() && step.mesh_count_with(&gone, &new, &touched) > most_meshes {
+                // Taken back.
+                if is_split {
+                    self.merge(node);
+                } else {
+                    self.split(node);
+                }
                 break;
             }
-            step = longer;
+            way.pass(node, is_split, new.len() as isize - gone.len() as isize);
+            step.add(gone, new, touched);
         }
-        (!step.new.is_empty()).then_some(step)
+        (!step.new.is_empty()).then(|| step.finish())
     }
 
     /// All differences from another cut of the same quadtree.
@@ -73,23 +84,6 @@ impl Cut {
         step.touched = touching.filter(|&near| self.contains(near)).collect();
         step.sort();
         step
-    }
-
-    /// The next node to be split, or to be merged.
-    fn next_change(&self, other: &Self, rank: impl Fn(Node) -> u64) -> Option<(Node, bool)> {
-        let to_split = other.split_nodes().filter(|&node| !self.is_split(node));
-        let to_merge = self.split_nodes().filter(|&node| !other.is_split(node));
-        // Nodes of equal rank in order, so that no order of a hash set shows.
-        let nearest = to_split.min_by_key(|&node| (rank(node), node));
-        let farthest = to_merge.max_by_key(|&node| (rank(node), node));
-        let has_more = self.nodes().count() > other.nodes().count();
-        match (nearest, farthest) {
-            (Some(node), farthest) if farthest.is_none() || !has_more => {
-                Some((self.first_to_split(node), true))
-            }
-            (_, Some(node)) => Some((self.first_to_merge(node), false)),
-            _ => None,
-        }
     }
 
     /// The node itself, or one above that must be split first.
@@ -107,23 +101,90 @@ impl Cut {
         }
         node
     }
+}
 
-    /// The nodes to draw again after these nodes changed.
-    fn step_from(&self, before: &Self, changed: &[Node]) -> Step {
-        let mut step = Step::default();
-        for &node in changed {
-            for near in before.nodes_within(node) {
-                if !self.contains(near) {
-                    step.gone.push(near);
-                }
+/// What is left to do from one cut to another. Nodes that are split or merged on the way stay so, hence all that there is to do
+/// is known from the beginning.
+struct Way {
+    /// Nodes to be split and to be merged by their rank; those of equal rank in order, so that no order of a hash set shows.
+    to_split: BTreeSet<(u64, Node)>,
+    to_merge: BTreeSet<(u64, Node)>,
+    ranks: FxHashMap<Node, u64>,
+    /// How many nodes there are more than the other cut has.
+    excess: isize,
+}
+
+impl Way {
+    fn new(cut: &Cut, other: &Cut, rank: impl Fn(Node) -> u64) -> Self {
+        let mut ranks = FxHashMap::default();
+        let mut ranked = |nodes: &mut dyn Iterator<Item = Node>| {
+            let ranked = nodes.map(|node| {
+                let rank = rank(node);
+                ranks.insert(node, rank);
+                (rank, node)
+            });
+            ranked.collect::<BTreeSet<_>>()
+        };
+        let to_split = ranked(&mut other.split_nodes().filter(|&node| !cut.is_split(node)));
+        let to_merge = ranked(&mut cut.split_nodes().filter(|&node| !other.is_split(node)));
+        let excess = cut.nodes().count() as isize - other.nodes().count() as isize;
+        Self { to_split, to_merge, ranks, excess }
+    }
+
+    /// The next node to be split, or to be merged.
+    fn next(&self, cut: &Cut) -> Option<(Node, bool)> {
+        let nearest = self.to_split.first().map(|&(_, node)| node);
+        let farthest = self.to_merge.last().map(|&(_, node)| node);
+        match (nearest, farthest) {
+            (Some(node), farthest) if farthest.is_none() || self.excess <= 0 => {
+                Some((cut.first_to_split(node), true))
             }
-            for near in self.nodes_within(node) {
-                if !before.contains(near) {
-                    step.new.push(near);
-                }
-            }
-            step.touched.extend(self.touching(node).into_iter().filter(|&near| before.contains(near)));
+            (_, Some(node)) => Some((cut.first_to_merge(node), false)),
+            _ => None,
         }
+    }
+
+    /// Records that a node was split or merged, and how many more nodes there are since.
+    fn pass(&mut self, node: Node, is_split: bool, more: isize) {
+        self.excess += more;
+        if let Some(&rank) = self.ranks.get(&node) {
+            let list = if is_split { &mut self.to_split } else { &mut self.to_merge };
+            list.remove(&(rank, node));
+        }
+    }
+}
+
+/// A step as far as it is known.
+#[derive(Default)]
+struct DraftStep {
+    gone: FxHashSet<Node>,
+    new: FxHashSet<Node>,
+    touched: FxHashSet<Node>,
+}
+
+impl DraftStep {
+    /// The meshes that it makes once nodes are gone, others are new, and these touch them.
+    fn mesh_count_with(&self, gone: &[Node], new: &[Node], touched: &[Node]) -> usize {
+        let without =
+            |own: &FxHashSet<Node>| own.len() - gone.iter().filter(|node| own.contains(*node)).count();
+        let more = touched.iter().filter(|node| !self.touched.contains(*node)).count();
+        without(&self.new) + new.len() + without(&self.touched) + more
+    }
+
+    fn add(&mut self, gone: Vec<Node>, new: Vec<Node>, touched: Vec<Node>) {
+        for node in gone {
+            self.touched.remove(&node);
+            if !self.new.remove(&node) {
+                self.gone.insert(node);
+            }
+        }
+        self.new.extend(new);
+        self.touched.extend(touched);
+    }
+
+    fn finish(self) -> Step {
+        let list = |nodes: FxHashSet<Node>| nodes.into_iter().collect::<Vec<Node>>();
+        let mut step = Step { gone: list(self.gone), new: list(self.new), touched: list(self.touched) };
         step.sort();
         step
     }

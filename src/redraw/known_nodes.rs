@@ -1,15 +1,15 @@
 //! A cache of facts about the nodes of a world's quadtree, and the choice of cuts from them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
 use glam::Vec3;
 use rayon::prelude::*;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 use super::node_facts::GroundFacts;
 use crate::lod::{Cut, LodGrid, LodSettings, Node, NodeFacts, Viewpoint};
-use crate::world::{Version, World};
+use crate::world::World;
 
 /// The number of cached nodes above which some are dropped.
 const KEPT_NODES: usize = 32_768;
@@ -19,8 +19,6 @@ const KEPT_NODES: usize = 32_768;
 #[derive(Default)]
 pub struct KnownNodes {
     facts: RwLock<FxHashMap<Node, GroundFacts>>,
-    /// Nodes with edits, at one version of the world.
-    edited: RwLock<Option<(Version, Arc<FxHashSet<Node>>)>>,
     waiting: AtomicUsize,
 }
 
@@ -45,18 +43,6 @@ impl KnownNodes {
         self.facts.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn edited(&self, world: &World, grid: LodGrid) -> Arc<FxHashSet<Node>> {
-        let mut known = self.edited.write().unwrap_or_else(PoisonError::into_inner);
-        match &*known {
-            Some((version, nodes)) if *version == world.version() => Arc::clone(nodes),
-            _ => {
-                let nodes = Arc::new(world.edited_nodes(grid));
-                *known = Some((world.version(), Arc::clone(&nodes)));
-                nodes
-            }
-        }
-    }
-
     /// One step of `most` meshes at most, or of one change, towards the cut that these eyes need. Nodes that were not drawn
     /// yet, and so are not known, are not split: what is coarse comes first.
     pub fn next_cut(
@@ -68,7 +54,6 @@ impl KnownNodes {
         most: usize,
     ) -> Cut {
         self.learn(world, cut.grid(), cut.nodes());
-        let edited = self.edited(world, cut.grid());
         let target = {
             let facts = self.read();
             choice.cut(cut, eyes, |node| {
@@ -76,7 +61,7 @@ impl KnownNodes {
                 known.map_or(NodeFacts::default(), |GroundFacts { heights, error }| NodeFacts {
                     heights,
                     error,
-                    has_edits: edited.contains(&node),
+                    has_edits: world.is_edited(node),
                 })
             })
         };

@@ -3,13 +3,12 @@
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use glam::IVec3;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::cut::{ChooseCut, DrawnCut, NodeUpdate};
 use super::source::{SurfaceDraft, TileUpdate};
 use crate::lattice::{BrickPos, ChunkPos, Column, ItemCost, ONE, TilePos, parallel_map};
-use crate::lod::{Cut, LodGrid, Node};
+use crate::lod::{Cut, Node};
 use crate::surface::ChunkSurface;
 use crate::surface::lod::{self, LodView, Stacks};
 use crate::surface::vertex::WorldView;
@@ -28,23 +27,6 @@ impl World {
         let state = State::committed(self);
         let updates = state.updates(&cut, &nodes, |_| false);
         (before.after(cut, &updates), updates)
-    }
-
-    /// All nodes with edits, of all levels.
-    pub fn edited_nodes(&self, grid: LodGrid) -> FxHashSet<Node> {
-        let mut nodes = FxHashSet::default();
-        for &(x, z) in self.stacks.keys() {
-            // Samples of a brick may belong to two tiles, along x and z each.
-            for (x, z) in [(0, 0), (7, 0), (0, 7), (7, 7)].map(|(dx, dz)| (x * 8 + dx, z * 8 + dz)) {
-                let tile = self.grid.chunk_of(IVec3::new(x, 0, z)).tile();
-                for level in 0..=grid.top() {
-                    if !nodes.insert(Node::over(tile, level)) {
-                        break;
-                    }
-                }
-            }
-        }
-        nodes
     }
 
     /// Redraws the nodes that show some of these tiles or border on them.

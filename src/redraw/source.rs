@@ -77,7 +77,7 @@ impl World {
             Drawn::Tile(_) => SurfaceDraft::Nothing,
             Drawn::Chunk(chunk) => {
                 let unmeshed = || self.unmeshed(chunk).map(|chunk| SurfaceDraft::Unmeshed(Arc::new(chunk)));
-                let kept = self.meshes.surfaces.get(&chunk).cloned().map(SurfaceDraft::Chunk);
+                let kept = self.meshes.surfaces.get(chunk).cloned().map(SurfaceDraft::Chunk);
                 kept.or_else(unmeshed).unwrap_or(SurfaceDraft::Nothing)
             }
         }

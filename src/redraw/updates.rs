@@ -214,7 +214,7 @@ fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn Mes
     };
     let update = |chunk: ChunkPos, numbers: &[u32]| {
         let nothing = ChunkSurface::default();
-        let old = world.meshes.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
+        let old = world.meshes.surfaces.get(chunk).map_or(&nothing, Arc::as_ref);
         // For a chunk without a kept surface, an empty surface counts as a change.
         let empty = || world.meshes.unmeshed.contains_key(&chunk).then(ChunkSurface::default);
         Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh)).or_else(empty)?)))

@@ -12,7 +12,7 @@ use super::receipt::{Asked, Receipt, Rejection};
 use super::record::CommitRecord;
 use crate::lattice::LatticeBox;
 use crate::loose::LoosePiece;
-use crate::world::{Change, Patch, World, brick_bytes};
+use crate::world::{Change, Patch, Reached, World, brick_bytes};
 
 /// A direction through a terrain's history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +64,10 @@ pub(super) struct UndoDelta {
     pub tags: Vec<u64>,
     /// The pieces that its edits took out of the ground, with the tags of these.
     pub pieces: Vec<(u64, LoosePiece)>,
+    /// Bytes of fields and pieces in its lists, once it is recorded.
+    listed_bytes: usize,
+    /// Where the change holds something, while later edits of the group are added: its lists are not sorted then.
+    reached: Option<Reached>,
 }
 
 impl UndoDelta {
@@ -75,27 +79,54 @@ impl UndoDelta {
         (tags, pieces): (Vec<u64>, Vec<(u64, LoosePiece)>),
     ) -> Self {
         let bounds = change.patch.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
-        Self { change, bounds, brick_bytes: replaced_bytes, group, tags, pieces }
+        Self {
+            change,
+            bounds,
+            brick_bytes: replaced_bytes,
+            group,
+            tags,
+            pieces,
+            listed_bytes: 0,
+            reached: None,
+        }
     }
 
-    /// Adds what later edits of the same group replaced; returns what earlier ones had replaced already.
+    /// Counts what is in its lists, which now are those of the parts that it replaced.
+    fn count(&mut self) {
+        let pieces = self.pieces.iter().map(|(_, piece)| piece.bytes()).sum::<usize>();
+        self.listed_bytes = self.change.field_bytes() + pieces;
+    }
+
+    /// Adds what later edits of the same group replaced, and returns what earlier ones had replaced already. Takes as long as
+    /// there is to add, however long the stroke is.
     fn extend(&mut self, later: Self) -> Patch {
-        let left = self.change.absorb(later.change);
-        let left_bytes = left.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));
-        self.brick_bytes += later.brick_bytes.saturating_sub(left_bytes.sum());
+        let reached = self.reached.get_or_insert_with(|| Reached::of(&self.change));
+        let left = self.change.absorb(reached, later.change);
+        let left_bricks = left.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));
+        self.brick_bytes += later.brick_bytes.saturating_sub(left_bricks.sum());
+        let left_fields = left.fields.iter().map(|(_, fields)| fields.bytes()).sum::<usize>();
+        self.listed_bytes += later.listed_bytes.saturating_sub(left_fields);
         self.bounds = self.bounds.into_iter().chain(later.bounds).reduce(LatticeBox::union);
-        self.tags.reserve_exact(later.tags.len());
         self.tags.extend(later.tags);
-        self.pieces.reserve_exact(later.pieces.len());
         self.pieces.extend(later.pieces);
         left
     }
 
-    /// Bytes that dropping it frees, the counters of its `Arc` included.
+    /// No later edit is added to it.
+    fn close(&mut self) {
+        if self.reached.take().is_some() {
+            self.change.shrink();
+            self.tags.shrink_to_fit();
+            self.pieces.shrink_to_fit();
+        }
+    }
+
+    /// Bytes that dropping it frees, the counters of its `Arc` included. They do not depend on the number of commits that it took:
+    /// what helps to add later edits, and goes when none can come, is not counted.
     fn bytes(&self) -> usize {
-        let own = 2 * size_of::<usize>() + size_of::<Self>() + size_of_val(&self.tags[..]);
-        let pieces = self.pieces.iter().map(|(tag, piece)| size_of_val(tag) + piece.bytes()).sum::<usize>();
-        own + pieces + self.change.bytes() + self.brick_bytes
+        let own = 2 * size_of::<usize>() + size_of::<Self>();
+        let lists = size_of_val(&self.tags[..]) + size_of_val(&self.pieces[..]) + self.change.list_bytes();
+        own + lists + self.listed_bytes + self.brick_bytes
     }
 }
 
@@ -195,7 +226,8 @@ impl UndoStack {
 
     /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can
     /// be redone.
-    pub fn record(&mut self, replaced: UndoDelta, dropped: &mut DeferredDrop) {
+    pub fn record(&mut self, mut replaced: UndoDelta, dropped: &mut DeferredDrop) {
+        replaced.count();
         let first = dropped.steps.len();
         dropped.steps.extend(self.redo.drain(..));
         self.step_bytes -= dropped.steps[first..].iter().map(|step| step.bytes()).sum::<usize>();
@@ -218,9 +250,10 @@ impl UndoStack {
         &mut self,
         step: Step,
         used: &Arc<UndoDelta>,
-        replaced: UndoDelta,
+        mut replaced: UndoDelta,
         dropped: &mut DeferredDrop,
     ) {
+        replaced.count();
         // The budget may have dropped it meanwhile.
         if self.next(step).is_some_and(|next| Arc::ptr_eq(next, used)) {
             dropped.steps.extend(self.list(step).pop_back());
@@ -235,6 +268,10 @@ impl UndoStack {
     }
 
     fn keep(&mut self, step: Step, replaced: UndoDelta) {
+        // No edit joins the step before it any more.
+        if let Some(before) = self.undo.back_mut().and_then(Arc::get_mut) {
+            before.close();
+        }
         self.step_bytes += replaced.bytes();
         self.list(step).push_back(Arc::new(replaced));
     }

@@ -367,4 +367,10 @@ impl Terrain {
     pub fn meshing(&self) -> Meshing {
         self.meshing
     }
+
+    /// Changes the world in a test.
+    #[cfg(test)]
+    pub(crate) fn edit_world(&mut self, edit: impl FnOnce(&mut World)) {
+        edit(Arc::make_mut(&mut self.world));
+    }
 }

@@ -1,8 +1,12 @@
 //! The content that a commit replaces in the world.
 
-use super::patch::{Patch, fill_in};
+use std::hash::Hash;
+
+use rustc_hash::FxHashMap;
+
+use super::patch::Patch;
 use super::state::World;
-use crate::lattice::BrickPos;
+use crate::lattice::{BrickPos, ChunkPos};
 use crate::volume::Brick;
 
 /// Parts of a world at one revision: bricks, fields, words of the mask. Everything else is unchanged or made from
@@ -27,19 +31,73 @@ impl Change {
         std::mem::swap(&mut self.sample_hash, &mut world.sample_hash);
     }
 
-    /// Adds what a later change replaced first, so that swapping restores the state before both. Returns what is not
-    /// added.
-    pub fn absorb(&mut self, later: Self) -> Patch {
-        // The words of a mask come in no order.
-        self.mask.sort_unstable_by_key(|own| own.0);
-        fill_in(&mut self.mask, later.mask);
-        self.patch.fill_in(later.patch)
+    /// Adds what a later change replaced first, so that swapping restores the state before both, and returns what is not added;
+    /// `reached` has the positions of this one. Takes as long as the later change is large. The lists are [sorted](Self::sort)
+    /// no more.
+    pub fn absorb(&mut self, reached: &mut Reached, later: Self) -> Patch {
+        add_new(&mut self.mask, &mut reached.words, later.mask);
+        let Patch { bricks, fields, next_field } = later.patch;
+        self.patch.next_field = self.patch.next_field.max(next_field);
+        Patch {
+            bricks: add_new(&mut self.patch.bricks, &mut reached.bricks, bricks),
+            fields: add_new(&mut self.patch.fields, &mut reached.chunks, fields),
+            next_field,
+        }
     }
 
-    /// Bytes of the lists, and of the fields in them; bricks come on top.
-    pub fn bytes(&self) -> usize {
-        self.patch.bytes() + self.mask.capacity() * size_of::<((i32, i32), u64)>()
+    /// Sorts its lists by positions.
+    pub fn sort(&mut self) {
+        self.patch.bricks.sort_unstable_by_key(|own| own.0);
+        self.patch.fields.sort_unstable_by_key(|own| own.0);
+        self.mask.sort_unstable_by_key(|own| own.0);
     }
+
+    /// Gives back the room that its lists do not need.
+    pub fn shrink(&mut self) {
+        self.patch.bricks.shrink_to_fit();
+        self.patch.fields.shrink_to_fit();
+        self.mask.shrink_to_fit();
+    }
+
+    /// Bytes of the fields in its lists.
+    pub fn field_bytes(&self) -> usize {
+        self.patch.field_bytes()
+    }
+
+    /// Bytes of the lists; bricks and fields come on top.
+    pub fn list_bytes(&self) -> usize {
+        self.patch.list_bytes() + size_of_val(&self.mask[..])
+    }
+}
+
+/// The positions at which a change holds something.
+pub(crate) struct Reached {
+    bricks: FxHashMap<BrickPos, ()>,
+    chunks: FxHashMap<ChunkPos, ()>,
+    words: FxHashMap<(i32, i32), ()>,
+}
+
+impl Reached {
+    /// Those of a change.
+    pub fn of(change: &Change) -> Self {
+        Self {
+            bricks: change.patch.bricks.iter().map(|own| (own.0, ())).collect(),
+            chunks: change.patch.fields.iter().map(|own| (own.0, ())).collect(),
+            words: change.mask.iter().map(|own| (own.0, ())).collect(),
+        }
+    }
+}
+
+/// Adds to a list what another one has at new positions; returns the rest.
+fn add_new<K: Copy + Eq + Hash, V>(
+    list: &mut Vec<(K, V)>,
+    reached: &mut FxHashMap<K, ()>,
+    later: Vec<(K, V)>,
+) -> Vec<(K, V)> {
+    let (new, rest): (Vec<_>, Vec<_>) =
+        later.into_iter().partition(|own| reached.insert(own.0, ()).is_none());
+    list.extend(new);
+    rest
 }
 
 /// Bytes of the brick that a world holds there, if it holds one. Uniform bricks count nothing: the world keeps the one

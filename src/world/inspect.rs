@@ -115,14 +115,14 @@ impl World {
 
     /// The chunks whose positions lie in a box that draw something, or may.
     fn maybe_drawn_in(&self, places: LatticeBox) -> Vec<ChunkPos> {
-        let mut chunks = found_in(&self.meshes.surfaces, places);
+        let mut chunks = found_in(self.meshes.surfaces.table(), places);
         chunks.append(&mut found_in(&self.meshes.unmeshed, places));
         chunks
     }
 
     /// The stored mesh of a chunk; `None` if it draws nothing or no mesh is stored.
     pub fn chunk_surface(&self, chunk: ChunkPos) -> Option<&SurfaceMesh> {
-        self.meshes.surfaces.get(&chunk).map(|surface| surface.mesh())
+        self.meshes.surfaces.get(chunk).map(|surface| surface.mesh())
     }
 }
 

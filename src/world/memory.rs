@@ -13,7 +13,8 @@ pub struct Memory {
     pub samples: usize,
     /// Materials of bricks.
     pub materials: usize,
-    /// Meshes of chunks, from whose unchanged parts the next ones are copied. Besides, room for the next
+    /// Meshes of the chunks that changed last, from whose unchanged parts the next ones are copied: at most 32 MiB, or one
+    /// chunk. Besides, room for the next
     /// transaction is kept, which belongs to no world: some 3 MiB for each thread that meshes, up to 8 of them.
     pub meshes: usize,
     /// Where parts are in meshes, and rings of tiles.
@@ -47,16 +48,16 @@ impl World {
             memory.samples += Brick::BYTES;
             memory.materials += brick.bytes() - Brick::BYTES;
         }
-        for surface in self.meshes.surfaces.values() {
+        for surface in self.meshes.surfaces.surfaces() {
             let (mesh, parts) = surface.bytes();
             memory.meshes += mesh;
             memory.parts += parts;
         }
         memory.parts += self.meshes.rings.values().map(|rings| rings.bytes()).sum::<usize>();
         memory.index +=
-            table_bytes(&self.bricks) + table_bytes(&self.meshes.surfaces) + table_bytes(&self.meshes.rings);
+            table_bytes(&self.bricks) + self.meshes.surfaces.table_bytes() + table_bytes(&self.meshes.rings);
         memory.index += table_bytes(&self.fields) + table_bytes(&self.stacks) + table_bytes(&self.uniform);
-        memory.index += table_bytes(&self.meshes.unmeshed);
+        memory.index += table_bytes(&self.meshes.unmeshed) + self.edited_nodes.bytes();
         memory.index += self.fields.values().map(Fields::bytes).sum::<usize>();
         memory.index += self.stacks.values().map(|stack| stack.capacity() * size_of::<i32>()).sum::<usize>();
         memory

@@ -6,14 +6,17 @@
 //! | `patch` | what differs between two states |
 //! | `change` | what a commit swaps |
 //! | `parts`, `regions` | bricks and fields, as they are saved, compared and sent |
-//! | `meshes`, `unmeshed` | surfaces that are kept, and surfaces that are made when they are asked for |
+//! | `edited_nodes` | which nodes of the quadtree contain edits |
+//! | `meshes`, `kept_surfaces`, `unmeshed` | surfaces that are kept, and surfaces that are made when they are asked for |
 //! | `query`, `ray`, `triangles`, `inspect`, `heights` | heights, rays, debug views, export |
 //! | `memory` | the bytes that it takes |
 //! | `settings` | voxel size and chunk size |
 
 mod change;
+mod edited_nodes;
 mod heights;
 mod inspect;
+mod kept_surfaces;
 mod memory;
 mod meshes;
 mod parts;
@@ -28,7 +31,7 @@ mod state;
 mod triangles;
 mod unmeshed;
 
-pub(crate) use change::{Change, brick_bytes, replaced_bytes};
+pub(crate) use change::{Change, Reached, brick_bytes, replaced_bytes};
 pub use memory::Memory;
 pub(crate) use meshes::NewSurfaces;
 pub(crate) use parts::{brick_over, columns_of};

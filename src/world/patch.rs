@@ -162,6 +162,9 @@ impl Patch {
                 }
                 if stack.is_empty() {
                     world.stacks.remove(&key);
+                    world.edited_nodes.remove(world.grid, key);
+                } else if is_there && stack.len() == 1 {
+                    world.edited_nodes.add(world.grid, key);
                 }
             }
             *brick = before;
@@ -175,20 +178,21 @@ impl Patch {
         world.next_field = world.next_field.max(self.next_field);
     }
 
-    /// Bytes of the lists, and of the fields in them; bricks come on top.
-    pub(crate) fn bytes(&self) -> usize {
-        self.bricks.capacity() * size_of::<ChangedBrick>()
-            + self.fields.capacity() * size_of::<(ChunkPos, Fields)>()
-            + self.fields.iter().map(|(_, fields)| fields.bytes()).sum::<usize>()
+    /// Bytes of the lists; bricks and fields come on top.
+    pub(super) fn list_bytes(&self) -> usize {
+        size_of_val(&self.bricks[..]) + size_of_val(&self.fields[..])
+    }
+
+    /// Bytes of the fields in its list.
+    pub(super) fn field_bytes(&self) -> usize {
+        self.fields.iter().map(|(_, fields)| fields.bytes()).sum()
     }
 }
 
 /// Adds to a list that is sorted by its keys what another one has under other keys; returns the rest.
-pub(super) fn fill_in<K: Copy + Ord, V>(list: &mut Vec<(K, V)>, other: Vec<(K, V)>) -> Vec<(K, V)> {
+fn fill_in<K: Copy + Ord, V>(list: &mut Vec<(K, V)>, other: Vec<(K, V)>) -> Vec<(K, V)> {
     let is_new = |(key, _): &(K, V)| list.binary_search_by_key(key, |own| own.0).is_err();
     let (mut new, left): (Vec<_>, Vec<_>) = other.into_iter().partition(is_new);
-    // Exactly: capacity counts as history's bytes.
-    list.reserve_exact(new.len());
     list.append(&mut new);
     list.sort_by_key(|own| own.0);
     left

@@ -7,9 +7,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
+use super::edited_nodes::EditedNodes;
 use super::meshes::Meshes;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash, shrink_if_sparse};
+use crate::lod::Node;
 use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
@@ -52,6 +54,7 @@ pub struct World {
     pub(crate) bricks: Bricks,
     /// Brick heights (y) over each brick column (x, z), ascending.
     pub(crate) stacks: FxHashMap<(i32, i32), Vec<i32>>,
+    pub(super) edited_nodes: EditedNodes,
     pub(crate) fields: FxHashMap<ChunkPos, Fields>,
     pub(crate) mask: Mask,
     pub(crate) meshes: Meshes,
@@ -100,6 +103,7 @@ impl World {
             grid,
             bricks: Bricks::default(),
             stacks: FxHashMap::default(),
+            edited_nodes: EditedNodes::default(),
             fields: FxHashMap::default(),
             mask: Mask::default(),
             meshes: Meshes::default(),
@@ -130,6 +134,11 @@ impl World {
     /// The cells that marching cubes draws.
     pub fn mask(&self) -> &Mask {
         &self.mask
+    }
+
+    /// Returns `true` if a node of the [quadtree](Self::lod_grid) contains bricks with edits.
+    pub(crate) fn is_edited(&self, node: Node) -> bool {
+        self.edited_nodes.contains(node)
     }
 
     /// Counts the commits.
@@ -206,7 +215,7 @@ impl World {
         let made = || self.unmeshed(chunk).map(|chunk| chunk.surface().mesh().clone());
         self.meshes
             .surfaces
-            .get(&chunk)
+            .get(chunk)
             .map(|surface| surface.mesh().clone())
             .or_else(made)
             .unwrap_or_default()

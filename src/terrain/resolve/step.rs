@@ -58,7 +58,10 @@ pub(crate) fn place(
 /// Resolves a step through history.
 pub(crate) fn step(scene: Scene, asked: Asked, target: &UndoDelta) -> Resolved {
     let (world, start, mut stages) = (scene.world, Instant::now(), Stages::default());
-    let (change, mut bricks) = (target.change.clone(), Vec::with_capacity(target.change.patch.bricks.len()));
+    let mut change = target.change.clone();
+    // A stroke's parts are in the order of its commits.
+    change.sort();
+    let mut bricks = Vec::with_capacity(change.patch.bricks.len());
     let (mut effect, mut changed) = (EditEffect::default(), Vec::with_capacity(change.patch.bricks.len()));
     Stages::time(&mut stages.edit, || {
         for (pos, after) in &change.patch.bricks {
