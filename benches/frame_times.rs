@@ -1,6 +1,7 @@
 //! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT
 //! [horizon] [moving] [passes]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with
-//! levels of detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full detail.
+//! levels of detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full detail, and
+//! the meshes are counted that cast shadows in each cascade.
 //! With `moving`, a terrain of 4096 tiles is drawn while a child of it moves and while nothing does.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
@@ -22,10 +23,12 @@ mod mountains;
 #[path = "../examples/shared/offscreen.rs"]
 mod offscreen;
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use avian3d::prelude::*;
 use bevy::camera::RenderTarget;
+use bevy::camera::visibility::CascadesVisibleEntities;
 use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::diagnostic::DiagnosticsStore;
 use bevy::light::CascadeShadowConfigBuilder;
@@ -37,6 +40,7 @@ use bevy_burrow::backend::{Backend, Engine, EngineState};
 use bevy_burrow::ground::{GreyImage, ImageLimits, ImageScale, NoiseSource};
 use bevy_burrow::lattice::Column;
 use bevy_burrow::physics::{ColliderSource, PhysicsFigures, TerrainPhysicsPlugin};
+use bevy_burrow::plugin::MeshBytes;
 use bevy_burrow::prelude::*;
 use image::Rgb;
 
@@ -300,6 +304,26 @@ impl Walk {
         }
     }
 
+    /// What each cascade of the sun draws: meshes, by the levels of their nodes, and their bytes.
+    fn casters(&mut self) -> Vec<String> {
+        let world = self.app.world_mut();
+        let mut suns = world.query::<&CascadesVisibleEntities>();
+        let cascades = suns.iter(world).flat_map(|sun| sun.entities.values().flatten());
+        let cascades: Vec<Vec<Entity>> = cascades.map(|cascade| cascade.entities.clone()).collect();
+        let mut parts = world.query::<(Option<&Tile>, &MeshBytes)>();
+        let describe = |casters: &Vec<Entity>| {
+            let (mut levels, mut bytes) = (BTreeMap::<u8, usize>::new(), 0);
+            for (tile, own) in parts.iter_many(world, casters) {
+                *levels.entry(tile.map_or(0, |tile| tile.level)).or_default() += 1;
+                bytes += own.0;
+            }
+            let levels: Vec<String> =
+                levels.iter().map(|(level, count)| format!("{level}: {count}")).collect();
+            format!("{} ({}; {} KiB)", casters.len(), levels.join(", "), bytes >> 10)
+        };
+        cascades.iter().map(describe).collect()
+    }
+
     /// Looks at some frames of the walk.
     ///
     /// # Panics
@@ -470,12 +494,18 @@ fn horizon(size: (u32, u32), frames: usize) {
                     (0..FIRST_FRAMES + FRAMES_OF_ROUND).map(|number| walk.frame(number, false)).collect();
                 took.drain(..FIRST_FRAMES);
                 took.sort_unstable();
+                let shadows = if has_shadows { "shadows" } else { "no shadows" };
+                let what = if is_visible { "the ground" } else { "nothing in sight" };
+                walk.report_passes(&format!("{view} km, {shadows}, {what}"));
                 took[took.len() / 2].as_secs_f64() * 1e6
             });
             own[0] -= own[1];
             *time = own[0];
         }
         walk.set_visible(true);
+        walk.set_shadows(true);
+        walk.frame(0, false);
+        println!("    casters in each cascade: {}", walk.casters().join(", "));
         walk.check_for_holes("levels of detail");
         if view == 0.0 {
             first = times;

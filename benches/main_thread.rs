@@ -1,7 +1,8 @@
 //! The cost of digging on the main thread: `cargo bench --features examples --bench main_thread`.
 //!
 //! The real landscape in an app without a renderer, one sphere of radius 4 at a time, compared with idle frames; and
-//! the task's time until Bevy's meshes are ready, by chunk size.
+//! the task's time until Bevy's meshes are ready, by chunk size. Vertices have depths, or with `-- slim` none. With
+//! `-- colliders`, all ground has colliders, in chunks of 32. Printed first is the time until all of the landscape is there.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -18,6 +19,11 @@ fn report(what: &str, mut durations: Vec<Duration>) {
     println!("{what:<50} median {:8.1} us   p99 {:8.1} us   n {}", at(0.5), at(0.99), durations.len());
 }
 
+/// Whether the command line has this word.
+fn is_asked(word: &str) -> bool {
+    std::env::args().any(|arg| arg == word)
+}
+
 /// Times of one app.
 #[derive(Default)]
 struct Times {
@@ -31,17 +37,32 @@ struct Times {
 }
 
 /// An app whose terrain is loaded.
-fn app(ground: &Arc<Ground>, chunk_size: u32) -> App {
+fn app(ground: &Arc<Ground>, chunk_size: u32, is_slim: bool) -> App {
     let settings = TerrainSettings { chunk_size, ..default() };
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, BurrowPlugins));
+    #[cfg(feature = "avian")]
+    if is_asked("colliders") {
+        use avian3d::prelude::PhysicsPlugins;
+        use bevy_burrow::physics::{ColliderSource, TerrainPhysicsPlugin};
+        app.add_plugins((PhysicsPlugins::default(), TerrainPhysicsPlugin));
+        app.world_mut().spawn((Transform::default(), ColliderSource { radius: f32::INFINITY }));
+    }
     app.finish();
     app.cleanup();
-    app.world_mut().spawn(Terrain::new(Arc::clone(ground), &settings).expect("valid settings"));
+    let terrain = Terrain::new(Arc::clone(ground), &settings).expect("valid settings");
+    let terrain = app.world_mut().spawn(terrain).id();
+    if is_slim {
+        app.world_mut().entity_mut(terrain).insert(SlimVertices);
+    }
     let mut tiles = app.world_mut().query_filtered::<(), With<Tile>>();
+    let start = Instant::now();
     while tiles.iter(app.world()).count() == 0 {
         app.update();
+        std::thread::sleep(Duration::from_micros(200));
     }
+    let count = tiles.iter(app.world()).count();
+    println!("chunks of {chunk_size}: {count} tiles in full detail are shown after {:.2?}", start.elapsed());
     app
 }
 
@@ -76,7 +97,9 @@ fn main() {
     let image = GreyImage::decode_png(&bytes, &ImageLimits::default()).expect("a grey PNG");
     let scale = ImageScale { voxels_per_sample: 3, low: 0.0, high: 150.0, detail: None };
     let ground = Arc::new(Ground::from_image(&image, &scale).expect("valid ground"));
-    let mut apps = [32, 25, 50, 100].map(|size| (size, app(&ground, size), Times::default()));
+    let sizes: &[u32] = if is_asked("colliders") { &[32] } else { &[32, 25, 50, 100] };
+    let mut apps: Vec<_> =
+        sizes.iter().map(|&size| (size, app(&ground, size, is_asked("slim")), Times::default())).collect();
     for (turn, i) in (0..500).enumerate() {
         let (x, z) = (40 + i * 389 % 1100, 40 + i * 211 % 940);
         let at = Vec3::new(x as f32, ground.height(Column::new(x, z)) as f32 / 256.0, z as f32);

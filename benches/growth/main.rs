@@ -169,7 +169,7 @@ fn print_world(bricks: usize) {
 
 /// Digs once; returns the times of the transaction and of the commit.
 fn dig(terrain: &mut Terrain, at: Vec3) -> (Duration, Duration) {
-    terrain.submit(&Brush::dig(Shape::sphere(at, 4.0)));
+    terrain.submit(Brush::dig(Shape::sphere(at, 4.0)));
     let transaction = terrain.begin().expect("a dig waits");
     let start = Instant::now();
     let commit = transaction.run();

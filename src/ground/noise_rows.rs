@@ -60,7 +60,7 @@ fn perlin(table: &[u8; 256], xs: &Lanes, z: f64) -> Lanes {
     let easts = us.map(|u| u - 1.0);
     let dots = |corner: usize| {
         let xs = if corner < 2 { &us } else { &easts };
-        gradient_dots(&corners[corner], xs, if corner.is_multiple_of(2) { v } else { v - 1.0 })
+        gradient_dots(&corners[corner], xs, [v, v - 1.0][corner & 1])
     };
     let [north_west, south_west, north_east, south_east] = [dots(0), dots(1), dots(2), dots(3)];
     from_fn(|lane| {

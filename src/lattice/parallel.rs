@@ -13,6 +13,9 @@ pub(crate) enum ItemCost {
     Brick,
     /// Building the surface of a tile or chunk: tens of microseconds.
     Surface,
+    /// Building a surface and what depends on it, such as a collider: a tenth of a millisecond or more.
+    #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
+    Collider,
 }
 
 impl ItemCost {
@@ -23,13 +26,14 @@ impl ItemCost {
             Self::Lookup => 1 << 9,
             Self::Brick => 48,
             Self::Surface => 8,
+            Self::Collider => 2,
         }
     }
 
     /// The most items that a thread takes at once. Surfaces differ in cost, so they are taken one at a time.
     const fn most_at_once(self) -> usize {
         match self {
-            Self::Surface => 1,
+            Self::Surface | Self::Collider => 1,
             _ => usize::MAX,
         }
     }

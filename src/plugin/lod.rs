@@ -26,7 +26,7 @@ use crate::terrain::{ChooseCut, Terrain};
 const FASTEST: f32 = 2000.0;
 
 /// A new terrain's cut is reached in steps of this many meshes.
-const FIRST_MESHES: usize = 192;
+const FIRST_MESHES: usize = 400;
 
 /// Edits come first, but after this many transactions with them a change of levels has its turn.
 const EDITS: u32 = 2;

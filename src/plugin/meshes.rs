@@ -12,8 +12,9 @@ use bevy::mesh::{
 };
 
 use super::palettes::{Arranged, Palettes};
+use super::tile_columns::TileColumns;
 use super::{MaterialColors, MeshBytes};
-use crate::ground::{ColumnMaterial, Ground, RowBuffer};
+use crate::ground::Ground;
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
@@ -70,11 +71,20 @@ impl MeshBuilder {
         Self { extras, usages, ground: world.shared_ground() }
     }
 
-    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task.
-    pub(crate) fn build(&self, origin: IVec3, draft: &SurfaceDraft) -> BuiltMesh {
+    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task. The columns of a tile are computed
+    /// unless they are known.
+    pub(super) fn build(
+        &self,
+        origin: IVec3,
+        draft: &SurfaceDraft,
+        columns: Option<&TileColumns>,
+    ) -> BuiltMesh {
         match draft {
             SurfaceDraft::Nothing => None,
-            SurfaceDraft::Tile(tile) => self.build_tile(origin, tile),
+            SurfaceDraft::Tile(tile) => match columns {
+                Some(columns) => self.build_tile(origin, tile, columns),
+                None => self.build_tile(origin, tile, &TileColumns::new(tile)),
+            },
             SurfaceDraft::Chunk(chunk) => self.build_whole(origin, chunk.mesh()),
             SurfaceDraft::Unmeshed(chunk) => self.build_whole(origin, chunk.surface().mesh()),
         }
@@ -90,30 +100,33 @@ impl MeshBuilder {
         arrays.finish(&surface.indices)
     }
 
-    /// Builds the mesh of a node of level 1 or above. Its vertices lie far apart.
-    pub(crate) fn build_node(&self, origin: IVec3, surface: &SurfaceMesh) -> BuiltMesh {
+    /// Builds the mesh of a node of level 1 or above, with columns that are a stride apart. Most vertices lie over them, so
+    /// their heights are computed together, and those of others one by one.
+    pub(crate) fn build_node(
+        &self,
+        columns: (Column, Column),
+        stride: i32,
+        surface: &SurfaceMesh,
+    ) -> BuiltMesh {
         if surface.is_empty() {
             return None;
         }
         let mut arrays = Arrays::with_capacity(surface.vertices.len(), self);
-        arrays.height = Ground::lone_height;
-        arrays.push(&surface.vertices, origin);
+        if self.extras.has_depth {
+            arrays.heights = Heights::Node(NodeHeights::new(&self.ground, columns, stride));
+        }
+        arrays.push(&surface.vertices, columns.0.at(0));
         arrays.finish(&surface.indices)
     }
 
-    /// Builds the mesh of a tile straight from the ground: only its rings and indices depend on digging.
-    fn build_tile(&self, origin: IVec3, draft: &TileUpdate) -> BuiltMesh {
+    /// Builds the mesh of a tile: only its rings and indices depend on digging.
+    fn build_tile(&self, origin: IVec3, draft: &TileUpdate, columns: &TileColumns) -> BuiltMesh {
         if draft.indices().is_empty() {
             return None;
         }
-        let (low, high) = draft.grid.tile_cells(draft.tile);
-        let (width, rings) = ((high.x - low.x + 1).max(0) as usize, draft.rings.vertices());
-        let columns = width * (high.z - low.z + 1).max(0) as usize;
-        let mut arrays = Arrays::with_capacity(columns + rings.len(), self);
-        let mut buffer = RowBuffer::default();
-        for z in low.z..=high.z {
-            arrays.push_columns(z - low.z, draft.ground.row(Column::new(low.x, z), width, &mut buffer));
-        }
+        let (columns, rings) = (columns.vertices(), draft.rings.vertices());
+        let mut arrays = Arrays::with_capacity(columns.len() + rings.len(), self);
+        arrays.push_on_surface(columns);
         arrays.push(rings, origin);
         arrays.finish(draft.indices())
     }
@@ -122,11 +135,12 @@ impl MeshBuilder {
 /// The attributes of a mesh while it is built.
 struct Arrays<'a> {
     mesh_builder: &'a MeshBuilder,
-    /// The query of the pristine surface.
-    height: fn(&Ground, Column) -> i32,
+    heights: Heights,
     positions: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
     materials: Palettes,
+    /// The lowest and the highest corner.
+    bounds: (Vec3, Vec3),
     /// Empty without depths.
     depths: Vec<f32>,
     /// Empty without colours.
@@ -141,10 +155,11 @@ impl<'a> Arrays<'a> {
         let room = |is_there: bool| if is_there { vertices } else { 0 };
         Self {
             mesh_builder,
-            height: Ground::height,
+            heights: Heights::Ground,
             positions: Vec::with_capacity(vertices),
             normals: Vec::with_capacity(vertices),
             materials: Palettes::with_capacity(vertices),
+            bounds: (Vec3::INFINITY, Vec3::NEG_INFINITY),
             depths: Vec::with_capacity(room(*has_depth)),
             colors: Vec::with_capacity(room(!colors.is_empty())),
             blended: (MaterialMix::default(), blend(MaterialMix::default(), colors)),
@@ -153,46 +168,54 @@ impl<'a> Arrays<'a> {
 
     /// Appends vertices whose positions count from some point.
     fn push(&mut self, vertices: &[Vertex], origin: IVec3) {
-        self.positions.extend(vertices.iter().map(Vertex::position_f32));
-        self.normals.extend(vertices.iter().map(|vertex| vertex.normal.to_array()));
+        self.push_without_depth(vertices);
         if self.mesh_builder.extras.has_depth {
-            let height = |column| (self.height)(&self.mesh_builder.ground, column);
-            let depth = |vertex: &Vertex| depth(origin * SNAP + vertex.position, height);
+            let ground = &*self.mesh_builder.ground;
+            let depth = |vertex: &Vertex| {
+                let place = origin * SNAP + vertex.position;
+                match &self.heights {
+                    Heights::Ground => depth(place, |column| ground.height(column)),
+                    Heights::Node(heights) => depth(place, |column| heights.height(ground, column)),
+                }
+            };
             self.depths.extend(vertices.iter().map(depth));
         }
-        vertices.iter().for_each(|vertex| self.push_mix(vertex.materials));
     }
 
-    /// Appends a row of columns as the heightmap draws them: heights, normals, materials.
-    fn push_columns(&mut self, z: i32, row: impl Iterator<Item = (i32, Vec3, ColumnMaterial)>) {
-        for (x, (height, normal, material)) in (0..).zip(row) {
-            let y = height * (SNAP / ONE);
-            self.positions.push([x as f32, y as f32 / SNAP as f32, z as f32]);
-            self.normals.push(normal.to_array());
-            self.push_mix(MaterialMix::column(material));
-        }
+    /// Appends vertices that lie on the undug surface.
+    fn push_on_surface(&mut self, vertices: &[Vertex]) {
+        self.push_without_depth(vertices);
         if self.mesh_builder.extras.has_depth {
-            // They lie on the undug surface.
             self.depths.resize(self.positions.len(), 0.0);
         }
     }
 
-    fn push_mix(&mut self, mix: MaterialMix) {
-        self.materials.push(mix);
-        let colors = &self.mesh_builder.extras.colors;
-        if !colors.is_empty() {
-            if self.blended.0 != mix {
-                self.blended = (mix, blend(mix, colors));
-            }
-            self.colors.push(self.blended.1);
+    fn push_without_depth(&mut self, vertices: &[Vertex]) {
+        let (mut low, mut high) = (IVec3::MAX, IVec3::MIN);
+        for vertex in vertices {
+            (low, high) = (low.min(vertex.position), high.max(vertex.position));
+        }
+        if !vertices.is_empty() {
+            let [low, high] = [low, high].map(|corner| corner.as_vec3() / SNAP as f32);
+            self.bounds = (self.bounds.0.min(low), self.bounds.1.max(high));
+        }
+        self.positions.extend(vertices.iter().map(Vertex::position_f32));
+        self.normals.extend(vertices.iter().map(|vertex| vertex.normal.to_array()));
+        self.materials.extend(vertices.iter().map(|vertex| vertex.materials));
+        if !self.mesh_builder.extras.colors.is_empty() {
+            vertices.iter().for_each(|vertex| self.push_color(vertex.materials));
         }
     }
 
+    fn push_color(&mut self, mix: MaterialMix) {
+        if self.blended.0 != mix {
+            self.blended = (mix, blend(mix, &self.mesh_builder.extras.colors));
+        }
+        self.colors.push(self.blended.1);
+    }
+
     fn finish(mut self, indices: &surface::Indices) -> BuiltMesh {
-        let first = Vec3::from(*self.positions.first()?);
-        let corners =
-            |(min, max): (Vec3, Vec3), at: &[f32; 3]| (min.min(Vec3::from(*at)), max.max(Vec3::from(*at)));
-        let (min, max) = self.positions.iter().fold((first, first), corners);
+        let (min, max) = self.bounds;
         let Arranged { ids, weights, copies, indices } = self.materials.arrange(indices);
         copy(&mut self.positions, &copies);
         copy(&mut self.normals, &copies);
@@ -222,6 +245,43 @@ impl<'a> Arrays<'a> {
     }
 }
 
+/// Where the heights of the pristine surface come from.
+enum Heights {
+    Ground,
+    Node(NodeHeights),
+}
+
+/// Heights of a node's columns.
+struct NodeHeights {
+    low: Column,
+    high: Column,
+    stride: i32,
+    width: usize,
+    heights: Vec<i32>,
+}
+
+impl NodeHeights {
+    /// Those of columns from `low` to `high`, both included.
+    fn new(ground: &Ground, (low, high): (Column, Column), stride: i32) -> Self {
+        let count = |low: i32, high: i32| ((high - low).max(0) as usize).div_ceil(stride as usize) + 1;
+        let [width, depth] = [count(low.x, high.x), count(low.z, high.z)];
+        Self { low, high, stride, width, heights: ground.page_heights(low, stride, [width, depth]) }
+    }
+
+    /// The height over any column.
+    fn height(&self, ground: &Ground, column: Column) -> i32 {
+        // The last column may lie nearer, at the rim.
+        let place = |at: i32, low: i32, high: i32| {
+            let is_drawn = (low..=high).contains(&at) && ((at - low) % self.stride == 0 || at == high);
+            is_drawn.then(|| ((at - low) as usize).div_ceil(self.stride as usize))
+        };
+        let x = place(column.x, self.low.x, self.high.x);
+        let known = x.zip(place(column.z, self.low.z, self.high.z));
+        let known = known.and_then(|(x, z)| self.heights.get(z * self.width + x));
+        known.copied().unwrap_or_else(|| ground.lone_height(column))
+    }
+}
+
 /// Appends copies of some values; nothing if there are no values.
 fn copy<T: Copy>(values: &mut Vec<T>, of: &[u32]) {
     let copies: Vec<T> = of.iter().filter_map(|&at| values.get(at as usize).copied()).collect();
@@ -235,7 +295,9 @@ fn depth(place: IVec3, height: impl Fn(Column) -> i32) -> f32 {
     // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are the same.
     let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
     let next = column.offset(i32::from(x > 0), i32::from(z > 0));
-    let [here, there] = [column, next].map(|column| i64::from(height(column)));
+    let here = i64::from(height(column));
+    // Nearly all vertices lie over a column.
+    let there = if next == column { here } else { i64::from(height(next)) };
     let height = here * i64::from(SNAP) + (there - here) * i64::from(x.max(z));
     (height - i64::from(place.y) * i64::from(ONE)) as f32 / (SNAP * ONE) as f32
 }
@@ -260,7 +322,8 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights, NoiseSource};
-    use crate::terrain::{Drawn, Terrain, TerrainSettings};
+    use crate::lod::Cut;
+    use crate::terrain::{Drawn, NodeUpdate, Terrain, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
 
@@ -356,6 +419,36 @@ mod tests {
     }
 
     #[test]
+    fn depths_of_a_node_are_those_of_the_ground_wherever_its_vertices_lie() {
+        let noise = NoiseHeights { seed: 4, scale: 30.0, amplitude: 20.0, ..NoiseHeights::default() };
+        // Widths that are no multiple of any stride.
+        let ground = Ground::from_source(157, 93, NoiseSource::new(&noise).unwrap()).unwrap();
+        let digs: Vec<Brush> = (0..12)
+            .map(|i| (i * 37 % 157, i * 23 % 93))
+            .map(|(x, z)| (x, ground.height(Column::new(x, z)) / ONE, z))
+            .map(|(x, y, z)| Brush::dig(Shape::sphere(IVec3::new(x, y, z).as_vec3(), 5.0)))
+            .collect();
+        let settings = TerrainSettings { chunk_size: 16, ..TerrainSettings::default() };
+        let mut terrain = Terrain::new(ground, &settings).unwrap();
+        terrain.apply(digs);
+        let world = terrain.world();
+        let builder = MeshBuilder::new(world, VertexExtras::of(None, false), RenderAssetUsages::RENDER_WORLD);
+        let mut compared = 0;
+        for level in 0..4 {
+            // Nodes of different levels meet.
+            let cut = Cut::random(world.lod_grid(level), u64::from(level), 50);
+            for NodeUpdate { node, mesh, .. } in world.draw_cut(cut).1 {
+                let Some(mesh) = mesh else { continue };
+                let columns = world.lod_grid(level).columns(node);
+                let found = bytes_of(builder.build_node(columns, node.stride(), &mesh));
+                assert!(found == bytes_of(builder.build_whole(columns.0.at(0), &mesh)), "{node:?}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 20, "{compared}");
+    }
+
+    #[test]
     fn a_tile_straight_from_the_ground_is_the_tile() {
         let noise = NoiseHeights { seed: 5, scale: 20.0, amplitude: 14.0, ..NoiseHeights::default() };
         let mask = GreyImage::from_samples(70, 60, (0..70 * 60).map(|index| index % 97 * 640).collect());
@@ -378,7 +471,8 @@ mod tests {
                 for (tile, update) in &commit.meshes.tiles {
                     let origin = terrain.world().origin(Drawn::Tile(*tile));
                     for builder in &builders {
-                        let found = bytes_of(builder.build(origin, &SurfaceDraft::Tile(update.clone())));
+                        let found =
+                            bytes_of(builder.build(origin, &SurfaceDraft::Tile(update.clone()), None));
                         assert!(found == bytes_of(builder.build_whole(origin, &update.mesh())), "{tile:?}");
                         compared += usize::from(found.is_some());
                     }

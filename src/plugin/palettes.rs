@@ -80,23 +80,38 @@ impl Palettes {
         Self { mixes: Vec::with_capacity(vertices), all: Set::default() }
     }
 
-    /// Adds the next vertex.
-    pub fn push(&mut self, mix: MaterialMix) {
-        if self.mixes.last() != Some(&mix) {
-            self.all = self.all.union(Set::of(mix));
+    /// Adds further vertices.
+    pub fn extend(&mut self, mixes: impl Iterator<Item = MaterialMix>) {
+        let first = self.mixes.len();
+        self.mixes.extend(mixes);
+        let mut last = None;
+        for mix in &self.mixes[first..] {
+            // Neighbours mostly have the same materials.
+            if last != Some(mix) {
+                self.all = self.all.union(Set::of(*mix));
+                last = Some(mix);
+            }
         }
-        self.mixes.push(mix);
     }
 
     /// Makes all corners of each triangle list the same materials.
     pub fn arrange(mut self, indices: &Indices) -> Arranged {
-        let (copies, indices) = if self.all.len() <= 4 {
+        if self.all.len() <= 4 {
             let list = self.all.list();
-            self.mixes.iter_mut().for_each(|mix| *mix = in_order(*mix, list));
-            (Vec::new(), indices.clone())
-        } else {
-            self.group(indices)
-        };
+            // Neighbours mostly have the same materials.
+            let mut last = MaterialMix::default();
+            let mut ordered = in_order(last, list);
+            let weights = self.mixes.iter().map(|&mix| {
+                if mix != last {
+                    (last, ordered) = (mix, in_order(mix, list));
+                }
+                ordered.weights
+            });
+            let weights = weights.collect();
+            let ids = vec![list; self.mixes.len()];
+            return Arranged { ids, weights, copies: Vec::new(), indices: indices.clone() };
+        }
+        let (copies, indices) = self.group(indices);
         Arranged {
             ids: self.mixes.iter().map(|mix| mix.ids).collect(),
             weights: self.mixes.iter().map(|mix| mix.weights).collect(),
@@ -195,7 +210,7 @@ mod tests {
             let count = rng.usize(3..400);
             let mixes: Vec<_> = (0..count).map(|_| mix(rng, materials)).collect();
             let mut palettes = Palettes::with_capacity(count);
-            mixes.iter().for_each(|&mix| palettes.push(mix));
+            palettes.extend(mixes.iter().copied());
             let corners: Vec<u32> = (0..rng.usize(1..300) * 3).map(|_| rng.u32(..count as u32)).collect();
             let mut indices = Indices::with_capacity(count, corners.len());
             indices.extend(&corners);

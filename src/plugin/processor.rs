@@ -1,5 +1,6 @@
 //! Extra data for each surface: built in the same task as the meshes, swapped in by the same commit.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,9 +11,10 @@ use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
 use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
+use super::tile_columns::KeptColumns;
 use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
-use crate::lod::Node;
+use crate::lod::{LodGrid, Node};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Drawn, DrawnCut, NodeUpdate, SurfaceDraft, Terrain};
 
@@ -178,6 +180,7 @@ pub(super) struct BuildSettings<'w> {
     assets: Option<Res<'w, Assets<Mesh>>>,
     processors: Res<'w, SurfaceProcessors>,
     settings: Res<'w, BurrowSettings>,
+    columns: Res<'w, KeptColumns>,
 }
 
 impl BuildSettings<'_> {
@@ -185,6 +188,11 @@ impl BuildSettings<'_> {
     pub fn builder(&self, terrain: (Entity, &Terrain), extras: VertexExtras) -> SurfaceBuilder {
         let usages = self.assets.as_ref().map(|_| self.settings.mesh_usages);
         SurfaceBuilder::new(terrain, extras, usages, &self.processors)
+    }
+
+    /// A builder for edits of a terrain, which touch the same tiles again and again.
+    pub fn edit_builder(&self, terrain: (Entity, &Terrain), extras: VertexExtras) -> SurfaceBuilder {
+        SurfaceBuilder { columns: Some(self.columns.clone()), ..self.builder(terrain, extras) }
     }
 }
 
@@ -199,6 +207,8 @@ pub(super) struct SurfaceBuilder {
     /// `None` where there are no meshes.
     pub mesh_builder: Option<MeshBuilder>,
     processors: SurfaceProcessors,
+    /// Where the columns of tiles are kept from edit to edit.
+    columns: Option<KeptColumns>,
 }
 
 impl SurfaceBuilder {
@@ -217,6 +227,7 @@ impl SurfaceBuilder {
             revision: world.revision(),
             mesh_builder: mesh_usages.map(|usages| MeshBuilder::new(world, extras, usages)),
             processors: processors.clone(),
+            columns: None,
         }
     }
 
@@ -232,7 +243,8 @@ impl SurfaceBuilder {
         drafts: Vec<(Drawn, SurfaceDraft)>,
         drawn_cut: Option<&DrawnCut>,
     ) -> Vec<BuiltSurface> {
-        parallel_map_into(drafts, ItemCost::Surface, |(drawn, draft)| {
+        let cost = if self.processors.is_empty() { ItemCost::Surface } else { ItemCost::Collider };
+        parallel_map_into(drafts, cost, |(drawn, draft)| {
             let is_drawn = drawn_cut.is_none_or(|cut| cut.shows_parts(drawn.tile()));
             self.build((drawn, is_drawn), draft.is_empty(), || draft)
         })
@@ -242,9 +254,10 @@ impl SurfaceBuilder {
     pub fn build_nodes(&self, updates: Vec<NodeUpdate>) -> Vec<BuiltNode> {
         parallel_map_into(updates, ItemCost::Surface, |update| {
             let NodeUpdate { node, mesh, shown, hidden } = update;
-            let origin = node_origin(self.grid, node);
+            let columns = LodGrid::new(self.grid, u8::MAX).columns(node);
             let build = |mesh: Arc<SurfaceMesh>| {
-                self.mesh_builder.as_ref().and_then(|builder| builder.build_node(origin, &mesh))
+                let builder = self.mesh_builder.as_ref();
+                builder.and_then(|builder| builder.build_node(columns, node.stride(), &mesh))
             };
             let shown = shown.into_iter();
             let shown = shown.map(|(drawn, draft)| self.build((drawn, true), draft.is_empty(), || draft));
@@ -279,9 +292,17 @@ impl SurfaceBuilder {
         }
         let draft = draft();
         built.shown.is_empty = draft.is_empty();
-        built.mesh = mesh_builder.and_then(|builder| builder.build(part.origin, &draft));
+        let columns = match (&draft, &self.columns) {
+            (SurfaceDraft::Tile(tile), Some(kept)) if !built.shown.is_empty => Some((kept.of(tile), tile)),
+            _ => None,
+        };
+        let known = columns.as_ref().map(|(columns, _)| &**columns);
+        built.mesh = mesh_builder.and_then(|builder| builder.build(part.origin, &draft, known));
         if !processors.is_empty() {
-            let surface = &draft.surface();
+            let surface = &match columns {
+                Some((columns, tile)) => Cow::Owned(columns.surface(tile)),
+                None => draft.surface(),
+            };
             let build = |processor: &Arc<dyn SurfaceProcessor>| {
                 guarded.guarded(part.terrain, || processor.build(part, surface))
             };
