@@ -8,8 +8,8 @@ use rustc_hash::FxHashMap;
 use crate::lattice::{ChunkPos, shrink_if_sparse, table_bytes};
 use crate::surface::ChunkSurface;
 
-/// The most bytes of surfaces: some 750 chunks of 32 voxels that are dug all over.
-const MOST_BYTES: usize = 32 << 20;
+/// The most bytes of surfaces: some 1,500 chunks of 32 voxels that are dug all over.
+const MOST_BYTES: usize = 64 << 20;
 
 /// The surfaces of the chunks that changed last, none of them empty. A dig copies the unchanged parts of a kept surface; that of
 /// any other chunk is made again as a whole, which takes about as long as the dig itself in chunks of 32.
