@@ -129,9 +129,7 @@ impl Pace {
                 .saturating_add(u64::try_from(millis).unwrap_or(u64::MAX).saturating_mul(UNKNOWN) / 1000);
         };
         let Some(rate) = greatest(&self.rates) else { return LEAST };
-        // Until the line is known, a pause may be that of a queue.
-        let pauses = self.pauses.iter().filter(|_| self.is_known);
-        let pause = pauses.map(|(_, pause)| *pause).max().unwrap_or_default();
+        let pause = self.pauses.iter().map(|(_, pause)| *pause).max().unwrap_or_default();
         let millis = u64::try_from((shortest + QUEUE + pause).as_millis()).unwrap_or(u64::MAX);
         let probe = if self.is_known { PROBE } else { FIRST_PROBE };
         LEAST.max(rate.saturating_mul(millis) / 1000 * probe / 100)
