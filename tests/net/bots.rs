@@ -122,8 +122,6 @@ pub struct Bot {
     /// The longest time from the arrival of an entry until it was shown.
     pub lag: Duration,
     pub events: BTreeMap<&'static str, u64>,
-    /// The longest time that an entry waited for other bytes of its line.
-    pub queue: Duration,
     pub playable_at: Option<Duration>,
     pub joined_at: Option<Duration>,
     pub durable: u64,
@@ -173,7 +171,6 @@ impl Bot {
             arrived,
             own_frames: 0,
             lag: Duration::ZERO,
-            queue: Duration::ZERO,
             events,
             playable_at: None,
             joined_at: None,
@@ -360,9 +357,6 @@ impl Play {
             };
             let Some(message) = message else { continue };
             bot.bytes[lane as usize] += message.len() as u64;
-            if lane == Lane::Order {
-                bot.queue = bot.queue.max(bot.free[0].saturating_sub(self.now));
-            }
             let way = if lane == Lane::Order { &mut bot.order } else { &mut bot.bulk };
             way.send(message, self.now, &mut bot.free[0], &self.line, &mut self.rng);
         }

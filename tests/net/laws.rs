@@ -15,7 +15,6 @@ use glam::Vec3;
 
 use crate::bots::{Bot, Play, TICK};
 use crate::follower::{count, hills, terrain};
-use crate::link::Line;
 use crate::worlds::any_random_brush;
 
 fn settings() -> ServerSettings {
@@ -270,44 +269,6 @@ fn who_comes_late_plays_soon_without_the_whole_log() {
         play.settle();
     }
     assert!(play.bots.iter().all(|bot| bot.client.figures().repairs == 0));
-}
-
-/// A client gets all regions over a line of this many bytes a second that loses nothing, while four others dig.
-fn join_over(rate: u64) {
-    let settings = ServerSettings { log_bytes: 10_000, ..ServerSettings::default() };
-    let edits = count("BURROW_EDITS", 1000);
-    let mut play = Play::new(&hills(if edits > 20_000 { 512 } else { 160 }), 4, settings);
-    play.seconds(2.0);
-    dig_before(&mut play, edits);
-    play.seconds(20.0);
-    play.line = Line { rate, lost: 0, ..Line::BAD };
-    let before = play.now;
-    play.bots.iter_mut().for_each(|bot| bot.queue = Duration::ZERO);
-    play.join();
-    wait_until(&mut play, 4, |bot| bot.client.has_joined());
-    let (took, late) = (play.now - before, &play.bots[4]);
-    let [order, bulk] = late.bytes;
-    println!(
-        "{rate} bytes a second: joined after {took:?} with {order} and {bulk} bytes, playable after {:?}; entries waited {:?}, \
-         those of others {:?}",
-        late.playable_at.map(|at| at - before),
-        late.queue,
-        play.bots[..4].iter().map(|bot| bot.queue).max()
-    );
-    assert!(late.client.figures().applied < 500, "it got the log");
-    // What is sent before anything is known of the line, and a little more; a window would be 512 KiB.
-    let most = Duration::from_millis(500) + Duration::from_secs_f64(49_152.0 / rate as f64);
-    assert!(late.queue <= most, "entries waited {:?} for regions", late.queue);
-    assert!(play.bots[..4].iter().all(|bot| bot.queue <= most), "entries of others waited");
-    // Some seconds to learn what the line carries.
-    let least = (took.as_secs_f64() - 6.0).max(0.0) * rate as f64 * 0.6;
-    assert!((order + bulk) as f64 >= least, "most of the line was idle");
-    play.settle();
-}
-
-#[test]
-fn a_join_uses_its_line_and_leaves_the_edits_of_the_live_game_their_latency() {
-    join_over(count("BURROW_RATE", 48 << 10));
 }
 
 /// Cuts the first player's line for some seconds while others dig, and restores it.

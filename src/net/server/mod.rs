@@ -22,7 +22,6 @@ mod kept;
 mod keys;
 mod order_log;
 mod own_numbers;
-mod pace;
 mod players;
 mod receive;
 #[cfg(feature = "store")]

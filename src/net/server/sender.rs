@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::pace::Pace;
 use super::settings::ServerSettings;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
@@ -126,12 +125,7 @@ impl Encodings {
     }
 }
 
-/// The most bytes that a client must acknowledge for it to be progress: a line that is slower than this in some seconds is too
-/// slow to join.
-const PROGRESS: u64 = 64 << 10;
-
-/// The bulk lane of a client: limited in bytes a second, and in unacknowledged bytes by the [pace](Pace) of its line and by the
-/// window.
+/// The bulk lane of a client: limited in bytes a second, and in unacknowledged bytes by the window.
 pub struct BulkSender {
     jobs: VecDeque<Job>,
     /// Regions among these.
@@ -148,7 +142,6 @@ pub struct BulkSender {
     noted: u64,
     least: u64,
     window: u64,
-    pace: Pace,
     piece: usize,
 }
 
@@ -163,9 +156,8 @@ impl BulkSender {
             sent: 0,
             acknowledged: 0,
             noted: 0,
-            least: (settings.window / 8).min(settings.bulk.per_second).clamp(1, PROGRESS),
+            least: (settings.window / 8).min(settings.bulk.per_second).max(1),
             window: settings.window,
-            pace: Pace::default(),
             piece: (settings.piece as u64).min(settings.bulk.burst).min(settings.window).max(1) as usize,
         }
     }
@@ -219,10 +211,7 @@ impl BulkSender {
     }
 
     /// Records the number of bytes that have arrived. Returns `false` if it is impossible.
-    pub fn acknowledge(&mut self, bytes: u64, now: Duration) -> bool {
-        if self.acknowledged < bytes && bytes <= self.sent {
-            self.pace.acknowledge(bytes, now);
-        }
+    pub fn acknowledge(&mut self, bytes: u64) -> bool {
         self.acknowledged = self.acknowledged.max(bytes.min(self.sent));
         bytes <= self.sent
     }
@@ -242,8 +231,7 @@ impl BulkSender {
         }
         let rest = self.stream.get(self.at..)?;
         let on_the_way = self.sent - self.acknowledged;
-        let window = self.window.min(self.pace.window(now));
-        let room = window.saturating_sub(on_the_way).min(bucket.left(now));
+        let room = self.window.saturating_sub(on_the_way).min(bucket.left(now));
         let whole = rest.len().min(self.piece);
         // A tiny piece is not worth a message.
         let is_worth_it = room >= whole as u64;
@@ -253,7 +241,6 @@ impl BulkSender {
         let piece = rest.get(..whole)?.to_vec();
         self.at += whole;
         self.sent += whole as u64;
-        self.pace.send(self.sent, self.acknowledged, now);
         Some(piece)
     }
 

@@ -56,9 +56,9 @@ pub struct ServerSettings {
     pub undo_bytes: usize,
     /// Bytes of old entries that are kept for clients that reconnect.
     pub log_bytes: usize,
-    /// The most bytes of the bulk lane for each client. How many there are within this limit is adapted to each client's line.
+    /// Bytes of the bulk lane for each client.
     pub bulk: Rate,
-    /// The most bytes of each lane that a client may not have acknowledged. In the order lane, one message is sent in any case.
+    /// Bytes of each lane that a client may not have acknowledged. In the order lane, one message is sent in any case.
     pub window: u64,
     /// Most bytes of a piece of the bulk lane.
     pub piece: usize,
@@ -81,7 +81,7 @@ impl Default for ServerSettings {
             undo: UndoPolicy::Nobody,
             undo_bytes: 64 << 20,
             log_bytes: 8 << 20,
-            bulk: Rate { per_second: 2 << 20, burst: 128 << 10 },
+            bulk: Rate { per_second: 256 << 10, burst: 32 << 10 },
             window: 512 << 10,
             piece: 1 << 10,
             // Some 40 ms, however much comes at once; at 30 frames a second, all that 64 players may spend.
