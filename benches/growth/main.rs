@@ -105,7 +105,7 @@ fn resident() -> f64 {
     line.trim().trim_end_matches(" kB").parse().unwrap_or(0.0) * 1024.0
 }
 
-/// A place in the ground, up to so many voxels deep.
+/// A place in the ground, at most `depth` voxels deep.
 fn place(ground: &Ground, rng: &mut Rng, depth: f32) -> Vec3 {
     let [x, z] = [ground.width(), ground.depth()].map(|width| rng.f32() * (width - 32) as f32 + 16.0);
     let height = ground.height(Column::new(x as i32, z as i32)) as f32 / 256.0;
@@ -242,7 +242,7 @@ fn save_and_open(terrain: &mut Terrain, ground: &Arc<Ground>, rng: &mut Rng) -> 
     [percentiles(digs)[0] / 1e3, checkpoint.as_secs_f64() * 1e3, open.as_secs_f64() * 1e3]
 }
 
-/// Prints what so many digs leave behind, with meshes and without.
+/// Prints what `count` digs leave behind, with meshes and without.
 fn digs(count: &str) {
     println!(
         "\n| {count} digs of radius 4 | Terrain::memory, MiB | of it samples | meshes and rings | undo | resident more |"

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
-use super::resolve::{FieldChange, Resolved, patch_of};
+use super::resolve::{FieldChange, Resolved, install, patch_of};
 use crate::lattice::ChunkPos;
 use crate::redraw::{DrawnCut, MeshUpdates, Stages};
 use crate::volume::UniformBricks;
@@ -122,15 +122,7 @@ impl Commit {
 
     /// Makes this the world.
     pub(super) fn install(self, world: &mut World) -> Installed {
-        let mut replaced = self.changes;
-        replaced.iter_mut().for_each(|own| own.change.swap(world));
-        replaced.retain(|own| !own.change.patch.bricks.is_empty());
-        if let Some(uniform) = self.uniform {
-            world.set_uniform(uniform);
-        }
-        world.meshes.apply(self.kept);
-        world.shrink();
-        world.next_field = self.next_field;
+        let replaced = install(world, self.changes, self.uniform, self.kept, self.next_field);
         world.revision += 1;
         Installed { receipts: self.receipts, replaced }
     }

@@ -91,7 +91,7 @@ impl UndoDelta {
         }
     }
 
-    /// Counts what is in its lists, which now are those of the parts that it replaced.
+    /// Counts the bytes of its lists, once they hold the replaced parts.
     fn count(&mut self) {
         let pieces = self.pieces.iter().map(|(_, piece)| piece.bytes()).sum::<usize>();
         self.listed_bytes = self.change.field_bytes() + pieces;

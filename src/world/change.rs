@@ -52,7 +52,7 @@ impl Change {
         self.mask.sort_unstable_by_key(|own| own.0);
     }
 
-    /// Gives back the room that its lists do not need.
+    /// Releases the room that its lists do not need.
     pub fn shrink(&mut self) {
         self.patch.bricks.shrink_to_fit();
         self.patch.fields.shrink_to_fit();

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 use web_time::Instant;
 
-use super::resolved::Resolved;
+use super::resolved::{Resolved, install};
 use super::step::{Placed, place};
 use crate::backend::Cpu;
 use crate::edits::{EditEffect, count_replaced};
@@ -16,7 +16,6 @@ use crate::lattice::{BrickPos, LatticeBox};
 use crate::redraw::{Scene, Stages, dirty_cells, joined_mask};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::terrain::commit::Commit;
 use crate::terrain::history::UndoDelta;
 use crate::terrain::parts_error::{PartsError, check_number};
 use crate::terrain::receipt::{Applied, Asked, Receipt};
@@ -112,9 +111,9 @@ pub(crate) fn world_of(
     check_number(revision)?;
     let mut world = World::new(ground, chunk_size);
     let scene = Scene { world: &world, meshing: Meshing::Never, cut: None, backend: &Cpu };
-    let (resolved, _) = replaced(scene, &parts, None, false)?;
-    // What it replaces is pristine.
-    Commit::new(0, false, resolved).install(&mut world);
+    let (Resolved { changes, uniform, next_field, meshes, .. }, _) = replaced(scene, &parts, None, false)?;
+    // The replaced parts are pristine.
+    drop(install(&mut world, changes, uniform, meshes.kept(), next_field));
     world.revision = revision;
     Ok(world)
 }

@@ -8,7 +8,7 @@ use crate::redraw::{MeshUpdates, Stages};
 use crate::terrain::history::UndoDelta;
 use crate::terrain::receipt::Receipt;
 use crate::volume::UniformBricks;
-use crate::world::{Patch, World};
+use crate::world::{NewSurfaces, Patch, World};
 
 /// The result of a transaction's work: the parts that change, how they are drawn, and the answers.
 pub(crate) struct Resolved {
@@ -49,6 +49,25 @@ impl Resolved {
             stages: Stages::default(),
         }
     }
+}
+
+/// Makes parts those of a world, in order, and returns what they replaced.
+pub(crate) fn install(
+    world: &mut World,
+    mut changes: Vec<UndoDelta>,
+    uniform: Option<UniformBricks>,
+    kept: NewSurfaces,
+    next_field: u64,
+) -> Vec<UndoDelta> {
+    changes.iter_mut().for_each(|own| own.change.swap(world));
+    changes.retain(|own| !own.change.patch.bricks.is_empty());
+    if let Some(uniform) = uniform {
+        world.set_uniform(uniform);
+    }
+    world.meshes.apply(kept);
+    world.shrink();
+    world.next_field = next_field;
+    changes
 }
 
 /// The bricks and fields that changes in order lead to, or those of another world.
