@@ -93,7 +93,7 @@ impl UndoDelta {
 
     /// Counts the bytes of its lists, once they hold the replaced parts.
     fn count(&mut self) {
-        let pieces = self.pieces.iter().map(|(_, piece)| piece.bytes()).sum::<usize>();
+        let pieces = self.pieces.iter().map(|(tag, piece)| size_of_val(tag) + piece.bytes()).sum::<usize>();
         self.listed_bytes = self.change.field_bytes() + pieces;
     }
 
@@ -125,7 +125,7 @@ impl UndoDelta {
     /// what helps to add later edits, and goes when none can come, is not counted.
     fn bytes(&self) -> usize {
         let own = 2 * size_of::<usize>() + size_of::<Self>();
-        let lists = size_of_val(&self.tags[..]) + size_of_val(&self.pieces[..]) + self.change.list_bytes();
+        let lists = size_of_val(&self.tags[..]) + self.change.list_bytes();
         own + lists + self.listed_bytes + self.brick_bytes
     }
 }
