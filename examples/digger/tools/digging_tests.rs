@@ -134,7 +134,7 @@ fn what_was_dug_flies_off_as_chips() {
     let is_chips = |burst: &Burst| burst.kind == ParticleKind::Chips(MaterialId(0)) && burst.count > 3;
     assert!(bursts.iter().any(is_chips), "{bursts:?}");
     // A receipt of another brush throws no chips.
-    let receipt = Receipt { tag, outcome: Ok(Applied::default()) };
+    let receipt = Receipt::of_edit(tag, Ok(Applied::default()));
     app.world_mut().write_message(BrushApplied { terrain: None, receipt });
     app.update();
     assert!(drain::<Burst>(&mut app).is_empty());

@@ -259,9 +259,9 @@ fn reserved_material_is_not_available() {
     inventory.reserve(second, ROCK, 20);
     assert_eq!((inventory.amount(ROCK), inventory.available(ROCK)), (100, 10));
     // A rejected brush used nothing.
-    let rejected = Receipt { tag: first, outcome: Err(Rejection::TerrainGone) };
+    let rejected = Receipt::of_edit(first, Err(Rejection::TerrainGone));
     assert_eq!(inventory.apply_receipt(&rejected, true), []);
     assert_eq!((inventory.amount(ROCK), inventory.available(ROCK)), (100, 80));
-    inventory.apply_receipt(&Receipt { tag: second, outcome: Ok(Applied::default()) }, true);
+    inventory.apply_receipt(&Receipt::of_edit(second, Ok(Applied::default())), true);
     assert_eq!(inventory.available(ROCK), 100);
 }
