@@ -56,22 +56,13 @@ impl GroundShape {
         }
         let vertices = welded.vertices(voxel_size / SNAP as f32);
         let (neighbours, beyond) = welded.neighbours(&vertices);
-        Some(Self::of(vertices, welded.triangles, welded.is_heightmap, neighbours, beyond))
-    }
-
-    fn of(
-        vertices: Vec<Vector>,
-        triangles: Vec<[u32; 3]>,
-        is_heightmap: bool,
-        neighbours: Vec<[u32; 3]>,
-        beyond: Vec<Vector>,
-    ) -> Self {
+        let triangles = welded.triangles;
         let bounds = triangles.iter().map(|triangle| {
             let [a, b, c] = triangle.map(|corner| vertices[corner as usize]);
             Aabb::new(a.min(b).min(c), a.max(b).max(c))
         });
-        let (tree, leaves) = ordered_bvh(&bounds.collect::<Vec<_>>(), is_heightmap);
-        Self { vertices, triangles, tree, leaves, neighbours, beyond, plain: OnceLock::new() }
+        let (tree, leaves) = ordered_bvh(&bounds.collect::<Vec<_>>(), welded.is_heightmap);
+        Some(Self { vertices, triangles, tree, leaves, neighbours, beyond, plain: OnceLock::new() })
     }
 
     #[inline]
@@ -277,9 +268,12 @@ impl Shape for GroundShape {
     fn scale_dyn(&self, scale: Vector, _: u32) -> Option<Box<dyn Shape>> {
         // Normals scale inversely.
         let across = Vector::new(scale.y * scale.z, scale.z * scale.x, scale.x * scale.y);
-        let beyond = self.beyond.iter().map(|normal| (normal * across).normalize_or_zero()).collect();
-        let vertices = self.vertices.iter().map(|vertex| *vertex * scale).collect();
-        Some(Box::new(Self::of(vertices, self.triangles.clone(), false, self.neighbours.clone(), beyond)))
+        let mut scaled = Self { plain: OnceLock::new(), ..self.clone() };
+        scaled.vertices.iter_mut().for_each(|vertex| *vertex *= scale);
+        scaled.beyond.iter_mut().for_each(|normal| *normal = (*normal * across).normalize_or_zero());
+        // Its parts keep their numbers.
+        scaled.tree.scale(scale);
+        Some(Box::new(scaled))
     }
 
     fn mass_properties(&self, _: Real) -> MassProperties {
