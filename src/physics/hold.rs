@@ -2,6 +2,7 @@
 
 use avian3d::physics_transform::PhysicsTransformConfig;
 use avian3d::prelude::*;
+use bevy::ecs::entity::EntityHashSet;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::QueryData;
 use bevy::math::Affine3A;
@@ -209,14 +210,14 @@ impl HoldCheck<'_, '_, '_> {
         !self.changed.is_empty() && self.frames.iter().any(has_changed)
     }
 
-    /// Whether a body collides with the ground of some terrain, and, if that has to be checked, may soon reach such ground where
-    /// it has no collider.
-    fn must_hold(&self, body: &BodyItem, solids: &Solids, must_check: bool) -> bool {
+    /// The terrain a body is held for: it collides with its ground and, if that has to be checked, may soon reach a place where
+    /// this ground has no collider.
+    fn holder(&self, body: &BodyItem, solids: &Solids, must_check: bool) -> Option<Entity> {
         let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
         let placed = if must_check { self.placed(body) } else { None };
         // Most terrains have the same layers.
         let mut known: Option<(CollisionLayers, Option<Reach>)> = None;
-        self.frames.iter().any(|frame| {
+        let must_hold = |frame: &&TerrainFrame| {
             let known = match known {
                 Some(known) if known.0 == frame.layers => known,
                 _ => *known.insert((frame.layers, solids.reach(&body.extent, frame.layers))),
@@ -225,7 +226,8 @@ impl HoldCheck<'_, '_, '_> {
             let lacks_ground_at =
                 |place: Vec3| frame.lacks_ground(self.columns, place + reach.middle(), towards, reach.half());
             !must_check || lacks_ground_at(body.position.0) || placed.is_some_and(lacks_ground_at)
-        })
+        };
+        self.frames.iter().find(must_hold).map(|frame| frame.terrain)
     }
 
     /// Where a game has just moved the body by its transform. Physics takes that over in its next step.
@@ -252,6 +254,7 @@ pub(super) fn hold_bodies(
     mut columns: ResMut<Columns>,
     solids: Solids,
     mut known: Local<Vec<TerrainState>>,
+    mut reported: Local<EntityHashSet>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
@@ -269,6 +272,10 @@ pub(super) fn hold_bodies(
     let follows_transform = config.is_none_or(|config| config.transform_to_position);
     let check =
         HoldCheck { frames, are_same, columns: &columns, changed, places: &places, follows_transform };
+    let has_sources = !sources.is_empty();
+    if has_sources {
+        reported.clear();
+    }
     let mut held = 0;
     for mut body in &mut bodies {
         let must_check = check.must_check(&body);
@@ -276,18 +283,21 @@ pub(super) fn hold_bodies(
             continue;
         }
         // Without a check, a held body stays held.
-        if body.can_be_held() && check.must_hold(&body, &solids, must_check) {
-            held += 1;
-            body.hold(&mut commands);
-        } else {
+        let holder = if body.can_be_held() { check.holder(&body, &solids, must_check) } else { None };
+        let Some(terrain) = holder else {
             body.release(&mut commands);
+            continue;
+        };
+        held += 1;
+        body.hold(&mut commands);
+        if !has_sources && reported.insert(terrain) {
+            warn!(
+                "the terrain {terrain} has no colliders, so the body {} and others above it are held: insert a ColliderSource \
+                 on the player, for example",
+                body.entity
+            );
         }
     }
     figures.held = held;
-    if held > 0 && sources.is_empty() {
-        warn_once!(
-            "bodies above a terrain are held: the ground has no colliders, since no entity has a ColliderSource"
-        );
-    }
     figures.main_thread += start.elapsed();
 }

@@ -110,8 +110,10 @@ impl AssetSaver for LevelSaver {
 /// starts from the level. That world saves only its differences from the level, and needs a level to be opened: if that
 /// is another one, for example a new version, [`SavedWorld::base_changed`](super::SavedWorld::base_changed) decides
 /// what happens. If a world is open already, inserting it has no effect.
+///
+/// The component is immutable: for another level, insert another one.
 #[derive(Component, Clone, Debug, PartialEq)]
-#[component(on_insert = hold)]
+#[component(immutable, on_insert = hold)]
 pub struct StartLevel(pub Handle<BurrowLevel>);
 
 /// A level that is being made into a terrain.

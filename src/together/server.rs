@@ -53,6 +53,8 @@ enum Work {
 struct Parts {
     server: Server,
     store: Option<Store>,
+    /// Whether it was logged that saving failed.
+    has_failed: bool,
 }
 
 /// The most requests of the game that wait until a world is read; further ones are dropped.
@@ -75,7 +77,7 @@ pub enum GroundServerEvent {
 impl GroundServer {
     /// Serves a world that is not saved.
     pub fn new(server: Server) -> Self {
-        Self::working(Work::Here(Box::new(Parts { server, store: None })))
+        Self::working(Work::Here(Box::new(Parts { server, store: None, has_failed: false })))
     }
 
     /// Serves a saved world: the one in this folder on the ground of this terrain, or where there is none, the terrain, which is
@@ -86,7 +88,7 @@ impl GroundServer {
         let task = ThreadTask::start(Threads::Background, move || {
             let ReadWorld { store, terrain, troubles } = reader.read()?;
             let server = Server::open(terrain, &store, settings);
-            Ok((Box::new(Parts { server, store: Some(store) }), troubles))
+            Ok((Box::new(Parts { server, store: Some(store), has_failed: false }), troubles))
         });
         Self::working(Work::Opening(task, progress))
     }
@@ -100,7 +102,8 @@ impl GroundServer {
     /// [`Server::open`] to make the server.
     pub fn with_store(server: Server, store: Store) -> Self {
         let data = store.game_data().clone();
-        let mut ground = Self::working(Work::Here(Box::new(Parts { server, store: Some(store) })));
+        let mut ground =
+            Self::working(Work::Here(Box::new(Parts { server, store: Some(store), has_failed: false })));
         ground.data = data;
         ground
     }
@@ -143,7 +146,7 @@ impl GroundServer {
     pub fn serve_instead(&mut self, server: Server) {
         if let Work::Gone = self.work {
             self.served = Some(Served::by(&server));
-            self.work = Work::Here(Box::new(Parts { server, store: None }));
+            self.work = Work::Here(Box::new(Parts { server, store: None, has_failed: false }));
         }
     }
 
@@ -273,8 +276,9 @@ impl Parts {
         self.server.advance(now);
         if let Some(store) = &mut self.store
             && let Err(why) = self.server.save(store)
+            && !std::mem::replace(&mut self.has_failed, true)
         {
-            error_once!("nothing is saved any more: {why}");
+            error!("the world of the ground's server is not saved any more: {why}");
         }
     }
 }

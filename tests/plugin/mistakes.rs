@@ -168,7 +168,7 @@ fn a_brush_with_a_size_that_is_not_allowed() {
             stage.send(dig(30.0, 8.0, 30.0, radius));
             stage.send_to(terrain, dig(30.0, 8.0, 30.0, radius));
         }
-        stage.frames(2);
+        stage.frames_until("all are answered", |stage| stage.receipts().len() == 6);
     });
     assert_eq!(stage.receipts().len(), 6);
     assert_logged(&log, &[terrain], "a brush was rejected", "BrushApplied");
@@ -235,6 +235,44 @@ fn a_surface_processor_that_panics() {
     stage.app.world_mut().resource_mut::<SurfaceProcessors>().add(Broken);
     stage.show(level(1.0));
     assert_eq!(stage.count::<Tile>(), 16, "the ground is shown without its data");
+}
+
+#[cfg(feature = "avian")]
+#[test]
+fn bodies_without_a_collider_source() {
+    use avian3d::prelude::*;
+    use bevy_burrow::physics::{ColliderSource, TerrainPhysicsPlugin};
+
+    fn physics() -> Stage {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, PhysicsPlugins::default(), BurrowPlugins, TerrainPhysicsPlugin));
+        app.finish();
+        app.cleanup();
+        Stage::of(app)
+    }
+
+    let mut terrains = Vec::new();
+    let (_, log) = logged(physics(), |stage| {
+        for number in 0..2 {
+            let at = Vec3::X * 100.0 * number as f32;
+            terrains.push(stage.spawn_at(level(1.0), at));
+            for x in [20.0, 30.0] {
+                let place = Transform::from_translation(at + Vec3::new(x, 12.0, 20.0));
+                stage.app.world_mut().spawn((RigidBody::Dynamic, Collider::sphere(0.5), place));
+            }
+        }
+        stage.frames(60);
+    });
+    assert_logged(&log, &terrains, "has no colliders", "ColliderSource");
+
+    let (_, log) = logged(physics(), |stage| {
+        stage.spawn_at(level(1.0), Vec3::ZERO);
+        let place = Transform::from_xyz(20.0, 12.0, 20.0);
+        stage.app.world_mut().spawn((RigidBody::Dynamic, Collider::sphere(0.5), place));
+        stage.app.world_mut().spawn((ColliderSource { radius: 40.0 }, place));
+        stage.frames(60);
+    });
+    assert_eq!(log.count("has no colliders"), 0, "{}", log.text());
 }
 
 /// Each mistake of the guide's table has a test here that looks for what the table quotes.
