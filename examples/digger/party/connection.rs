@@ -17,7 +17,7 @@ use crate::player::game_state::GameState;
 use crate::ui::hud::Hint;
 use crate::ui::texts;
 use crate::world::landscape::{self, NewGame, OriginalGround};
-use crate::world::saves::PlayedWorld;
+use crate::world::saves::{NotOpened, PlayedWorld};
 
 /// Most players.
 const PLAYERS: usize = 16;
@@ -162,17 +162,18 @@ fn unsaved(ground: &OriginalGround) -> Result<Server> {
     Ok(Server::new(landscape::new_terrain(&ground.0)?, settings()))
 }
 
-/// Continues without saving if the world can't be read.
+/// Serves a world that is not saved while the player reads why the saved one can't be opened.
 fn serve_unsaved(
     mut events: MessageReader<GroundServerEvent>,
     ground: Option<Res<OriginalGround>>,
     mut server: Option<ResMut<GroundServer>>,
     mut hints: MessageWriter<Hint>,
+    mut commands: Commands,
 ) -> Result {
     for event in events.read() {
         match event {
             GroundServerEvent::Opened(Err(why)) => {
-                hints.write(Hint(texts::nothing_saved(why)));
+                commands.trigger(NotOpened(why.to_string()));
                 if let (Some(ground), Some(server)) = (&ground, &mut server) {
                     server.serve_instead(unsaved(ground)?);
                 }

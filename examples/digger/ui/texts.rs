@@ -14,11 +14,11 @@ texts! {
     MAIN_MENU = "Main menu", SAVE_AND_QUIT = "Save and quit", CREATING_TEXTURES = "Creating textures",
     READING_WORLD = "Reading the world", JOINING = "Joining", LOADING_LANDSCAPE = "Loading the landscape",
     MORE_WORLDS = "More worlds", NO_WORLDS = "There are no saved worlds yet.",
-    WORLDS_HELP = "Choose a world to play it. The > button or the right arrow key renames, copies or deletes it.",
+    WORLDS_HELP = "Choose a world to play it. Press > or the right arrow key to rename, duplicate or delete it.",
     WORLD_NAME = "Name", SEED = "Seed",
     SEED_HELP = "The seed decides where hills, layers of rock and ore are. The same seed makes the same world.",
     CREATE = "Create and play", WORLD = "World", PLAY_WORLD = "Play this world", DUPLICATE = "Duplicate",
-    DELETE = "Delete", CURRENT = ", open now", COPY = "copy", SURE = "Are you sure?", CANCEL = "Cancel",
+    DELETE = "Delete", CURRENT = ", open now", OPEN_ELSEWHERE = ", open in another window", COPY = "copy", SURE = "Are you sure?", NOT_POSSIBLE = "Not possible", CANCEL = "Cancel",
     RESET = "Reset", RESET_CONTROLS = "All keys and buttons get their default actions.",
     RESET_SETTINGS = "All settings on this page get their default values.",
     NEW_UNSAVED = "Nothing is saved on this machine: the world that you have dug will be lost.",
@@ -86,6 +86,14 @@ texts! {
 
 pub fn continue_world(name: &str) -> String {
     format!("{CONTINUE} {name}")
+}
+
+pub fn is_open(name: &str) -> String {
+    format!("\"{name}\" is open in another window. Close it there first.")
+}
+
+pub fn not_opened(name: &str, why: impl Display) -> String {
+    format!("\"{name}\" can't be played: {why}.")
 }
 
 pub fn delete_world(name: &str) -> String {

@@ -102,7 +102,8 @@ pub fn item(position: usize, node: Node) -> impl Bundle {
 
 /// A menu item with one line of text.
 pub fn button(position: usize, words: &str, width: f32) -> impl Bundle {
-    let node = Node { width: px(width), padding: UiRect::axes(px(18), px(9)), ..default() };
+    let padding = UiRect::axes(px(18), px(9));
+    let node = Node { width: px(width), padding, overflow: Overflow::clip_x(), ..default() };
     (item(position, node), children![text(words, 22.0, WHITE)])
 }
 

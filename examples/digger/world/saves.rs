@@ -233,6 +233,10 @@ pub struct SavedPlace {
     pub pitch: f32,
 }
 
+/// A saved world can't be opened, so that nothing that is dug would be kept.
+#[derive(Event, Clone, Debug)]
+pub struct NotOpened(pub String);
+
 /// The saved game was read, or there is none: from now on it is written.
 #[derive(Resource)]
 struct GameIsRead;
@@ -324,12 +328,12 @@ fn continue_game(
     mut game: PlayedGame,
     worlds: Query<&WorldStore>,
     server: Option<Res<GroundServer>>,
-    mut hints: MessageWriter<Hint>,
 ) {
     let mut games = Vec::new();
     for message in opened.read() {
         if let Err(why) = &message.outcome {
-            hints.write(Hint(texts::nothing_saved(why)));
+            game.commands.trigger(NotOpened(why.to_string()));
+            continue;
         }
         games.push(worlds.get(message.terrain).ok().and_then(|world| world.get(KEY)));
     }

@@ -1,4 +1,4 @@
-//! The page that asks before something is lost.
+//! The page that asks before something is lost, and says why something can't be done.
 
 use std::sync::Arc;
 
@@ -24,9 +24,8 @@ impl Plugin for QuestionPlugin {
 #[derive(Resource, Clone)]
 pub struct Question {
     text: String,
-    /// The label of the answer that does it.
-    yes: &'static str,
-    action: Arc<dyn Fn(&mut Commands) + Send + Sync>,
+    /// The label of the answer that does it, and what it does; `None` if there is nothing to decide.
+    yes: Option<(&'static str, Arc<dyn Fn(&mut Commands) + Send + Sync>)>,
     /// The page on which it was asked.
     pub back: MenuPage,
 }
@@ -40,20 +39,31 @@ pub fn ask(
     yes: &'static str,
     action: impl Fn(&mut Commands) + Send + Sync + 'static,
 ) {
-    commands.insert_resource(Question { text: text.into(), yes, action: Arc::new(action), back });
+    commands.insert_resource(Question { text: text.into(), yes: Some((yes, Arc::new(action))), back });
+    commands.set_state(MenuPage::Question);
+}
+
+/// Opens the page with a text that the player should not miss, and leads back.
+pub fn tell(commands: &mut Commands, back: MenuPage, text: impl Into<String>) {
+    commands.insert_resource(Question { text: text.into(), yes: None, back });
     commands.set_state(MenuPage::Question);
 }
 
 fn open(mut commands: Commands, question: Option<Res<Question>>) {
     let Some(question) = question.as_deref().cloned() else { return };
-    spawn_page(&mut commands, MenuPage::Question, texts::SURE, WIDTH + 54.0, |column| {
+    let (title, back) = match question.yes {
+        Some(_) => (texts::SURE, texts::CANCEL),
+        None => (texts::NOT_POSSIBLE, texts::BACK),
+    };
+    spawn_page(&mut commands, MenuPage::Question, title, WIDTH + 54.0, |column| {
         let line = Node { width: px(WIDTH), margin: UiRect::bottom(px(14)), ..default() };
         column.spawn((widgets::paragraph(&question.text, 18.0, WHITE), line));
-        column.spawn(widgets::button(0, texts::CANCEL, WIDTH)).observe(super::go_to(question.back));
-        column.spawn(widgets::button(1, question.yes, WIDTH)).observe(
+        column.spawn(widgets::button(0, back, WIDTH)).observe(super::go_to(question.back));
+        let Some((yes, action)) = question.yes else { return };
+        column.spawn(widgets::button(1, yes, WIDTH)).observe(
             move |_: On<Activated>, mut commands: Commands| {
                 commands.set_state(question.back);
-                (question.action)(&mut commands);
+                action(&mut commands);
             },
         );
     });

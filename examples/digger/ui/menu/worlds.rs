@@ -2,8 +2,10 @@
 
 use std::io;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use bevy::prelude::*;
+use bevy::window::PrimaryWindow;
 
 use super::fields::{Draft, Field, spawn_field};
 use super::question;
@@ -15,7 +17,7 @@ use crate::ui::hud::Hint;
 use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, Adjusted, Arrow, GREY, WHITE};
 use crate::world::landscape::NewGame;
-use crate::world::saves::{self, FoundWorld, PlayedWorld};
+use crate::world::saves::{self, FoundWorld, NotOpened, PlayedWorld};
 use crate::world::thumbnails;
 
 /// Width of the buttons.
@@ -24,6 +26,8 @@ const WIDTH: f32 = 460.0;
 const PICTURE: Vec2 = Vec2::new(96.0, 54.0);
 /// Worlds that the list shows at the same time.
 const SHOWN: usize = 6;
+/// How long a world may take to be closed before it counts as open in another window.
+const CLOSING: Duration = Duration::from_secs(5);
 
 /// The pages of saved worlds.
 pub struct WorldsPlugin;
@@ -31,6 +35,7 @@ pub struct WorldsPlugin;
 impl Plugin for WorldsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<FirstShown>()
+            .add_observer(refuse)
             .add_systems(OnEnter(MenuPage::Worlds), open)
             .add_systems(OnEnter(MenuPage::World), open_world.run_if(resource_exists::<Chosen>))
             .add_systems(OnExit(MenuPage::World), rename)
@@ -52,6 +57,30 @@ struct Chosen(PathBuf);
 enum Change {
     Delete(PathBuf),
     Duplicate(PathBuf),
+}
+
+/// Plays no world that can't be saved, and says why. A script has nobody to read it, and goes on.
+fn refuse(
+    not_opened: On<NotOpened>,
+    mut commands: Commands,
+    mut played: ResMut<PlayedWorld>,
+    mut party: ResMut<Party>,
+    mut start: ResMut<Start>,
+    mut hints: MessageWriter<Hint>,
+    windows: Query<(), With<PrimaryWindow>>,
+) {
+    let why = &not_opened.0;
+    let Some(folder) = played.0.clone().filter(|_| !windows.is_empty()) else {
+        hints.write(Hint(texts::nothing_saved(why)));
+        return;
+    };
+    (played.0, *party, start.is_wanted) = (None, Party::Alone, false);
+    commands.trigger(NewGame);
+    let text = match saves::is_closed(&folder) {
+        true => texts::not_opened(&saves::name(&folder), why),
+        false => texts::is_open(&saves::name(&folder)),
+    };
+    question::tell(&mut commands, MenuPage::Menu, text);
 }
 
 fn open(
@@ -111,7 +140,12 @@ fn slot(at: usize, world: &FoundWorld, is_played: bool, picture: Option<Handle<I
     // A world that was left before a picture was taken.
     let picture = picture.map_or(ImageNode::solid_color(Color::srgb(0.16, 0.20, 0.16)), ImageNode::new);
     let minutes = world.saved.elapsed().map_or(0, |passed| passed.as_secs() / 60);
-    let saved = format!("{}{}", texts::ago(minutes), if is_played { texts::CURRENT } else { "" });
+    let open = match is_played {
+        true => texts::CURRENT,
+        false if saves::is_closed(&world.folder) => "",
+        false => texts::OPEN_ELSEWHERE,
+    };
+    let saved = format!("{}{open}", texts::ago(minutes));
     let words = (
         Node { flex_grow: 1.0, overflow: Overflow::clip(), ..widgets::column(px(2)) },
         children![widgets::text(saves::name(&world.folder), 20.0, WHITE), widgets::text(saved, 14.0, GREY)],
@@ -153,40 +187,56 @@ fn open_world(mut commands: Commands, chosen: Res<Chosen>, mut draft: ResMut<Dra
     });
 }
 
-fn rename(chosen: Option<Res<Chosen>>, draft: Res<Draft>, mut hints: MessageWriter<Hint>) {
+fn rename(chosen: Option<Res<Chosen>>, draft: Res<Draft>, played: Res<PlayedWorld>, mut commands: Commands) {
     let Some(folder) = chosen.map(|chosen| chosen.0.clone()).filter(|folder| folder.exists()) else { return };
-    if draft.name != saves::name(&folder)
-        && let Err(why) = saves::rename(&folder, &draft.name)
-    {
-        hints.write(Hint(texts::failed(texts::WORLD_NAME, why)));
+    let name = saves::name(&folder);
+    if draft.name == name {
+        return;
+    }
+    if played.0.as_ref() != Some(&folder) && !saves::is_closed(&folder) {
+        question::tell(&mut commands, MenuPage::Worlds, texts::is_open(&name));
+    } else if let Err(why) = saves::rename(&folder, &draft.name) {
+        question::tell(&mut commands, MenuPage::Worlds, texts::failed(texts::WORLD_NAME, why));
     }
 }
 
-/// Closes the world if it is open, and changes it once that is done.
+/// Closes the world if it is open, and changes it once that is done. One that stays open is somebody else's.
 fn change(
     mut commands: Commands,
     change: Res<Change>,
+    time: Res<Time<Real>>,
+    mut waited: Local<Duration>,
     mut played: ResMut<PlayedWorld>,
-    mut hints: MessageWriter<Hint>,
 ) {
     let (Change::Delete(folder) | Change::Duplicate(folder)) = &*change;
+    if change.is_added() {
+        *waited = Duration::ZERO;
+    }
     if played.0.as_ref() == Some(folder) {
         played.0 = None;
         commands.trigger(NewGame);
         return;
     }
     if !saves::is_closed(folder) {
+        *waited += time.delta();
+        if *waited > CLOSING {
+            commands.remove_resource::<Change>();
+            question::tell(&mut commands, MenuPage::Worlds, texts::is_open(&saves::name(folder)));
+        }
         return;
     }
     let done: io::Result<()> = match &*change {
         Change::Delete(folder) => std::fs::remove_dir_all(folder),
         Change::Duplicate(folder) => saves::duplicate(folder),
     };
-    if let Err(why) = done {
-        hints.write(Hint(texts::failed(&folder.display().to_string(), why)));
-    }
     commands.remove_resource::<Change>();
-    commands.set_state(MenuPage::Worlds);
+    match done {
+        Ok(()) => commands.set_state(MenuPage::Worlds),
+        Err(why) => {
+            let text = texts::failed(&folder.display().to_string(), why);
+            question::tell(&mut commands, MenuPage::Worlds, text);
+        }
+    }
 }
 
 fn open_new(mut commands: Commands, mut draft: ResMut<Draft>) {
@@ -202,10 +252,12 @@ fn open_new(mut commands: Commands, mut draft: ResMut<Draft>) {
     });
 }
 
-fn create(_: On<Activated>, mut commands: Commands, draft: Res<Draft>, mut hints: MessageWriter<Hint>) {
+fn create(_: On<Activated>, mut commands: Commands, draft: Res<Draft>) {
     match saves::create(&draft.name, draft.seed.parse().unwrap_or_default()) {
         Ok(folder) => play(&mut commands, folder),
-        Err(why) => drop(hints.write(Hint(texts::failed(texts::CREATE, why)))),
+        Err(why) => {
+            question::tell(&mut commands, MenuPage::NewWorld, texts::failed(texts::CREATE, why));
+        }
     }
 }
 
@@ -260,6 +312,46 @@ mod tests {
             assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Menu);
             assert_eq!(**app.world().resource::<State<GameState>>(), GameState::Title);
         }
+    }
+
+    #[test]
+    fn a_world_that_is_open_in_another_window_is_neither_played_renamed_nor_deleted() {
+        let folder = std::env::temp_dir().join(format!("digger_elsewhere_{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let lock = std::fs::File::create(folder.join("lock")).expect("a file");
+        lock.try_lock().expect("free");
+        let text = texts::is_open(&saves::name(&folder));
+        let mut app = app(MenuPage::Menu);
+        app.world_mut().spawn((Window::default(), PrimaryWindow));
+        app.insert_resource(Chosen(folder.clone()));
+        let is_told = |app: &mut App| {
+            app.update();
+            app.update();
+            assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Question);
+            assert!(words(app).contains(&text), "{:?}", words(app));
+        };
+
+        play(&mut app.world_mut().commands(), folder.clone());
+        app.update();
+        app.world_mut().trigger(NotOpened("it is open".into()));
+        is_told(&mut app);
+        assert_eq!(*app.world().resource::<PlayedWorld>(), PlayedWorld(None), "nothing is written to it");
+        assert!(!app.world().resource::<Start>().is_wanted);
+
+        go_to(&mut app, MenuPage::World);
+        app.world_mut().resource_mut::<Draft>().name = "mine".into();
+        go_to(&mut app, MenuPage::Worlds);
+        is_told(&mut app);
+        assert_ne!(saves::name(&folder), "mine");
+
+        go_to(&mut app, MenuPage::Worlds);
+        app.insert_resource(Change::Delete(folder.clone()));
+        app.update();
+        app.world_mut().resource_mut::<Time<Real>>().advance_by(CLOSING * 2);
+        app.world_mut().run_system_cached(change).expect("it runs");
+        is_told(&mut app);
+        assert!(folder.exists() && !app.world().contains_resource::<Change>());
+        std::fs::remove_dir_all(&folder).expect("removed");
     }
 
     #[test]
