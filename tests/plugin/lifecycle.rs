@@ -510,12 +510,12 @@ impl Life {
         let shape = Shape::sphere(center, 2.0 + self.rng.u32(0..16) as f32 / 4.0);
         let brush = match self.rng.u32(0..6) {
             0 => Brush::add(shape, MaterialId(4)),
+            1 => Brush::dig(shape).with_roughness(Roughness::new(1.0, 3.0, self.rng.u32(..))),
             2 => Brush::reset(shape),
             3 => {
                 let to = center + Vec3::new(6.0, -2.0, 4.0);
                 Brush::dig(Shape::curve([center, center - Vec3::Y * 3.0, to + Vec3::X * 2.0, to], [2.0, 1.5]))
             }
-            1 => Brush::dig(shape).with_roughness(Roughness::new(1.0, 3.0, self.rng.u32(..))),
             _ => Brush::dig(shape),
         };
         self.tag += 1;

@@ -59,7 +59,8 @@ enum Change {
     Duplicate(PathBuf),
 }
 
-/// Plays no world that can't be saved, and says why. A script has nobody to read it, and goes on.
+/// Plays no world that can't be saved, and says why. A script, which nobody watches, continues
+/// without saving.
 fn refuse(
     not_opened: On<NotOpened>,
     mut commands: Commands,
