@@ -245,6 +245,7 @@
 //! | [`backend`] | engines on CPU and GPU |
 //! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
 //! | [`terrain`] | orders, transactions, history, the commit log; exports what the three above have for games |
+//! | `scatter` | where plants stand, and whether they still do |
 //! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
 //! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `debug`, `panel` | everything else that uses Bevy |
@@ -320,6 +321,7 @@
 //! | `net` | multiplayer: a server and clients without a transport | |
 //! | `picking` | Bevy's pointer events on the ground, with the `TerrainHit` as extra data | |
 //! | `replicon` | multiplayer over bevy_replicon | |
+//! | `scatter` | plants and stones that go and return with their ground | |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
@@ -370,6 +372,8 @@ pub use plugins::BurrowPlugins;
 mod redraw;
 #[cfg(all(feature = "plugin", feature = "store"))]
 pub mod saves;
+#[cfg(feature = "scatter")]
+pub mod scatter;
 #[cfg(feature = "store")]
 pub mod store;
 pub mod surface;
