@@ -89,6 +89,7 @@
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for the game's own textures |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
+//! | plants and stones that follow the ground | `Plants`, `PlantLooks` and the `plants` plugins (feature `scatter`) |
 //! | other cameras, no shadows | `RenderLayers`, `NotShadowCaster`, `NotShadowReceiver` on the terrain |
 //! | more from the same surfaces, in the same commit | `SurfaceProcessor`s |
 //! | a custom look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
@@ -248,7 +249,7 @@
 //! | `scatter` | where plants stand, and whether they still do |
 //! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
-//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `debug`, `panel` | everything else that uses Bevy |
+//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `plants`, `debug`, `panel` | everything else that uses Bevy |
 //!
 //! # How the seam closes
 //!
@@ -363,6 +364,8 @@ pub mod net;
 pub mod panel;
 #[cfg(feature = "avian")]
 pub mod physics;
+#[cfg(all(feature = "plugin", feature = "scatter"))]
+pub mod plants;
 #[cfg(feature = "plugin")]
 pub mod plugin;
 #[cfg(feature = "plugin")]

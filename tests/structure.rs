@@ -11,7 +11,7 @@ use std::path::Path;
 const MODULES: &[&str] = &[
     "threads", "lattice", "lod", "ground", "brush", "volume", "edits", "surface", "dense", "backend",
     "world", "loose", "redraw", "terrain", "scatter", "format", "store", "net", "plugin", "view", "saves",
-    "plugins", "together", "physics", "debug", "panel",
+    "plugins", "together", "physics", "plants", "debug", "panel",
 ];
 
 /// The most names that the documentation shows in public modules, and functions of `Terrain`. What a game needs is shown; what

@@ -44,7 +44,7 @@
 //! | --- | --- |
 //! | `player` | input and bindings, the character, the camera, the headlamp, the game's states |
 //! | `tools` | what the player holds: digging, building, bombs, balls and lamps, and the inventory |
-//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, particles, debris and sounds |
+//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, plants, particles, debris and sounds |
 //! | `ui` | menus, settings, and the heads-up display |
 //! | `party` | playing together: hosting, joining, and what other players look like |
 //! | `film` | scripts that play the game for pictures and films |
@@ -221,6 +221,7 @@ pub fn game(
             world::light::LightPlugin,
             world::particles::ParticlesPlugin,
             world::debris::DebrisEffectsPlugin,
+            world::plants::PlantEffectsPlugin,
         ))
         .init_resource::<ui::images::Images>()
         .add_plugins((

@@ -41,8 +41,10 @@
 //! | `spots` | the spots of a species, before others are asked |
 //! | `plants` | the plants of an area |
 //! | `stands` | whether a plant stands in a world |
+//! | `patches` | squares of plants that follow a world from commit to commit |
 //! | `query` | the nearest plant, plants in a box, plants along a ray |
 
+mod patches;
 mod plants;
 mod query;
 mod rules;
@@ -50,6 +52,7 @@ mod species;
 mod spots;
 mod stands;
 
+pub use patches::{PatchPos, PlantChange, PlantPatch, PlantPatches};
 pub use plants::{Plant, PlantId, Scatter};
 pub use query::PlantHit;
 pub use rules::{Clearance, Clusters, ScatterError, ScatterRules, Species, Stem, ViewDistances};

@@ -1,5 +1,9 @@
 //! The rules of a scatter: species, as a game writes them. All lengths are in voxels.
 
+#[cfg(feature = "plugin")]
+use bevy::reflect::std_traits::ReflectDefault;
+#[cfg(feature = "plugin")]
+use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -8,7 +12,11 @@ use crate::ground::MaterialId;
 /// What grows on a ground. It can be read from a file, and be changed at any time: plants follow from it alone.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+#[cfg_attr(
+    feature = "plugin",
+    derive(bevy::reflect::Reflect),
+    reflect(opaque, Clone, Debug, Default, PartialEq, Serialize, Deserialize)
+)]
 pub struct ScatterRules {
     /// Another number gives other plants.
     pub seed: u64,
@@ -22,7 +30,6 @@ pub struct ScatterRules {
 /// passes all rules.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Species {
     /// Its name. Where its plants stand depends on it, and not on its place in the list.
     pub name: String,
@@ -83,7 +90,6 @@ impl Default for Species {
 /// Groups of plants: round, thinner towards their edges.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Clusters {
     /// Sides of the squares that have one group each, 1 to 1024.
     pub size: f32,
@@ -94,7 +100,6 @@ pub struct Clusters {
 /// A cylinder around a plant, times the plant's size, in which its ground must stay and nothing may be built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Clearance {
     /// Columns within this distance belong to it, at most 16. With 0, the four columns of the plant's cell.
     pub radius: f32,
@@ -105,7 +110,6 @@ pub struct Clearance {
 /// An upright cylinder, times the plant's size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Stem {
     /// Its radius, 1/256 to 16.
     pub radius: f32,
@@ -116,7 +120,6 @@ pub struct Stem {
 /// How far a species is drawn. Where plants stand does not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct ViewDistances {
     /// Plants farther away are drawn with their simple mesh, if they have one.
     pub detail: f32,

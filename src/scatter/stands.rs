@@ -9,6 +9,9 @@ impl Scatter {
     /// there and the air is free.
     pub fn stands(&self, world: &World, plant: &Plant) -> bool {
         let Some(rule) = self.rules.get(usize::from(plant.id.species)) else { return false };
+        if world.stacks.is_empty() {
+            return true;
+        }
         let scaled = |length: i32| (i64::from(length) * i64::from(plant.size) / i64::from(ONE)) as i32;
         let (radius, cell) = (scaled(rule.clearance_radius), plant.cell());
         let low = Column::new((plant.x - radius).div_euclid(ONE), (plant.z - radius).div_euclid(ONE));
@@ -19,6 +22,10 @@ impl Scatter {
         }
         if world.mask().contains(cell) {
             return false;
+        }
+        // The unedited sheet of its own cell is all of its clearance.
+        if rule.clearance_radius == 0 && rule.clearance_height == 0 {
+            return true;
         }
         let top = (plant.y.div_euclid(i64::from(ONE)) as i32 + scaled(rule.clearance_height)).div_euclid(ONE);
         let squared = i64::from(radius).pow(2);
@@ -46,9 +53,7 @@ impl Scatter {
 
 /// Whether there are bricks over any of these columns.
 fn has_edits(world: &World, low: Column, high: Column) -> bool {
-    !world.stacks.is_empty()
-        && (low.z >> 3..=high.z >> 3)
-            .any(|z| (low.x >> 3..=high.x >> 3).any(|x| world.stacks.contains_key(&(x, z))))
+    (low.z >> 3..=high.z >> 3).any(|z| (low.x >> 3..=high.x >> 3).any(|x| world.stacks.contains_key(&(x, z))))
 }
 
 /// Whether the topmost ground of a column is there, and the air above it is free up to some height.

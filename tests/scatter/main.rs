@@ -46,3 +46,9 @@ fn scatter(rules: &ScatterRules) -> Scatter {
 fn all_plants(scatter: &Scatter, ground: &Ground) -> Vec<Plant> {
     scatter.plants(ground, Column::new(0, 0), Column::new(ground.width(), ground.depth()), |_| true)
 }
+
+/// How far the drawn ground may be from a plant's foot, in voxels: vertices are rounded to 1/4096 voxel, along slopes too.
+fn tolerance(plant: &Plant) -> f64 {
+    let [x, z] = plant.rise.map(|rise| f64::from(rise.abs()) / 256.0);
+    (2.0 + x + z) / 4096.0
+}
