@@ -1,6 +1,8 @@
 //! Plants and stones: where they are, and when they stand.
 
 mod laws;
+#[cfg(feature = "plugin")]
+mod plugin;
 mod points;
 mod queries;
 #[path = "../worlds/mod.rs"]
