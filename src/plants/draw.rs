@@ -6,6 +6,8 @@
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::primitives::{Aabb, MeshAabb};
 use bevy::camera::visibility::{NoAutoAabb, VisibilityRange};
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::Allow;
 use bevy::light::NotShadowCaster;
 use bevy::mesh::{Indices, MeshTag, PrimitiveTopology, VertexAttributeValues};
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
@@ -36,6 +38,7 @@ impl Plugin for PlantDrawingPlugin {
         bevy::asset::embedded_asset!(app, "plants.wgsl");
         app.add_plugins(MaterialPlugin::<PlantMaterial>::default())
             .init_resource::<PlantBuffers>()
+            .add_observer(free_slots)
             .add_systems(Update, draw_plants.in_set(PlantSystems).after(super::follow::follow_commits))
             .add_systems(
                 PostUpdate,
@@ -217,6 +220,18 @@ fn draw_plants(
         }
     }
     upload(buffers, &mut assets, &mut materials);
+}
+
+/// Frees the slots of a terrain that is despawned or loses its looks' state. Its entities go with it.
+fn free_slots(
+    gone: On<Remove, DrawnPlants>,
+    mut drawn: Query<&mut DrawnPlants, Allow<Disabled>>,
+    mut buffers: ResMut<PlantBuffers>,
+) {
+    let Ok(mut drawn) = drawn.get_mut(gone.entity) else { return };
+    for (_, (start, count, _)) in drawn.patches.drain() {
+        buffers.slots.give(start, count);
+    }
 }
 
 /// Writes the plants of a patch, and spawns its entities.

@@ -22,6 +22,10 @@ pub(super) fn follow_commits(
             continue; // Another world: loaded again as a whole.
         }
         let world = model.world();
+        // This system runs twice in a frame.
+        if *version == Some(world.version()) {
+            continue;
+        }
         let changes: Vec<PlantChange> = match boxes {
             Some(boxes) if *version == Some(*before) => {
                 boxes.iter().flat_map(|&samples| patches.update(world, Some(samples))).collect()

@@ -1,5 +1,7 @@
 //! Plants and stones: where they are, and when they stand.
 
+#[cfg(feature = "examples")]
+mod drawing;
 mod laws;
 #[cfg(feature = "plugin")]
 mod plugin;
