@@ -105,6 +105,9 @@ pub struct Options {
     /// Draw the script in low quality on a GPU too, as software renderers always do, so that pictures can be compared.
     #[arg(long, requires = "headless")]
     low: bool,
+    /// Draw plants in the script and the tour too. They always are in the window.
+    #[arg(long)]
+    plants: bool,
     /// Log events to standard output, for programs that play the game.
     #[arg(long)]
     tell: bool,
@@ -221,7 +224,6 @@ pub fn game(
             world::light::LightPlugin,
             world::particles::ParticlesPlugin,
             world::debris::DebrisEffectsPlugin,
-            world::plants::PlantEffectsPlugin,
         ))
         .init_resource::<ui::images::Images>()
         .add_plugins((
@@ -244,6 +246,7 @@ fn open_window(options: &Options) -> App {
     let world = options.saved_world().or_else(PlayedWorld::latest);
     let world = world.or_else(|| options.host.and_then(|_| new_world()));
     game(&mut app, options.backend.engine(), SettingsFile::of_user(), world, options.party());
+    app.add_plugins((world::plants::PlantEffectsPlugin, bevy_burrow::plants::PlantCollidersPlugin));
     if let Some(name) = &options.name {
         app.world_mut().resource_mut::<Settings>().name.clone_from(name);
     }

@@ -6,7 +6,7 @@
 
 use std::collections::HashSet;
 
-use bevy_burrow::lattice::{Column, ONE};
+use bevy_burrow::lattice::{Column, LatticeBox, ONE};
 use bevy_burrow::prelude::*;
 use bevy_burrow::scatter::{Clearance, Plant, Scatter, ScatterRules, Species};
 use bevy_burrow::surface::mask::cell_sheet;
@@ -219,15 +219,15 @@ fn plants_go_with_their_clearance() {
 }
 
 #[test]
-fn rules_of_the_ground_can_refuse_a_removal() {
+fn protected_ground_keeps_its_plants() {
     let (mut terrain, scatter, plants) = meadow();
     let tree = plants[0];
-    terrain.set_rules(DiggingRules::default().with_bedrock(30)).expect("valid");
+    let around = LatticeBox { min: tree.cell().at(0) - 4, max: tree.cell().at(60) + 4 };
+    terrain.set_rules(DiggingRules::default().with_protected(around)).expect("valid");
+    let hash = terrain.world().hash();
     terrain.apply([tree.removal()]);
-    println!(
-        "below bedrock, a plant {}",
-        if scatter.stands(terrain.world(), &tree) { "stays" } else { "goes" }
-    );
+    assert!(scatter.stands(terrain.world(), &tree));
+    assert_eq!(terrain.world().hash(), hash);
 }
 
 #[test]

@@ -4,12 +4,13 @@ use avian3d::prelude::*;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy_burrow::plants::{
-    PlantCollidersPlugin, PlantDrawingPlugin, PlantLook, PlantLooks, PlantRemoved, PlantReturned, Plants,
-    PlantsPlugin, ShownPlants, removal_of,
+    PlantDrawingPlugin, PlantLook, PlantLooks, PlantRemoved, PlantReturned, Plants, PlantsPlugin,
+    ShownPlants, removal_of,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::scatter::{Clearance, Clusters, PlantId, ScatterRules, Species, Stem, ViewDistances};
 
+use crate::player::camera::PlayerCamera;
 use crate::tools::{Tool, ToolUsed};
 use crate::world::landscape::{DespawnOnNewGame, GRASS, ROCK};
 
@@ -25,7 +26,7 @@ pub struct PlantEffectsPlugin;
 
 impl Plugin for PlantEffectsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins((PlantsPlugin, PlantDrawingPlugin, PlantCollidersPlugin))
+        app.add_plugins((PlantsPlugin, PlantDrawingPlugin))
             .add_observer(grow)
             .add_observer(fell)
             .add_systems(Update, (fall, stand_up, rot).chain().after(BurrowSystems::Commit));
@@ -120,7 +121,7 @@ fn grow(ready: On<TerrainReady>, mut commands: Commands, mut meshes: ResMut<Asse
 /// A blow of the pickaxe or the drill at a stem fells its tree.
 fn fell(
     used: On<ToolUsed>,
-    camera: Single<&GlobalTransform, With<Camera3d>>,
+    camera: Single<&GlobalTransform, With<PlayerCamera>>,
     terrains: Query<(Entity, &Terrain, &ShownPlants, &GlobalTransform)>,
     mut brushes: MessageWriter<TargetedBrush>,
 ) {
