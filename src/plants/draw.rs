@@ -172,12 +172,13 @@ fn draw_plants(
     for (entity, terrain, mut shown, looks, mut drawn) in &mut terrains {
         let ShownPlants { patches, news, .. } = shown.bypass_change_detection();
         let drawn = drawn.bypass_change_detection();
-        if looks.is_changed() {
+        let mut latest = news.take();
+        if looks.is_changed() || latest.is_none() {
             drawn.clear(&mut commands, &mut buffers.slots);
-            news.clear();
+            latest = None;
             drawn.waiting.extend(patches.iter().flat_map(|patches| patches.iter().map(|(pos, _)| pos)));
         }
-        for news in news.drain(..) {
+        for news in latest.into_iter().flatten() {
             match news {
                 News::Cleared => drawn.clear(&mut commands, &mut buffers.slots),
                 News::Loaded(pos) => drawn.waiting.push(pos),

@@ -42,7 +42,6 @@ impl ShownPlants {
         let scatter = self.scatter().cloned();
         free_later(std::mem::replace(&mut self.patches, scatter.map(PlantPatches::new)));
         (self.task, self.version, self.is_settled) = (None, None, false);
-        self.news.clear();
         self.news.push(News::Cleared);
     }
 }

@@ -105,7 +105,25 @@ pub struct ShownPlants {
     viewers: Vec<load::Viewer>,
     is_settled: bool,
     /// What the drawing has not followed yet.
-    news: Vec<News>,
+    news: NewsList,
+}
+
+/// News for what draws the plants; none are kept before something does.
+#[derive(Debug, Default)]
+struct NewsList(Option<Vec<News>>);
+
+impl NewsList {
+    fn push(&mut self, news: News) {
+        if let Self(Some(all)) = self {
+            all.push(news);
+        }
+    }
+
+    /// All news since the last call; `None` the first time.
+    #[cfg(feature = "render")]
+    fn take(&mut self) -> Option<Vec<News>> {
+        self.0.replace(Vec::new())
+    }
 }
 
 /// What changed of the plants that are shown.
