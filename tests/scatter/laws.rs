@@ -89,7 +89,7 @@ fn step(rng: &mut Rng, terrain: &mut Terrain, standing: &[Plant]) {
 
 #[test]
 fn no_plant_in_the_air_or_in_the_ground_and_none_missing() {
-    let (all, mut gone, mut back) = (steps(120), 0, 0);
+    let (all, mut gone, mut back) = (steps(80), 0, 0);
     for world in 0..all.div_ceil(40) {
         let rng = &mut Rng::with_seed(world);
         let ground = std::sync::Arc::new(random_ground_of_size(rng, world, 48, 40));
