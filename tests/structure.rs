@@ -10,13 +10,13 @@ use std::path::Path;
 /// The modules of the crate, from the ground up. Each imports only those before it.
 const MODULES: &[&str] = &[
     "threads", "lattice", "lod", "ground", "brush", "volume", "edits", "surface", "dense", "backend",
-    "world", "loose", "redraw", "terrain", "format", "store", "net", "plugin", "view", "saves", "plugins",
-    "together", "physics", "debug", "panel",
+    "world", "loose", "redraw", "terrain", "scatter", "format", "store", "net", "plugin", "view", "saves",
+    "plugins", "together", "physics", "plants", "debug", "panel",
 ];
 
 /// The most names that the documentation shows in public modules, and functions of `Terrain`. What a game needs is shown; what
 /// only tools and tests need is `#[doc(hidden)]`, or behind the feature `tools`.
-const SHOWN_NAMES: usize = 230;
+const SHOWN_NAMES: usize = 260;
 const TERRAIN_FUNCTIONS: usize = 37;
 
 /// The text of a crate's files, by path below `src`.

@@ -44,7 +44,7 @@
 //! | --- | --- |
 //! | `player` | input and bindings, the character, the camera, the headlamp, the game's states |
 //! | `tools` | what the player holds: digging, building, bombs, balls and lamps, and the inventory |
-//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, particles, debris and sounds |
+//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, plants, particles, debris and sounds |
 //! | `ui` | menus, settings, and the heads-up display |
 //! | `party` | playing together: hosting, joining, and what other players look like |
 //! | `film` | scripts that play the game for pictures and films |
@@ -105,6 +105,9 @@ pub struct Options {
     /// Draw the script in low quality on a GPU too, as software renderers always do, so that pictures can be compared.
     #[arg(long, requires = "headless")]
     low: bool,
+    /// Draw plants in the script and the tour too. They always are in the window.
+    #[arg(long)]
+    plants: bool,
     /// Log events to standard output, for programs that play the game.
     #[arg(long)]
     tell: bool,
@@ -243,6 +246,7 @@ fn open_window(options: &Options) -> App {
     let world = options.saved_world().or_else(PlayedWorld::latest);
     let world = world.or_else(|| options.host.and_then(|_| new_world()));
     game(&mut app, options.backend.engine(), SettingsFile::of_user(), world, options.party());
+    app.add_plugins((world::plants::PlantEffectsPlugin, bevy_burrow::plants::PlantCollidersPlugin));
     if let Some(name) = &options.name {
         app.world_mut().resource_mut::<Settings>().name.clone_from(name);
     }

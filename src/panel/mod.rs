@@ -31,6 +31,8 @@ mod look_section;
 mod open_level;
 mod operations;
 mod picture;
+#[cfg(feature = "scatter")]
+mod plants_section;
 mod plot;
 mod rules_section;
 mod state;
@@ -216,6 +218,7 @@ fn draw(
     terrains: Query<(Entity, &Terrain)>,
     parts: Query<(Option<&Name>, Option<&MaterialColors>, Option<&LooseGround>, Option<&GroundLook>)>,
     mut places: ResMut<PanelPlaces>,
+    #[cfg(feature = "scatter")] plants: Query<(&crate::plants::Plants, &crate::plants::ShownPlants)>,
     #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,
     mut commands: Commands,
@@ -237,6 +240,11 @@ fn draw(
             TerrainControls::of(terrain, part.and_then(|part| part.2), part.and_then(|part| part.3))
         },
     );
+    #[cfg(feature = "scatter")]
+    let plants = chosen.and_then(|entity| plants.get(entity).ok());
+    #[cfg(feature = "scatter")]
+    let controls =
+        TerrainControls { plants: plants.map(|(crate::plants::Plants(rules), _)| rules.clone()), ..controls };
     let mut lines: Vec<TerrainLine> = terrains
         .iter()
         .map(|(entity, terrain)| {
@@ -258,6 +266,8 @@ fn draw(
         survey: &survey,
         settings: &mut new_settings,
         controls: &mut new_controls,
+        #[cfg(feature = "scatter")]
+        plants: plants.map(|(_, shown)| shown),
         materials: &materials,
         actions: &mut pressed,
     };

@@ -86,6 +86,8 @@ impl Screen {
                 survey: &survey,
                 settings: &mut self.settings,
                 controls: &mut self.controls,
+                #[cfg(feature = "scatter")]
+                plants: None,
                 materials: &materials,
                 actions: &mut actions,
             };

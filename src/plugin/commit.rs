@@ -24,6 +24,10 @@ use super::{
     LoosePieceFound, MaterialColors, SlimVertices,
 };
 use crate::lattice::ChunkPos;
+#[cfg(feature = "scatter")]
+use crate::lattice::LatticeBox;
+#[cfg(feature = "scatter")]
+use crate::terrain::Version;
 use crate::terrain::{Asked, Drawn, FieldChange, Receipt, Rejection, Terrain, World as TerrainWorld};
 use crate::threads::free_later;
 
@@ -94,6 +98,19 @@ pub(super) struct CommitMessages<'w> {
     receipts: MessageWriter<'w, BrushApplied>,
     history: HistoryMessages<'w>,
     found: MessageWriter<'w, LoosePieceFound>,
+    #[cfg(feature = "scatter")]
+    changed: MessageWriter<'w, GroundChanged>,
+}
+
+/// A commit changed the ground of a terrain in this frame.
+#[cfg(feature = "scatter")]
+#[derive(Message, Clone, Debug)]
+pub(crate) struct GroundChanged {
+    pub terrain: Entity,
+    /// The versions before and after.
+    pub versions: [Version; 2],
+    /// Boxes around the samples that changed; `None` if they are not known.
+    pub boxes: Option<Vec<LatticeBox>>,
 }
 
 /// All that it takes to commit.
@@ -227,6 +244,12 @@ fn commit(
         Change::Unseen(unseen) => {
             let is_shown = unseen.is_of(terrain.world()) && unseen.follows(entities.shown);
             if is_shown {
+                #[cfg(feature = "scatter")]
+                messages.changed.write(GroundChanged {
+                    terrain: entity,
+                    versions: [entities.shown, unseen.version()],
+                    boxes: None,
+                });
                 entities.shown = unseen.version();
                 display.show((entity, terrain.world()), &mut entities, surfaces, unseen.fields(), true);
                 display.show_nodes((entity, terrain.world()), &mut entities, nodes);
@@ -275,10 +298,18 @@ fn commit(
     }
     let is_whole = commit.is_whole();
     let fields = commit.field_news().to_vec();
+    #[cfg(feature = "scatter")]
+    let (boxes, before) = (commit.changed_boxes().collect(), terrain.world().version());
     let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return false };
     if !waste.is_empty() {
         free_later(waste);
     }
+    #[cfg(feature = "scatter")]
+    messages.changed.write(GroundChanged {
+        terrain: entity,
+        versions: [before, terrain.world().version()],
+        boxes: (!is_whole).then_some(boxes),
+    });
     let is_step = terrain.has_receipts(Asked::is_step);
     send_history(entity, &mut terrain, &mut messages.history);
     // Another world is loaded like a new terrain; until then the old one is shown.

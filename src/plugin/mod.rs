@@ -51,11 +51,15 @@ mod task;
 mod tile_columns;
 mod times;
 
+#[cfg(feature = "scatter")]
+pub(crate) use commit::GroundChanged;
 pub use components::{Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SlimVertices, Tile};
 #[doc(hidden)]
 pub use components::{GroundPieces, MeshBytes, ShownSurface};
+#[cfg(any(feature = "avian", feature = "scatter"))]
+pub(crate) use entities::TerrainEntities;
 #[cfg(feature = "avian")]
-pub(crate) use entities::{TerrainEntities, trigger_if_alive};
+pub(crate) use entities::trigger_if_alive;
 pub use figures::BurrowFigures;
 #[doc(hidden)]
 pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};
@@ -73,7 +77,7 @@ pub use messages::{
 };
 #[cfg(feature = "picking")]
 pub use picking::TerrainPickingPlugin;
-#[cfg(feature = "avian")]
+#[cfg(any(feature = "avian", feature = "scatter"))]
 pub(crate) use places::Places;
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 pub use propagate::TerrainPropagatePlugin;
@@ -141,7 +145,7 @@ pub(crate) enum BeforeLoad {
 }
 
 /// Systems that look at what was just committed, still in [`BurrowSystems::Commit`].
-#[cfg(feature = "replicon")]
+#[cfg(any(feature = "replicon", feature = "scatter"))]
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct FollowCommits;
 
@@ -215,7 +219,9 @@ impl Plugin for TerrainPlugin {
                     (lod::begin_lod_changes, commit::begin_transactions).chain().in_set(BurrowSystems::Begin),
                 ),
             );
-        #[cfg(feature = "replicon")]
+        #[cfg(feature = "scatter")]
+        app.add_message::<GroundChanged>();
+        #[cfg(any(feature = "replicon", feature = "scatter"))]
         app.configure_sets(
             Update,
             FollowCommits.in_set(BurrowSystems::Commit).after(commit::commit_transactions),

@@ -8,6 +8,8 @@ use super::log::RecordDraft;
 use super::receipt::Receipt;
 use super::resolve::{FieldChange, Resolved, install, patch_of};
 use crate::lattice::ChunkPos;
+#[cfg(all(feature = "plugin", feature = "scatter"))]
+use crate::lattice::LatticeBox;
 use crate::redraw::{DrawnCut, MeshUpdates, Stages};
 use crate::volume::UniformBricks;
 use crate::world::{NewSurfaces, Patch, World};
@@ -112,6 +114,12 @@ impl Commit {
     /// Returns `true` if another world replaces this one, so that all meshes are made again.
     pub fn is_whole(&self) -> bool {
         self.whole.is_some()
+    }
+
+    /// Boxes around the bricks that it changes.
+    #[cfg(all(feature = "plugin", feature = "scatter"))]
+    pub(crate) fn changed_boxes(&self) -> impl Iterator<Item = LatticeBox> {
+        self.changes.iter().filter_map(|delta| delta.bounds)
     }
 
     /// The receipts of its orders.

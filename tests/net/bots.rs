@@ -27,6 +27,17 @@ pub const TICK: Duration = Duration::from_micros(2 * 16_667);
 /// Frames between two edits of a player.
 const EDIT: u64 = 12;
 
+/// The plants that stand in a world.
+#[cfg(feature = "scatter")]
+fn plants(world: &World) -> Vec<bevy_burrow::scatter::Plant> {
+    use bevy_burrow::scatter::{Clearance, Scatter, ScatterRules, Species};
+    let clearance = Clearance { radius: 1.5, height: 6.0 };
+    let tree = Species { spacing: 3.0, distance: 2.5, clearance, ..Species::named("tree") };
+    let scatter = Scatter::new(&ScatterRules { seed: 4, species: vec![tree, Species::named("grass")] });
+    let all = glam::DVec3::splat(1e6);
+    scatter.expect("valid rules").in_box(world, -all, all, |_| true)
+}
+
 /// The world that results from the order, entry by entry, and its hash at every number.
 pub struct Reference {
     terrain: Terrain,
@@ -457,6 +468,8 @@ impl Play {
             assert_eq!(bot.client.world().hash(), hash, "{:?}", bot.id);
             assert_eq!(bot.shown.world().hash(), hash, "{:?}", bot.id);
             assert_eq!(names(bot.client.world()), names(self.server.terrain().world()), "{:?}", bot.id);
+            #[cfg(feature = "scatter")]
+            assert_eq!(plants(bot.client.world()), plants(self.server.terrain().world()), "{:?}", bot.id);
             assert_eq!(bot.client.figures().malformed, 0, "{:?}", bot.id);
         }
         let figures = self.server.figures();

@@ -98,6 +98,10 @@ impl Studio {
                 app.insert_resource(GroundTextures::Baked { side: 512, anisotropy: 1 });
             }
             crate::game(app, engine, SettingsFile::default(), options.saved_world(), options.party());
+            // Without colliders: a scripted player does not walk round trees.
+            if options.plants {
+                app.add_plugins(crate::world::plants::PlantEffectsPlugin);
+            }
         });
         // One frame, for the systems that spawn the camera.
         app.update();
