@@ -17,6 +17,7 @@
 #![cfg(feature = "examples")]
 
 mod album;
+mod borders;
 #[path = "../../examples/shared/capture.rs"]
 mod capture;
 mod debug_views;
@@ -33,6 +34,7 @@ mod panel;
 mod pieces;
 mod return_of_ground;
 mod sameness;
+mod scenes;
 #[path = "../../examples/shared/shaders.rs"]
 mod shaders;
 mod studio;
@@ -60,6 +62,14 @@ fn ground_looks_as_approved() {
     return_of_ground::shoot(&mut studio, &mut album);
     pieces::shoot(&mut studio, &mut album);
     truth::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+#[test]
+fn borders_do_not_show_the_mesh() {
+    let Some(mut studio) = Studio::open(|_| {}) else { return };
+    let mut album = Album::default();
+    borders::shoot(&mut studio, &mut album);
     album.close();
 }
 

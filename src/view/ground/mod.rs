@@ -15,20 +15,23 @@
 //! the triangle has, and a border strays from the middle between two vertices by less than half their distance.
 
 mod bake;
+mod cache;
 mod fit;
 mod look;
 mod material;
 mod noise;
 mod pack;
+mod paint;
 mod palette;
 mod pieces;
 #[cfg(test)]
 mod stage;
 mod textures;
 
+pub use cache::GroundTextureCache;
 pub use fit::GroundTexturesError;
 pub use look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
-pub use material::{GroundExtension, GroundMaterial};
+pub use material::{GroundBase, GroundExtension, GroundMaterial};
 pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
 
@@ -123,7 +126,6 @@ fn add_materials(
         if current.is_some_and(fits) {
             continue;
         }
-        let base = StandardMaterial { reflectance: 0.3, ..default() };
         let extension = GroundExtension {
             uniform: GroundUniform::new(look, place),
             albedo: Some(textures.albedo.clone()),
@@ -132,7 +134,7 @@ fn add_materials(
             without_anisotropy: textures.without_anisotropy,
             quality: look.quality,
         };
-        let base = current.map_or(base, |current| current.base.clone());
+        let base = current.map_or_else(GroundBase::default, |current| current.base.clone());
         let own = materials.add(GroundMaterial { base, extension });
         commands.entity(entity).try_insert((OwnMaterial(own.id()), MeshMaterial3d(own)));
     }
