@@ -58,6 +58,7 @@ fn ground_looks_as_approved() {
     tunnel::shoot(&mut studio, &mut album);
     sameness::shoot(&mut studio, &mut album);
     ways::shoot(&mut studio, &mut album);
+    ways::count_bindings(&mut studio, &mut album);
     own_textures::shoot(&mut studio, &mut album);
     return_of_ground::shoot(&mut studio, &mut album);
     pieces::shoot(&mut studio, &mut album);

@@ -1,5 +1,6 @@
 //! The landscape, the light on it, and particles.
 
+pub mod air;
 pub mod day;
 pub mod debris;
 pub mod landscape;

@@ -27,9 +27,9 @@ pub struct GroundLook {
     /// The layers, by number; [`MAX_LAYERS`] at most.
     pub layers: Vec<GroundLayer>,
     /// Distances from the camera in metres: up to the first, textures have their own scale; beyond the second, six times it,
-    /// and colours alone.
+    /// with a relief that fades out until 700 m.
     pub distance: (f32, f32),
-    /// The variation of tints from place to place, 0 to 1.
+    /// The variation of tints from place to place, and far away by slope: 0 to 1.
     pub variety: f32,
     /// The texture fetches per pixel.
     pub quality: GroundQuality,

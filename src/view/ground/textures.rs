@@ -387,6 +387,30 @@ mod tests {
     }
 
     #[test]
+    fn coarse_textures_are_shown_until_fine_ones_are_painted() {
+        let mut app = app();
+        app.insert_resource(GroundTextures::Baked { side: 2 * COARSE, anisotropy: 1 });
+        let side = |app: &App| {
+            let ready = loading(app).ready.as_ref()?;
+            let images = app.world().resource::<Assets<Image>>();
+            Some(images.get(&ready.albedo).expect("it is kept").width())
+        };
+        update_until(&mut app, "coarse ones", |loading| loading.ready.is_some());
+        assert_eq!((side(&app), loading(&app).is_ready()), (Some(COARSE), false));
+        assert!(loading(&app).progress() < 1.0);
+        update_until(&mut app, "fine ones", GroundLoading::is_ready);
+        assert_eq!(side(&app), Some(2 * COARSE));
+        // Others are worn until their successors are as fine as they shall be.
+        app.insert_resource(GroundTextures::Baked { side: 4 * COARSE, anisotropy: 1 });
+        app.update();
+        update_until(&mut app, "finer ones", |loading| {
+            assert!(loading.ready.is_some());
+            loading.is_ready()
+        });
+        assert_eq!(side(&app), Some(4 * COARSE));
+    }
+
+    #[test]
     fn software_renderers_go_without_anisotropic_filtering() {
         let filtered = |anisotropy_clamp| {
             ImageSampler::Descriptor(ImageSamplerDescriptor {
