@@ -86,6 +86,9 @@ struct Vertex {
     @location(8) ids: vec4<u32>,
     @location(9) weights: vec4<f32>,
 #endif
+#ifdef GROUND_SKY_LIGHT
+    @location(10) sky_light: vec4<f32>,
+#endif
 }
 
 struct Varying {
@@ -102,6 +105,10 @@ struct Varying {
     // Up to four layers, the same at all corners of a triangle, and the weight of each.
     @location(5) @interpolate(flat) layers: vec4<u32>,
     @location(6) weights: vec4<f32>,
+#endif
+#ifdef GROUND_SKY_LIGHT
+    // The share of the sky that lights this place, and how deep below the undug surface it is: 1 is `CUT_VOXELS`.
+    @location(7) sky_light: vec2<f32>,
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -150,6 +157,9 @@ fn vertex(in: Vertex) -> Varying {
     out.layers = min(in.ids, vec4(u32(ground.layer_count) - 1u));
     out.weights = in.weights;
 #endif
+#ifdef GROUND_SKY_LIGHT
+    out.sky_light = in.sky_light.xy;
+#endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
     let previous = mesh_functions::get_previous_world_from_local(in.instance_index);
@@ -178,6 +188,11 @@ const BROAD_NEAR: f32 = 250.0;
 const BROAD_FAR: f32 = 700.0;
 const FAR_ROUGHNESS: f32 = 0.95;
 const STEEP_TINT: vec3<f32> = vec3(0.62, 0.56, 0.50);
+
+// Dug faces: by how much the height of the texture moves their rim, their colour, and that of the band below the rim.
+const CUT_CRUMBS: f32 = 0.16;
+const CUT_TINT: vec3<f32> = vec3(0.90, 0.86, 0.82);
+const RIM_TINT: vec3<f32> = vec3(0.62, 0.55, 0.49);
 
 // Sides from which textures are laid on: along x, y, z.
 const X: u32 = 0u;
@@ -477,6 +492,27 @@ fn fragment(in: VertexOutput) {
 }
 #endif
 #else
+// The share of ambient and indirect light that reaches a place: that of the sky above it.
+fn sky_light_of(in: Varying) -> f32 {
+#ifdef GROUND_SKY_LIGHT
+    return in.sky_light.x;
+#else
+    return 1.0;
+#endif
+}
+
+// How much a place is a dug face, and how much it is the band below the rim of one, whose edge crumbles: by the height of the
+// texture there.
+fn cut_of(in: Varying, height: f32) -> vec2<f32> {
+#ifdef GROUND_SKY_LIGHT
+    let deep = in.sky_light.y + CUT_CRUMBS * (height - 0.5) * smoothstep(0.0, 0.06, in.sky_light.y);
+    let cut = smoothstep(0.03, 0.10, deep);
+    return vec2(cut, cut * (1.0 - smoothstep(0.22, 0.62, deep)));
+#else
+    return vec2(0.0);
+#endif
+}
+
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutput {
 #ifdef VISIBILITY_RANGE_DITHER
@@ -536,6 +572,12 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     // No two places have quite the same tint.
     color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(in.mood.x, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-in.mood.x, 0.0));
     color *= 1.0 + (0.16 + 0.3 * site.far) * in.mood.y;
+    // Dug faces are fresh: moist, rough, and darkest below the rim, where roots and crumbs are.
+    let cut = cut_of(in, texels.color.a) * min(2.0 * ground.variety, 1.0);
+    color *= mix(vec3(1.0), CUT_TINT, cut.x) * mix(vec3(1.0), RIM_TINT, cut.y);
+    texels.finish.y = mix(texels.finish.y, 1.0, 0.5 * cut.x);
+    texels.finish.x *= 1.0 - 0.25 * cut.y;
+    texels.lean *= 1.0 + 0.35 * cut.x;
     let lean = texels.lean - dot(texels.lean, site.normal) * site.normal;
     let bent = normalize(site.normal + lean);
     // Nothing gathers on steep ground: it is darker, and warmer than what lies above and below.
@@ -544,8 +586,9 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     pbr_input.material.base_color = vec4(base.color.rgb * color, 1.0);
     pbr_input.material.perceptual_roughness = clamp(texels.finish.y, 0.089, 1.0);
     pbr_input.material.metallic = metallic;
-    pbr_input.diffuse_occlusion = vec3(texels.finish.x);
-    pbr_input.specular_occlusion = texels.finish.x;
+    let open_sky = texels.finish.x * sky_light_of(in);
+    pbr_input.diffuse_occlusion = vec3(open_sky);
+    pbr_input.specular_occlusion = open_sky;
     pbr_input.N = facing(normalize(bent * turn), normalize(in.world_normal), pbr_input.V);
     // What changes from pixel to pixel would sparkle: it is rough (Tokuyoshi and Kaplanyan 2019).
     let bend_x = dpdx(pbr_input.N);

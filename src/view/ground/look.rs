@@ -29,7 +29,7 @@ pub struct GroundLook {
     /// Distances from the camera in metres: up to the first, textures have their own scale; beyond the second, six times it,
     /// with a relief that fades out until 700 m.
     pub distance: (f32, f32),
-    /// The variation of tints from place to place, and far away by slope: 0 to 1.
+    /// The variation of tints from place to place, and far away by slope, and on dug faces: 0 to 1.
     pub variety: f32,
     /// The texture fetches per pixel.
     pub quality: GroundQuality,
