@@ -10,6 +10,8 @@
 //! Vulkan driver; lavapipe is enough. Without one, the tests print a notice and pass; with `BURROW_REQUIRE=1` they
 //! fail.
 //!
+//! `make scenes` renders more views of one country, to be looked at: see `scenes.rs`.
+//!
 //! # A new scene
 //!
 //! Add a file with `pub fn shoot(studio: &mut Studio, album: &mut Album)`, and a line to the test below. A scene that
