@@ -170,15 +170,16 @@ fn vertex(in: Vertex) -> Varying {
 }
 
 // Borders between layers: the size of a cell on the screen in pixels, how many voxels the noise spans, its strength, and the
-// largest power of two by which it multiplies a weight.
+// largest power of two by which it multiplies a weight, near the camera and where cells are larger than voxels.
 const BORDER_PIXELS: f32 = 9.0;
 const BORDER_VOXELS: f32 = 5.0;
 const BORDER_NOISE: f32 = 2.6;
-const BORDER_MOST: f32 = 1.6;
+const BORDER_MOST: f32 = 0.65;
+const BORDER_MOST_FAR: f32 = 1.4;
 // How much heights move a border, how wide it is, and the share from which on a second layer can show.
 const HEIGHT_SHIFT: f32 = 0.4;
 const BORDER_WIDTH: f32 = 0.07;
-const BORDER_START: f32 = 0.25;
+const BORDER_START: f32 = 0.30;
 
 // How many times larger textures are far away, and how much coarser than a pixel asks for.
 const FAR_SCALE: f32 = 6.0;
@@ -406,36 +407,46 @@ struct Choice {
     share: f32,
 }
 
-// Noise of about the size of a cell of the ground at a distance from the camera: levels of detail draw cells of several pixels.
-fn border_noise(place: vec3<f32>, distance: f32) -> vec4<f32> {
+// How many octaves cells of the ground are larger than a voxel at a distance from the camera: levels of detail draw cells of
+// several pixels.
+fn octave_of(distance: f32) -> f32 {
     // An orthographic lens shows all distances alike.
     let depth = select(distance, 1.0, view.clip_from_view[3][3] == 1.0);
     let pixels_per_metre = 0.5 * view.viewport.w * view.clip_from_view[1][1] / depth;
-    let octave = max(log2(BORDER_PIXELS / (pixels_per_metre * ground.voxel)), 0.0);
-    let metres = BORDER_VOXELS * ground.voxel * exp2(floor(octave));
-    var noise = noise_at(place, metres);
-    if octave > 0.0 {
-        noise = mix(noise, noise_at(place, 2.0 * metres), fract(octave));
-    }
-    return noise;
+    return max(log2(BORDER_PIXELS / (pixels_per_metre * ground.voxel)), 0.0);
 }
 
-// By how much noise raises the weight of a layer: no two layers have the same noise. By the layer's number, since its place in
-// the list may be another one in the next mesh.
-fn raise(noise: vec4<f32>, layer: u32) -> f32 {
-    let signs = select(vec4(-1.0), vec4(1.0), (vec4(layer) & vec4(1u, 2u, 4u, 8u)) != vec4(0u));
-    return exp2(clamp(BORDER_NOISE * dot(noise, signs), -BORDER_MOST, BORDER_MOST));
+// Noise of about the size of a cell.
+fn border_noise(place: vec3<f32>, octave: f32) -> vec4<f32> {
+    let metres = BORDER_VOXELS * ground.voxel * exp2(floor(octave));
+    let noise = noise_at(place, metres);
+    if octave <= 0.0 {
+        return noise;
+    }
+    return mix(noise, noise_at(place, 2.0 * metres), fract(octave));
+}
+
+// The noise of a layer: no two layers have the same one. By the layer's number, since its place in the list may be another one
+// in the next mesh.
+fn noise_of(noise: vec4<f32>, layer: u32) -> f32 {
+    return dot(noise, select(vec4(-0.5), vec4(0.5), (vec4(layer) & vec4(1u, 2u, 4u, 8u)) != vec4(0u)));
 }
 
 // Noise moves the borders between layers. It multiplies weights, so a layer shows only where a corner of the triangle has it, and
-// a border strays from the middle between two corners by less than half their distance.
+// near the camera a border strays from the middle between two corners by less than half a voxel.
 fn choose(in: Varying, place: vec3<f32>, distance: f32) -> Choice {
 #ifdef GROUND_ATTRIBUTES
     let layers = in.layers;
     var weights = in.weights;
     if max(max(weights.x, weights.y), max(weights.z, weights.w)) < 0.999 {
-        let noise = border_noise(place, distance);
-        weights *= vec4(raise(noise, layers.x), raise(noise, layers.y), raise(noise, layers.z), raise(noise, layers.w));
+        let octave = octave_of(distance);
+        let noise = border_noise(place, octave);
+        var rise =
+            vec4(noise_of(noise, layers.x), noise_of(noise, layers.y), noise_of(noise, layers.z), noise_of(noise, layers.w));
+        // Only differences count: what all that show have in common would use up the limit.
+        rise = BORDER_NOISE * (rise - dot(weights, rise));
+        let most = vec4(mix(BORDER_MOST, BORDER_MOST_FAR, min(octave, 1.0)));
+        weights *= exp2(clamp(rise, -most, most));
     }
     // The winner and the loser of each half.
     let is_left = weights.xz >= weights.yw;
