@@ -17,7 +17,7 @@ use bevy_burrow::ground::NoiseSource;
 use bevy_burrow::prelude::*;
 use image::RgbImage;
 
-use crate::lod::{settle, watch_levels};
+use crate::lod::{settle, watch};
 use crate::studio::Studio;
 
 /// Cells along a side of the world.
@@ -187,7 +187,9 @@ impl Book {
 
     fn country(&mut self, wants: &dyn Fn(&str) -> bool) {
         let look = self.look();
-        self.studio.terrain(country(), look);
+        watch(&mut self.studio, VIEW);
+        let levels = LevelsOfDetail { view_distance: VIEW, ..default() };
+        self.studio.terrain_with(country(), (look, levels));
         let fog = DistanceFog {
             color: Color::linear_rgb(0.50, 0.66, 0.86),
             falloff: FogFalloff::from_visibility_squared(2.2 * VIEW),
@@ -195,7 +197,6 @@ impl Book {
         };
         let camera = self.studio.camera;
         self.studio.app.world_mut().entity_mut(camera).insert((fog, DepthPrepass));
-        watch_levels(&mut self.studio, VIEW);
         let height = self.size.1 as f32;
         self.studio.one::<DetailSource>().picture_height = height;
         let places = Places::find(&mut self.studio);

@@ -107,9 +107,14 @@ impl Studio {
 
     /// Replaces the terrain by a new one with this look, and waits until it is shown.
     pub fn terrain(&mut self, ground: Ground, look: GroundLook) {
+        self.terrain_with(ground, look);
+    }
+
+    /// Replaces the terrain by a new one with these components, a look among them, and waits until it is shown.
+    pub fn terrain_with(&mut self, ground: Ground, components: impl Bundle) {
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         self.close_terrain();
-        let entity = self.app.world_mut().spawn((terrain, look)).id();
+        let entity = self.app.world_mut().spawn((terrain, components)).id();
         self.until("the terrain's material", |app| {
             let mut tiles = app
                 .world_mut()
