@@ -26,12 +26,15 @@ const ALONG: f32 = 5.0;
 const MOST: f32 = 0.20;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
-    let strata = Strata {
-        strata: vec![Stratum::pocket(MaterialId(4), 16, 0.45), Stratum::fill(MaterialId(1))],
-        ..Strata::default()
+    let middle = VOXELS as f32 / 2.0;
+    // Rings, whose borders have all directions.
+    let rings = move |point: IVec3, _| {
+        let out = Vec2::new(point.x as f32 - middle - 0.3, point.z as f32 - middle + 0.4).length();
+        Some(MaterialId(if out % 14.0 < 7.0 { 4 } else { 1 }))
     };
     let noise = NoiseHeights { seed: 5, scale: 40.0, amplitude: 3.0, octaves: 2, base: 20.0, ..default() };
-    let ground = Ground::from_noise(VOXELS, VOXELS, &noise).and_then(|ground| ground.with_strata(&strata));
+    let ground =
+        Ground::from_noise(VOXELS, VOXELS, &noise).and_then(|ground| ground.with_material_fn(1, rings));
     studio.terrain(ground.expect("valid ground"), GroundLook { variety: 0.0, ..default() });
     let own = studio.app.world().resource::<GroundTextures>().clone();
     let textures = flat(studio);
@@ -42,7 +45,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     }
     let side = VOXELS * PIXELS;
     studio.resize((side, side));
-    let middle = Vec3::new(VOXELS as f32 / 2.0, 0.0, VOXELS as f32 / 2.0);
+    let middle = Vec3::new(middle, 0.0, middle);
     let above = Transform::from_translation(middle + Vec3::Y * 60.0).looking_at(middle, Vec3::NEG_Z);
     let scaling_mode = ScalingMode::Fixed { width: VOXELS as f32, height: VOXELS as f32 };
     let lens = OrthographicProjection { scaling_mode, ..OrthographicProjection::default_3d() };
