@@ -54,6 +54,8 @@ struct Ground {
     place: mat4x4<f32>,
     layers: array<Layer, 16>,
     tints: array<Tint, 16>,
+    // The strength of the large relief of each layer.
+    broad: array<vec4<f32>, 4>,
     near: f32,
     far: f32,
     variety: f32,
@@ -173,20 +175,29 @@ fn vertex(in: Vertex) -> Varying {
 // largest power of two by which it multiplies a weight, near the camera and where cells are larger than voxels.
 const BORDER_PIXELS: f32 = 9.0;
 const BORDER_VOXELS: f32 = 5.0;
-const BORDER_NOISE: f32 = 2.6;
-const BORDER_MOST: f32 = 0.65;
-const BORDER_MOST_FAR: f32 = 1.4;
+const BORDER_NOISE: f32 = 7.0;
+const BORDER_MOST: f32 = 2.2;
+const BORDER_MOST_FAR: f32 = 2.6;
 // How much heights move a border, how wide it is, and the share from which on a second layer can show.
 const HEIGHT_SHIFT: f32 = 0.4;
-const BORDER_WIDTH: f32 = 0.07;
+const BORDER_WIDTH: f32 = 0.10;
 const BORDER_START: f32 = 0.30;
 
-// How many times larger textures are far away, and how much coarser than a pixel asks for.
+// How many times larger textures are far away, and how much coarser than a pixel asks for. Each time that the distance grows by
+// `FAR_STEP`, they do too: ground looks as rough as the same ground nearer by.
 const FAR_SCALE: f32 = 6.0;
-const FAR_BLUR: f32 = 1.6;
+const FAR_STEP: f32 = 4.0;
+const FAR_BLUR: f32 = 2.0;
+// How many texels along its side a texture has at most, far away.
+const FAR_TEXELS: f32 = 64.0;
+// The part of a step, on a scale of logarithms, in which one size gives way to the next one.
+const FAR_MIX: f32 = 0.2;
+// The relief is larger and turned, so that the repetition of both does not add up; the tint's noise bends both.
+const RELIEF_SCALE: f32 = 2.3;
+const FAR_BEND: f32 = 0.10;
 // Metres from the camera up to which the large relief shows, and from which it has faded.
-const BROAD_NEAR: f32 = 250.0;
-const BROAD_FAR: f32 = 700.0;
+const BROAD_NEAR: f32 = 900.0;
+const BROAD_FAR: f32 = 3000.0;
 const FAR_ROUGHNESS: f32 = 0.95;
 const STEEP_TINT: vec3<f32> = vec3(0.62, 0.56, 0.50);
 
@@ -213,8 +224,13 @@ struct Site {
     next_weight: f32,
     // 0 near, 1 far.
     far: f32,
+    // How many times larger textures are there, and how much the next size shows.
+    scale: f32,
+    next_scale: f32,
     // How much of the large relief shows: 1, and 0 farther away.
     broad: f32,
+    // What bends large textures.
+    bend: vec2<f32>,
 }
 
 // What textures say: colour and height; occlusion and roughness; by how much the normal leans.
@@ -350,25 +366,47 @@ fn near_side(layer: u32, side: u32, site: Site) -> Texels {
     return Texels(pair.albedo, pair.relief.zw, off_side(lean, side));
 }
 
+// How strong the large relief of a layer is.
+fn broad_relief(layer: u32) -> f32 {
+    return ground.broad[layer >> 2u][layer & 3u];
+}
+
 // A layer far from the camera, laid on from one side, several times as large.
-fn far_side(layer: u32, side: u32, site: Site) -> Texels {
+fn far_side(layer: u32, side: u32, site: Site, times: f32) -> Texels {
     let settings = ground.layers[layer];
-    let scale = settings.per_metre / FAR_SCALE;
+    let scale = settings.per_metre / times;
     // Turned, so that large and small do not lie alike; but bedded rock keeps its beds level.
-    let way = select(vec2(0.8, 0.6), vec2(1.0, 0.0), is_bedded(layer) && side != Y);
+    let is_level = is_bedded(layer) && side != Y;
+    let way = select(vec2(0.8, 0.6), vec2(1.0, 0.0), is_level);
     let turn = mat2x2<f32>(way.x, way.y, -way.y, way.x);
-    let uv = turn * on_side(site.place, side) * scale;
+    let at = on_side(site.place, side) * scale;
+    let bend = select(site.bend, vec2(0.0), is_level);
     let texture = texture_of(layer, side);
     let size = f32(textureDimensions(albedo_texture).x) * scale;
     let level = 0.5 * log2(max(dot(site.dx, site.dx), dot(site.dy, site.dy))) + log2(size);
-    // From coarser levels: joints six times as large as they are would be seen as what they are.
-    let color = textureSampleLevel(albedo_texture, noise_sampler, uv, texture, level + log2(FAR_BLUR));
-    if site.broad <= 0.0 {
+    // From coarse levels: joints and stones several times as large as they are would be seen as what they are.
+    let coarse = max(level + log2(FAR_BLUR), log2(f32(textureDimensions(albedo_texture).x) / FAR_TEXELS));
+    let color = textureSampleLevel(albedo_texture, noise_sampler, turn * at + bend, texture, coarse);
+    let strength = site.broad * broad_relief(layer);
+    if strength <= 0.0 {
         return Texels(color, vec2(1.0, FAR_ROUGHNESS), vec3(0.0));
     }
-    let relief = textureSampleLevel(relief_texture, noise_sampler, uv, texture, level);
-    let lean = ((relief.xy * 2.0 - 1.0) * (settings.relief * site.broad)) * turn;
-    return Texels(color, vec2(mix(1.0, relief.z, site.broad), FAR_ROUGHNESS), off_side(lean, side));
+    // The other way round.
+    let large = select(1.0 / RELIEF_SCALE, 1.0, is_level);
+    // That of layer 0, as other layers have stones and blades in it; but beds are beds at any size.
+    let relief = textureSampleLevel(
+        relief_texture, noise_sampler, (at * turn) * large + bend.yx, select(0, texture, is_level), level + log2(large));
+    let lean = turn * ((relief.xy * 2.0 - 1.0) * strength);
+    return Texels(color, vec2(mix(1.0, relief.z, strength), FAR_ROUGHNESS), off_side(lean, side));
+}
+
+// A layer far from the camera, from the sides that show.
+fn far_at(layer: u32, site: Site, times: f32) -> Texels {
+    var texels = far_side(layer, site.side, site, times);
+    if site.next_weight > 0.0 {
+        texels = mix_texels(texels, far_side(layer, site.next_side, site, times), site.next_weight);
+    }
+    return texels;
 }
 
 // Another texture shows from above: the layer's own has beds.
@@ -391,9 +429,9 @@ fn layer_at(layer: u32, site: Site) -> Texels {
         }
     }
     if site.far > 0.0 {
-        var broad = far_side(layer, site.side, site);
-        if site.next_weight > 0.0 {
-            broad = mix_texels(broad, far_side(layer, site.next_side, site), site.next_weight);
+        var broad = far_at(layer, site, site.scale);
+        if site.next_scale > 0.0 {
+            broad = mix_texels(broad, far_at(layer, site, FAR_STEP * site.scale), site.next_scale);
         }
         texels = mix_texels(texels, broad, site.far);
     }
@@ -563,6 +601,10 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     let distance = length(view.world_position - in.world_position.xyz);
     site.far = smoothstep(ground.near, ground.far, distance);
     site.broad = 1.0 - smoothstep(BROAD_NEAR, BROAD_FAR, distance);
+    let steps = max(log2(distance / ground.far) / log2(FAR_STEP), 0.0);
+    site.scale = FAR_SCALE * pow(FAR_STEP, floor(steps));
+    site.next_scale = smoothstep(1.0 - FAR_MIX, 1.0, fract(steps));
+    site.bend = FAR_BEND * in.mood;
 
     let choice = choose(in, site.place, distance);
     let best = choice.layers.x;

@@ -154,6 +154,8 @@ pub(super) struct GroundUniform {
     pub place: Mat4,
     layers: [LayerUniform; MAX_LAYERS],
     tints: [TintUniform; MAX_LAYERS],
+    /// The strength of the large relief of each layer.
+    broad: [Vec4; MAX_LAYERS / 4],
     near: f32,
     far: f32,
     variety: f32,
@@ -179,6 +181,9 @@ impl GroundUniform {
             tints: std::array::from_fn(|at| {
                 let GroundLayer { tint, top, .. } = layer(at);
                 TintUniform { color: tint.to_vec3(), top: top.map_or(-1.0, f32::from) }
+            }),
+            broad: std::array::from_fn(|four| {
+                Vec4::from_array(std::array::from_fn(|at| layer(4 * four + at).broad_relief))
             }),
             near: look.distance.0,
             far: look.distance.1.max(look.distance.0 + 0.1),
