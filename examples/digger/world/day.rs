@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use crate::player::camera::PlayerCamera;
 use crate::ui::settings::Settings;
 use crate::world::landscape::NewGame;
-use crate::world::light::{Skylight, Sun};
+use crate::world::light::Sun;
 use crate::world::sky::SkyMaterial;
 
 /// The hour at which the sun is at [`SUN`](crate::world::light::SUN), where places for the script are searched.
@@ -162,7 +162,7 @@ fn update_light(clock: Res<Clock>, mut sun: Single<(&mut DirectionalLight, &mut 
 fn update_colors(
     clock: Res<Clock>,
     time: Res<Time>,
-    mut skylight: ResMut<Skylight>,
+    mut skylight: ResMut<GlobalAmbientLight>,
     mut skies: ResMut<Assets<SkyMaterial>>,
     mut fogs: Query<&mut DistanceFog, With<PlayerCamera>>,
     mut clear: ResMut<ClearColor>,
@@ -170,7 +170,7 @@ fn update_colors(
     let (sun, moon) = (clock.sun(), clock.moon());
     let colors = Colors::at(sun.y);
     let linear = |c: Vec3| Color::linear_rgb(c.x, c.y, c.z);
-    *skylight = Skylight { color: linear(colors.ambient), brightness: colors.brightness };
+    (skylight.color, skylight.brightness) = (linear(colors.ambient), colors.brightness);
     clear.0 = linear(colors.horizon);
     for mut fog in &mut fogs {
         fog.color = linear(colors.horizon);

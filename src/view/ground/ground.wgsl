@@ -68,6 +68,9 @@ struct Vertex {
     @location(8) ids: vec4<u32>,
     @location(9) weights: vec4<f32>,
 #endif
+#ifdef GROUND_SKY_LIGHT
+    @location(10) sky_light: vec4<f32>,
+#endif
 }
 
 struct Varying {
@@ -84,6 +87,9 @@ struct Varying {
     // Up to four layers, the same at all corners of a triangle, and the weight of each.
     @location(5) @interpolate(flat) layers: vec4<u32>,
     @location(6) weights: vec4<f32>,
+#endif
+#ifdef GROUND_SKY_LIGHT
+    @location(7) sky_light: f32,
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -131,6 +137,9 @@ fn vertex(in: Vertex) -> Varying {
 #ifdef GROUND_ATTRIBUTES
     out.layers = min(in.ids, vec4(u32(ground.layer_count) - 1u));
     out.weights = in.weights;
+#endif
+#ifdef GROUND_SKY_LIGHT
+    out.sky_light = in.sky_light.x;
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -385,6 +394,15 @@ fn facing(normal: vec3<f32>, ground_normal: vec3<f32>, eye: vec3<f32>) -> vec3<f
     return normalize(normal + max(lacking, 0.0) * eye);
 }
 
+// The share of ambient and indirect light that reaches a place: that of the sky above it.
+fn sky_light_of(in: Varying) -> f32 {
+#ifdef GROUND_SKY_LIGHT
+    return in.sky_light;
+#else
+    return 1.0;
+#endif
+}
+
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutput {
 #ifdef VISIBILITY_RANGE_DITHER
@@ -442,8 +460,8 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     pbr_input.material.base_color = vec4(pbr_input.material.base_color.rgb * color, 1.0);
     pbr_input.material.perceptual_roughness = clamp(texels.finish.y, 0.089, 1.0);
     pbr_input.material.metallic = metallic;
-    pbr_input.diffuse_occlusion *= texels.finish.x;
-    pbr_input.specular_occlusion *= texels.finish.x;
+    pbr_input.diffuse_occlusion *= texels.finish.x * sky_light_of(in);
+    pbr_input.specular_occlusion *= texels.finish.x * sky_light_of(in);
     let lean = texels.lean - dot(texels.lean, site.normal) * site.normal;
     pbr_input.N = facing(normalize(normalize(site.normal + lean) * turn), normalize(in.world_normal), pbr_input.V);
     apply_decals(&pbr_input);
