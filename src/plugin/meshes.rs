@@ -35,10 +35,14 @@ pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
 
 /// The share of the sky that lights a vertex, 0..=1, in x: 1 on a plain, 0 in a cave; see
-/// [`World::sky_light`](crate::terrain::World::sky_light). y, z and w are 0. Materials multiply ambient and indirect light by it,
+/// [`World::sky_light`](crate::terrain::World::sky_light). In y how deep it lies below the surface that was there before anyone
+/// dug, of which 1 is [`CUT_VOXELS`] or more. z and w are 0. Materials multiply ambient and indirect light by it,
 /// and never that of the sun. Only on terrains with [`SkyLight`](super::SkyLight).
 pub const ATTRIBUTE_SKY_LIGHT: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowSkyLight", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
+
+/// The depth in voxels that is 1 in [`ATTRIBUTE_SKY_LIGHT`].
+pub const CUT_VOXELS: i32 = 8;
 
 /// The components of an entity in addition to its mesh: bounds that Bevy need not compute, and bytes.
 pub(crate) type MeshFacts = (Aabb, NoAutoAabb, MeshBytes);
@@ -293,7 +297,11 @@ impl<'a> Arrays<'a> {
 
     /// Appends the light of vertices whose positions count from some point.
     fn push_lights(&mut self, vertices: &[Vertex], origin: IVec3, lights: &mut dyn SkyLights) {
-        let light = |vertex: &Vertex| [lights.light(origin * SNAP + vertex.position), 0, 0, 0];
+        let light = |vertex: &Vertex| {
+            let place = origin * SNAP + vertex.position;
+            let depth = lights.depth(place).clamp(0, CUT_VOXELS * ONE) * 255 / (CUT_VOXELS * ONE);
+            [lights.light(place), depth as u8, 0, 0]
+        };
         self.lights.extend(vertices.iter().map(light));
     }
 

@@ -69,6 +69,7 @@ pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
 pub use meshes::{
     ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
+    CUT_VOXELS,
 };
 #[doc(hidden)]
 pub use messages::{

@@ -16,7 +16,6 @@ mod dirty;
 mod known_nodes;
 mod node_facts;
 mod nodes;
-#[cfg(any(feature = "plugin", test))]
 mod relit;
 mod source;
 mod stages;
@@ -29,7 +28,6 @@ pub(crate) use dirty::{dirty_cells, joined_mask};
 pub use known_nodes::KnownNodes;
 pub use node_facts::GroundFacts;
 pub(crate) use nodes::change_cut;
-#[cfg(any(feature = "plugin", test))]
 #[cfg_attr(not(feature = "plugin"), allow(unused_imports))]
 pub(crate) use relit::{relit_nodes, relit_parts};
 #[cfg(feature = "plugin")]

@@ -175,13 +175,13 @@ impl<'a> Compared<'a> {
     /// Light comes from above.
     fn may_differ(&self, place: IVec3) -> bool {
         let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-        let is_inside = |at: i32, low: i32, high: i32| low <= at && at < high;
         place.y < self.highest * (SNAP / ONE)
-            && is_inside(column.x, self.low.x, self.high.x.max(self.low.x + 1))
-            && is_inside(column.z, self.low.z, self.high.z.max(self.low.z + 1))
+            && (self.low.x..=self.high.x).contains(&column.x)
+            && (self.low.z..=self.high.z).contains(&column.z)
     }
 }
 
+#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 /// The nodes of a drawn cut that have meshes of their own and whose light differs after a commit, without those that it
 /// redraws anyway.
 pub(crate) fn relit_nodes(
@@ -211,6 +211,7 @@ pub(crate) fn relit_nodes(
     updates.into_iter().filter(|update| differs(update)).collect()
 }
 
+#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 /// Whether light at a place may change.
 fn is_near(areas: &[Area], place: IVec3) -> bool {
     let (x, z) = (place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));

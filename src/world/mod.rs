@@ -28,7 +28,7 @@ mod query;
 mod ray;
 mod regions;
 mod settings;
-// Most of it is for meshes, which only the plugin makes.
+// Some of it is for meshes, which only the plugin makes.
 #[cfg_attr(not(feature = "plugin"), allow(dead_code, unused_imports))]
 pub(crate) mod sky;
 mod state;

@@ -116,6 +116,26 @@ pub(crate) trait SkyLights {
         light_of(hidden)
     }
 
+    /// The height of a column before anyone dug, in 1/256 voxel.
+    fn undug_height(&mut self, column: Column) -> i32 {
+        match self.is_changed(column) {
+            true => self.view().ground().lone_height(column),
+            false => self.top(column),
+        }
+    }
+
+    /// How far a place in 1/4096 voxel, as [`light`](Self::light) takes it, lies below the surface that was there before
+    /// anyone dug, in 1/256 voxel; less than 0 above it.
+    fn depth(&mut self, place: IVec3) -> i32 {
+        let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
+        let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
+        let next = column.offset(i32::from(x > 0), i32::from(z > 0));
+        let here = i64::from(self.undug_height(column));
+        let there = if next == column { here } else { i64::from(self.undug_height(next)) };
+        let height = here + (there - here) * i64::from(x.max(z)) / i64::from(SNAP);
+        height as i32 - place.y.div_euclid(SNAP / ONE)
+    }
+
     /// The light at a place on the surface, in 1/4096 voxel, that lies on an edge of the lattice or over the diagonal of a
     /// cell. It depends on the place alone.
     fn light(&mut self, place: IVec3) -> u8 {
