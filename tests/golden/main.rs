@@ -23,6 +23,7 @@ mod borders;
 #[path = "../../examples/shared/capture.rs"]
 mod capture;
 mod debug_views;
+mod far;
 #[path = "../../examples/shared/holes.rs"]
 mod holes;
 mod landscape;
@@ -97,6 +98,15 @@ fn ground_has_no_holes() {
     let mut album = Album::default();
     whole::shoot(&mut studio, &mut album);
     album.close();
+}
+
+/// `cargo test --release --features examples --test golden -- --ignored --nocapture far_ground`
+#[test]
+#[ignore = "measures, and takes minutes on a software renderer"]
+fn far_ground_is_measured() {
+    let Some(mut studio) = Studio::open(|_| {}) else { return };
+    let found = far::measure(&mut studio);
+    assert!(found.iter().all(|(own, _)| (0.0..0.5).contains(own)), "{found:?}");
 }
 
 /// `BURROW_COMPARE=A:B` names two folders; each picture of A is compared with the one of that name in B.

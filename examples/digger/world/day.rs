@@ -9,7 +9,7 @@ use crate::player::camera::PlayerCamera;
 use crate::ui::settings::Settings;
 use crate::world::air::Air;
 use crate::world::landscape::NewGame;
-use crate::world::light::{Skylight, Sun};
+use crate::world::light::Sun;
 use crate::world::sky::SkyMaterial;
 
 /// The hour at which the sun is at [`SUN`](crate::world::light::SUN), where places for the script are searched.
@@ -173,7 +173,7 @@ fn update_light(
 fn update_colors(
     clock: Res<Clock>,
     time: Res<Time>,
-    mut skylight: ResMut<Skylight>,
+    mut skylight: ResMut<GlobalAmbientLight>,
     mut skies: ResMut<Assets<SkyMaterial>>,
     air: Res<Air>,
     mut fogs: Query<&mut DistanceFog, With<PlayerCamera>>,
@@ -182,7 +182,7 @@ fn update_colors(
     let (sun, moon) = (clock.sun(), clock.moon());
     let colors = Colors::at(sun.y);
     let linear = |c: Vec3| Color::linear_rgb(c.x, c.y, c.z);
-    *skylight = Skylight { color: linear(colors.ambient), brightness: colors.brightness };
+    (skylight.color, skylight.brightness) = (linear(colors.ambient), colors.brightness);
     clear.0 = linear(colors.horizon);
     for mut fog in &mut fogs {
         fog.color = linear(colors.horizon);

@@ -109,7 +109,7 @@ struct Varying {
     @location(6) weights: vec4<f32>,
 #endif
 #ifdef GROUND_SKY_LIGHT
-    // The share of the sky that lights this place, and how deep below the undug surface it is: 1 is `CUT_VOXELS`.
+    // The share of the sky that lights this place, and how many voxels it was dug below the surface, `CUT_VOXELS` at most.
     @location(7) sky_light: vec2<f32>,
 #endif
 #ifdef PREPASS_PIPELINE
@@ -160,7 +160,7 @@ fn vertex(in: Vertex) -> Varying {
     out.weights = in.weights;
 #endif
 #ifdef GROUND_SKY_LIGHT
-    out.sky_light = in.sky_light.xy;
+    out.sky_light = in.sky_light.xy * vec2(1.0, CUT_VOXELS);
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -201,8 +201,10 @@ const BROAD_FAR: f32 = 3000.0;
 const FAR_ROUGHNESS: f32 = 0.95;
 const STEEP_TINT: vec3<f32> = vec3(0.62, 0.56, 0.50);
 
-// Dug faces: by how much the height of the texture moves their rim, their colour, and that of the band below the rim.
-const CUT_CRUMBS: f32 = 0.16;
+// Dug faces: how deep meshes tell, by how many voxels the height of the texture moves their rim, their colour, and that of the
+// band below the rim.
+const CUT_VOXELS: f32 = 8.0;
+const CUT_CRUMBS: f32 = 0.7;
 const CUT_TINT: vec3<f32> = vec3(0.90, 0.86, 0.82);
 const RIM_TINT: vec3<f32> = vec3(0.62, 0.55, 0.49);
 
@@ -554,9 +556,9 @@ fn sky_light_of(in: Varying) -> f32 {
 // texture there.
 fn cut_of(in: Varying, height: f32) -> vec2<f32> {
 #ifdef GROUND_SKY_LIGHT
-    let deep = in.sky_light.y + CUT_CRUMBS * (height - 0.5) * smoothstep(0.0, 0.06, in.sky_light.y);
-    let cut = smoothstep(0.03, 0.10, deep);
-    return vec2(cut, cut * (1.0 - smoothstep(0.22, 0.62, deep)));
+    let deep = in.sky_light.y + CUT_CRUMBS * (height - 0.5) * smoothstep(0.0, 0.3, in.sky_light.y);
+    let cut = smoothstep(0.1, 0.4, deep);
+    return vec2(cut, cut * (1.0 - smoothstep(0.9, 2.6, deep)));
 #else
     return vec2(0.0);
 #endif

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use crate::plugin::SlimVertices;
+use crate::plugin::{SkyLight, SlimVertices};
 
 /// Most layers of a ground; ids from the last one on share it.
 pub const MAX_LAYERS: usize = 16;
@@ -22,7 +22,7 @@ pub const MAX_LAYERS: usize = 16;
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default)]
-#[require(SlimVertices)]
+#[require(SlimVertices, SkyLight)]
 pub struct GroundLook {
     /// The layers, by number; [`MAX_LAYERS`] at most.
     pub layers: Vec<GroundLayer>,

@@ -16,7 +16,7 @@ use bevy::shader::{ShaderDefVal, ShaderRef};
 
 use super::super::vertex::prepass_vertex_shader;
 use super::look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
-use crate::plugin::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
+use crate::plugin::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT};
 
 /// The material of terrains with a [`GroundLook`]: lit like Bevy's `StandardMaterial`, with colour, roughness and relief from
 /// layers of texture. Shadows, fog, clustered decals, prepasses and deferred rendering work as they do there.
@@ -259,6 +259,15 @@ impl MaterialExtension for GroundExtension {
                 own.iter().zip(8..).map(|(attribute, location)| attribute.at_shader_location(location)),
             );
             let definition = ShaderDefVal::from("GROUND_ATTRIBUTES");
+            descriptor.vertex.shader_defs.push(definition.clone());
+            if let Some(fragment) = &mut descriptor.fragment {
+                fragment.shader_defs.push(definition);
+            }
+        }
+        // Pieces have none.
+        if layout.0.contains(ATTRIBUTE_SKY_LIGHT.id) {
+            attributes.push(ATTRIBUTE_SKY_LIGHT.at_shader_location(10));
+            let definition = ShaderDefVal::from("GROUND_SKY_LIGHT");
             descriptor.vertex.shader_defs.push(definition.clone());
             if let Some(fragment) = &mut descriptor.fragment {
                 fragment.shader_defs.push(definition);

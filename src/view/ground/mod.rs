@@ -42,7 +42,7 @@ use bevy::prelude::*;
 
 use super::vertex::VertexPlugin;
 use crate::plugin::{
-    BurrowSystems, GroundPiece, SlimVertices, propagate_look, remove_inherited, warn_of_textures,
+    BurrowSystems, GroundPiece, SkyLight, SlimVertices, propagate_look, remove_inherited, warn_of_textures,
     warn_of_undrawn,
 };
 use crate::terrain::Terrain;
@@ -143,7 +143,7 @@ fn add_materials(
 
 /// Restores vertex colours on a terrain that lost its look.
 fn thicken_vertices(gone: On<Remove, GroundLook>, mut commands: Commands) {
-    commands.entity(gone.entity).try_remove::<SlimVertices>();
+    commands.entity(gone.entity).try_remove::<(SlimVertices, SkyLight)>();
 }
 
 /// Removes the material of a terrain that has lost its look and has no other material.
