@@ -192,9 +192,8 @@ const FAR_BLUR: f32 = 2.0;
 const FAR_TEXELS: f32 = 64.0;
 // The part of a step, on a scale of logarithms, in which one size gives way to the next one.
 const FAR_MIX: f32 = 0.2;
-// The relief is larger and turned, so that the repetition of both does not add up; the tint's noise bends both.
+// The relief is larger and turned the other way, so that the repetition of both does not add up.
 const RELIEF_SCALE: f32 = 2.3;
-const FAR_BEND: f32 = 0.10;
 // Metres from the camera up to which the large relief shows, and from which it has faded.
 const BROAD_NEAR: f32 = 900.0;
 const BROAD_FAR: f32 = 3000.0;
@@ -231,8 +230,6 @@ struct Site {
     next_scale: f32,
     // How much of the large relief shows: 1, and 0 farther away.
     broad: f32,
-    // What bends large textures.
-    bend: vec2<f32>,
 }
 
 // What textures say: colour and height; occlusion and roughness; by how much the normal leans.
@@ -382,13 +379,12 @@ fn far_side(layer: u32, side: u32, site: Site, times: f32) -> Texels {
     let way = select(vec2(0.8, 0.6), vec2(1.0, 0.0), is_level);
     let turn = mat2x2<f32>(way.x, way.y, -way.y, way.x);
     let at = on_side(site.place, side) * scale;
-    let bend = select(site.bend, vec2(0.0), is_level);
     let texture = texture_of(layer, side);
     let size = f32(textureDimensions(albedo_texture).x) * scale;
     let level = 0.5 * log2(max(dot(site.dx, site.dx), dot(site.dy, site.dy))) + log2(size);
     // From coarse levels: joints and stones several times as large as they are would be seen as what they are.
     let coarse = max(level + log2(FAR_BLUR), log2(f32(textureDimensions(albedo_texture).x) / FAR_TEXELS));
-    let color = textureSampleLevel(albedo_texture, noise_sampler, turn * at + bend, texture, coarse);
+    let color = textureSampleLevel(albedo_texture, noise_sampler, turn * at, texture, coarse);
     let strength = site.broad * broad_relief(layer);
     if strength <= 0.0 {
         return Texels(color, vec2(1.0, FAR_ROUGHNESS), vec3(0.0));
@@ -397,7 +393,7 @@ fn far_side(layer: u32, side: u32, site: Site, times: f32) -> Texels {
     let large = select(1.0 / RELIEF_SCALE, 1.0, is_level);
     // That of layer 0, as other layers have stones and blades in it; but beds are beds at any size.
     let relief = textureSampleLevel(
-        relief_texture, noise_sampler, (at * turn) * large + bend.yx, select(0, texture, is_level), level + log2(large));
+        relief_texture, noise_sampler, (at * turn) * large, select(0, texture, is_level), level + log2(large));
     let lean = turn * ((relief.xy * 2.0 - 1.0) * strength);
     return Texels(color, vec2(mix(1.0, relief.z, strength), FAR_ROUGHNESS), off_side(lean, side));
 }
@@ -606,7 +602,6 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     let steps = max(log2(distance / ground.far) / log2(FAR_STEP), 0.0);
     site.scale = FAR_SCALE * pow(FAR_STEP, floor(steps));
     site.next_scale = smoothstep(1.0 - FAR_MIX, 1.0, fract(steps));
-    site.bend = FAR_BEND * in.mood;
 
     let choice = choose(in, site.place, distance);
     let best = choice.layers.x;
