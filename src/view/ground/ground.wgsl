@@ -190,6 +190,7 @@ const FAR_STEP: f32 = 4.0;
 const FAR_BLUR: f32 = 2.0;
 // How many texels along its side a texture has at most, far away.
 const FAR_TEXELS: f32 = 64.0;
+const SOFT_TEXELS: f32 = 40.0;
 // The part of a step, on a scale of logarithms, in which one size gives way to the next one.
 const FAR_MIX: f32 = 0.2;
 // The relief is larger and turned the other way, so that the repetition of both does not add up.
@@ -385,15 +386,18 @@ fn far_side(layer: u32, side: u32, site: Site, times: f32) -> Texels {
     // From coarse levels: joints and stones several times as large as they are would be seen as what they are.
     let coarse = max(level + log2(FAR_BLUR), log2(f32(textureDimensions(albedo_texture).x) / FAR_TEXELS));
     let color = textureSampleLevel(albedo_texture, noise_sampler, turn * at, texture, coarse);
-    let strength = site.broad * broad_relief(layer);
+    let broad = broad_relief(layer);
+    let strength = site.broad * broad;
     if strength <= 0.0 {
         return Texels(color, vec2(1.0, FAR_ROUGHNESS), vec3(0.0));
     }
     // The other way round.
     let large = select(1.0 / RELIEF_SCALE, 1.0, is_level);
-    // That of layer 0, as other layers have stones and blades in it; but beds are beds at any size.
+    // That of layer 0, as other layers have stones and blades in it; but beds are beds at any size. Soft layers have none of its
+    // cracks.
+    let soft = (1.0 - smoothstep(0.5, 0.75, broad)) * log2(f32(textureDimensions(relief_texture).x) / SOFT_TEXELS);
     let relief = textureSampleLevel(
-        relief_texture, noise_sampler, (at * turn) * large, select(0, texture, is_level), level + log2(large));
+        relief_texture, noise_sampler, (at * turn) * large, select(0, texture, is_level), max(level + log2(large), soft));
     let lean = turn * ((relief.xy * 2.0 - 1.0) * strength);
     return Texels(color, vec2(mix(1.0, relief.z, strength), FAR_ROUGHNESS), off_side(lean, side));
 }
