@@ -190,7 +190,7 @@ const FAR_STEP: f32 = 4.0;
 const FAR_BLUR: f32 = 2.0;
 // How many texels along its side a texture has at most, far away.
 const FAR_TEXELS: f32 = 64.0;
-const SOFT_TEXELS: f32 = 40.0;
+const SOFT_TEXELS: f32 = 72.0;
 // The part of a step, on a scale of logarithms, in which one size gives way to the next one.
 const FAR_MIX: f32 = 0.2;
 // The relief is larger and turned the other way, so that the repetition of both does not add up.
