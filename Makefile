@@ -41,7 +41,7 @@ export BURROW_REQUIRE ?= 1
 endif
 
 .NOTPARALLEL:
-.PHONY: help setup run example test test-model test-plugin test-examples features features-model features-plugin drive soak crowd paper figures pictures bench bench-backends peers instructions ptx sanitize
+.PHONY: help setup run example test test-model test-plugin test-examples features features-model features-plugin drive soak crowd paper figures pictures scenes bench bench-backends peers instructions ptx sanitize
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -144,6 +144,9 @@ instructions: ## Count the instructions of fixed workloads; fails where they gre
 
 figures: ## Draw the figures of the guide
 	cargo run $(WITHOUT_BEVY) --example figures
+
+scenes: ## Render views of one country, and swatches of all layers, to look at (out/scenes; BURROW_ONLY=pit,works, BURROW_SIZE=1280x720)
+	BURROW_SCENES=$(CURDIR)/out/scenes cargo test $(WITH_BEVY) --test golden -- --ignored --nocapture scenes_are_rendered
 
 pictures: ## Render the still pictures of the README
 	@tools/setup.sh run

@@ -407,7 +407,7 @@ pub mod prelude {
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, BurrowSystems, Chunk, DetailSource, Field,
         GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
-        LoosePieceReturned, MaterialColors, Redo, Redraw, ShownLevels, SlimVertices, TargetedBrush,
+        LoosePieceReturned, MaterialColors, Redo, Redraw, ShownLevels, SkyLight, SlimVertices, TargetedBrush,
         TerrainHit, TerrainPropagatePlugin, TerrainReady, Terrains, Tile, Undo,
     };
     #[cfg(all(feature = "plugin", feature = "store"))]

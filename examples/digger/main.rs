@@ -220,6 +220,7 @@ pub fn game(
             world::saves::SavesPlugin(world),
             world::thumbnails::ThumbnailsPlugin,
             world::sky::SkyPlugin,
+            world::air::AirPlugin,
             world::day::DayPlugin,
             world::light::LightPlugin,
             world::particles::ParticlesPlugin,

@@ -14,14 +14,14 @@ use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive
 use super::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
 use super::load::Loading;
 use super::lod_state::{LodState, ShownLevels, WantedTiles, Watchers};
-use super::meshes::{BuiltMesh, VertexExtras};
+use super::meshes::{BuiltMesh, VertexExtras, VertexKind};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface};
 use super::reports::{Report, Reports};
 use super::same_frame::SameFrame;
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
-    LoosePieceFound, MaterialColors, SlimVertices,
+    LoosePieceFound, MaterialColors, SkyLight, SlimVertices,
 };
 use crate::lattice::ChunkPos;
 #[cfg(feature = "scatter")]
@@ -40,7 +40,7 @@ pub(super) fn begin_transactions(
             &mut Terrain,
             &TerrainEntities,
             Option<&MaterialColors>,
-            Has<SlimVertices>,
+            (Has<SlimVertices>, Option<&SkyLight>),
             Option<&mut LodState>,
         ),
         (Without<Loading>, Without<InFlight>, Without<Held>),
@@ -53,13 +53,14 @@ pub(super) fn begin_transactions(
     mut same_frame: ResMut<SameFrame>,
 ) {
     let start = Instant::now();
-    for (entity, mut terrain, entities, colors, is_slim, levels) in &mut terrains {
+    for (entity, mut terrain, entities, colors, (is_slim, sky_light), levels) in &mut terrains {
         // The game moved a terrain here while a task of another entity ran for it.
         if terrain.waits_for_plugin() {
             terrain.abandon();
         }
         // Changes that the game made itself are shown first.
-        if terrain.queued() == 0 || !entities.show(terrain.world()) || entities.is_slim != is_slim {
+        let kind = VertexKind::of(is_slim, sky_light);
+        if terrain.queued() == 0 || !entities.show(terrain.world()) || entities.vertices != kind {
             continue;
         }
         let work = terrain.waiting_work();
@@ -70,7 +71,7 @@ pub(super) fn begin_transactions(
             levels.count_edit();
         }
         let engine = terrain.engine().unwrap_or(&engine).clone();
-        let extras = VertexExtras::of(colors, is_slim);
+        let extras = VertexExtras::of(colors, kind);
         let mut builder = build.edit_builder((entity, &terrain), extras);
         builder.revision += 1;
         let task = InFlight::transaction(counter.next(), entity, transaction, engine, builder);

@@ -201,6 +201,30 @@ pub struct EditOutbox {
 #[reflect(Component, Default)]
 pub struct SlimVertices;
 
+/// Whether the meshes of this terrain have [`ATTRIBUTE_SKY_LIGHT`](super::ATTRIBUTE_SKY_LIGHT): how much of the sky lights each
+/// vertex, so that pits, gullies and tunnels are darker than meadows, near and far, and as soon as they are dug. It takes 4 bytes
+/// a vertex. A `GroundLook` brings it, unless the terrain has [`SkyLight::OFF`]; insert it for a material of your own that reads
+/// the attribute. Servers and other apps without meshes compute no light.
+///
+/// A terrain whose meshes have it or lose it is loaded again, and its former tiles and chunks stay until then.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component, Default)]
+pub struct SkyLight {
+    /// Whether they have it.
+    pub is_on: bool,
+}
+
+impl SkyLight {
+    /// No light of the sky: all ground is lit alike.
+    pub const OFF: Self = Self { is_on: false };
+}
+
+impl Default for SkyLight {
+    fn default() -> Self {
+        Self { is_on: true }
+    }
+}
+
 /// The colour of each material id, for the vertex colours of a terrain's meshes; insert it on the terrain's entity. Ids past
 /// its end have the last colour. If it is empty, or there are [`SlimVertices`], meshes have no vertex colours, which saves 16
 /// bytes a vertex.

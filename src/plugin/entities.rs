@@ -4,6 +4,7 @@ use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
+use super::meshes::VertexKind;
 use super::processor::node_origin;
 use super::{
     Chunk, CommitAction, Field, FieldChanged, FieldCreated, FieldMerged, ShownSurface, TerrainReady, Tile,
@@ -19,8 +20,8 @@ pub struct TerrainEntities {
     pub(super) shown: Version,
     /// Metres along the side of the voxels that they were built for.
     pub(super) voxel_size: f32,
-    /// Whether they were built with [`SlimVertices`](super::SlimVertices).
-    pub(super) is_slim: bool,
+    /// The attributes of their vertices.
+    pub(super) vertices: VertexKind,
     /// Whether they were built with [`LevelsOfDetail`](super::LevelsOfDetail).
     pub(super) has_lod: bool,
     /// Whether all of them have to be rebuilt.
@@ -36,11 +37,11 @@ pub struct TerrainEntities {
 }
 
 impl TerrainEntities {
-    pub(super) fn new(shown: Version, voxel_size: f32, is_slim: bool, has_lod: bool) -> Self {
+    pub(super) fn new(shown: Version, voxel_size: f32, vertices: VertexKind, has_lod: bool) -> Self {
         Self {
             shown,
             voxel_size,
-            is_slim,
+            vertices,
             has_lod,
             is_outdated: false,
             drawn: HashMap::default(),

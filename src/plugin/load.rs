@@ -11,22 +11,23 @@ use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
 use super::lod_state::{LevelsOfDetail, LodState, ShownLevels};
-use super::meshes::{BuiltMesh, MeshFacts, VertexExtras};
+use super::meshes::{BuiltMesh, MeshFacts, VertexExtras, VertexKind};
 use super::places::{LocalPlaces, TerrainPlace, place_terrain};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::reports::{Report, Reports};
 use super::task::{InFlight, TaskCounter};
-use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SlimVertices};
+use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SkyLight, SlimVertices};
 use crate::lattice::ChunkPos;
 use crate::lod::Cut;
 use crate::terrain::{Drawn, DrawnCut, KnownNodes, Terrain, World};
 use crate::threads::{ThreadTask, Threads, panic_message};
+use crate::world::sky::LitWorld;
 
 /// Surfaces of one snapshot that are built, and passed to the renderer, until all can be shown.
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
-    is_slim: bool,
+    vertices: VertexKind,
     has_lod: bool,
     task: Option<ThreadTask<BuiltWorld>>,
     waiting: Vec<BuiltSurface>,
@@ -183,7 +184,7 @@ pub(super) fn drop_other_vertices(
     mut commands: Commands,
     loading: Query<&Loading, Allow<Disabled>>,
 ) {
-    if loading.get(new.entity).is_ok_and(|loading| !loading.is_slim) {
+    if loading.get(new.entity).is_ok_and(|loading| !loading.vertices.is_slim) {
         commands.entity(new.entity).try_remove::<Loading>();
     }
 }
@@ -194,7 +195,7 @@ pub(super) fn drop_slim_vertices(
     mut commands: Commands,
     loading: Query<&Loading, Allow<Disabled>>,
 ) {
-    if loading.get(gone.entity).is_ok_and(|loading| loading.is_slim) {
+    if loading.get(gone.entity).is_ok_and(|loading| loading.vertices.is_slim) {
         commands.entity(gone.entity).try_remove::<Loading>();
     }
 }
@@ -208,7 +209,7 @@ pub(super) fn start_loading(
             Entity,
             &mut Terrain,
             Option<&MaterialColors>,
-            Has<SlimVertices>,
+            (Has<SlimVertices>, Option<&SkyLight>),
             Has<LevelsOfDetail>,
             Option<&TerrainEntities>,
         ),
@@ -218,15 +219,16 @@ pub(super) fn start_loading(
     settings: Res<BurrowSettings>,
     mut counter: ResMut<TaskCounter>,
 ) {
-    for (entity, mut terrain, colors, is_slim, has_lod, entities) in &mut terrains {
+    for (entity, mut terrain, colors, (is_slim, sky_light), has_lod, entities) in &mut terrains {
+        let kind = VertexKind::of(is_slim, sky_light);
         let is_same_kind = |entities: &&TerrainEntities| {
-            !entities.is_outdated && (entities.is_slim, entities.has_lod) == (is_slim, has_lod)
+            !entities.is_outdated && (entities.vertices, entities.has_lod) == (kind, has_lod)
         };
         let entities_of_kind = entities.filter(is_same_kind);
         if entities_of_kind.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
-        let extras = VertexExtras::of(colors, is_slim);
+        let extras = VertexExtras::of(colors, kind);
         let builder = build.builder((entity, &terrain), extras);
         // For the game this is no change.
         let model = terrain.bypass_change_detection();
@@ -241,13 +243,14 @@ pub(super) fn start_loading(
         let world = model.snapshot();
         let task = (!builder.is_idle() || has_lod).then(|| {
             let world = Arc::clone(&world);
+            let builder = builder.lit_by(&Arc::new(LitWorld::new(Arc::clone(&world), Vec::new())));
             ThreadTask::start(Threads::Background, move || match has_lod {
                 true => build_nodes(&world, &builder),
                 false => (build_world(&world, &builder), None),
             })
         });
         let (waiting, ready) = (Vec::new(), HashMap::default());
-        let loading = Loading { world, is_slim, has_lod, task, waiting, ready, levels: None };
+        let loading = Loading { world, vertices: kind, has_lod, task, waiting, ready, levels: None };
         commands.entity(entity).try_insert(loading);
     }
 }
@@ -379,7 +382,7 @@ fn show(
 ) -> TerrainEntities {
     let world = Arc::clone(&loading.world);
     let (version, has_lod) = (world.version(), loading.has_lod);
-    let mut entities = TerrainEntities::new(version, voxel_size, loading.is_slim, has_lod);
+    let mut entities = TerrainEntities::new(version, voxel_size, loading.vertices, has_lod);
     let with_fields = world.fields().map(|(chunk, _)| chunk);
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     // With levels, tiles come as they are drawn.

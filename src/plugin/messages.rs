@@ -6,7 +6,7 @@ use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
 
 use super::MaterialColors;
-use super::meshes::{MeshBuilder, VertexExtras};
+use super::meshes::{MeshBuilder, VertexExtras, VertexKind};
 use crate::brush::Brush;
 use crate::terrain::{LoosePiece, Receipt, ReturnedPiece, Terrain};
 
@@ -132,7 +132,7 @@ impl LoosePieceFound {
         if let Some(mesh) = &self.mesh {
             return Some(Mesh::clone(mesh));
         }
-        let extras = VertexExtras::of(Some(colors), false);
+        let extras = VertexExtras::of(Some(colors), VertexKind::default());
         self.build(&MeshBuilder::new(terrain.world(), extras, RenderAssetUsages::RENDER_WORLD))
     }
 

@@ -53,7 +53,9 @@ mod times;
 
 #[cfg(feature = "scatter")]
 pub(crate) use commit::GroundChanged;
-pub use components::{Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SlimVertices, Tile};
+pub use components::{
+    Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SkyLight, SlimVertices, Tile,
+};
 #[doc(hidden)]
 pub use components::{GroundPieces, MeshBytes, ShownSurface};
 #[cfg(any(feature = "avian", feature = "scatter"))]
@@ -69,7 +71,10 @@ pub(crate) use lod_state::WantedTiles;
 pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[cfg(feature = "render")]
 pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
-pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
+pub use meshes::{
+    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
+    CUT_VOXELS,
+};
 #[doc(hidden)]
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,

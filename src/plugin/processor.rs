@@ -1,6 +1,7 @@
 //! Extra data for each surface: built in the same task as the meshes, swapped in by the same commit.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,13 +11,14 @@ use bevy::ecs::system::SystemParam;
 use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
-use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
+use super::meshes::{BuiltMesh, MeshBuilder, TileLights, VertexExtras};
 use super::tile_columns::KeptColumns;
 use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::lod::{LodGrid, Node};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Drawn, DrawnCut, NodeUpdate, SurfaceDraft, Terrain};
+use crate::world::sky::LitWorld;
 
 /// A tile or chunk whose surface is built.
 #[derive(Clone, Copy, Debug)]
@@ -231,6 +233,19 @@ impl SurfaceBuilder {
         }
     }
 
+    /// Whether surfaces have sky light.
+    pub fn has_sky_light(&self) -> bool {
+        self.mesh_builder.as_ref().is_some_and(MeshBuilder::has_sky_light)
+    }
+
+    /// This builder with surfaces lit by a world, if they have sky light.
+    pub fn lit_by(mut self, lit: &Arc<LitWorld>) -> Self {
+        if let Some(builder) = &mut self.mesh_builder {
+            builder.light_by(lit);
+        }
+        self
+    }
+
     /// Whether there is nothing to build.
     pub fn is_idle(&self) -> bool {
         self.mesh_builder.is_none() && self.processors.is_empty()
@@ -244,10 +259,31 @@ impl SurfaceBuilder {
         drawn_cut: Option<&DrawnCut>,
     ) -> Vec<BuiltSurface> {
         let cost = if self.processors.is_empty() { ItemCost::Surface } else { ItemCost::Collider };
-        parallel_map_into(drafts, cost, |(drawn, draft)| {
-            let is_drawn = drawn_cut.is_none_or(|cut| cut.shows_parts(drawn.tile()));
-            self.build((drawn, is_drawn), draft.is_empty(), || draft)
-        })
+        let is_drawn = |tile| drawn_cut.is_none_or(|cut| cut.shows_parts(tile));
+        if !self.has_sky_light() {
+            return parallel_map_into(drafts, cost, |(drawn, draft)| {
+                self.build((drawn, is_drawn(drawn.tile())), draft.is_empty(), || draft)
+            });
+        }
+        // A tile and its chunks are lit together.
+        let mut by_tile: BTreeMap<TilePos, Vec<(usize, Drawn, SurfaceDraft)>> = BTreeMap::new();
+        for (number, (drawn, draft)) in drafts.into_iter().enumerate() {
+            by_tile.entry(drawn.tile()).or_default().push((number, drawn, draft));
+        }
+        let built = parallel_map_into(by_tile.into_iter().collect(), cost, |(tile, drafts)| {
+            let mut lights = self.lights_over(tile);
+            let build = |(number, drawn, draft): (usize, Drawn, SurfaceDraft)| {
+                (number, self.build_lit((drawn, is_drawn(tile)), draft.is_empty(), || draft, &mut lights))
+            };
+            drafts.into_iter().map(build).collect::<Vec<_>>()
+        });
+        let mut built: Vec<(usize, BuiltSurface)> = built.into_iter().flatten().collect();
+        built.sort_unstable_by_key(|(number, _)| *number);
+        built.into_iter().map(|(_, built)| built).collect()
+    }
+
+    fn lights_over(&self, tile: TilePos) -> TileLights<'_> {
+        TileLights::new(self.mesh_builder.as_ref(), self.grid.tile_cells(tile))
     }
 
     /// Builds what these nodes are drawn with, in parallel.
@@ -273,6 +309,16 @@ impl SurfaceBuilder {
         is_empty: bool,
         draft: impl FnOnce() -> SurfaceDraft,
     ) -> BuiltSurface {
+        self.build_lit((drawn, is_drawn), is_empty, draft, &mut self.lights_over(drawn.tile()))
+    }
+
+    fn build_lit(
+        &self,
+        (drawn, is_drawn): (Drawn, bool),
+        is_empty: bool,
+        draft: impl FnOnce() -> SurfaceDraft,
+        lights: &mut TileLights,
+    ) -> BuiltSurface {
         let part = &Part::new(self.terrain, self.voxel_size, self.grid, self.revision, drawn);
         let guarded = &self.processors;
         let wants = |processor: &&Arc<dyn SurfaceProcessor>| {
@@ -297,7 +343,7 @@ impl SurfaceBuilder {
             _ => None,
         };
         let known = columns.as_ref().map(|(columns, _)| &**columns);
-        built.mesh = mesh_builder.and_then(|builder| builder.build(part.origin, &draft, known));
+        built.mesh = mesh_builder.and_then(|builder| builder.build(part.origin, &draft, known, lights));
         if !processors.is_empty() {
             let surface = &match columns {
                 Some((columns, tile)) => Cow::Owned(columns.surface(tile)),

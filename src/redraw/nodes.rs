@@ -132,7 +132,7 @@ fn merged(areas: impl Iterator<Item = (Column, Column)>) -> Vec<(Column, Column)
 }
 
 /// A world as it is drawn: as committed, or with what a running transaction changes.
-struct State<'a> {
+pub(super) struct State<'a> {
     world: &'a World,
     view: WorldView<'a>,
     stacks: Stacks<'a>,
@@ -150,7 +150,7 @@ struct NewOver<'a> {
 }
 
 impl<'a> State<'a> {
-    fn committed(world: &'a World) -> Self {
+    pub fn committed(world: &'a World) -> Self {
         Self {
             world,
             view: world.view(),
@@ -178,7 +178,12 @@ impl<'a> State<'a> {
 
     /// The meshes of these nodes of a cut. Nodes of level 0 that were and are drawn by their parts are left out,
     /// because changed parts have their own updates.
-    fn updates(&self, cut: &Cut, nodes: &[Node], shows_parts: impl Fn(TilePos) -> bool) -> Vec<NodeUpdate> {
+    pub fn updates(
+        &self,
+        cut: &Cut,
+        nodes: &[Node],
+        shows_parts: impl Fn(TilePos) -> bool,
+    ) -> Vec<NodeUpdate> {
         let view = LodView::new(self.view, cut, self.stacks);
         // Most digs draw nothing here, so threads are not involved.
         let changing = nodes.iter().filter_map(|&node| {

@@ -7,12 +7,13 @@ use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
 use super::resolve::{FieldChange, Resolved, install, patch_of};
-use crate::lattice::ChunkPos;
 #[cfg(all(feature = "plugin", feature = "scatter"))]
 use crate::lattice::LatticeBox;
-use crate::redraw::{DrawnCut, MeshUpdates, Stages};
+use crate::lattice::{ChunkPos, SNAP, TilePos};
+use crate::redraw::{DrawnCut, MeshUpdates, Stages, relit_parts};
 use crate::volume::UniformBricks;
-use crate::world::{NewSurfaces, Patch, World};
+use crate::world::sky::{LitWorld, SkyColumns, SkyLights};
+use crate::world::{Drawn, NewSurfaces, Patch, World};
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
@@ -89,6 +90,34 @@ impl Commit {
     /// The bricks and fields that it leads to, as its [record](super::CommitRecord) lists them.
     pub fn change(&self) -> Patch {
         patch_of(&self.changes, self.whole.as_deref(), self.next_field)
+    }
+
+    /// Computes the light of all surfaces that a commit to this world makes or lights otherwise, and returns the number of
+    /// their vertices: for benchmarks.
+    #[doc(hidden)]
+    pub fn light(&self, before: Arc<World>) -> usize {
+        let lit = LitWorld::new(before, self.change().bricks);
+        let tiles = self.meshes.tiles.iter().map(|(tile, _)| Drawn::Tile(*tile));
+        let chunks = self.meshes.chunks.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));
+        let redrawn: Vec<Drawn> = tiles.chain(chunks).collect();
+        let relit = relit_parts(&lit, |drawn| redrawn.contains(&drawn));
+        let mut tiles: Vec<TilePos> = redrawn.iter().chain(&relit).map(|drawn| drawn.tile()).collect();
+        tiles.sort_unstable();
+        tiles.dedup();
+        let mut count = 0;
+        for tile in tiles {
+            let (low, high) = lit.before().grid().tile_cells(tile);
+            let mut lights = SkyColumns::new(lit.view(), low, high);
+            count += lights.lights().len();
+            for (chunk, surface) in self.meshes.chunks.iter().filter(|(chunk, _)| chunk.tile() == tile) {
+                let origin = lit.before().grid().origin(*chunk) * SNAP;
+                for vertex in &surface.mesh().vertices {
+                    std::hint::black_box(lights.light(origin + vertex.position));
+                }
+                count += surface.mesh().vertices.len();
+            }
+        }
+        count
     }
 
     /// Hash of every edited sample, once this is committed: equal for equal edits of equal samples, whatever ran them.

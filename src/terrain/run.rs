@@ -41,6 +41,15 @@ impl Transaction {
         Self { engine: Some(engine.clone()), ..self }.run()
     }
 
+    /// Computes the commit on another engine than the terrain's own, and returns the world before it too. It must be dropped
+    /// before the commit is installed, otherwise that copies the world.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn run_with_world(self, engine: &Engine) -> (Commit, Arc<World>) {
+        let own = Self { engine: Some(engine.clone()), ..self };
+        let commit = own.attempt().unwrap_or_else(|_| own.clone().run_without_faults());
+        (commit, own.world)
+    }
+
     /// Computes the commit. Runs on any thread; large transactions use the threads of the current rayon pool, and the
     /// result does not depend on how many those are.
     ///

@@ -371,7 +371,7 @@ impl Studio {
 
     /// Takes a picture through the player's eyes.
     pub fn shoot(&mut self, name: &str) -> Result {
-        // The ambient light adapts slowly.
+        // Whatever falls comes to rest.
         self.wait(90);
         if self.photographer.is_some() {
             self.wait_for_details()?;

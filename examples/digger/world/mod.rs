@@ -1,5 +1,6 @@
 //! The landscape, what grows on it, the light, and particles.
 
+pub mod air;
 pub mod day;
 pub mod debris;
 pub mod landscape;
