@@ -31,7 +31,7 @@ pub const MAGIC: [u8; 4] = *b"\xB5BRW";
 pub const SCHEMA: u32 = 1;
 
 /// Content is packed by at most this factor.
-const MOST_PACKED: usize = 255;
+const MAX_PACKED: usize = 255;
 
 /// Bytes of the checksum.
 const CHECKSUM: usize = 8;
@@ -216,7 +216,7 @@ fn unpacked(parts: &Parts, limit: usize) -> Result<Vec<u8>, FormatError> {
     if !parts.is_packed {
         return Ok(parts.stored.to_vec());
     }
-    if length / MOST_PACKED > parts.stored.len() {
+    if length / MAX_PACKED > parts.stored.len() {
         return Err(FormatError::Invalid("length"));
     }
     let unpacked = lz4_flex::block::decompress(parts.stored, length).ok();

@@ -17,7 +17,7 @@ const AXIS_STEPS: usize = 20;
 const LEAST_STAY: f32 = 0.01;
 
 /// The most often they grow: by then they are so large that only nodes around an eye are split.
-const MOST_GROWTHS: u32 = 60;
+const MAX_GROWTHS: u32 = 60;
 
 /// A viewpoint that the level of detail is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,7 +157,7 @@ impl LodSettings {
             })
         };
         let mut cut = with_limits(1.0);
-        for times in 1..=MOST_GROWTHS {
+        for times in 1..=MAX_GROWTHS {
             if cut.nodes().count() <= self.most_nodes {
                 break;
             }

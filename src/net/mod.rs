@@ -72,10 +72,12 @@ pub use bucket::Rate;
 #[doc(hidden)]
 pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
-pub use message::{ClientId, Kick, Lane, MOST_TO_SERVER, PROTOCOL, Refusal};
+#[doc(hidden)]
+pub use message::KickReason as Kick;
+pub use message::{ClientId, KickReason, Lane, MAX_TO_SERVER, PROTOCOL, Refusal};
 #[doc(hidden)]
 pub use message::{
-    Entries, Entry, Epoch, Hello, Join, MOST_OWN_JUMP, RegionContent, RegionHashes, Terms, ToClient,
+    Entries, Entry, Epoch, Hello, Join, MAX_SEQUENCE_JUMP, RegionContent, RegionHashes, RuleState, ToClient,
     ToServer, Welcome,
 };
 #[doc(hidden)]

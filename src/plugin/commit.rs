@@ -24,7 +24,7 @@ use super::{
     LoosePieceFound, MaterialColors, SlimVertices,
 };
 use crate::lattice::ChunkPos;
-use crate::terrain::{Asked, Drawn, FieldChange, Receipt, Rejection, Terrain, World as TerrainWorld};
+use crate::terrain::{Asked, FieldChange, MeshKey, Receipt, Rejection, Terrain, World as TerrainWorld};
 use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
@@ -224,11 +224,11 @@ fn commit(
         return false;
     };
     let commit = match change {
-        Change::Unseen(unseen) => {
-            let is_shown = unseen.is_of(terrain.world()) && unseen.follows(entities.shown);
+        Change::PendingDisplay(pending) => {
+            let is_shown = pending.is_of(terrain.world()) && pending.follows(entities.shown);
             if is_shown {
-                entities.shown = unseen.version();
-                display.show((entity, terrain.world()), &mut entities, surfaces, unseen.fields(), true);
+                entities.shown = pending.version();
+                display.show((entity, terrain.world()), &mut entities, surfaces, pending.fields(), true);
                 display.show_nodes((entity, terrain.world()), &mut entities, nodes);
                 // A game that changes the ground in each frame is always one step ahead; all that was loaded is shown.
                 entities.trigger_ready(&mut display.commands, entity);
@@ -316,7 +316,7 @@ fn output_of_panicked(
     }
     let rejected = ticket.and_then(|ticket| terrain.rejected(ticket));
     let Some(rejected) = rejected else {
-        terrain.bypass_change_detection().forget_unseen();
+        terrain.bypass_change_detection().forget_pending_display();
         return None;
     };
     let change = Change::Transaction(Box::new(rejected));
@@ -334,11 +334,11 @@ impl Display<'_, '_> {
         fields: &[(ChunkPos, FieldChange)],
         is_step: bool,
     ) {
-        let with_fields = fields.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
+        let with_fields = fields.iter().map(|&(chunk, _)| (MeshKey::Chunk(chunk), None));
         let with_surfaces = surfaces.into_iter().map(|built| (built.drawn, Some(built)));
         let mut touched = Vec::new();
         for (drawn, built) in with_surfaces.chain(with_fields) {
-            if let (Drawn::Chunk(chunk), true) = (drawn, is_step) {
+            if let (MeshKey::Chunk(chunk), true) = (drawn, is_step) {
                 touched.push(chunk);
             }
             self.show_part((entity, world), entities, drawn, built);
@@ -352,16 +352,16 @@ impl Display<'_, '_> {
         &mut self,
         (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
-        drawn: Drawn,
+        drawn: MeshKey,
         built: Option<BuiltSurface>,
     ) {
         let commands = &mut self.commands;
         let child = entities.get(commands, drawn);
         let is_new = child.is_none();
         let is_gone = match drawn {
-            Drawn::Chunk(chunk) => is_empty(world, chunk),
+            MeshKey::Chunk(chunk) => is_empty(world, chunk),
             // It has an entity while it is drawn, or wanted.
-            Drawn::Tile(_) => built.as_ref().is_some_and(|built| !built.is_drawn),
+            MeshKey::Tile(_) => built.as_ref().is_some_and(|built| !built.is_drawn),
         };
         if is_new && (is_gone || built.as_ref().is_some_and(|built| built.shown.is_empty)) {
             return;
@@ -378,8 +378,8 @@ impl Display<'_, '_> {
             apply_actions(commands, child, shown, actions);
         }
         match drawn {
-            Drawn::Chunk(_) if is_new => trigger_if_alive(commands, ChunkCreated { entity: child }),
-            Drawn::Chunk(_) if has_changed => trigger_if_alive(commands, ChunkChanged { entity: child }),
+            MeshKey::Chunk(_) if is_new => trigger_if_alive(commands, ChunkCreated { entity: child }),
+            MeshKey::Chunk(_) if has_changed => trigger_if_alive(commands, ChunkChanged { entity: child }),
             _ => {}
         }
     }
@@ -414,10 +414,10 @@ impl Display<'_, '_> {
     }
 
     /// Draws a tile or chunk no more. A tile that nothing else needs has no entity any more.
-    fn hide_part(&mut self, terrain: Entity, entities: &mut TerrainEntities, drawn: Drawn) {
+    fn hide_part(&mut self, terrain: Entity, entities: &mut TerrainEntities, drawn: MeshKey) {
         let Some(child) = entities.get(&mut self.commands, drawn) else { return };
         match drawn {
-            Drawn::Tile(tile) if !self.wanted.has(terrain, tile) => {
+            MeshKey::Tile(tile) if !self.wanted.has(terrain, tile) => {
                 entities.despawn_tile(&mut self.commands, tile);
             }
             _ => {

@@ -323,7 +323,7 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights, NoiseSource};
     use crate::lod::Cut;
-    use crate::terrain::{Drawn, NodeUpdate, Terrain, TerrainSettings};
+    use crate::terrain::{MeshKey, NodeUpdate, Terrain, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
 
@@ -336,12 +336,12 @@ mod tests {
 
     /// All vertices that are drawn, with their place in 1/4096 voxel.
     fn drawn(world: &World) -> Vec<(bool, IVec3, Vertex)> {
-        let tiles = world.grid().tiles().map(Drawn::Tile);
-        let all = tiles.chain(world.drawn_chunks().map(Drawn::Chunk));
+        let tiles = world.grid().tiles().map(MeshKey::Tile);
+        let all = tiles.chain(world.drawn_chunks().map(MeshKey::Chunk));
         let vertices = all.flat_map(|drawn| {
             let (is_tile, mesh) = match drawn {
-                Drawn::Tile(tile) => (true, world.tile_mesh(tile)),
-                Drawn::Chunk(chunk) => (false, world.chunk_mesh(chunk)),
+                MeshKey::Tile(tile) => (true, world.tile_mesh(tile)),
+                MeshKey::Chunk(chunk) => (false, world.chunk_mesh(chunk)),
             };
             let origin = world.origin(drawn) * SNAP;
             mesh.vertices.into_iter().map(move |vertex| (is_tile, origin, vertex))
@@ -469,7 +469,7 @@ mod tests {
                 terrain.submit(Brush::dig(Shape::sphere(place, 3.0 + i as f32)));
                 let commit = terrain.begin().unwrap().run();
                 for (tile, update) in &commit.meshes.tiles {
-                    let origin = terrain.world().origin(Drawn::Tile(*tile));
+                    let origin = terrain.world().origin(MeshKey::Tile(*tile));
                     for builder in &builders {
                         let found =
                             bytes_of(builder.build(origin, &SurfaceDraft::Tile(update.clone()), None));

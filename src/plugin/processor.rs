@@ -16,7 +16,7 @@ use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::lod::{LodGrid, Node};
 use crate::surface::SurfaceMesh;
-use crate::terrain::{Drawn, DrawnCut, NodeUpdate, SurfaceDraft, Terrain};
+use crate::terrain::{DrawnCut, MeshKey, NodeUpdate, SurfaceDraft, Terrain};
 
 /// A tile or chunk whose surface is built.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ pub struct Part {
     /// The terrain's entity.
     pub terrain: Entity,
     /// Which tile or chunk.
-    pub drawn: Drawn,
+    pub drawn: MeshKey,
     /// The lattice point that positions of its surface count from, in voxels of the terrain.
     pub origin: IVec3,
     /// Cells along its sides.
@@ -41,11 +41,11 @@ impl Part {
         voxel_size: f32,
         grid: ChunkGrid,
         revision: u64,
-        drawn: Drawn,
+        drawn: MeshKey,
     ) -> Self {
         let origin = match drawn {
-            Drawn::Tile(tile) => grid.tile_cells(tile).0.at(0),
-            Drawn::Chunk(chunk) => grid.origin(chunk),
+            MeshKey::Tile(tile) => grid.tile_cells(tile).0.at(0),
+            MeshKey::Chunk(chunk) => grid.origin(chunk),
         };
         Self { terrain, drawn, origin, size: grid.size(), voxel_size, revision }
     }
@@ -134,7 +134,7 @@ impl fmt::Debug for SurfaceProcessors {
 
 /// The new surface of a tile or chunk, ready to be swapped in.
 pub(super) struct BuiltSurface {
-    pub drawn: Drawn,
+    pub drawn: MeshKey,
     pub mesh: BuiltMesh,
     pub shown: ShownSurface,
     pub actions: Vec<CommitAction>,
@@ -150,7 +150,7 @@ pub(super) struct BuiltNode {
     /// Tile and chunks that are drawn from now on.
     pub shown: Vec<BuiltSurface>,
     /// Tile and chunks that are drawn no more.
-    pub hidden: Vec<Drawn>,
+    pub hidden: Vec<MeshKey>,
 }
 
 impl BuiltNode {
@@ -240,7 +240,7 @@ impl SurfaceBuilder {
     /// meshes.
     pub fn build_all(
         &self,
-        drafts: Vec<(Drawn, SurfaceDraft)>,
+        drafts: Vec<(MeshKey, SurfaceDraft)>,
         drawn_cut: Option<&DrawnCut>,
     ) -> Vec<BuiltSurface> {
         let cost = if self.processors.is_empty() { ItemCost::Surface } else { ItemCost::Collider };
@@ -269,7 +269,7 @@ impl SurfaceBuilder {
     /// otherwise `is_empty` says whether the surface is known to have no triangles.
     pub fn build(
         &self,
-        (drawn, is_drawn): (Drawn, bool),
+        (drawn, is_drawn): (MeshKey, bool),
         is_empty: bool,
         draft: impl FnOnce() -> SurfaceDraft,
     ) -> BuiltSurface {

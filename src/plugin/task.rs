@@ -11,7 +11,7 @@ use super::collect::{pieces, pieces_again};
 use super::figures::TaskTimes;
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use crate::backend::Engine;
-use crate::terrain::{Asked, Commit, Drawn, Receipt, SurfaceDraft, Terrain, Transaction, Unseen};
+use crate::terrain::{Asked, Commit, MeshKey, PendingDisplay, Receipt, SurfaceDraft, Terrain, Transaction};
 use crate::threads::{ThreadTask, Threads};
 
 /// The running task of a terrain.
@@ -51,7 +51,7 @@ pub(super) enum Change {
     /// A transaction, not committed yet.
     Transaction(Box<Commit>),
     /// Commits that the game made itself.
-    Unseen(Unseen),
+    PendingDisplay(PendingDisplay),
 }
 
 impl InFlight {
@@ -76,9 +76,9 @@ impl InFlight {
             let updates = std::mem::take(&mut commit.meshes);
             let drawn_cut = commit.drawn_cut().cloned();
             let tiles = updates.tiles.into_iter();
-            let tiles = tiles.map(|(tile, update)| (Drawn::Tile(tile), SurfaceDraft::Tile(update)));
+            let tiles = tiles.map(|(tile, update)| (MeshKey::Tile(tile), SurfaceDraft::Tile(update)));
             let chunks = updates.chunks.into_iter();
-            let chunks = chunks.map(|(at, chunk)| (Drawn::Chunk(at), SurfaceDraft::Chunk(chunk)));
+            let chunks = chunks.map(|(at, chunk)| (MeshKey::Chunk(at), SurfaceDraft::Chunk(chunk)));
             let _span = info_span!("burrow_mesh").entered();
             let surfaces = builder.build_all(tiles.chain(chunks).collect(), drawn_cut.as_deref());
             let nodes = builder.build_nodes(updates.nodes);
@@ -94,16 +94,21 @@ impl InFlight {
     }
 
     /// Builds the surfaces that the game changed itself.
-    pub fn unseen(number: u64, terrain: &Terrain, unseen: Unseen, builder: SurfaceBuilder) -> Self {
-        let drafts = unseen.drawn().map(|drawn| (drawn, terrain.world().draft(drawn))).collect();
+    pub fn pending_display(
+        number: u64,
+        terrain: &Terrain,
+        pending: PendingDisplay,
+        builder: SurfaceBuilder,
+    ) -> Self {
+        let drafts = pending.drawn().map(|drawn| (drawn, terrain.world().draft(drawn))).collect();
         // Nodes are made from all of the world.
         let cut = terrain.drawn_cut().map(|cut| (terrain.snapshot(), Arc::clone(cut)));
         Self::start(number, None, move || {
             let _span = info_span!("burrow_mesh").entered();
             let surfaces = builder.build_all(drafts, cut.as_ref().map(|(_, cut)| cut.as_ref()));
-            let nodes = cut.map(|(world, cut)| world.redraw_tiles(&cut, unseen.drawn().map(Drawn::tile)));
+            let nodes = cut.map(|(world, cut)| world.redraw_tiles(&cut, pending.drawn().map(MeshKey::tile)));
             let nodes = builder.build_nodes(nodes.unwrap_or_default());
-            let (change, times) = (Change::Unseen(unseen), TaskTimes::default());
+            let (change, times) = (Change::PendingDisplay(pending), TaskTimes::default());
             TaskOutput { change, surfaces, nodes, pieces: Vec::new(), times }
         })
     }

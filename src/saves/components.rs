@@ -62,7 +62,7 @@ pub struct WorldStore {
     /// The component that it was opened for.
     pub(super) saved: SavedWorld,
     /// The last point that was reported as durable.
-    pub(super) told: Option<SavePoint>,
+    pub(super) reported: Option<SavePoint>,
     /// The point that [`SaveNow`](super::SaveNow) waits for; `asked_again` if another was sent since.
     pub(super) asked: Option<SavePoint>,
     pub(super) asked_again: bool,
@@ -77,7 +77,7 @@ impl WorldStore {
         Self {
             store: Some(store),
             saved,
-            told: None,
+            reported: None,
             asked: None,
             asked_again: false,
             closing: ClosedBecause::Removed,
@@ -128,18 +128,18 @@ pub(super) fn warn_without_plugin(world: &DeferredWorld, component: &str) {
 pub(super) struct Unopened {
     pub since: Instant,
     /// Whether it was logged that there is no terrain.
-    pub told: bool,
+    pub reported: bool,
     /// What the world was to be read for before its terrain was removed.
     pub level: Option<LevelId>,
 }
 
 impl Unopened {
     pub fn new(level: Option<LevelId>) -> Self {
-        Self { since: Instant::now(), told: false, level }
+        Self { since: Instant::now(), reported: false, level }
     }
 }
 
-/// What tells a level from others: its ground and its sizes.
+/// What distinguishes a level from others: its ground and its sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LevelId {
     ground: u64,

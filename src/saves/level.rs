@@ -122,12 +122,12 @@ pub(super) struct MakingLevel(pub ThreadTask<Result<Terrain, RestoreLevelError>>
 #[derive(Component)]
 pub(super) struct Waiting {
     pub since: Instant,
-    pub told: bool,
+    pub reported: bool,
 }
 
 impl Waiting {
     pub fn new() -> Self {
-        Self { since: Instant::now(), told: false }
+        Self { since: Instant::now(), reported: false }
     }
 }
 

@@ -86,7 +86,7 @@ impl Plugin for SavePlugin {
                     )
                         .chain()
                         .in_set(BeforeLoad::Worlds),
-                    (saving::save_commits, saving::save_now, saving::tell, closing::tell_closed)
+                    (saving::save_commits, saving::save_now, saving::report, closing::report_closed)
                         .chain()
                         .in_set(SaveSystems),
                 ),

@@ -21,7 +21,7 @@ use crate::threads::free_later;
 const LOG_BYTES: usize = 64 << 20;
 
 /// How long a component waits for a terrain before that is logged.
-const TERRAIN_TOLD: Duration = Duration::from_secs(10);
+const REPORT_AFTER: Duration = Duration::from_secs(10);
 
 /// A world that is to be read is not being read for what was there before.
 pub(super) fn begin_anew(new: On<Insert, Unopened>, mut commands: Commands) {
@@ -150,8 +150,8 @@ pub(super) fn warn_of_no_terrain(
     mut worlds: Query<(Entity, &SavedWorld, &mut Unopened), (Without<Terrain>, Allow<Disabled>)>,
 ) {
     for (entity, saved, mut unopened) in &mut worlds {
-        if !unopened.told && unopened.since.elapsed() >= TERRAIN_TOLD {
-            unopened.told = true;
+        if !unopened.reported && unopened.since.elapsed() >= REPORT_AFTER {
+            unopened.reported = true;
             warn!(
                 "the SavedWorld of {entity} waits for a terrain, and saves nothing in {}: insert it on the entity of the Terrain",
                 saved.path.display()
@@ -170,12 +170,12 @@ pub(super) fn finish_opening(
 ) {
     for (entity, mut terrain, mut opening) in &mut worlds {
         let saved = &Arc::clone(&opening.reader).saved;
-        let mut tell = |trouble| {
+        let mut report = |trouble| {
             warn!("the world in {}: {trouble}", saved.path.display());
             troubles.write(StoreTroubleFound { terrain: entity, trouble });
         };
-        if opening.tells_of_lock() {
-            tell(StoreTrouble::WaitsForLock);
+        if opening.reports_lock() {
+            report(StoreTrouble::WaitsForLock);
         }
         let Some(outcome) = opening.poll() else { continue };
         let now = terrain.world().version();
@@ -197,7 +197,7 @@ pub(super) fn finish_opening(
                     store
                 }
                 Found::Old(ReadWorld { store, terrain: mut read, troubles }) => {
-                    troubles.into_iter().for_each(&mut tell);
+                    troubles.into_iter().for_each(&mut report);
                     if now != opening.version {
                         warn!("what the game did to {entity} while its world was read is not in that");
                     }

@@ -24,7 +24,7 @@ impl StoreThread {
             if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
                 let why = message_of(&*panic);
                 shared.set_failing(Some(&why));
-                shared.tell(StoreTrouble::Ended(why));
+                shared.report_trouble(StoreTrouble::Ended(why));
             }
         };
         thread.spawn(guarded).map(Self).map_err(StoreError::files("starting the store's thread"))

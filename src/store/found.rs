@@ -10,7 +10,7 @@ use super::error::StoreError;
 use super::files::Files;
 use super::keys::{self, Key};
 use super::progress::{Progress, Work};
-use super::segment::{self, Bad, FRAME_LIMIT, Found, Frame, MOST_NUMBER};
+use super::segment::{self, Bad, FRAME_LIMIT, Found, Frame, MAX_NUMBER};
 use super::sources::{self, Source};
 use super::{checkpoint_copy, unsaved};
 use crate::format::bytes::Reader;
@@ -134,7 +134,7 @@ impl Contents {
             let own = found.frames.iter().map(|frame| frame.number);
             own.chain((found.length > 0).then_some(found.number))
         });
-        if numbers.max() > Some(MOST_NUMBER / 2) {
+        if numbers.max() > Some(MAX_NUMBER / 2) {
             return Err(StoreError::Unreadable(
                 "the numbers in its journal leave none for what follows".into(),
             ));
@@ -422,7 +422,7 @@ fn decode_checkpoint(payload: &[u8]) -> Option<Checkpoint> {
     let checkpoint = Checkpoint::decode(payload)?;
     let Metadata { revision, next_field, .. } = checkpoint.metadata;
     let numbers = checkpoint.regions.values().copied().chain([checkpoint.frame, revision, next_field]);
-    (numbers.max() <= Some(MOST_NUMBER / 2)).then_some(checkpoint)
+    (numbers.max() <= Some(MAX_NUMBER / 2)).then_some(checkpoint)
 }
 
 /// Refuses a world that a newer version wrote to, because data that this version can't read is not damage.
@@ -490,7 +490,7 @@ mod tests {
     fn numbers_that_no_others_can_follow_are_none() {
         let ground = Arc::new(Ground::flat(64, 64, 4.0).unwrap());
         for which in ["frame", "revision", "field", "region"] {
-            for number in [u64::MAX, u64::MAX - 1, MOST_NUMBER + 1] {
+            for number in [u64::MAX, u64::MAX - 1, MAX_NUMBER + 1] {
                 let disk = world(&ground);
                 let expected = {
                     let opened = Store::open_in(

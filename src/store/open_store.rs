@@ -143,7 +143,7 @@ impl Store {
         let world = WorldId::random();
         let ground = terrain.world().shared_ground();
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let terms = (parts.rules.clone(), parts.loose);
+        let (rules, loose) = (parts.rules.clone(), parts.loose);
         let (grid, level) = (terrain.world().grid(), options.level.clone());
         let progress = options.progress.clone();
         let mirror = Mirror::new(grid, parts, hash, data.clone(), level);
@@ -151,8 +151,8 @@ impl Store {
         let is_whole = revision == 0 && mirror.is_as_level() && data.is_empty();
         let mut entries = Vec::new();
         if is_whole {
-            entries.extend(terms.0.map(|rules| LogEntry::Order(Order::Rules(Some(Arc::new(rules))))));
-            entries.extend(terms.1.map(|loose| LogEntry::Order(Order::Loose(Some(loose)))));
+            entries.extend(rules.map(|rules| LogEntry::Order(Order::Rules(Some(Arc::new(rules))))));
+            entries.extend(loose.map(|loose| LogEntry::Order(Order::Loose(Some(loose)))));
         }
         let frame = u64::from(!is_whole);
         let shared = Arc::new(Shared::default());

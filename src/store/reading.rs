@@ -10,7 +10,7 @@ const BLOCK: usize = 64 << 10;
 const SECTOR: usize = 512;
 
 /// Sectors after which the disk counts as broken, not as one with bad sectors: each may take seconds.
-const MOST_BAD: usize = 256;
+const MAX_BAD: usize = 256;
 
 /// The bytes of a file.
 #[derive(Debug, Default)]
@@ -54,7 +54,7 @@ pub(super) fn read_file(files: &dyn Files, path: &str) -> io::Result<FileBytes> 
                 continue;
             }
             bad += 1;
-            if bad > MOST_BAD {
+            if bad > MAX_BAD {
                 return Err(error);
             }
             match read.unreadable.last_mut().filter(|last| last.end == sector.start) {

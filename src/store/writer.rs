@@ -376,7 +376,7 @@ impl Writer {
     fn leave_gap(&mut self) {
         if !self.state.has_gap {
             let revision = self.shared.durable().map_or(0, SavePoint::revision);
-            self.shared.tell(StoreTrouble::LogGap { revision });
+            self.shared.report_trouble(StoreTrouble::LogGap { revision });
         }
         self.give_up_waiting();
         self.checkpoint_soon();
@@ -466,7 +466,7 @@ impl Writer {
             None => RETRY.0,
         };
         if self.state.failing.as_ref().is_none_or(|failing| failing.why != why) {
-            self.shared.tell(StoreTrouble::NotSaved(why.into()));
+            self.shared.report_trouble(StoreTrouble::NotSaved(why.into()));
         }
         self.shared.set_failing(Some(why));
         self.state.failing = Some(Failing { wait, again: Instant::now() + wait, why: why.into() });
@@ -475,7 +475,7 @@ impl Writer {
 
     pub(super) fn succeed(&mut self) {
         if self.state.failing.take().is_some_and(|failing| !failing.why.is_empty()) {
-            self.shared.tell(StoreTrouble::SavedAgain);
+            self.shared.report_trouble(StoreTrouble::SavedAgain);
         }
         self.shared.set_failing(None);
     }

@@ -74,8 +74,8 @@ impl Terrain {
             }
             Ok(Order::Loose(settings)) => self.set_loose(settings),
             _ => {
-                let terms = (self.rules.clone(), self.loose);
-                self.queue.push(self.world.grid(), request, together, terms);
+                let rules = (self.rules.clone(), self.loose);
+                self.queue.push(self.world.grid(), request, together, rules);
             }
         }
         Ok(())

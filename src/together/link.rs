@@ -8,14 +8,14 @@ use bevy::platform::time::Instant;
 use super::messages::GroundId;
 use super::service::Service;
 use super::trouble::SharingTrouble;
-use crate::net::{self, Client, Kick, Lane, ShownChange, Stamps};
+use crate::net::{self, Client, KickReason, Lane, ShownChange, Stamps};
 use crate::plugin::{LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Asked, Order, Terrain, TerrainError, TerrainSettings, Version, World};
 use crate::threads::{ThreadTask, Threads};
 use crate::volume::DiggingRules;
 
 /// Most edits that wait for the server's answer.
-pub(super) const MOST_PENDING: usize = 1 << 16;
+pub(super) const MAX_PENDING: usize = 1 << 16;
 
 /// What a shared terrain knows of its server.
 pub(super) struct Link {
@@ -31,10 +31,10 @@ pub(super) struct Link {
     /// Whether there was one.
     pub was_served: bool,
     /// The server of this invitation has sent the player away.
-    pub kicked: Option<(Kick, u64)>,
+    pub kicked: Option<(KickReason, u64)>,
     pub inbox: Vec<(Lane, Vec<u8>)>,
     /// What the player asked for and the client has not got yet, in order.
-    pub asks: Vec<Order>,
+    pub requests: Vec<Order>,
     /// Whether the limit of waiting edits is reached, so that no more are taken.
     pub is_full: bool,
     /// Tags of edits, and the number of undos, that are asked for and not answered.
@@ -137,7 +137,7 @@ impl Link {
             was_served: false,
             kicked: None,
             inbox: Vec::new(),
-            asks: Vec::new(),
+            requests: Vec::new(),
             is_full: false,
             tags: VecDeque::new(),
             undos: 0,
@@ -164,12 +164,12 @@ impl Link {
     }
 
     /// Records a request of the player.
-    pub fn ask(&mut self, order: Order) {
+    pub fn request(&mut self, order: Order) {
         match order.edit() {
             Some(edit) => self.tags.push_back(edit.tag()),
             None => self.undos += 1,
         }
-        self.asks.push(order);
+        self.requests.push(order);
     }
 
     /// Records that an edit with this tag was answered.

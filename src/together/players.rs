@@ -8,7 +8,7 @@ use super::replicon::{Peer, Peers};
 use crate::net;
 
 /// The most bytes of a player's messages that wait while the server is busy. A player that sends more is kicked.
-const MOST_WAITING_BYTES: usize = 1 << 20;
+const MAX_WAITING_BYTES: usize = 1 << 20;
 
 /// The approximate overhead of a message in bytes.
 const MESSAGE_BYTES: usize = 128;
@@ -70,7 +70,7 @@ impl Players {
         let waiting = self.waiting.entry(player).or_default();
         let before = *waiting;
         *waiting = waiting.saturating_add(length + MESSAGE_BYTES);
-        match (before <= MOST_WAITING_BYTES, *waiting <= MOST_WAITING_BYTES) {
+        match (before <= MAX_WAITING_BYTES, *waiting <= MAX_WAITING_BYTES) {
             (_, true) => said,
             (true, false) => Said::TooMuch,
             (false, false) => Said::Nothing,

@@ -13,7 +13,7 @@ pub(super) use bevy_replicon::shared::backend::connected_client::NetworkId;
 use bevy_replicon::shared::message::ctx::{ClientSendCtx, ServerReceiveCtx};
 
 use super::messages::{BulkLane, FromPlayer, Invitation, OrderLane, Served};
-use crate::net::{self, Lane, MOST_TO_SERVER};
+use crate::net::{self, Lane, MAX_TO_SERVER};
 
 /// The most bytes of a [`FromPlayer`] in addition to its content.
 const OVERHEAD: usize = 16;
@@ -50,7 +50,7 @@ fn write(_: &mut ClientSendCtx, message: &FromPlayer, bytes: &mut Vec<u8>) -> Re
 }
 
 fn read(_: &mut ServerReceiveCtx, bytes: &mut Bytes) -> Result<FromPlayer> {
-    if bytes.len() > MOST_TO_SERVER + OVERHEAD {
+    if bytes.len() > MAX_TO_SERVER + OVERHEAD {
         return Ok(FromPlayer::TooLong);
     }
     Ok(postcard_utils::from_buf(bytes)?)

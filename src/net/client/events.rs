@@ -1,6 +1,6 @@
 //! Events and statistics of a client.
 
-use super::super::message::{ClientId, Kick, Refusal};
+use super::super::message::{ClientId, KickReason, Refusal};
 use crate::lattice::RegionPos;
 use crate::terrain::{Applied, LoosePiece, Receipt, ReturnedPiece};
 
@@ -64,7 +64,7 @@ pub enum ClientEvent {
     /// These regions differed from the server's, and were fetched. This is a bug: of the plugin's or of a machine.
     Repaired(Vec<RegionPos>),
     /// The server has removed the client.
-    Kicked(Kick),
+    Kicked(KickReason),
 }
 
 /// Statistics of a client.

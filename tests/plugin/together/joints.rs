@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_burrow::format::Level;
-use bevy_burrow::net::{Kick, Server, ServerSettings};
+use bevy_burrow::net::{KickReason, Server, ServerSettings};
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble};
 use bevy_replicon::prelude::*;
@@ -274,7 +274,7 @@ fn who_connects_twice_plays_over_the_later_connection() {
     party.join();
     party.rounds_until("the later one joins", |party| party.shared(1).has_joined());
     party.rounds_until("the earlier one has a trouble", |party| party.shared(0).trouble().is_some());
-    assert_eq!(party.shared(0).trouble(), Some(SharingTrouble::Kicked(Kick::ConnectedAgain)));
+    assert_eq!(party.shared(0).trouble(), Some(SharingTrouble::Kicked(KickReason::ConnectedAgain)));
     let messages = party.ask(|server| server.figures().messages);
     for turn in 0..10 {
         party.dig_at(0, 20.0 + 5.0 * turn as f32, 20.0);

@@ -36,7 +36,7 @@ fn a_device_passes_the_whole_self_test() {
 /// Runs in a separate process, started by the test below.
 #[test]
 #[ignore = "looks at the machine's driver"]
-fn tell_what_the_driver_says() {
+fn print_what_the_driver_reports() {
     let engine = Engine::new(crate::backend::Backend::Cuda);
     println!("state: {:?}", engine.wait(Duration::from_secs(30)));
     compare(&mut Rng::with_seed(3), 3, &engine);
@@ -77,7 +77,7 @@ fn a_driver_without_a_device_is_no_device() {
             "int cuInit(unsigned flags) {{ (void)flags; return {code}; }}\n\
              int cuGetErrorName(int code, const char** name) {{ (void)code; *name = \"{name}\"; return 0; }}\n"
         );
-        let Some(text) = with_driver(name, &source, "tell_what_the_driver_says") else { return };
+        let Some(text) = with_driver(name, &source, "print_what_the_driver_reports") else { return };
         assert!(text.contains(&format!("Lost(\"there is no CUDA device: {name}\")")), "{text}");
     }
 }

@@ -24,7 +24,7 @@ use super::*;
 use crate::backend::Engine;
 use crate::prelude::*;
 use crate::surface::Indices;
-use crate::terrain::{Drawn, World};
+use crate::terrain::{MeshKey, World};
 
 pub(super) use crate::worlds;
 
@@ -55,7 +55,7 @@ fn engine(device: Box<dyn Device>, records: usize) -> Engine {
 }
 
 /// All drawn meshes, as bits.
-fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Indices)> {
+fn drawn(world: &World) -> Vec<(MeshKey, Vec<u8>, Indices)> {
     let bits = |vertex: &crate::surface::Vertex| {
         let mut bytes = Vec::with_capacity(32);
         vertex.position.to_array().iter().for_each(|part| bytes.extend(part.to_le_bytes()));
