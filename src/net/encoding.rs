@@ -365,6 +365,7 @@ fn flag(reader: &mut Reader) -> Result<bool, FormatError> {
 }
 
 fn place_in<T: PartialEq>(all: &[T], one: &T) -> u8 {
+    debug_assert!(all.contains(one), "a reason without a number");
     all.iter().position(|other| other == one).unwrap_or_default() as u8
 }
 

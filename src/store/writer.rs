@@ -160,7 +160,6 @@ pub(super) struct State {
 }
 
 impl Writer {
-    #[allow(clippy::too_many_arguments)]
     pub fn new(
         files: Arc<dyn Files>,
         options: StoreOptions,

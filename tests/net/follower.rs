@@ -25,11 +25,7 @@ pub fn count(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
 }
 
-/// A ground of gentle hills.
-pub fn hills(side: u32) -> Arc<Ground> {
-    let height = |x: i32, z: i32| 20.0 + (f64::from(x) * 0.11).sin() + (f64::from(z) * 0.07).cos();
-    Arc::new(Ground::from_fn(side, side, height).expect("valid heights"))
-}
+pub use crate::load::hills;
 
 /// A terrain without meshes.
 pub fn terrain(ground: &Arc<Ground>) -> Terrain {
