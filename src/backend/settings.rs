@@ -1,4 +1,4 @@
-//! Settings of an engine.
+//! Settings of an engine: which GPU, and how much of its memory.
 
 use super::Backend;
 

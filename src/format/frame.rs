@@ -15,8 +15,8 @@
 //! | bytes | content |
 //! | 8 | XXH3 over all before |
 //!
-//! Integers are little-endian; a *number* is an integer of [variable length](super::bytes). In every schema the magic and the
-//! schema come first and the checksum comes last.
+//! Integers are little-endian; a *number* is an integer of [variable length](super::bytes). In every schema the magic
+//! and the schema come first and the checksum comes last.
 
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -158,8 +158,8 @@ pub fn peek(bytes: &[u8]) -> Option<Peeked<'_>> {
 /// Unwraps what [`seal`] wrapped.
 ///
 /// # Errors
-/// Where `bytes` are not exactly such a frame, or one of another kind, world or key, or of more than `limit` bytes of content,
-/// for which no memory is taken then.
+/// Where `bytes` are not exactly such a frame, or one of another kind, world or key, or of more than `limit` bytes of
+/// content, for which no memory is taken then.
 pub fn open(
     bytes: &[u8],
     kind: Kind,

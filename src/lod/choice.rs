@@ -26,8 +26,8 @@ pub struct Viewpoint {
     pub position: Vec3,
     /// Voxels a second.
     pub velocity: Vec3,
-    /// Pixels that one voxel covers. In perspective, one voxel away: the height of the picture over twice the tangent of half
-    /// the angle of view.
+    /// Pixels that one voxel covers. In perspective, one voxel away: the height of the picture over twice the tangent
+    /// of half the angle of view.
     pub pixels: f32,
     /// How sizes change with distance.
     pub view: View,

@@ -274,7 +274,8 @@ impl ToClient {
         }
     }
 
-    /// Reads a message from a server. Stamps whose images the list lacks get another image; the names of these are returned too.
+    /// Reads a message from a server. Stamps whose images the list lacks get another image; the names of these are
+    /// returned too.
     pub(super) fn read(
         bytes: &[u8],
         ground: &Ground,

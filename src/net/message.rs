@@ -22,8 +22,8 @@
 //! A client repeats its greeting until it is answered, and a server that does not know a connected client asks it to
 //! [greet](ToClient::Greet).
 //!
-//! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the pristine world
-//! after the entries 1 to n. All clients that have applied them in order have the same world.
+//! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the
+//! pristine world after the entries 1 to n. All clients that have applied them in order have the same world.
 
 use std::sync::Arc;
 
@@ -50,8 +50,8 @@ pub const MAX_EDITS: usize = 256;
 pub const MAX_REGIONS: usize = 4096;
 /// Most images that a message asks for.
 pub const MAX_IMAGES: usize = 64;
-/// The most by which the sequence number of a client's edit may exceed the previous one. Larger jumps are invalid, so no
-/// client can use up the numbers of a player.
+/// The most by which the sequence number of a client's edit may exceed the previous one. Larger jumps are invalid, so
+/// no client can use up the numbers of a player.
 pub const MAX_SEQUENCE_JUMP: u64 = 1 << 16;
 
 /// Identifies a player. The caller assigns these numbers: a client that reconnects with the same number is the same
@@ -78,7 +78,8 @@ pub enum Lane {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Entry {
-    /// Something that is asked of the world: an edit, other rules or settings of loose pieces, or parts that replace others.
+    /// Something that is asked of the world: an edit, other rules or settings of loose pieces, or parts that replace
+    /// others.
     Order {
         /// The client that asked for it, and its sequence number there. `None` for the game's server; an edit of the
         /// game's server has [`ClientId::SERVER`] here.
@@ -409,7 +410,8 @@ pub enum KickReason {
     /// The player has connected again, and plays over the new connection.
     #[error("the player has connected again")]
     ConnectedAgain,
-    /// The game [does not admit](super::Server::set_admission) the player. The number has a meaning for the game only, for example which text it shows.
+    /// The game [does not admit](super::Server::set_admission) the player. The number has a meaning for the game only,
+    /// for example which text it shows.
     #[error("refused by the game, reason {0}")]
     Refused(u32),
 }

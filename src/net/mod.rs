@@ -1,8 +1,8 @@
 //! Multiplayer: one server owns the order of all edits, and clients show their own edits at once. Without Bevy and
 //! without a transport: bytes in, bytes out, and a clock that the caller provides.
 //!
-//! Edits are integers and their results are equal on every machine, so the order of edits is all that has to be sent. The
-//! [`Server`] numbers the edits of clients and sends them on before it has applied them itself.
+//! Edits are integers and their results are equal on every machine, so the order of edits is all that has to be sent.
+//! The [`Server`] numbers the edits of clients and sends them on before it has applied them itself.
 //!
 //! | file | what it holds |
 //! | --- | --- |

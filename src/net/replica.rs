@@ -165,8 +165,8 @@ impl Replica {
         self.pending.iter().map(|pending| (pending.sequence, &pending.edit))
     }
 
-    /// Renumbers the pending edits beyond `seen`, from the one after `last` on; returns the next number. `last` is not less
-    /// than `seen`.
+    /// Renumbers the pending edits beyond `seen`, from the one after `last` on; returns the next number. `last` is not
+    /// less than `seen`.
     pub fn renumber(&mut self, seen: u64, last: u64) -> u64 {
         let mut next = last + 1;
         for pending in self.pending.iter_mut().filter(|pending| pending.sequence > seen) {
@@ -277,8 +277,8 @@ impl Replica {
         }
     }
 
-    /// Continues from another position of an order with the rules and settings there, either with the present world or from the
-    /// pristine one.
+    /// Continues from another position of an order with the rules and settings there, either with the present world or
+    /// from the pristine one.
     ///
     /// # Errors
     /// When the rules or settings are invalid.

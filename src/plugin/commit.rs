@@ -126,8 +126,8 @@ impl Commits<'_, '_> {
         self.display.figures.measure(took);
     }
 
-    /// Commits tasks that are done, by number and terrain: each transaction whole, as many as the frame's budget of swaps allows,
-    /// and at least one.
+    /// Commits tasks that are done, by number and terrain: each transaction whole, as many as the frame's budget of
+    /// swaps allows, and at least one.
     pub fn commit(&mut self, mut done: Vec<(u64, Entity)>, swapped: &mut usize) {
         if done.is_empty() {
             return;
@@ -206,8 +206,8 @@ pub(super) fn commit_begun(
     }
 }
 
-/// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait in
-/// the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
+/// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait
+/// in the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
 fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
@@ -431,8 +431,8 @@ impl Display<'_, '_> {
 /// `Mesh3d` that is inserted and never takes anything from it: the entity would be seen twice after the next one.
 type Drawing = (Mesh3d, VisibilityClass);
 
-/// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes into
-/// view or gets another material.
+/// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes
+/// into view or gets another material.
 fn refresh_material(mut child: EntityWorldMut) {
     if let Some(mut visibility) = child.get_mut::<ViewVisibility>() {
         visibility.set_changed();

@@ -1,4 +1,4 @@
-//! The entities below a terrain.
+//! The entities below a terrain: tiles, chunks and fields, spawned and despawned as the world changes.
 
 use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::{HashMap, HashSet};
@@ -51,7 +51,7 @@ impl TerrainEntities {
         }
     }
 
-    /// Do they show the current state of this world? False while changes of the game load.
+    /// Whether they show the current state of this world. `false` while changes of the game load.
     pub(crate) fn show(&self, world: &World) -> bool {
         self.shown == world.version()
     }

@@ -96,9 +96,9 @@ fn scale(
     }
 }
 
-/// Scales and places a new terrain at once, so that queries in the frame that spawned it, for example in `Startup`, find it
-/// in its place. Tasks of another terrain on its entity are dropped. The tiles and chunks of that terrain stay until the new
-/// one has loaded, unless they have another size.
+/// Scales and places a new terrain at once, so that queries in the frame that spawned it, for example in `Startup`,
+/// find it in its place. Tasks of another terrain on its entity are dropped. The tiles and chunks of that terrain stay
+/// until the new one has loaded, unless they have another size.
 pub(super) fn prepare_new(
     new: On<Insert, Terrain>,
     mut commands: Commands,
@@ -123,8 +123,8 @@ pub(super) fn prepare_new(
     }
 }
 
-/// Drops tasks of terrains that have no entities: such a task belongs to a former terrain, and the new one must not wait
-/// for it.
+/// Drops tasks of terrains that have no entities: such a task belongs to a former terrain, and the new one must not
+/// wait for it.
 pub(super) fn drop_stray_tasks(
     mut commands: Commands,
     strays: Query<Entity, (With<Terrain>, With<InFlight>, Without<TerrainEntities>)>,
@@ -199,8 +199,8 @@ pub(super) fn drop_slim_vertices(
     }
 }
 
-/// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces are
-/// built.
+/// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces
+/// are built.
 pub(super) fn start_loading(
     mut commands: Commands,
     mut terrains: Query<
@@ -308,8 +308,8 @@ fn loaded(
     }
 }
 
-/// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and chunks
-/// are despawned in that frame.
+/// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and
+/// chunks are despawned in that frame.
 pub(super) fn finish_loading(
     mut commands: Commands,
     settings: Res<BurrowSettings>,

@@ -56,10 +56,11 @@ pub type CommitAction = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
 
 /// Builds extra data for each surface off-thread, and swaps it in with the mesh: colliders, or a navigation mesh.
 ///
-/// [`build`](Self::build) runs in the task that makes the surface of a tile or chunk. The [`CommitAction`] that it returns
-/// runs on the entity of that tile or chunk in the frame in which the mesh is swapped, on a server without meshes too.
-/// Large transactions build several parts at a time on rayon's threads: a processor that uses rayon itself should hold no
-/// lock while it does. If a processor panics, that part goes without its data, and an error is logged once.
+/// [`build`](Self::build) runs in the task that makes the surface of a tile or chunk. The [`CommitAction`] that it
+/// returns runs on the entity of that tile or chunk in the frame in which the mesh is swapped, on a server without
+/// meshes too. Large transactions build several parts at a time on rayon's threads: a processor that uses rayon itself
+/// should hold no lock while it does. If a processor panics, that part goes without its data, and an error is logged
+/// once.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -84,7 +85,7 @@ pub type CommitAction = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
 /// app.world_mut().resource_mut::<SurfaceProcessors>().add(Counter);
 /// ```
 pub trait SurfaceProcessor: Send + Sync + 'static {
-    /// Is there anything to build for this part? A server does not assemble surfaces that no processor wants.
+    /// Whether there is anything to build for this part. A server does not assemble surfaces that no processor wants.
     fn wants(&self, part: &Part) -> bool {
         let _ = part;
         true
@@ -113,8 +114,8 @@ impl SurfaceProcessors {
         self.processors.is_empty()
     }
 
-    /// Runs code of a processor. If it panics, an error is logged once for each terrain, and the ground is shown without its
-    /// data.
+    /// Runs code of a processor. If it panics, an error is logged once for each terrain, and the ground is shown
+    /// without its data.
     fn guarded<T>(&self, terrain: Entity, work: impl FnOnce() -> T) -> Option<T> {
         let done = catch_unwind(AssertUnwindSafe(work));
         if done.is_err() && self.failed.lock().unwrap_or_else(PoisonError::into_inner).insert(terrain) {
@@ -138,7 +139,7 @@ pub(super) struct BuiltSurface {
     pub mesh: BuiltMesh,
     pub shown: ShownSurface,
     pub actions: Vec<CommitAction>,
-    /// Is it drawn? Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
+    /// Whether it is drawn. Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
     pub is_drawn: bool,
 }
 
@@ -236,8 +237,8 @@ impl SurfaceBuilder {
         self.mesh_builder.is_none() && self.processors.is_empty()
     }
 
-    /// Builds everything for these surfaces; many are built in parallel. Where a cut is drawn, those that it does not show get no
-    /// meshes.
+    /// Builds everything for these surfaces; many are built in parallel. Where a cut is drawn, those that it does not
+    /// show get no meshes.
     pub fn build_all(
         &self,
         drafts: Vec<(MeshKey, SurfaceDraft)>,
@@ -265,8 +266,8 @@ impl SurfaceBuilder {
         })
     }
 
-    /// Builds everything for one surface; no mesh if it is not drawn. `draft` is called only if something is built from it;
-    /// otherwise `is_empty` says whether the surface is known to have no triangles.
+    /// Builds everything for one surface; no mesh if it is not drawn. `draft` is called only if something is built from
+    /// it; otherwise `is_empty` says whether the surface is known to have no triangles.
     pub fn build(
         &self,
         (drawn, is_drawn): (MeshKey, bool),

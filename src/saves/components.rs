@@ -16,11 +16,11 @@ use crate::terrain::Terrain;
 /// The longest time that an exiting app waits for the disk.
 pub(crate) const EXIT_WAIT: Duration = Duration::from_secs(10);
 
-/// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
-/// it; the terrain itself they leave out.
+/// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain.
+/// Scenes may hold it; the terrain itself they leave out.
 ///
-/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed) says so. Changing it
-/// in its place is like inserting another one.
+/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed)
+/// says so. Changing it in its place is like inserting another one.
 ///
 /// | inserted on the same entity | what happens |
 /// | --- | --- |
@@ -164,7 +164,7 @@ impl LevelId {
 #[derive(Component)]
 pub(super) struct HeldHere;
 
-/// Holds a terrain; what is under way on it is done later.
+/// Holds a terrain. Its running transaction is begun again later.
 pub(super) fn hold_now(entity: &mut EntityWorldMut) {
     if let Some(mut terrain) = entity.get_mut::<Terrain>() {
         terrain.abandon();
@@ -174,9 +174,10 @@ pub(super) fn hold_now(entity: &mut EntityWorldMut) {
     }
 }
 
-/// Holds a terrain until its world is read. What is under way on it is done on the world that was read.
+/// Holds a terrain until its world is read. Its running transaction is then begun again on the world that was read.
 ///
-/// This is a hook, so that it comes before whatever observers do with the component, and looks whether the component is still there.
+/// It is a hook because hooks run before observers, which may remove the component again; so it checks that the
+/// component is still there.
 fn hold(mut world: DeferredWorld, context: HookContext) {
     warn_without_plugin(&world, "SavedWorld");
     world.commands().queue(move |world: &mut World| {

@@ -28,7 +28,8 @@ pub(super) fn begin_anew(new: On<Insert, Unopened>, mut commands: Commands) {
     commands.entity(new.entity).try_remove::<OpeningWorld>();
 }
 
-/// A component that the game has changed in its place is like another one that was inserted: what it named before is closed.
+/// A component that the game has changed in its place is like another one that was inserted: what it named before is
+/// closed.
 pub(super) fn follow_changed(
     mut commands: Commands,
     changed: Query<
@@ -116,7 +117,8 @@ pub(super) fn start_opening(
             Some(Ok(None)) => continue,
             Some(Ok(Some(level))) => Some((level.clone(), levels.path_of(start))),
         };
-        // For the game this is no change. A new world is made of the terrain as it is now, and what is committed from now on follows.
+        // For the game this is no change. A new world is made of the terrain as it is now, and what is committed from
+        // now on follows.
         let terrain = terrain.bypass_change_detection();
         terrain.abandon();
         terrain.keep_log(Some(LOG_BYTES));
@@ -217,8 +219,8 @@ pub(super) fn finish_opening(
     }
 }
 
-/// Lets a store follow the terrain of its component. If the game has removed or changed that meanwhile, the world is closed, and the one
-/// that the component names now is read.
+/// Lets a store follow the terrain of its component. If the game has removed or changed that meanwhile, the world is
+/// closed, and the one that the component names now is read.
 fn insert_store(commands: &mut Commands, entity: Entity, saved: SavedWorld, store: Store) {
     commands.queue(move |world: &mut World| {
         let path = saved.path.clone();

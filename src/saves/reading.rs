@@ -126,8 +126,8 @@ pub(crate) struct WorldReader {
 }
 
 impl WorldReader {
-    /// A reader for this saved world. If there is none yet, it is created from the terrain, on the level if one is given. The
-    /// terrain's rules and loose settings also hold in a world that exists.
+    /// A reader for this saved world. If there is none yet, it is created from the terrain, on the level if one is
+    /// given. The terrain's rules and loose settings also hold in a world that exists.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
         let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));

@@ -48,7 +48,8 @@ pub enum StoreError {
         /// The reason why it can't continue on this ground, and what to do.
         why: &'static str,
     },
-    /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
+    /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse)
+    /// holds.
     #[error(
         "the ground is not the one that the world was saved with{}: give that one, or allow `base_changed`, which moves the world",
         if *.regions == 0 { String::new() } else { format!(", and differs below {regions} saved regions") }

@@ -262,13 +262,13 @@ impl Contents {
         heads.chain(self.copies.iter().cloned())
     }
 
-    /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, with which most regions
-    /// agree. It is the database's, a segment's, or that of another file if the database has none.
+    /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, with which
+    /// most regions agree. It is the database's, a segment's, or that of another file if the database has none.
     pub fn choose_checkpoint(&self) -> Option<Checkpoint> {
         let heads: Vec<Checkpoint> = self.heads().collect();
         let others = if self.checkpoints.is_empty() { &self.other_checkpoints[..] } else { &[] };
-        // A damaged database may hold a checkpoint that was never finished, and other files may be old: they say nothing about what
-        // the latest state is.
+        // A damaged database may hold a checkpoint that was never finished, and other files may be old: they say
+        // nothing about what the latest state is.
         let finished = if self.damaged.is_none() { &self.checkpoints[..] } else { &[] };
         let known = heads.iter().chain(finished).map(|checkpoint| checkpoint.frame);
         let latest = known.chain([self.greatest_frame()]).max().unwrap_or_default();
@@ -345,8 +345,8 @@ impl Contents {
         frames.map(|frame| frame.number).max().unwrap_or_default()
     }
 
-    /// Whether the log leads to a checkpoint, as far as its last commit before it says: one of another branch of the same world
-    /// does not.
+    /// Whether the log leads to a checkpoint, as far as its last commit before it says: one of another branch of the
+    /// same world does not.
     pub fn leads_to(&self, checkpoint: &Checkpoint) -> bool {
         let metadata = &checkpoint.metadata;
         match self.last_commit(checkpoint.frame) {
@@ -381,8 +381,8 @@ impl Contents {
         self.regions.values().chain(self.other_regions.values()).flatten().any(|record| record.is_change)
     }
 
-    /// Whether what can't be read of a segment makes no difference to a world at a frame: frames that follow are part of it, or the
-    /// one that began there is.
+    /// Whether what can't be read of a segment makes no difference to a world at a frame: frames that follow are part
+    /// of it, or the one that began there is.
     pub fn is_harmless(&self, segment: u64, bad: &Bad, frame: u64) -> bool {
         let is_part = |own: &Frame| own.number <= frame;
         let is_after = |own: &Found, at: &Frame| {

@@ -183,11 +183,11 @@ impl Store {
     /// Opens the world in a folder over the ground that it was saved with.
     ///
     /// # Errors
-    /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below has changed
-    /// and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing, and when
-    /// nothing of it can be read. Also when a file that can't be read at the moment holds something that no other file
-    /// has, and when this ground has no room for edits that were made on a ground of another size. Nothing is changed
-    /// then. All other problems are reported in [`Opened::troubles`].
+    /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below
+    /// has changed and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is
+    /// missing, and when nothing of it can be read. Also when a file that can't be read at the moment holds something
+    /// that no other file has, and when this ground has no room for edits that were made on a ground of another size.
+    /// Nothing is changed then. All other problems are reported in [`Opened::troubles`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -379,8 +379,9 @@ impl Store {
     /// the last ones.
     ///
     /// # Errors
-    /// [`StoreError::Gap`] when they do not follow those that were taken before; [`StoreError::Full`] when too much waits for a disk
-    /// that does not answer. None is taken then. [`StoreError::Ended`] when the store's thread has panicked.
+    /// [`StoreError::Gap`] when they do not follow those that were taken before; [`StoreError::Full`] when too much
+    /// waits for a disk that does not answer. None is taken then. [`StoreError::Ended`] when the store's thread has
+    /// panicked.
     pub fn append(&mut self, records: Vec<CommitRecord>) -> Result<(), StoreError> {
         if self.has_gap || !self.continues(&records) {
             let found = records.first().map_or(0, |record| record.revision);

@@ -5,7 +5,8 @@ use crate::format::{FormatError, frame};
 /// How often the bytes of a file may be looked at: records that lie in one another are none, but each has to be tried.
 const MAX_PASSES: usize = 8;
 
-/// Calls `take` with the key and the bytes of each record that may be one. Where it is, records that overlap it are none.
+/// Calls `take` with the key and the bytes of each record that may be one. Where it is, records that overlap it are
+/// none.
 pub(super) fn records(bytes: &[u8], mut take: impl FnMut(&[u8], &[u8]) -> Result<(), FormatError>) {
     let magic = &frame::MAGIC;
     // Made so that files of others take no more time or memory than they have bytes.

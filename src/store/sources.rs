@@ -124,8 +124,8 @@ pub(super) fn others(files: &dyn Files) -> io::Result<impl Iterator<Item = Strin
     Ok(std::iter::once(UNFINISHED.to_owned()).chain(kept.take(MAX_KEPT)))
 }
 
-/// Whether a folder holds anything of a world. Files without a byte do not count, nor does one that was not complete when the
-/// process ended that created the world.
+/// Whether a folder holds anything of a world. Files without a byte do not count, nor does one that was not complete
+/// when the process ended that created the world.
 pub(super) fn has_world(files: &dyn Files) -> io::Result<bool> {
     let holds_bytes = |path: &str| match files.open(path, Opening::Existing) {
         Ok(file) => Ok(file.length()? > 0),

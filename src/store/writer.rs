@@ -25,7 +25,8 @@ use crate::terrain::{CommitRecord, LogEntry, Order, Patch, TerrainSettings, Worl
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
 
-/// How long the disk may take for a frame of the log and for a checkpoint, before it is reported that it does not answer.
+/// How long the disk may take for a frame of the log and for a checkpoint, before it is reported that it does not
+/// answer.
 const FRAME_TIME: Duration = Duration::from_secs(3);
 pub(super) const CHECKPOINT_TIME: Duration = Duration::from_secs(30);
 

@@ -92,8 +92,8 @@ impl Terrain {
         self.set_meshing(old.meshing());
     }
 
-    /// Commits a transaction that the plugin began and shows. Returns the receipts of edits; the others are kept until they
-    /// are taken. The caller may drop the other data on another thread.
+    /// Commits a transaction that the plugin began and shows. Returns the receipts of edits; the others are kept until
+    /// they are taken. The caller may drop the other data on another thread.
     pub(crate) fn commit_shown(
         &mut self,
         commit: Commit,

@@ -41,8 +41,9 @@ pub struct StaleCommit;
 /// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and
 /// overwrites any other; a parent may scale it further.
 ///
-/// To change levels, insert a new one on the same entity, with its own `SavedWorld` if it is saved. A terrain that is assigned
-/// through `&mut Terrain` is shown too, but edits that waited in the old one get no receipts, and its debris stays.
+/// To change levels, insert a new one on the same entity, with its own `SavedWorld` if it is saved. A terrain that is
+/// assigned through `&mut Terrain` is shown too, but edits that waited in the old one get no receipts, and its debris
+/// stays.
 pub struct Terrain {
     pub(super) world: Arc<World>,
     engine: Option<Engine>,

@@ -16,8 +16,8 @@ use crate::volume::DiggingRules;
 /// Limits of a terrain's work, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
 /// A brick takes the CPU about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose pieces are
-/// not counted: each has a [budget](super::LooseSettings) that follows from its edit. A step through history counts as a fixed
-/// amount.
+/// not counted: each has a [budget](super::LooseSettings) that follows from its edit. A step through history counts as
+/// a fixed amount.
 ///
 /// [`Terrain::set_work_limits`]: super::Terrain::set_work_limits
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]

@@ -217,8 +217,8 @@ impl Turn<'_, '_> {
     }
 }
 
-/// Leaves the server while a terrain is disabled, because it does not read messages of the server. The terrain joins again once it is enabled,
-/// and what waits for an answer is sent again.
+/// Leaves the server while a terrain is disabled, because it does not read messages of the server. The terrain joins
+/// again once it is enabled, and what waits for an answer is sent again.
 fn leave_meanwhile(link: &mut Link, service: Service, messages: &mut MessageWriter<FromPlayer>) {
     if link.greeted.is_none() {
         return;

@@ -76,7 +76,8 @@ pub(super) struct Display {
     pub is_broken: bool,
     /// All of it, to be put next.
     pub whole: Option<ShownChange>,
-    /// Messages about pieces, each with the number of answered changes at which it is sent: the ground changes with these.
+    /// Messages about pieces, each with the number of answered changes at which it is sent: the ground changes with
+    /// these.
     pub pieces: VecDeque<(u64, PieceMessage)>,
 }
 
@@ -101,8 +102,8 @@ pub(super) enum Standing {
 }
 
 impl Link {
-    /// The client begins with what the terrain holds, such as the level that the game ships, so only regions that differ from the
-    /// server's have to come.
+    /// The client begins with what the terrain holds, such as the level that the game ships, so only regions that
+    /// differ from the server's have to come.
     ///
     /// # Errors
     /// When the terrain's settings are those of no terrain.
@@ -254,8 +255,8 @@ impl Display {
         self.pieces.drain(..count).map(|(_, piece)| piece).collect()
     }
 
-    /// Compares what is shown with what should be, which has this hash, once nothing waits for the terrain. They differ where somebody
-    /// else has changed the terrain, for example with brushes that were under way when it became shared.
+    /// Compares what is shown with what should be, which has this hash, once nothing waits for the terrain. They differ
+    /// where somebody else has changed the terrain, for example with brushes that were under way when it became shared.
     pub fn compare(&mut self, shown: &World, hash: u64) {
         if self.is_idle() && !self.is_broken && shown.hash() != hash {
             self.is_broken = true;

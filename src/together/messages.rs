@@ -1,4 +1,5 @@
-//! The messages that carry the bytes of clients and server. Each type is sent in a separate channel, reliably and in order.
+//! The messages that carry the bytes of clients and server. Each type is sent in a separate channel, reliably and in
+//! order.
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};

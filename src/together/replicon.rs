@@ -1,5 +1,5 @@
-//! The transport: connections and messages of bevy_replicon. No other file names it, so another transport is another file with the
-//! same items.
+//! The transport: connections and messages of bevy_replicon. No other file names it, so another transport is another
+//! file with the same items.
 
 use bevy::ecs::message::MessageCursor;
 use bevy::ecs::schedule::IntoScheduleConfigs;
@@ -23,7 +23,8 @@ const NEEDS_REPLICON: &str = "TogetherPlugin does nothing: it needs RepliconPlug
     DefaultPlugins have and MinimalPlugins have not: add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, BurrowPlugins, \
     TogetherPlugin)), and a transport such as RepliconRenetPlugins";
 
-/// Registers the messages; `forget_connection` runs when a client's connection ends. Returns `false` if replicon's plugins are missing.
+/// Registers the messages; `forget_connection` runs when a client's connection ends. Returns `false` if replicon's
+/// plugins are missing.
 pub(super) fn build<M>(
     app: &mut App,
     forget_connection: impl IntoScheduleConfigs<ScheduleSystem, M>,

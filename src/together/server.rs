@@ -20,8 +20,8 @@ use crate::threads::{ThreadTask, Threads};
 /// The server of a shared world: insert it in the server's app. Its [`Server`] owns a terrain that is not
 /// drawn; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like all other players.
 ///
-/// Replacing or removing it saves what is not saved yet and closes its world, without a wait of the main thread; an app that exits
-/// waits for this at most ten seconds.
+/// Replacing or removing it saves what is not saved yet and closes its world, without a wait of the main thread; an app
+/// that exits waits for this at most ten seconds.
 #[derive(Resource)]
 pub struct GroundServer {
     state: State,
@@ -78,8 +78,9 @@ impl GroundServer {
         Self::with_state(State::Idle(Box::new(ServerState { server, store: None })))
     }
 
-    /// Serves a saved world: the one in this folder on the ground of this terrain, or where there is none, the terrain, which is
-    /// saved there from now on. It is read on another thread; [`GroundServerEvent::Opened`] reports the result.
+    /// Serves a saved world: the one in this folder on the ground of this terrain, or where there is none, the terrain,
+    /// which is saved there from now on. It is read on another thread; [`GroundServerEvent::Opened`] reports the
+    /// result.
     pub fn saved(world: &SavedWorld, terrain: &Terrain, settings: ServerSettings) -> Self {
         let reader = WorldReader::new(world, terrain, None);
         let progress = reader.progress.clone();
@@ -163,18 +164,19 @@ impl GroundServer {
         self.data.get(key).map(Vec::as_slice)
     }
 
-    /// The number of a player on the server: one more than the transport's [`NetworkId`], so it stays the same over connections. A
-    /// player on the server's own machine has the number 0.
+    /// The number of a player on the server: one more than the transport's [`NetworkId`], so it stays the same over
+    /// connections. A player on the server's own machine has the number 0.
     ///
-    /// The two greatest network ids have no number: [`net::ClientId::SERVER`] is returned, and such clients are not served. A transport
-    /// without network ids gives a new number to each connection, so a returning player counts as a new one.
+    /// The two greatest network ids have no number: [`net::ClientId::SERVER`] is returned, and such clients are not
+    /// served. A transport without network ids gives a new number to each connection, so a returning player counts as a
+    /// new one.
     pub fn player(client: Peer, ids: &Query<&NetworkId>) -> net::ClientId {
         let id = client.entity().and_then(|entity| ids.get(entity).ok());
         number(client, id).unwrap_or(net::ClientId::SERVER)
     }
 
-    /// Waits until all requests are done and saved, but no longer than ten seconds. An app that exits does this. A world that is still
-    /// being read has nothing to save.
+    /// Waits until all requests are done and saved, but no longer than ten seconds. An app that exits does this. A
+    /// world that is still being read has nothing to save.
     pub fn finish(&mut self) {
         let deadline = Instant::now() + EXIT_WAIT;
         while let State::Running(_) = self.state {
@@ -232,8 +234,8 @@ impl GroundServer {
     }
 }
 
-/// Dropping it does not block: another thread finishes the requests that wait and closes the store. An app that exits waits for
-/// that thread.
+/// Dropping it does not block: another thread finishes the requests that wait and closes the store. An app that exits
+/// waits for that thread.
 impl Drop for GroundServer {
     fn drop(&mut self) {
         let work = std::mem::replace(&mut self.state, State::Unavailable);

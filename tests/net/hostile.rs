@@ -20,7 +20,8 @@ use crate::worlds::any_random_brush;
 
 /// Bytes that a decoder may take regardless of the size of its input.
 const ANYWAY: u64 = 1 << 20;
-/// Bytes that a message to the server may take for each of its bytes: an edit is some 200 bytes, and at least 4 in a message.
+/// Bytes that a message to the server may take for each of its bytes: an edit is some 200 bytes, and at least 4 in a
+/// message.
 const TO_SERVER: u64 = 400;
 /// Bytes that a message to a client may take for each of its bytes: a brick of few bits takes a thousand bytes.
 const TO_CLIENT: u64 = 800;

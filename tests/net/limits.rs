@@ -147,8 +147,8 @@ impl Play {
     }
 }
 
-/// Additional bytes that the server holds after ten seconds in which a client digs, with or without fetching regions. It
-/// acknowledges nothing, and yet all of its edits are done.
+/// Additional bytes that the server holds after ten seconds in which a client digs, with or without fetching regions.
+/// It acknowledges nothing, and yet all of its edits are done.
 fn held(fetches: bool) -> i64 {
     let ground = flat(512);
     let mut dug = terrain(&ground);

@@ -124,9 +124,9 @@ impl Client {
         std::mem::take(&mut self.early).into_iter().for_each(|edit| self.submit(edit));
     }
 
-    /// Gives edits that the server has not seen numbers that it accepts. It has seen no edit of this client beyond `seen`,
-    /// but possibly greater numbers of the same player's earlier client. A restored server may also have seen less than the
-    /// one before it, so that pending numbers exceed its last one by too much.
+    /// Gives edits that the server has not seen numbers that it accepts. It has seen no edit of this client beyond
+    /// `seen`, but possibly greater numbers of the same player's earlier client. A restored server may also have seen
+    /// less than the one before it, so that pending numbers exceed its last one by too much.
     fn renumber(&mut self, sequence: u64, seen: u64) {
         let mut last = sequence;
         let mut unseen =

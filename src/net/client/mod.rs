@@ -58,10 +58,10 @@ const MAX_NUMBER: u64 = u64::MAX / 2;
 
 /// A client: bytes in, bytes out.
 ///
-/// In each frame, pass received messages to [`receive`](Self::receive) and edits of the player to [`submit`](Self::submit),
-/// send the messages of [`take_outgoing`](Self::take_outgoing), call [`advance`](Self::advance), which takes as long as
-/// its edits take, apply the changes of [`take_shown`](Self::take_shown) to the shown terrain, and handle the
-/// [events](Self::take_events).
+/// In each frame, pass received messages to [`receive`](Self::receive) and edits of the player to
+/// [`submit`](Self::submit), send the messages of [`take_outgoing`](Self::take_outgoing), call
+/// [`advance`](Self::advance), which takes as long as its edits take, apply the changes of
+/// [`take_shown`](Self::take_shown) to the shown terrain, and handle the [events](Self::take_events).
 pub struct Client {
     replica: Replica,
     stamps: Stamps,
@@ -168,9 +168,9 @@ impl Client {
         })
     }
 
-    /// Begins with a world that is here already, such as the level that the game ships, instead of the pristine one: its
-    /// [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent. Call it before the
-    /// first [`connect`](Self::connect).
+    /// Begins with a world that is here already, such as the level that the game ships, instead of the pristine one:
+    /// its [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent.
+    /// Call it before the first [`connect`](Self::connect).
     ///
     /// # Errors
     /// When the parts do not fit the ground or the chunk size.
@@ -266,8 +266,8 @@ impl Client {
         self.replica.shown_hash()
     }
 
-    /// All that is to be put into a terrain that does not hold what it should, for example because a change was refused there. It takes the
-    /// place of everything that [`take_shown`](Self::take_shown) would return now.
+    /// All that is to be put into a terrain that does not hold what it should, for example because a change was refused
+    /// there. It takes the place of everything that [`take_shown`](Self::take_shown) would return now.
     pub fn show_whole(&mut self, shown: &World) -> ShownChange {
         let (_, receipts) = self.replica.update();
         self.shown.clear();

@@ -1,5 +1,5 @@
-//! Sends the player's edits and undos to the server, in order, as fast as its limits allow, so nothing is refused for its cost,
-//! even after a long time without a connection.
+//! Sends the player's edits and undos to the server, in order, as fast as its limits allow, so nothing is refused for
+//! its cost, even after a long time without a connection.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;

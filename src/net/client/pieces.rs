@@ -96,7 +96,8 @@ impl Client {
         self.report_pieces(receipt.tag, all(receipt).cloned().collect(), Vec::new());
     }
 
-    /// The server has ordered an edit; `sequence` is its number if it is one of this client's. Corrects wrong predictions.
+    /// The server has ordered an edit; `sequence` is its number if it is one of this client's. Corrects wrong
+    /// predictions.
     pub(super) fn confirm_pieces(&mut self, sequence: Option<u64>, receipt: &Receipt) {
         let mut predicted =
             sequence.and_then(|sequence| self.pieces.predicted.remove(&sequence)).unwrap_or_default();

@@ -61,7 +61,8 @@ impl Server {
         1
     }
 
-    /// How many edits at the front go into one transaction: all in a row, or where strokes are kept, those of one stroke.
+    /// How many edits at the front go into one transaction: all in a row, or where strokes are kept, those of one
+    /// stroke.
     fn edits_together(&self, most: u64) -> usize {
         let keeps_strokes = self.settings.undo != UndoPolicy::Nobody;
         let (mut work, mut first) = (0_u64, None);

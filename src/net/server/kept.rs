@@ -1,8 +1,8 @@
 //! Older states of the world that are kept while clients download them.
 //!
-//! Once the server's world changes, each that is kept takes as much memory as its index and what has changed since. So clients that come
-//! at about the same time share one, and clients that make no progress lose theirs, so few worlds are kept for any
-//! number of clients.
+//! Once the server's world changes, each that is kept takes as much memory as its index and what has changed since. So
+//! clients that come at about the same time share one, and clients that make no progress lose theirs, so few worlds are
+//! kept for any number of clients.
 
 use std::sync::Arc;
 use std::time::Duration;

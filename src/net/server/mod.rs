@@ -288,8 +288,8 @@ impl Server {
     }
 
     /// Sets a function that decides at each greeting whether a player may join. `Err` rejects the player with
-    /// [`KickReason::Refused`] and a number chosen by the game. By default all players may join. To remove a player that has
-    /// joined already, see [`kick_for`](Self::kick_for).
+    /// [`KickReason::Refused`] and a number chosen by the game. By default all players may join. To remove a player
+    /// that has joined already, see [`kick_for`](Self::kick_for).
     pub fn set_admission(&mut self, admission: impl Fn(ClientId) -> Result<(), u32> + Send + Sync + 'static) {
         self.admission = Box::new(admission);
     }

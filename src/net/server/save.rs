@@ -9,7 +9,8 @@ use crate::net::message::ClientId;
 use crate::store::{Store, StoreError};
 use crate::terrain::Terrain;
 
-/// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its world holds.
+/// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its
+/// world holds.
 const KEY: &str = "own/";
 
 /// What a server has passed to its store.
@@ -30,9 +31,9 @@ impl Saving {
 }
 
 impl Server {
-    /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or one that a store
-    /// was created of. What its clients send again that the world holds already is not done twice: the last numbers of the 1024
-    /// players who dug last are saved with it.
+    /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or
+    /// one that a store was created of. What its clients send again that the world holds already is not done twice: the
+    /// last numbers of the 1024 players who dug last are saved with it.
     pub fn open(terrain: Terrain, store: &Store, settings: ServerSettings) -> Self {
         let number = store
             .get(&format!("{}{NUMBER}", prefix(store)))

@@ -1,5 +1,5 @@
-//! Where the parts of a session meet: levels, play alone, undos under way, changes of server while somebody joins, and players who
-//! come twice.
+//! Where the parts of a session meet: levels, play alone, undos under way, changes of server while somebody joins, and
+//! players who come twice.
 
 use std::sync::mpsc::channel;
 use std::sync::{Mutex, PoisonError};
@@ -84,7 +84,8 @@ impl Party {
     }
 }
 
-/// Bytes that are sent to a player that joins this level and begins with a terrain, which is held until a level is loaded if `is_asset`.
+/// Bytes that are sent to a player that joins this level and begins with a terrain, which is held until a level is
+/// loaded if `is_asset`.
 fn bytes_to_join(level: &Terrain, begins: Terrain, is_asset: bool) -> u64 {
     let mut built = copy_of(level, large_ground());
     built.apply([Brush::dig(Shape::sphere(Vec3::new(200.0, 40.0, 200.0), 8.0))]);
