@@ -245,6 +245,6 @@ impl Plugin for TerrainPlugin {
 
     #[cfg(feature = "render")]
     fn finish(&self, app: &mut App) {
-        engine::suggest_renderers_card(app.world());
+        engine::suggest_renderers_gpu(app.world());
     }
 }

@@ -17,7 +17,7 @@ use fastrand::Rng;
 
 use super::async_copies::AsyncCopies;
 use super::device::Device;
-use super::driver::Card;
+use super::driver::Gpu;
 use super::emulator_process::Emulator;
 use super::zero_copy::ZeroCopy;
 use super::*;
@@ -30,8 +30,8 @@ pub(super) use crate::worlds;
 
 /// A device to test, if any. If there is a GPU that cannot be opened, the test fails.
 pub(super) fn device() -> Option<Box<dyn Device>> {
-    match Card::open(&CardChoice::Default, None) {
-        Ok(card) => Some(Box::new(card)),
+    match Gpu::open(&GpuChoice::Default, None) {
+        Ok(gpu) => Some(Box::new(gpu)),
         Err(Fault::NoDriver | Fault::NoDevice(_)) => Some(Box::new(Emulator::start()?)),
         Err(fault) => panic!("the GPU can't be tested: {fault}"),
     }
