@@ -9,7 +9,7 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::messages::Served;
-use super::players::{Players, Said};
+use super::players::{PlayerMessage, Players};
 use super::replicon::{FromPlayers, NetworkId, Peer, Peers, ReadMessages, ToPlayers, number};
 use crate::net::{self, KickReason, Lane, Server, ServerEvent, ServerSettings, ToClient};
 use crate::saves::{AbandonedStores, ClosingWorlds, EXIT_WAIT, ReadWorld, SavedWorld, WorldReader};
@@ -293,20 +293,22 @@ impl GroundServer {
                 && is_ours
                 && let Some(number) = self.players.find(peer, peers)
             {
-                said.push((number, self.players.hear(number, peer, message)));
+                said.push((number, self.players.receive(number, peer, message)));
             }
         }
         for (player, said) in said {
             match said {
-                Said::Bytes { begins, bytes } => self.ask(move |parts, now| {
+                PlayerMessage::Bytes { begins, bytes } => self.ask(move |parts, now| {
                     if begins {
                         parts.server.connect(player, now);
                     }
                     parts.server.receive(player, &bytes, now);
                 }),
-                Said::Leaves => self.ask(move |parts, _| parts.server.disconnect(player)),
-                Said::TooMuch => self.ask(move |parts, _| parts.server.kick_for(player, KickReason::Flood)),
-                Said::Nothing => {}
+                PlayerMessage::Leaves => self.ask(move |parts, _| parts.server.disconnect(player)),
+                PlayerMessage::Flood => {
+                    self.ask(move |parts, _| parts.server.kick_for(player, KickReason::Flood))
+                }
+                PlayerMessage::Nothing => {}
             }
         }
         for player in self.players.take_gone(peers) {
