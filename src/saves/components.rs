@@ -17,7 +17,7 @@ use crate::terrain::Terrain;
 pub(crate) const EXIT_WAIT: Duration = Duration::from_secs(10);
 
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain.
-/// Scenes may hold it; the terrain itself they leave out.
+/// Scenes may contain it; they leave out the terrain itself.
 ///
 /// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed)
 /// says so. Changing it in its place is like inserting another one.
@@ -112,11 +112,11 @@ impl WorldStore {
     }
 }
 
-/// The plugin that opens and saves worlds is there.
+/// Exists if the plugin that opens and saves worlds was added.
 #[derive(Resource)]
 pub(super) struct SavesWorlds;
 
-/// Without the plugin a terrain would be held for ever, and nothing would say why.
+/// Warns if the plugin is missing: the terrain would be held for ever, without any message.
 pub(super) fn warn_without_plugin(world: &DeferredWorld, component: &str) {
     if world.get_resource::<SavesWorlds>().is_none() {
         error!("a {component} holds its terrain until there is a SavePlugin: add BurrowPlugins");

@@ -17,18 +17,18 @@ use crate::store::{Store, StoreTrouble};
 use crate::terrain::Terrain;
 use crate::threads::free_later;
 
-/// Bytes of commits that wait at most until the store takes them, which it does each frame.
+/// Most bytes of commits that a terrain keeps until the store takes them, which it does each frame.
 const LOG_BYTES: usize = 64 << 20;
 
 /// How long a component waits for a terrain before that is logged.
 const REPORT_AFTER: Duration = Duration::from_secs(10);
 
-/// A world that is to be read is not being read for what was there before.
+/// Stops reading for a component that was there before, when another one is inserted.
 pub(super) fn begin_anew(new: On<Insert, Unopened>, mut commands: Commands) {
     commands.entity(new.entity).try_remove::<OpeningWorld>();
 }
 
-/// A component that the game has changed in its place is like another one that was inserted: what it named before is
+/// Handles components that the game changed in place like newly inserted ones: the world that they named before is
 /// closed.
 pub(super) fn follow_changed(
     mut commands: Commands,
@@ -45,7 +45,7 @@ pub(super) fn follow_changed(
     }
 }
 
-/// A world is no longer wanted.
+/// Stops reading a world whose component was removed.
 pub(super) fn give_up(gone: On<Remove, SavedWorld>, mut commands: Commands) {
     commands.entity(gone.entity).try_remove::<(OpeningWorld, Unopened)>();
     release(&mut commands, gone.entity);
@@ -79,7 +79,7 @@ fn read_again(commands: &mut Commands, entity: Entity) {
     });
 }
 
-/// A terrain that is gone can't be read for.
+/// Waits for another terrain if the one that a world is read for was removed.
 pub(super) fn wait_for_terrain(
     gone: On<Remove, Terrain>,
     opening: Query<(), (With<OpeningWorld>, Allow<Disabled>)>,
@@ -136,7 +136,7 @@ pub(super) fn start_opening(
     }
 }
 
-/// Another level took the place of one that was removed while its world was read.
+/// Removes the component if another level took the place of the terrain whose world was being read.
 fn detach_unless_replaced(commands: &mut Commands, entity: Entity, saved: &SavedWorld) {
     let saved = saved.clone();
     commands.queue(move |world: &mut World| {

@@ -120,7 +120,7 @@ pub(super) fn send(
     }
 }
 
-/// Empties a list of what a player asked for.
+/// Takes the requests of a player.
 fn take_requests(mut outbox: Mut<EditOutbox>) -> Vec<Order> {
     if outbox.orders.is_empty() {
         return Vec::new();
@@ -128,7 +128,7 @@ fn take_requests(mut outbox: Mut<EditOutbox>) -> Vec<Order> {
     std::mem::take(&mut outbox.orders)
 }
 
-/// The turn of the terrain that is shared, in a frame.
+/// The shared terrain of a frame, and the messages about its edits.
 struct Turn<'a, 'w> {
     entity: Entity,
     edit_messages: &'a mut EditMessages<'w>,
@@ -253,7 +253,7 @@ fn change_server(
     }
 }
 
-/// Puts into terrains what is to be shown, and says what happened.
+/// Submits changes to the shown terrains, and reports what happened.
 pub(super) fn show(
     mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>,
     mut edit_messages: EditMessages,
@@ -288,7 +288,7 @@ pub(super) fn show(
     }
 }
 
-/// EditMessages what waits for a terrain that is no longer shared, and sends the server that it left.
+/// Answers what waits for a terrain that is no longer shared, and sends the server that it left.
 pub(super) fn close(
     gone: On<Discard, SharedTerrain>,
     mut shared: Query<(&mut SharedTerrain, Option<&mut EditOutbox>), Allow<Disabled>>,
@@ -308,7 +308,7 @@ impl EditMessages<'_> {
         self.troubles.write(SharingTroubleFound { terrain, trouble });
     }
 
-    /// EditMessages something that is not sent to a server.
+    /// Answers something that is not sent to a server.
     fn refuse(&mut self, terrain: Entity, request: Order, link: Option<&mut Link>) {
         let why = match &request {
             Order::Edit(edit) => {
@@ -323,7 +323,7 @@ impl EditMessages<'_> {
         self.stepped(terrain, request.asked(), Err(why));
     }
 
-    /// EditMessages what waits, and drops the link.
+    /// Answers what waits, and drops the link.
     fn close(&mut self, terrain: Entity, link: Option<Link>, messages: &mut MessageWriter<FromPlayer>) {
         let Some(link) = link else { return };
         link.tags.iter().for_each(|tag| self.refused(terrain, *tag, None));

@@ -19,7 +19,7 @@ pub(super) const MAX_PENDING: usize = 1 << 16;
 
 /// What a shared terrain knows of its server.
 pub(super) struct Link {
-    /// `None` while a task works with it.
+    /// `None` while a task has it.
     pub client: Option<Client>,
     pub task: Option<ThreadTask<Worked>>,
     /// The ground that the client was made for.
@@ -28,12 +28,12 @@ pub(super) struct Link {
     pub greeted: Option<u64>,
     /// The [run](super::messages::Served::run) of the server that it has greeted last.
     pub run: u32,
-    /// Whether there was one.
+    /// Whether it has greeted any server.
     pub was_served: bool,
     /// The server of this invitation has sent the player away.
     pub kicked: Option<(KickReason, u64)>,
     pub inbox: Vec<(Lane, Vec<u8>)>,
-    /// What the player asked for and the client has not got yet, in order.
+    /// Requests of the player that the client does not have yet, in order.
     pub requests: Vec<Order>,
     /// Whether the limit of waiting edits is reached, so that no more are taken.
     pub is_full: bool,
@@ -93,7 +93,7 @@ pub(super) enum PieceMessage {
 pub(super) enum Standing {
     /// It follows the server that has sent this invitation.
     Follows(u64),
-    /// No server has said yet that it serves a ground. Edits wait for that.
+    /// No server has announced that it serves a ground. Edits wait until one does.
     Waits,
     /// There is no connection. Edits are shown, and wait for another one.
     Lost,
@@ -221,7 +221,7 @@ fn is_change(asked: Asked) -> bool {
 }
 
 impl Display {
-    /// Of a terrain, in which changes of an earlier link may still wait.
+    /// The state for a terrain in which changes of an earlier link may still wait.
     fn of(terrain: &mut Terrain) -> Self {
         drop(terrain.take_receipts_of(is_change));
         Self {
@@ -264,7 +264,7 @@ impl Display {
         }
     }
 
-    /// Lets the pieces wait until all that should be shown is put.
+    /// Keeps messages about pieces until the whole world is shown.
     fn hold_pieces(&mut self) {
         let due = self.submitted + 1;
         self.pieces.iter_mut().for_each(|(at, _)| *at = due);

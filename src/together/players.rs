@@ -94,7 +94,7 @@ impl Players {
         Some(client)
     }
 
-    /// Returns the clients that are still connected, and whose player has spoken over another connection since.
+    /// Returns the clients that are still connected, and whose player has used another connection since.
     pub fn take_replaced(&mut self, peers: &Peers) -> Vec<Entity> {
         self.replaced.drain(..).filter(|client| peers.has(*client)).collect()
     }

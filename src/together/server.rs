@@ -20,8 +20,8 @@ use crate::threads::{ThreadTask, Threads};
 /// The server of a shared world: insert it in the server's app. Its [`Server`] owns a terrain that is not
 /// drawn; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like all other players.
 ///
-/// Replacing or removing it saves what is not saved yet and closes its world, without a wait of the main thread; an app
-/// that exits waits for this at most ten seconds.
+/// When it is replaced or removed, the remaining edits are saved and its world is closed, without blocking the main
+/// thread; an app that exits waits for this, ten seconds at most.
 #[derive(Resource)]
 pub struct GroundServer {
     state: State,

@@ -38,7 +38,7 @@ impl FrameRecorder {
         Self { studio, fps, interval, played: 0, drawn: 0, is_warm: false }
     }
 
-    /// MeshKey frames per second of the film.
+    /// Drawn frames per second of the film.
     pub fn rate(&self) -> f32 {
         (f64::from(self.fps) / self.interval) as f32
     }
