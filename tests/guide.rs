@@ -176,8 +176,8 @@ fn commands_name_what_exists() {
     }
 }
 
-/// Files and folders of the repository that inline code of a text names, and that do not exist. Capitals stand for names
-/// to be chosen.
+/// Files and folders of the repository that inline code of a text names, and that do not exist. Capitals stand for
+/// names to be chosen.
 fn missing_files(text: &str) -> Vec<&str> {
     let folders = ["src/", "tests/", "benches/", "examples/", "tools/", "docs/", "assets/"];
     let is_path = |span: &&str| {

@@ -78,7 +78,7 @@ pub enum StoreError {
         /// The hash of the given level.
         found: u64,
     },
-    /// Nothing of it can be read, and there is no log from which to rebuild it.
+    /// Nothing of it can be read, and no log is left to rebuild it from.
     #[error("the world can't be read: {0}")]
     Unreadable(String),
     /// A part of a file takes more bytes than can be read, so it is neither read nor written.

@@ -31,8 +31,8 @@ impl FileBytes {
 /// Reads all of a file that can be read.
 ///
 /// # Errors
-/// When there is no such file, when it must not be read, and when the disk answers no more: bad sectors are damage, a
-/// disk that is gone is not.
+/// When there is no such file, when it must not be read, and when the disk no longer answers: bad sectors are
+/// damage, a missing disk is not.
 pub(super) fn read_file(files: &dyn Files, path: &str) -> io::Result<FileBytes> {
     let error = match files.read(path) {
         Ok(bytes) => return Ok(FileBytes { bytes, unreadable: Vec::new() }),

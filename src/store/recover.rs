@@ -30,7 +30,7 @@ use crate::volume::{Field, Fields};
 const RECOVERED: f32 = 0.97;
 const RECOVERED_ANEW: f32 = 0.75;
 
-/// What a byte of a region costs to decode and to put in place, and a byte of a commit to replay, in one unit.
+/// The work of decoding and inserting a byte of a region, and of replaying a byte of a commit, in the same unit.
 const DECODE: u64 = 1;
 const RESTORE: u64 = 2;
 const REPLAY: u64 = 32;

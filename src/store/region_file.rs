@@ -40,7 +40,7 @@ impl RegionFile {
         Self { next: Next::Whole(Old::Quarantined), least_frame, ..Self::new() }
     }
 
-    /// Makes the next checkpoint, which has to hold all regions, write the file as small as possible.
+    /// Makes the next checkpoint, which must hold all regions, write a file that is as small as possible.
     pub fn compact_next(&mut self) {
         if self.next == Next::InPlace {
             self.next = Next::Compact;

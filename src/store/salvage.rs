@@ -2,7 +2,7 @@
 
 use crate::format::{FormatError, frame};
 
-/// How often the bytes of a file may be looked at: records that lie in one another are none, but each has to be tried.
+/// How often the bytes of a file may be looked at: nested records are invalid, but each has to be tried.
 const MAX_PASSES: usize = 8;
 
 /// Calls `take` with the key and the bytes of each record that may be one. Where it is, records that overlap it are

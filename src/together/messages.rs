@@ -52,7 +52,8 @@ impl Served {
 }
 
 impl FromPlayer {
-    /// Whether it is for the server of another run than this one. Such a message may arrive after a server was replaced.
+    /// Whether it is for the server of another run than this one. Such a message may arrive after a server was
+    /// replaced.
     pub fn is_for_another(&self, run: u32) -> bool {
         matches!(self, Self::Bytes(own, _) | Self::Left(own) if *own != run)
     }
