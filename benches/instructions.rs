@@ -14,8 +14,7 @@ use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
 use glam::{Quat, Vec3};
 
-// The fields of the benchmark `meshers`, of which only a few are used here.
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the benchmark `meshers` uses all of it")]
 #[path = "meshers/fields.rs"]
 mod fields;
 

@@ -1,9 +1,9 @@
 //! The cost of digging on the main thread: `cargo bench --features examples --bench main_thread`.
 //!
 //! The real landscape in an app without a renderer, one sphere of radius 4 at a time, compared with idle frames; and
-//! the task's time until Bevy's meshes are ready, by chunk size. Vertices have depths, or with `-- slim` none; with `-- light`
-//! they have the light of the sky. With
-//! `-- colliders`, all ground has colliders, in chunks of 32. Printed first is the time until all of the landscape is there.
+//! the task's time until Bevy's meshes are ready, by chunk size. Vertices have depths, or with `-- slim` none; with
+//! `-- light` they have the light of the sky. With `-- colliders`, all ground has colliders, in chunks of 32. Printed
+//! first is the time until all of the landscape is there.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

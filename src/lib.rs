@@ -336,8 +336,8 @@
 //! # Limits
 //!
 //! Heights stay within 32768 voxels. A world's sides have up to 16384 cells, or 262144 where its heights come from a
-//! [source](ground::HeightSource). All of it is drawn in full detail, or with `LevelsOfDetail` distant ground coarsely. A
-//! terrain may be moved by whole voxels and scaled by powers of two, by
+//! [source](ground::HeightSource). All of it is drawn in full detail, or with `LevelsOfDetail` distant ground coarsely.
+//! A terrain may be moved by whole voxels and scaled by powers of two, by
 //! [`TerrainSettings::voxel_size`](terrain::TerrainSettings::voxel_size) or by a parent: the scale of its own
 //! `Transform` is the plugin's. Rotated, stretched or moved by a part of a voxel, its seams lose their equal bits.
 

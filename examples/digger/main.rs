@@ -26,12 +26,14 @@
 //! continues the world that was played last, "Worlds" lists all, and `--world NAME` plays one, or a new one of that
 //! name. Scripts save only with `--world`.
 //!
-//! Others can join: choose "Multiplayer" on the title, or start with `--host`, and with `--join ADDRESS` on their machines.
+//! Others can join: choose "Multiplayer" on the title, or start with `--host`, and with `--join ADDRESS` on their
+//! machines.
 //!
-//! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows into
-//! mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
+//! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows
+//! into mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
 //!
-//! With `--features examples,sound`, digging, steps, bombs and falling ground are heard. Linux needs the headers of ALSA.
+//! With `--features examples,sound`, digging, steps, bombs and falling ground are heard. Linux needs the headers of
+//! ALSA.
 //!
 //! With `--features examples,gamepad`, a gamepad does all of this except for the panel. Its sticks
 //! walk and look, its shoulder buttons change the tool, and its left stick or D-pad selects menu items.

@@ -355,8 +355,8 @@ fn fold_one(context: &egui::Context, are_two: bool) {
     }
 }
 
-/// A framed column along one side of the window, at most as high as the window. A click on its title folds it. The head stays
-/// in sight, and the content scrolls below it.
+/// A framed column along one side of the window, at most as high as the window. A click on its title folds it. The head
+/// stays in sight, and the content scrolls below it.
 fn column<T>(
     context: &egui::Context,
     id: &'static str,

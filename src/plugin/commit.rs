@@ -28,7 +28,7 @@ use crate::lattice::ChunkPos;
 use crate::lattice::LatticeBox;
 #[cfg(feature = "scatter")]
 use crate::terrain::Version;
-use crate::terrain::{Asked, Drawn, FieldChange, Receipt, Rejection, Terrain, World as TerrainWorld};
+use crate::terrain::{Asked, FieldChange, MeshKey, Receipt, Rejection, Terrain, World as TerrainWorld};
 use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
@@ -144,8 +144,8 @@ impl Commits<'_, '_> {
         self.display.figures.measure(took);
     }
 
-    /// Commits tasks that are done, by number and terrain: each transaction whole, as many as the frame's budget of swaps allows,
-    /// and at least one.
+    /// Commits tasks that are done, by number and terrain: each transaction whole, as many as the frame's budget of
+    /// swaps allows, and at least one.
     pub fn commit(&mut self, mut done: Vec<(u64, Entity)>, swapped: &mut usize) {
         if done.is_empty() {
             return;
@@ -224,8 +224,8 @@ pub(super) fn commit_begun(
     }
 }
 
-/// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait in
-/// the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
+/// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait
+/// in the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
 fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
@@ -242,17 +242,17 @@ fn commit(
         return false;
     };
     let commit = match change {
-        Change::Unseen(unseen) => {
-            let is_shown = unseen.is_of(terrain.world()) && unseen.follows(entities.shown);
+        Change::PendingDisplay(pending) => {
+            let is_shown = pending.is_of(terrain.world()) && pending.follows(entities.shown);
             if is_shown {
                 #[cfg(feature = "scatter")]
                 messages.changed.write(GroundChanged {
                     terrain: entity,
-                    versions: [entities.shown, unseen.version()],
+                    versions: [entities.shown, pending.version()],
                     boxes: None,
                 });
-                entities.shown = unseen.version();
-                display.show((entity, terrain.world()), &mut entities, surfaces, unseen.fields(), true);
+                entities.shown = pending.version();
+                display.show((entity, terrain.world()), &mut entities, surfaces, pending.fields(), true);
                 display.show_nodes((entity, terrain.world()), &mut entities, nodes);
                 // A game that changes the ground in each frame is always one step ahead; all that was loaded is shown.
                 entities.trigger_ready(&mut display.commands, entity);
@@ -348,7 +348,7 @@ fn output_of_panicked(
     }
     let rejected = ticket.and_then(|ticket| terrain.rejected(ticket));
     let Some(rejected) = rejected else {
-        terrain.bypass_change_detection().forget_unseen();
+        terrain.bypass_change_detection().forget_pending_display();
         return None;
     };
     let change = Change::Transaction(Box::new(rejected));
@@ -366,11 +366,11 @@ impl Display<'_, '_> {
         fields: &[(ChunkPos, FieldChange)],
         is_step: bool,
     ) {
-        let with_fields = fields.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
+        let with_fields = fields.iter().map(|&(chunk, _)| (MeshKey::Chunk(chunk), None));
         let with_surfaces = surfaces.into_iter().map(|built| (built.drawn, Some(built)));
         let mut touched = Vec::new();
         for (drawn, built) in with_surfaces.chain(with_fields) {
-            if let (Drawn::Chunk(chunk), true) = (drawn, is_step) {
+            if let (MeshKey::Chunk(chunk), true) = (drawn, is_step) {
                 touched.push(chunk);
             }
             self.show_part((entity, world), entities, drawn, built);
@@ -384,16 +384,16 @@ impl Display<'_, '_> {
         &mut self,
         (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
-        drawn: Drawn,
+        drawn: MeshKey,
         built: Option<BuiltSurface>,
     ) {
         let commands = &mut self.commands;
         let child = entities.get(commands, drawn);
         let is_new = child.is_none();
         let is_gone = match drawn {
-            Drawn::Chunk(chunk) => is_empty(world, chunk),
+            MeshKey::Chunk(chunk) => is_empty(world, chunk),
             // It has an entity while it is drawn, or wanted.
-            Drawn::Tile(_) => built.as_ref().is_some_and(|built| !built.is_drawn),
+            MeshKey::Tile(_) => built.as_ref().is_some_and(|built| !built.is_drawn),
         };
         if is_new && (is_gone || built.as_ref().is_some_and(|built| built.shown.is_empty)) {
             return;
@@ -410,8 +410,8 @@ impl Display<'_, '_> {
             apply_actions(commands, child, shown, actions);
         }
         match drawn {
-            Drawn::Chunk(_) if is_new => trigger_if_alive(commands, ChunkCreated { entity: child }),
-            Drawn::Chunk(_) if has_changed => trigger_if_alive(commands, ChunkChanged { entity: child }),
+            MeshKey::Chunk(_) if is_new => trigger_if_alive(commands, ChunkCreated { entity: child }),
+            MeshKey::Chunk(_) if has_changed => trigger_if_alive(commands, ChunkChanged { entity: child }),
             _ => {}
         }
     }
@@ -446,10 +446,10 @@ impl Display<'_, '_> {
     }
 
     /// Draws a tile or chunk no more. A tile that nothing else needs has no entity any more.
-    fn hide_part(&mut self, terrain: Entity, entities: &mut TerrainEntities, drawn: Drawn) {
+    fn hide_part(&mut self, terrain: Entity, entities: &mut TerrainEntities, drawn: MeshKey) {
         let Some(child) = entities.get(&mut self.commands, drawn) else { return };
         match drawn {
-            Drawn::Tile(tile) if !self.wanted.has(terrain, tile) => {
+            MeshKey::Tile(tile) if !self.wanted.has(terrain, tile) => {
                 entities.despawn_tile(&mut self.commands, tile);
             }
             _ => {
@@ -463,8 +463,8 @@ impl Display<'_, '_> {
 /// `Mesh3d` that is inserted and never takes anything from it: the entity would be seen twice after the next one.
 type Drawing = (Mesh3d, VisibilityClass);
 
-/// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes into
-/// view or gets another material.
+/// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes
+/// into view or gets another material.
 fn refresh_material(mut child: EntityWorldMut) {
     if let Some(mut visibility) = child.get_mut::<ViewVisibility>() {
         visibility.set_changed();

@@ -19,7 +19,7 @@ use super::task::{InFlight, TaskCounter};
 use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SkyLight, SlimVertices};
 use crate::lattice::ChunkPos;
 use crate::lod::Cut;
-use crate::terrain::{Drawn, DrawnCut, KnownNodes, Terrain, World};
+use crate::terrain::{DrawnCut, KnownNodes, MeshKey, Terrain, World};
 use crate::threads::{ThreadTask, Threads, panic_message};
 use crate::world::sky::LitWorld;
 
@@ -31,7 +31,7 @@ pub(super) struct Loading {
     has_lod: bool,
     task: Option<ThreadTask<BuiltWorld>>,
     waiting: Vec<BuiltSurface>,
-    ready: HashMap<Drawn, Loaded>,
+    ready: HashMap<MeshKey, Loaded>,
     levels: Option<BuiltNodes>,
 }
 
@@ -97,9 +97,9 @@ fn scale(
     }
 }
 
-/// Scales and places a new terrain at once, so that queries in the frame that spawned it, for example in `Startup`, find it
-/// in its place. Tasks of another terrain on its entity are dropped. The tiles and chunks of that terrain stay until the new
-/// one has loaded, unless they have another size.
+/// Scales and places a new terrain at once, so that queries in the frame that spawned it, for example in `Startup`,
+/// find it in its place. Tasks of another terrain on its entity are dropped. The tiles and chunks of that terrain stay
+/// until the new one has loaded, unless they have another size.
 pub(super) fn prepare_new(
     new: On<Insert, Terrain>,
     mut commands: Commands,
@@ -124,8 +124,8 @@ pub(super) fn prepare_new(
     }
 }
 
-/// Drops tasks of terrains that have no entities: such a task belongs to a former terrain, and the new one must not wait
-/// for it.
+/// Drops tasks of terrains that have no entities: such a task belongs to a former terrain, and the new one must not
+/// wait for it.
 pub(super) fn drop_stray_tasks(
     mut commands: Commands,
     strays: Query<Entity, (With<Terrain>, With<InFlight>, Without<TerrainEntities>)>,
@@ -200,8 +200,8 @@ pub(super) fn drop_slim_vertices(
     }
 }
 
-/// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces are
-/// built.
+/// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces
+/// are built.
 pub(super) fn start_loading(
     mut commands: Commands,
     mut terrains: Query<
@@ -232,10 +232,10 @@ pub(super) fn start_loading(
         let builder = build.builder((entity, &terrain), extras);
         // For the game this is no change.
         let model = terrain.bypass_change_detection();
-        let unseen = entities_of_kind.and_then(|entities| model.take_unseen(entities.shown));
+        let pending = entities_of_kind.and_then(|entities| model.take_pending_display(entities.shown));
         // If more has changed than a frame may swap, the terrain is loaded again over several frames.
-        if let Some(unseen) = unseen.filter(|unseen| unseen.len() <= settings.swaps_per_frame) {
-            let task = InFlight::unseen(counter.next(), model, unseen, builder);
+        if let Some(pending) = pending.filter(|pending| pending.len() <= settings.swaps_per_frame) {
+            let task = InFlight::pending_display(counter.next(), model, pending, builder);
             commands.entity(entity).try_insert(task);
             continue;
         }
@@ -258,8 +258,8 @@ pub(super) fn start_loading(
 /// Builds all surfaces of a world.
 fn build_world(world: &World, builder: &SurfaceBuilder) -> Vec<BuiltSurface> {
     let _span = info_span!("burrow_load").entered();
-    let chunks = world.drawn_chunks().map(Drawn::Chunk);
-    let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
+    let chunks = world.drawn_chunks().map(MeshKey::Chunk);
+    let all: Vec<MeshKey> = world.grid().tiles().map(MeshKey::Tile).chain(chunks).collect();
     all.par_iter().map(|&drawn| builder.build((drawn, true), false, || world.draft(drawn))).collect()
 }
 
@@ -270,8 +270,8 @@ fn build_nodes(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
     let cut = Cut::coarsest(world.lod_grid(u8::MAX));
     known.learn(world, cut.grid(), cut.nodes());
     let (drawn, updates) = world.draw_cut(cut);
-    let chunks: Vec<Drawn> = world.drawn_chunks().map(Drawn::Chunk).collect();
-    let build = |&drawn: &Drawn| builder.build((drawn, false), false, || world.draft(drawn));
+    let chunks: Vec<MeshKey> = world.drawn_chunks().map(MeshKey::Chunk).collect();
+    let build = |&drawn: &MeshKey| builder.build((drawn, false), false, || world.draft(drawn));
     let chunks = chunks.par_iter().map(build).collect();
     (chunks, Some(BuiltNodes { drawn, nodes: builder.build_nodes(updates), known }))
 }
@@ -311,8 +311,8 @@ fn loaded(
     }
 }
 
-/// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and chunks
-/// are despawned in that frame.
+/// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and
+/// chunks are despawned in that frame.
 pub(super) fn finish_loading(
     mut commands: Commands,
     settings: Res<BurrowSettings>,
@@ -386,8 +386,8 @@ fn show(
     let with_fields = world.fields().map(|(chunk, _)| chunk);
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     // With levels, tiles come as they are drawn.
-    let tiles = (!has_lod).then(|| world.grid().tiles().map(Drawn::Tile)).into_iter().flatten();
-    for drawn in tiles.chain(chunks.into_iter().map(Drawn::Chunk)) {
+    let tiles = (!has_lod).then(|| world.grid().tiles().map(MeshKey::Tile)).into_iter().flatten();
+    for drawn in tiles.chain(chunks.into_iter().map(MeshKey::Chunk)) {
         let child = entities.spawn(commands, terrain, &world, drawn);
         if let Some(Loaded { mesh, built }) = loading.ready.remove(&drawn) {
             if let Some((handle, facts)) = mesh {
@@ -395,7 +395,7 @@ fn show(
             }
             apply_actions(commands, child, built.shown, built.actions);
         }
-        if let Drawn::Chunk(_) = drawn {
+        if let MeshKey::Chunk(_) = drawn {
             trigger_if_alive(commands, ChunkCreated { entity: child });
         }
     }

@@ -20,8 +20,8 @@ use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
 use crate::world::sky::{LitWorld, SkyColumns, SkyLights, SparseSky};
 
-/// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have the same ids in the
-/// same order, so a shader may take those of any corner and blend the weights alone.
+/// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have the same ids in
+/// the same order, so a shader may take those of any corner and blend the weights alone.
 pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowMaterialIds", 0x6275_7272_6f77_0001, VertexFormat::Uint8x4);
 
@@ -29,8 +29,8 @@ pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
 pub const ATTRIBUTE_MATERIAL_WEIGHTS: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowMaterialWeights", 0x6275_7272_6f77_0002, VertexFormat::Unorm8x4);
 
-/// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it. Not on
-/// terrains with [`SlimVertices`](super::SlimVertices).
+/// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it. Not
+/// on terrains with [`SlimVertices`](super::SlimVertices).
 pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
 
@@ -113,8 +113,8 @@ impl MeshBuilder {
         self.lit = self.has_sky_light().then(|| Arc::clone(lit));
     }
 
-    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task. The columns of a tile are computed
-    /// unless they are known.
+    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task. The columns of a tile are
+    /// computed unless they are known.
     pub(super) fn build(
         &self,
         origin: IVec3,
@@ -150,8 +150,8 @@ impl MeshBuilder {
         arrays.finish(&surface.indices)
     }
 
-    /// Builds the mesh of a node of level 1 or above, with columns that are a stride apart. Most vertices lie over them, so
-    /// their heights are computed together, and those of others one by one.
+    /// Builds the mesh of a node of level 1 or above, with columns that are a stride apart. Most vertices lie over
+    /// them, so their heights are computed together, and those of others one by one.
     pub(crate) fn build_node(
         &self,
         columns: (Column, Column),
@@ -390,11 +390,12 @@ fn copy<T: Copy>(values: &mut Vec<T>, of: &[u32]) {
     values.extend(copies);
 }
 
-/// How many voxels a vertex, in 1/4096 voxel of the terrain, lies below the pristine surface; above it less than 0. It depends
-/// on the position alone, so both sides of a seam get the same bits.
+/// How many voxels a vertex, in 1/4096 voxel of the terrain, lies below the pristine surface; above it less than 0. It
+/// depends on the position alone, so both sides of a seam get the same bits.
 fn depth(place: IVec3, height: impl Fn(Column) -> i32) -> f32 {
     let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-    // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are the same.
+    // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are
+    // the same.
     let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
     let next = column.offset(i32::from(x > 0), i32::from(z > 0));
     let here = i64::from(height(column));
@@ -425,7 +426,7 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights, NoiseSource};
     use crate::lod::Cut;
-    use crate::terrain::{Drawn, NodeUpdate, Terrain, TerrainSettings};
+    use crate::terrain::{MeshKey, NodeUpdate, Terrain, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
 
@@ -438,12 +439,12 @@ mod tests {
 
     /// All vertices that are drawn, with their place in 1/4096 voxel.
     fn drawn(world: &World) -> Vec<(bool, IVec3, Vertex)> {
-        let tiles = world.grid().tiles().map(Drawn::Tile);
-        let all = tiles.chain(world.drawn_chunks().map(Drawn::Chunk));
+        let tiles = world.grid().tiles().map(MeshKey::Tile);
+        let all = tiles.chain(world.drawn_chunks().map(MeshKey::Chunk));
         let vertices = all.flat_map(|drawn| {
             let (is_tile, mesh) = match drawn {
-                Drawn::Tile(tile) => (true, world.tile_mesh(tile)),
-                Drawn::Chunk(chunk) => (false, world.chunk_mesh(chunk)),
+                MeshKey::Tile(tile) => (true, world.tile_mesh(tile)),
+                MeshKey::Chunk(chunk) => (false, world.chunk_mesh(chunk)),
             };
             let origin = world.origin(drawn) * SNAP;
             mesh.vertices.into_iter().map(move |vertex| (is_tile, origin, vertex))
@@ -576,7 +577,7 @@ mod tests {
                 terrain.submit(Brush::dig(Shape::sphere(place, 3.0 + i as f32)));
                 let commit = terrain.begin().unwrap().run();
                 for (tile, update) in &commit.meshes.tiles {
-                    let origin = terrain.world().origin(Drawn::Tile(*tile));
+                    let origin = terrain.world().origin(MeshKey::Tile(*tile));
                     for builder in &builders {
                         let found = bytes_of(builder.build(
                             origin,

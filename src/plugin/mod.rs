@@ -1,18 +1,19 @@
 //! The Bevy plugin: turns brush messages into meshes and receipts.
 //!
-//! Put a [`Terrain`] on an entity. The plugin spawns one child for each [`Tile`], and one for each [`Chunk`] that digging
-//! touches, with a [`Field`] below it for each region of edits. [`Brush`] messages, in world space, become transactions
-//! that run on the plugin's own threads; a finished one is committed in a single frame:
-//! meshes, entities, [`BrushApplied`] receipts and entity events. A server with `MinimalPlugins` has no `Assets<Mesh>`: it
-//! gets everything but the meshes.
+//! Put a [`Terrain`] on an entity. The plugin spawns one child for each [`Tile`], and one for each [`Chunk`] that
+//! digging touches, with a [`Field`] below it for each region of edits. [`Brush`] messages, in world space, become
+//! transactions that run on the plugin's own threads; a finished one is committed in a single frame: meshes, entities,
+//! [`BrushApplied`] receipts and entity events. A server with `MinimalPlugins` has no `Assets<Mesh>`: it gets
+//! everything but the meshes.
 //!
 //! [`Undo`] and [`Redo`] messages work by whole strokes, and are answered by [`HistoryMoved`]. On terrains with
-//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`] for each
-//! that an undo brings back.
+//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`]
+//! for each that an undo brings back.
 //!
-//! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`], and,
-//! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. They follow when such a component is inserted, changed
-//! or removed. An entity that is spawned with its own, of the same type, keeps it until the terrain's changes.
+//! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`],
+//! and, with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. They follow when such a component is
+//! inserted, changed or removed. An entity that is spawned with its own, of the same type, keeps it until the terrain's
+//! changes.
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
 //! [`Terrain`]: crate::terrain::Terrain
@@ -127,11 +128,12 @@ pub use crate::threads::ThreadSettings;
 pub enum BurrowSystems {
     /// New terrains are loaded; their tiles appear all at once when all meshes are built.
     Load,
-    /// Brush, undo and redo messages are checked and queued. Send them before this set to have them in this frame's transaction.
+    /// Brush, undo and redo messages are checked and queued. Send them before this set to have them in this frame's
+    /// transaction.
     Collect,
-    /// Finished transactions are committed: meshes, entities, receipts, events. Small ones that begin in this frame are committed
-    /// in `PostUpdate`, if this set runs: see [`BurrowSettings::same_frame`]. Systems in `Update` read their messages in the next
-    /// frame, before anything of it is saved.
+    /// Finished transactions are committed: meshes, entities, receipts, events. Small ones that begin in this frame are
+    /// committed in `PostUpdate`, if this set runs: see [`BurrowSettings::same_frame`]. Systems in `Update` read their
+    /// messages in the next frame, before anything of it is saved.
     Commit,
     /// Queued brushes start as transactions.
     Begin,
@@ -254,6 +256,6 @@ impl Plugin for TerrainPlugin {
 
     #[cfg(feature = "render")]
     fn finish(&self, app: &mut App) {
-        engine::suggest_renderers_card(app.world());
+        engine::suggest_renderers_gpu(app.world());
     }
 }

@@ -17,7 +17,7 @@ use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::lod::{LodGrid, Node};
 use crate::surface::SurfaceMesh;
-use crate::terrain::{Drawn, DrawnCut, NodeUpdate, SurfaceDraft, Terrain};
+use crate::terrain::{DrawnCut, MeshKey, NodeUpdate, SurfaceDraft, Terrain};
 use crate::world::sky::LitWorld;
 
 /// A tile or chunk whose surface is built.
@@ -26,7 +26,7 @@ pub struct Part {
     /// The terrain's entity.
     pub terrain: Entity,
     /// Which tile or chunk.
-    pub drawn: Drawn,
+    pub drawn: MeshKey,
     /// The lattice point that positions of its surface count from, in voxels of the terrain.
     pub origin: IVec3,
     /// Cells along its sides.
@@ -43,11 +43,11 @@ impl Part {
         voxel_size: f32,
         grid: ChunkGrid,
         revision: u64,
-        drawn: Drawn,
+        drawn: MeshKey,
     ) -> Self {
         let origin = match drawn {
-            Drawn::Tile(tile) => grid.tile_cells(tile).0.at(0),
-            Drawn::Chunk(chunk) => grid.origin(chunk),
+            MeshKey::Tile(tile) => grid.tile_cells(tile).0.at(0),
+            MeshKey::Chunk(chunk) => grid.origin(chunk),
         };
         Self { terrain, drawn, origin, size: grid.size(), voxel_size, revision }
     }
@@ -58,10 +58,11 @@ pub type CommitAction = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
 
 /// Builds extra data for each surface off-thread, and swaps it in with the mesh: colliders, or a navigation mesh.
 ///
-/// [`build`](Self::build) runs in the task that makes the surface of a tile or chunk. The [`CommitAction`] that it returns
-/// runs on the entity of that tile or chunk in the frame in which the mesh is swapped, on a server without meshes too.
-/// Large transactions build several parts at a time on rayon's threads: a processor that uses rayon itself should hold no
-/// lock while it does. If a processor panics, that part goes without its data, and an error is logged once.
+/// [`build`](Self::build) runs in the task that makes the surface of a tile or chunk. The [`CommitAction`] that it
+/// returns runs on the entity of that tile or chunk in the frame in which the mesh is swapped, on a server without
+/// meshes too. Large transactions build several parts at a time on rayon's threads: a processor that uses rayon itself
+/// should hold no lock while it does. If a processor panics, that part goes without its data, and an error is logged
+/// once.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -86,7 +87,7 @@ pub type CommitAction = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
 /// app.world_mut().resource_mut::<SurfaceProcessors>().add(Counter);
 /// ```
 pub trait SurfaceProcessor: Send + Sync + 'static {
-    /// Is there anything to build for this part? A server does not assemble surfaces that no processor wants.
+    /// Whether there is anything to build for this part. A server does not assemble surfaces that no processor wants.
     fn wants(&self, part: &Part) -> bool {
         let _ = part;
         true
@@ -115,8 +116,8 @@ impl SurfaceProcessors {
         self.processors.is_empty()
     }
 
-    /// Runs code of a processor. If it panics, an error is logged once for each terrain, and the ground is shown without its
-    /// data.
+    /// Runs code of a processor. If it panics, an error is logged once for each terrain, and the ground is shown
+    /// without its data.
     fn guarded<T>(&self, terrain: Entity, work: impl FnOnce() -> T) -> Option<T> {
         let done = catch_unwind(AssertUnwindSafe(work));
         if done.is_err() && self.failed.lock().unwrap_or_else(PoisonError::into_inner).insert(terrain) {
@@ -136,11 +137,11 @@ impl fmt::Debug for SurfaceProcessors {
 
 /// The new surface of a tile or chunk, ready to be swapped in.
 pub(super) struct BuiltSurface {
-    pub drawn: Drawn,
+    pub drawn: MeshKey,
     pub mesh: BuiltMesh,
     pub shown: ShownSurface,
     pub actions: Vec<CommitAction>,
-    /// Is it drawn? Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
+    /// Whether it is drawn. Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
     pub is_drawn: bool,
 }
 
@@ -152,7 +153,7 @@ pub(super) struct BuiltNode {
     /// Tile and chunks that are drawn from now on.
     pub shown: Vec<BuiltSurface>,
     /// Tile and chunks that are drawn no more.
-    pub hidden: Vec<Drawn>,
+    pub hidden: Vec<MeshKey>,
 }
 
 impl BuiltNode {
@@ -251,11 +252,11 @@ impl SurfaceBuilder {
         self.mesh_builder.is_none() && self.processors.is_empty()
     }
 
-    /// Builds everything for these surfaces; many are built in parallel. Where a cut is drawn, those that it does not show get no
-    /// meshes.
+    /// Builds everything for these surfaces; many are built in parallel. Where a cut is drawn, those that it does not
+    /// show get no meshes.
     pub fn build_all(
         &self,
-        drafts: Vec<(Drawn, SurfaceDraft)>,
+        drafts: Vec<(MeshKey, SurfaceDraft)>,
         drawn_cut: Option<&DrawnCut>,
     ) -> Vec<BuiltSurface> {
         let cost = if self.processors.is_empty() { ItemCost::Surface } else { ItemCost::Collider };
@@ -266,13 +267,13 @@ impl SurfaceBuilder {
             });
         }
         // A tile and its chunks are lit together.
-        let mut by_tile: BTreeMap<TilePos, Vec<(usize, Drawn, SurfaceDraft)>> = BTreeMap::new();
+        let mut by_tile: BTreeMap<TilePos, Vec<(usize, MeshKey, SurfaceDraft)>> = BTreeMap::new();
         for (number, (drawn, draft)) in drafts.into_iter().enumerate() {
             by_tile.entry(drawn.tile()).or_default().push((number, drawn, draft));
         }
         let built = parallel_map_into(by_tile.into_iter().collect(), cost, |(tile, drafts)| {
             let mut lights = self.lights_over(tile);
-            let build = |(number, drawn, draft): (usize, Drawn, SurfaceDraft)| {
+            let build = |(number, drawn, draft): (usize, MeshKey, SurfaceDraft)| {
                 (number, self.build_lit((drawn, is_drawn(tile)), draft.is_empty(), || draft, &mut lights))
             };
             drafts.into_iter().map(build).collect::<Vec<_>>()
@@ -301,11 +302,11 @@ impl SurfaceBuilder {
         })
     }
 
-    /// Builds everything for one surface; no mesh if it is not drawn. `draft` is called only if something is built from it;
-    /// otherwise `is_empty` says whether the surface is known to have no triangles.
+    /// Builds everything for one surface; no mesh if it is not drawn. `draft` is called only if something is built from
+    /// it; otherwise `is_empty` says whether the surface is known to have no triangles.
     pub fn build(
         &self,
-        (drawn, is_drawn): (Drawn, bool),
+        (drawn, is_drawn): (MeshKey, bool),
         is_empty: bool,
         draft: impl FnOnce() -> SurfaceDraft,
     ) -> BuiltSurface {
@@ -314,7 +315,7 @@ impl SurfaceBuilder {
 
     fn build_lit(
         &self,
-        (drawn, is_drawn): (Drawn, bool),
+        (drawn, is_drawn): (MeshKey, bool),
         is_empty: bool,
         draft: impl FnOnce() -> SurfaceDraft,
         lights: &mut TileLights,

@@ -17,7 +17,7 @@ use crate::lattice::TilePos;
 use crate::lod::Node;
 use crate::redraw::{relit_nodes, relit_parts};
 use crate::terrain::{
-    Asked, Commit, Drawn, MeshUpdates, Receipt, SurfaceDraft, Terrain, Transaction, Unseen, World,
+    Asked, Commit, MeshKey, MeshUpdates, PendingDisplay, Receipt, SurfaceDraft, Terrain, Transaction, World,
 };
 use crate::threads::{ThreadTask, Threads};
 use crate::world::sky::{LitWorld, REACH};
@@ -59,7 +59,7 @@ pub(super) enum Change {
     /// A transaction, not committed yet.
     Transaction(Box<Commit>),
     /// Commits that the game made itself.
-    Unseen(Unseen),
+    PendingDisplay(PendingDisplay),
 }
 
 impl InFlight {
@@ -87,9 +87,9 @@ impl InFlight {
             (builder, relit) = relight(builder, world, &commit, &mut updates);
             let drawn_cut = commit.drawn_cut().cloned();
             let tiles = updates.tiles.into_iter();
-            let tiles = tiles.map(|(tile, update)| (Drawn::Tile(tile), SurfaceDraft::Tile(update)));
+            let tiles = tiles.map(|(tile, update)| (MeshKey::Tile(tile), SurfaceDraft::Tile(update)));
             let chunks = updates.chunks.into_iter();
-            let chunks = chunks.map(|(at, chunk)| (Drawn::Chunk(at), SurfaceDraft::Chunk(chunk)));
+            let chunks = chunks.map(|(at, chunk)| (MeshKey::Chunk(at), SurfaceDraft::Chunk(chunk)));
             let _span = info_span!("burrow_mesh").entered();
             let drafts = tiles.chain(chunks).chain(relit).collect();
             let surfaces = builder.build_all(drafts, drawn_cut.as_deref());
@@ -106,11 +106,16 @@ impl InFlight {
     }
 
     /// Builds the surfaces that the game changed itself.
-    pub fn unseen(number: u64, terrain: &Terrain, unseen: Unseen, builder: SurfaceBuilder) -> Self {
+    pub fn pending_display(
+        number: u64,
+        terrain: &Terrain,
+        pending: PendingDisplay,
+        builder: SurfaceBuilder,
+    ) -> Self {
         // What was there before is not known, so all ground near is lit again.
-        let mut drawn: BTreeSet<Drawn> = unseen.drawn().collect();
+        let mut drawn: BTreeSet<MeshKey> = pending.drawn().collect();
         if builder.has_sky_light() {
-            drawn.extend(parts_near(terrain.world(), unseen.drawn()));
+            drawn.extend(parts_near(terrain.world(), pending.drawn()));
         }
         let drafts = drawn.iter().map(|&drawn| (drawn, terrain.world().draft(drawn))).collect();
         let builder = match builder.has_sky_light() {
@@ -125,7 +130,7 @@ impl InFlight {
             let nodes =
                 cut.map(|(world, cut)| world.redraw_tiles(&cut, drawn.iter().map(|drawn| drawn.tile())));
             let nodes = builder.build_nodes(nodes.unwrap_or_default());
-            let (change, times) = (Change::Unseen(unseen), TaskTimes::default());
+            let (change, times) = (Change::PendingDisplay(pending), TaskTimes::default());
             TaskOutput { change, surfaces, nodes, pieces: Vec::new(), times }
         })
     }
@@ -143,9 +148,9 @@ impl InFlight {
         self.done.is_some()
     }
 
-    /// Whether its result is a transaction with edits or a step through history, and no piece of ground breaks off or comes
-    /// back. Debris is made and removed in `Update`: earlier, a piece would be nowhere for a frame, or twice. Other players'
-    /// edits come as parts, and their pieces besides.
+    /// Whether its result is a transaction with edits or a step through history, and no piece of ground breaks off or
+    /// comes back. Debris is made and removed in `Update`: earlier, a piece would be nowhere for a frame, or twice.
+    /// Other players' edits come as parts, and their pieces besides.
     pub fn is_plain(&self) -> bool {
         let Some(Ok(TaskOutput { change: Change::Transaction(commit), pieces, .. })) = &self.done else {
             return false;
@@ -169,7 +174,7 @@ fn relight(
     world: Arc<World>,
     commit: &Commit,
     updates: &mut MeshUpdates,
-) -> (SurfaceBuilder, Vec<(Drawn, SurfaceDraft)>) {
+) -> (SurfaceBuilder, Vec<(MeshKey, SurfaceDraft)>) {
     if !builder.has_sky_light() {
         return (builder, Vec::new());
     }
@@ -178,9 +183,9 @@ fn relight(
     // Another world is loaded as a whole.
     let is_relit = !commit.is_cut() && !commit.is_whole();
     let parts = if is_relit {
-        let redrawn: HashSet<Drawn> = {
-            let tiles = updates.tiles.iter().map(|(tile, _)| Drawn::Tile(*tile));
-            tiles.chain(updates.chunks.iter().map(|(chunk, _)| Drawn::Chunk(*chunk))).collect()
+        let redrawn: HashSet<MeshKey> = {
+            let tiles = updates.tiles.iter().map(|(tile, _)| MeshKey::Tile(*tile));
+            tiles.chain(updates.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk))).collect()
         };
         relit_parts(&lit, |drawn| redrawn.contains(&drawn))
     } else {
@@ -195,14 +200,14 @@ fn relight(
 }
 
 /// The tiles and chunks that are so near to some that these may change their light.
-fn parts_near(world: &World, of: impl Iterator<Item = Drawn>) -> Vec<Drawn> {
+fn parts_near(world: &World, of: impl Iterator<Item = MeshKey>) -> Vec<MeshKey> {
     let by = REACH / world.grid().size() + 1;
     let near = |TilePos { x, z }| {
         (x - by..=x + by).flat_map(move |x| (z - by..=z + by).map(move |z| TilePos { x, z }))
     };
     let tiles: HashSet<TilePos> = of.flat_map(|drawn| near(drawn.tile())).collect();
-    let chunks = world.drawn_chunks().filter(|chunk| tiles.contains(&chunk.tile())).map(Drawn::Chunk);
-    let tiles = tiles.iter().filter(|tile| world.grid().has_tile(**tile)).map(|&tile| Drawn::Tile(tile));
+    let chunks = world.drawn_chunks().filter(|chunk| tiles.contains(&chunk.tile())).map(MeshKey::Chunk);
+    let tiles = tiles.iter().filter(|tile| world.grid().has_tile(**tile)).map(|&tile| MeshKey::Tile(tile));
     tiles.chain(chunks).collect()
 }
 

@@ -108,13 +108,13 @@ impl Kept {
 mod tests {
     use super::*;
     use crate::ground::NoiseHeights;
-    use crate::terrain::{Drawn, SurfaceDraft, Terrain, TerrainSettings};
+    use crate::terrain::{MeshKey, SurfaceDraft, Terrain, TerrainSettings};
 
     fn tiles(ground: &Arc<Ground>, chunk_size: u32) -> Vec<TileUpdate> {
         let settings = TerrainSettings { chunk_size, ..Default::default() };
         let terrain = Terrain::new(Arc::clone(ground), &settings).unwrap();
         let world = terrain.world();
-        let tile = |tile| match world.draft(Drawn::Tile(tile)) {
+        let tile = |tile| match world.draft(MeshKey::Tile(tile)) {
             SurfaceDraft::Tile(tile) => tile,
             _ => panic!("a tile is drawn as a tile"),
         };

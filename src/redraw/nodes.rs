@@ -12,7 +12,7 @@ use crate::lod::{Cut, Node};
 use crate::surface::ChunkSurface;
 use crate::surface::lod::{self, LodView, Stacks};
 use crate::surface::vertex::WorldView;
-use crate::world::{Drawn, World};
+use crate::world::{MeshKey, World};
 
 /// Tiles and chunks that a running transaction changes.
 pub(crate) type NewParts<'a> = (&'a [(TilePos, TileUpdate)], &'a [(ChunkPos, Arc<ChunkSurface>)]);
@@ -202,7 +202,7 @@ impl<'a> State<'a> {
     }
 
     /// The tile and all chunks over it that draw something.
-    fn parts_over(&self, tile: TilePos) -> Vec<Drawn> {
+    fn parts_over(&self, tile: TilePos) -> Vec<MeshKey> {
         let size = self.world.grid.size();
         let mut chunks: Vec<ChunkPos> = Vec::new();
         let rows = self.world.rows_over(tile).unwrap_or(0..0);
@@ -214,14 +214,14 @@ impl<'a> State<'a> {
         chunks.extend(self.new_over(tile).iter().flat_map(|new| &new.chunks).map(|(chunk, _)| *chunk));
         chunks.sort_unstable();
         chunks.dedup();
-        std::iter::once(Drawn::Tile(tile)).chain(chunks.into_iter().map(Drawn::Chunk)).collect()
+        std::iter::once(MeshKey::Tile(tile)).chain(chunks.into_iter().map(MeshKey::Chunk)).collect()
     }
 
     /// The samples that a tile or chunk is built from.
-    fn draft(&self, drawn: Drawn) -> SurfaceDraft {
+    fn draft(&self, drawn: MeshKey) -> SurfaceDraft {
         let new = self.new_over(drawn.tile());
         match drawn {
-            Drawn::Tile(tile) => {
+            MeshKey::Tile(tile) => {
                 let new = new.and_then(|new| new.tile);
                 let old = || {
                     TileUpdate::new(self.world, &self.view, tile, |borders| {
@@ -230,7 +230,7 @@ impl<'a> State<'a> {
                 };
                 SurfaceDraft::Tile(new.cloned().unwrap_or_else(old))
             }
-            Drawn::Chunk(chunk) => {
+            MeshKey::Chunk(chunk) => {
                 let new = new.and_then(|new| new.chunks.iter().find(|(other, _)| *other == chunk));
                 match new {
                     Some((_, surface)) => SurfaceDraft::Chunk(Arc::clone(surface)),

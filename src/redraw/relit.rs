@@ -12,7 +12,7 @@ use crate::lattice::{BRICK, ChunkPos, Column, ItemCost, LatticeBox, ONE, SNAP, T
 use crate::lod::Node;
 use crate::surface::lod;
 use crate::world::sky::{LitWorld, REACH, SkyColumns, SkyLights, SkyView, SparseSky, stack_tops};
-use crate::world::{Drawn, World};
+use crate::world::{MeshKey, World};
 
 /// Columns over which something changes.
 #[derive(Clone, Copy)]
@@ -63,7 +63,7 @@ fn areas(lit: &LitWorld) -> Vec<Area> {
 }
 
 /// The tiles and chunks whose light differs after a commit, in order, without those that it redraws anyway.
-pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(Drawn) -> bool + Sync) -> Vec<Drawn> {
+pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(MeshKey) -> bool + Sync) -> Vec<MeshKey> {
     let (world, grid) = (lit.before(), lit.before().grid());
     let mut by_tile: FxHashMap<TilePos, Vec<Area>> = FxHashMap::default();
     for area in areas(lit) {
@@ -81,7 +81,7 @@ pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(Drawn) -> bool + S
     }
     let mut chunks: FxHashMap<TilePos, Vec<ChunkPos>> = FxHashMap::default();
     for chunk in world.meshes.maybe_drawn() {
-        if by_tile.contains_key(&chunk.tile()) && !is_redrawn(Drawn::Chunk(chunk)) {
+        if by_tile.contains_key(&chunk.tile()) && !is_redrawn(MeshKey::Chunk(chunk)) {
             chunks.entry(chunk.tile()).or_default().push(chunk);
         }
     }
@@ -90,14 +90,14 @@ pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(Drawn) -> bool + S
     let found = parallel_map(&tiles, ItemCost::Surface, |(tile, areas)| {
         let mut own: Vec<ChunkPos> = chunks.get(tile).cloned().unwrap_or_default();
         own.sort_unstable();
-        let is_whole = !is_redrawn(Drawn::Tile(*tile));
+        let is_whole = !is_redrawn(MeshKey::Tile(*tile));
         let compared = Compared::new(lit, *tile, areas, (is_whole, !own.is_empty()));
         compared.map_or(Vec::new(), |mut compared| {
             let mut found = Vec::new();
             if is_whole && compared.tile_differs() {
-                found.push(Drawn::Tile(*tile));
+                found.push(MeshKey::Tile(*tile));
             }
-            found.extend(own.into_iter().filter(|&chunk| compared.chunk_differs(chunk)).map(Drawn::Chunk));
+            found.extend(own.into_iter().filter(|&chunk| compared.chunk_differs(chunk)).map(MeshKey::Chunk));
             found
         })
     });

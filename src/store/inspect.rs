@@ -171,8 +171,8 @@ pub struct WorldCheck {
     pub replays: Option<bool>,
 }
 
-/// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the journal's
-/// tail, and, if it is whole, the log from the first commit on.
+/// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the
+/// journal's tail, and, if it is whole, the log from the first commit on.
 ///
 /// # Errors
 /// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.
@@ -196,8 +196,8 @@ pub fn check_in(
     look(files, &ground.into(), level, true)
 }
 
-/// Reads the world in a folder, over its ground and its level if it has one, without changing it, and without replaying its log from
-/// the first commit on.
+/// Reads the world in a folder, over its ground and its level if it has one, without changing it, and without replaying
+/// its log from the first commit on.
 ///
 /// # Errors
 /// As for [`check`].
@@ -262,12 +262,12 @@ fn as_found(trouble: &StoreTrouble) -> String {
     }
 }
 
-/// Replays the log of the world in a folder from the first commit on, over this ground and its level if it has one, and verifies
-/// each commit. Returns the terrain.
+/// Replays the log of the world in a folder from the first commit on, over this ground and its level if it has one, and
+/// verifies each commit. Returns the terrain.
 ///
 /// # Errors
-/// When there is none, when it is open, when its ground is another one, and when the log does not reach back to the first commit or can't
-/// be replayed.
+/// When there is none, when it is open, when its ground is another one, and when the log does not reach back to the
+/// first commit or can't be replayed.
 pub fn replay(
     folder: impl AsRef<Path>,
     ground: impl Into<Arc<Ground>>,

@@ -30,7 +30,7 @@ use crate::volume::{Field, Fields};
 const RECOVERED: f32 = 0.97;
 const RECOVERED_ANEW: f32 = 0.75;
 
-/// What a byte of a region costs to decode and to put in place, and a byte of a commit to replay, in one unit.
+/// The work of decoding and inserting a byte of a region, and of replaying a byte of a commit, in the same unit.
 const DECODE: u64 = 1;
 const RESTORE: u64 = 2;
 const REPLAY: u64 = 32;
@@ -408,8 +408,8 @@ fn keep_latest<K: Copy + Ord, V>(list: &mut Vec<(K, V)>) {
     });
 }
 
-/// Replays frames up to the first that does not fit, from the world that `begin` makes, and again without it: a world that was
-/// given a part of it can't be used.
+/// Replays frames up to the first that does not fit, from the world that `begin` makes, and again without it: a world
+/// that was given a part of it can't be used.
 fn replay_good(
     mut begin: impl FnMut() -> Result<Terrain, StoreError>,
     game: &GameData,
@@ -425,7 +425,8 @@ fn replay_good(
     Ok(Replayed { refused: replayed.refused, ..replay(begin()?, game.clone(), &good, is_checked, work)? })
 }
 
-/// Replays frames, and compares the world with each commit if `is_checked`. Stops before the first frame that does not fit.
+/// Replays frames, and compares the world with each commit if `is_checked`. Stops before the first frame that does not
+/// fit.
 fn replay(
     mut terrain: Terrain,
     mut game: GameData,

@@ -1,4 +1,4 @@
-//! Vertices and meshes, local to the chunk or tile that draws them.
+//! Vertices with up to four materials, and meshes of them, local to the chunk or tile that draws them.
 
 use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};

@@ -13,7 +13,7 @@ use crate::lattice::{ChunkPos, SNAP, TilePos};
 use crate::redraw::{DrawnCut, MeshUpdates, Stages, relit_parts};
 use crate::volume::UniformBricks;
 use crate::world::sky::{LitWorld, SkyColumns, SkyLights};
-use crate::world::{Drawn, NewSurfaces, Patch, World};
+use crate::world::{MeshKey, NewSurfaces, Patch, World};
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
@@ -97,9 +97,9 @@ impl Commit {
     #[doc(hidden)]
     pub fn light(&self, before: Arc<World>) -> usize {
         let lit = LitWorld::new(before, self.change().bricks);
-        let tiles = self.meshes.tiles.iter().map(|(tile, _)| Drawn::Tile(*tile));
-        let chunks = self.meshes.chunks.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));
-        let redrawn: Vec<Drawn> = tiles.chain(chunks).collect();
+        let tiles = self.meshes.tiles.iter().map(|(tile, _)| MeshKey::Tile(*tile));
+        let chunks = self.meshes.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk));
+        let redrawn: Vec<MeshKey> = tiles.chain(chunks).collect();
         let relit = relit_parts(&lit, |drawn| redrawn.contains(&drawn));
         let mut tiles: Vec<TilePos> = redrawn.iter().chain(&relit).map(|drawn| drawn.tile()).collect();
         tiles.sort_unstable();

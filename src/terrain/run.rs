@@ -29,7 +29,7 @@ use crate::world::World;
 
 /// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for
 /// more would take too long.
-const MOST_FAULTS: usize = 16;
+const MAX_FAULTS: usize = 16;
 
 /// A transaction panicked.
 #[derive(Debug)]
@@ -118,9 +118,9 @@ impl Transaction {
         }
         // This many are known to run together.
         let mut fine = 0;
-        for found in 1..=MOST_FAULTS {
+        for found in 1..=MAX_FAULTS {
             let fault = self.first_fault(&submissions, fine);
-            let rejected = if found == MOST_FAULTS { fault..submissions.len() } else { fault..fault + 1 };
+            let rejected = if found == MAX_FAULTS { fault..submissions.len() } else { fault..fault + 1 };
             for own in submissions.iter_mut().take(rejected.end).skip(rejected.start) {
                 if own.order.is_ok() {
                     own.order = Err(Rejection::Panicked);

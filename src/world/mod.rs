@@ -45,6 +45,6 @@ pub(crate) use patch::{ChangedBrick, Overlay, Places, State};
 pub use query::{RayHit, Span};
 pub use settings::{TerrainError, TerrainSettings};
 pub(crate) use state::unique;
-pub use state::{Drawn, Version, World};
+pub use state::{MeshKey, Version, World};
 pub use unmeshed::Meshing;
 pub(crate) use unmeshed::{UnmeshedChunk, blocks_of};

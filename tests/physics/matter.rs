@@ -1,5 +1,5 @@
-//! Matter is conserved: ground, debris and inventories together have as many voxels at every step, whatever is dug, undone and
-//! redone, wherever debris has rolled.
+//! Matter is conserved: ground, debris and inventories together have as many voxels at every step, whatever is dug,
+//! undone and redone, wherever debris has rolled.
 
 use std::collections::BTreeMap;
 

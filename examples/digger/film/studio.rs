@@ -175,8 +175,8 @@ impl Studio {
         Ok(Land { model: self.terrain()?.world(), origin: ORIGIN })
     }
 
-    /// Is all ground drawn at the levels of detail that the camera needs? A camera that moved is noticed in the second
-    /// frame.
+    /// Whether all ground is drawn at the levels of detail that the camera needs. A camera that moved is noticed in the
+    /// second frame.
     pub fn is_detailed(&mut self) -> bool {
         let world = self.app.world_mut();
         let mut terrains = world.query::<(&Terrain, &ShownLevels)>();

@@ -29,8 +29,8 @@ pub struct PlayerCamera;
 #[derive(Component)]
 pub struct DetachedCamera;
 
-/// The camera's far plane, as a multiple of the view distance. Fog hides 95 % of what is at the view distance, and more than
-/// 99 % here, so that ground does not end in a line.
+/// The camera's far plane, as a multiple of the view distance. Fog hides 95 % of what is at the view distance, and more
+/// than 99 % here, so that ground does not end in a line.
 const FAR: f32 = 1.3;
 
 /// How hard the camera shakes from blows and explosions.

@@ -1,4 +1,4 @@
-//! The limits of a server.
+//! Settings of a server: budgets of clients, reach, undo, and how much is kept.
 
 use std::time::Duration;
 

@@ -9,7 +9,7 @@ use crate::lod::Cut;
 use crate::redraw::relit_parts;
 use crate::surface::Vertex;
 use crate::terrain::{Terrain, TerrainSettings};
-use crate::world::Drawn;
+use crate::world::MeshKey;
 
 fn terrain(ground: Ground, chunk_size: u32) -> Terrain {
     Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings")
@@ -212,10 +212,10 @@ fn equal_places_have_equal_light_whatever_draws_them() {
 }
 
 /// The light of all corners of triangles of a tile or chunk.
-fn lights_of(world: &World, drawn: Drawn) -> Vec<u8> {
+fn lights_of(world: &World, drawn: MeshKey) -> Vec<u8> {
     let mesh = match drawn {
-        Drawn::Tile(tile) => world.tile_mesh(tile),
-        Drawn::Chunk(chunk) => world.chunk_mesh(chunk),
+        MeshKey::Tile(tile) => world.tile_mesh(tile),
+        MeshKey::Chunk(chunk) => world.chunk_mesh(chunk),
     };
     let (low, high) = world.grid().tile_cells(drawn.tile());
     let mut lights = SkyColumns::new(SkyView::of(world), low, high);
@@ -235,9 +235,9 @@ fn a_commit_lights_all_that_it_changes() {
             terrain.submit(brush);
             let commit = terrain.begin().expect("it waits").run();
             let lit = LitWorld::new(Arc::new(before.clone()), commit.change().bricks);
-            let mut redrawn: Vec<Drawn> =
-                commit.meshes.tiles.iter().map(|(tile, _)| Drawn::Tile(*tile)).collect();
-            redrawn.extend(commit.meshes.chunks.iter().map(|(chunk, _)| Drawn::Chunk(*chunk)));
+            let mut redrawn: Vec<MeshKey> =
+                commit.meshes.tiles.iter().map(|(tile, _)| MeshKey::Tile(*tile)).collect();
+            redrawn.extend(commit.meshes.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk)));
             let relit = relit_parts(&lit, |drawn| redrawn.contains(&drawn));
             terrain.commit(commit).expect("it is next");
             let world = terrain.world();
@@ -249,9 +249,9 @@ fn a_commit_lights_all_that_it_changes() {
                 assert_eq!(running.lights(), done.lights());
             }
             assert!(!relit.iter().any(|drawn| redrawn.contains(drawn)));
-            relit_tiles += relit.iter().filter(|drawn| matches!(drawn, Drawn::Tile(_))).count();
-            let tiles = world.grid().tiles().map(Drawn::Tile);
-            for drawn in tiles.chain(before.drawn_chunks().map(Drawn::Chunk)) {
+            relit_tiles += relit.iter().filter(|drawn| matches!(drawn, MeshKey::Tile(_))).count();
+            let tiles = world.grid().tiles().map(MeshKey::Tile);
+            for drawn in tiles.chain(before.drawn_chunks().map(MeshKey::Chunk)) {
                 if !redrawn.contains(&drawn) && !relit.contains(&drawn) {
                     assert_eq!(lights_of(&before, drawn), lights_of(world, drawn), "{drawn:?}");
                 }
@@ -271,8 +271,8 @@ fn a_dig_on_a_plain_redraws_nothing_for_its_light() {
     let redrawn: Vec<TilePos> = commit.meshes.tiles.iter().map(|(tile, _)| *tile).collect();
     let chunks: Vec<ChunkPos> = commit.meshes.chunks.iter().map(|(chunk, _)| *chunk).collect();
     let is_redrawn = |drawn| match drawn {
-        Drawn::Tile(tile) => redrawn.contains(&tile),
-        Drawn::Chunk(chunk) => chunks.contains(&chunk),
+        MeshKey::Tile(tile) => redrawn.contains(&tile),
+        MeshKey::Chunk(chunk) => chunks.contains(&chunk),
     };
     assert_eq!(relit_parts(&lit, is_redrawn), []);
 }
