@@ -175,8 +175,8 @@ fn vertex(in: Vertex) -> Varying {
 // largest power of two by which it multiplies a weight, near the camera and where cells are larger than voxels.
 const BORDER_PIXELS: f32 = 9.0;
 const BORDER_VOXELS: f32 = 5.0;
-const BORDER_NOISE: f32 = 7.0;
-const BORDER_MOST: f32 = 2.2;
+const BORDER_NOISE: f32 = 6.0;
+const BORDER_MOST: f32 = 1.7;
 const BORDER_MOST_FAR: f32 = 2.6;
 // How much heights move a border, how wide it is, and the share from which on a second layer can show.
 const HEIGHT_SHIFT: f32 = 0.4;
