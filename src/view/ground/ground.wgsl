@@ -175,8 +175,8 @@ fn vertex(in: Vertex) -> Varying {
 // largest power of two by which it multiplies a weight, near the camera and where cells are larger than voxels.
 const BORDER_PIXELS: f32 = 9.0;
 const BORDER_VOXELS: f32 = 5.0;
-const BORDER_NOISE: f32 = 7.0;
-const BORDER_MOST: f32 = 2.2;
+const BORDER_NOISE: f32 = 6.0;
+const BORDER_MOST: f32 = 2.0;
 const BORDER_MOST_FAR: f32 = 2.6;
 // How much heights move a border, how wide it is, and the share from which on a second layer can show.
 const HEIGHT_SHIFT: f32 = 0.4;
@@ -474,18 +474,27 @@ fn noise_of(noise: vec4<f32>, layer: u32) -> f32 {
 
 // Noise moves the borders between layers. It multiplies weights, so a layer shows only where a corner of the triangle has it, and
 // near the camera a border strays from the middle between two corners by less than half a voxel.
-fn choose(in: Varying, place: vec3<f32>, distance: f32) -> Choice {
+fn choose(in: Varying, site: Site, distance: f32) -> Choice {
 #ifdef GROUND_ATTRIBUTES
     let layers = in.layers;
     var weights = in.weights;
+    let across = dpdx(in.weights);
+    let down = dpdy(in.weights);
     if max(max(weights.x, weights.y), max(weights.z, weights.w)) < 0.999 {
         let octave = octave_of(distance);
-        let noise = border_noise(place, octave);
+        let noise = border_noise(site.place, octave);
         var rise =
             vec4(noise_of(noise, layers.x), noise_of(noise, layers.y), noise_of(noise, layers.z), noise_of(noise, layers.w));
         // Only differences count: what all that show have in common would use up the limit.
         rise = BORDER_NOISE * (rise - dot(weights, rise));
-        let most = vec4(mix(BORDER_MOST, BORDER_MOST_FAR, min(octave, 1.0)));
+        // Weights that change slowly move little: or borders would stray farther than half a cell.
+        let along = dot(site.dx, site.dy);
+        let squares = vec2(dot(site.dx, site.dx), dot(site.dy, site.dy));
+        let area = max(squares.x * squares.y - along * along, 1e-12);
+        let slopes = across * across * squares.y - 2.0 * along * across * down + down * down * squares.x;
+        let slope = sqrt(max(max(max(slopes.x, slopes.y), max(slopes.z, slopes.w)), 0.0) / area);
+        let share = min(slope * ground.voxel * exp2(octave), 1.0);
+        let most = vec4(share * mix(BORDER_MOST, BORDER_MOST_FAR, min(octave, 1.0)));
         weights *= exp2(clamp(rise, -most, most));
     }
     // The winner and the loser of each half.
@@ -607,7 +616,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     site.scale = FAR_SCALE * pow(FAR_STEP, floor(steps));
     site.next_scale = smoothstep(1.0 - FAR_MIX, 1.0, fract(steps));
 
-    let choice = choose(in, site.place, distance);
+    let choice = choose(in, site, distance);
     let best = choice.layers.x;
     let next = choice.layers.y;
     var texels = layer_at(best, site);
