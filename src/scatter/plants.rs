@@ -47,7 +47,7 @@ impl Plant {
     fn new(rule: &Rule, species: u8, spot: &Spot, ground: &Ground) -> Self {
         let (smallest, largest) = rule.size;
         let random = |from: u32| (spot.random >> from) as u16;
-        let size = smallest + (i64::from(largest - smallest) * i64::from(random(0)) >> 16) as i32;
+        let size = smallest + ((i64::from(largest - smallest) * i64::from(random(0))) >> 16) as i32;
         Self {
             id: PlantId { species, z: spot.square.1, x: spot.square.0 },
             x: spot.x,
