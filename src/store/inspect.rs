@@ -11,7 +11,8 @@ use super::found::Contents;
 use super::keys;
 use super::open_store::take_lock;
 use super::options::{BaseChanged, StoreOptions};
-use super::recover::{self, recover};
+use super::recover::recover;
+use super::replay_log::replay_all;
 use super::segment::{self, Bad};
 use super::shared::apply_game;
 use super::sources::has_world;
@@ -229,7 +230,7 @@ fn look(
     let replays = is_asked.then(|| {
         let world = recovered.terrain.world();
         let level = recovered.mirror.level.as_ref();
-        let other = recover::replay_all(&contents, ground, recovered.settings(), level)
+        let other = replay_all(&contents, ground, recovered.settings(), level)
             .map_err(|why| format!("the log does not lead to the world: {why}"))?;
         let (found, expected) = (other.world().hash(), world.hash());
         match found == expected && other.world().revision() == world.revision() {
@@ -284,5 +285,5 @@ pub fn replay(
     let level = BaseLevel::needed(name, level)?;
     BaseLevel::expect(level, name)?;
     let settings = checkpoint.as_ref().map_or_else(TerrainSettings::default, |own| own.metadata.settings);
-    recover::replay_all(&contents, &ground, settings, level)
+    replay_all(&contents, &ground, settings, level)
 }
