@@ -10,7 +10,7 @@
 //! | `own_numbers` | the last numbers of players' own edits |
 //! | `apply` | applies entries to the world |
 //! | `strokes` | strokes that can be undone |
-//! | `join`, `sender` | clients that join, reconnect, or differ; the bulk lane |
+//! | `join`, `sender`, `pace` | clients that join, reconnect, or differ; the bulk lane; how fast it is |
 //! | `kept` | older states of the world that are kept for joining clients |
 //! | `save` | a server that survives a restart |
 
@@ -22,6 +22,7 @@ mod kept;
 mod keys;
 mod order_log;
 mod own_numbers;
+mod pace;
 mod players;
 mod receive;
 #[cfg(feature = "store")]
