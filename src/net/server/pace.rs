@@ -13,7 +13,7 @@ const FIRST: u64 = 256 << 10;
 const SPAN: Duration = Duration::from_millis(500);
 
 /// A line carries a rate if it delivers at least this percentage of what was sent in the same time.
-const CARRIED: u64 = 85;
+const CARRIED: u64 = 92;
 
 /// Measurements in a row that must show that the line does not carry a rate. A single one may only have met a lost packet.
 const FAILURES: u32 = 2;
@@ -21,11 +21,11 @@ const FAILURES: u32 = 2;
 /// What the rate becomes, in percent: of itself while the line carries it, before and after the line's limit was met for the first
 /// time, and of what was delivered where the line does not carry it.
 const GROWTH: u64 = 150;
-const LATER_GROWTH: u64 = 115;
-const BACK: u64 = 95;
+const LATER_GROWTH: u64 = 110;
+const BACK: u64 = 85;
 
-/// The rate of a lane, by additive measurements: it grows as long as the line delivers what is sent, and falls to what the line
-/// delivers otherwise.
+/// The rate of a lane: it grows as long as the line delivers what is sent, and falls below what the line delivers otherwise, so that a
+/// queue in the line drains again.
 ///
 /// Delays are not looked at, because lanes are reliable: a lost packet delays all later ones, but after it has been sent
 /// again they arrive together, so it hardly changes what arrives in a longer time.
@@ -36,7 +36,8 @@ pub struct Pace {
     window: u64,
     rate: u64,
     phase: Phase,
-    /// Measurements in a row that show that the line does not carry the rate, and the most bytes a second among these.
+    /// Measurements in a row that show that the line does not carry the rate, and the most bytes a second among these and the one
+    /// before them: a lost packet makes one of them small.
     failures: u32,
     delivered: u64,
     has_met_limit: bool,
@@ -123,7 +124,7 @@ impl Pace {
     fn judge(&mut self, is_carried: bool, delivered: u64) {
         if is_carried {
             let growth = if self.has_met_limit { LATER_GROWTH } else { GROWTH };
-            (self.failures, self.delivered) = (0, 0);
+            (self.failures, self.delivered) = (0, delivered);
             self.rate = scaled(self.rate, growth, 100).min(self.most.per_second);
             return;
         }
