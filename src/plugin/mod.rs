@@ -48,7 +48,6 @@ mod reports;
 mod same_frame;
 mod settings;
 mod task;
-mod tile_columns;
 mod times;
 
 pub use components::{Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SlimVertices, Tile};
@@ -160,7 +159,6 @@ impl Plugin for TerrainPlugin {
             .init_resource::<inbox::Inbox>()
             .init_resource::<reports::Reported>()
             .init_resource::<same_frame::SameFrame>()
-            .init_resource::<tile_columns::KeptColumns>()
             .init_resource::<WantedTiles>()
             .add_message::<Brush>()
             .register_type::<Brush>()
