@@ -72,7 +72,7 @@ pub(super) fn begin_transactions(
         }
         let engine = terrain.engine().unwrap_or(&engine).clone();
         let extras = VertexExtras::of(colors, kind);
-        let mut builder = build.edit_builder((entity, &terrain), extras);
+        let mut builder = build.builder((entity, &terrain), extras);
         builder.revision += 1;
         let task = InFlight::transaction(counter.next(), entity, transaction, engine, builder);
         commands.entity(entity).try_insert(task);

@@ -1,5 +1,6 @@
 //! Surface meshes as Bevy meshes.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use bevy::asset::RenderAssetUsages;
@@ -12,11 +13,10 @@ use bevy::mesh::{
 };
 
 use super::palettes::{Arranged, Palettes};
-use super::tile_columns::TileColumns;
 use super::{MaterialColors, MeshBytes, SkyLight};
 use crate::ground::Ground;
 use crate::lattice::{Column, ONE, SNAP};
-use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
+use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex, tile};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
 use crate::world::sky::{LitWorld, SkyColumns, SkyLights, SparseSky};
 
@@ -113,21 +113,18 @@ impl MeshBuilder {
         self.lit = self.has_sky_light().then(|| Arc::clone(lit));
     }
 
-    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task. The columns of a tile are
-    /// computed unless they are known.
+    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task. `whole` is the draft's
+    /// [surface](SurfaceDraft::surface) where it is known.
     pub(super) fn build(
         &self,
         origin: IVec3,
         draft: &SurfaceDraft,
-        columns: Option<&TileColumns>,
+        whole: Option<&SurfaceMesh>,
         lights: &mut TileLights,
     ) -> BuiltMesh {
         match draft {
             SurfaceDraft::Nothing => None,
-            SurfaceDraft::Tile(tile) => match columns {
-                Some(columns) => self.build_tile(origin, tile, columns, lights),
-                None => self.build_tile(origin, tile, &TileColumns::new(tile), lights),
-            },
+            SurfaceDraft::Tile(tile) => self.build_tile(origin, tile, whole, lights),
             SurfaceDraft::Chunk(chunk) => self.build_lit(origin, chunk.mesh(), lights),
             SurfaceDraft::Unmeshed(chunk) => self.build_lit(origin, chunk.surface().mesh(), lights),
         }
@@ -173,24 +170,28 @@ impl MeshBuilder {
         arrays.finish(&surface.indices)
     }
 
-    /// Builds the mesh of a tile: only its rings and indices depend on digging.
+    /// Builds the mesh of a tile, whose columns come before its rings. `whole` is its mesh where it is known.
     fn build_tile(
         &self,
         origin: IVec3,
         draft: &TileUpdate,
-        columns: &TileColumns,
+        whole: Option<&SurfaceMesh>,
         lights: &mut TileLights,
     ) -> BuiltMesh {
         if draft.indices().is_empty() {
             return None;
         }
-        let (columns, rings) = (columns.vertices(), draft.rings.vertices());
-        let mut arrays = Arrays::with_capacity(columns.len() + rings.len(), self);
+        let vertices = match whole {
+            Some(whole) => Cow::Borrowed(&*whole.vertices),
+            None => Cow::Owned(tile::vertices(&draft.ground, draft.grid, draft.tile, &draft.rings)),
+        };
+        let columns = vertices.len().saturating_sub(draft.rings.vertices().len());
+        let (columns, rings) = vertices.split_at(columns);
+        let mut arrays = Arrays::with_capacity(vertices.len(), self);
         arrays.push_on_surface(columns);
         arrays.push(rings, origin);
         if let Some(lights) = lights.get() {
-            arrays.push_lights(columns, origin, lights);
-            arrays.push_lights(rings, origin, lights);
+            arrays.push_lights(&vertices, origin, lights);
         }
         arrays.finish(draft.indices())
     }

@@ -49,7 +49,6 @@ mod reports;
 mod same_frame;
 mod settings;
 mod task;
-mod tile_columns;
 mod times;
 
 #[cfg(feature = "scatter")]
@@ -171,7 +170,6 @@ impl Plugin for TerrainPlugin {
             .init_resource::<inbox::Inbox>()
             .init_resource::<reports::Reported>()
             .init_resource::<same_frame::SameFrame>()
-            .init_resource::<tile_columns::KeptColumns>()
             .init_resource::<WantedTiles>()
             .add_message::<Brush>()
             .register_type::<Brush>()

@@ -1,6 +1,5 @@
 //! Extra data for each surface: built in the same task as the meshes, swapped in by the same commit.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,7 +11,6 @@ use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
 use super::meshes::{BuiltMesh, MeshBuilder, TileLights, VertexExtras};
-use super::tile_columns::KeptColumns;
 use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::lod::{LodGrid, Node};
@@ -183,7 +181,6 @@ pub(super) struct BuildSettings<'w> {
     assets: Option<Res<'w, Assets<Mesh>>>,
     processors: Res<'w, SurfaceProcessors>,
     settings: Res<'w, BurrowSettings>,
-    columns: Res<'w, KeptColumns>,
 }
 
 impl BuildSettings<'_> {
@@ -191,11 +188,6 @@ impl BuildSettings<'_> {
     pub fn builder(&self, terrain: (Entity, &Terrain), extras: VertexExtras) -> SurfaceBuilder {
         let usages = self.assets.as_ref().map(|_| self.settings.mesh_usages);
         SurfaceBuilder::new(terrain, extras, usages, &self.processors)
-    }
-
-    /// A builder for edits of a terrain, which touch the same tiles again and again.
-    pub fn edit_builder(&self, terrain: (Entity, &Terrain), extras: VertexExtras) -> SurfaceBuilder {
-        SurfaceBuilder { columns: Some(self.columns.clone()), ..self.builder(terrain, extras) }
     }
 }
 
@@ -210,8 +202,6 @@ pub(super) struct SurfaceBuilder {
     /// `None` where there are no meshes.
     pub mesh_builder: Option<MeshBuilder>,
     processors: SurfaceProcessors,
-    /// Where the columns of tiles are kept from edit to edit.
-    columns: Option<KeptColumns>,
 }
 
 impl SurfaceBuilder {
@@ -230,7 +220,6 @@ impl SurfaceBuilder {
             revision: world.revision(),
             mesh_builder: mesh_usages.map(|usages| MeshBuilder::new(world, extras, usages)),
             processors: processors.clone(),
-            columns: None,
         }
     }
 
@@ -339,17 +328,10 @@ impl SurfaceBuilder {
         }
         let draft = draft();
         built.shown.is_empty = draft.is_empty();
-        let columns = match (&draft, &self.columns) {
-            (SurfaceDraft::Tile(tile), Some(kept)) if !built.shown.is_empty => Some((kept.of(tile), tile)),
-            _ => None,
-        };
-        let known = columns.as_ref().map(|(columns, _)| &**columns);
-        built.mesh = mesh_builder.and_then(|builder| builder.build(part.origin, &draft, known, lights));
-        if !processors.is_empty() {
-            let surface = &match columns {
-                Some((columns, tile)) => Cow::Owned(columns.surface(tile)),
-                None => draft.surface(),
-            };
+        let surface = (!processors.is_empty()).then(|| draft.surface());
+        built.mesh =
+            mesh_builder.and_then(|builder| builder.build(part.origin, &draft, surface.as_deref(), lights));
+        if let Some(surface) = &surface {
             let build = |processor: &Arc<dyn SurfaceProcessor>| {
                 guarded.guarded(part.terrain, || processor.build(part, surface))
             };

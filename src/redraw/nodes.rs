@@ -48,10 +48,13 @@ impl World {
 pub(crate) type NodeChanges = (Arc<DrawnCut>, Vec<NodeUpdate>);
 
 /// The updates that lead from one cut to another: removed nodes, new nodes, and nodes that touch them.
-pub(crate) fn change_cut(world: &World, drawn: &DrawnCut, choose: &ChooseCut) -> NodeChanges {
+pub(crate) fn change_cut(world: &World, drawn: &Arc<DrawnCut>, choose: &ChooseCut) -> NodeChanges {
     let chosen = choose(world, &drawn.cut);
     // A cut of another quadtree has no relation to this one.
     let cut = if chosen.grid() == drawn.cut.grid() { chosen } else { drawn.cut.clone() };
+    if cut == drawn.cut {
+        return (Arc::clone(drawn), Vec::new());
+    }
     let state = State::committed(world);
     let step = drawn.cut.changes_to(&cut);
     let mut nodes = step.new;

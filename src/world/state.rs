@@ -141,6 +141,11 @@ impl World {
         self.edited_nodes.contains(node)
     }
 
+    /// The [version](EditedNodes::version) of the nodes with edits.
+    pub(crate) fn edited_nodes_version(&self) -> u64 {
+        self.edited_nodes.version()
+    }
+
     /// Counts the commits.
     pub fn revision(&self) -> u64 {
         self.revision

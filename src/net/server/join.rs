@@ -248,6 +248,7 @@ impl Server {
             for (client, session) in self.sessions.range_mut(turn) {
                 let was_short = self.encodings.is_short();
                 let bucket = &mut self.players.player(*client).bulk;
+                bucket.set_rate(now, session.bulk.rate());
                 while let Some(piece) = session.bulk.next_piece(bucket, now, &mut self.encodings) {
                     let message = ToClient::Piece(piece).to_bytes();
                     self.figures.bulk_bytes += message.len() as u64;

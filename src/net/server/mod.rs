@@ -10,7 +10,7 @@
 //! | `sequences` | the last sequence numbers of players' edits |
 //! | `apply` | applies entries to the world |
 //! | `strokes` | strokes that can be undone |
-//! | `join`, `sender` | clients that join, reconnect, or differ; the bulk lane |
+//! | `join`, `sender`, `pace` | clients that join, reconnect, or differ; the bulk lane; how fast it is |
 //! | `kept` | older states of the world that are kept for joining clients |
 //! | `save` | a server that survives a restart |
 
@@ -21,6 +21,7 @@ mod kept;
 #[cfg(feature = "store")]
 mod keys;
 mod order_log;
+mod pace;
 mod players;
 mod receive;
 #[cfg(feature = "store")]

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use glam::IVec3;
 
+use super::pace::Pace;
 use super::settings::ServerSettings;
 use crate::net::bucket::{Bucket, Rate};
 use crate::net::message::ClientId;
@@ -39,7 +40,7 @@ impl Player {
             flood: full(settings.cost.times(settings.flood)),
             malformed: full(settings.malformed),
             greetings: full(GREETINGS),
-            bulk: full(settings.bulk),
+            bulk: full(Pace::new(settings).rate()),
             place: None,
             is_administrator: false,
             used: 0,

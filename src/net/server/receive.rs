@@ -175,7 +175,7 @@ impl Server {
 
     fn receive_ack(&mut self, client: ClientId, bulk: u64, number: u64) -> bool {
         let Some(session) = self.sessions.get_mut(&client) else { return true };
-        if number > self.epoch.number || !session.bulk.acknowledge(bulk) {
+        if number > self.epoch.number || !session.bulk.acknowledge(bulk, self.now) {
             return false;
         }
         session.acknowledged = number;
