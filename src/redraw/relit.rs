@@ -205,9 +205,9 @@ impl<'a> Compared<'a> {
     }
 }
 
-#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 /// The nodes of a drawn cut that have meshes of their own and whose light differs after a commit, without those that it
 /// redraws anyway.
+#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 pub(crate) fn relit_nodes(
     lit: &LitWorld,
     drawn: &DrawnCut,
@@ -235,8 +235,8 @@ pub(crate) fn relit_nodes(
     updates.into_iter().filter(|update| differs(update)).collect()
 }
 
-#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 /// Whether light at a place may change.
+#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 fn is_near(areas: &[Area], place: IVec3) -> bool {
     let (x, z) = (place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
     areas.iter().any(|area| {
