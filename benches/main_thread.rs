@@ -1,7 +1,8 @@
 //! The cost of digging on the main thread: `cargo bench --features examples --bench main_thread`.
 //!
 //! The real landscape in an app without a renderer, one sphere of radius 4 at a time, compared with idle frames; and
-//! the task's time until Bevy's meshes are ready, by chunk size. Vertices have depths, or with `-- slim` none. With
+//! the task's time until Bevy's meshes are ready, by chunk size. Vertices have depths, or with `-- slim` none; with `-- light`
+//! they have the light of the sky. With
 //! `-- colliders`, all ground has colliders, in chunks of 32. Printed first is the time until all of the landscape is there.
 
 use std::sync::Arc;
@@ -54,6 +55,9 @@ fn app(ground: &Arc<Ground>, chunk_size: u32, is_slim: bool) -> App {
     let terrain = app.world_mut().spawn(terrain).id();
     if is_slim {
         app.world_mut().entity_mut(terrain).insert(SlimVertices);
+    }
+    if is_asked("light") {
+        app.world_mut().entity_mut(terrain).insert(SkyLight::default());
     }
     let mut tiles = app.world_mut().query_filtered::<(), With<Tile>>();
     let start = Instant::now();

@@ -91,7 +91,8 @@ pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(Drawn) -> bool + S
         let mut own: Vec<ChunkPos> = chunks.get(tile).cloned().unwrap_or_default();
         own.sort_unstable();
         let is_whole = !is_redrawn(Drawn::Tile(*tile));
-        Compared::new(lit, *tile, areas).map_or(Vec::new(), |mut compared| {
+        let compared = Compared::new(lit, *tile, areas, (is_whole, !own.is_empty()));
+        compared.map_or(Vec::new(), |mut compared| {
             let mut found = Vec::new();
             if is_whole && compared.tile_differs() {
                 found.push(Drawn::Tile(*tile));
@@ -118,17 +119,36 @@ struct Compared<'a> {
 }
 
 impl<'a> Compared<'a> {
-    fn new(lit: &'a LitWorld, tile: TilePos, areas: &'a [Area]) -> Option<Self> {
+    /// `None` if nothing differs: neither the tile's light, if that is asked for, nor that of chunks.
+    fn new(
+        lit: &'a LitWorld,
+        tile: TilePos,
+        areas: &'a [Area],
+        (has_tile, has_chunks): (bool, bool),
+    ) -> Option<Self> {
         let world = lit.before();
         let (first, last) = world.grid().tile_cells(tile);
-        let all = areas.iter().map(|area| LatticeBox { min: area.stack.at(0), max: area.last().at(0) });
+        let around = |area: &Area| match area.open {
+            Some((low, high, _)) if !has_chunks => (low, high),
+            _ => (area.stack, area.last()),
+        };
+        let all = areas.iter().map(around);
+        let all = all.map(|(low, high)| LatticeBox { min: low.at(0), max: high.at(0) });
         let near = all.reduce(LatticeBox::union)?;
         let near = LatticeBox { min: near.min - REACH, max: near.max + REACH };
         let own = LatticeBox::new(first.at(near.min.y), last.at(near.max.y))?.intersection(near)?;
         let (low, high) = (Column::of(own.min), Column::of(own.max));
-        let [before, after] = [SkyView::of(world), lit.view()].map(|view| SkyColumns::new(view, low, high));
         let tops = areas.iter().filter_map(|area| area.open).map(|(.., highest)| highest);
-        let highest = areas.iter().map(|area| area.highest).chain(tops).max()?;
+        let highest_top = tops.max().unwrap_or(i32::MIN);
+        let highest = areas.iter().map(|area| area.highest).max()?.max(highest_top);
+        // Light comes from above, and ground that nothing was built over looks at tops alone.
+        let lowest = lit.lowest_ground(low, high);
+        let is_open = lit.is_undug(low, high);
+        if !has_chunks && (!has_tile || lowest >= if is_open { highest_top } else { highest }) {
+            return None;
+        }
+        let before = SkyColumns::new(SkyView::of(world), low, high);
+        let after = before.after(lit);
         Some(Self { world, areas, low, high, before, after, highest })
     }
 
@@ -137,13 +157,13 @@ impl<'a> Compared<'a> {
         let tops = self.areas.iter().filter_map(|area| area.open).map(|(.., highest)| highest);
         let highest = tops.max().unwrap_or(i32::MIN);
         let lowest = self.before.lowest_inside().min(self.after.lowest_inside());
-        if lowest < highest && self.before.lights() != self.after.lights() {
+        if lowest < highest && self.before.shows_other_lights(&self.after) {
             return true;
         }
         if !self.before.has_changes() && !self.after.has_changes() {
             return false;
         }
-        // Ground under roofs, or that was under one.
+        // Ground under roofs, or that was under one. What was dug is not drawn by a tile.
         let ground = self.world.ground();
         for z in self.low.z..=self.high.z {
             for x in self.low.x..=self.high.x {
@@ -151,7 +171,11 @@ impl<'a> Compared<'a> {
                 if !self.before.is_changed(column) && !self.after.is_changed(column) {
                     continue;
                 }
-                let place = (column.at(0) * SNAP).with_y(ground.height(column) * (SNAP / ONE));
+                let height = ground.height(column);
+                if self.before.top(column).max(self.after.top(column)) < height {
+                    continue;
+                }
+                let place = (column.at(0) * SNAP).with_y(height * (SNAP / ONE));
                 if self.before.light(place) != self.after.light(place) {
                     return true;
                 }
@@ -181,9 +205,9 @@ impl<'a> Compared<'a> {
     }
 }
 
-#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 /// The nodes of a drawn cut that have meshes of their own and whose light differs after a commit, without those that it
 /// redraws anyway.
+#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 pub(crate) fn relit_nodes(
     lit: &LitWorld,
     drawn: &DrawnCut,
@@ -211,8 +235,8 @@ pub(crate) fn relit_nodes(
     updates.into_iter().filter(|update| differs(update)).collect()
 }
 
-#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 /// Whether light at a place may change.
+#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 fn is_near(areas: &[Area], place: IVec3) -> bool {
     let (x, z) = (place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
     areas.iter().any(|area| {

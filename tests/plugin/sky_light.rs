@@ -1,6 +1,6 @@
 //! The light of the sky in meshes: in the commit of a dig, near and far, and equal wherever meshes meet.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use bevy::mesh::VertexAttributeValues;
 use bevy::prelude::*;
@@ -9,7 +9,7 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
 
-/// The light of all drawn vertices by their places in 1/4096 voxel; `None` if some mesh has none. Panics where vertices at
+/// The light of all corners of triangles by their places in 1/4096 voxel; `None` if some mesh has none. Panics where vertices at
 /// one place differ.
 fn lights(stage: &mut Stage) -> Option<HashMap<IVec3, [u8; 4]>> {
     let world = stage.app.world_mut();
@@ -25,8 +25,11 @@ fn lights(stage: &mut Stage) -> Option<HashMap<IVec3, [u8; 4]>> {
         let places = mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(VertexAttributeValues::as_float3);
         let places = places.expect("each mesh has positions");
         assert_eq!(own.len(), places.len());
-        for (&place, &own) in places.iter().zip(own) {
-            let place = ((Vec3::from(place) + origin) * 4096.0).round().as_ivec3();
+        // Tiles keep vertices of ground that was dug, which no triangle uses.
+        let used: HashSet<usize> = mesh.indices().expect("it has indices").iter().collect();
+        for at in used {
+            let own = own[at];
+            let place = ((Vec3::from(places[at]) + origin) * 4096.0).round().as_ivec3();
             let first = *found.entry(place).or_insert(own);
             assert_eq!(first, own, "at {:?}", place.as_vec3() / 4096.0);
         }

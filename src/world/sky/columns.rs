@@ -5,9 +5,9 @@ use std::cell::OnceCell;
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
-use super::SkyView;
 use super::light::{FAR, HIGHEST_RISE, NEAR, REACH, SkyLights, Step, below, light_of, slope};
 use super::tops::stack_tops;
+use super::{LitWorld, SkyView};
 use crate::lattice::{Column, ONE};
 
 /// The columns of a rectangle and those around it that its light depends on.
@@ -36,51 +36,89 @@ impl<'a> SkyColumns<'a> {
         let last = high.offset(REACH, REACH);
         let [width, depth] = [last.x - first.x + 1, last.z - first.z + 1].map(|count| count.max(1) as usize);
         let size = [high.x - low.x + 1, high.z - low.z + 1].map(|count| count.max(1) as usize);
-        let mut tops = vec![0; width * depth];
-        let mut changed = Vec::new();
-        for stack_z in first.z >> 3..=last.z >> 3 {
-            for stack_x in first.x >> 3..=last.x >> 3 {
-                let at = Column::new(stack_x * 8, stack_z * 8);
-                let own = stack_tops(view, (stack_x, stack_z));
-                let pristine;
-                let (all, bits) = match &own {
-                    Some(own) => (own.tops.as_slice(), own.changed),
-                    None => {
-                        pristine = view.ground().heights::<8>(at);
-                        (pristine.as_flattened(), 0)
-                    }
-                };
-                let (from, to) = ((first.x - at.x).max(0), (last.x - at.x).min(7));
-                let place = |z: i32| (at.z + z - first.z) as usize * width + (at.x + from - first.x) as usize;
-                for z in (first.z - at.z).max(0)..=(last.z - at.z).min(7) {
-                    let row = &all[(z * 8 + from) as usize..=(z * 8 + to) as usize];
-                    tops[place(z)..place(z) + row.len()].copy_from_slice(row);
-                }
-                if bits != 0 {
-                    changed.resize(width * depth, 0);
-                    for z in (first.z - at.z).max(0)..=(last.z - at.z).min(7) {
-                        for x in from..=to {
-                            changed[place(z) + (x - from) as usize] = -((bits >> (z * 8 + x) & 1) as i16);
-                        }
-                    }
-                }
-            }
-        }
         let mut all = Self {
             view,
             low,
             size,
             first,
             width,
-            tops,
-            changed,
+            tops: vec![0; width * depth],
+            changed: Vec::new(),
             lowest: 0,
             lights: OnceCell::new(),
             known: FxHashMap::default(),
         };
-        all.repeat_rim(last);
-        all.lowest = all.tops.iter().copied().min().unwrap_or_default();
+        for stack_z in first.z >> 3..=last.z >> 3 {
+            for stack_x in first.x >> 3..=last.x >> 3 {
+                all.fill((stack_x, stack_z));
+            }
+        }
+        all.finish();
         all
+    }
+
+    /// The same columns after a commit to their world.
+    pub fn after<'b>(&self, lit: &'b LitWorld) -> SkyColumns<'b> {
+        let mut all = SkyColumns {
+            view: lit.view(),
+            tops: self.tops.clone(),
+            changed: self.changed.clone(),
+            lights: OnceCell::new(),
+            known: FxHashMap::default(),
+            ..*self
+        };
+        let last = all.last();
+        for (x, z) in lit.changed_stacks() {
+            let is_near = |at: i32, first: i32, last: i32| first >> 3 <= at && at <= last >> 3;
+            if is_near(x, all.first.x, last.x) && is_near(z, all.first.z, last.z) {
+                all.fill((x, z));
+            }
+        }
+        all.finish();
+        all
+    }
+
+    /// The last of all columns.
+    fn last(&self) -> Column {
+        let depth = self.tops.len() / self.width;
+        self.first.offset(self.width as i32 - 1, depth as i32 - 1)
+    }
+
+    /// Fills in the columns of a stack of bricks.
+    fn fill(&mut self, stack: (i32, i32)) {
+        let (first, last, width, view) = (self.first, self.last(), self.width, self.view);
+        let at = Column::new(stack.0 * 8, stack.1 * 8);
+        let own = stack_tops(view, stack);
+        let pristine;
+        let (all, bits) = match &own {
+            Some(own) => (own.tops.as_slice(), own.changed),
+            None => {
+                pristine = view.ground().heights::<8>(at);
+                (pristine.as_flattened(), 0)
+            }
+        };
+        let (from, to) = ((first.x - at.x).max(0), (last.x - at.x).min(7));
+        let rows = (first.z - at.z).max(0)..=(last.z - at.z).min(7);
+        let place = |z: i32| (at.z + z - first.z) as usize * width + (at.x + from - first.x) as usize;
+        for z in rows.clone() {
+            let row = &all[(z * 8 + from) as usize..=(z * 8 + to) as usize];
+            self.tops[place(z)..place(z) + row.len()].copy_from_slice(row);
+        }
+        if bits != 0 {
+            self.changed.resize(self.tops.len(), 0);
+        }
+        if !self.changed.is_empty() {
+            for z in rows {
+                for x in from..=to {
+                    self.changed[place(z) + (x - from) as usize] = -((bits >> (z * 8 + x) & 1) as i16);
+                }
+            }
+        }
+    }
+
+    fn finish(&mut self) {
+        self.repeat_rim(self.last());
+        self.lowest = self.tops.iter().copied().min().unwrap_or_default();
     }
 
     /// Beyond the rim, columns are those on it.
@@ -119,6 +157,21 @@ impl<'a> SkyColumns<'a> {
             &self.tops[start..start + self.size[0]]
         };
         (0..self.size[1]).flat_map(row).copied().min().unwrap_or_default()
+    }
+
+    /// Whether the light differs on any of the rectangle's columns that neither was changed in.
+    pub fn shows_other_lights(&self, other: &SkyColumns) -> bool {
+        let (own, others) = (self.lights(), other.lights());
+        if own == others {
+            return false;
+        }
+        let is_changed =
+            |all: &SkyColumns, column: Column| !all.changed.is_empty() && all.changed[all.index(column)] != 0;
+        let width = self.size[0];
+        (0..own.len()).filter(|&at| own[at] != others[at]).any(|at| {
+            let column = self.low.offset((at % width) as i32, (at / width) as i32);
+            !is_changed(self, column) && !is_changed(other, column)
+        })
     }
 
     /// Whether any column's top is not the ground's own height.

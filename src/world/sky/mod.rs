@@ -76,6 +76,21 @@ impl LitWorld {
         &self.world
     }
 
+    /// The lowest of some columns before anyone dug, and of others beside them, in 1/256 voxel.
+    pub fn lowest_ground(&self, low: Column, high: Column) -> i32 {
+        let heights = |(x, z): (i32, i32)| {
+            let heights = self.world.ground.heights::<8>(Column::new(x * 8, z * 8));
+            heights.as_flattened().iter().copied().min().unwrap_or(i32::MIN)
+        };
+        stacks_over(low, high).map(heights).min().unwrap_or(i32::MIN)
+    }
+
+    /// Whether no bricks are stored over some columns, neither before nor after the commit.
+    pub fn is_undug(&self, low: Column, high: Column) -> bool {
+        let [before, after] = [SkyView::of(&self.world), self.view()];
+        stacks_over(low, high).all(|stack| before.rows(stack).is_empty() && after.rows(stack).is_empty())
+    }
+
     /// The world after the commit.
     pub fn view(&self) -> SkyView<'_> {
         SkyView { world: &self.world, newer: Some(&self.newer) }
@@ -90,6 +105,11 @@ impl LitWorld {
     pub fn changed_bricks(&self) -> impl Iterator<Item = BrickPos> {
         self.newer.bricks.keys().copied()
     }
+}
+
+/// The stacks of bricks over some columns, both ends included.
+fn stacks_over(low: Column, high: Column) -> impl Iterator<Item = (i32, i32)> {
+    (low.z >> 3..=high.z >> 3).flat_map(move |z| (low.x >> 3..=high.x >> 3).map(move |x| (x, z)))
 }
 
 /// A world as far as light depends on it.

@@ -211,7 +211,7 @@ fn equal_places_have_equal_light_whatever_draws_them() {
     assert!(shared > 3000, "{shared} places are drawn more than once");
 }
 
-/// The light of all vertices of a tile or chunk.
+/// The light of all corners of triangles of a tile or chunk.
 fn lights_of(world: &World, drawn: Drawn) -> Vec<u8> {
     let mesh = match drawn {
         Drawn::Tile(tile) => world.tile_mesh(tile),
@@ -220,7 +220,7 @@ fn lights_of(world: &World, drawn: Drawn) -> Vec<u8> {
     let (low, high) = world.grid().tile_cells(drawn.tile());
     let mut lights = SkyColumns::new(SkyView::of(world), low, high);
     let origin = world.origin(drawn) * SNAP;
-    mesh.vertices.iter().map(|vertex| lights.light(origin + vertex.position)).collect()
+    mesh.triangles().flatten().map(|vertex| lights.light(origin + vertex.position)).collect()
 }
 
 #[test]
