@@ -173,7 +173,13 @@ impl PlantPatch {
         let points =
             |low: i32, high: i32| low.saturating_mul(ONE)..high.saturating_add(1).saturating_mul(ONE);
         let (along_x, along_z) = (points(low.x, high.x), points(low.z, high.z));
-        for (index, (plant, gone)) in self.plants.iter().zip(&mut self.gone).enumerate() {
+        // Plants are in order of their squares along z: only some rows can be meant.
+        let spacing = scatter.spacing(patch.species);
+        let row = |z: i32| z.div_euclid(spacing);
+        let first = self.plants.partition_point(|plant| plant.id.z < row(along_z.start));
+        let end = self.plants.partition_point(|plant| plant.id.z <= row(along_z.end));
+        let rows = self.plants[first..end].iter().zip(&mut self.gone[first..end]);
+        for (index, (plant, gone)) in (first..).zip(rows) {
             if !(along_x.contains(&plant.x) && along_z.contains(&plant.z)) {
                 continue;
             }
@@ -197,6 +203,11 @@ impl Scatter {
     pub fn patch_size(&self, species: u8) -> i32 {
         let end = self.species().get(usize::from(species)).map_or(0.0, |own| own.view.end);
         ((end / 4.0) as u32).clamp(16, 128).next_power_of_two().min(128) as i32
+    }
+
+    /// Sides of a species' squares, in 1/256 voxel.
+    fn spacing(&self, species: u8) -> i32 {
+        self.rules.get(usize::from(species)).map_or(ONE, |rule| rule.spacing)
     }
 
     /// The cells of a patch: lowest and highest, both included.

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 
 use bevy_burrow::lattice::{Column, LatticeBox, ONE};
 use bevy_burrow::prelude::*;
-use bevy_burrow::scatter::{Clearance, Plant, Scatter, ScatterRules, Species};
+use bevy_burrow::scatter::{Clearance, PatchPos, Plant, PlantPatches, Scatter, ScatterRules, Species};
 use bevy_burrow::surface::mask::cell_sheet;
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
@@ -251,6 +251,46 @@ fn what_an_edit_removes_lies_in_the_area_that_it_affects() {
             let cell = plant.cell();
             let is_inside = (low.x..=high.x).contains(&cell.x) && (low.z..=high.z).contains(&cell.z);
             assert!(is_inside, "{plant:?} is not between {low:?} and {high:?}");
+        }
+    }
+}
+
+#[test]
+fn patches_that_follow_edits_are_those_made_anew() {
+    let rng = &mut Rng::with_seed(5);
+    for index in 0..10 {
+        let ground = random_ground_of_size(rng, index, 60, 50);
+        let scatter = std::sync::Arc::new(scatter(&random_rules(rng)));
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+        let made = |world: &World| {
+            let mut patches = PlantPatches::new(scatter.clone());
+            for species in 0..scatter.species().len() as u8 {
+                for (x, z) in (0..4).flat_map(|x| (0..4).map(move |z| (x, z))) {
+                    let pos = PatchPos { species, x, z };
+                    patches.insert(world, pos, scatter.patch(world.ground(), pos));
+                }
+            }
+            patches
+        };
+        let standing = |patches: &PlantPatches| {
+            let mut all: Vec<Plant> =
+                patches.iter().flat_map(|(_, patch)| patch.standing().copied()).collect();
+            all.sort_by_key(|plant| plant.id);
+            all
+        };
+        let mut patches = made(terrain.world());
+        for _ in 0..12 {
+            let receipt = match rng.u8(0..4) {
+                0 => terrain.undo(),
+                _ => terrain.apply_one(any_random_brush(rng, terrain.world().ground())),
+            };
+            let Some(bounds) = receipt.outcome.ok().and_then(|applied| applied.bounds) else { continue };
+            let before = standing(&patches);
+            let changes = patches.update(terrain.world(), Some(bounds));
+            let after = standing(&patches);
+            assert_eq!(after, standing(&made(terrain.world())));
+            let gone = before.iter().filter(|plant| !after.contains(plant)).count();
+            assert_eq!(changes.iter().filter(|change| !change.stands).count(), gone);
         }
     }
 }
