@@ -51,7 +51,7 @@ fn share(vertex: &Vertex, material: u8) -> u32 {
 fn a_coarse_vertex_has_the_shares_of_its_columns() {
     let inside = |column: Column| (8..=56).contains(&column.x) && (8..=56).contains(&column.z);
     // A border along x: its vertices show some of both, and all others one.
-    let halves = terrain(ground(64, |column| 1 + u8::from(column.x >= 30)));
+    let halves = terrain(ground(64, |column| 1 + u8::from(column.x >= 33)));
     for level in 1..=3 {
         let cut = Cut::coarsest(halves.world().lod_grid(level));
         let mut mixed = 0;
@@ -63,8 +63,8 @@ fn a_coarse_vertex_has_the_shares_of_its_columns() {
             let stride = 1 << level;
             mixed += usize::from(left > 0 && right > 0);
             match column.x {
-                x if x + stride <= 30 => assert_eq!(left, 255, "{column:?} at level {level}"),
-                x if x - stride >= 30 => assert_eq!(right, 255, "{column:?} at level {level}"),
+                x if x + stride <= 33 => assert_eq!(left, 255, "{column:?} at level {level}"),
+                x if x - stride >= 33 => assert_eq!(right, 255, "{column:?} at level {level}"),
                 _ => {}
             }
         }

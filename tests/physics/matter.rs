@@ -1,5 +1,5 @@
-//! Matter is conserved: ground, debris and inventories together have as many voxels at every step, whatever is dug,
-//! undone and redone, wherever debris has rolled.
+//! Matter is conserved: ground, debris and inventories together have as many voxels at every step, whatever is dug, undone and
+//! redone, wherever debris has rolled.
 
 use std::collections::BTreeMap;
 
@@ -81,7 +81,7 @@ pub fn random_brush(rng: &mut Rng) -> Brush {
         Vec3::new(part(rng, 8.0, 40.0), part(rng, low, high), part(rng, 8.0, 40.0))
     };
     let material = MaterialId(rng.u8(1..5));
-    match rng.u8(0..10) {
+    match rng.u8(0..8) {
         0 => Brush::add(Shape::cuboid(at(rng, 14.0, 18.0), Vec3::new(1.2, 10.0, 1.2)), material),
         1 => {
             let half = Vec3::new(part(rng, 2.0, 7.0), 1.2, part(rng, 2.0, 7.0));
@@ -95,11 +95,6 @@ pub fn random_brush(rng: &mut Rng) -> Brush {
         5 => {
             let rough = Roughness::new(2.0, 2.0, rng.u32(..));
             Brush::dig(Shape::sphere(at(rng, 8.0, 20.0), part(rng, 3.0, 7.0))).with_roughness(rough)
-        }
-        6 => Brush::reset(Shape::sphere(at(rng, 4.0, 22.0), part(rng, 2.0, 5.0))),
-        7 => {
-            let points = [at(rng, 6.0, 20.0), at(rng, 6.0, 20.0), at(rng, 6.0, 20.0), at(rng, 6.0, 20.0)];
-            Brush::dig(Shape::curve(points, [part(rng, 1.0, 3.0), part(rng, 1.0, 3.0)]))
         }
         _ => Brush::dig(Shape::sphere(at(rng, 4.0, 22.0), part(rng, 2.0, 5.0))),
     }

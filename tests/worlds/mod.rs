@@ -304,22 +304,7 @@ pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let (radius, axis) = (2.0 + rng.f32() * 5.0, random_rotation(rng) * Vec3::Y);
     let dig = rng.bool();
     let center = random_center(rng, ground, dig, radius / 2.0);
-    match rng.u32(0..4) {
-        0 => Brush { shape: random_curve(rng, ground, dig), ..brush },
-        // Over ground that other brushes changed, with luck.
-        1 => Brush { tag: brush.tag, ..Brush::reset(brush.shape) },
-        2 => Brush::reset(random_curve(rng, ground, dig)),
-        _ => Brush { shape: Shape::torus(center, axis, radius, radius * (0.2 + 0.8 * rng.f32())), ..brush },
-    }
-}
-
-/// A tube along a curve in or over the ground, short or across all of it.
-fn random_curve(rng: &mut Rng, ground: &Ground, dig: bool) -> Shape {
-    let from = random_center(rng, ground, dig, 3.0);
-    let reach = [0.1, 0.4, 1.0][rng.usize(0..3)];
-    let mut next = || from.lerp(random_center(rng, ground, dig, 3.0), reach);
-    let points = [from, next(), next(), next()];
-    Shape::curve(points, [1.0 + rng.f32() * 4.0, 1.0 + rng.f32() * 4.0])
+    Brush { shape: Shape::torus(center, axis, radius, radius * (0.2 + 0.8 * rng.f32())), ..brush }
 }
 
 /// Rules of every kind, some of which affect the edits.
