@@ -73,7 +73,7 @@ use bevy_burrow::prelude::*;
 use clap::Parser;
 
 use crate::party::connection::{Address, Party};
-use crate::ui::settings::{Settings, SettingsFile};
+use crate::ui::settings::{Quality, Settings, SettingsFile};
 use crate::world::saves::{self, PlayedWorld};
 
 /// A first-person game on a landscape that can be dug.
@@ -107,7 +107,7 @@ pub struct Options {
     /// Draw the script in low quality on a GPU too, as software renderers always do, so that pictures can be compared.
     #[arg(long, requires = "headless")]
     low: bool,
-    /// Draw plants in the script and the tour too. They always are in the window.
+    /// Draw plants in the script and the tour, and in the window in low quality; in others they always are there.
     #[arg(long)]
     plants: bool,
     /// Log events to standard output, for programs that play the game.
@@ -249,7 +249,10 @@ fn open_window(options: &Options) -> App {
     let world = options.saved_world().or_else(PlayedWorld::latest);
     let world = world.or_else(|| options.host.and_then(|_| new_world()));
     game(&mut app, options.backend.engine(), SettingsFile::of_user(), world, options.party());
-    app.add_plugins((world::plants::PlantEffectsPlugin, bevy_burrow::plants::PlantCollidersPlugin));
+    // Low quality is for weak GPUs and software renderers.
+    if options.plants || app.world().resource::<Settings>().quality != Quality::Low {
+        app.add_plugins((world::plants::PlantEffectsPlugin, bevy_burrow::plants::PlantCollidersPlugin));
+    }
     if let Some(name) = &options.name {
         app.world_mut().resource_mut::<Settings>().name.clone_from(name);
     }
