@@ -1,7 +1,7 @@
 # bevy_burrow: diggable ground for Bevy. `make help` lists what can be done.
 #
 # One feature set and one profile for everything that compiles Bevy, so that it is compiled once:
-#   without Bevy   cargo ... --no-default-features --features cuda,net,store,import   the model: tests, soak
+#   without Bevy   cargo ... --no-default-features --features cuda,net,store,import,scatter   the model: tests, soak
 #   with Bevy      cargo ... --release --features examples           the plugin and the examples
 #
 # Builds are in CARGO_TARGET_DIR, outside the clone unless set otherwise.
@@ -10,19 +10,20 @@ SHELL := /bin/sh
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
 
-WITHOUT_BEVY := --no-default-features --features cuda,net,store,import
+WITHOUT_BEVY := --no-default-features --features cuda,net,store,import,scatter
 comma := ,
 # What somebody may choose besides. Each set with Bevy has other features of Bevy's crates, so that much is checked anew.
-SETS_WITHOUT_BEVY := '' format store net import cuda,net,store,import
-SETS_WITH_BEVY := default plugin replicon render avian egui debug examples,gamepad examples,sound
+SETS_WITHOUT_BEVY := '' format store net import scatter cuda,net,store,import,scatter
+SETS_WITH_BEVY := default plugin replicon render avian egui debug render,scatter examples,gamepad examples,sound
 # Features besides: `make run MORE=gamepad` or MORE=gamepad,sound compiles some crates more.
 WITH_BEVY := --release --features examples$(MORE:%=$(comma)%)
 # `make run` has sound where it compiles: on Linux that takes ALSA's headers.
 SOUND = $(shell { [ "$$(uname -s)" != Linux ] || pkg-config --exists alsa 2>/dev/null; } && echo $(comma)sound)
 
-# Tests of the plugin open with #![cfg(feature = ...)]; the others test the model, and need not run twice.
+# Tests of the plugin open with #![cfg(feature = ...)]; the others test the model, and need not run twice. Those of plants have
+# parts of both kinds.
 PLUGIN_TESTS := $(patsubst tests/%,--test %,$(patsubst %/main,%,$(basename \
-	$(shell grep -ls '^.!.cfg.feature' tests/*.rs tests/*/main.rs))))
+	$(shell grep -ls '^.!.cfg.feature' tests/*.rs tests/*/main.rs)))) --test scatter
 
 # Examples that leave pictures without a display.
 DRAWING := digger sculpt physics custom_material
@@ -41,7 +42,7 @@ export BURROW_REQUIRE ?= 1
 endif
 
 .NOTPARALLEL:
-.PHONY: help setup run example test test-model test-plugin test-examples features features-model features-plugin drive soak crowd paper figures pictures bench bench-backends peers instructions ptx sanitize
+.PHONY: help setup run example test test-model test-plugin test-examples features features-model features-plugin drive soak crowd paper figures pictures scenes bench bench-backends peers instructions ptx sanitize
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -144,6 +145,9 @@ instructions: ## Count the instructions of fixed workloads; fails where they gre
 
 figures: ## Draw the figures of the guide
 	cargo run $(WITHOUT_BEVY) --example figures
+
+scenes: ## Render views of one country, and swatches of all layers, to look at (out/scenes; BURROW_ONLY=pit,works, BURROW_SIZE=1280x720)
+	BURROW_SCENES=$(CURDIR)/out/scenes cargo test $(WITH_BEVY) --test golden -- --ignored --nocapture scenes_are_rendered
 
 pictures: ## Render the still pictures of the README
 	@tools/setup.sh run

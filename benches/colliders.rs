@@ -1,23 +1,27 @@
 //! The cost of colliders in tasks, by kind, and on the main thread: `cargo bench --features avian --bench colliders`.
 //!
 //! For tiles and chunks of hills with tunnels, it compares the crate's own shape, a parry triangle mesh with fixed
-//! internal edges, one without, and, for unedited tiles, a height field. Then it measures the systems that update
-//! colliders on 4096 tiles, and commits with and without a snapshot of the world held.
+//! internal edges, one without, and, for unedited tiles, a height field. Then it digs in colliders that can be edited, one of
+//! meshes and one of voxels. Last, it measures the systems that update colliders on 4096 tiles, and commits with and without a
+//! snapshot of the world held.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use avian3d::parry::math::Vector;
-use avian3d::parry::shape::{HeightField, HeightFieldFlags, TriMesh, TriMeshFlags};
+use avian3d::parry::math::{IVector, Vector};
+use avian3d::parry::query::{Ray, RayCast};
+use avian3d::parry::shape::{HeightField, HeightFieldFlags, TriMesh, TriMeshFlags, Voxels};
 use avian3d::parry::utils::Array2;
 use avian3d::prelude::{LinearVelocity, PhysicsPlugins};
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
+use bevy_burrow::lattice::{ChunkPos, Column, TilePos};
 use bevy_burrow::physics::{
     ColliderSource, GroundShape, PhysicsFigures, TerrainPhysicsPlugin, TerrainPhysicsSystems,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
+use fastrand::Rng;
 
 /// Rounds, of which the fastest counts.
 const ROUNDS: u32 = 20;
@@ -51,9 +55,118 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         println!();
     }
+    digs()?;
+    println!();
     upkeep()?;
     println!();
     commits()
+}
+
+/// Cells of a chunk, and columns along a side of the world, in which colliders are dug.
+const CHUNK: i32 = 32;
+const SIDE: i32 = 256;
+
+/// The shapes of a tile and of the chunks over it, each with its lowest point.
+fn shapes_over(terrain: &Terrain, tile: TilePos) -> Vec<(Vec3, GroundShape)> {
+    let world = terrain.world();
+    let origin = |y: i32| IVec3::new(tile.x, y, tile.z).as_vec3() * CHUNK as f32;
+    let of = |origin, mesh| Some((origin, GroundShape::new(&mesh, 1.0)?));
+    let chunks = world.drawn_chunks().filter(|chunk| chunk.tile() == tile);
+    let chunks = chunks.filter_map(|chunk: ChunkPos| of(origin(chunk.y), world.chunk_mesh(chunk)));
+    of(origin(0), world.tile_mesh(tile)).into_iter().chain(chunks).collect()
+}
+
+/// A ball of radius 4 is dug out of colliders again and again. The crate's own shapes are those of the ground's meshes, and are built
+/// anew for the parts that a dig touches; a voxel at a time is taken out of parry's `Voxels`, which has no slopes. Then rays are cast down.
+fn digs() -> Result<(), Box<dyn std::error::Error>> {
+    let noise = NoiseHeights { seed: 11, scale: 60.0, amplitude: 20.0, base: 4.0, ..Default::default() };
+    let ground = Ground::from_noise(SIDE as u32, SIDE as u32, &noise)?;
+    let height = |x: i32, z: i32| ground.height(Column::new(x, z)) / 256;
+    let columns = (0..SIDE).flat_map(|x| (0..SIDE).map(move |z| (x, z)));
+    let solid: Vec<IVector> =
+        columns.flat_map(|(x, z)| (-24..height(x, z)).map(move |y| IVector::new(x, y, z))).collect();
+    let start = Instant::now();
+    let mut voxels = Voxels::new(Vector::splat(1.0), &solid);
+    println!("{} voxels are made in {:.0?}", solid.len(), start.elapsed());
+    let mut rng = Rng::with_seed(9);
+    let places: Vec<Vec3> = (0..200)
+        .map(|number| {
+            let (x, z) = (20 + number * 37 % 216, 20 + number * 53 % 216);
+            Vec3::new(x as f32, height(x, z) as f32 - 6.0 * rng.f32(), z as f32)
+        })
+        .collect();
+    let mut terrain = Terrain::new(ground, &TerrainSettings { chunk_size: CHUNK as u32, voxel_size: 1.0 })?;
+    let [mut edits, mut built, mut taken] = [const { Vec::new() }; 3];
+    for &place in &places {
+        terrain.submit(Brush::dig(Shape::sphere(place, 4.0)));
+        let transaction = terrain.begin().ok_or("nothing to do")?;
+        let start = Instant::now();
+        let commit = transaction.run();
+        edits.push(start.elapsed());
+        terrain.commit(commit)?;
+        let [low, high] = [-5.0, 5.0].map(|reach| ((place + reach) / CHUNK as f32).floor().as_ivec3());
+        let world = terrain.world();
+        let mut meshes = Vec::new();
+        for (x, z) in (low.x..=high.x).flat_map(|x| (low.z..=high.z).map(move |z| (x, z))) {
+            meshes.push(world.tile_mesh(TilePos { x, z }));
+            meshes.extend((low.y..=high.y).map(|y| world.chunk_mesh(ChunkPos { x, y, z })));
+        }
+        let start = Instant::now();
+        black_box(meshes.iter().filter_map(|mesh| GroundShape::new(mesh, 1.0)).count());
+        built.push(start.elapsed());
+        let start = Instant::now();
+        let reach = || -5..=5;
+        for offset in
+            reach().flat_map(|x| reach().flat_map(move |y| reach().map(move |z| IVec3::new(x, y, z))))
+        {
+            let at = place.floor().as_ivec3() + offset;
+            if (at.as_vec3() + 0.5).distance(place) <= 4.0 {
+                voxels.set_voxel(IVector::from_array(at.to_array()), false);
+            }
+        }
+        taken.push(start.elapsed());
+    }
+    let tiles = |x: i32| (0..SIDE / CHUNK).map(move |z| TilePos { x, z });
+    let shapes: Vec<_> =
+        (0..SIDE / CHUNK).flat_map(tiles).map(|tile| (tile, shapes_over(&terrain, tile))).collect();
+    let rays: Vec<Vec3> =
+        (0..4000).map(|_| Vec3::new(rng.f32() * 250.0 + 3.0, 90.0, rng.f32() * 250.0 + 3.0)).collect();
+    let down = |from: Vec3| Ray::new(Vector::from_array(from.to_array()), Vector::new(0.0, -1.0, 0.0));
+    let start = Instant::now();
+    for &from in &rays {
+        let tile = TilePos { x: from.x as i32 / CHUNK, z: from.z as i32 / CHUNK };
+        let over = shapes.iter().find(|(other, _)| *other == tile);
+        let hits = over.into_iter().flat_map(|(_, shapes)| shapes);
+        black_box(
+            hits.filter_map(|(low, shape)| shape.cast_local_ray(&down(from - *low), 200.0, true)).count(),
+        );
+    }
+    let ours = start.elapsed();
+    let start = Instant::now();
+    for &from in &rays {
+        black_box(voxels.cast_local_ray(&down(from), 200.0, true));
+    }
+    let theirs = start.elapsed();
+    let ray = |all: Duration| all.as_secs_f64() * 1e9 / rays.len() as f64;
+    for list in [&mut edits, &mut built, &mut taken] {
+        list.sort_unstable();
+    }
+    let bytes: usize = shapes.iter().flat_map(|(_, shapes)| shapes).map(|(_, shape)| shape.bytes()).sum();
+    println!(
+        "| {} digs of radius 4, chunks of {CHUNK} | edit of the ground with meshes, median µs | collider, median µs | p99 µs | a ray, ns | bytes |",
+        places.len()
+    );
+    println!("| --- | --- | --- | --- | --- | --- |");
+    let row = |what, edit: String, times: &[Duration], ns: f64, bytes: usize| {
+        println!(
+            "| {what} | {edit} | {:.1} | {:.1} | {ns:.0} | {bytes} |",
+            micros(times, 0.5),
+            micros(times, 0.99)
+        );
+    };
+    row("own shapes of the touched parts", format!("{:.1}", micros(&edits, 0.5)), &built, ray(ours), bytes);
+    row("parry's `Voxels`", "-".into(), &taken, ray(theirs), voxels.total_memory_size());
+    Ok(())
 }
 
 /// When the systems of a frame began, and how long they took.

@@ -1,18 +1,18 @@
 //! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT
-//! [horizon] [moving] [passes]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km with
-//! levels of detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full detail, and
-//! the meshes are counted that cast shadows in each cascade.
-//! With `moving`, a terrain of 4096 tiles is drawn while a child of it moves and while nothing does.
+//! [horizon] [moving] [passes]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km
+//! with levels of detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full
+//! detail, and the meshes are counted that cast shadows in each cascade. With `moving`, a terrain of 4096 tiles is
+//! drawn while a child of it moves and while nothing does.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
-//! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
-//! dug ground without digging. Colliders are made near a body that moves along, and balls lie about there. A frame is
-//! timed from its start until the GPU has drawn it, so unlike in a game, frames never overlap. The plugin's
-//! time on the main thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same
-//! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
-//! times the plain material's part of the frame the look takes. With `passes`, the GPU's own time of each render pass is
-//! printed for each of them, which costs time itself. Pictures are checked too: the benchmark fails if ground
-//! is missing where a ray meets it.
+//! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the dug
+//! ground without digging. Colliders are made near a body that moves along, and balls lie about there. A frame is timed
+//! from its start until the GPU has drawn it, so unlike in a game, frames never overlap. The plugin's time on the main
+//! thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same meshes in
+//! place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many times
+//! the plain material's part of the frame the look takes. With `passes`, the GPU's own time of each render pass is
+//! printed for each of them, which costs time itself. Pictures are checked too: the benchmark fails if ground is
+//! missing where a ray meets it.
 
 #[path = "../examples/shared/capture.rs"]
 mod capture;

@@ -14,8 +14,7 @@ use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
 use glam::{Quat, Vec3};
 
-// The fields of the benchmark `meshers`, of which only a few are used here.
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the benchmark `meshers` uses all of it")]
 #[path = "meshers/fields.rs"]
 mod fields;
 
@@ -31,7 +30,7 @@ fn counted_workload(work: &mut dyn FnMut()) {
 /// A name, and what to do.
 type Workload = (&'static str, fn());
 
-const WORKLOADS: [Workload; 13] = [
+const WORKLOADS: [Workload; 15] = [
     ("dense-caves", || dense(Field::Caves)),
     ("dense-chunk-i16", dense_chunk),
     ("dense-empty", || dense(Field::Empty)),
@@ -39,6 +38,8 @@ const WORKLOADS: [Workload; 13] = [
     ("dense-terrain", || dense(Field::Terrain)),
     ("dig-radius-4-dug", || dig(Digging::Dug)),
     ("dig-radius-4-fresh", || dig(Digging::Fresh)),
+    ("light-radius-4-dug", || dig_lit(Digging::Dug)),
+    ("light-radius-4-fresh", || dig_lit(Digging::Fresh)),
     ("dig-radius-4-deep", || dig(Digging::Deep)),
     ("dig-radius-4-mine", || dig(Digging::Mine)),
     ("dig-radius-4-mine-deep", || dig(Digging::DeepMine)),
@@ -154,6 +155,29 @@ fn dig(ground: Digging) {
             one_by_one(&mut terrain, &first);
             counted_workload(&mut || one_by_one(&mut terrain, &second));
         }
+    }
+}
+
+/// The light of digs, which are not counted themselves.
+fn dig_lit(ground: Digging) {
+    let mut terrain = terrain();
+    terrain.apply([Brush::dig(Shape::sphere(Vec3::new(8.0, 0.0, 8.0), 4.0))]);
+    let (first, second) = (spheres(&terrain, 4.0, 0.0, 24), spheres(&terrain, 4.0, 3.0, 24));
+    let brushes = if matches!(ground, Digging::Dug) {
+        one_by_one(&mut terrain, &first);
+        second
+    } else {
+        first
+    };
+    for brush in &brushes {
+        terrain.submit(brush);
+        let commit = terrain.begin().expect("a queued brush").run();
+        let before = terrain.snapshot();
+        counted_workload(&mut || {
+            black_box(commit.light(before.clone()));
+        });
+        drop(before);
+        black_box(terrain.commit(commit).expect("no other commit"));
     }
 }
 

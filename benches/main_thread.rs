@@ -1,8 +1,9 @@
 //! The cost of digging on the main thread: `cargo bench --features examples --bench main_thread`.
 //!
 //! The real landscape in an app without a renderer, one sphere of radius 4 at a time, compared with idle frames; and
-//! the task's time until Bevy's meshes are ready, by chunk size. Vertices have depths, or with `-- slim` none. With
-//! `-- colliders`, all ground has colliders, in chunks of 32. Printed first is the time until all of the landscape is there.
+//! the task's time until Bevy's meshes are ready, by chunk size. Vertices have depths, or with `-- slim` none; with
+//! `-- light` they have the light of the sky. With `-- colliders`, all ground has colliders, in chunks of 32. With
+//! `-- repeated`, each dig is near the one before it. Printed first is the time until all of the landscape is there.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -55,6 +56,9 @@ fn app(ground: &Arc<Ground>, chunk_size: u32, is_slim: bool) -> App {
     if is_slim {
         app.world_mut().entity_mut(terrain).insert(SlimVertices);
     }
+    if is_asked("light") {
+        app.world_mut().entity_mut(terrain).insert(SkyLight::default());
+    }
     let mut tiles = app.world_mut().query_filtered::<(), With<Tile>>();
     let start = Instant::now();
     while tiles.iter(app.world()).count() == 0 {
@@ -101,7 +105,10 @@ fn main() {
     let mut apps: Vec<_> =
         sizes.iter().map(|&size| (size, app(&ground, size, is_asked("slim")), Times::default())).collect();
     for (turn, i) in (0..500).enumerate() {
-        let (x, z) = (40 + i * 389 % 1100, 40 + i * 211 % 940);
+        let (x, z) = match is_asked("repeated") {
+            true => (500 + i * 5 % 40, 500 + i * 3 % 41),
+            false => (40 + i * 389 % 1100, 40 + i * 211 % 940),
+        };
         let at = Vec3::new(x as f32, ground.height(Column::new(x, z)) as f32 / 256.0, z as f32);
         // In turns, beginning with another app each time.
         for number in 0..apps.len() {

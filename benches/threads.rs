@@ -1,8 +1,8 @@
 //! Frames while a terrain loads, by the number of background threads: `cargo bench --bench threads`.
 //!
-//! A game of 60 frames a second works for a third of each frame on the main thread and for a third on all of Bevy's threads,
-//! while a terrain of 2048 x 2048 voxels loads with meshes. Prints how long the load takes, and how long frames take until
-//! then, for each number of background threads up to the number of cores.
+//! A game of 60 frames a second works for a third of each frame on the main thread and for a third on all of Bevy's
+//! threads, while a terrain of 2048 x 2048 voxels loads with meshes. Prints how long the load takes, and how long
+//! frames take until then, for each number of background threads up to the number of cores.
 
 use std::time::{Duration, Instant};
 

@@ -89,6 +89,7 @@
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for the game's own textures |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
+//! | plants and stones that follow the ground | `Plants`, `PlantLooks` and the `plants` plugins (feature `scatter`) |
 //! | other cameras, no shadows | `RenderLayers`, `NotShadowCaster`, `NotShadowReceiver` on the terrain |
 //! | more from the same surfaces, in the same commit | `SurfaceProcessor`s |
 //! | a custom look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
@@ -245,9 +246,10 @@
 //! | [`backend`] | engines on CPU and GPU |
 //! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
 //! | [`terrain`] | orders, transactions, history, the commit log; exports what the three above have for games |
+//! | `scatter` | where plants stand, and whether they still do |
 //! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
-//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `debug`, `panel` | everything else that uses Bevy |
+//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `plants`, `debug`, `panel` | everything else that uses Bevy |
 //!
 //! # How the seam closes
 //!
@@ -320,6 +322,7 @@
 //! | `net` | multiplayer: a server and clients without a transport | |
 //! | `picking` | Bevy's pointer events on the ground, with the `TerrainHit` as extra data | |
 //! | `replicon` | multiplayer over bevy_replicon | |
+//! | `scatter` | plants and stones that go and return with their ground | |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
@@ -333,8 +336,8 @@
 //! # Limits
 //!
 //! Heights stay within 32768 voxels. A world's sides have up to 16384 cells, or 262144 where its heights come from a
-//! [source](ground::HeightSource). All of it is drawn in full detail, or with `LevelsOfDetail` distant ground coarsely. A
-//! terrain may be moved by whole voxels and scaled by powers of two, by
+//! [source](ground::HeightSource). All of it is drawn in full detail, or with `LevelsOfDetail` distant ground coarsely.
+//! A terrain may be moved by whole voxels and scaled by powers of two, by
 //! [`TerrainSettings::voxel_size`](terrain::TerrainSettings::voxel_size) or by a parent: the scale of its own
 //! `Transform` is the plugin's. Rotated, stretched or moved by a part of a voxel, its seams lose their equal bits.
 
@@ -361,6 +364,8 @@ pub mod net;
 pub mod panel;
 #[cfg(feature = "avian")]
 pub mod physics;
+#[cfg(all(feature = "plugin", feature = "scatter"))]
+pub mod plants;
 #[cfg(feature = "plugin")]
 pub mod plugin;
 #[cfg(feature = "plugin")]
@@ -370,6 +375,8 @@ pub use plugins::BurrowPlugins;
 mod redraw;
 #[cfg(all(feature = "plugin", feature = "store"))]
 pub mod saves;
+#[cfg(feature = "scatter")]
+pub mod scatter;
 #[cfg(feature = "store")]
 pub mod store;
 pub mod surface;
@@ -400,7 +407,7 @@ pub mod prelude {
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, BurrowSystems, Chunk, DetailSource, Field,
         GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
-        LoosePieceReturned, MaterialColors, Redo, Redraw, ShownLevels, SlimVertices, TargetedBrush,
+        LoosePieceReturned, MaterialColors, Redo, Redraw, ShownLevels, SkyLight, SlimVertices, TargetedBrush,
         TerrainHit, TerrainPropagatePlugin, TerrainReady, Terrains, Tile, Undo,
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
@@ -437,6 +444,7 @@ mod guide {
         Levels "docs/guide/src/levels.md"
         Brushes "docs/guide/src/brushes.md"
         Materials "docs/guide/src/materials.md"
+        Plants "docs/guide/src/plants.md"
         Physics "docs/guide/src/physics.md"
         Undo "docs/guide/src/undo.md"
         Events "docs/guide/src/events.md"
@@ -452,7 +460,6 @@ mod guide {
         Mining "docs/guide/src/recipes/mining.md"
         Explosions "docs/guide/src/recipes/explosions.md"
         Journal "docs/guide/src/recipes/journal.md"
-        Foliage "docs/guide/src/recipes/foliage.md"
         Water "docs/guide/src/recipes/water.md"
         Navigation "docs/guide/src/recipes/navigation.md"
         Cameras "docs/guide/src/recipes/cameras.md"

@@ -7,8 +7,8 @@ use crate::plugin::{HeightmapPlugin, TerrainPlugin};
 
 /// Everything a game needs. Parts can be disabled, as in any plugin group.
 ///
-/// Add them after Bevy's own, `add_plugins((DefaultPlugins, BurrowPlugins))`: otherwise no terrain with a `GroundLook` is
-/// drawn, and an error is logged.
+/// Add them after Bevy's own, `add_plugins((DefaultPlugins, BurrowPlugins))`: otherwise no terrain with a `GroundLook`
+/// is drawn, and an error is logged.
 ///
 /// | plugin | what it does |
 /// | --- | --- |

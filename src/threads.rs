@@ -1,9 +1,9 @@
 //! Threads for long work: transactions, colliders, and background work that may take longer.
 //!
-//! Bevy's task pools are shared: `AsyncComputeTaskPool` compiles pipelines and has one thread on four cores, so work
-//! of seconds would block other users, and rayon's global pool belongs to the game. There are three pools, each of which works
-//! first in, first out: a world that loads delays neither the transactions of another one nor the colliders that bodies wait
-//! for. Their threads sleep while there is no work. [`ThreadSettings`] says how many there are.
+//! Bevy's task pools are shared: `AsyncComputeTaskPool` compiles pipelines and has one thread on four cores, so work of
+//! seconds would block other users, and rayon's global pool belongs to the game. There are three pools, each of which
+//! works first in, first out: a world that loads delays neither the transactions of another one nor the colliders that
+//! bodies wait for. Their threads sleep while there is no work. [`ThreadSettings`] says how many there are.
 //!
 //! On platforms without threads, work is done at once.
 

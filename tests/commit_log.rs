@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{
-    CommitRecord, Drawn, LogEntry, Meshing, PartsError, Patch, ReplayError, RestoreError, SIMULATION, World,
+    CommitRecord, LogEntry, MeshKey, Meshing, PartsError, Patch, ReplayError, RestoreError, SIMULATION, World,
 };
 use bevy_burrow::volume::Brick;
 use fastrand::Rng;
@@ -67,7 +67,7 @@ fn state(terrain: &Terrain) -> impl PartialEq + std::fmt::Debug + use<> {
 }
 
 /// Everything that is drawn; chunks that turn out to draw nothing are left out.
-fn meshes(world: &World) -> BTreeMap<Drawn, bevy_burrow::surface::SurfaceMesh> {
+fn meshes(world: &World) -> BTreeMap<MeshKey, bevy_burrow::surface::SurfaceMesh> {
     world.drawn().filter(|(_, mesh)| !mesh.is_empty()).collect()
 }
 
@@ -249,7 +249,7 @@ fn rules_are_logged_where_they_bind() {
     terrain.apply::<Brush>([]);
     terrain.set_rules(DiggingRules::default()).expect("valid");
     let kinds: Vec<Vec<&str>> = terrain.take_log().iter().map(|record| kinds_of(record)).collect();
-    // At first nothing is known of the terms; the last record has no commit.
+    // At first nothing is known of the rules; the last record has no commit.
     assert_eq!(kinds, [vec!["no rules", "loose"], vec!["edit", "rules", "edit"], vec!["no rules"]]);
 }
 

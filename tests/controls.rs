@@ -205,8 +205,9 @@ impl<'a> ReferenceMesher<'a> {
         }
     }
 
-    /// With strata: do two lattice levels or more separate the heights of two neighbouring columns of a cell, but nowhere
-    /// more than 64, while the solid ends of all such edges and the voxels below its corners are of several materials?
+    /// With strata: do two lattice levels or more separate the heights of two neighbouring columns of a cell, but
+    /// nowhere more than 64, while the solid ends of all such edges and the voxels below its corners are of several
+    /// materials?
     fn is_steep(&self, cell: Column) -> bool {
         let (ground, [a, b, c, d]) = (self.view.ground(), cell.corners());
         let is_solid = |point: &IVec3| point.y * ONE < ground.height(Column::of(*point));

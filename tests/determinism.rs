@@ -9,7 +9,7 @@ use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::{BrickPos, Column, LatticeBox, SNAP};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::{Indices, SurfaceMesh};
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use fastrand::Rng;
 use glam::{I64Vec3, Quat, Vec3};
 use worlds::{
@@ -108,7 +108,7 @@ fn bits(mesh: &SurfaceMesh, origin: glam::IVec3) -> Vec<Bits> {
 }
 
 /// Every drawn mesh: its tile or chunk, vertices and indices.
-fn drawn(world: &World) -> Vec<(Drawn, Vec<Bits>, Indices)> {
+fn drawn(world: &World) -> Vec<(MeshKey, Vec<Bits>, Indices)> {
     world.drawn().map(|(drawn, mesh)| (drawn, bits(&mesh, world.origin(drawn)), mesh.indices)).collect()
 }
 
@@ -248,14 +248,15 @@ fn the_meshes_of_commits_add_up_to_the_drawn_world() {
     for seed in 300..330 {
         let (ground, brushes) = random_script(seed);
         let mut terrain = terrain(&ground.into(), [8, 25, 32][seed as usize % 3]);
-        let mut shown: BTreeMap<String, (Drawn, SurfaceMesh)> =
+        let mut shown: BTreeMap<String, (MeshKey, SurfaceMesh)> =
             terrain.world().drawn().map(|(drawn, mesh)| (format!("{drawn:?}"), (drawn, mesh))).collect();
         for brush in &brushes {
             terrain.submit(brush);
             let commit = terrain.begin().expect("something is queued").run();
-            let tiles = commit.meshes.tiles.iter().map(|(tile, update)| (Drawn::Tile(*tile), update.mesh()));
+            let tiles =
+                commit.meshes.tiles.iter().map(|(tile, update)| (MeshKey::Tile(*tile), update.mesh()));
             let chunks =
-                commit.meshes.chunks.iter().map(|(at, chunk)| (Drawn::Chunk(*at), chunk.mesh().clone()));
+                commit.meshes.chunks.iter().map(|(at, chunk)| (MeshKey::Chunk(*at), chunk.mesh().clone()));
             for (drawn, mesh) in tiles.chain(chunks) {
                 shown.insert(format!("{drawn:?}"), (drawn, mesh));
             }

@@ -176,6 +176,28 @@ fn commands_name_what_exists() {
     }
 }
 
+/// Files and folders of the repository that inline code of a text names, and that do not exist. Capitals stand for
+/// names to be chosen.
+fn missing_files(text: &str) -> Vec<&str> {
+    let folders = ["src/", "tests/", "benches/", "examples/", "tools/", "docs/", "assets/"];
+    let is_path = |span: &&str| {
+        folders.iter().any(|folder| span.starts_with(folder))
+            && !span.contains([' ', '*', '{', ':'])
+            && !span.contains("NAME")
+    };
+    let spans = lines(text, false).flat_map(|line| line.split('`').skip(1).step_by(2));
+    spans.filter(is_path).filter(|path| !root().join(path).exists()).collect()
+}
+
+#[test]
+fn files_that_are_named_exist() {
+    for page in documents() {
+        assert_eq!(missing_files(&read(&page)), [""; 0], "{}", page.display());
+    }
+    let text = "`src/lib.rs` `src/none.rs` `tests/NAME.rs` src/nothing.rs\n```\n`src/no.rs`\n```\n`tools` `docs/none`";
+    assert_eq!(missing_files(text), ["src/none.rs", "docs/none"]);
+}
+
 /// The names in code in the first cells of all tables of a text.
 fn names_in_tables(text: &str) -> BTreeSet<&str> {
     let rows =

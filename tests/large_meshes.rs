@@ -4,14 +4,14 @@ use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::ONE;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::{Indices, SurfaceMesh};
-use bevy_burrow::terrain::Drawn;
+use bevy_burrow::terrain::MeshKey;
 use glam::Vec3;
 
 /// Checks that indices have 16 bits where that is enough, and that each has a vertex; returns whether they have 32
 /// bits.
 fn check(what: &str, mesh: &SurfaceMesh) -> bool {
     let is_long = matches!(mesh.indices, Indices::U32(_));
-    assert_eq!(is_long, mesh.vertices.len() > Indices::MOST_SHORT, "{what}");
+    assert_eq!(is_long, mesh.vertices.len() > Indices::MAX_SHORT, "{what}");
     assert!(mesh.indices.iter().all(|index| (index as usize) < mesh.vertices.len()), "{what}");
     is_long
 }
@@ -31,7 +31,7 @@ fn a_chunk_grows_beyond_16_bits_and_shrinks_again() {
     let (mut states, mut long) = (vec![terrain.world().drawn().collect::<Vec<_>>()], 0);
     for layer in 0..8 {
         terrain.apply(holes(layer..layer + 1));
-        let drawn: Vec<(Drawn, SurfaceMesh)> = terrain.world().drawn().collect();
+        let drawn: Vec<(MeshKey, SurfaceMesh)> = terrain.world().drawn().collect();
         long += drawn.iter().filter(|(at, mesh)| check(&format!("{at:?}, {layer} layers"), mesh)).count();
         states.push(drawn);
     }
@@ -55,10 +55,11 @@ fn a_ring_on_needles_makes_a_tile_grow_beyond_16_bits() {
     let height = |at: i32| if (at % 34 + at / 34) % 2 == 0 { 0 } else { (3000 + at) * ONE };
     let ground = Ground::from_heights(33, 33, (0..34 * 34).map(height).collect()).expect("valid ground");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
-    let untouched: Vec<(Drawn, SurfaceMesh)> = terrain.world().drawn().collect();
+    let untouched: Vec<(MeshKey, SurfaceMesh)> = terrain.world().drawn().collect();
     terrain.apply([Brush::dig(Shape::sphere(Vec3::new(16.0, 1500.0, 16.0), 3.0))]);
-    let is_long =
-        |(at, mesh): (Drawn, SurfaceMesh)| check(&format!("{at:?}"), &mesh) && matches!(at, Drawn::Tile(_));
+    let is_long = |(at, mesh): (MeshKey, SurfaceMesh)| {
+        check(&format!("{at:?}"), &mesh) && matches!(at, MeshKey::Tile(_))
+    };
     assert!(terrain.world().drawn().any(is_long), "no tile has more vertices than 16 bits can address");
     let seams = terrain.world().check_seams();
     assert!(seams.is_flawless(), "{seams:?}");

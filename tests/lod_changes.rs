@@ -8,7 +8,7 @@ use bevy_burrow::lattice::ChunkGrid;
 use bevy_burrow::lod::{Cut, Node};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::{SeamChecker, SurfaceMesh};
-use bevy_burrow::terrain::{ChooseCut, Commit, Drawn, World};
+use bevy_burrow::terrain::{ChooseCut, Commit, MeshKey, World};
 use fastrand::Rng;
 
 mod worlds;
@@ -16,7 +16,7 @@ mod worlds;
 /// What has a mesh of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Key {
-    Part(Drawn),
+    Part(MeshKey),
     Node(Node),
 }
 
@@ -38,12 +38,12 @@ impl Display {
         let drawn_cut = commit.drawn_cut().expect("a cut is drawn");
         for (tile, update) in &commit.meshes.tiles {
             if drawn_cut.shows_parts(*tile) {
-                self.set(Key::Part(Drawn::Tile(*tile)), update.mesh());
+                self.set(Key::Part(MeshKey::Tile(*tile)), update.mesh());
             }
         }
         for (chunk, surface) in &commit.meshes.chunks {
             if drawn_cut.shows_parts(chunk.tile()) {
-                self.set(Key::Part(Drawn::Chunk(*chunk)), surface.mesh().clone());
+                self.set(Key::Part(MeshKey::Chunk(*chunk)), surface.mesh().clone());
             }
         }
         self.show_nodes(&commit.meshes.nodes);
@@ -68,9 +68,9 @@ impl Display {
                 display.set(Key::Node(node), world.node_mesh(cut, node));
                 continue;
             }
-            display.set(Key::Part(Drawn::Tile(node.tile())), world.tile_mesh(node.tile()));
+            display.set(Key::Part(MeshKey::Tile(node.tile())), world.tile_mesh(node.tile()));
             for chunk in world.drawn_chunks().filter(|chunk| chunk.tile() == node.tile()) {
-                display.set(Key::Part(Drawn::Chunk(chunk)), world.chunk_mesh(chunk));
+                display.set(Key::Part(MeshKey::Chunk(chunk)), world.chunk_mesh(chunk));
             }
         }
         display

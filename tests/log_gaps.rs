@@ -8,7 +8,7 @@ use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{
-    CommitRecord, Drawn, LogEntry, Meshing, ReplayError, Transaction, WorkLimits, WorldParts,
+    CommitRecord, LogEntry, MeshKey, Meshing, ReplayError, Transaction, WorkLimits, WorldParts,
 };
 use fastrand::Rng;
 use glam::Vec3;
@@ -318,6 +318,6 @@ fn edits_at_the_worlds_ends_come_back() {
 }
 
 /// Everything that is drawn.
-fn meshes(terrain: &Terrain) -> Vec<(Drawn, SurfaceMesh)> {
+fn meshes(terrain: &Terrain) -> Vec<(MeshKey, SurfaceMesh)> {
     terrain.world().drawn().filter(|(_, mesh)| !mesh.is_empty()).collect()
 }

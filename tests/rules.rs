@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use bevy_burrow::volume::{MaterialCounts, RulesError};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
@@ -38,7 +38,7 @@ fn terrain(ground: &Arc<Ground>, chunk_size: u32, rules: &DiggingRules) -> Terra
     terrain
 }
 
-fn drawn(world: &World) -> Vec<(Drawn, SurfaceMesh)> {
+fn drawn(world: &World) -> Vec<(MeshKey, SurfaceMesh)> {
     world.drawn().collect()
 }
 

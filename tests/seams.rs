@@ -10,7 +10,7 @@ use std::collections::hash_map::Entry;
 use bevy_burrow::lattice::SNAP;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::MaterialMix;
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 use rustc_hash::FxHashMap;
@@ -22,12 +22,12 @@ use worlds::{random_world, real_ground, world_count};
 struct MeetingVertices(BTreeMap<&'static str, [usize; 2]>);
 
 impl MeetingVertices {
-    fn kind(a: Drawn, b: Drawn) -> &'static str {
+    fn kind(a: MeshKey, b: MeshKey) -> &'static str {
         match (a, b) {
-            (Drawn::Tile(a), Drawn::Tile(b)) if a == b => "parts of a tile",
-            (Drawn::Tile(_), Drawn::Tile(_)) => "two tiles",
-            (Drawn::Chunk(a), Drawn::Chunk(b)) if a == b => "parts of a chunk",
-            (Drawn::Chunk(_), Drawn::Chunk(_)) => "two chunks",
+            (MeshKey::Tile(a), MeshKey::Tile(b)) if a == b => "parts of a tile",
+            (MeshKey::Tile(_), MeshKey::Tile(_)) => "two tiles",
+            (MeshKey::Chunk(a), MeshKey::Chunk(b)) if a == b => "parts of a chunk",
+            (MeshKey::Chunk(_), MeshKey::Chunk(_)) => "two chunks",
             _ => "tile and chunk",
         }
     }
@@ -41,7 +41,7 @@ impl MeetingVertices {
 
     /// Checks that all drawn vertices at the same position have the same materials and weights.
     fn check_materials(&mut self, world: &World, what: &str) {
-        let mut first: FxHashMap<IVec3, (Drawn, MaterialMix)> = FxHashMap::default();
+        let mut first: FxHashMap<IVec3, (MeshKey, MaterialMix)> = FxHashMap::default();
         for (drawn, mesh) in world.drawn() {
             // Tiles also contain vertices that no triangle uses.
             let mut is_drawn = vec![false; mesh.vertices.len()];

@@ -9,7 +9,7 @@ use bevy_burrow::ground::{Ground, Strata};
 use bevy_burrow::lattice::{Column, LatticeBox, SNAP};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::{SurfaceMesh, Vertex};
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
@@ -250,10 +250,10 @@ fn every_vertex_shows_what_a_dig_there_yields() {
         let terrain = random_world(&mut Rng::with_seed(index), index);
         let world = terrain.world();
         for tile in world.grid().tiles() {
-            tiles += check_vertices(world, &world.tile_mesh(tile), world.origin(Drawn::Tile(tile)));
+            tiles += check_vertices(world, &world.tile_mesh(tile), world.origin(MeshKey::Tile(tile)));
         }
         for chunk in world.drawn_chunks() {
-            chunks += check_vertices(world, &world.chunk_mesh(chunk), world.origin(Drawn::Chunk(chunk)));
+            chunks += check_vertices(world, &world.chunk_mesh(chunk), world.origin(MeshKey::Chunk(chunk)));
         }
         let report = world.check_seams();
         assert!(report.is_flawless(), "world {index}: {report}");
@@ -335,7 +335,7 @@ fn every_point_shows_what_a_dig_there_yields() {
                 for weights in points_of(&triangle) {
                     let at = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
                     let shown = shown(&triangle, weights);
-                    points[usize::from(matches!(drawn, Drawn::Chunk(_)))] += 1;
+                    points[usize::from(matches!(drawn, MeshKey::Chunk(_)))] += 1;
                     let error = error_at(world, at, shown);
                     far += u32::from(error.is_none_or(|error| error > 0.5));
                     if error.is_none_or(|error| error > 1.084) {

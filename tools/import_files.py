@@ -371,7 +371,7 @@ def ascii_files():
     kept("without_void_value.asc", (head.replace("NODATA_value -9999\n", "") + text(holes)).encode())
     kept("comma.asc", (head + text(ground).replace(".", ",")).encode(), error="decimal comma")
     kept("short.asc", good[:-30], error="ends after")
-    kept("long.asc", good + b"5 6\n", error="goes on after 117 samples")
+    kept("long.asc", good + b"5 6\n", error="continues after 117 samples")
     kept("no_rows.asc", good.replace(b"nrows 9\n", b""), error="without nrows")
     kept("word.asc", good.replace(b"\n", b"\nbogus 3\n", 1), error="unknown name")
     kept("letters.asc", good[:-9] + b"1.2x3\n", error="in place of a number")

@@ -4,11 +4,11 @@
 //! stated otherwise. Times run from the edits to the commit, with vertices in host memory.
 
 #[path = "../edits/landscape.rs"]
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the benchmark `edits` uses all of it")]
 mod landscape;
 mod level;
 #[path = "../edits/statistics.rs"]
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the benchmark `edits` uses all of it")]
 mod statistics;
 
 use std::collections::VecDeque;

@@ -1,10 +1,11 @@
-//! What grows with the edits of a world: `cargo bench --no-default-features --features store --bench growth`; with the frames
-//! of an app, `cargo bench --features examples --bench growth`.
+//! What grows with the edits of a world: `cargo bench --no-default-features --features store --bench growth`; with the
+//! frames of an app, `cargo bench --features examples --bench growth`.
 //!
-//! Worlds with 10,000, 100,000 and 1,000,000 edited bricks, at the same density. Each is made and measured in a process of its
-//! own, so that memory is that of one world: digs of radius 4, one after the other in tunnels, alone and with levels of detail;
-//! bytes; saving and opening. The last line has the slopes of logarithms between the smallest and the largest world: 0 for
-//! what does not grow, 1 for what grows in proportion. Then 100,000 digs in one landscape, with meshes and without.
+//! Worlds with 10,000, 100,000 and 1,000,000 edited bricks, at the same density. Each is made and measured in a process
+//! of its own, so that memory is that of one world: digs of radius 4, one after the other in tunnels, alone and with
+//! levels of detail; bytes; saving and opening. The last line has the slopes of logarithms between the smallest and the
+//! largest world: 0 for what does not grow, 1 for what grows in proportion. Then 100,000 digs in one landscape, with
+//! meshes and without.
 //!
 //! ```text
 //! growth [BRICKS...]       these worlds only

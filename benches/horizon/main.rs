@@ -1,6 +1,6 @@
 //! Levels of detail by their figures, without drawing: `cargo bench --no-default-features --bench horizon [--
-//! KILOMETRES] [PART...]`, where parts are `views`, `cdlod`, `load`, `nodes`, `edited`, `digs` and `flight`; all of them
-//! unless some are named.
+//! KILOMETRES] [PART...]`, where parts are `views`, `cdlod`, `load`, `nodes`, `edited`, `digs` and `flight`; all of
+//! them unless some are named.
 //!
 //! A world of 16 x 16 km (or the given size) whose mountains are computed on demand, seen by an eye on a summit at 1440
 //! lines and 45 degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the

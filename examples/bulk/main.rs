@@ -175,7 +175,7 @@ struct Outcome {
     commit: Commit,
     hash: u64,
     /// Numbers of stages that ran on the GPU, and of those with work that did not.
-    on_card: u64,
+    on_gpu: u64,
     left: usize,
     /// Expected times on CPU and GPU, in milliseconds, summed over all choices.
     expected: [f64; 2],
@@ -187,7 +187,7 @@ fn run(terrain: &mut Terrain, engine: &Engine) -> Outcome {
     let commit = terrain.begin().expect("brushes wait").run_on(engine);
     terrain.abandon();
     let figures = engine.figures();
-    let on_card = figures.cuda - before.cuda;
+    let on_gpu = figures.cuda - before.cuda;
     let fresh = (figures.cuda + figures.cpu - before.cuda - before.cpu) as usize;
     let choices = || figures.choices.iter().rev().take(fresh);
     let left = choices().filter(|choice| !choice.is_cuda && choice.amount > 0).count();
@@ -196,7 +196,7 @@ fn run(terrain: &mut Terrain, engine: &Engine) -> Outcome {
         [cpu + estimate.cpu.as_secs_f64() * 1e3, cuda + estimate.cuda.as_secs_f64() * 1e3]
     });
     let hash = commit.sample_hash();
-    Outcome { commit, hash, on_card, left, expected }
+    Outcome { commit, hash, on_gpu, left, expected }
 }
 
 /// Returns `true` if both draw the same meshes.
@@ -238,7 +238,7 @@ fn main() {
         terrain.set_work_limits(WorkLimits::UNBOUNDED);
         terrain.submit_all(&brushes);
         let mut times = [const { Vec::new() }; 3];
-        let (mut hashes, mut vertices, mut on_card, mut expected) = (Vec::new(), 0, [0; 3], [0.0; 2]);
+        let (mut hashes, mut vertices, mut on_gpu, mut expected) = (Vec::new(), 0, [0; 3], [0.0; 2]);
         let mut first: Option<Commit> = None;
         // The first round warms memory and threads.
         for round in 0..=arguments.repeats {
@@ -250,7 +250,7 @@ fn main() {
                 let engine = &engines[i].1;
                 let outcome = run(&mut terrain, engine);
                 hashes.push(outcome.hash);
-                on_card[i] = outcome.on_card;
+                on_gpu[i] = outcome.on_gpu;
                 // In the end, of Auto.
                 expected = if i == 2 { outcome.expected } else { expected };
                 let is_card = engines[i].0 == Backend::Cuda && has_card;
@@ -273,7 +273,7 @@ fn main() {
         println!("{:<24}{:>9}{vertices:>10}{cpu}{cuda}{auto}", scene.name, brushes.len());
         assert!(hashes.windows(2).all(|pair| pair[0] == pair[1]), "all engines make the same world");
         let [cpu, cuda] = expected;
-        println!("{:<24}stages on the GPU: {on_card:?}; samples {:016x} on all", "", hashes[0]);
+        println!("{:<24}stages on the GPU: {on_gpu:?}; samples {:016x} on all", "", hashes[0]);
         println!("{:<24}Auto expected {cpu:.1} ms of the CPU, {cuda:.1} of the GPU", "");
     }
 }

@@ -32,8 +32,8 @@ pub struct GroundArgs {
     /// The level that the world was begun on: its folder, or the packed file
     #[arg(long, value_name = "PATH", global = true)]
     level: Option<PathBuf>,
-    /// What `repair`, `compact` and `import` do if the ground or the level is not the one that the world was saved with: refuse it, or move the
-    /// world onto it for good, with edited ground as it is or with all edits made again
+    /// What `repair`, `compact` and `import` do if the ground or the level is not the one that the world was saved
+    /// with: refuse it, or move the world onto it for good, with edited ground as it is or with all edits made again
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = OtherBase::Refuse, global = true)]
     other_base: OtherBase,
 }

@@ -15,14 +15,15 @@
 //! | `export` | writes the world to one file | yes |
 //! | `import` | makes a world of such a file | yes |
 //!
-//! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights` and the
-//! options beside it name it as for the example `export`, `--side` as for the example `server`. `--level` names the level that it was
-//! begun on, if it was begun on one. `repair`, `compact` and `import` refuse another ground or level than the world's own, as one wrong number
-//! would move the world there for good; `--other-base keep` or `replay` does so on purpose.
+//! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights`
+//! and the the options next to it name it as for the example `export`, `--side` as for the example `server`. `--level`
+//! names the level that it was begun on, if it was begun on one. `repair`, `compact` and `import` refuse another ground
+//! or level than the world's own, as one wrong number would move the world there for good; `--other-base keep` or
+//! `replay` does so on purpose.
 //!
-//! `info`, `check`, `replay` and `export` change nothing, so that they work on read-only media too. `repair` opens worlds that a game
-//! refuses to open, as a file can't be read or only regions are left; it replaces a file only once the new one is complete, and keeps the
-//! old one in `quarantine`.
+//! `info`, `check`, `replay` and `export` change nothing, so that they work on read-only media too. `repair` opens
+//! worlds that a game refuses to open, as a file can't be read or only regions are left; it replaces a file only once
+//! the new one is complete, and keeps the old one in `quarantine`.
 //!
 //! | exit code | when |
 //! | --- | --- |

@@ -26,12 +26,14 @@
 //! continues the world that was played last, "Worlds" lists all, and `--world NAME` plays one, or a new one of that
 //! name. Scripts save only with `--world`.
 //!
-//! Others can join: choose "Multiplayer" on the title, or start with `--host`, and with `--join ADDRESS` on their machines.
+//! Others can join: choose "Multiplayer" on the title, or start with `--host`, and with `--join ADDRESS` on their
+//! machines.
 //!
-//! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows into
-//! mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
+//! The world has 8192 x 8192 cells of a metre: a real elevation model in the middle, and noise around it, which grows
+//! into mountains. Ground is computed where it is needed, and drawn at levels of detail up to the view distance.
 //!
-//! With `--features examples,sound`, digging, steps, bombs and falling ground are heard. Linux needs the headers of ALSA.
+//! With `--features examples,sound`, digging, steps, bombs and falling ground are heard. Linux needs the headers of
+//! ALSA.
 //!
 //! With `--features examples,gamepad`, a gamepad does all of this except for the panel. Its sticks
 //! walk and look, its shoulder buttons change the tool, and its left stick or D-pad selects menu items.
@@ -44,7 +46,7 @@
 //! | --- | --- |
 //! | `player` | input and bindings, the character, the camera, the headlamp, the game's states |
 //! | `tools` | what the player holds: digging, building, bombs, balls and lamps, and the inventory |
-//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, particles, debris and sounds |
+//! | `world` | the landscape and its ore, saved worlds, day and night, the sky, plants, particles, debris and sounds |
 //! | `ui` | menus, settings, and the heads-up display |
 //! | `party` | playing together: hosting, joining, and what other players look like |
 //! | `film` | scripts that play the game for pictures and films |
@@ -71,7 +73,7 @@ use bevy_burrow::prelude::*;
 use clap::Parser;
 
 use crate::party::connection::{Address, Party};
-use crate::ui::settings::{Settings, SettingsFile};
+use crate::ui::settings::{Quality, Settings, SettingsFile};
 use crate::world::saves::{self, PlayedWorld};
 
 /// A first-person game on a landscape that can be dug.
@@ -105,6 +107,9 @@ pub struct Options {
     /// Draw the script in low quality on a GPU too, as software renderers always do, so that pictures can be compared.
     #[arg(long, requires = "headless")]
     low: bool,
+    /// Draw plants in the script and the tour, and in the window in low quality; in others they always are there.
+    #[arg(long)]
+    plants: bool,
     /// Log events to standard output, for programs that play the game.
     #[arg(long)]
     tell: bool,
@@ -217,6 +222,7 @@ pub fn game(
             world::saves::SavesPlugin(world),
             world::thumbnails::ThumbnailsPlugin,
             world::sky::SkyPlugin,
+            world::air::AirPlugin,
             world::day::DayPlugin,
             world::light::LightPlugin,
             world::particles::ParticlesPlugin,
@@ -243,6 +249,10 @@ fn open_window(options: &Options) -> App {
     let world = options.saved_world().or_else(PlayedWorld::latest);
     let world = world.or_else(|| options.host.and_then(|_| new_world()));
     game(&mut app, options.backend.engine(), SettingsFile::of_user(), world, options.party());
+    // Low quality is for weak GPUs and software renderers.
+    if options.plants || app.world().resource::<Settings>().quality != Quality::Low {
+        app.add_plugins((world::plants::PlantEffectsPlugin, bevy_burrow::plants::PlantCollidersPlugin));
+    }
     if let Some(name) = &options.name {
         app.world_mut().resource_mut::<Settings>().name.clone_from(name);
     }

@@ -219,12 +219,12 @@ fn write_json(out: &mut impl Write, content: &(impl Serialize + ?Sized)) -> io::
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, ExportError> {
     let bytes =
-        read_at_most(path, MOST_JSON).map_err(|reason| ExportError::Read { path: path.into(), reason })?;
+        read_at_most(path, MAX_JSON).map_err(|reason| ExportError::Read { path: path.into(), reason })?;
     json::parse(&bytes).map_err(|reason| ExportError::Json { path: path.into(), reason })
 }
 
 /// Most bytes of a file with strata or rules.
-const MOST_JSON: u64 = 1 << 24;
+const MAX_JSON: u64 = 1 << 24;
 
 /// The preset of that name, or the strata in a file.
 fn read_strata(name: &Path) -> Result<Strata, ExportError> {

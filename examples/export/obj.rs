@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use bevy_burrow::lattice::SNAP;
 use bevy_burrow::surface::SurfaceMesh;
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use glam::{I64Vec3, IVec3};
 
 use crate::lod::Levels;
@@ -14,8 +14,8 @@ pub fn write(world: &World, out: &mut impl Write) -> io::Result<u64> {
     let mut obj = ObjWriter::new(out);
     for (drawn, mesh) in world.drawn() {
         let name = match drawn {
-            Drawn::Tile(tile) => format!("tile_{}_{}", tile.x, tile.z),
-            Drawn::Chunk(chunk) => format!("chunk_{}_{}_{}", chunk.x, chunk.y, chunk.z),
+            MeshKey::Tile(tile) => format!("tile_{}_{}", tile.x, tile.z),
+            MeshKey::Chunk(chunk) => format!("chunk_{}_{}_{}", chunk.x, chunk.y, chunk.z),
         };
         obj.group(&name, &mesh, world.origin(drawn))?;
     }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use bevy_burrow::lattice::{Column, LatticeBox, ONE, SNAP};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use glam::{IVec3, Vec2, Vec3};
 
 use crate::canvas::Canvas;
@@ -64,13 +64,13 @@ fn tunnel() -> Brush {
 
 /// Triangles of one kind of mesh, in voxels of the world.
 fn triangles(world: &World, are_chunks: bool) -> Vec<[Vec3; 3]> {
-    let of = |drawn: Drawn, mesh: &SurfaceMesh| -> Vec<[Vec3; 3]> {
+    let of = |drawn: MeshKey, mesh: &SurfaceMesh| -> Vec<[Vec3; 3]> {
         let origin = world.origin(drawn).as_vec3();
         let place = |position: IVec3| origin + position.as_vec3() / SNAP as f32;
         mesh.triangles().map(|triangle| triangle.map(|vertex| place(vertex.position))).collect()
     };
-    let mut drawn: Vec<(Drawn, SurfaceMesh)> =
-        world.drawn().filter(|(drawn, _)| matches!(drawn, Drawn::Chunk(_)) == are_chunks).collect();
+    let mut drawn: Vec<(MeshKey, SurfaceMesh)> =
+        world.drawn().filter(|(drawn, _)| matches!(drawn, MeshKey::Chunk(_)) == are_chunks).collect();
     drawn.sort_by_key(|&(drawn, _)| drawn);
     drawn.iter().flat_map(|(drawn, mesh)| of(*drawn, mesh)).collect()
 }

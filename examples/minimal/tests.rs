@@ -47,7 +47,8 @@ fn grass_under_a_sky_is_drawn_in_time() -> Result {
         std::thread::sleep(Duration::from_millis(1));
         let mut tiles = app.world_mut().query_filtered::<Has<MeshMaterial3d<GroundMaterial>>, With<Tile>>();
         let dressed: Vec<bool> = tiles.iter(app.world()).collect();
-        !dressed.is_empty() && dressed.iter().all(|is_dressed| *is_dressed)
+        let are_fine = app.world().resource::<GroundLoading>().is_ready();
+        !dressed.is_empty() && dressed.iter().all(|is_dressed| *is_dressed) && are_fine
     })?;
     let path = proof()?.join("ground.png");
     photographer.shoot_after(2, &mut app, &path, photo::draw)?;

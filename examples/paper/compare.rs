@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use bevy_burrow::lattice::{Column, SNAP};
 use bevy_burrow::surface::{SurfaceMesh, Vertex};
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use glam::IVec3;
 
 use crate::edits::{Run, Scene};
@@ -76,7 +76,7 @@ impl Surface {
         let mut surface = Self::default();
         let mut others: HashMap<Key, [Vertex; 3]> = keyed(&full.mesh(), IVec3::ZERO).collect();
         for chunk in world.drawn_chunks() {
-            let (mesh, origin) = (world.chunk_mesh(chunk), world.origin(Drawn::Chunk(chunk)));
+            let (mesh, origin) = (world.chunk_mesh(chunk), world.origin(MeshKey::Chunk(chunk)));
             for (key, here) in keyed(&mesh, origin) {
                 surface.triangles += 1;
                 let Some(there) = others.remove(&key) else {

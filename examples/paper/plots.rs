@@ -145,10 +145,10 @@ fn range(rows: &[Row]) -> Range<f64> {
     if high > 0.0 { low / 2.0..high * 2.0 * (high / low).powf(0.3) } else { 0.1..1.0 }
 }
 
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+type MeshKey = Result<(), Box<dyn std::error::Error>>;
 
 /// Groups of bars over a logarithmic axis, each with its value on top.
-fn bars((path, title): &(impl AsRef<Path>, &str), groups: &[String], rows: &[Row]) -> Drawn {
+fn bars((path, title): &(impl AsRef<Path>, &str), groups: &[String], rows: &[Row]) -> MeshKey {
     let area = SVGBackend::new(path, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let range = range(rows);
@@ -181,7 +181,7 @@ fn bars((path, title): &(impl AsRef<Path>, &str), groups: &[String], rows: &[Row
 }
 
 /// Lines over a logarithmic axis.
-fn lines((path, title): &(impl AsRef<Path>, &str), along: &str, rows: &[Row]) -> Drawn {
+fn lines((path, title): &(impl AsRef<Path>, &str), along: &str, rows: &[Row]) -> MeshKey {
     let area = SVGBackend::new(path, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let longest = rows.iter().map(|row| row.values.len()).max().unwrap_or(0).max(2);

@@ -35,9 +35,10 @@ fn prints_all(print_all: Res<PrintAll>) -> bool {
 /// Reports when the ground's textures have loaded, and it is visible.
 fn print_look(
     shown: Query<(), (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>,
+    textures: Res<GroundLoading>,
     mut is_printed: Local<bool>,
 ) {
-    if !*is_printed && !shown.is_empty() {
+    if !*is_printed && !shown.is_empty() && textures.is_ready() {
         *is_printed = true;
         println!("dressed");
     }

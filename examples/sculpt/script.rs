@@ -31,7 +31,8 @@ pub fn play(options: &Options) -> Result {
     let mut stage = Stage::open(options)?;
     stage.wait_until(|world| {
         let mut dressed = world.query_filtered::<(), (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>();
-        dressed.iter(world).next().is_some()
+        // Coarse textures are shown until then.
+        dressed.iter(world).next().is_some() && world.resource::<GroundLoading>().is_ready()
     })?;
 
     // Dig, build and paint.

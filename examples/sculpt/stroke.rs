@@ -182,7 +182,8 @@ fn modified(tool: &BrushTool, modifier: Modifier) -> BrushTool {
     BrushTool { operation, ..tool.clone() }
 }
 
-/// Applies a brush at the first press, then at the tool's rate. All brushes until the button is released are one stroke.
+/// Applies a brush at the first press, then at the tool's rate. All brushes until the button is released are one
+/// stroke.
 fn stroke(
     time: Res<Time>,
     mouse: Res<ButtonInput<MouseButton>>,
@@ -303,8 +304,8 @@ fn ask_to_close(mut requests: MessageReader<WindowCloseRequested>, mut actions: 
     }
 }
 
-/// Undo, redo and files. Reads keyboard messages, because `ButtonInput<Key>` never releases a `Z` that comes up as `z` after
-/// Shift was released.
+/// Undo, redo and files. Reads keyboard messages, because `ButtonInput<Key>` never releases a `Z` that comes up as `z`
+/// after Shift was released.
 fn command(
     mut presses: MessageReader<KeyboardInput>,
     keys: Res<ButtonInput<KeyCode>>,

@@ -17,7 +17,7 @@ use crate::output::complain;
 use crate::report::Report;
 
 /// Lines that wait to be sent, at most.
-const MOST_WAITING: usize = 1024;
+const MAX_WAITING: usize = 1024;
 
 /// How long nothing is done where there is nothing to do.
 const REST: Duration = Duration::from_millis(1);
@@ -73,7 +73,7 @@ fn entries(script: impl Read, name: String) -> impl Iterator<Item = Entry> {
 
 /// Lines of interactive input, which may pause. Input that arrives faster than it is sent has to wait.
 fn listen(script: impl Read + Send + 'static, name: String) -> Feed {
-    let (sender, receiver) = sync_channel(MOST_WAITING);
+    let (sender, receiver) = sync_channel(MAX_WAITING);
     std::thread::spawn(move || {
         entries(script, name).map_while(|entry| sender.send(entry).ok()).for_each(drop);
     });

@@ -1,5 +1,5 @@
-//! Counts holes in the ground: pixels that show what lies behind it. Shared by examples, benchmarks and tests, which include
-//! this file by path.
+//! Counts holes in the ground: pixels that show what lies behind it. Shared by examples, benchmarks and tests, which
+//! include this file by path.
 //!
 //! Where ground must be is known from rays that are cast into the model, not from what is drawn.
 
@@ -15,9 +15,9 @@ pub struct Holes {
     pub holes: usize,
 }
 
-/// Counts the holes of a picture that `camera` took in the last frame. Only ground within `reach` metres counts, and only
-/// pixels that have ground on all sides, so that outlines do not. `is_background` says whether a pixel shows what lies
-/// behind the ground.
+/// Counts the holes of a picture that `camera` took in the last frame. Only ground within `reach` metres counts, and
+/// only pixels that have ground on all sides, so that outlines do not. `is_background` says whether a pixel shows what
+/// lies behind the ground.
 pub fn count(
     app: &App,
     camera: Entity,
@@ -42,8 +42,8 @@ pub fn count(
     found
 }
 
-/// The ground within `reach` metres that a picture lacks because of the camera's depth prepass: it is compared with one that
-/// was taken from the same place without the prepass, where nothing can be missing.
+/// The ground within `reach` metres that a picture lacks because of the camera's depth prepass: it is compared with one
+/// that was taken from the same place without the prepass, where nothing can be missing.
 #[allow(dead_code, reason = "for those whose background is no single colour")]
 pub fn count_against(app: &App, camera: Entity, picture: &RgbImage, whole: &RgbImage, reach: f32) -> Holes {
     let differs = |a: u8, b: u8| a.abs_diff(b) > 24;

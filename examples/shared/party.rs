@@ -1,7 +1,7 @@
 //! Connections over UDP, for programs whose players dig together.
 //!
-//! How players prove who they are is in [`ServerAuthentication`] and [`ClientAuthentication`]. `Unsecure` connections are not
-//! encrypted, and anyone may join under any number: they are for friends. `Secure` ones need a token for each
+//! How players prove who they are is in [`ServerAuthentication`] and [`ClientAuthentication`]. `Unsecure` connections
+//! are not encrypted, and anyone may join under any number: they are for friends. `Secure` ones need a token for each
 //! connection, as `tokens.rs` issues them.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
@@ -41,8 +41,8 @@ pub fn listen(world: &mut World, address: SocketAddr, players: usize) -> Result<
     listen_as(world, address, None, players, ServerAuthentication::Unsecure)
 }
 
-/// Listens for players who prove who they are in this way. Tokens have to name the address that is returned, or the public one if
-/// there is one.
+/// Listens for players who prove who they are in this way. Tokens have to name the address that is returned, or the
+/// public one if there is one.
 ///
 /// # Errors
 /// When the address is taken.

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
-use bevy_burrow::net::Kick;
+use bevy_burrow::net::KickReason;
 use bevy_burrow::together::{SharingTrouble, SharingTroubleFound};
 use bevy_replicon::prelude::ClientState;
 
@@ -44,7 +44,7 @@ impl Plugin for ReconnectPlugin {
 
 /// Stops reconnecting once the player has connected from another device, as a connection from here would end that one.
 fn stop(mut troubles: MessageReader<SharingTroubleFound>, mut commands: Commands) {
-    let plays_elsewhere = SharingTrouble::Kicked(Kick::ConnectedAgain);
+    let plays_elsewhere = SharingTrouble::Kicked(KickReason::ConnectedAgain);
     if troubles.read().any(|found| found.trouble == plays_elsewhere) {
         commands.remove_resource::<StayConnected>();
     }

@@ -1,8 +1,9 @@
 //! Connect tokens: the holder of a server's key decides which players may connect, and under which numbers.
 //!
-//! A login service and the server have the key. The service checks who a player is, by a password or an account of a shop, and sends
-//! a token over HTTPS. It names the player's number, the server and a time, and holds keys for one encrypted connection. Nobody can
-//! make or change one without the key. To ban a player, the service issues no more tokens.
+//! A login service and the server have the key. The service checks who a player is, by a password or an account of a
+//! shop, and sends a token over HTTPS. It names the player's number, the server and a time, and holds keys for one
+//! encrypted connection. Nobody can make or change one without the key. To ban a player, the service issues no more
+//! tokens.
 
 use std::fs::{self, OpenOptions};
 use std::io::Write;
@@ -76,7 +77,8 @@ impl Key {
         ServerAuthentication::Secure { private_key: self.0 }
     }
 
-    /// A token for a player of this number. The player tries these addresses one after the other; the server's has to be among them.
+    /// A token for a player of this number. The player tries these addresses one after the other; the server's has to
+    /// be among them.
     ///
     /// # Errors
     /// When there are too many addresses.

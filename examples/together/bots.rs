@@ -83,7 +83,8 @@ impl Bots {
         self.all.iter().all(|bot| is_settled(bot) && Some(bot.state()) == first)
     }
 
-    /// Prints what became of their edits. Do all see the same, the world of this hash if it is known, and was nothing repaired?
+    /// Prints what became of their edits. Do all see the same, the world of this hash if it is known, and was nothing
+    /// repaired?
     pub fn report(&self, hash: Option<u64>) -> bool {
         let mut repaired = 0;
         for (number, bot) in self.all.iter().enumerate() {

@@ -157,15 +157,15 @@ pub(super) struct Costs {
 impl Costs {
     /// Returns the expected times of a stage, and whether the GPU runs it.
     pub fn choose(&self, load: Load) -> (Estimate, bool) {
-        let [cpu, card] = self.expected(load, Recent::median);
-        let is_faster = card < cpu;
+        let [cpu, gpu] = self.expected(load, Recent::median);
+        let is_faster = gpu < cpu;
         let credit = self.credit[load.kind as usize].get(size(load.amount)).copied().unwrap_or_default();
         // If the median comes from stages that had to wait, the shortest time is the better estimate.
         let shortest = self.expected(load, Recent::shortest);
         let may_be_faster = shortest[usize::from(!is_faster)] < shortest[usize::from(is_faster)];
-        let is_turn = may_be_faster || (card - cpu).abs() < credit;
+        let is_turn = may_be_faster || (gpu - cpu).abs() < credit;
         let time = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        (Estimate { cpu: time(cpu), cuda: time(card) }, is_faster != is_turn)
+        (Estimate { cpu: time(cpu), cuda: time(gpu) }, is_faster != is_turn)
     }
 
     /// Seconds on the CPU and on the GPU. The times of edits include the meshing that follows: that stage
@@ -288,7 +288,7 @@ mod tests {
     #[derive(Clone, Copy)]
     struct Machine {
         cpu: fn(f64) -> f64,
-        card: fn(f64) -> f64,
+        gpu: fn(f64) -> f64,
         /// Relative deviation of times, in both directions.
         noise: f64,
     }
@@ -299,17 +299,14 @@ mod tests {
     }
 
     const MACHINES: [(&str, Machine); 5] = [
-        ("a fast card", Machine { cpu: threads, card: |blocks| 45.0 + 0.08 * blocks, noise: 0.15 }),
-        ("a slow card", Machine { cpu: threads, card: |blocks| 150.0 + 0.9 * blocks, noise: 0.15 }),
+        ("a fast GPU", Machine { cpu: threads, gpu: |blocks| 45.0 + 0.08 * blocks, noise: 0.15 }),
+        ("a slow GPU", Machine { cpu: threads, gpu: |blocks| 150.0 + 0.9 * blocks, noise: 0.15 }),
         (
             "a GPU that is always faster",
-            Machine { cpu: threads, card: |blocks| 0.5 + 0.1 * blocks, noise: 0.1 },
+            Machine { cpu: threads, gpu: |blocks| 0.5 + 0.1 * blocks, noise: 0.1 },
         ),
-        (
-            "one thread",
-            Machine { cpu: |blocks| 1.4 * blocks, card: |blocks| 60.0 + 0.1 * blocks, noise: 0.3 },
-        ),
-        ("nearly as fast", Machine { cpu: threads, card: |blocks| 38.0 + 0.28 * blocks, noise: 0.15 }),
+        ("one thread", Machine { cpu: |blocks| 1.4 * blocks, gpu: |blocks| 60.0 + 0.1 * blocks, noise: 0.3 }),
+        ("nearly as fast", Machine { cpu: threads, gpu: |blocks| 38.0 + 0.28 * blocks, noise: 0.15 }),
     ];
 
     /// What became of stages.
@@ -337,7 +334,7 @@ mod tests {
     ) -> Played {
         let mut played = Played::default();
         for amount in amounts {
-            let truth = [machine.cpu, machine.card].map(|time| time(amount as f64));
+            let truth = [machine.cpu, machine.gpu].map(|time| time(amount as f64));
             let load = Load::of_blocks(amount);
             let (_, is_cuda) = costs.choose(load);
             let noise = 1.0 + machine.noise * (2.0 * rng.f64() - 1.0);
@@ -394,19 +391,19 @@ mod tests {
 
     #[test]
     fn small_stages_do_not_pay_for_a_slower_gpu() {
-        for card in [45.0, 100.0, 1000.0, 100_000.0] {
+        for gpu in [45.0, 100.0, 1000.0, 100_000.0] {
             let (mut costs, rng) = (Costs::default(), &mut Rng::with_seed(3));
             let mut times = [0.0, 0.0];
             for stage in 0..10_000 {
                 let (_, is_cuda) = costs.choose(Load::of_blocks(16));
-                let time = if is_cuda { card } else { 24.0 } * (0.9 + 0.2 * rng.f64());
+                let time = if is_cuda { gpu } else { 24.0 } * (0.9 + 0.2 * rng.f64());
                 took(&mut costs, 16, is_cuda, time);
                 // Once it has to be tried.
                 times[usize::from(is_cuda)] += if stage < 2 { 0.0 } else { time };
             }
             let all = times[0] + times[1];
             let lost = all / (10_000.0 * 24.0) - 1.0;
-            assert!(lost < 0.03, "{card}: {lost}");
+            assert!(lost < 0.03, "{gpu}: {lost}");
         }
     }
 
@@ -435,7 +432,7 @@ mod tests {
     fn a_backend_that_becomes_faster_or_slower_is_found_out() {
         let [fast, slow] = [|_: f64| 100.0, |_: f64| 400.0];
         for (before, after) in [([fast, slow], [slow, fast]), ([slow, fast], [fast, slow])] {
-            let machine = |[cpu, card]: [fn(f64) -> f64; 2]| Machine { cpu, card, noise: 0.1 };
+            let machine = |[cpu, gpu]: [fn(f64) -> f64; 2]| Machine { cpu, gpu, noise: 0.1 };
             let (mut costs, rng) = (Costs::default(), &mut Rng::with_seed(9));
             assert!(play(&mut costs, machine(before), rng, [60; 500]).regret() < 0.05);
             assert!(play(&mut costs, machine(after), rng, [60; 500]).regret() < 0.08);
@@ -445,8 +442,8 @@ mod tests {
         for is_cuda in [false, true] {
             let (mut costs, rng) = (Costs::default(), &mut Rng::with_seed(9));
             let pick = |own: fn(f64) -> f64, other: fn(f64) -> f64| {
-                let [cpu, card] = if is_cuda { [other, own] } else { [own, other] };
-                Machine { cpu, card, noise: 0.1 }
+                let [cpu, gpu] = if is_cuda { [other, own] } else { [own, other] };
+                Machine { cpu, gpu, noise: 0.1 }
             };
             play(&mut costs, pick(fast, slow), rng, [60; 500]);
             let played = play(&mut costs, pick(fast, |_| 50.0), rng, [60; 1000]);

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::{Backend, CardChoice, Choice, Compute, Cpu, EngineSettings, EngineState, Stage, lock};
+use super::{Backend, Choice, Compute, Cpu, EngineSettings, EngineState, GpuChoice, Stage, lock};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::{Ground, GroundError, NoiseHeights};
 use crate::surface::block::Block;
@@ -91,14 +91,14 @@ impl Engine {
     }
 
     /// Suggests a GPU, such as the one that renders. It is used if the settings do not choose one
-    /// ([`CardChoice::Default`]) and none is open yet. If CUDA does not list it, the first GPU is opened.
-    pub fn suggest_card(&self, card: CardChoice) {
+    /// ([`GpuChoice::Default`]) and none is open yet. If CUDA does not list it, the first GPU is opened.
+    pub fn suggest_gpu(&self, gpu: GpuChoice) {
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.0.cuda {
-            cuda.suggest(card);
+            cuda.suggest(gpu);
         }
         #[cfg(not(feature = "cuda"))]
-        let _ = card;
+        let _ = gpu;
     }
 
     #[cfg(all(test, feature = "cuda"))]

@@ -26,7 +26,9 @@ mod state;
 pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::Cpu;
 pub use engine::{Engine, EngineFigures};
-pub use settings::{CardChoice, EngineSettings};
+#[doc(hidden)]
+pub use settings::GpuChoice as CardChoice;
+pub use settings::{EngineSettings, GpuChoice};
 pub use state::EngineState;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -1,12 +1,12 @@
-//! Settings of an engine.
+//! Settings of an engine: which GPU, and how much of its memory.
 
 use super::Backend;
 
 /// Selects the CUDA GPU that an engine opens.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum CardChoice {
-    /// The [suggested](super::Engine::suggest_card) GPU, such as the renderer's, if CUDA lists it; otherwise
+pub enum GpuChoice {
+    /// The [suggested](super::Engine::suggest_gpu) GPU, such as the renderer's, if CUDA lists it; otherwise
     /// the first.
     #[default]
     Default,
@@ -22,9 +22,9 @@ pub enum CardChoice {
 /// What an [`Engine`](super::Engine) may run on.
 ///
 /// ```
-/// use bevy_burrow::backend::{CardChoice, Engine, EngineSettings};
+/// use bevy_burrow::backend::{GpuChoice, Engine, EngineSettings};
 ///
-/// let settings = EngineSettings { card: CardChoice::Ordinal(1), ..EngineSettings::default() };
+/// let settings = EngineSettings { gpu: GpuChoice::Ordinal(1), ..EngineSettings::default() };
 /// let engine = Engine::with_settings(&settings);
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -32,7 +32,7 @@ pub struct EngineSettings {
     /// CPU, GPU, or the faster of the two.
     pub backend: Backend,
     /// Selects the GPU. One that does not exist is treated like one that fails.
-    pub card: CardChoice,
+    pub gpu: GpuChoice,
     /// Most bytes of GPU memory. Up to half may hold bricks and ground, which stay there between
     /// transactions. `None`: a quarter of the memory that is free when the GPU is opened, at most 2 GiB.
     pub device_memory: Option<usize>,
@@ -43,11 +43,6 @@ pub struct EngineSettings {
 
 impl Default for EngineSettings {
     fn default() -> Self {
-        Self {
-            backend: Backend::Auto,
-            card: CardChoice::Default,
-            device_memory: None,
-            pinned_memory: 1 << 30,
-        }
+        Self { backend: Backend::Auto, gpu: GpuChoice::Default, device_memory: None, pinned_memory: 1 << 30 }
     }
 }

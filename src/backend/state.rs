@@ -1,4 +1,4 @@
-//! The state of an engine.
+//! The state of an engine: the device that it runs on, and why.
 
 /// The device that an engine runs on.
 #[derive(Clone, Debug, PartialEq, Eq)]

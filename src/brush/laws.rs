@@ -1,4 +1,4 @@
-//! Laws of edits, for any brush.
+//! Tests: laws that the edits of any brush obey.
 
 use glam::{DQuat, DVec3, IVec3, Quat, Vec2, Vec3};
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! Whether a brush reaches a world, even if it is not valid there.
+//! Whether a brush comes near a world: decides which terrains get a brush, before it is quantised and checked.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use super::shapes::Extent;
 use super::{BAND, Shape};
 use crate::lattice::{ChunkGrid, ONE};
 
-/// Does a shape, in voxels, come near to a world's columns? `None` if its position is not a number.
+/// Whether a shape, in voxels, comes near a world's columns. `None` if its position is not a number.
 pub(crate) fn reaches(shape: &Shape, grid: ChunkGrid) -> Option<bool> {
     let (low, high) = bounds(shape)?;
     let (world, band) = (grid.edit_bounds(), (BAND / ONE) as f32);

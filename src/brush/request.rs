@@ -214,8 +214,8 @@ impl Brush {
         self.transformed(rotation, rotation * -translation * scale, scale)
     }
 
-    /// The brush in the space of a terrain that a parent stretches: points are transformed exactly, and sizes, which have
-    /// no direction, are scaled by the cube root of the change in volume. `rotation` is that of `matrix`.
+    /// The brush in the space of a terrain that a parent stretches: points are transformed exactly, and sizes, which
+    /// have no direction, are scaled by the cube root of the change in volume. `rotation` is that of `matrix`.
     #[cfg(feature = "plugin")]
     pub(crate) fn placed_in_stretched(&self, matrix: Mat3A, rotation: Quat, translation: Vec3) -> Self {
         let scale = matrix.determinant().abs().cbrt();

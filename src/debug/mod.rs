@@ -19,9 +19,9 @@
 //! | [`normals`](BurrowDebug::normals) | normals of vertices: golden of tiles, blue of chunks |
 //! | [`wires`](BurrowDebug::wires) | edges of triangles: golden of tiles, blue of chunks, white what both share |
 //!
-//! Views are lines on children of the terrain's entity, on its `RenderLayers`. They cover the surroundings of a place, up to a
-//! limit of lines, and are drawn again when the world or the place changes. Their cost depends on the radius and not on the
-//! size of the world. [`SeamWires`] and [`draw_shape`] can be used by themselves.
+//! Views are lines on children of the terrain's entity, on its `RenderLayers`. They cover the surroundings of a place,
+//! up to a limit of lines, and are drawn again when the world or the place changes. Their cost depends on the radius
+//! and not on the size of the world. [`SeamWires`] and [`draw_shape`] can be used by themselves.
 
 mod lines;
 mod plugin;

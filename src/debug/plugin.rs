@@ -216,7 +216,8 @@ fn fresh_bricks(dirty: &DirtyBricks, terrain: Entity, debug: &BurrowDebug, now: 
     fresh
 }
 
-/// The centre of the views, in voxels of a terrain: set by the game, or where the camera looks at the ground, or its place.
+/// The centre of the views, in voxels of a terrain: set by the game, or where the camera looks at the ground, or its
+/// place.
 fn focus(
     debug: &BurrowDebug,
     terrain: &Terrain,

@@ -7,7 +7,7 @@ use super::lines::LineBuffer;
 use super::wires::{SeamWires, around, edges_of, voxels};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP};
 use crate::lod::{Cut, Node};
-use crate::terrain::{Drawn, Terrain, World};
+use crate::terrain::{MeshKey, Terrain, World};
 
 const CHUNK: LinearRgba = LinearRgba::rgb(0.08, 0.60, 1.0);
 const TILE: LinearRgba = LinearRgba::rgb(0.85, 0.85, 0.9);
@@ -93,7 +93,7 @@ fn chunks(world: &World, place: Place, bounds: LatticeBox, out: &mut LineBuffer)
     });
     out.width(1.5);
     for tile in world.drawn_near(bounds) {
-        let Drawn::Tile(tile) = tile else { continue };
+        let MeshKey::Tile(tile) = tile else { continue };
         let (low, high) = grid.tile_cells(tile);
         let sides = [(1, 0, high.x - low.x), (0, 1, high.z - low.z)];
         for (dx, dz, count) in sides {
@@ -145,7 +145,7 @@ fn mask(world: &World, bounds: LatticeBox, out: &mut LineBuffer) {
 fn rings(world: &World, bounds: LatticeBox, out: &mut LineBuffer) {
     out.width(2.0);
     for drawn in world.drawn_near(bounds) {
-        let Drawn::Tile(tile) = drawn else { continue };
+        let MeshKey::Tile(tile) = drawn else { continue };
         for triangle in world.ring_triangles(tile) {
             if triangle.iter().all(|corner| bounds.contains(corner.floor().as_ivec3())) {
                 out.triangle(triangle, RING);
@@ -184,7 +184,7 @@ fn normals(world: &World, place: Place, out: &mut LineBuffer) {
             }
         };
         match drawn {
-            Drawn::Tile(tile) => {
+            MeshKey::Tile(tile) => {
                 let mesh = world.tile_mesh(tile);
                 // Of columns in the mask no triangle is left.
                 let mut is_used = vec![false; mesh.vertices.len()];
@@ -196,7 +196,7 @@ fn normals(world: &World, place: Place, out: &mut LineBuffer) {
                 let used = mesh.vertices.iter().zip(is_used).filter(|(_, used)| *used);
                 used.for_each(|(vertex, _)| draw(vertex.position_f32(), vertex.normal, GOLD));
             }
-            Drawn::Chunk(chunk) => {
+            MeshKey::Chunk(chunk) => {
                 let vertices = world.chunk_surface(chunk).into_iter().flat_map(|mesh| &mesh.vertices);
                 vertices.for_each(|vertex| draw(vertex.position_f32(), vertex.normal, BLUE));
             }

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use super::lines::LineBuffer;
 use crate::lattice::{LatticeBox, SNAP};
 use crate::surface::SurfaceMesh;
-use crate::terrain::{Drawn, World};
+use crate::terrain::{MeshKey, World};
 
 /// Both ends in 1/4096 voxel of the terrain, the lesser first: edges that are drawn at the same bits are equal.
 type Edge = [IVec3; 2];
@@ -30,10 +30,10 @@ impl SeamWires {
             let origin = world.origin(drawn) * SNAP;
             let is_near = |edge: &Edge| edge.iter().all(|&end| voxels(end).distance(place) < radius);
             match drawn {
-                Drawn::Tile(tile) => {
+                MeshKey::Tile(tile) => {
                     wires.tiles.extend(edges_of(&world.tile_mesh(tile), origin).filter(is_near));
                 }
-                Drawn::Chunk(chunk) => {
+                MeshKey::Chunk(chunk) => {
                     let mesh = world.chunk_surface(chunk);
                     wires
                         .chunks

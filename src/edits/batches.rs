@@ -9,7 +9,7 @@ use crate::lattice::BrickPos;
 const LONGEST: usize = 1 << 12;
 
 /// Most bricks around all edits of a batch, unless it is a single edit: their jobs take 16 MiB.
-pub(super) const MOST_BRICKS: u64 = 1 << 20;
+pub(super) const MAX_BRICKS: u64 = 1 << 20;
 
 /// Splits edits into batches, in order, in which no edit reads what an earlier edit of the batch may write, except for
 /// the samples that it changes itself. Digs, adds and paint read nothing else; edits that sculpt, and edits that rules
@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn an_edit_that_sculpts_follows_all_that_it_reads() {
         let at = |x: f32| Shape::sphere(Vec3::new(x, 0.0, 50.0), 4.0);
-        let of = |brushes: &[Brush]| begins(brushes, MOST_BRICKS);
+        let of = |brushes: &[Brush]| begins(brushes, MAX_BRICKS);
         let (dig, smooth) = (|x| Brush::dig(at(x)), |x| Brush::smooth(at(x), 1.0));
         assert!(of(&[]).is_empty());
         assert_eq!(of(&vec![dig(50.0); 9000]), [0]);
@@ -92,6 +92,6 @@ mod tests {
         assert_eq!(begins(&[dig(-90.0), dig(16.0), dig(16.0)], 8), [0, 2]);
         // Large balls, some at a time.
         let ball = Brush::dig(Shape::sphere(Vec3::splat(200.0), 190.0));
-        assert_eq!(begins(&vec![ball; 30], MOST_BRICKS), [0, 8, 16, 24]);
+        assert_eq!(begins(&vec![ball; 30], MAX_BRICKS), [0, 8, 16, 24]);
     }
 }

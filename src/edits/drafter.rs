@@ -5,7 +5,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::batches::{MOST_BRICKS, batches};
+use super::batches::{MAX_BRICKS, batches};
 use super::delta::{EditDelta, enter_effects};
 use super::effect::{DraftedBrick, EditEffect, MergedBricks, Overlay};
 use super::prepared::PreparedEdits;
@@ -63,7 +63,7 @@ impl<'a> Drafter<'a> {
     pub fn draft(&mut self, edits: &[&Edit], rules: Option<&DiggingRules>) -> Draft {
         let edits: Vec<PreparedEdit> =
             edits.iter().map(|edit| PreparedEdit::new(self.grid, edit, rules)).collect();
-        let lengths: Vec<usize> = batches(&edits, MOST_BRICKS).into_iter().map(|batch| batch.len()).collect();
+        let lengths: Vec<usize> = batches(&edits, MAX_BRICKS).into_iter().map(|batch| batch.len()).collect();
         self.draft_batches(edits, &lengths, rules)
     }
 

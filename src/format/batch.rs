@@ -1,8 +1,8 @@
 //! The encoding of commits: the content of a frame of the journal.
 //!
-//! Most commits are one edit, and lead to the next revision: these begin with an odd byte, whose other bits are the head of the
-//! [edit](super::edits). Others begin with 0. Each has the hash of the world that it leads to. The game's data up to
-//! the last of them follows.
+//! Most commits are one edit, and lead to the next revision: these begin with an odd byte, whose other bits are the
+//! head of the [edit](super::edits). Others begin with 0. Each has the hash of the world that it leads to. The game's
+//! data up to the last of them follows.
 
 use std::sync::Arc;
 

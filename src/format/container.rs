@@ -65,8 +65,8 @@ pub fn write(
 /// Takes a file apart.
 ///
 /// # Errors
-/// When it is no file of this kind, when it is cut off, when a frame is not the one that the head names, or when the head has more
-/// bytes than `limit`.
+/// When it is no file of this kind, when it is cut off, when a frame is not the one that the head names, or when the
+/// head has more bytes than `limit`.
 pub fn read(kind: Kind, file: &[u8], limit: usize) -> Result<Container<'_>, FormatError> {
     let (world, head, mut rest) = read_head(kind, file, limit)?;
     let mut reader = Reader(&head);

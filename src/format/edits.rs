@@ -1,7 +1,7 @@
 //! The encoding of edits, each as the difference from the previous one, because players move little between digs.
 //!
-//! The serialised form of an [`Edit`] is cut into shape, middle, what lies between, tag and stroke. Bits of a head say which of
-//! them are as before; it is below 128. Reading joins them again and deserialises the result, which checks it.
+//! The serialised form of an [`Edit`] is cut into shape, middle, what lies between, tag and stroke. Bits of a head say
+//! which of them are as before; it is below 128. Reading joins them again and deserialises the result, which checks it.
 
 use super::bytes::{Reader, put_bytes, put_signed};
 use super::error::FormatError;

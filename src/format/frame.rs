@@ -15,8 +15,8 @@
 //! | bytes | content |
 //! | 8 | XXH3 over all before |
 //!
-//! Integers are little-endian; a *number* is an integer of [variable length](super::bytes). In every schema the magic and the
-//! schema come first and the checksum comes last.
+//! Integers are little-endian; a *number* is an integer of [variable length](super::bytes). In every schema the magic
+//! and the schema come first and the checksum comes last.
 
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -31,7 +31,7 @@ pub const MAGIC: [u8; 4] = *b"\xB5BRW";
 pub const SCHEMA: u32 = 1;
 
 /// Content is packed by at most this factor.
-const MOST_PACKED: usize = 255;
+const MAX_PACKED: usize = 255;
 
 /// Bytes of the checksum.
 const CHECKSUM: usize = 8;
@@ -158,8 +158,8 @@ pub fn peek(bytes: &[u8]) -> Option<Peeked<'_>> {
 /// Unwraps what [`seal`] wrapped.
 ///
 /// # Errors
-/// Where `bytes` are not exactly such a frame, or one of another kind, world or key, or of more than `limit` bytes of content,
-/// for which no memory is taken then.
+/// Where `bytes` are not exactly such a frame, or one of another kind, world or key, or of more than `limit` bytes of
+/// content, for which no memory is taken then.
 pub fn open(
     bytes: &[u8],
     kind: Kind,
@@ -216,7 +216,7 @@ fn unpacked(parts: &Parts, limit: usize) -> Result<Vec<u8>, FormatError> {
     if !parts.is_packed {
         return Ok(parts.stored.to_vec());
     }
-    if length / MOST_PACKED > parts.stored.len() {
+    if length / MAX_PACKED > parts.stored.len() {
         return Err(FormatError::Invalid("length"));
     }
     let unpacked = lz4_flex::block::decompress(parts.stored, length).ok();

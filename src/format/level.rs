@@ -98,8 +98,8 @@ fn file_error(name: &str, why: impl ToString) -> FormatError {
 /// The files of a level. Equal content gives equal bytes, file by file.
 ///
 /// # Errors
-/// When settings hold numbers that JSON can't, and [`FormatError::TooLarge`] when `level.json` with the game's data takes more than
-/// 64 MiB or a region more than 8 MiB, which bricks and fields of a terrain never do.
+/// When settings hold numbers that JSON can't, and [`FormatError::TooLarge`] when `level.json` with the game's data
+/// takes more than 64 MiB or a region more than 8 MiB, which bricks and fields of a terrain never do.
 pub fn write_level(level: &Level) -> Result<LevelFiles, FormatError> {
     write_within(level, &Limits::FORMAT)
 }

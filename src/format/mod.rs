@@ -1,4 +1,5 @@
-//! The formats of worlds that are saved or sent, as pure conversions to and from bytes: no files, no threads, no clocks.
+//! The formats of worlds that are saved or sent, as pure conversions to and from bytes: no files, no threads, no
+//! clocks.
 //!
 //! | file | encodes |
 //! | --- | --- |

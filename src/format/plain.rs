@@ -6,7 +6,8 @@ use super::error::FormatError;
 
 /// The bytes of a value.
 pub fn to_bytes<T: Serialize + ?Sized>(value: &T) -> Vec<u8> {
-    // It fails for sequences of unknown length and maps of such only, which no record holds; reading nothing is an error.
+    // It fails for sequences of unknown length and maps of such only, which no record holds; reading nothing is an
+    // error.
     postcard::to_stdvec(value).unwrap_or_default()
 }
 

@@ -71,8 +71,8 @@ pub struct PortableHead {
 }
 
 impl PortableWorld {
-    /// A world without its journal. The metadata's revision, rules, settings of loose pieces, names and chunk size are those
-    /// of the parts.
+    /// A world without its journal. The metadata's revision, rules, settings of loose pieces, names and chunk size are
+    /// those of the parts.
     pub fn new(world: WorldId, metadata: Metadata, parts: WorldParts, ground: &Ground) -> Self {
         let WorldParts { change, chunk_size, revision, rules, loose } = parts;
         let (mut metadata, next_field) = (metadata, change.next_field);
@@ -143,8 +143,9 @@ pub fn of_regions(regions: &BTreeMap<RegionPos, SavedRegion>, next_field: u64) -
 /// The bytes of a portable file. The same world gives the same bytes.
 ///
 /// # Errors
-/// [`FormatError::TooLarge`] when a part has more bytes than can be read again: 256 MiB for data of the game's and the list of
-/// regions, 256 MiB for a frame of commits, and 8 MiB for a region, which bricks and fields of a terrain never take.
+/// [`FormatError::TooLarge`] when a part has more bytes than can be read again: 256 MiB for data of the game's and the
+/// list of regions, 256 MiB for a frame of commits, and 8 MiB for a region, which bricks and fields of a terrain never
+/// take.
 pub fn write_portable(portable: &PortableWorld) -> Result<Vec<u8>, FormatError> {
     write_within(portable, &Limits::FORMAT)
 }
@@ -174,7 +175,8 @@ pub(crate) fn write_within(portable: &PortableWorld, limits: &Limits) -> Result<
 /// Reads what [`write_portable`] wrote, over the ground of the world.
 ///
 /// # Errors
-/// When anything in the file is damaged or invalid. Memory is taken by the length of the file, and by a limit for each frame.
+/// When anything in the file is damaged or invalid. Memory is taken by the length of the file, and by a limit for each
+/// frame.
 pub fn read_portable(file: &[u8], ground: &Ground) -> Result<PortableWorld, FormatError> {
     read_within(file, ground, &Limits::FORMAT)
 }

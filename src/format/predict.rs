@@ -1,8 +1,8 @@
 //! Predicting densities from neighbours, so that only small differences have to be stored.
 //!
-//! Densities are distances, nearly linear in space. With a, b, c the neighbours one step lower along each axis, ab the one a step
-//! lower along two of them, and so on, a sample is about a + b + c - ab - bc - ac + abc. Where some of them are not known,
-//! it is predicted from a plane, from a line, or from a nearby sample.
+//! Densities are distances, nearly linear in space. With a, b, c the neighbours one step lower along each axis, ab the
+//! one a step lower along two of them, and so on, a sample is about a + b + c - ab - bc - ac + abc. Where some of them
+//! are not known, it is predicted from a plane, from a line, or from a nearby sample.
 
 use crate::brush::{BAND, DEPTH};
 use crate::lattice::BRICK;
@@ -39,8 +39,8 @@ impl Context {
 pub struct Known([i16; SIDE * SIDE * SIDE]);
 
 impl Known {
-    /// The neighbours are those one brick lower along x (bit 0), z (bit 1) and y (bit 2) of their index. Nothing is known of the
-    /// brick itself, which has index 0.
+    /// The neighbours are those one brick lower along x (bit 0), z (bit 1) and y (bit 2) of their index. Nothing is
+    /// known of the brick itself, which has index 0.
     pub fn new(neighbours: &[Option<&[i16; 512]>; 8]) -> Self {
         let mut known = Self([UNKNOWN; SIDE * SIDE * SIDE]);
         for (number, neighbour) in neighbours.iter().enumerate().skip(1) {

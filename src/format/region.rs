@@ -27,8 +27,8 @@ pub fn encode_region<'a>(
     bytes
 }
 
-/// Reads what [`encode_region`] wrote, for the region at this place over this ground. Which pristine samples are solid is
-/// computed from the ground; all else is as it was, whatever ground it was written over.
+/// Reads what [`encode_region`] wrote, for the region at this place over this ground. Which pristine samples are solid
+/// is computed from the ground; all else is as it was, whatever ground it was written over.
 ///
 /// # Errors
 /// When anything is invalid. Memory is taken for at most 512 bricks, and for fields by the length of `bytes`.

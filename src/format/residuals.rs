@@ -1,7 +1,8 @@
 //! Small integers in few bits: Rice codes that adapt to earlier values.
 //!
-//! A number u is written as `u >> k` ones, a zero, and the low k bits of u. Each [`Context`](super::predict::Context) has its own
-//! k, which follows the mean of its last numbers. R. F. Rice, *Some Practical Universal Noiseless Coding Techniques*, 1979.
+//! A number u is written as `u >> k` ones, a zero, and the low k bits of u. Each [`Context`](super::predict::Context)
+//! has its own k, which follows the mean of its last numbers. R. F. Rice, *Some Practical Universal Noiseless Coding
+//! Techniques*, 1979.
 
 use super::error::FormatError;
 use super::predict::Context;

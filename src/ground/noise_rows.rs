@@ -23,8 +23,8 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
     b * t + a * (1.0 - t)
 }
 
-/// Added to a number of less than 2^51, it leaves the nearest integer in the lowest bits of the sum. Conversions to integers
-/// would do one number at a time.
+/// Added to a number of less than 2^51, it leaves the nearest integer in the lowest bits of the sum. Conversions to
+/// integers would do one number at a time.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// The floor of a number, as bits of which the lowest eight are those of the integer, and its fraction.

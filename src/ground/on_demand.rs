@@ -69,7 +69,6 @@ impl Ground {
     }
 
     /// [Height](Self::height) of a single column: no page is made for it.
-    #[cfg(feature = "plugin")]
     pub(crate) fn lone_height(&self, column: Column) -> i32 {
         let Column { x, z } = self.extent().clamp(column);
         let point = self.pages().and_then(|pages| pages.points([&[x], &[z]], 1).first().copied());

@@ -25,7 +25,7 @@ const SIDE: usize = (BEFORE + PAGE + AFTER) as usize;
 pub(super) const DEFAULT_BUDGET: usize = 32 << 20;
 
 /// Most parts of the cache that are locked on their own.
-const MOST_SHARDS: usize = 16;
+const MAX_SHARDS: usize = 16;
 
 /// Which page: its column of pages along x, and along z.
 pub(super) type Place = (i32, i32);
@@ -152,7 +152,7 @@ impl Pages {
         let page_bytes = own + column_bytes * (PAGE * PAGE) as usize;
         let count = budget / page_bytes;
         // Few large shards are emptied more evenly than many small ones.
-        let shards = (count / 8).clamp(1, MOST_SHARDS);
+        let shards = (count / 8).clamp(1, MAX_SHARDS);
         Self {
             number,
             budget,

@@ -407,7 +407,7 @@ impl Ground {
 
     /// Square of the surface's steepness over a column of the world, in 1/256 voxel of rise over two voxels of run.
     #[inline]
-    pub(super) fn squared_slope(&self, column: Column) -> u64 {
+    pub(crate) fn squared_slope(&self, column: Column) -> u64 {
         Self::squared_slope_of(self.rises(column))
     }
 

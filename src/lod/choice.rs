@@ -17,7 +17,7 @@ const AXIS_STEPS: usize = 20;
 const LEAST_STAY: f32 = 0.01;
 
 /// The most often they grow: by then they are so large that only nodes around an eye are split.
-const MOST_GROWTHS: u32 = 60;
+const MAX_GROWTHS: u32 = 60;
 
 /// A viewpoint that the level of detail is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +26,8 @@ pub struct Viewpoint {
     pub position: Vec3,
     /// Voxels a second.
     pub velocity: Vec3,
-    /// Pixels that one voxel covers. In perspective, one voxel away: the height of the picture over twice the tangent of half
-    /// the angle of view.
+    /// Pixels that one voxel covers. In perspective, one voxel away: the height of the picture over twice the tangent
+    /// of half the angle of view.
     pub pixels: f32,
     /// How sizes change with distance.
     pub view: View,
@@ -157,7 +157,7 @@ impl LodSettings {
             })
         };
         let mut cut = with_limits(1.0);
-        for times in 1..=MOST_GROWTHS {
+        for times in 1..=MAX_GROWTHS {
             if cut.nodes().count() <= self.most_nodes {
                 break;
             }

@@ -1,5 +1,7 @@
 //! Cuts: sets of nodes that are drawn together.
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashSet;
 
 use super::{LodGrid, Node};
@@ -8,17 +10,18 @@ use crate::lattice::TilePos;
 /// Nodes that together cover the world once. Those that share an edge differ by at most one level; across a corner they
 /// may differ by more.
 ///
-/// It is kept as the set of nodes that are split. A node of the cut is one that is not split, of a parent that is.
+/// It is kept as the set of nodes that are split. A node of the cut is one that is not split, of a parent that is. Clones share
+/// the set until one of them changes, so that an unchanged cut is copied and compared at no cost.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cut {
     grid: LodGrid,
-    split: FxHashSet<Node>,
+    split: Arc<FxHashSet<Node>>,
 }
 
 impl Cut {
     /// The nodes of the coarsest level.
     pub fn coarsest(grid: LodGrid) -> Self {
-        Self { grid, split: FxHashSet::default() }
+        Self { grid, split: Arc::default() }
     }
 
     /// The coarsest cut in which every node is split that ought to be. Nodes are asked about from above; the children
@@ -44,9 +47,10 @@ impl Cut {
     fn require(&mut self, node: Node, made: &mut Vec<Node>) {
         let mut wanted = vec![node];
         while let Some(node) = wanted.pop() {
-            if !self.split.insert(node) {
+            if self.split.contains(&node) {
                 continue;
             }
+            self.split(node);
             made.extend(node.children().into_iter().flatten().filter(|&child| self.grid.has(child)));
             wanted.extend(self.required_by(node));
         }
@@ -126,11 +130,11 @@ impl Cut {
     }
 
     pub(super) fn split(&mut self, node: Node) {
-        self.split.insert(node);
+        Arc::make_mut(&mut self.split).insert(node);
     }
 
     pub(super) fn merge(&mut self, node: Node) {
-        self.split.remove(&node);
+        Arc::make_mut(&mut self.split).remove(&node);
     }
 
     /// The nodes that are split, in no order.

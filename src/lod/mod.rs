@@ -2,8 +2,8 @@
 //!
 //! A world is a quadtree of [`Node`]s. A node of level 0 is a tile; one of level L covers as many cells, each 2^L
 //! voxels wide. A [`Cut`] is the set of drawn nodes: they cover the world once, and nodes that share an edge differ by
-//! at most one level. [`LodSettings`] computes the cut for a set of viewpoints, and [`Cut::step_to`] leads from one cut to another
-//! without violating that rule.
+//! at most one level. [`LodSettings`] computes the cut for a set of viewpoints, and [`Cut::step_to`] leads from one cut
+//! to another without violating that rule.
 //!
 //! Nothing here knows heights or meshes: the roughness of nodes is an input.
 

@@ -3,7 +3,7 @@
 use crate::lattice::{ChunkGrid, Column, TilePos};
 
 /// The coarsest level there may be: cells 1,024 voxels wide.
-const MOST_LEVELS: u8 = 10;
+const MAX_LEVELS: u8 = 10;
 
 /// A square of the world that is drawn at one level of detail: a node of the quadtree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -88,7 +88,7 @@ impl LodGrid {
     pub fn new(grid: ChunkGrid, top: u8) -> Self {
         let (x, z) = grid.tile_counts();
         let enough = (x.max(z).max(1) as u32).next_power_of_two().trailing_zeros();
-        Self { grid, top: top.min(MOST_LEVELS).min(enough as u8) }
+        Self { grid, top: top.min(MAX_LEVELS).min(enough as u8) }
     }
 
     /// The chunks and tiles below.

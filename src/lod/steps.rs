@@ -103,10 +103,11 @@ impl Cut {
     }
 }
 
-/// What is left to do from one cut to another. Nodes that are split or merged on the way stay so, hence all that there is to do
-/// is known from the beginning.
+/// What is left to do from one cut to another. Nodes that are split or merged on the way stay so, hence all that there
+/// is to do is known from the beginning.
 struct Way {
-    /// Nodes to be split and to be merged by their rank; those of equal rank in order, so that no order of a hash set shows.
+    /// Nodes to be split and to be merged by their rank; those of equal rank in order, so that no order of a hash set
+    /// shows.
     to_split: BTreeSet<(u64, Node)>,
     to_merge: BTreeSet<(u64, Node)>,
     ranks: FxHashMap<Node, u64>,

@@ -72,8 +72,8 @@ pub(super) fn closed(view: SampleView, grid: ChunkGrid, piece: &Component, origi
     mesh.into()
 }
 
-/// The cubes around a sample of the piece that hold surface, with their cases. Of the samples that are corners of a cube,
-/// only the first gets it.
+/// The cubes around a sample of the piece that hold surface, with their cases. Of the samples that are corners of a
+/// cube, only the first gets it.
 fn cubes_of(piece: &Piece, point: IVec3, mut each: impl FnMut(IVec3, usize)) {
     let mut around = [false; 27];
     for (i, own) in (0..).zip(&mut around) {

@@ -1,21 +1,21 @@
 //! Loose pieces: ground that digging cut off from the world.
 //!
 //! **Connected** are solid samples that are neighbours along an axis, six for each sample. The surface connects the same
-//! ones: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples,
-//! and separates solid corners that only meet across a diagonal. So two samples belong to one piece of ground exactly if a
-//! path inside the drawn surface connects them.
+//! ones: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples, and separates
+//! solid corners that only meet across a diagonal. So two samples belong to one piece of ground exactly if a path
+//! inside the drawn surface connects them.
 //!
 //! **Anchored** is a piece that reaches ground below everything that was ever edited. The world's sides anchor
-//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further. Its result
-//! does not depend on the order of the search.
+//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further. Its
+//! result does not depend on the order of the search.
 //!
 //! **Budget.** The search after an edit visits a bounded number of bricks, and what it finds has a bounded number of voxels:
 //! see [`LooseSettings`]. Pieces beyond these bounds stay as ground, and the receipt reports it. Seeds are taken in a
 //! fixed order, so the outcome is the same on every machine.
 //!
 //! **Removal.** The samples of a removed piece get the density of air in the middle of a dig, and so does air that touches
-//! them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this belongs to
-//! the edit that cut the piece off: it is hashed, undone and replayed with it.
+//! them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this belongs
+//! to the edit that cut the piece off: it is hashed, undone and replayed with it.
 
 mod bits;
 mod mesh;
@@ -38,14 +38,14 @@ use search::{Budget, Component, Solid};
 
 /// Which loose pieces to search for after a dig, and what happens to them.
 ///
-/// Each edit that can remove ground is followed by a search before the next edit applies, so the result does not depend on how
-/// edits are batched.
+/// Each edit that can remove ground is followed by a search before the next edit applies, so the result does not depend
+/// on how edits are batched.
 ///
-/// A search is as bounded as its edit: it visits at most 4096 bricks of 8x8x8 samples and 16 more for each brick that the edit
-/// changed, or an eighth of [`largest`](Self::largest) if that is more; all pieces that it finds have at most four times
-/// `largest` voxels together, or 131,072 if that is more. Pieces beyond these bounds stay as ground, and
-/// [`Applied::has_unsearched`](crate::terrain::Applied::has_unsearched) reports that there may be some. A later dig next to them
-/// finds them.
+/// A search is as bounded as its edit: it visits at most 4096 bricks of 8x8x8 samples and 16 more for each brick that
+/// the edit changed, or an eighth of [`largest`](Self::largest) if that is more; all pieces that it finds have at most
+/// four times `largest` voxels together, or 131,072 if that is more. Pieces beyond these bounds stay as ground, and
+/// [`Applied::has_unsearched`](crate::terrain::Applied::has_unsearched) reports that there may be some. A later dig
+/// next to them finds them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
@@ -79,8 +79,9 @@ impl LooseSettings {
 }
 
 impl World {
-    /// The loose pieces of up to `largest` voxels that hold some sample of a box, in order of their lowest samples there.
-    /// Each has the fate that the settings give it, but none is removed and no mesh is built. The search has no budget.
+    /// The loose pieces of up to `largest` voxels that hold some sample of a box, in order of their lowest samples
+    /// there. Each has the fate that the settings give it, but none is removed and no mesh is built. The search has no
+    /// budget.
     pub fn loose_pieces(&self, around: LatticeBox, settings: &LooseSettings) -> Vec<LoosePiece> {
         let solid = Solid::new(self, self.samples(), None);
         let Some(around) = around.intersection(self.grid.edit_bounds()) else { return Vec::new() };
@@ -118,8 +119,8 @@ pub(crate) struct Fallen {
     pub removed: EditDelta,
 }
 
-/// Looks for loose pieces at seeds, in a world under newer bricks, and takes them out where the settings and rules say so.
-/// `changed` is the number of bricks that the edit changed.
+/// Looks for loose pieces at seeds, in a world under newer bricks, and takes them out where the settings and rules say
+/// so. `changed` is the number of bricks that the edit changed.
 pub(crate) fn fall(
     world: &World,
     rules: Option<&DiggingRules>,

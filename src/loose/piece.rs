@@ -14,8 +14,8 @@ use crate::volume::{MaterialCounts, SampleView};
 /// What happened to a loose piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum PieceFate {
-    /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`](crate::volume::DiggingRules) protect
-    /// a part.
+    /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`](crate::volume::DiggingRules)
+    /// protect a part.
     Left,
     /// It was taken out of the ground.
     Removed,
@@ -26,8 +26,8 @@ pub enum PieceFate {
 /// Names a loose piece.
 ///
 /// The name is a hash of the piece's samples and materials. The edit that cuts a piece off and the ground that it meets
-/// decide these, so an edit gives its pieces the same names on every machine: as a client's prediction, on the server, and
-/// when it is redone.
+/// decide these, so an edit gives its pieces the same names on every machine: as a client's prediction, on the server,
+/// and when it is redone.
 ///
 /// Two pieces have the same name only if they came from exactly the same samples and materials: for example if a game
 /// builds the same wall again and cuts it off once more. An undo then returns the later one.
@@ -54,8 +54,8 @@ pub struct Run {
     pub len: u32,
 }
 
-/// A piece of ground that is not connected to the world. It can be saved as it is, with its mesh: pieces that broke off are the
-/// game's, not the terrain's.
+/// A piece of ground that is not connected to the world. It can be saved as it is, with its mesh: pieces that broke off
+/// are the game's, not the terrain's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Plain", into = "Plain")]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]

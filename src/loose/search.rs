@@ -1,11 +1,12 @@
 //! The search for pieces that are not anchored.
 //!
-//! From each seed a component of solid samples grows, brick by brick and the lowest brick first. Two things end it early:
-//! a brick without any stored one below it, whose solid samples stand on pristine ground all the way down; and a sample
-//! that an earlier search reached, which ended early itself. A component whose growth ends without either is loose.
+//! From each seed a component of solid samples grows, brick by brick and the lowest brick first. Two things end it
+//! early: a brick without any stored one below it, whose solid samples stand on pristine ground all the way down; and a
+//! sample that an earlier search reached, which ended early itself. A component whose growth ends without either is
+//! loose.
 //!
-//! Seeds are taken lowest brick first, and so are the bricks of a component. So it depends on the world alone what a search
-//! had reached when its budget ran out.
+//! Seeds are taken lowest brick first, and so are the bricks of a component. So it depends on the world alone what a
+//! search had reached when its budget ran out.
 
 use std::collections::BTreeMap;
 
@@ -102,8 +103,8 @@ fn take(left: &mut u64, some: u64, has_run_out: &mut bool) -> bool {
     rest.is_some()
 }
 
-/// Every loose component of at most `largest` samples that holds one of the seeds, in order of their seeds, as far as the
-/// budget goes.
+/// Every loose component of at most `largest` samples that holds one of the seeds, in order of their seeds, as far as
+/// the budget goes.
 pub(super) fn search(solid: &Solid, seeds: &Samples, largest: u64, budget: &mut Budget) -> Vec<Component> {
     let mut order: Vec<(BrickPos, &Layers)> = seeds.iter().map(|(&pos, layers)| (pos, layers)).collect();
     order.sort_unstable_by_key(|(pos, _)| pos.layer_order());

@@ -36,6 +36,15 @@ impl Bucket {
         Self { rate, left: i128::from(rate.burst) * SECOND, at: now }
     }
 
+    /// Lets it refill at another rate from now on.
+    pub fn set_rate(&mut self, now: Duration, rate: Rate) {
+        if rate != self.rate {
+            self.left(now);
+            self.rate = rate;
+            self.left(now);
+        }
+    }
+
     /// The amount that may be spent now. Times before the latest one count as the latest.
     pub fn left(&mut self, now: Duration) -> u64 {
         let passed = now.saturating_sub(self.at).as_nanos();
@@ -94,6 +103,17 @@ mod tests {
         bucket.charge(at(5), 30);
         assert!(!bucket.spend(at(6), 1) && bucket.left(at(7)) == 0);
         assert!(bucket.spend(at(8), 10) && !bucket.spend(at(8), 1));
+    }
+
+    #[test]
+    fn another_rate_begins_with_what_is_left() {
+        let at = Duration::from_secs;
+        let mut bucket = Bucket::new(Rate { per_second: 10, burst: 10 }, at(5));
+        assert!(bucket.spend(at(5), 10));
+        bucket.set_rate(at(6), Rate { per_second: 100, burst: 300 });
+        assert_eq!((bucket.left(at(6)), bucket.left(at(8))), (10, 210));
+        bucket.set_rate(at(8), Rate { per_second: 1, burst: 5 });
+        assert_eq!((bucket.left(at(8)), bucket.left(at(20))), (5, 5));
     }
 
     #[test]

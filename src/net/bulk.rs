@@ -1,7 +1,7 @@
 //! The bulk lane: a sequence of messages as one stream of bytes, which the server cuts into pieces according to its
 //! limits.
 
-use super::message::{MOST_TO_CLIENT, ToClient};
+use super::message::{MAX_TO_CLIENT, ToClient};
 use super::stamps::Stamps;
 use crate::format::FormatError;
 use crate::format::bytes::{Reader, put_bytes};
@@ -52,8 +52,8 @@ impl BulkReader {
             Err(FormatError::Truncated) => return Ok(None),
             Err(error) => return Err(error),
         };
-        if length > MOST_TO_CLIENT as u64 {
-            return Err(FormatError::TooLarge { length, limit: MOST_TO_CLIENT as u64 });
+        if length > MAX_TO_CLIENT as u64 {
+            return Err(FormatError::TooLarge { length, limit: MAX_TO_CLIENT as u64 });
         }
         let Ok(message) = reader.take(length as usize) else { return Ok(None) };
         let (message, left) = (message.to_vec(), reader.0.len());

@@ -31,7 +31,7 @@ const IMAGES: u8 = 6;
 const WELCOME: u8 = 0;
 const KICKED: u8 = 1;
 const ENTRIES: u8 = 2;
-const VOID: u8 = 3;
+const FAILED: u8 = 3;
 const REFUSED: u8 = 4;
 const HASHES: u8 = 5;
 const TABLE: u8 = 6;
@@ -41,7 +41,7 @@ pub(super) const PIECE: u8 = 9;
 /// The tag of a compressed message.
 const PACKED: u8 = 10;
 /// Most bytes of a compressed message after decompression, so that few bytes can't take much memory.
-const MOST_PACKED: usize = 64 << 10;
+const MAX_PACKED: usize = 64 << 10;
 const STREAM: u8 = 11;
 const GREET: u8 = 12;
 const IMAGE: u8 = 13;
@@ -70,15 +70,15 @@ const REFUSALS: [Refusal; 10] = [
     Refusal::UnknownStamp,
 ];
 
-const KICKS: [Kick; 8] = [
-    Kick::Protocol,
-    Kick::Simulation,
-    Kick::Ground,
-    Kick::ChunkSize,
-    Kick::Malformed,
-    Kick::Flood,
-    Kick::ByGame,
-    Kick::ConnectedAgain,
+const KICKS: [KickReason; 8] = [
+    KickReason::Protocol,
+    KickReason::Simulation,
+    KickReason::Ground,
+    KickReason::ChunkSize,
+    KickReason::Malformed,
+    KickReason::Flood,
+    KickReason::ByGame,
+    KickReason::ConnectedAgain,
 ];
 /// The tag of a reason chosen by the game.
 const REFUSED_BY_GAME: u8 = 255;
@@ -101,12 +101,12 @@ impl ToServer {
                 to.push(EDITS);
                 put_number(&mut to, *first);
                 put_number(&mut to, edits.len() as u64);
-                let mut sequence = EditSequence::default();
-                edits.iter().for_each(|edit| put_edit(&mut to, &[], edit, &mut sequence));
+                let mut coder = EditSequence::default();
+                edits.iter().for_each(|edit| put_edit(&mut to, &[], edit, &mut coder));
             }
-            Self::Undo { own, of } => {
+            Self::Undo { sequence, of } => {
                 to.push(UNDO);
-                put_number(&mut to, *own);
+                put_number(&mut to, *sequence);
                 put_number(&mut to, of.0);
             }
             Self::Fetch { number, regions } => {
@@ -142,33 +142,33 @@ impl ToServer {
     /// Reads a message from a client. Edits whose stamps have images that the list lacks get another image; their
     /// positions in the message are returned too.
     pub(super) fn read(bytes: &[u8], stamps: &Stamps) -> Result<(Self, Vec<usize>), FormatError> {
-        within(bytes.len(), MOST_TO_SERVER)?;
+        within(bytes.len(), MAX_TO_SERVER)?;
         let (mut reader, mut unknown) = (Reader(bytes), Vec::new());
         let message = match reader.byte()? {
             HELLO => Self::Hello(read_hello(&mut reader)?),
             GREETING => Self::Greeting { stream: reader.number()?, hello: read_hello(&mut reader)? },
             EDITS => {
                 let (first, count) = (reader.number()?, reader.count()?);
-                within(count, MOST_EDITS)?;
-                let (mut edits, mut sequence) = (Vec::with_capacity(count), EditSequence::default());
+                within(count, MAX_EDITS)?;
+                let (mut edits, mut coder) = (Vec::with_capacity(count), EditSequence::default());
                 for place in 0..count {
                     let head = reader.byte()?;
-                    let read = read_edit(&mut reader, head, stamps, &mut sequence, |_| Ok(()))?;
+                    let read = read_edit(&mut reader, head, stamps, &mut coder, |_| Ok(()))?;
                     unknown.extend(read.missing.map(|_| place));
                     edits.push(read.edit);
                 }
                 Self::Edits { first, edits }
             }
-            UNDO => Self::Undo { own: reader.number()?, of: ClientId(reader.number()?) },
+            UNDO => Self::Undo { sequence: reader.number()?, of: ClientId(reader.number()?) },
             FETCH => {
                 let number = reader.number()?;
-                let regions = read_regions(&mut reader, MOST_REGIONS, |_| Ok(()))?;
+                let regions = read_regions(&mut reader, MAX_REGIONS, |_| Ok(()))?;
                 Self::Fetch { number, regions: regions.into_iter().map(|(pos, ())| pos).collect() }
             }
             ACK => Self::Ack { bulk: reader.number()?, number: reader.number()? },
             IMAGES => {
                 let count = reader.count()?;
-                within(count, MOST_IMAGES)?;
+                within(count, MAX_IMAGES)?;
                 let image = |_| Ok(StampId(u64::from_le_bytes(reader.array()?)));
                 Self::Images { images: (0..count).map(image).collect::<Result<_, FormatError>>()? }
             }
@@ -209,7 +209,7 @@ impl ToClient {
                 to.push(WELCOME);
                 put_welcome(&mut to, welcome);
             }
-            Self::Kicked(Kick::Refused(reason)) => {
+            Self::Kicked(KickReason::Refused(reason)) => {
                 to.extend([KICKED, REFUSED_BY_GAME]);
                 put_number(&mut to, (*reason).into());
             }
@@ -218,16 +218,16 @@ impl ToClient {
                 to.push(ENTRIES);
                 put_number(&mut to, *first);
                 put_number(&mut to, entries.len() as u64);
-                let mut sequence = EditSequence::default();
-                entries.iter().for_each(|entry| put_entry(&mut to, entry, &mut sequence));
+                let mut coder = EditSequence::default();
+                entries.iter().for_each(|entry| put_entry(&mut to, entry, &mut coder));
             }
-            Self::Void { number } => {
-                to.push(VOID);
+            Self::Failed { number } => {
+                to.push(FAILED);
                 put_number(&mut to, *number);
             }
-            Self::Refused { own, why } => {
+            Self::Refused { sequence, why } => {
                 to.extend([REFUSED, place_in(&REFUSALS, why)]);
-                put_number(&mut to, *own);
+                put_number(&mut to, *sequence);
             }
             Self::Hashes { number, regions } => put_hashes(&mut to, HASHES, *number, regions),
             Self::Table { number, regions } => put_hashes(&mut to, TABLE, *number, regions),
@@ -274,18 +274,19 @@ impl ToClient {
         }
     }
 
-    /// Reads a message from a server. Stamps whose images the list lacks get another image; the names of these are returned too.
+    /// Reads a message from a server. Stamps whose images the list lacks get another image; the names of these are
+    /// returned too.
     pub(super) fn read(
         bytes: &[u8],
         ground: &Ground,
         stamps: &Stamps,
     ) -> Result<(Self, BTreeSet<StampId>), FormatError> {
-        within(bytes.len(), MOST_TO_CLIENT)?;
+        within(bytes.len(), MAX_TO_CLIENT)?;
         let (mut reader, mut missing) = (Reader(bytes), BTreeSet::new());
         let message = match reader.byte()? {
             WELCOME => Self::Welcome(read_welcome(&mut reader)?),
             KICKED => Self::Kicked(match reader.byte()? {
-                REFUSED_BY_GAME => Kick::Refused(small(&mut reader)?),
+                REFUSED_BY_GAME => KickReason::Refused(small(&mut reader)?),
                 place => at_place(&KICKS, place)?,
             }),
             ENTRIES => {
@@ -293,18 +294,18 @@ impl ToClient {
                 if first.checked_add(count as u64).is_none() {
                     return Err(FormatError::Invalid("number of an entry"));
                 }
-                let (mut entries, mut sequence) = (Vec::new(), EditSequence::default());
+                let (mut entries, mut coder) = (Vec::new(), EditSequence::default());
                 for _ in 0..count {
-                    let (entry, unknown) = read_entry(&mut reader, ground, stamps, &mut sequence)?;
+                    let (entry, unknown) = read_entry(&mut reader, ground, stamps, &mut coder)?;
                     missing.extend(unknown);
                     entries.push(entry);
                 }
                 Self::Entries(Entries { first, entries })
             }
-            VOID => Self::Void { number: reader.number()? },
+            FAILED => Self::Failed { number: reader.number()? },
             REFUSED => {
                 let why = at_place(&REFUSALS, reader.byte()?)?;
-                Self::Refused { own: reader.number()?, why }
+                Self::Refused { sequence: reader.number()?, why }
             }
             HASHES => Self::Hashes { number: reader.number()?, regions: read_hashes(&mut reader)? },
             TABLE => Self::Table { number: reader.number()?, regions: read_hashes(&mut reader)? },
@@ -365,6 +366,7 @@ fn flag(reader: &mut Reader) -> Result<bool, FormatError> {
 }
 
 fn place_in<T: PartialEq>(all: &[T], one: &T) -> u8 {
+    debug_assert!(all.contains(one), "a reason without a number");
     all.iter().position(|other| other == one).unwrap_or_default() as u8
 }
 
@@ -373,7 +375,7 @@ fn at_place<T: Copy>(all: &[T], place: u8) -> Result<T, FormatError> {
 }
 
 /// Appends an edit; `before` stands between its head and the rest.
-fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, sequence: &mut EditSequence) {
+fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, coder: &mut EditSequence) {
     let unnamed = edit.stamp_image().and_then(|image| {
         to.push(STAMP);
         to.extend_from_slice(&StampId::of(image).0.to_le_bytes());
@@ -382,7 +384,7 @@ fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, sequence: &mut EditSe
     let at = to.len();
     to.push(0);
     before.iter().for_each(|&number| put_number(to, number));
-    let head = sequence.put(to, unnamed.as_ref().unwrap_or(edit));
+    let head = coder.put(to, unnamed.as_ref().unwrap_or(edit));
     if let Some(place) = to.get_mut(at) {
         *place = head;
     }
@@ -402,13 +404,13 @@ fn read_edit<T>(
     reader: &mut Reader,
     head: u8,
     stamps: &Stamps,
-    sequence: &mut EditSequence,
+    coder: &mut EditSequence,
     before: impl FnOnce(&mut Reader) -> Result<T, FormatError>,
 ) -> Result<ReadEdit<T>, FormatError> {
     let stamp = (head == STAMP).then(|| reader.array().map(u64::from_le_bytes)).transpose()?;
     let head = if stamp.is_some() { reader.byte()? } else { head };
     let before = before(reader)?;
-    let edit = sequence.read(head, reader)?;
+    let edit = coder.read(head, reader)?;
     let (edit, missing) = match (stamp.map(StampId), edit.stamp_image()) {
         (None, None) => (edit, None),
         (Some(id), Some(_)) => match stamps.get(id) {
@@ -428,12 +430,12 @@ fn no_image() -> Option<Arc<GreyImage>> {
     GreyImage::from_samples(2, 2, vec![0; 4]).ok().map(Arc::new)
 }
 
-fn put_entry(to: &mut Vec<u8>, entry: &Entry, sequence: &mut EditSequence) {
+fn put_entry(to: &mut Vec<u8>, entry: &Entry, coder: &mut EditSequence) {
     let Entry::Order { by, order } = entry else { return to.push(MARK) };
     match order {
         Order::Edit(edit) => {
-            let (author, own) = by.unwrap_or((ClientId::SERVER, 0));
-            put_edit(to, &[author.0, own], edit, sequence);
+            let (author, sequence) = by.unwrap_or((ClientId::SERVER, 0));
+            put_edit(to, &[author.0, sequence], edit, coder);
         }
         Order::Rules(rules) => {
             to.push(RULES);
@@ -445,9 +447,9 @@ fn put_entry(to: &mut Vec<u8>, entry: &Entry, sequence: &mut EditSequence) {
         }
         Order::Parts { change, .. } => {
             to.extend([PARTS, by.is_some().into()]);
-            if let Some((client, own)) = by {
+            if let Some((client, sequence)) = by {
                 put_number(to, client.0);
-                put_number(to, *own);
+                put_number(to, *sequence);
             }
             put_change(to, change);
         }
@@ -468,12 +470,12 @@ pub(super) fn entry_bytes(entry: &Entry) -> usize {
 pub(super) struct OrderWriter {
     bytes: Vec<u8>,
     count: u64,
-    sequence: EditSequence,
+    coder: EditSequence,
 }
 
 impl OrderWriter {
     pub fn put(&mut self, entry: &Entry) {
-        put_entry(&mut self.bytes, entry, &mut self.sequence);
+        put_entry(&mut self.bytes, entry, &mut self.coder);
         self.count += 1;
     }
 
@@ -500,7 +502,7 @@ impl OrderWriter {
 
 /// Compresses a message to a client, if that makes it shorter.
 pub(super) fn pack(message: &[u8]) -> Vec<u8> {
-    if message.len() > MOST_PACKED {
+    if message.len() > MAX_PACKED {
         return message.to_vec();
     }
     let mut packed = vec![PACKED];
@@ -513,8 +515,8 @@ pub(super) fn pack(message: &[u8]) -> Vec<u8> {
 fn unpack(reader: &mut Reader) -> Result<Vec<u8>, FormatError> {
     let length = reader.number()?;
     let packed = std::mem::take(&mut reader.0);
-    if length > MOST_PACKED as u64 {
-        return Err(FormatError::TooLarge { length, limit: MOST_PACKED as u64 });
+    if length > MAX_PACKED as u64 {
+        return Err(FormatError::TooLarge { length, limit: MAX_PACKED as u64 });
     }
     let message = lz4_flex::block::decompress(packed, length as usize);
     message
@@ -527,7 +529,7 @@ fn read_entry(
     reader: &mut Reader,
     ground: &Ground,
     stamps: &Stamps,
-    sequence: &mut EditSequence,
+    coder: &mut EditSequence,
 ) -> Result<(Entry, Option<StampId>), FormatError> {
     let entry = match reader.byte()? {
         RULES => Entry::of_server(Order::Rules(read_rules(reader.bytes()?)?.map(Arc::new))),
@@ -545,9 +547,9 @@ fn read_entry(
         MARK => Entry::HashCheck,
         head => {
             let from = |reader: &mut Reader| Ok((ClientId(reader.number()?), reader.number()?));
-            let ReadEdit { before: (author, own), edit, missing } =
-                read_edit(reader, head, stamps, sequence, from)?;
-            return Ok((Entry::of(author, own, Order::Edit(edit)), missing));
+            let ReadEdit { before: (author, sequence), edit, missing } =
+                read_edit(reader, head, stamps, coder, from)?;
+            return Ok((Entry::of(author, sequence, Order::Edit(edit)), missing));
         }
     };
     Ok((entry, None))
@@ -575,36 +577,36 @@ fn epoch(reader: &mut Reader) -> Result<Epoch, FormatError> {
 fn put_welcome(to: &mut Vec<u8>, welcome: &Welcome) {
     put_number(to, welcome.client.0);
     put_epoch(to, &welcome.epoch);
-    put_number(to, welcome.own);
+    put_number(to, welcome.sequence);
     put_number(to, welcome.left);
     // No distance is as great as `u32::MAX + 1`.
     put_number(to, welcome.reach.map_or(0, |reach| u64::from(reach) + 1));
     welcome.cost.iter().for_each(|&number| put_number(to, number));
     match &welcome.join {
-        Join::Log { voids } => {
+        Join::Log { failed } => {
             to.push(LOG);
-            put_number(to, voids.len() as u64);
+            put_number(to, failed.len() as u64);
             let mut last = 0;
-            for &number in voids {
+            for &number in failed {
                 put_number(to, number.wrapping_sub(last));
                 last = number;
             }
         }
-        Join::Regions { regions, terms } => {
+        Join::Regions { regions, state } => {
             to.push(REGIONS);
             put_number(to, (*regions).into());
-            put_terms(to, terms);
+            put_rule_state(to, state);
         }
-        Join::Compare { terms } => {
+        Join::Compare { state } => {
             to.push(COMPARE);
-            put_terms(to, terms);
+            put_rule_state(to, state);
         }
     }
 }
 
 fn read_welcome(reader: &mut Reader) -> Result<Welcome, FormatError> {
     let (client, epoch) = (ClientId(reader.number()?), epoch(reader)?);
-    let (own, left) = (reader.number()?, reader.number()?);
+    let (sequence, left) = (reader.number()?, reader.number()?);
     let reach = match reader.number()? {
         0 => None,
         more => Some(u32::try_from(more - 1).map_err(|_| FormatError::Invalid("reach"))?),
@@ -612,30 +614,30 @@ fn read_welcome(reader: &mut Reader) -> Result<Welcome, FormatError> {
     let cost = [reader.number()?, reader.number()?];
     let join = match reader.byte()? {
         LOG => {
-            let (mut voids, mut last) = (Vec::new(), 0_u64);
+            let (mut failed, mut last) = (Vec::new(), 0_u64);
             for _ in 0..reader.count()? {
                 last = last.wrapping_add(reader.number()?);
-                voids.push(last);
+                failed.push(last);
             }
-            Join::Log { voids }
+            Join::Log { failed }
         }
-        REGIONS => Join::Regions { regions: small(reader)?, terms: read_terms(reader)? },
-        COMPARE => Join::Compare { terms: read_terms(reader)? },
+        REGIONS => Join::Regions { regions: small(reader)?, state: read_rule_state(reader)? },
+        COMPARE => Join::Compare { state: read_rule_state(reader)? },
         _ => return Err(FormatError::Invalid("way to join")),
     };
-    Ok(Welcome { client, epoch, own, reach, cost, left, join })
+    Ok(Welcome { client, epoch, sequence, reach, cost, left, join })
 }
 
-fn put_terms(to: &mut Vec<u8>, terms: &Terms) {
-    put_bytes(to, &plain::to_bytes(&terms.rules));
-    put_bytes(to, &plain::to_bytes(&terms.loose));
-    put_number(to, terms.next_field);
+fn put_rule_state(to: &mut Vec<u8>, state: &RuleState) {
+    put_bytes(to, &plain::to_bytes(&state.rules));
+    put_bytes(to, &plain::to_bytes(&state.loose));
+    put_number(to, state.next_field);
 }
 
-fn read_terms(reader: &mut Reader) -> Result<Box<Terms>, FormatError> {
+fn read_rule_state(reader: &mut Reader) -> Result<Box<RuleState>, FormatError> {
     let rules = read_rules(reader.bytes()?)?;
     let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
-    Ok(Box::new(Terms { rules, loose, next_field: reader.number()? }))
+    Ok(Box::new(RuleState { rules, loose, next_field: reader.number()? }))
 }
 
 /// Appends regions, each as the difference from the previous one, and a value for each.
@@ -698,11 +700,11 @@ mod tests {
 
     #[test]
     fn packed_messages_are_what_they_were() {
-        for count in [0, 1, 5, 1000, MOST_PACKED - 10, MOST_PACKED + 10] {
+        for count in [0, 1, 5, 1000, MAX_PACKED - 10, MAX_PACKED + 10] {
             let message = marks(count);
             let packed = pack(&message);
             assert!(packed.len() <= message.len());
-            assert_eq!(packed.len() < message.len(), (1000..=MOST_PACKED).contains(&count), "{count}");
+            assert_eq!(packed.len() < message.len(), (1000..=MAX_PACKED).contains(&count), "{count}");
             assert_eq!(read(&packed).expect("a message").to_bytes(), message);
         }
     }
@@ -717,10 +719,10 @@ mod tests {
         };
         let length = marks(1000).len() as u64;
         assert!(read(&with_length(length)).is_ok());
-        for wrong in [0, length - 1, length + 1, MOST_PACKED as u64] {
+        for wrong in [0, length - 1, length + 1, MAX_PACKED as u64] {
             assert!(matches!(read(&with_length(wrong)), Err(FormatError::Invalid(_))), "{wrong}");
         }
-        let too_long = read(&with_length(MOST_PACKED as u64 + 1));
+        let too_long = read(&with_length(MAX_PACKED as u64 + 1));
         assert!(matches!(too_long, Err(FormatError::TooLarge { .. })), "{too_long:?}");
         let mut twice = vec![PACKED];
         put_number(&mut twice, with_length(length).len() as u64);

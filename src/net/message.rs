@@ -22,8 +22,8 @@
 //! A client repeats its greeting until it is answered, and a server that does not know a connected client asks it to
 //! [greet](ToClient::Greet).
 //!
-//! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the pristine world
-//! after the entries 1 to n. All clients that have applied them in order have the same world.
+//! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the
+//! pristine world after the entries 1 to n. All clients that have applied them in order have the same world.
 
 use std::sync::Arc;
 
@@ -41,18 +41,18 @@ use crate::volume::{Brick, DiggingRules, Fields};
 pub const PROTOCOL: u32 = 3;
 
 /// Most bytes of a message to a server.
-pub const MOST_TO_SERVER: usize = 64 << 10;
+pub const MAX_TO_SERVER: usize = 64 << 10;
 /// Most bytes of a message to a client, in either lane.
-pub const MOST_TO_CLIENT: usize = 8 << 20;
+pub const MAX_TO_CLIENT: usize = 8 << 20;
 /// Most edits in a message.
-pub const MOST_EDITS: usize = 256;
+pub const MAX_EDITS: usize = 256;
 /// Most regions that a message names.
-pub const MOST_REGIONS: usize = 4096;
+pub const MAX_REGIONS: usize = 4096;
 /// Most images that a message asks for.
-pub const MOST_IMAGES: usize = 64;
-/// The most by which the number of a client's edit may exceed the previous one. Larger jumps are invalid, so no client
-/// can use up the numbers of a player.
-pub const MOST_OWN_JUMP: u64 = 1 << 16;
+pub const MAX_IMAGES: usize = 64;
+/// The most by which the sequence number of a client's edit may exceed the previous one. Larger jumps are invalid, so
+/// no client can use up the numbers of a player.
+pub const MAX_SEQUENCE_JUMP: u64 = 1 << 16;
 
 /// Identifies a player. The caller assigns these numbers: a client that reconnects with the same number is the same
 /// player. Small numbers take fewer bytes. Limits, undo and administrators depend on them, so the caller has to
@@ -78,9 +78,10 @@ pub enum Lane {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Entry {
-    /// Something that is asked of the world: an edit, other rules or settings of loose pieces, or parts that replace others.
+    /// Something that is asked of the world: an edit, other rules or settings of loose pieces, or parts that replace
+    /// others.
     Order {
-        /// The client that asked for it, and the number that it had there. `None` for the game's server; an edit of the
+        /// The client that asked for it, and its sequence number there. `None` for the game's server; an edit of the
         /// game's server has [`ClientId::SERVER`] here.
         by: Option<(ClientId, u64)>,
         /// The order. The tag of an edit is 0 and it has no stroke: these concern its author and the server.
@@ -92,8 +93,8 @@ pub enum Entry {
 
 impl Entry {
     /// An order of a client.
-    pub fn of(author: ClientId, own: u64, order: Order) -> Self {
-        Self::Order { by: Some((author, own)), order }
+    pub fn of(author: ClientId, sequence: u64, order: Order) -> Self {
+        Self::Order { by: Some((author, sequence)), order }
     }
 
     /// An order of the game's server.
@@ -116,10 +117,10 @@ impl Entry {
         if let Some(Order::Parts { change, .. }) = self.order() { Some(change) } else { None }
     }
 
-    /// The number that it had at a client, if that asked for it.
+    /// Its sequence number at a client, if that client asked for it.
     pub(crate) fn number_of(&self, client: Option<ClientId>) -> Option<u64> {
         match self {
-            Self::Order { by: Some((author, own)), .. } if Some(*author) == client => Some(*own),
+            Self::Order { by: Some((author, sequence)), .. } if Some(*author) == client => Some(*sequence),
             _ => None,
         }
     }
@@ -181,13 +182,13 @@ pub enum ToServer {
     Edits {
         /// The number of the first.
         first: u64,
-        /// At most [`MOST_EDITS`].
+        /// At most [`MAX_EDITS`].
         edits: Vec<Edit>,
     },
     /// Undoes the last stroke of a client before this position among its edits.
     Undo {
-        /// Its number among the client's edits and undos.
-        own: u64,
+        /// Its sequence number among the client's edits and undos.
+        sequence: u64,
         /// The player whose stroke is undone.
         of: ClientId,
     },
@@ -195,7 +196,7 @@ pub enum ToServer {
     Fetch {
         /// The number that the client's world is at.
         number: u64,
-        /// At most [`MOST_REGIONS`].
+        /// At most [`MAX_REGIONS`].
         regions: Vec<RegionPos>,
     },
     /// Acknowledges received data.
@@ -207,7 +208,7 @@ pub enum ToServer {
     },
     /// Asks for images of stamps that the client does not have.
     Images {
-        /// At most [`MOST_IMAGES`].
+        /// At most [`MAX_IMAGES`].
         images: Vec<StampId>,
     },
 }
@@ -219,26 +220,26 @@ pub enum Join {
     /// client without an [epoch](Hello::epoch) has the number 0: the pristine world, without rules.
     Log {
         /// The numbers of entries among them that the server could not apply: they do nothing.
-        voids: Vec<u64>,
+        failed: Vec<u64>,
     },
     /// All regions follow in the bulk lane. All others are pristine.
     Regions {
         /// How many.
         regions: u32,
         /// Rules, settings, names at the start.
-        terms: Box<Terms>,
+        state: Box<RuleState>,
     },
     /// The [table](ToClient::Table) of all regions follows in the bulk lane. The client fetches those that differ;
     /// regions that the table lacks are pristine.
     Compare {
         /// Rules, settings, names at the start.
-        terms: Box<Terms>,
+        state: Box<RuleState>,
     },
 }
 
 /// The state at a number in addition to bricks and fields.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Terms {
+pub struct RuleState {
     /// The rules.
     pub rules: Option<DiggingRules>,
     /// The settings of loose pieces.
@@ -255,8 +256,8 @@ pub struct Welcome {
     /// The world, the server's run, and the number n that the client starts from: entries after it follow in the order
     /// lane.
     pub epoch: Epoch,
-    /// The last number of the client's own edits that the server has seen. Those up to it have an entry, or were refused.
-    pub own: u64,
+    /// The client's last sequence number that the server has seen. Edits up to it have an entry, or were refused.
+    pub sequence: u64,
     /// How far from its player a client may dig, in voxels; `None` if that is not checked.
     pub reach: Option<u32>,
     /// The client's cost bucket: its refill each second, and the most that it holds. An edit costs 20, and 1 for
@@ -295,18 +296,18 @@ pub enum ToClient {
     /// The client is admitted.
     Welcome(Welcome),
     /// The server has removed the client.
-    Kicked(Kick),
+    Kicked(KickReason),
     /// Entries of the order.
     Entries(Entries),
     /// The server could not apply this entry: the regions that it reaches may differ.
-    Void {
+    Failed {
         /// The entry's number.
         number: u64,
     },
-    /// An edit or undo of the client that was refused.
+    /// The server refused an edit or undo of the client.
     Refused {
-        /// Its number there.
-        own: u64,
+        /// Its sequence number.
+        sequence: u64,
         /// Why.
         why: Refusal,
     },
@@ -384,7 +385,7 @@ pub enum Refusal {
 /// The reason why a server removes a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Kick {
+pub enum KickReason {
     /// It speaks another [`PROTOCOL`].
     #[error("client and server have different versions of the protocol")]
     Protocol,
@@ -409,7 +410,8 @@ pub enum Kick {
     /// The player has connected again, and plays over the new connection.
     #[error("the player has connected again")]
     ConnectedAgain,
-    /// The game [does not admit](super::Server::set_admission) the player. The number has a meaning for the game only, for example which text it shows.
+    /// The game [does not admit](super::Server::set_admission) the player. The number has a meaning for the game only,
+    /// for example which text it shows.
     #[error("refused by the game, reason {0}")]
     Refused(u32),
 }

@@ -1,8 +1,8 @@
 //! Multiplayer: one server owns the order of all edits, and clients show their own edits at once. Without Bevy and
 //! without a transport: bytes in, bytes out, and a clock that the caller provides.
 //!
-//! Edits are integers and their results are equal on every machine, so the order of edits is all that has to be sent. The
-//! [`Server`] numbers the edits of clients and sends them on before it has applied them itself.
+//! Edits are integers and their results are equal on every machine, so the order of edits is all that has to be sent.
+//! The [`Server`] numbers the edits of clients and sends them on before it has applied them itself.
 //!
 //! | file | what it holds |
 //! | --- | --- |
@@ -72,10 +72,12 @@ pub use bucket::Rate;
 #[doc(hidden)]
 pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
-pub use message::{ClientId, Kick, Lane, MOST_TO_SERVER, PROTOCOL, Refusal};
+#[doc(hidden)]
+pub use message::KickReason as Kick;
+pub use message::{ClientId, KickReason, Lane, MAX_TO_SERVER, PROTOCOL, Refusal};
 #[doc(hidden)]
 pub use message::{
-    Entries, Entry, Epoch, Hello, Join, MOST_OWN_JUMP, RegionContent, RegionHashes, Terms, ToClient,
+    Entries, Entry, Epoch, Hello, Join, MAX_SEQUENCE_JUMP, RegionContent, RegionHashes, RuleState, ToClient,
     ToServer, Welcome,
 };
 #[doc(hidden)]

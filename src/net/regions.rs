@@ -14,8 +14,8 @@ pub fn region_hash(world: &World, region: RegionPos) -> u64 {
     hash_with_names(world, region, world.region_hash(region))
 }
 
-/// The hashes of regions' samples, kept up to date with each patch. Otherwise a mark would hash all bricks of the regions that
-/// changed since the last one, in one tick.
+/// The hashes of regions' samples, kept up to date with each patch. Otherwise a mark would hash all bricks of the
+/// regions that changed since the last one, in one tick.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RegionSums(FxHashMap<RegionPos, u64>);
 

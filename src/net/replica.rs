@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
-use super::message::{Entry, Terms};
+use super::message::{Entry, RuleState};
 use super::never_shown;
 use super::regions::{RegionSums, Steps, chunks_of, touched_regions};
 use crate::brush::Edit;
@@ -37,10 +37,10 @@ pub struct ShownChange {
     pub hash: u64,
 }
 
-/// An own edit that has no number yet.
+/// An edit of this client that the server has not ordered yet.
 #[derive(Clone, Debug)]
 struct Pending {
-    own: u64,
+    sequence: u64,
     edit: Edit,
 }
 
@@ -52,7 +52,7 @@ pub(super) struct Applied {
     /// The regions that changed.
     pub regions: BTreeSet<RegionPos>,
     /// Whether an entry failed here that may succeed on other machines.
-    pub is_void: bool,
+    pub failed_locally: bool,
 }
 
 /// The confirmed and the shown world.
@@ -65,9 +65,9 @@ pub(super) struct Replica {
     /// The shown content where it differs from the confirmed one.
     predicted: Overlay,
     /// The sum of the hashes of all regions of the shown world.
-    samples: u64,
+    shown_regions_hash: u64,
     /// Difference from the confirmed world's hash at the last comparison.
-    more: u64,
+    hash_offset: u64,
     /// The greatest name that a field of what is shown has had.
     next_field: u64,
     /// The old content of those parts of the confirmed world that changed since the last comparison with the shown
@@ -77,7 +77,7 @@ pub(super) struct Replica {
     is_outdated: bool,
     /// Whether all changes of the confirmed world since the last comparison are outside the samples that pending edits
     /// read.
-    is_apart: bool,
+    changes_are_independent: bool,
     /// The number of last pending edits without a prediction.
     appended: usize,
     /// The shown world, while many edits are pending.
@@ -93,19 +93,19 @@ impl Replica {
     pub fn new(ground: Arc<Ground>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
         let mut confirmed = Terrain::new(ground, settings)?;
         never_shown(&mut confirmed);
-        let (samples, next_field) = (confirmed.world().regions_hash(), confirmed.world().next_field());
-        let (pending, predicted, before, is_outdated, is_apart) = Default::default();
+        let (shown_regions_hash, next_field) =
+            (confirmed.world().regions_hash(), confirmed.world().next_field());
         Ok(Self {
             confirmed,
-            pending,
+            pending: VecDeque::new(),
             sums: RegionSums::default(),
-            predicted,
-            samples,
-            more: 0,
+            predicted: Overlay::default(),
+            shown_regions_hash,
+            hash_offset: 0,
             next_field,
-            before,
-            is_outdated,
-            is_apart,
+            before: Overlay::default(),
+            is_outdated: false,
+            changes_are_independent: false,
             appended: 0,
             shown: None,
             drafts: 0,
@@ -119,8 +119,8 @@ impl Replica {
     }
 
     /// The present state in addition to bricks and fields.
-    pub fn terms(&self) -> Terms {
-        Terms {
+    pub fn rule_state(&self) -> RuleState {
+        RuleState {
             rules: self.confirmed.rules().cloned(),
             loose: self.confirmed.loose().copied(),
             next_field: self.world().next_field(),
@@ -129,7 +129,7 @@ impl Replica {
 
     /// The hash of the shown world after all returned changes.
     pub fn shown_hash(&self) -> u64 {
-        World::hash_of(self.world().ground().hash(), self.samples)
+        World::hash_of(self.world().ground().hash(), self.shown_regions_hash)
     }
 
     /// The [hash](super::region_hash) of a region of the confirmed world.
@@ -147,63 +147,66 @@ impl Replica {
         self.drafted
     }
 
-    /// Adds an own edit.
-    pub fn predict(&mut self, own: u64, edit: Edit) {
-        self.pending.push_back(Pending { own, edit });
+    /// Adds an edit of this client.
+    pub fn predict(&mut self, sequence: u64, edit: Edit) {
+        self.pending.push_back(Pending { sequence, edit });
         self.appended += 1;
         self.is_outdated |= self.pending.len() < MANY;
     }
 
-    /// The edit that is pending under a number.
-    pub fn pending_edit(&self, own: u64) -> Option<&Edit> {
-        let at = self.pending.binary_search_by_key(&own, |pending| pending.own).ok()?;
+    /// The pending edit with a sequence number.
+    pub fn pending_edit(&self, sequence: u64) -> Option<&Edit> {
+        let at = self.pending.binary_search_by_key(&sequence, |pending| pending.sequence).ok()?;
         self.pending.get(at).map(|pending| &pending.edit)
     }
 
-    /// The own edits that have no number yet.
+    /// The edits that the server has not ordered yet, with their sequence numbers.
     pub fn pending(&self) -> impl Iterator<Item = (u64, &Edit)> {
-        self.pending.iter().map(|pending| (pending.own, &pending.edit))
+        self.pending.iter().map(|pending| (pending.sequence, &pending.edit))
     }
 
-    /// Renumbers the own edits beyond `seen`, from the one after `last` on; returns the next number. `last` is not less than `seen`.
+    /// Renumbers the pending edits beyond `seen`, from the one after `last` on; returns the next number. `last` is not
+    /// less than `seen`.
     pub fn renumber(&mut self, seen: u64, last: u64) -> u64 {
         let mut next = last + 1;
-        for pending in self.pending.iter_mut().filter(|pending| pending.own > seen) {
-            pending.own = next;
+        for pending in self.pending.iter_mut().filter(|pending| pending.sequence > seen) {
+            pending.sequence = next;
             next += 1;
         }
         next
     }
 
-    /// Removes an own edit, for example after a refusal; returns it if it was pending.
-    pub fn take_back(&mut self, own: u64) -> Option<Edit> {
-        let at = self.pending.iter().position(|pending| pending.own == own)?;
+    /// Removes an edit, for example after a refusal; returns it if it was pending.
+    pub fn take_back(&mut self, sequence: u64) -> Option<Edit> {
+        let at = self.pending.iter().position(|pending| pending.sequence == sequence)?;
         self.is_outdated = true;
         self.appended = 0;
         self.pending.remove(at).map(|pending| pending.edit)
     }
 
-    /// Applies entries of the order. Own edits among them are no longer pending; `own` returns their numbers.
-    pub fn apply(&mut self, entries: &[Entry], own: impl Fn(&Entry) -> Option<u64>) -> Applied {
+    /// Applies entries of the order. This client's edits among them are no longer pending; `sequence_of`
+    /// returns their sequence numbers.
+    pub fn apply(&mut self, entries: &[Entry], sequence_of: impl Fn(&Entry) -> Option<u64>) -> Applied {
         // Those may be among them.
         self.is_outdated |= self.appended > 0;
         let (mut is_own, mut is_foreign) = (false, false);
         let next_field = self.world().next_field();
-        self.is_outdated |= self.is_apart && entries.iter().any(|entry| own(entry).is_some());
+        self.is_outdated |=
+            self.changes_are_independent && entries.iter().any(|entry| sequence_of(entry).is_some());
         for entry in entries {
             if let Some(order) = entry.order() {
                 // The server checked rules.
                 self.confirmed.submit(order);
             }
-            match own(entry) {
+            match sequence_of(entry) {
                 // What is shown contains it already.
-                Some(number) if self.pending.front().is_some_and(|first| first.own == number) => {
+                Some(number) if self.pending.front().is_some_and(|first| first.sequence == number) => {
                     self.pending.pop_front();
                     is_own = true;
                 }
                 Some(number) => {
                     self.is_outdated = true;
-                    self.pending.retain(|pending| pending.own != number);
+                    self.pending.retain(|pending| pending.sequence != number);
                 }
                 None if entry.edit().is_some() || entry.parts().is_some() => is_foreign = true,
                 None if entry.order().is_some() => {
@@ -218,8 +221,8 @@ impl Replica {
         let is_rejected = |receipt: &Receipt| receipt.asked == Asked::Edit && receipt.outcome.is_err();
         self.is_outdated |= applied.receipts.iter().any(is_rejected);
         if is_foreign && !self.is_outdated {
-            self.is_apart = !is_own && self.reads_nothing_of_before(next_field);
-            self.is_outdated = !self.is_apart;
+            self.changes_are_independent = !is_own && self.reads_nothing_of_before(next_field);
+            self.is_outdated = !self.changes_are_independent;
         }
         self.share();
         applied
@@ -239,7 +242,7 @@ impl Replica {
             self.sums.add(self.confirmed.world(), steps);
         }
         let mut parts = applied.receipts.iter().filter(|receipt| receipt.asked == Asked::Parts);
-        applied.is_void = parts.any(Receipt::is_local_failure);
+        applied.failed_locally = parts.any(Receipt::is_local_failure);
         applied
     }
 
@@ -249,11 +252,11 @@ impl Replica {
         let changed = self.before.bricks.keys().filter_map(|pos| Some((*pos, Arc::clone(shown(pos)?))));
         let changed: Vec<(BrickPos, Arc<Brick>)> = changed.collect();
         self.confirmed.share_bricks(changed.iter().map(|(pos, brick)| (*pos, brick)));
-        if self.is_outdated || self.is_apart {
+        if self.is_outdated || self.changes_are_independent {
             return;
         }
         // The shown world does not change: all changes were shown before.
-        self.more = self.samples.wrapping_sub(self.world().regions_hash());
+        self.hash_offset = self.shown_regions_hash.wrapping_sub(self.world().regions_hash());
         let before = std::mem::take(&mut self.before);
         let places = before.places();
         self.predicted.keep(before.patch(0));
@@ -274,19 +277,19 @@ impl Replica {
         }
     }
 
-    /// Continues from another position of an order with the terms there, either with the present world or from the
-    /// pristine one.
+    /// Continues from another position of an order with the rules and settings there, either with the present world or
+    /// from the pristine one.
     ///
     /// # Errors
-    /// When the terms are invalid.
-    pub fn restart(&mut self, terms: &Terms, keeps_world: bool) -> Result<(), RestoreError> {
+    /// When the rules or settings are invalid.
+    pub fn restart(&mut self, state: &RuleState, keeps_world: bool) -> Result<(), RestoreError> {
         let WorldParts { change, chunk_size, .. } = self.confirmed.parts();
         if !keeps_world {
             self.before.keep(change.inverse(self.confirmed.world()));
         }
         let kept = if keeps_world { change } else { Patch::default() };
-        let change = Patch { next_field: terms.next_field, ..kept };
-        let (rules, loose) = (terms.rules.clone(), terms.loose);
+        let change = Patch { next_field: state.next_field, ..kept };
+        let (rules, loose) = (state.rules.clone(), state.loose);
         let parts = WorldParts { change, chunk_size, revision: 0, rules, loose };
         let settings = TerrainSettings { chunk_size, voxel_size: self.confirmed.voxel_size() };
         self.confirmed = Terrain::restore(self.confirmed.world().shared_ground(), &settings, parts)?;
@@ -334,7 +337,7 @@ impl Replica {
         let reads: Vec<LatticeBox> = self.pending.iter().filter_map(|pending| reads(&pending.edit)).collect();
         let chunks: BTreeSet<ChunkPos> =
             reads.iter().flat_map(|samples| world.grid().chunks_of(*samples)).collect();
-        let is_read = |pos: &BrickPos| reads.iter().any(|own| own.intersection(pos.samples()).is_some());
+        let is_read = |pos: &BrickPos| reads.iter().any(|read| read.intersection(pos.samples()).is_some());
         self.before
             .fields
             .keys()
@@ -368,7 +371,7 @@ impl Replica {
 
     /// Whether the last pending edits can be predicted alone, as long as no entries are applied.
     pub fn can_append(&self) -> bool {
-        self.appended > 0 && !self.is_outdated && !self.is_apart
+        self.appended > 0 && !self.is_outdated && !self.changes_are_independent
     }
 
     /// Predicts the last pending edits over the shown world. `None` if that world can't be built.
@@ -393,8 +396,9 @@ impl Replica {
         let world = self.confirmed.world();
         self.predicted.lay(&change);
         self.predicted.forget(world, &change.places());
-        (self.samples, self.next_field) = (shown.world().regions_hash(), shown.world().next_field());
-        self.more = self.samples.wrapping_sub(world.regions_hash());
+        (self.shown_regions_hash, self.next_field) =
+            (shown.world().regions_hash(), shown.world().next_field());
+        self.hash_offset = self.shown_regions_hash.wrapping_sub(world.regions_hash());
         change.next_field = self.next_field;
         let is_empty = change.is_empty();
         let hash = self.shown_hash();
@@ -411,14 +415,14 @@ impl Replica {
     }
 
     fn update_all(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
-        if self.is_apart && !self.is_outdated {
-            self.is_apart = false;
+        if self.changes_are_independent && !self.is_outdated {
+            self.changes_are_independent = false;
             return (self.follow_apart(), None);
         }
         if !self.is_outdated {
             return (None, None);
         }
-        (self.is_outdated, self.is_apart) = (false, false);
+        (self.is_outdated, self.changes_are_independent) = (false, false);
         self.drafts += u64::from(!self.pending.is_empty());
         (self.appended, self.drafted) = (0, self.drafted + self.pending.len() as u64);
         let edits: Vec<Edit> = self.pending.iter().map(|pending| pending.edit.clone()).collect();
@@ -433,12 +437,12 @@ impl Replica {
         let change = Patch::between(&shown, &predicted.over(world), places, draft.change.next_field);
         // Of equal bricks the one that is shown stays, so that it is held once.
         for (pos, brick) in &mut predicted.bricks {
-            if change.bricks.binary_search_by_key(pos, |own| own.0).is_err() {
+            if change.bricks.binary_search_by_key(pos, |(at, _)| *at).is_err() {
                 *brick = shown.brick(*pos).cloned();
             }
         }
-        self.more = draft.regions_hash.wrapping_sub(world.regions_hash());
-        (self.predicted, self.samples) = (predicted, draft.regions_hash);
+        self.hash_offset = draft.regions_hash.wrapping_sub(world.regions_hash());
+        (self.predicted, self.shown_regions_hash) = (predicted, draft.regions_hash);
         self.next_field = change.next_field;
         let is_empty = change.is_empty();
         let shown = (!is_empty).then_some(ShownChange { change, hash: draft.hash });
@@ -449,7 +453,7 @@ impl Replica {
     /// stay.
     fn follow_apart(&mut self) -> Option<ShownChange> {
         let before = std::mem::take(&mut self.before);
-        self.samples = self.world().regions_hash().wrapping_add(self.more);
+        self.shown_regions_hash = self.world().regions_hash().wrapping_add(self.hash_offset);
         let (hash, world) = (self.shown_hash(), self.confirmed.world());
         self.next_field = self.next_field.max(world.next_field());
         let change = Patch::between(&before.over(world), world, before.places(), self.next_field);

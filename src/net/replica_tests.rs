@@ -146,7 +146,8 @@ impl Play {
 
     /// Gives the replica some entries, and checks whether it has to do anything.
     fn give(&mut self, count: usize) {
-        let was_outdated = self.replica.is_outdated || self.replica.is_apart || self.replica.appended > 0;
+        let was_outdated =
+            self.replica.is_outdated || self.replica.changes_are_independent || self.replica.appended > 0;
         let batch = &self.order[self.given..self.order.len().min(self.given + count)];
         let mut pending: VecDeque<u64> = self.replica.pending().map(|(own, _)| own).collect();
         let is_echo = |entry: &Entry| match own_number(entry) {
@@ -159,7 +160,7 @@ impl Play {
         let edits = batch.iter().filter(|entry| entry.edit().is_some()).count();
         let parts = batch.iter().filter(|entry| entry.parts().is_some()).count();
         assert_eq!(applied.receipts.len(), edits + parts);
-        assert!(!applied.is_void);
+        assert!(!applied.failed_locally);
         if is_quiet && !was_outdated && applied.receipts.iter().all(|receipt| receipt.outcome.is_ok()) {
             let (change, receipts) = self.replica.update();
             assert!(change.is_none() && receipts.is_none(), "what was predicted came");

@@ -27,8 +27,8 @@ impl StampId {
     }
 }
 
-/// The images that stamps may have. A client sends no edits with other images, and a server refuses them. Clients that lack an image
-/// of the server get it at its first use, so only players that use stamps need their own images.
+/// The images that stamps may have. A client sends no edits with other images, and a server refuses them. Clients that
+/// lack an image of the server get it at its first use, so only players that use stamps need their own images.
 #[derive(Clone, Debug, Default)]
 pub struct Stamps(FxHashMap<StampId, Arc<GreyImage>>);
 

@@ -31,6 +31,8 @@ mod look_section;
 mod open_level;
 mod operations;
 mod picture;
+#[cfg(feature = "scatter")]
+mod plants_section;
 mod plot;
 mod rules_section;
 mod state;
@@ -216,6 +218,7 @@ fn draw(
     terrains: Query<(Entity, &Terrain)>,
     parts: Query<(Option<&Name>, Option<&MaterialColors>, Option<&LooseGround>, Option<&GroundLook>)>,
     mut places: ResMut<PanelPlaces>,
+    #[cfg(feature = "scatter")] plants: Query<(&crate::plants::Plants, &crate::plants::ShownPlants)>,
     #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,
     mut commands: Commands,
@@ -237,6 +240,11 @@ fn draw(
             TerrainControls::of(terrain, part.and_then(|part| part.2), part.and_then(|part| part.3))
         },
     );
+    #[cfg(feature = "scatter")]
+    let plants = chosen.and_then(|entity| plants.get(entity).ok());
+    #[cfg(feature = "scatter")]
+    let controls =
+        TerrainControls { plants: plants.map(|(crate::plants::Plants(rules), _)| rules.clone()), ..controls };
     let mut lines: Vec<TerrainLine> = terrains
         .iter()
         .map(|(entity, terrain)| {
@@ -258,6 +266,8 @@ fn draw(
         survey: &survey,
         settings: &mut new_settings,
         controls: &mut new_controls,
+        #[cfg(feature = "scatter")]
+        plants: plants.map(|(_, shown)| shown),
         materials: &materials,
         actions: &mut pressed,
     };
@@ -345,8 +355,8 @@ fn fold_one(context: &egui::Context, are_two: bool) {
     }
 }
 
-/// A framed column along one side of the window, at most as high as the window. A click on its title folds it. The head stays
-/// in sight, and the content scrolls below it.
+/// A framed column along one side of the window, at most as high as the window. A click on its title folds it. The head
+/// stays in sight, and the content scrolls below it.
 fn column<T>(
     context: &egui::Context,
     id: &'static str,

@@ -28,8 +28,8 @@ impl Line {
     }
 }
 
-/// Draws a line chart over the full width, the newest value at the right, below a line with `label` and `now`. The vertical range is from
-/// 0 to the largest value or `least_top`.
+/// Draws a line chart over the full width, the newest value at the right, below a line with `label` and `now`. The
+/// vertical range is from 0 to the largest value or `least_top`.
 pub fn line(
     ui: &mut Ui,
     values: impl ExactSizeIterator<Item = f32>,

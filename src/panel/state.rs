@@ -19,7 +19,8 @@ pub struct BurrowPanel {
     pub shows_brush: bool,
     /// Whether the right column, terrain and statistics, is shown.
     pub shows_world: bool,
-    /// Whether that column has buttons for files. A game that saves its worlds itself hides them: they replace the terrain.
+    /// Whether that column has buttons for files. A game that saves its worlds itself hides them: they replace the
+    /// terrain.
     pub shows_files: bool,
     /// The terrain that the right column shows. Without one, or if it is gone, that is the first terrain.
     pub terrain: Option<Entity>,
@@ -115,13 +116,13 @@ pub enum PanelAction {
     Redo,
     /// Saves a screenshot of the camera that draws the panel, including the panel.
     SavePicture,
-    /// Saves the terrain as a [level](crate::format::Level) in a task: where it was opened from or saved last, or else in the
-    /// [folder](BurrowPanel::level). Asks before another level is replaced.
+    /// Saves the terrain as a [level](crate::format::Level) in a task: where it was opened from or saved last, or else
+    /// in the [folder](BurrowPanel::level). Asks before another level is replaced.
     SaveLevel,
     /// Saves the terrain as a level in the [folder](BurrowPanel::level). Asks before another level is replaced.
     SaveLevelAs,
-    /// Puts the level of that folder, or packed file, in the terrain's place; it must have been made on the same ground. Asks
-    /// before unsaved changes are lost.
+    /// Puts the level of that folder, or packed file, in the terrain's place; it must have been made on the same
+    /// ground. Asks before unsaved changes are lost.
     LoadLevel,
     /// Puts the ground without any edits in the terrain's place. Asks before unsaved changes are lost.
     NewLevel,

@@ -18,13 +18,15 @@ pub struct TerrainControls {
     pub undo_budget: usize,
     pub loose: Option<LooseGround>,
     pub look: Option<GroundLook>,
+    #[cfg(feature = "scatter")]
+    pub plants: Option<crate::scatter::ScatterRules>,
 }
 
 impl TerrainControls {
     pub fn of(terrain: &Terrain, loose: Option<&LooseGround>, look: Option<&GroundLook>) -> Self {
         let rules = terrain.rules().cloned().unwrap_or_default();
         let undo_budget = terrain.undo_budget();
-        Self { rules, undo_budget, loose: loose.copied(), look: look.cloned() }
+        Self { rules, undo_budget, loose: loose.copied(), look: look.cloned(), ..Self::default() }
     }
 
     /// Applies the settings that differ from `before` to the terrain.
@@ -38,6 +40,10 @@ impl TerrainControls {
         }
         if let Some(look) = self.look.filter(|look| before.look.as_ref() != Some(look)) {
             terrain.try_insert(look);
+        }
+        #[cfg(feature = "scatter")]
+        if let Some(plants) = self.plants.filter(|plants| before.plants.as_ref() != Some(plants)) {
+            terrain.try_insert(crate::plants::Plants(plants));
         }
         if self.rules != before.rules {
             terrain.queue_silenced(move |mut terrain: EntityWorldMut| {
@@ -83,14 +89,33 @@ mod tests {
         let rules = DiggingRules::default().with_bedrock(i32::MIN).with_hardness(MaterialId(3), 9);
         let loose = Some(LooseGround { crumbs: 5, ..LooseGround::default() });
         let steps = [
-            TerrainControls { rules: rules.clone(), undo_budget: 5 << 20, loose: None, look: look.clone() },
-            TerrainControls { rules: rules.clone(), undo_budget: 6 << 20, loose: None, look: look.clone() },
-            TerrainControls { rules: rules.clone(), undo_budget: 6 << 20, loose, look: look.clone() },
+            TerrainControls {
+                rules: rules.clone(),
+                undo_budget: 5 << 20,
+                loose: None,
+                look: look.clone(),
+                ..Default::default()
+            },
+            TerrainControls {
+                rules: rules.clone(),
+                undo_budget: 6 << 20,
+                loose: None,
+                look: look.clone(),
+                ..Default::default()
+            },
+            TerrainControls {
+                rules: rules.clone(),
+                undo_budget: 6 << 20,
+                loose,
+                look: look.clone(),
+                ..Default::default()
+            },
             TerrainControls {
                 rules: DiggingRules::default(),
                 undo_budget: 6 << 20,
                 loose,
                 look: look.clone(),
+                ..Default::default()
             },
             TerrainControls {
                 look: Some(GroundLook { variety: 0.25, ..GroundLook::default() }),

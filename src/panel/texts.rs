@@ -47,6 +47,12 @@ pub const OPERATIONS: [(&str, &str); 11] = [
 /// The shapes, in the order of `ToolShape`.
 pub const SHAPES: [&str; 6] = ["Sphere", "Box", "Cylinder", "Capsule", "Cone", "Torus"];
 
+// The plants of a terrain.
+texts! {
+    PLANTS = "Plants", PLANTS_STANDING = "Standing nearby", PLANTS_DENSITY = "Density",
+    PLANTS_SPACING = "Spacing", PLANTS_DISTANCE = "Distance",
+}
+
 // Files, and questions about them.
 texts! {
     NEW = "New", NEW_HELP = "Starts again from the ground without any edits", OPEN = "Open",

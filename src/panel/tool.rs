@@ -218,8 +218,8 @@ impl BrushTool {
         if self.operation.fits(self.shape) { self.shape } else { ToolShape::Sphere }
     }
 
-    /// The height of a stamp above the ground at a place in its square, for a preview: `u` and `v` go from -1 to 1. `None` for
-    /// other operations.
+    /// The height of a stamp above the ground at a place in its square, for a preview: `u` and `v` go from -1 to 1.
+    /// `None` for other operations.
     pub fn stamp_height(&self, u: f32, v: f32) -> Option<f32> {
         let image = self.stamp.image().filter(|_| self.operation == ToolOperation::Stamp)?;
         let at = |part: f32, samples: u32| {

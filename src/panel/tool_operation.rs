@@ -25,7 +25,8 @@ pub enum ToolOperation {
     Raise,
     /// Moves the surface inwards by [`BrushTool::amount`](super::BrushTool::amount).
     Lower,
-    /// Presses the image [`BrushTool::stamp`](super::BrushTool::stamp) onto the ground, with a height of [`BrushTool::amount`](super::BrushTool::amount).
+    /// Presses the image [`BrushTool::stamp`](super::BrushTool::stamp) onto the ground, with a height of
+    /// [`BrushTool::amount`](super::BrushTool::amount).
     Stamp,
     /// Cuts slopes into terraces of height [`BrushTool::step`](super::BrushTool::step).
     Terrace,

@@ -30,6 +30,8 @@ pub struct Content<'a> {
     pub survey: &'a Survey,
     pub settings: &'a mut BurrowSettings,
     pub controls: &'a mut TerrainControls,
+    #[cfg(feature = "scatter")]
+    pub plants: Option<&'a crate::plants::ShownPlants>,
     pub materials: &'a [(Color32, String)],
     pub actions: &'a mut Vec<PanelAction>,
 }
@@ -53,6 +55,10 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
         rules_section::show(ui, content.controls, &mut panel.material, content.materials, voxel);
         if let Some(look) = &mut content.controls.look {
             look_section::show(ui, look);
+        }
+        #[cfg(feature = "scatter")]
+        if let Some(rules) = &mut content.controls.plants {
+            super::plants_section::show(ui, rules, content.plants);
         }
     }
     let undo_budget = chosen.is_some().then_some(&mut content.controls.undo_budget);

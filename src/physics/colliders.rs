@@ -17,13 +17,13 @@ use super::shape::GroundShape;
 use super::wake::{GroundChange, GroundChanges};
 use crate::plugin::{CommitAction, Part, Places, ShownSurface, SurfaceProcessor};
 use crate::surface::SurfaceMesh;
-use crate::terrain::Drawn;
+use crate::terrain::MeshKey;
 
 /// State shared by tasks and the main thread.
 #[derive(Default)]
 struct Shared {
     near: RwLock<Neighbourhood>,
-    shapes: RwLock<HashMap<(Entity, Drawn), Arc<GroundShape>>>,
+    shapes: RwLock<HashMap<(Entity, MeshKey), Arc<GroundShape>>>,
     /// How many more colliders panic while they are built.
     #[cfg(test)]
     panics: std::sync::atomic::AtomicU32,
@@ -48,7 +48,7 @@ impl GroundColliders {
         shapes.get(&(part.terrain, part.drawn)).cloned()
     }
 
-    fn has_shape(&self, terrain: Entity, drawn: Drawn) -> bool {
+    fn has_shape(&self, terrain: Entity, drawn: MeshKey) -> bool {
         let shapes = self.0.shapes.read().unwrap_or_else(PoisonError::into_inner);
         shapes.contains_key(&(terrain, drawn))
     }
@@ -94,7 +94,7 @@ impl SurfaceProcessor for GroundColliders {
         let near = self.0.near.read().unwrap_or_else(PoisonError::into_inner);
         let tile = part.drawn.tile();
         let has_shape = |drawn| self.has_shape(part.terrain, drawn);
-        let stays = || has_shape(part.drawn) || has_shape(Drawn::Tile(tile));
+        let stays = || has_shape(part.drawn) || has_shape(MeshKey::Tile(tile));
         near.distance((part.terrain, tile)).is_some_and(|distance| distance <= 0.0 || stays())
     }
 

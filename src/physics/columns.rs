@@ -8,15 +8,15 @@ use bevy::prelude::*;
 use super::ground::GroundCollider;
 use crate::lattice::TilePos;
 use crate::plugin::{Chunk, ShownSurface, Tile};
-use crate::terrain::Drawn;
+use crate::terrain::MeshKey;
 
 /// A column of chunks of a terrain's entity.
 pub(super) type ColumnKey = (Entity, TilePos);
 
 /// Which tile or chunk an entity is; none if it is a coarser tile.
-fn drawn(tile: Option<&Tile>, chunk: Option<&Chunk>) -> Option<Drawn> {
-    let tile = tile.filter(|tile| tile.level == 0).map(|&tile| Drawn::Tile(tile.into()));
-    tile.or_else(|| chunk.map(|&chunk| Drawn::Chunk(chunk.into())))
+fn drawn(tile: Option<&Tile>, chunk: Option<&Chunk>) -> Option<MeshKey> {
+    let tile = tile.filter(|tile| tile.level == 0).map(|&tile| MeshKey::Tile(tile.into()));
+    tile.or_else(|| chunk.map(|&chunk| MeshKey::Chunk(chunk.into())))
 }
 
 /// Tiles and chunks that show a surface, and the colliders they have.
@@ -45,9 +45,9 @@ pub(super) struct PartState {
 /// The parts of a column, as of the last check.
 #[derive(Default)]
 struct ColumnState {
-    parts: Vec<(Entity, Drawn)>,
+    parts: Vec<(Entity, MeshKey)>,
     colliders: usize,
-    missing: Vec<(Entity, Drawn)>,
+    missing: Vec<(Entity, MeshKey)>,
     is_ready: bool,
 }
 
@@ -152,7 +152,7 @@ impl Columns {
     }
 
     /// The tiles and chunks of a terrain that miss a collider.
-    pub fn missing(&self, terrain: Entity) -> impl Iterator<Item = (TilePos, Entity, Drawn)> {
+    pub fn missing(&self, terrain: Entity) -> impl Iterator<Item = (TilePos, Entity, MeshKey)> {
         let columns = self.waiting.get(&terrain).into_iter().flatten();
         columns.flat_map(move |&tile| {
             let missing = self.states.get(&(terrain, tile)).map_or(&[][..], |state| &state.missing);

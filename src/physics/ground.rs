@@ -3,7 +3,7 @@
 use avian3d::prelude::*;
 use bevy::prelude::*;
 
-use crate::terrain::Drawn;
+use crate::terrain::MeshKey;
 
 /// Marks a tile or chunk whose collider was made. The collider is on a child with a [`GroundBody`]; a surface without
 /// triangles has none.
@@ -22,7 +22,7 @@ pub struct GroundBody {
     /// The terrain's entity.
     pub terrain: Entity,
     /// Which tile or chunk of the terrain it is.
-    pub drawn: Drawn,
+    pub drawn: MeshKey,
 }
 
 /// The contact properties of ground, for all terrains without a [`TerrainContact`]. A change applies to each collider when

@@ -308,7 +308,7 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape as BrushShape};
     use crate::ground::{Ground, MaterialId};
-    use crate::terrain::{Drawn, Terrain, TerrainSettings};
+    use crate::terrain::{MeshKey, Terrain, TerrainSettings};
 
     /// How steep the roof's slopes are: rise over run.
     const PITCH: f64 = 0.5;
@@ -324,7 +324,7 @@ mod tests {
         let mut found = Vec::new();
         for tile in world.grid().tiles() {
             let shape = GroundShape::new(&world.tile_mesh(tile), 1.0).expect("it has triangles");
-            let ridge = (ridge - world.origin(Drawn::Tile(tile)).x) as f32;
+            let ridge = (ridge - world.origin(MeshKey::Tile(tile)).x) as f32;
             for number in 0..shape.triangles() as u32 {
                 let triangle = shape.triangle(number);
                 let cone = shape.cone(number, &triangle).expect("it has a normal");
@@ -376,7 +376,7 @@ mod tests {
         let ground = Ground::from_fn(32, 32, |x, z| 10.0 + f64::from((x * 7 + z * 3) % 5)).expect("valid");
         let settings = TerrainSettings { chunk_size: 16, voxel_size: 1.0 };
         let mut terrain = Terrain::new(ground, &settings).expect("valid");
-        let shapes = |terrain: &Terrain| -> Vec<(Drawn, GroundShape)> {
+        let shapes = |terrain: &Terrain| -> Vec<(MeshKey, GroundShape)> {
             let world = terrain.world();
             let meshes =
                 world.drawn().filter_map(|(drawn, mesh)| Some((drawn, GroundShape::new(&mesh, 1.0)?)));
@@ -389,7 +389,8 @@ mod tests {
             let dig = if rng.bool() { Brush::dig(ball) } else { Brush::add(ball, MaterialId(1)) };
             terrain.apply([dig]);
             let after = shapes(&terrain);
-            let find = |all: &[(Drawn, GroundShape)], drawn: Drawn| all.iter().position(|own| own.0 == drawn);
+            let find =
+                |all: &[(MeshKey, GroundShape)], drawn: MeshKey| all.iter().position(|own| own.0 == drawn);
             for &(drawn, _) in before.iter().chain(&after) {
                 let old = find(&before, drawn).map(|at| &before[at].1);
                 let new = find(&after, drawn).map(|at| &after[at].1);

@@ -13,7 +13,7 @@ use super::character::CharacterMotion;
 use super::solids::Solids;
 use super::{GroundBody, PhysicsFigures, TerrainPhysicsDisabled};
 use crate::plugin::TerrainEntities;
-use crate::terrain::{Drawn, Terrain, World as TerrainWorld};
+use crate::terrain::{MeshKey, Terrain, World as TerrainWorld};
 
 /// Bodies within this distance of a change are woken, in metres.
 const NEAR: f32 = 0.2;
@@ -64,12 +64,12 @@ impl GroundChange {
 #[derive(Resource, Default)]
 pub(super) struct GroundChanges {
     boxes: Vec<GroundChange>,
-    numbers: HashMap<(Entity, Drawn), usize>,
+    numbers: HashMap<(Entity, MeshKey), usize>,
 }
 
 impl GroundChanges {
     /// Adds a change of one tile or chunk of its terrain.
-    pub fn add(&mut self, drawn: Drawn, change: GroundChange) {
+    pub fn add(&mut self, drawn: MeshKey, change: GroundChange) {
         let number = *self.numbers.entry((change.terrain, drawn)).or_insert(self.boxes.len());
         match self.boxes.get_mut(number) {
             Some(known) => (known.low, known.high) = (known.low.min(change.low), known.high.max(change.high)),

@@ -18,8 +18,8 @@ use crate::lattice::ChunkGrid;
 use crate::terrain::{Asked, Order, Receipt, Rejection, Request, ReturnedPiece, Terrain, Together, unique};
 use crate::threads::free_later;
 
-/// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected at
-/// once, and so is a brush that reaches no terrain. Edits of a terrain with an [`EditOutbox`] are put there instead.
+/// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected
+/// at once, and so is a brush that reaches no terrain. Edits of a terrain with an [`EditOutbox`] are put there instead.
 pub(super) fn collect_brushes(
     mut requests: Requests,
     mut terrains: Query<(Entity, &mut Terrain, Option<&LooseGround>, Option<&mut EditOutbox>)>,

@@ -14,17 +14,21 @@ use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive
 use super::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
 use super::load::Loading;
 use super::lod_state::{LodState, ShownLevels, WantedTiles, Watchers};
-use super::meshes::{BuiltMesh, VertexExtras};
+use super::meshes::{BuiltMesh, VertexExtras, VertexKind};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface};
 use super::reports::{Report, Reports};
 use super::same_frame::SameFrame;
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
-    LoosePieceFound, MaterialColors, SlimVertices,
+    LoosePieceFound, MaterialColors, SkyLight, SlimVertices,
 };
 use crate::lattice::ChunkPos;
-use crate::terrain::{Asked, Drawn, FieldChange, Receipt, Rejection, Terrain, World as TerrainWorld};
+#[cfg(feature = "scatter")]
+use crate::lattice::LatticeBox;
+#[cfg(feature = "scatter")]
+use crate::terrain::Version;
+use crate::terrain::{Asked, FieldChange, MeshKey, Receipt, Rejection, Terrain, World as TerrainWorld};
 use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
@@ -36,7 +40,7 @@ pub(super) fn begin_transactions(
             &mut Terrain,
             &TerrainEntities,
             Option<&MaterialColors>,
-            Has<SlimVertices>,
+            (Has<SlimVertices>, Option<&SkyLight>),
             Option<&mut LodState>,
         ),
         (Without<Loading>, Without<InFlight>, Without<Held>),
@@ -49,13 +53,14 @@ pub(super) fn begin_transactions(
     mut same_frame: ResMut<SameFrame>,
 ) {
     let start = Instant::now();
-    for (entity, mut terrain, entities, colors, is_slim, levels) in &mut terrains {
+    for (entity, mut terrain, entities, colors, (is_slim, sky_light), levels) in &mut terrains {
         // The game moved a terrain here while a task of another entity ran for it.
         if terrain.waits_for_plugin() {
             terrain.abandon();
         }
         // Changes that the game made itself are shown first.
-        if terrain.queued() == 0 || !entities.show(terrain.world()) || entities.is_slim != is_slim {
+        let kind = VertexKind::of(is_slim, sky_light);
+        if terrain.queued() == 0 || !entities.show(terrain.world()) || entities.vertices != kind {
             continue;
         }
         let work = terrain.waiting_work();
@@ -66,8 +71,8 @@ pub(super) fn begin_transactions(
             levels.count_edit();
         }
         let engine = terrain.engine().unwrap_or(&engine).clone();
-        let extras = VertexExtras::of(colors, is_slim);
-        let mut builder = build.edit_builder((entity, &terrain), extras);
+        let extras = VertexExtras::of(colors, kind);
+        let mut builder = build.builder((entity, &terrain), extras);
         builder.revision += 1;
         let task = InFlight::transaction(counter.next(), entity, transaction, engine, builder);
         commands.entity(entity).try_insert(task);
@@ -94,6 +99,19 @@ pub(super) struct CommitMessages<'w> {
     receipts: MessageWriter<'w, BrushApplied>,
     history: HistoryMessages<'w>,
     found: MessageWriter<'w, LoosePieceFound>,
+    #[cfg(feature = "scatter")]
+    changed: MessageWriter<'w, GroundChanged>,
+}
+
+/// A commit changed the ground of a terrain in this frame.
+#[cfg(feature = "scatter")]
+#[derive(Message, Clone, Debug)]
+pub(crate) struct GroundChanged {
+    pub terrain: Entity,
+    /// The versions before and after.
+    pub versions: [Version; 2],
+    /// Boxes around the samples that changed; `None` if they are not known.
+    pub boxes: Option<Vec<LatticeBox>>,
 }
 
 /// All that it takes to commit.
@@ -126,8 +144,8 @@ impl Commits<'_, '_> {
         self.display.figures.measure(took);
     }
 
-    /// Commits tasks that are done, by number and terrain: each transaction whole, as many as the frame's budget of swaps allows,
-    /// and at least one.
+    /// Commits tasks that are done, by number and terrain: each transaction whole, as many as the frame's budget of
+    /// swaps allows, and at least one.
     pub fn commit(&mut self, mut done: Vec<(u64, Entity)>, swapped: &mut usize) {
         if done.is_empty() {
             return;
@@ -206,8 +224,8 @@ pub(super) fn commit_begun(
     }
 }
 
-/// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait in
-/// the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
+/// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait
+/// in the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
 fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
@@ -224,11 +242,17 @@ fn commit(
         return false;
     };
     let commit = match change {
-        Change::Unseen(unseen) => {
-            let is_shown = unseen.is_of(terrain.world()) && unseen.follows(entities.shown);
+        Change::PendingDisplay(pending) => {
+            let is_shown = pending.is_of(terrain.world()) && pending.follows(entities.shown);
             if is_shown {
-                entities.shown = unseen.version();
-                display.show((entity, terrain.world()), &mut entities, surfaces, unseen.fields(), true);
+                #[cfg(feature = "scatter")]
+                messages.changed.write(GroundChanged {
+                    terrain: entity,
+                    versions: [entities.shown, pending.version()],
+                    boxes: None,
+                });
+                entities.shown = pending.version();
+                display.show((entity, terrain.world()), &mut entities, surfaces, pending.fields(), true);
                 display.show_nodes((entity, terrain.world()), &mut entities, nodes);
                 // A game that changes the ground in each frame is always one step ahead; all that was loaded is shown.
                 entities.trigger_ready(&mut display.commands, entity);
@@ -275,10 +299,18 @@ fn commit(
     }
     let is_whole = commit.is_whole();
     let fields = commit.field_news().to_vec();
+    #[cfg(feature = "scatter")]
+    let (boxes, before) = (commit.changed_boxes().collect(), terrain.world().version());
     let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return false };
     if !waste.is_empty() {
         free_later(waste);
     }
+    #[cfg(feature = "scatter")]
+    messages.changed.write(GroundChanged {
+        terrain: entity,
+        versions: [before, terrain.world().version()],
+        boxes: (!is_whole).then_some(boxes),
+    });
     let is_step = terrain.has_receipts(Asked::is_step);
     send_history(entity, &mut terrain, &mut messages.history);
     // Another world is loaded like a new terrain; until then the old one is shown.
@@ -316,7 +348,7 @@ fn output_of_panicked(
     }
     let rejected = ticket.and_then(|ticket| terrain.rejected(ticket));
     let Some(rejected) = rejected else {
-        terrain.bypass_change_detection().forget_unseen();
+        terrain.bypass_change_detection().forget_pending_display();
         return None;
     };
     let change = Change::Transaction(Box::new(rejected));
@@ -334,11 +366,11 @@ impl Display<'_, '_> {
         fields: &[(ChunkPos, FieldChange)],
         is_step: bool,
     ) {
-        let with_fields = fields.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
+        let with_fields = fields.iter().map(|&(chunk, _)| (MeshKey::Chunk(chunk), None));
         let with_surfaces = surfaces.into_iter().map(|built| (built.drawn, Some(built)));
         let mut touched = Vec::new();
         for (drawn, built) in with_surfaces.chain(with_fields) {
-            if let (Drawn::Chunk(chunk), true) = (drawn, is_step) {
+            if let (MeshKey::Chunk(chunk), true) = (drawn, is_step) {
                 touched.push(chunk);
             }
             self.show_part((entity, world), entities, drawn, built);
@@ -352,16 +384,16 @@ impl Display<'_, '_> {
         &mut self,
         (entity, world): (Entity, &TerrainWorld),
         entities: &mut TerrainEntities,
-        drawn: Drawn,
+        drawn: MeshKey,
         built: Option<BuiltSurface>,
     ) {
         let commands = &mut self.commands;
         let child = entities.get(commands, drawn);
         let is_new = child.is_none();
         let is_gone = match drawn {
-            Drawn::Chunk(chunk) => is_empty(world, chunk),
+            MeshKey::Chunk(chunk) => is_empty(world, chunk),
             // It has an entity while it is drawn, or wanted.
-            Drawn::Tile(_) => built.as_ref().is_some_and(|built| !built.is_drawn),
+            MeshKey::Tile(_) => built.as_ref().is_some_and(|built| !built.is_drawn),
         };
         if is_new && (is_gone || built.as_ref().is_some_and(|built| built.shown.is_empty)) {
             return;
@@ -378,8 +410,8 @@ impl Display<'_, '_> {
             apply_actions(commands, child, shown, actions);
         }
         match drawn {
-            Drawn::Chunk(_) if is_new => trigger_if_alive(commands, ChunkCreated { entity: child }),
-            Drawn::Chunk(_) if has_changed => trigger_if_alive(commands, ChunkChanged { entity: child }),
+            MeshKey::Chunk(_) if is_new => trigger_if_alive(commands, ChunkCreated { entity: child }),
+            MeshKey::Chunk(_) if has_changed => trigger_if_alive(commands, ChunkChanged { entity: child }),
             _ => {}
         }
     }
@@ -414,10 +446,10 @@ impl Display<'_, '_> {
     }
 
     /// Draws a tile or chunk no more. A tile that nothing else needs has no entity any more.
-    fn hide_part(&mut self, terrain: Entity, entities: &mut TerrainEntities, drawn: Drawn) {
+    fn hide_part(&mut self, terrain: Entity, entities: &mut TerrainEntities, drawn: MeshKey) {
         let Some(child) = entities.get(&mut self.commands, drawn) else { return };
         match drawn {
-            Drawn::Tile(tile) if !self.wanted.has(terrain, tile) => {
+            MeshKey::Tile(tile) if !self.wanted.has(terrain, tile) => {
                 entities.despawn_tile(&mut self.commands, tile);
             }
             _ => {
@@ -431,8 +463,8 @@ impl Display<'_, '_> {
 /// `Mesh3d` that is inserted and never takes anything from it: the entity would be seen twice after the next one.
 type Drawing = (Mesh3d, VisibilityClass);
 
-/// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes into
-/// view or gets another material.
+/// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes
+/// into view or gets another material.
 fn refresh_material(mut child: EntityWorldMut) {
     if let Some(mut visibility) = child.get_mut::<ViewVisibility>() {
         visibility.set_changed();

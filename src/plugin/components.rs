@@ -31,12 +31,13 @@ pub(super) struct Materials(pub u64);
 
 /// A tile of the heightmap: child of its [`Terrain`]. Has a `Mesh3d` while some of its cells are not dug.
 ///
-/// On terrains with [`LevelsOfDetail`](super::LevelsOfDetail) it may be a square of 2^`level` tiles along each side, which one
-/// mesh draws with all that was dug and built there. One of level 0 without a mesh is not drawn: it is there for its collider.
+/// On terrains with [`LevelsOfDetail`](super::LevelsOfDetail) it may be a square of 2^`level` tiles along each side,
+/// which one mesh draws with all that was dug and built there. One of level 0 without a mesh is not drawn: it is there
+/// for its collider.
 ///
-/// It inherits the terrain's material, `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver`: insert them on the terrain.
-/// Leave tiles out of saved scenes: a scene of the whole world would restore them without their terrain, which is not
-/// reflected.
+/// It inherits the terrain's material, `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver`: insert them on the
+/// terrain. Leave tiles out of saved scenes: a scene of the whole world would restore them without their terrain, which
+/// is not reflected.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]
@@ -49,8 +50,9 @@ pub struct Tile {
     pub level: u8,
 }
 
-/// A chunk that digging touched: child of its [`Terrain`]. Has a `Mesh3d` if it draws something, even if it has no field
-/// itself; on terrains with [`LevelsOfDetail`](super::LevelsOfDetail) while it is drawn at level 0. It inherits components, and is left out of saved scenes, like a [`Tile`].
+/// A chunk that digging touched: child of its [`Terrain`]. Has a `Mesh3d` if it draws something, even if it has no
+/// field itself; on terrains with [`LevelsOfDetail`](super::LevelsOfDetail) while it is drawn at level 0. It inherits
+/// components, and is left out of saved scenes, like a [`Tile`].
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]
@@ -177,9 +179,9 @@ impl From<&volume::Field> for Field {
     }
 }
 
-/// A terrain that waits: it is not loaded, and begins no transaction; what is sent to it stays queued. Say because the world that
-/// it is to show is still on its way. A `SavedWorld` or `StartLevel` brings it until its world is read; one that the game has inserted before
-/// stays until the game removes it.
+/// Marks a terrain that waits, for example for the world that it is to show: it is not loaded and begins no
+/// transaction, and brushes for it stay queued. A `SavedWorld` or `StartLevel` inserts it until its world is read; if
+/// the game has inserted it before, it stays until the game removes it.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct Held;
@@ -193,17 +195,42 @@ pub struct EditOutbox {
     pub orders: Vec<Order>,
 }
 
-/// The meshes of this terrain have vertices of 32 bytes: positions, normals, materials; no colours and no depth in the ground,
-/// which take 20 more. A `GroundLook` brings it and takes it away again; insert it for materials of your own that need neither.
+/// The meshes of this terrain have vertices of 32 bytes: positions, normals, materials; no colours and no depth in the
+/// ground, which take 20 more. A `GroundLook` brings it and takes it away again; insert it for materials of your own
+/// that need neither.
 ///
 /// A terrain that gets or loses it is loaded again, and its former tiles and chunks stay until then.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct SlimVertices;
 
-/// The colour of each material id, for the vertex colours of a terrain's meshes; insert it on the terrain's entity. Ids past
-/// its end have the last colour. If it is empty, or there are [`SlimVertices`], meshes have no vertex colours, which saves 16
-/// bytes a vertex.
+/// Whether the meshes of this terrain have [`ATTRIBUTE_SKY_LIGHT`](super::ATTRIBUTE_SKY_LIGHT): how much of the sky lights each
+/// vertex, so that pits, gullies and tunnels are darker than meadows, near and far, and as soon as they are dug. It takes 4 bytes
+/// a vertex. A `GroundLook` brings it, unless the terrain has [`SkyLight::OFF`]; insert it for a material of your own that reads
+/// the attribute. Servers and other apps without meshes compute no light.
+///
+/// A terrain whose meshes have it or lose it is loaded again, and its former tiles and chunks stay until then.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component, Default)]
+pub struct SkyLight {
+    /// Whether they have it.
+    pub is_on: bool,
+}
+
+impl SkyLight {
+    /// No light of the sky: all ground is lit alike.
+    pub const OFF: Self = Self { is_on: false };
+}
+
+impl Default for SkyLight {
+    fn default() -> Self {
+        Self { is_on: true }
+    }
+}
+
+/// The colour of each material id, for the vertex colours of a terrain's meshes; insert it on the terrain's entity. Ids
+/// past its end have the last colour. If it is empty, or there are [`SlimVertices`], meshes have no vertex colours,
+/// which saves 16 bytes a vertex.
 ///
 /// Only meshes that are built after a change have the new colours, and after its removal none.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! The figures of the plugin as Bevy diagnostics, for `LogDiagnosticsPlugin` and other tools that read the
-//! [`DiagnosticsStore`](bevy::diagnostic::DiagnosticsStore). The bytes that a terrain takes are not measured in each frame,
-//! because every brick would be visited: ask [`Terrain::memory`].
+//! [`DiagnosticsStore`](bevy::diagnostic::DiagnosticsStore). The bytes that a terrain takes are not measured in each
+//! frame, because every brick would be visited: ask [`Terrain::memory`].
 
 use std::time::Duration;
 

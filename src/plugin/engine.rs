@@ -34,14 +34,14 @@ pub(super) fn trim_engines(
 
 /// Suggests the GPU that renders, if there are several.
 #[cfg(feature = "render")]
-pub(super) fn suggest_renderers_card(world: &World) {
+pub(super) fn suggest_renderers_gpu(world: &World) {
     use bevy::render::renderer::RenderAdapterInfo;
 
-    use crate::backend::CardChoice;
+    use crate::backend::GpuChoice;
 
     let place = world.get_resource::<RenderAdapterInfo>().map(|info| info.device_pci_bus_id.clone());
     let place = place.filter(|place| !place.is_empty());
     if let (Some(place), Some(engine)) = (place, world.get_resource::<BurrowEngine>()) {
-        engine.suggest_card(CardChoice::PciBusId(place));
+        engine.suggest_gpu(GpuChoice::PciBusId(place));
     }
 }

@@ -1,16 +1,17 @@
-//! The entities below a terrain.
+//! The entities below a terrain: tiles, chunks and fields, spawned and despawned as the world changes.
 
 use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
+use super::meshes::VertexKind;
 use super::processor::node_origin;
 use super::{
     Chunk, CommitAction, Field, FieldChanged, FieldCreated, FieldMerged, ShownSurface, TerrainReady, Tile,
 };
 use crate::lattice::{ChunkPos, TilePos};
 use crate::lod::Node;
-use crate::terrain::{Drawn, FieldChange, Terrain, Version, World};
+use crate::terrain::{FieldChange, MeshKey, Terrain, Version, World};
 use crate::volume::{self, FieldId};
 
 /// The entities below a terrain, and the world that they show. A terrain has this component once it has loaded.
@@ -19,13 +20,13 @@ pub struct TerrainEntities {
     pub(super) shown: Version,
     /// Metres along the side of the voxels that they were built for.
     pub(super) voxel_size: f32,
-    /// Whether they were built with [`SlimVertices`](super::SlimVertices).
-    pub(super) is_slim: bool,
+    /// The attributes of their vertices.
+    pub(super) vertices: VertexKind,
     /// Whether they were built with [`LevelsOfDetail`](super::LevelsOfDetail).
     pub(super) has_lod: bool,
     /// Whether all of them have to be rebuilt.
     pub(super) is_outdated: bool,
-    drawn: HashMap<Drawn, Entity>,
+    drawn: HashMap<MeshKey, Entity>,
     /// Nodes of level 1 and above.
     nodes: HashMap<Node, Entity>,
     fields: HashMap<FieldId, Entity>,
@@ -36,11 +37,11 @@ pub struct TerrainEntities {
 }
 
 impl TerrainEntities {
-    pub(super) fn new(shown: Version, voxel_size: f32, is_slim: bool, has_lod: bool) -> Self {
+    pub(super) fn new(shown: Version, voxel_size: f32, vertices: VertexKind, has_lod: bool) -> Self {
         Self {
             shown,
             voxel_size,
-            is_slim,
+            vertices,
             has_lod,
             is_outdated: false,
             drawn: HashMap::default(),
@@ -51,7 +52,7 @@ impl TerrainEntities {
         }
     }
 
-    /// Do they show the current state of this world? False while changes of the game load.
+    /// Whether they show the current state of this world. `false` while changes of the game load.
     pub(crate) fn show(&self, world: &World) -> bool {
         self.shown == world.version()
     }
@@ -78,7 +79,7 @@ impl TerrainEntities {
     }
 
     /// The entity of a tile or chunk, if it has one and the game did not despawn it.
-    pub(super) fn get(&self, commands: &mut Commands, drawn: Drawn) -> Option<Entity> {
+    pub(super) fn get(&self, commands: &mut Commands, drawn: MeshKey) -> Option<Entity> {
         self.drawn.get(&drawn).copied().filter(|&child| commands.get_entity(child).is_ok())
     }
 
@@ -88,12 +89,12 @@ impl TerrainEntities {
         commands: &mut Commands,
         terrain: Entity,
         world: &World,
-        drawn: Drawn,
+        drawn: MeshKey,
     ) -> Entity {
         let place = Transform::from_translation(world.origin(drawn).as_vec3());
         let child = match drawn {
-            Drawn::Tile(tile) => spawn_below(commands, terrain, (Tile::from(tile), place)),
-            Drawn::Chunk(chunk) => spawn_below(commands, terrain, (Chunk::from(chunk), place)),
+            MeshKey::Tile(tile) => spawn_below(commands, terrain, (Tile::from(tile), place)),
+            MeshKey::Chunk(chunk) => spawn_below(commands, terrain, (Chunk::from(chunk), place)),
         };
         self.drawn.insert(drawn, child);
         child
@@ -102,7 +103,7 @@ impl TerrainEntities {
     /// Might a body over this tile fall through, as the tile has no entity yet that could have a collider?
     #[cfg(feature = "avian")]
     pub(crate) fn lack(&self, tile: TilePos) -> bool {
-        self.has_lod && !self.drawn.contains_key(&Drawn::Tile(tile))
+        self.has_lod && !self.drawn.contains_key(&MeshKey::Tile(tile))
     }
 
     /// The entity with the mesh of a node, which is spawned if there is none. One of level 0 is its tile's.
@@ -114,7 +115,7 @@ impl TerrainEntities {
         node: Node,
     ) -> Entity {
         if node.level == 0 {
-            let drawn = Drawn::Tile(node.tile());
+            let drawn = MeshKey::Tile(node.tile());
             let tile = self.get(commands, drawn);
             return tile.unwrap_or_else(|| self.spawn_shown_tile(commands, terrain, world, node.tile()));
         }
@@ -135,7 +136,7 @@ impl TerrainEntities {
         world: &World,
         tile: TilePos,
     ) -> Entity {
-        let child = self.spawn(commands, terrain, world, Drawn::Tile(tile));
+        let child = self.spawn(commands, terrain, world, MeshKey::Tile(tile));
         let shown = ShownSurface { revision: world.revision(), is_empty: false };
         commands.entity(child).try_insert(shown);
         child
@@ -150,7 +151,7 @@ impl TerrainEntities {
 
     /// Despawns the entity of a tile, if it has one.
     pub(super) fn despawn_tile(&mut self, commands: &mut Commands, tile: TilePos) {
-        if let Some(child) = self.drawn.remove(&Drawn::Tile(tile)) {
+        if let Some(child) = self.drawn.remove(&MeshKey::Tile(tile)) {
             commands.entity(child).try_despawn();
         }
     }
@@ -175,7 +176,7 @@ impl TerrainEntities {
         }
         for &tile in wanted {
             self.kept.insert(tile);
-            if !self.drawn.contains_key(&Drawn::Tile(tile)) {
+            if !self.drawn.contains_key(&MeshKey::Tile(tile)) {
                 self.spawn_shown_tile(commands, entity, terrain.world(), tile);
             }
         }
@@ -183,7 +184,7 @@ impl TerrainEntities {
 
     /// Spawns the entity of a field below its chunk, which must have one.
     pub(super) fn spawn_field(&mut self, commands: &mut Commands, chunk: ChunkPos, field: &volume::Field) {
-        let Some(parent) = self.get(commands, Drawn::Chunk(chunk)) else { return };
+        let Some(parent) = self.get(commands, MeshKey::Chunk(chunk)) else { return };
         let child = spawn_below(commands, parent, Field::from(field));
         self.fields.insert(field.id, child);
         trigger_if_alive(commands, FieldCreated { entity: child });
@@ -237,8 +238,8 @@ impl TerrainEntities {
     pub(super) fn drop_empty(&mut self, commands: &mut Commands, world: &World, chunks: Vec<ChunkPos>) {
         for chunk in chunks {
             if is_empty(world, chunk) {
-                let child = self.get(commands, Drawn::Chunk(chunk));
-                self.drawn.remove(&Drawn::Chunk(chunk));
+                let child = self.get(commands, MeshKey::Chunk(chunk));
+                self.drawn.remove(&MeshKey::Chunk(chunk));
                 child.into_iter().for_each(|child| commands.entity(child).try_despawn());
             }
         }

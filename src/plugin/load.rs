@@ -11,26 +11,27 @@ use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
 use super::lod_state::{LevelsOfDetail, LodState, ShownLevels};
-use super::meshes::{BuiltMesh, MeshFacts, VertexExtras};
+use super::meshes::{BuiltMesh, MeshFacts, VertexExtras, VertexKind};
 use super::places::{LocalPlaces, TerrainPlace, place_terrain};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::reports::{Report, Reports};
 use super::task::{InFlight, TaskCounter};
-use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SlimVertices};
+use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SkyLight, SlimVertices};
 use crate::lattice::ChunkPos;
 use crate::lod::Cut;
-use crate::terrain::{Drawn, DrawnCut, KnownNodes, Terrain, World};
+use crate::terrain::{DrawnCut, KnownNodes, MeshKey, Terrain, World};
 use crate::threads::{ThreadTask, Threads, panic_message};
+use crate::world::sky::LitWorld;
 
 /// Surfaces of one snapshot that are built, and passed to the renderer, until all can be shown.
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
-    is_slim: bool,
+    vertices: VertexKind,
     has_lod: bool,
     task: Option<ThreadTask<BuiltWorld>>,
     waiting: Vec<BuiltSurface>,
-    ready: HashMap<Drawn, Loaded>,
+    ready: HashMap<MeshKey, Loaded>,
     levels: Option<BuiltNodes>,
 }
 
@@ -96,9 +97,9 @@ fn scale(
     }
 }
 
-/// Scales and places a new terrain at once, so that queries in the frame that spawned it, for example in `Startup`, find it
-/// in its place. Tasks of another terrain on its entity are dropped. The tiles and chunks of that terrain stay until the new
-/// one has loaded, unless they have another size.
+/// Scales and places a new terrain at once, so that queries in the frame that spawned it, for example in `Startup`,
+/// find it in its place. Tasks of another terrain on its entity are dropped. The tiles and chunks of that terrain stay
+/// until the new one has loaded, unless they have another size.
 pub(super) fn prepare_new(
     new: On<Insert, Terrain>,
     mut commands: Commands,
@@ -123,8 +124,8 @@ pub(super) fn prepare_new(
     }
 }
 
-/// Drops tasks of terrains that have no entities: such a task belongs to a former terrain, and the new one must not wait
-/// for it.
+/// Drops tasks of terrains that have no entities: such a task belongs to a former terrain, and the new one must not
+/// wait for it.
 pub(super) fn drop_stray_tasks(
     mut commands: Commands,
     strays: Query<Entity, (With<Terrain>, With<InFlight>, Without<TerrainEntities>)>,
@@ -183,7 +184,7 @@ pub(super) fn drop_other_vertices(
     mut commands: Commands,
     loading: Query<&Loading, Allow<Disabled>>,
 ) {
-    if loading.get(new.entity).is_ok_and(|loading| !loading.is_slim) {
+    if loading.get(new.entity).is_ok_and(|loading| !loading.vertices.is_slim) {
         commands.entity(new.entity).try_remove::<Loading>();
     }
 }
@@ -194,13 +195,13 @@ pub(super) fn drop_slim_vertices(
     mut commands: Commands,
     loading: Query<&Loading, Allow<Disabled>>,
 ) {
-    if loading.get(gone.entity).is_ok_and(|loading| loading.is_slim) {
+    if loading.get(gone.entity).is_ok_and(|loading| loading.vertices.is_slim) {
         commands.entity(gone.entity).try_remove::<Loading>();
     }
 }
 
-/// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces are
-/// built.
+/// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces
+/// are built.
 pub(super) fn start_loading(
     mut commands: Commands,
     mut terrains: Query<
@@ -208,7 +209,7 @@ pub(super) fn start_loading(
             Entity,
             &mut Terrain,
             Option<&MaterialColors>,
-            Has<SlimVertices>,
+            (Has<SlimVertices>, Option<&SkyLight>),
             Has<LevelsOfDetail>,
             Option<&TerrainEntities>,
         ),
@@ -218,22 +219,23 @@ pub(super) fn start_loading(
     settings: Res<BurrowSettings>,
     mut counter: ResMut<TaskCounter>,
 ) {
-    for (entity, mut terrain, colors, is_slim, has_lod, entities) in &mut terrains {
+    for (entity, mut terrain, colors, (is_slim, sky_light), has_lod, entities) in &mut terrains {
+        let kind = VertexKind::of(is_slim, sky_light);
         let is_same_kind = |entities: &&TerrainEntities| {
-            !entities.is_outdated && (entities.is_slim, entities.has_lod) == (is_slim, has_lod)
+            !entities.is_outdated && (entities.vertices, entities.has_lod) == (kind, has_lod)
         };
         let entities_of_kind = entities.filter(is_same_kind);
         if entities_of_kind.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
-        let extras = VertexExtras::of(colors, is_slim);
+        let extras = VertexExtras::of(colors, kind);
         let builder = build.builder((entity, &terrain), extras);
         // For the game this is no change.
         let model = terrain.bypass_change_detection();
-        let unseen = entities_of_kind.and_then(|entities| model.take_unseen(entities.shown));
+        let pending = entities_of_kind.and_then(|entities| model.take_pending_display(entities.shown));
         // If more has changed than a frame may swap, the terrain is loaded again over several frames.
-        if let Some(unseen) = unseen.filter(|unseen| unseen.len() <= settings.swaps_per_frame) {
-            let task = InFlight::unseen(counter.next(), model, unseen, builder);
+        if let Some(pending) = pending.filter(|pending| pending.len() <= settings.swaps_per_frame) {
+            let task = InFlight::pending_display(counter.next(), model, pending, builder);
             commands.entity(entity).try_insert(task);
             continue;
         }
@@ -241,13 +243,14 @@ pub(super) fn start_loading(
         let world = model.snapshot();
         let task = (!builder.is_idle() || has_lod).then(|| {
             let world = Arc::clone(&world);
+            let builder = builder.lit_by(&Arc::new(LitWorld::new(Arc::clone(&world), Vec::new())));
             ThreadTask::start(Threads::Background, move || match has_lod {
                 true => build_nodes(&world, &builder),
                 false => (build_world(&world, &builder), None),
             })
         });
         let (waiting, ready) = (Vec::new(), HashMap::default());
-        let loading = Loading { world, is_slim, has_lod, task, waiting, ready, levels: None };
+        let loading = Loading { world, vertices: kind, has_lod, task, waiting, ready, levels: None };
         commands.entity(entity).try_insert(loading);
     }
 }
@@ -255,8 +258,8 @@ pub(super) fn start_loading(
 /// Builds all surfaces of a world.
 fn build_world(world: &World, builder: &SurfaceBuilder) -> Vec<BuiltSurface> {
     let _span = info_span!("burrow_load").entered();
-    let chunks = world.drawn_chunks().map(Drawn::Chunk);
-    let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
+    let chunks = world.drawn_chunks().map(MeshKey::Chunk);
+    let all: Vec<MeshKey> = world.grid().tiles().map(MeshKey::Tile).chain(chunks).collect();
     all.par_iter().map(|&drawn| builder.build((drawn, true), false, || world.draft(drawn))).collect()
 }
 
@@ -267,8 +270,8 @@ fn build_nodes(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
     let cut = Cut::coarsest(world.lod_grid(u8::MAX));
     known.learn(world, cut.grid(), cut.nodes());
     let (drawn, updates) = world.draw_cut(cut);
-    let chunks: Vec<Drawn> = world.drawn_chunks().map(Drawn::Chunk).collect();
-    let build = |&drawn: &Drawn| builder.build((drawn, false), false, || world.draft(drawn));
+    let chunks: Vec<MeshKey> = world.drawn_chunks().map(MeshKey::Chunk).collect();
+    let build = |&drawn: &MeshKey| builder.build((drawn, false), false, || world.draft(drawn));
     let chunks = chunks.par_iter().map(build).collect();
     (chunks, Some(BuiltNodes { drawn, nodes: builder.build_nodes(updates), known }))
 }
@@ -308,8 +311,8 @@ fn loaded(
     }
 }
 
-/// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and chunks
-/// are despawned in that frame.
+/// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and
+/// chunks are despawned in that frame.
 pub(super) fn finish_loading(
     mut commands: Commands,
     settings: Res<BurrowSettings>,
@@ -379,12 +382,12 @@ fn show(
 ) -> TerrainEntities {
     let world = Arc::clone(&loading.world);
     let (version, has_lod) = (world.version(), loading.has_lod);
-    let mut entities = TerrainEntities::new(version, voxel_size, loading.is_slim, has_lod);
+    let mut entities = TerrainEntities::new(version, voxel_size, loading.vertices, has_lod);
     let with_fields = world.fields().map(|(chunk, _)| chunk);
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     // With levels, tiles come as they are drawn.
-    let tiles = (!has_lod).then(|| world.grid().tiles().map(Drawn::Tile)).into_iter().flatten();
-    for drawn in tiles.chain(chunks.into_iter().map(Drawn::Chunk)) {
+    let tiles = (!has_lod).then(|| world.grid().tiles().map(MeshKey::Tile)).into_iter().flatten();
+    for drawn in tiles.chain(chunks.into_iter().map(MeshKey::Chunk)) {
         let child = entities.spawn(commands, terrain, &world, drawn);
         if let Some(Loaded { mesh, built }) = loading.ready.remove(&drawn) {
             if let Some((handle, facts)) = mesh {
@@ -392,7 +395,7 @@ fn show(
             }
             apply_actions(commands, child, built.shown, built.actions);
         }
-        if let Drawn::Chunk(_) = drawn {
+        if let MeshKey::Chunk(_) = drawn {
             trigger_if_alive(commands, ChunkCreated { entity: child });
         }
     }

@@ -14,11 +14,11 @@ use super::entities::TerrainEntities;
 use super::figures::MainThread;
 use super::load::Loading;
 use super::lod_state::{DetailSource, LevelsOfDetail, LodState, WantedTiles, Watchers};
-use super::meshes::VertexExtras;
+use super::meshes::{VertexExtras, VertexKind};
 use super::places::Places;
 use super::processor::BuildSettings;
 use super::task::{InFlight, TaskCounter};
-use super::{BurrowEngine, BurrowFigures, Held, MaterialColors, SlimVertices};
+use super::{BurrowEngine, BurrowFigures, Held, MaterialColors, SkyLight, SlimVertices};
 use crate::lod::{View, Viewpoint};
 use crate::terrain::{ChooseCut, Terrain};
 
@@ -205,7 +205,7 @@ pub(super) fn begin_lod_changes(
             &Watchers,
             &TerrainEntities,
             Option<&MaterialColors>,
-            Has<SlimVertices>,
+            (Has<SlimVertices>, Option<&SkyLight>),
         ),
         (Without<Loading>, Without<InFlight>, Without<Held>),
     >,
@@ -215,8 +215,11 @@ pub(super) fn begin_lod_changes(
     mut counter: ResMut<TaskCounter>,
 ) {
     let start = Instant::now();
-    for (entity, mut terrain, settings, mut state, watchers, entities, colors, is_slim) in &mut terrains {
-        if !entities.show(terrain.world()) || entities.is_slim != is_slim || terrain.is_busy() {
+    for (entity, mut terrain, settings, mut state, watchers, entities, colors, (is_slim, sky_light)) in
+        &mut terrains
+    {
+        let kind = VertexKind::of(is_slim, sky_light);
+        if !entities.show(terrain.world()) || entities.vertices != kind || terrain.is_busy() {
             continue;
         }
         if terrain.queued() > 0 && state.edits < EDITS {
@@ -238,7 +241,7 @@ pub(super) fn begin_lod_changes(
         };
         (state.eyes, state.settings, state.shown) = (eyes, Some(settings.clone()), Some(version));
         (state.edits, state.is_settled) = (0, false);
-        let extras = VertexExtras::of(colors, is_slim);
+        let extras = VertexExtras::of(colors, kind);
         let builder = build.builder((entity, &terrain), extras);
         let engine = terrain.engine().unwrap_or(&engine).clone();
         let task = InFlight::transaction(counter.next(), entity, transaction, engine, builder);

@@ -11,9 +11,9 @@ use crate::terrain::{KnownNodes, Version};
 
 /// Draws far ground coarsely: insert it on a terrain's entity, and worlds may be many kilometres wide.
 ///
-/// The ground is cut into squares, each of which is drawn at one of several levels of detail: at level L, its cells are 2^L
-/// voxels wide. Levels are chosen by the size of cells on the screen. Everything drawn together stays closed, and edits are
-/// exact everywhere: levels change what is drawn and nothing else.
+/// The ground is cut into squares, each of which is drawn at one of several levels of detail: at level L, its cells are
+/// 2^L voxels wide. Levels are chosen by the size of cells on the screen. Everything drawn together stays closed, and
+/// edits are exact everywhere: levels change what is drawn and nothing else.
 ///
 /// # Which cameras count
 ///
@@ -26,14 +26,14 @@ use crate::terrain::{KnownNodes, Version};
 /// | a `Camera2d` | none |
 /// | none, but a [`DetailSource`] | as for a camera at its place |
 ///
-/// All that count decide together. While none does, all stays as it is for those that looked last. Distances and speeds are
-/// measured in the terrain's own space and in real time: shifted origins and slow motion change nothing.
+/// All that count decide together. While none does, all stays as it is for those that looked last. Distances and speeds
+/// are measured in the terrain's own space and in real time: shifted origins and slow motion change nothing.
 ///
 /// The defaults need no change. A terrain that gets or loses this component is loaded again.
 ///
-/// With it, a [`Tile`](super::Tile) has an entity while it is drawn, and of level 0 also while something else needs it, like a
-/// collider. [`SurfaceProcessor`](super::SurfaceProcessor)s are called for tiles and chunks of level 0 only, when they come
-/// into view and when they change.
+/// With it, a [`Tile`](super::Tile) has an entity while it is drawn, and of level 0 also while something else needs it,
+/// like a collider. [`SurfaceProcessor`](super::SurfaceProcessor)s are called for tiles and chunks of level 0 only,
+/// when they come into view and when they change.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(ShownLevels, Watchers)]
@@ -115,9 +115,10 @@ impl ShownLevels {
     }
 }
 
-/// A place around which ground is drawn as finely as for a perspective camera there, though there is none: for a loading screen
-/// that waits for [`TerrainReady`](super::TerrainReady) before it spawns the player's camera, or for a place that a cut scene
-/// will soon show. Insert it on an entity with a `Transform`, and remove it when it is no longer needed.
+/// A place around which ground is drawn as finely as for a perspective camera there, though there is none: for a
+/// loading screen that waits for [`TerrainReady`](super::TerrainReady) before it spawns the player's camera, or for a
+/// place that a cut scene will soon show. Insert it on an entity with a `Transform`, and remove it when it is no longer
+/// needed.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(Transform)]

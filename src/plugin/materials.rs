@@ -1,4 +1,5 @@
-//! One material for each terrain: an entity with materials of two types is drawn with either, whichever Bevy extracts last.
+//! One material for each terrain: an entity with materials of two types is drawn with either, whichever Bevy extracts
+//! last.
 
 use bevy::prelude::*;
 
@@ -23,8 +24,8 @@ struct NoteMaterials;
 #[derive(Component, Default)]
 struct JustReady;
 
-/// Propagates a material of a terrain to its tiles, chunks and pieces, if no other one takes precedence: the one of a look does,
-/// or else the one whose plugin was added last.
+/// Propagates a material of a terrain to its tiles, chunks and pieces, if no other one takes precedence: the one of a
+/// look does, or else the one whose plugin was added last.
 pub(crate) fn propagate_material<M: Material>(app: &mut App) {
     let bit = app.world().get_resource::<MaterialTypes>().map_or(0, |types| types.0.len().min(LOOK - 1));
     choose::<M>(app, bit);
@@ -137,8 +138,8 @@ fn warn_of_unused_textures(
     }
 }
 
-/// Adds systems that log terrains which are shown and have nothing to be drawn with: neither a material nor a look, which may
-/// still wait for its textures.
+/// Adds systems that log terrains which are shown and have nothing to be drawn with: neither a material nor a look,
+/// which may still wait for its textures.
 pub(crate) fn warn_of_undrawn<L: Component>(app: &mut App) {
     let note = |ready: On<TerrainReady>, mut commands: Commands| {
         commands.entity(ready.entity).try_insert(JustReady);

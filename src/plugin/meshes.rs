@@ -1,5 +1,6 @@
 //! Surface meshes as Bevy meshes.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use bevy::asset::RenderAssetUsages;
@@ -12,15 +13,15 @@ use bevy::mesh::{
 };
 
 use super::palettes::{Arranged, Palettes};
-use super::tile_columns::TileColumns;
-use super::{MaterialColors, MeshBytes};
+use super::{MaterialColors, MeshBytes, SkyLight};
 use crate::ground::Ground;
 use crate::lattice::{Column, ONE, SNAP};
-use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
+use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex, tile};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
+use crate::world::sky::{LitWorld, SkyColumns, SkyLights, SparseSky};
 
-/// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have the same ids in the
-/// same order, so a shader may take those of any corner and blend the weights alone.
+/// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have the same ids in
+/// the same order, so a shader may take those of any corner and blend the weights alone.
 pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowMaterialIds", 0x6275_7272_6f77_0001, VertexFormat::Uint8x4);
 
@@ -28,10 +29,20 @@ pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
 pub const ATTRIBUTE_MATERIAL_WEIGHTS: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowMaterialWeights", 0x6275_7272_6f77_0002, VertexFormat::Unorm8x4);
 
-/// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it. Not on
-/// terrains with [`SlimVertices`](super::SlimVertices).
+/// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it. Not
+/// on terrains with [`SlimVertices`](super::SlimVertices).
 pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
+
+/// The share of the sky that lights a vertex, 0..=1, in x: 1 on a plain, 0 in a cave; see
+/// [`World::sky_light`](crate::terrain::World::sky_light). In y how deep it lies below the surface that was there before anyone
+/// dug, of which 1 is [`CUT_VOXELS`] or more. z and w are 0. Materials multiply ambient and indirect light by it,
+/// and never that of the sun. Only on terrains with [`SkyLight`](super::SkyLight).
+pub const ATTRIBUTE_SKY_LIGHT: MeshVertexAttribute =
+    MeshVertexAttribute::new("Vertex_BurrowSkyLight", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
+
+/// The depth in voxels that is 1 in [`ATTRIBUTE_SKY_LIGHT`].
+pub const CUT_VOXELS: i32 = 8;
 
 /// The components of an entity in addition to its mesh: bounds that Bevy need not compute, and bytes.
 pub(crate) type MeshFacts = (Aabb, NoAutoAabb, MeshBytes);
@@ -44,17 +55,36 @@ pub(crate) type BuiltMesh = Option<(Mesh, MeshFacts)>;
 pub(crate) struct VertexExtras {
     /// The depth in the ground.
     pub has_depth: bool,
+    /// The light of the sky.
+    pub has_sky_light: bool,
     /// The colours of materials, blended; none if it is empty.
     pub colors: Vec<LinearRgba>,
 }
 
+/// Which attributes a terrain's components ask for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct VertexKind {
+    /// [`SlimVertices`](super::SlimVertices).
+    pub is_slim: bool,
+    /// [`SkyLight`](super::SkyLight).
+    pub has_sky_light: bool,
+}
+
+impl VertexKind {
+    pub fn of(is_slim: bool, sky_light: Option<&SkyLight>) -> Self {
+        Self { is_slim, has_sky_light: sky_light.is_some_and(|light| light.is_on) }
+    }
+}
+
 impl VertexExtras {
     /// The extras of a terrain with these components.
-    pub(crate) fn of(colors: Option<&MaterialColors>, is_slim: bool) -> Self {
+    pub(crate) fn of(colors: Option<&MaterialColors>, kind: VertexKind) -> Self {
+        let VertexKind { is_slim, has_sky_light } = kind;
         if is_slim {
-            return Self::default();
+            return Self { has_sky_light, ..Self::default() };
         }
-        Self { has_depth: true, colors: colors.map_or(Vec::new(), |colors| colors.0.clone()) }
+        let colors = colors.map_or(Vec::new(), |colors| colors.0.clone());
+        Self { has_depth: true, has_sky_light, colors }
     }
 }
 
@@ -64,44 +94,61 @@ pub(crate) struct MeshBuilder {
     extras: VertexExtras,
     usages: RenderAssetUsages,
     ground: Arc<Ground>,
+    /// The world that lights surfaces; `None` where they have no sky light.
+    lit: Option<Arc<LitWorld>>,
 }
 
 impl MeshBuilder {
     pub(crate) fn new(world: &World, extras: VertexExtras, usages: RenderAssetUsages) -> Self {
-        Self { extras, usages, ground: world.shared_ground() }
+        Self { extras, usages, ground: world.shared_ground(), lit: None }
     }
 
-    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task. The columns of a tile are computed
-    /// unless they are known.
+    /// Whether surfaces have sky light, and so need a world that lights them.
+    pub(crate) fn has_sky_light(&self) -> bool {
+        self.extras.has_sky_light
+    }
+
+    /// Lights all surfaces that are built from now on by a world.
+    pub(crate) fn light_by(&mut self, lit: &Arc<LitWorld>) {
+        self.lit = self.has_sky_light().then(|| Arc::clone(lit));
+    }
+
+    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task. `whole` is the draft's
+    /// [surface](SurfaceDraft::surface) where it is known.
     pub(super) fn build(
         &self,
         origin: IVec3,
         draft: &SurfaceDraft,
-        columns: Option<&TileColumns>,
+        whole: Option<&SurfaceMesh>,
+        lights: &mut TileLights,
     ) -> BuiltMesh {
         match draft {
             SurfaceDraft::Nothing => None,
-            SurfaceDraft::Tile(tile) => match columns {
-                Some(columns) => self.build_tile(origin, tile, columns),
-                None => self.build_tile(origin, tile, &TileColumns::new(tile)),
-            },
-            SurfaceDraft::Chunk(chunk) => self.build_whole(origin, chunk.mesh()),
-            SurfaceDraft::Unmeshed(chunk) => self.build_whole(origin, chunk.surface().mesh()),
+            SurfaceDraft::Tile(tile) => self.build_tile(origin, tile, whole, lights),
+            SurfaceDraft::Chunk(chunk) => self.build_lit(origin, chunk.mesh(), lights),
+            SurfaceDraft::Unmeshed(chunk) => self.build_lit(origin, chunk.surface().mesh(), lights),
         }
     }
 
-    /// Builds the mesh of a surface that has all of its vertices.
+    /// Builds the mesh of a surface that has all of its vertices, without sky light.
     pub(crate) fn build_whole(&self, origin: IVec3, surface: &SurfaceMesh) -> BuiltMesh {
+        self.build_lit(origin, surface, &mut TileLights::default())
+    }
+
+    fn build_lit(&self, origin: IVec3, surface: &SurfaceMesh, lights: &mut TileLights) -> BuiltMesh {
         if surface.is_empty() {
             return None;
         }
         let mut arrays = Arrays::with_capacity(surface.vertices.len(), self);
         arrays.push(&surface.vertices, origin);
+        if let Some(lights) = lights.get() {
+            arrays.push_lights(&surface.vertices, origin, lights);
+        }
         arrays.finish(&surface.indices)
     }
 
-    /// Builds the mesh of a node of level 1 or above, with columns that are a stride apart. Most vertices lie over them, so
-    /// their heights are computed together, and those of others one by one.
+    /// Builds the mesh of a node of level 1 or above, with columns that are a stride apart. Most vertices lie over
+    /// them, so their heights are computed together, and those of others one by one.
     pub(crate) fn build_node(
         &self,
         columns: (Column, Column),
@@ -116,19 +163,58 @@ impl MeshBuilder {
             arrays.heights = Heights::Node(NodeHeights::new(&self.ground, columns, stride));
         }
         arrays.push(&surface.vertices, columns.0.at(0));
+        if let Some(lit) = &self.lit {
+            let mut lights = SparseSky::new(lit.view()).with_grid(columns.0, columns.1, stride);
+            arrays.push_lights(&surface.vertices, columns.0.at(0), &mut lights);
+        }
         arrays.finish(&surface.indices)
     }
 
-    /// Builds the mesh of a tile: only its rings and indices depend on digging.
-    fn build_tile(&self, origin: IVec3, draft: &TileUpdate, columns: &TileColumns) -> BuiltMesh {
+    /// Builds the mesh of a tile, whose columns come before its rings. `whole` is its mesh where it is known.
+    fn build_tile(
+        &self,
+        origin: IVec3,
+        draft: &TileUpdate,
+        whole: Option<&SurfaceMesh>,
+        lights: &mut TileLights,
+    ) -> BuiltMesh {
         if draft.indices().is_empty() {
             return None;
         }
-        let (columns, rings) = (columns.vertices(), draft.rings.vertices());
-        let mut arrays = Arrays::with_capacity(columns.len() + rings.len(), self);
+        let vertices = match whole {
+            Some(whole) => Cow::Borrowed(&*whole.vertices),
+            None => Cow::Owned(tile::vertices(&draft.ground, draft.grid, draft.tile, &draft.rings)),
+        };
+        let columns = vertices.len().saturating_sub(draft.rings.vertices().len());
+        let (columns, rings) = vertices.split_at(columns);
+        let mut arrays = Arrays::with_capacity(vertices.len(), self);
         arrays.push_on_surface(columns);
         arrays.push(rings, origin);
+        if let Some(lights) = lights.get() {
+            arrays.push_lights(&vertices, origin, lights);
+        }
         arrays.finish(draft.indices())
+    }
+}
+
+/// The light over a tile, for its mesh and those of its chunks: computed when it is first needed, if there is any.
+#[derive(Default)]
+pub(super) struct TileLights<'a> {
+    lit: Option<&'a LitWorld>,
+    columns: Option<(Column, Column)>,
+    lights: Option<SkyColumns<'a>>,
+}
+
+impl<'a> TileLights<'a> {
+    /// The light over some columns, both ends included, of the world by which a builder's surfaces are lit.
+    pub fn new(builder: Option<&'a MeshBuilder>, columns: (Column, Column)) -> Self {
+        let lit = builder.and_then(|builder| builder.lit.as_deref());
+        Self { lit, columns: Some(columns), lights: None }
+    }
+
+    fn get(&mut self) -> Option<&mut SkyColumns<'a>> {
+        let (lit, (low, high)) = (self.lit?, self.columns?);
+        Some(self.lights.get_or_insert_with(|| SkyColumns::new(lit.view(), low, high)))
     }
 }
 
@@ -143,6 +229,8 @@ struct Arrays<'a> {
     bounds: (Vec3, Vec3),
     /// Empty without depths.
     depths: Vec<f32>,
+    /// Empty without sky light.
+    lights: Vec<[u8; 4]>,
     /// Empty without colours.
     colors: Vec<[f32; 4]>,
     /// The materials that were blended last, and their colour.
@@ -151,7 +239,7 @@ struct Arrays<'a> {
 
 impl<'a> Arrays<'a> {
     fn with_capacity(vertices: usize, mesh_builder: &'a MeshBuilder) -> Self {
-        let VertexExtras { has_depth, colors } = &mesh_builder.extras;
+        let VertexExtras { has_depth, has_sky_light, colors } = &mesh_builder.extras;
         let room = |is_there: bool| if is_there { vertices } else { 0 };
         Self {
             mesh_builder,
@@ -161,6 +249,7 @@ impl<'a> Arrays<'a> {
             materials: Palettes::with_capacity(vertices),
             bounds: (Vec3::INFINITY, Vec3::NEG_INFINITY),
             depths: Vec::with_capacity(room(*has_depth)),
+            lights: Vec::with_capacity(room(*has_sky_light)),
             colors: Vec::with_capacity(room(!colors.is_empty())),
             blended: (MaterialMix::default(), blend(MaterialMix::default(), colors)),
         }
@@ -207,6 +296,16 @@ impl<'a> Arrays<'a> {
         }
     }
 
+    /// Appends the light of vertices whose positions count from some point.
+    fn push_lights(&mut self, vertices: &[Vertex], origin: IVec3, lights: &mut dyn SkyLights) {
+        let light = |vertex: &Vertex| {
+            let place = origin * SNAP + vertex.position;
+            let depth = lights.depth(place).clamp(0, CUT_VOXELS * ONE) * 255 / (CUT_VOXELS * ONE);
+            [lights.light(place), depth as u8, 0, 0]
+        };
+        self.lights.extend(vertices.iter().map(light));
+    }
+
     fn push_color(&mut self, mix: MaterialMix) {
         if self.blended.0 != mix {
             self.blended = (mix, blend(mix, &self.mesh_builder.extras.colors));
@@ -221,6 +320,7 @@ impl<'a> Arrays<'a> {
         copy(&mut self.normals, &copies);
         copy(&mut self.depths, &copies);
         copy(&mut self.colors, &copies);
+        copy(&mut self.lights, &copies);
         let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, self.mesh_builder.usages)
             .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, self.positions)
             .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, self.normals)
@@ -232,6 +332,9 @@ impl<'a> Arrays<'a> {
             });
         if self.mesh_builder.extras.has_depth {
             mesh.insert_attribute(ATTRIBUTE_GROUND_DEPTH, self.depths);
+        }
+        if !self.lights.is_empty() {
+            mesh.insert_attribute(ATTRIBUTE_SKY_LIGHT, VertexAttributeValues::Unorm8x4(self.lights));
         }
         if !self.mesh_builder.extras.colors.is_empty() {
             mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, self.colors);
@@ -288,11 +391,12 @@ fn copy<T: Copy>(values: &mut Vec<T>, of: &[u32]) {
     values.extend(copies);
 }
 
-/// How many voxels a vertex, in 1/4096 voxel of the terrain, lies below the pristine surface; above it less than 0. It depends
-/// on the position alone, so both sides of a seam get the same bits.
+/// How many voxels a vertex, in 1/4096 voxel of the terrain, lies below the pristine surface; above it less than 0. It
+/// depends on the position alone, so both sides of a seam get the same bits.
 fn depth(place: IVec3, height: impl Fn(Column) -> i32) -> f32 {
     let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-    // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are the same.
+    // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are
+    // the same.
     let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
     let next = column.offset(i32::from(x > 0), i32::from(z > 0));
     let here = i64::from(height(column));
@@ -323,7 +427,7 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights, NoiseSource};
     use crate::lod::Cut;
-    use crate::terrain::{Drawn, NodeUpdate, Terrain, TerrainSettings};
+    use crate::terrain::{MeshKey, NodeUpdate, Terrain, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
 
@@ -336,12 +440,12 @@ mod tests {
 
     /// All vertices that are drawn, with their place in 1/4096 voxel.
     fn drawn(world: &World) -> Vec<(bool, IVec3, Vertex)> {
-        let tiles = world.grid().tiles().map(Drawn::Tile);
-        let all = tiles.chain(world.drawn_chunks().map(Drawn::Chunk));
+        let tiles = world.grid().tiles().map(MeshKey::Tile);
+        let all = tiles.chain(world.drawn_chunks().map(MeshKey::Chunk));
         let vertices = all.flat_map(|drawn| {
             let (is_tile, mesh) = match drawn {
-                Drawn::Tile(tile) => (true, world.tile_mesh(tile)),
-                Drawn::Chunk(chunk) => (false, world.chunk_mesh(chunk)),
+                MeshKey::Tile(tile) => (true, world.tile_mesh(tile)),
+                MeshKey::Chunk(chunk) => (false, world.chunk_mesh(chunk)),
             };
             let origin = world.origin(drawn) * SNAP;
             mesh.vertices.into_iter().map(move |vertex| (is_tile, origin, vertex))
@@ -432,7 +536,11 @@ mod tests {
         let mut terrain = Terrain::new(ground, &settings).unwrap();
         terrain.apply(digs);
         let world = terrain.world();
-        let builder = MeshBuilder::new(world, VertexExtras::of(None, false), RenderAssetUsages::RENDER_WORLD);
+        let builder = MeshBuilder::new(
+            world,
+            VertexExtras::of(None, VertexKind::default()),
+            RenderAssetUsages::RENDER_WORLD,
+        );
         let mut compared = 0;
         for level in 0..4 {
             // Nodes of different levels meet.
@@ -460,7 +568,8 @@ mod tests {
             let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
             let mut terrain = Terrain::new(ground, &settings).unwrap();
             let builders = [true, false].map(|is_slim| {
-                let extras = VertexExtras::of(Some(&colors), is_slim);
+                let kind = VertexKind { is_slim, has_sky_light: false };
+                let extras = VertexExtras::of(Some(&colors), kind);
                 MeshBuilder::new(terrain.world(), extras, RenderAssetUsages::RENDER_WORLD)
             });
             let mut compared = 0;
@@ -469,10 +578,14 @@ mod tests {
                 terrain.submit(Brush::dig(Shape::sphere(place, 3.0 + i as f32)));
                 let commit = terrain.begin().unwrap().run();
                 for (tile, update) in &commit.meshes.tiles {
-                    let origin = terrain.world().origin(Drawn::Tile(*tile));
+                    let origin = terrain.world().origin(MeshKey::Tile(*tile));
                     for builder in &builders {
-                        let found =
-                            bytes_of(builder.build(origin, &SurfaceDraft::Tile(update.clone()), None));
+                        let found = bytes_of(builder.build(
+                            origin,
+                            &SurfaceDraft::Tile(update.clone()),
+                            None,
+                            &mut TileLights::default(),
+                        ));
                         assert!(found == bytes_of(builder.build_whole(origin, &update.mesh())), "{tile:?}");
                         compared += usize::from(found.is_some());
                     }

@@ -1,4 +1,5 @@
-//! Messages and entity events.
+//! The plugin's messages and entity events: brushes for one terrain, receipts, undo and redo, loose pieces, changes of
+//! chunks and fields.
 
 use std::sync::Arc;
 
@@ -6,17 +7,19 @@ use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
 
 use super::MaterialColors;
-use super::meshes::{MeshBuilder, VertexExtras};
+use super::meshes::{MeshBuilder, VertexExtras, VertexKind};
 use crate::brush::Brush;
 use crate::terrain::{LoosePiece, Receipt, ReturnedPiece, Terrain};
 
 /// A brush in world space. It edits every terrain that it reaches, hidden ones too.
 ///
-/// Like all messages of the plugin it is reflected, for editors and Bevy's remote protocol: its method `world.write_message` takes
-/// `{"message": "bevy_burrow::brush::request::Brush", "value": {"shape": "sphere", "center": [8, 0, 8], "radius": 4, "op": "dig"}}`.
+/// Like all messages of the plugin it is reflected, for editors and Bevy's remote protocol: its method
+/// `world.write_message` takes `{"message": "bevy_burrow::brush::request::Brush", "value": {"shape": "sphere",
+/// "center": [8, 0, 8], "radius": 4, "op": "dig"}}`.
 ///
-/// If a parent stretches a terrain, the points, axes and heights of a brush are transformed exactly. Its sizes (radii, half
-/// sides, amounts, falloff, roughness) are scaled by the cube root of the change in volume: in voxels, a ball stays a ball.
+/// If a parent stretches a terrain, the points, axes and heights of a brush are transformed exactly. Its sizes (radii,
+/// half sides, amounts, falloff, roughness) are scaled by the cube root of the change in volume: in voxels, a ball
+/// stays a ball.
 impl Message for Brush {}
 
 /// A brush in world space for one terrain alone.
@@ -29,8 +32,8 @@ pub struct TargetedBrush {
     pub brush: Brush,
 }
 
-/// The result of a brush: one message for each terrain that it reaches, applied or rejected. Bounds are in voxels of the
-/// terrain.
+/// The result of a brush: one message for each terrain that it reaches, applied or rejected. Bounds are in voxels of
+/// the terrain.
 #[derive(Message, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Message, Clone, Debug, PartialEq)]
 pub struct BrushApplied {
@@ -40,12 +43,13 @@ pub struct BrushApplied {
     pub receipt: Receipt,
 }
 
-/// Undoes the last [stroke](Brush::stroke) that changed the ground. Brushes without a stroke are undone by the frame in which
-/// they were sent. A [`HistoryMoved`] is sent when it is done.
+/// Undoes the last [stroke](Brush::stroke) that changed the ground. Brushes without a stroke are undone by the frame in
+/// which they were sent. A [`HistoryMoved`] is sent when it is done.
 ///
-/// Undo and redo are queued together with brushes. Bevy keeps the order of messages of one type only, so those of one frame
-/// are read as all [`Brush`]es, then [`TargetedBrush`]es, then `Undo`s, then [`Redo`]s. When transactions run makes no
-/// difference to what is undone together, but the frame rate does: give brushes a stroke if all machines must agree.
+/// Undo and redo are queued together with brushes. Bevy keeps the order of messages of one type only, so those of one
+/// frame are read as all [`Brush`]es, then [`TargetedBrush`]es, then `Undo`s, then [`Redo`]s. When transactions run
+/// makes no difference to what is undone together, but the frame rate does: give brushes a stroke if all machines must
+/// agree.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -74,8 +78,8 @@ pub struct Redo {
     pub terrain: Option<Entity>,
 }
 
-/// The result of an [`Undo`] or [`Redo`], sent in the frame in which its meshes are shown: one for each terrain that it is
-/// for.
+/// The result of an [`Undo`] or [`Redo`], sent in the frame in which its meshes are shown: one for each terrain that it
+/// is for.
 #[derive(Message, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Message, Clone, Debug, PartialEq)]
 pub struct HistoryMoved {
@@ -85,9 +89,9 @@ pub struct HistoryMoved {
     pub receipt: Receipt,
 }
 
-/// A brush cut off a piece of ground, on a terrain with [`LooseGround`](super::LooseGround). A piece that vanishes or breaks
-/// off is gone from the ground in the frame of this message. The brush's receipt lists its pieces as well. A redo that cuts
-/// a piece off again sends this again, with the same [id](LoosePiece::id).
+/// A brush cut off a piece of ground, on a terrain with [`LooseGround`](super::LooseGround). A piece that vanishes or
+/// breaks off is gone from the ground in the frame of this message. The brush's receipt lists its pieces as well. A
+/// redo that cuts a piece off again sends this again, with the same [id](LoosePiece::id).
 #[derive(Message, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Message, Clone, Debug, PartialEq)]
 pub struct LoosePieceFound {
@@ -102,9 +106,10 @@ pub struct LoosePieceFound {
     pub(super) mesh: Option<Arc<Mesh>>,
 }
 
-/// A piece that had been cut off is ground again from this frame on: by an undo, a player's own or another's, or because a
-/// server refused the dig. What a game made of the piece has to go; `DebrisPlugin` does that for its debris, wherever it has
-/// rolled. Of several pieces with the same [id](ReturnedPiece::id) this is the one that was cut off last.
+/// A piece that had been cut off is ground again from this frame on: by an undo, a player's own or another's, or
+/// because a server refused the dig. What a game made of the piece has to go; `DebrisPlugin` does that for its debris,
+/// wherever it has rolled. Of several pieces with the same [id](ReturnedPiece::id) this is the one that was cut off
+/// last.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct LoosePieceReturned {
     /// The terrain.
@@ -120,19 +125,20 @@ impl LoosePieceFound {
         Self { terrain, tag, piece, mesh: None }
     }
 
-    /// The origin of the piece's mesh in voxels of the terrain: the translation for a child of the terrain that shows it.
+    /// The origin of the piece's mesh in voxels of the terrain: the translation for a child of the terrain that shows
+    /// it.
     pub fn origin(&self) -> Vec3 {
         self.piece.bounds.min.as_vec3()
     }
 
-    /// The piece as a mesh with the attributes of a chunk's, for the same materials; `None` unless it broke off. The terrain
-    /// is needed for the depth of the piece in the ground. With a [`GroundPiece`](super::GroundPiece) it is drawn like the
-    /// terrain. Its colours are those from the start of the transaction.
+    /// The piece as a mesh with the attributes of a chunk's, for the same materials; `None` unless it broke off. The
+    /// terrain is needed for the depth of the piece in the ground. With a [`GroundPiece`](super::GroundPiece) it is
+    /// drawn like the terrain. Its colours are those from the start of the transaction.
     pub fn mesh(&self, terrain: &Terrain, colors: &MaterialColors) -> Option<Mesh> {
         if let Some(mesh) = &self.mesh {
             return Some(Mesh::clone(mesh));
         }
-        let extras = VertexExtras::of(Some(colors), false);
+        let extras = VertexExtras::of(Some(colors), VertexKind::default());
         self.build(&MeshBuilder::new(terrain.world(), extras, RenderAssetUsages::RENDER_WORLD))
     }
 
@@ -149,9 +155,9 @@ impl LoosePieceFound {
 
 /// All tiles of a terrain are shown, and it takes transactions.
 ///
-/// A terrain that is shown may not be drawn yet: while textures are made or loaded, a terrain with a `GroundLook` has no
-/// material. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look nor a
-/// `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` propagates becomes ready too, and is never drawn.
+/// A terrain that is shown may not be drawn yet: while textures are made or loaded, a terrain with a `GroundLook` has
+/// no material. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look
+/// nor a `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` propagates becomes ready too, and is never drawn.
 ///
 /// The event is triggered again whenever a terrain has been loaded again, because another terrain replaced it, or
 /// because the game changed more of it through the model than a frame [swaps](super::BurrowSettings::swaps_per_frame).

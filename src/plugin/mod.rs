@@ -1,18 +1,19 @@
 //! The Bevy plugin: turns brush messages into meshes and receipts.
 //!
-//! Put a [`Terrain`] on an entity. The plugin spawns one child for each [`Tile`], and one for each [`Chunk`] that digging
-//! touches, with a [`Field`] below it for each region of edits. [`Brush`] messages, in world space, become transactions
-//! that run on the plugin's own threads; a finished one is committed in a single frame:
-//! meshes, entities, [`BrushApplied`] receipts and entity events. A server with `MinimalPlugins` has no `Assets<Mesh>`: it
-//! gets everything but the meshes.
+//! Put a [`Terrain`] on an entity. The plugin spawns one child for each [`Tile`], and one for each [`Chunk`] that
+//! digging touches, with a [`Field`] below it for each region of edits. [`Brush`] messages, in world space, become
+//! transactions that run on the plugin's own threads; a finished one is committed in a single frame: meshes, entities,
+//! [`BrushApplied`] receipts and entity events. A server with `MinimalPlugins` has no `Assets<Mesh>`: it gets
+//! everything but the meshes.
 //!
 //! [`Undo`] and [`Redo`] messages work by whole strokes, and are answered by [`HistoryMoved`]. On terrains with
-//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`] for each
-//! that an undo brings back.
+//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`]
+//! for each that an undo brings back.
 //!
-//! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`], and,
-//! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. They follow when such a component is inserted, changed
-//! or removed. An entity that is spawned with its own, of the same type, keeps it until the terrain's changes.
+//! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`],
+//! and, with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. They follow when such a component is
+//! inserted, changed or removed. An entity that is spawned with its own, of the same type, keeps it until the terrain's
+//! changes.
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
 //! [`Terrain`]: crate::terrain::Terrain
@@ -48,14 +49,19 @@ mod reports;
 mod same_frame;
 mod settings;
 mod task;
-mod tile_columns;
 mod times;
 
-pub use components::{Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SlimVertices, Tile};
+#[cfg(feature = "scatter")]
+pub(crate) use commit::GroundChanged;
+pub use components::{
+    Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SkyLight, SlimVertices, Tile,
+};
 #[doc(hidden)]
 pub use components::{GroundPieces, MeshBytes, ShownSurface};
+#[cfg(any(feature = "avian", feature = "scatter"))]
+pub(crate) use entities::TerrainEntities;
 #[cfg(feature = "avian")]
-pub(crate) use entities::{TerrainEntities, trigger_if_alive};
+pub(crate) use entities::trigger_if_alive;
 pub use figures::BurrowFigures;
 #[doc(hidden)]
 pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};
@@ -65,7 +71,10 @@ pub(crate) use lod_state::WantedTiles;
 pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[cfg(feature = "render")]
 pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
-pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
+pub use meshes::{
+    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
+    CUT_VOXELS,
+};
 #[doc(hidden)]
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
@@ -73,7 +82,7 @@ pub use messages::{
 };
 #[cfg(feature = "picking")]
 pub use picking::TerrainPickingPlugin;
-#[cfg(feature = "avian")]
+#[cfg(any(feature = "avian", feature = "scatter"))]
 pub(crate) use places::Places;
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 pub use propagate::TerrainPropagatePlugin;
@@ -118,11 +127,12 @@ pub use crate::threads::ThreadSettings;
 pub enum BurrowSystems {
     /// New terrains are loaded; their tiles appear all at once when all meshes are built.
     Load,
-    /// Brush, undo and redo messages are checked and queued. Send them before this set to have them in this frame's transaction.
+    /// Brush, undo and redo messages are checked and queued. Send them before this set to have them in this frame's
+    /// transaction.
     Collect,
-    /// Finished transactions are committed: meshes, entities, receipts, events. Small ones that begin in this frame are committed
-    /// in `PostUpdate`, if this set runs: see [`BurrowSettings::same_frame`]. Systems in `Update` read their messages in the next
-    /// frame, before anything of it is saved.
+    /// Finished transactions are committed: meshes, entities, receipts, events. Small ones that begin in this frame are
+    /// committed in `PostUpdate`, if this set runs: see [`BurrowSettings::same_frame`]. Systems in `Update` read their
+    /// messages in the next frame, before anything of it is saved.
     Commit,
     /// Queued brushes start as transactions.
     Begin,
@@ -141,7 +151,7 @@ pub(crate) enum BeforeLoad {
 }
 
 /// Systems that look at what was just committed, still in [`BurrowSystems::Commit`].
-#[cfg(feature = "replicon")]
+#[cfg(any(feature = "replicon", feature = "scatter"))]
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct FollowCommits;
 
@@ -160,7 +170,6 @@ impl Plugin for TerrainPlugin {
             .init_resource::<inbox::Inbox>()
             .init_resource::<reports::Reported>()
             .init_resource::<same_frame::SameFrame>()
-            .init_resource::<tile_columns::KeptColumns>()
             .init_resource::<WantedTiles>()
             .add_message::<Brush>()
             .register_type::<Brush>()
@@ -215,7 +224,9 @@ impl Plugin for TerrainPlugin {
                     (lod::begin_lod_changes, commit::begin_transactions).chain().in_set(BurrowSystems::Begin),
                 ),
             );
-        #[cfg(feature = "replicon")]
+        #[cfg(feature = "scatter")]
+        app.add_message::<GroundChanged>();
+        #[cfg(any(feature = "replicon", feature = "scatter"))]
         app.configure_sets(
             Update,
             FollowCommits.in_set(BurrowSystems::Commit).after(commit::commit_transactions),
@@ -243,6 +254,6 @@ impl Plugin for TerrainPlugin {
 
     #[cfg(feature = "render")]
     fn finish(&self, app: &mut App) {
-        engine::suggest_renderers_card(app.world());
+        engine::suggest_renderers_gpu(app.world());
     }
 }

@@ -1,8 +1,8 @@
 //! The materials of triangles: up to four, the same ones in the same order at all corners.
 //!
-//! Numbers of materials can't be blended, but weights can. So a shader needs one list of materials for a whole triangle, and
-//! the weight of each at every corner. Nearly all meshes have four materials at most, and so one list. In others, triangles
-//! are grouped by lists, and vertices on the border between groups are copied.
+//! Numbers of materials can't be blended, but weights can. So a shader needs one list of materials for a whole
+//! triangle, and the weight of each at every corner. Nearly all meshes have four materials at most, and so one list. In
+//! others, triangles are grouped by lists, and vertices on the border between groups are copied.
 
 use std::collections::HashMap;
 

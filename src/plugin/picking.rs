@@ -9,13 +9,14 @@ use bevy_picking::{Pickable, PickingSystems};
 use super::{TerrainHit, Terrains};
 use crate::terrain::Terrain;
 
-/// Lets pointers hit terrains: `On<Pointer<Click>>` and all other events of `bevy_picking` come to the entity of the [`Terrain`],
-/// with the [`TerrainHit`] as extra data.
+/// Lets pointers hit terrains: `On<Pointer<Click>>` and all other events of `bevy_picking` come to the entity of the
+/// [`Terrain`], with the [`TerrainHit`] as extra data.
 ///
-/// `BurrowPlugins` contain it with the feature `picking`. It needs Bevy's `DefaultPickingPlugins`, which `DefaultPlugins` have with
-/// Bevy's own feature `bevy_picking`; without them it does nothing.
+/// `BurrowPlugins` contain it with the feature `picking`. It needs Bevy's `DefaultPickingPlugins`, which
+/// `DefaultPlugins` have with Bevy's own feature `bevy_picking`; without them it does nothing.
 ///
-/// Hit are terrains that are visible and on a layer of the camera's, unless they have a `Pickable` with `is_hoverable: false`.
+/// Hit are terrains that are visible and on a layer of the camera's, unless they have a `Pickable` with `is_hoverable:
+/// false`.
 ///
 /// ```
 /// # use bevy::prelude::*;

@@ -1,8 +1,8 @@
 //! Global transforms of entities in this frame, before Bevy propagates transforms at its end.
 //!
-//! A place is computed from the `Transform`s of an entity and its ancestors, as Bevy will do. Plugins for floating origins keep
-//! places in another way: the root of a `big_space` has no `Transform`, and its children are in cells that a `Transform` knows
-//! nothing of. There the `GlobalTransform` is right, and is used as it is.
+//! A place is computed from the `Transform`s of an entity and its ancestors, as Bevy will do. Plugins for floating
+//! origins keep places in another way: the root of a `big_space` has no `Transform`, and its children are in cells that
+//! a `Transform` knows nothing of. There the `GlobalTransform` is right, and is used as it is.
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::system::SystemParam;
@@ -20,7 +20,8 @@ pub(crate) struct TerrainPlace {
     pub(super) written: GlobalTransform,
     /// The scale that the plugin wrote last.
     pub(super) scale: f32,
-    /// Whether something else maintains the `GlobalTransform` of this terrain, so that its `Transform` does not lead to it.
+    /// Whether something else maintains the `GlobalTransform` of this terrain, so that its `Transform` does not lead to
+    /// it.
     pub(super) is_external: bool,
 }
 
@@ -37,8 +38,8 @@ impl LocalPlaces<'_, '_> {
         self.below(entity, |_| None)
     }
 
-    /// The place of an entity, counted from the first ancestor, or the entity itself, whose place is known. Multiplied from
-    /// the top, as Bevy does, so that the bits are the same.
+    /// The place of an entity, counted from the first ancestor, or the entity itself, whose place is known. Multiplied
+    /// from the top, as Bevy does, so that the bits are the same.
     fn below(
         &self,
         entity: Entity,
@@ -70,7 +71,8 @@ pub(crate) struct Places<'w, 's> {
 }
 
 impl Places<'_, '_> {
-    /// The place of an entity: from its `Transform`s if they lead to it, else its `GlobalTransform`. `None` if it has neither.
+    /// The place of an entity: from its `Transform`s if they lead to it, else its `GlobalTransform`. `None` if it has
+    /// neither.
     pub(crate) fn of(&self, entity: Entity) -> Option<GlobalTransform> {
         let known = |at| {
             let (place, terrain) = self.globals.get(at).ok()?;
@@ -90,7 +92,8 @@ impl Places<'_, '_> {
     }
 }
 
-/// Updates the global transforms of terrains before they are queried; Bevy does so only at the end of the frame, if at all.
+/// Updates the global transforms of terrains before they are queried; Bevy does so only at the end of the frame, if at
+/// all.
 pub(super) fn place_terrains(
     places: LocalPlaces,
     mut terrains: Query<(Entity, &Terrain, &mut GlobalTransform, &mut TerrainPlace)>,
@@ -119,8 +122,8 @@ pub(super) fn place_terrain(
     place.set_if_neq(next);
 }
 
-/// Notes, at the end of a frame, whether something else maintains the global transform of a terrain: it is neither what the
-/// `Transform`s lead to nor what the plugin wrote.
+/// Notes, at the end of a frame, whether something else maintains the global transform of a terrain: it is neither what
+/// the `Transform`s lead to nor what the plugin wrote.
 pub(super) fn find_external_places(
     places: LocalPlaces,
     mut terrains: Query<(Entity, &GlobalTransform, &mut TerrainPlace), With<Terrain>>,
@@ -201,8 +204,8 @@ fn is_stretched(place: &GlobalTransform) -> bool {
     !(scale / scale.x).abs_diff_eq(Vec3::ONE, 1e-5)
 }
 
-/// Whether both sides of seams keep the same bits: they do if the terrain is not rotated, its scale is a power of two, and it
-/// is moved by whole voxels.
+/// Whether both sides of seams keep the same bits: they do if the terrain is not rotated, its scale is a power of two,
+/// and it is moved by whole voxels.
 fn keeps_bits(place: &GlobalTransform) -> bool {
     let (scale, rotation, translation) = place.to_scale_rotation_translation();
     scale == Vec3::splat(scale.x)

@@ -1,6 +1,6 @@
 //! Extra data for each surface: built in the same task as the meshes, swapped in by the same commit.
 
-use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,13 +10,13 @@ use bevy::ecs::system::SystemParam;
 use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
-use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
-use super::tile_columns::KeptColumns;
+use super::meshes::{BuiltMesh, MeshBuilder, TileLights, VertexExtras};
 use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::lod::{LodGrid, Node};
 use crate::surface::SurfaceMesh;
-use crate::terrain::{Drawn, DrawnCut, NodeUpdate, SurfaceDraft, Terrain};
+use crate::terrain::{DrawnCut, MeshKey, NodeUpdate, SurfaceDraft, Terrain};
+use crate::world::sky::LitWorld;
 
 /// A tile or chunk whose surface is built.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ pub struct Part {
     /// The terrain's entity.
     pub terrain: Entity,
     /// Which tile or chunk.
-    pub drawn: Drawn,
+    pub drawn: MeshKey,
     /// The lattice point that positions of its surface count from, in voxels of the terrain.
     pub origin: IVec3,
     /// Cells along its sides.
@@ -41,11 +41,11 @@ impl Part {
         voxel_size: f32,
         grid: ChunkGrid,
         revision: u64,
-        drawn: Drawn,
+        drawn: MeshKey,
     ) -> Self {
         let origin = match drawn {
-            Drawn::Tile(tile) => grid.tile_cells(tile).0.at(0),
-            Drawn::Chunk(chunk) => grid.origin(chunk),
+            MeshKey::Tile(tile) => grid.tile_cells(tile).0.at(0),
+            MeshKey::Chunk(chunk) => grid.origin(chunk),
         };
         Self { terrain, drawn, origin, size: grid.size(), voxel_size, revision }
     }
@@ -56,10 +56,11 @@ pub type CommitAction = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
 
 /// Builds extra data for each surface off-thread, and swaps it in with the mesh: colliders, or a navigation mesh.
 ///
-/// [`build`](Self::build) runs in the task that makes the surface of a tile or chunk. The [`CommitAction`] that it returns
-/// runs on the entity of that tile or chunk in the frame in which the mesh is swapped, on a server without meshes too.
-/// Large transactions build several parts at a time on rayon's threads: a processor that uses rayon itself should hold no
-/// lock while it does. If a processor panics, that part goes without its data, and an error is logged once.
+/// [`build`](Self::build) runs in the task that makes the surface of a tile or chunk. The [`CommitAction`] that it
+/// returns runs on the entity of that tile or chunk in the frame in which the mesh is swapped, on a server without
+/// meshes too. Large transactions build several parts at a time on rayon's threads: a processor that uses rayon itself
+/// should hold no lock while it does. If a processor panics, that part goes without its data, and an error is logged
+/// once.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -84,7 +85,7 @@ pub type CommitAction = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
 /// app.world_mut().resource_mut::<SurfaceProcessors>().add(Counter);
 /// ```
 pub trait SurfaceProcessor: Send + Sync + 'static {
-    /// Is there anything to build for this part? A server does not assemble surfaces that no processor wants.
+    /// Whether there is anything to build for this part. A server does not assemble surfaces that no processor wants.
     fn wants(&self, part: &Part) -> bool {
         let _ = part;
         true
@@ -113,8 +114,8 @@ impl SurfaceProcessors {
         self.processors.is_empty()
     }
 
-    /// Runs code of a processor. If it panics, an error is logged once for each terrain, and the ground is shown without its
-    /// data.
+    /// Runs code of a processor. If it panics, an error is logged once for each terrain, and the ground is shown
+    /// without its data.
     fn guarded<T>(&self, terrain: Entity, work: impl FnOnce() -> T) -> Option<T> {
         let done = catch_unwind(AssertUnwindSafe(work));
         if done.is_err() && self.failed.lock().unwrap_or_else(PoisonError::into_inner).insert(terrain) {
@@ -134,11 +135,11 @@ impl fmt::Debug for SurfaceProcessors {
 
 /// The new surface of a tile or chunk, ready to be swapped in.
 pub(super) struct BuiltSurface {
-    pub drawn: Drawn,
+    pub drawn: MeshKey,
     pub mesh: BuiltMesh,
     pub shown: ShownSurface,
     pub actions: Vec<CommitAction>,
-    /// Is it drawn? Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
+    /// Whether it is drawn. Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
     pub is_drawn: bool,
 }
 
@@ -150,7 +151,7 @@ pub(super) struct BuiltNode {
     /// Tile and chunks that are drawn from now on.
     pub shown: Vec<BuiltSurface>,
     /// Tile and chunks that are drawn no more.
-    pub hidden: Vec<Drawn>,
+    pub hidden: Vec<MeshKey>,
 }
 
 impl BuiltNode {
@@ -180,7 +181,6 @@ pub(super) struct BuildSettings<'w> {
     assets: Option<Res<'w, Assets<Mesh>>>,
     processors: Res<'w, SurfaceProcessors>,
     settings: Res<'w, BurrowSettings>,
-    columns: Res<'w, KeptColumns>,
 }
 
 impl BuildSettings<'_> {
@@ -188,11 +188,6 @@ impl BuildSettings<'_> {
     pub fn builder(&self, terrain: (Entity, &Terrain), extras: VertexExtras) -> SurfaceBuilder {
         let usages = self.assets.as_ref().map(|_| self.settings.mesh_usages);
         SurfaceBuilder::new(terrain, extras, usages, &self.processors)
-    }
-
-    /// A builder for edits of a terrain, which touch the same tiles again and again.
-    pub fn edit_builder(&self, terrain: (Entity, &Terrain), extras: VertexExtras) -> SurfaceBuilder {
-        SurfaceBuilder { columns: Some(self.columns.clone()), ..self.builder(terrain, extras) }
     }
 }
 
@@ -207,8 +202,6 @@ pub(super) struct SurfaceBuilder {
     /// `None` where there are no meshes.
     pub mesh_builder: Option<MeshBuilder>,
     processors: SurfaceProcessors,
-    /// Where the columns of tiles are kept from edit to edit.
-    columns: Option<KeptColumns>,
 }
 
 impl SurfaceBuilder {
@@ -227,8 +220,20 @@ impl SurfaceBuilder {
             revision: world.revision(),
             mesh_builder: mesh_usages.map(|usages| MeshBuilder::new(world, extras, usages)),
             processors: processors.clone(),
-            columns: None,
         }
+    }
+
+    /// Whether surfaces have sky light.
+    pub fn has_sky_light(&self) -> bool {
+        self.mesh_builder.as_ref().is_some_and(MeshBuilder::has_sky_light)
+    }
+
+    /// This builder with surfaces lit by a world, if they have sky light.
+    pub fn lit_by(mut self, lit: &Arc<LitWorld>) -> Self {
+        if let Some(builder) = &mut self.mesh_builder {
+            builder.light_by(lit);
+        }
+        self
     }
 
     /// Whether there is nothing to build.
@@ -236,18 +241,39 @@ impl SurfaceBuilder {
         self.mesh_builder.is_none() && self.processors.is_empty()
     }
 
-    /// Builds everything for these surfaces; many are built in parallel. Where a cut is drawn, those that it does not show get no
-    /// meshes.
+    /// Builds everything for these surfaces; many are built in parallel. Where a cut is drawn, those that it does not
+    /// show get no meshes.
     pub fn build_all(
         &self,
-        drafts: Vec<(Drawn, SurfaceDraft)>,
+        drafts: Vec<(MeshKey, SurfaceDraft)>,
         drawn_cut: Option<&DrawnCut>,
     ) -> Vec<BuiltSurface> {
         let cost = if self.processors.is_empty() { ItemCost::Surface } else { ItemCost::Collider };
-        parallel_map_into(drafts, cost, |(drawn, draft)| {
-            let is_drawn = drawn_cut.is_none_or(|cut| cut.shows_parts(drawn.tile()));
-            self.build((drawn, is_drawn), draft.is_empty(), || draft)
-        })
+        let is_drawn = |tile| drawn_cut.is_none_or(|cut| cut.shows_parts(tile));
+        if !self.has_sky_light() {
+            return parallel_map_into(drafts, cost, |(drawn, draft)| {
+                self.build((drawn, is_drawn(drawn.tile())), draft.is_empty(), || draft)
+            });
+        }
+        // A tile and its chunks are lit together.
+        let mut by_tile: BTreeMap<TilePos, Vec<(usize, MeshKey, SurfaceDraft)>> = BTreeMap::new();
+        for (number, (drawn, draft)) in drafts.into_iter().enumerate() {
+            by_tile.entry(drawn.tile()).or_default().push((number, drawn, draft));
+        }
+        let built = parallel_map_into(by_tile.into_iter().collect(), cost, |(tile, drafts)| {
+            let mut lights = self.lights_over(tile);
+            let build = |(number, drawn, draft): (usize, MeshKey, SurfaceDraft)| {
+                (number, self.build_lit((drawn, is_drawn(tile)), draft.is_empty(), || draft, &mut lights))
+            };
+            drafts.into_iter().map(build).collect::<Vec<_>>()
+        });
+        let mut built: Vec<(usize, BuiltSurface)> = built.into_iter().flatten().collect();
+        built.sort_unstable_by_key(|(number, _)| *number);
+        built.into_iter().map(|(_, built)| built).collect()
+    }
+
+    fn lights_over(&self, tile: TilePos) -> TileLights<'_> {
+        TileLights::new(self.mesh_builder.as_ref(), self.grid.tile_cells(tile))
     }
 
     /// Builds what these nodes are drawn with, in parallel.
@@ -265,13 +291,23 @@ impl SurfaceBuilder {
         })
     }
 
-    /// Builds everything for one surface; no mesh if it is not drawn. `draft` is called only if something is built from it;
-    /// otherwise `is_empty` says whether the surface is known to have no triangles.
+    /// Builds everything for one surface; no mesh if it is not drawn. `draft` is called only if something is built from
+    /// it; otherwise `is_empty` says whether the surface is known to have no triangles.
     pub fn build(
         &self,
-        (drawn, is_drawn): (Drawn, bool),
+        (drawn, is_drawn): (MeshKey, bool),
         is_empty: bool,
         draft: impl FnOnce() -> SurfaceDraft,
+    ) -> BuiltSurface {
+        self.build_lit((drawn, is_drawn), is_empty, draft, &mut self.lights_over(drawn.tile()))
+    }
+
+    fn build_lit(
+        &self,
+        (drawn, is_drawn): (MeshKey, bool),
+        is_empty: bool,
+        draft: impl FnOnce() -> SurfaceDraft,
+        lights: &mut TileLights,
     ) -> BuiltSurface {
         let part = &Part::new(self.terrain, self.voxel_size, self.grid, self.revision, drawn);
         let guarded = &self.processors;
@@ -292,17 +328,10 @@ impl SurfaceBuilder {
         }
         let draft = draft();
         built.shown.is_empty = draft.is_empty();
-        let columns = match (&draft, &self.columns) {
-            (SurfaceDraft::Tile(tile), Some(kept)) if !built.shown.is_empty => Some((kept.of(tile), tile)),
-            _ => None,
-        };
-        let known = columns.as_ref().map(|(columns, _)| &**columns);
-        built.mesh = mesh_builder.and_then(|builder| builder.build(part.origin, &draft, known));
-        if !processors.is_empty() {
-            let surface = &match columns {
-                Some((columns, tile)) => Cow::Owned(columns.surface(tile)),
-                None => draft.surface(),
-            };
+        let surface = (!processors.is_empty()).then(|| draft.surface());
+        built.mesh =
+            mesh_builder.and_then(|builder| builder.build(part.origin, &draft, surface.as_deref(), lights));
+        if let Some(surface) = &surface {
             let build = |processor: &Arc<dyn SurfaceProcessor>| {
                 guarded.guarded(part.terrain, || processor.build(part, surface))
             };

@@ -1,8 +1,8 @@
-//! Propagates components from a terrain to its tiles, chunks and pieces: Bevy reads material, layers and shadows from the
-//! entity of each mesh, not from the terrain's.
+//! Propagates components from a terrain to its tiles, chunks and pieces: Bevy reads material, layers and shadows from
+//! the entity of each mesh, not from the terrain's.
 //!
-//! Bevy's `HierarchyPropagatePlugin` does not fit: games would have to wrap each component in a `Propagate`, and a piece that
-//! is spawned with its own component would lose it.
+//! Bevy's `HierarchyPropagatePlugin` does not fit: games would have to wrap each component in a `Propagate`, and a
+//! piece that is spawned with its own component would lose it.
 //!
 //! Propagated values are recorded as [`Source`]s on the terrain and [`Inherited`] on the parts, so nothing is missed
 //! while a game does not run these systems.
@@ -21,9 +21,9 @@ use super::same_frame::{PropagateSameFrame, SameFrame};
 use super::{BurrowSystems, Chunk, GroundPiece, Tile};
 use crate::terrain::Terrain;
 
-/// Propagates a component of any type from a terrain's entity to its tiles, chunks and [pieces](GroundPiece): when it is
-/// inserted, changed or removed. `BurrowPlugins` do so for `RenderLayers`, and with the feature `render` for materials,
-/// `NotShadowCaster` and `NotShadowReceiver`.
+/// Propagates a component of any type from a terrain's entity to its tiles, chunks and [pieces](GroundPiece): when it
+/// is inserted, changed or removed. `BurrowPlugins` do so for `RenderLayers`, and with the feature `render` for
+/// materials, `NotShadowCaster` and `NotShadowReceiver`.
 ///
 /// A tile, chunk or piece that is spawned with its own keeps it until the terrain's changes.
 ///
@@ -163,8 +163,8 @@ fn insert_on_new<C: Component + Clone, R: Relationship, F: QueryFilter>(
     }
 }
 
-/// Inserts the component on tiles and chunks that a commit spawned after [`BurrowSystems::Propagate`], and that have none of their
-/// own.
+/// Inserts the component on tiles and chunks that a commit spawned after [`BurrowSystems::Propagate`], and that have
+/// none of their own.
 fn insert_on_spawned<C: Component + Clone>(
     mut commands: Commands,
     same_frame: Res<SameFrame>,
@@ -181,7 +181,8 @@ fn insert_on_spawned<C: Component + Clone>(
     }
 }
 
-/// Inserts a component that is new or changed into all entities but those that are new themselves, and have not inherited it yet.
+/// Inserts a component that is new or changed into all entities but those that are new themselves, and have not
+/// inherited it yet.
 fn insert_changed<C: Component + Clone, R: Relationship, F: QueryFilter>(
     mut commands: Commands,
     terrains: Query<(&C, &R::RelationshipTarget), (Active<C>, Or<(Changed<C>, Added<Source<C, R>>)>)>,

@@ -11,10 +11,10 @@ use crate::terrain::{Span, Terrain};
 
 /// A system parameter for queries about the ground of all terrains in world space, hidden ones too.
 ///
-/// Terrains may be moved, rotated, scaled, stretched and mirrored. [`height`](Self::height) and [`spans`](Self::spans) leave
-/// out those whose y axis does not point straight up. The place of a terrain is the one at its insertion or at the start of
-/// this frame's [`BurrowSystems::Load`](super::BurrowSystems::Load), whichever came last; where another plugin maintains
-/// `GlobalTransform`s, as for floating origins, it is the one that this plugin wrote last.
+/// Terrains may be moved, rotated, scaled, stretched and mirrored. [`height`](Self::height) and [`spans`](Self::spans)
+/// leave out those whose y axis does not point straight up. The place of a terrain is the one at its insertion or at
+/// the start of this frame's [`BurrowSystems::Load`](super::BurrowSystems::Load), whichever came last; where another
+/// plugin maintains `GlobalTransform`s, as for floating origins, it is the one that this plugin wrote last.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -46,7 +46,7 @@ pub struct TerrainHit {
     pub normal: Vec3,
     /// The material of the ground there.
     pub material: MaterialId,
-    /// Did the ray come from inside the ground?
+    /// Whether the ray came from inside the ground.
     pub from_inside: bool,
 }
 
@@ -107,7 +107,8 @@ impl Terrains<'_, '_> {
         highest.map(|(_, _, spans)| spans).unwrap_or_default()
     }
 
-    /// The unit normal of the surface that is nearest to `place` along the y of its terrain; `None` if there is no terrain.
+    /// The unit normal of the surface that is nearest to `place` along the y of its terrain; `None` if there is no
+    /// terrain.
     pub fn normal(&self, place: Vec3) -> Option<Vec3> {
         let (terrain, space) = self.nearest(place)?;
         let normal = terrain.world().normal(space.inverse.transform_point3(place.as_dvec3()))?;
@@ -122,8 +123,8 @@ impl Terrains<'_, '_> {
         terrain.world().height(local.x, local.z).map(|_| terrain.world().material_under(local))
     }
 
-    /// The terrain whose surface is nearest to a place along its y; of two at one distance always the same one. If there is
-    /// only one terrain, it is returned even if it does not reach there.
+    /// The terrain whose surface is nearest to a place along its y; of two at one distance always the same one. If
+    /// there is only one terrain, it is returned even if it does not reach there.
     fn nearest(&self, place: Vec3) -> Option<(&Terrain, Space)> {
         if let Ok((_, terrain, at, _)) = self.terrains.single() {
             return Some((terrain, Space::of(at)?));
@@ -148,8 +149,8 @@ impl Terrains<'_, '_> {
         })
     }
 
-    /// Is all ground between two corners shown as it is, with no terrain loading and no edit on its way there? False
-    /// if there is no terrain at all, or a corner is not a number. Infinite corners stand for everywhere.
+    /// Whether all ground between two corners is shown as it is, with no terrain loading and no edit on its way there.
+    /// `false` if there is no terrain at all, or a corner is not a number. Infinite corners stand for everywhere.
     ///
     /// A terrain that is shown may not be drawn yet: see [`TerrainReady`](super::TerrainReady).
     pub fn is_ready(&self, min: Vec3, max: Vec3) -> bool {

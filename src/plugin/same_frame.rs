@@ -1,8 +1,9 @@
 //! Commits small transactions in the frame in which they began: a player sees the hole in the frame of the click.
 //!
-//! A transaction that begins in `Update` runs while the game's other systems do. In `PostUpdate`, before Bevy's systems for
-//! assets, transforms and visibility, the frame waits for at most [`same_frame`](super::BurrowSettings::same_frame). A
-//! transaction that is not done by then is committed like any other: in `Update` of a later frame.
+//! A transaction that begins in `Update` runs while the game's other systems do. In `PostUpdate`, before Bevy's systems
+//! for assets, transforms and visibility, the frame waits for at most
+//! [`same_frame`](super::BurrowSettings::same_frame). A transaction that is not done by then is committed like any
+//! other: in `Update` of a later frame.
 
 use bevy::asset::AssetEventSystems;
 use bevy::camera::visibility::VisibilitySystems;

@@ -30,19 +30,23 @@ impl Default for BurrowEngine {
 #[derive(Resource, Reflect, Clone, Debug, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct BurrowSettings {
-    /// Meshes swapped per frame. A commit is never split: a larger one is shown whole, and others wait for the next frame.
+    /// Meshes swapped per frame. A commit is never split: a larger one is shown whole, and others wait for the next
+    /// frame.
     pub swaps_per_frame: usize,
-    /// Meshes of tiles and chunks passed to the renderer per frame while a terrain loads. They are shown once all are there.
+    /// Meshes of tiles and chunks passed to the renderer per frame while a terrain loads. They are shown once all are
+    /// there.
     pub loads_per_frame: usize,
-    /// Where the meshes of tiles and chunks are kept. In the render world only, unless set otherwise: that saves memory and a
-    /// copy of each mesh, but Bevy's `Mesh` methods panic once such a mesh was extracted. Crates that read the meshes of a game,
-    /// for colliders, navigation or mesh picking, need `RenderAssetUsages::default()`, which keeps them in both worlds.
+    /// Where the meshes of tiles and chunks are kept. In the render world only, unless set otherwise: that saves memory
+    /// and a copy of each mesh, but Bevy's `Mesh` methods panic once such a mesh was extracted. Crates that read the
+    /// meshes of a game, for colliders, navigation or mesh picking, need `RenderAssetUsages::default()`, which keeps
+    /// them in both worlds.
     ///
     /// It holds for meshes that are built after a change; see [`Redraw`](super::Redraw).
     pub mesh_usages: RenderAssetUsages,
-    /// How long a frame waits, in `PostUpdate`, for small transactions that began in it, so that a brush is seen in the frame
-    /// in which it was sent. What takes longer is seen in a later frame, and where the latest transactions all took longer, the
-    /// frame does not wait. 0.3 ms; 0 never waits. An app without `Assets<Mesh>`, such as a server, never waits.
+    /// How long a frame waits, in `PostUpdate`, for small transactions that began in it, so that a brush is seen in the
+    /// frame in which it was sent. What takes longer is seen in a later frame, and where the latest transactions all
+    /// took longer, the frame does not wait. 0.3 ms; 0 never waits. An app without `Assets<Mesh>`, such as a server,
+    /// never waits.
     ///
     /// Order and content of edits are the same in any case.
     pub same_frame: Duration,
@@ -59,10 +63,11 @@ impl Default for BurrowSettings {
     }
 }
 
-/// Makes brushes look for pieces of ground that they cut off: insert it on a terrain's entity, and a [`LoosePieceFound`] is
-/// sent for each piece. Brushes that a game [applies](crate::terrain::Terrain::apply) itself look for pieces too, but these
-/// are only listed in the receipts: no message is sent, and none falls as debris. A terrain that is not spawned yet does not
-/// have this component: call `terrain.set_loose(Some(loose.into()))` before you replay a journal on it.
+/// Makes brushes look for pieces of ground that they cut off: insert it on a terrain's entity, and a
+/// [`LoosePieceFound`] is sent for each piece. Brushes that a game [applies](crate::terrain::Terrain::apply) itself
+/// look for pieces too, but these are only listed in the receipts: no message is sent, and none falls as debris. A
+/// terrain that is not spawned yet does not have this component: call `terrain.set_loose(Some(loose.into()))` before
+/// you replay a journal on it.
 ///
 /// ```
 /// # use bevy::prelude::*;

@@ -1,8 +1,10 @@
 //! The background task of a terrain: it runs a transaction, and builds the surfaces that the next commit shows.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
+use bevy::platform::collections::HashSet;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
@@ -11,8 +13,14 @@ use super::collect::{pieces, pieces_again};
 use super::figures::TaskTimes;
 use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use crate::backend::Engine;
-use crate::terrain::{Asked, Commit, Drawn, Receipt, SurfaceDraft, Terrain, Transaction, Unseen};
+use crate::lattice::TilePos;
+use crate::lod::Node;
+use crate::redraw::{relit_nodes, relit_parts};
+use crate::terrain::{
+    Asked, Commit, MeshKey, MeshUpdates, PendingDisplay, Receipt, SurfaceDraft, Terrain, Transaction, World,
+};
 use crate::threads::{ThreadTask, Threads};
+use crate::world::sky::{LitWorld, REACH};
 
 /// The running task of a terrain.
 #[derive(Component)]
@@ -51,7 +59,7 @@ pub(super) enum Change {
     /// A transaction, not committed yet.
     Transaction(Box<Commit>),
     /// Commits that the game made itself.
-    Unseen(Unseen),
+    PendingDisplay(PendingDisplay),
 }
 
 impl InFlight {
@@ -65,22 +73,26 @@ impl InFlight {
         terrain: Entity,
         transaction: Transaction,
         engine: Engine,
-        builder: SurfaceBuilder,
+        mut builder: SurfaceBuilder,
     ) -> Self {
         Self::start(number, Some(transaction.ticket()), move || {
             let _span = info_span!("burrow_transaction").entered();
             let start = Instant::now();
-            let mut commit = info_span!("burrow_edit").in_scope(|| transaction.run_on(&engine));
+            let (mut commit, world) =
+                info_span!("burrow_edit").in_scope(|| transaction.run_with_world(&engine));
             let edit = start.elapsed();
             // Taken out of the commit, so that they are dropped here and not on the main thread.
-            let updates = std::mem::take(&mut commit.meshes);
+            let mut updates = std::mem::take(&mut commit.meshes);
+            let relit;
+            (builder, relit) = relight(builder, world, &commit, &mut updates);
             let drawn_cut = commit.drawn_cut().cloned();
             let tiles = updates.tiles.into_iter();
-            let tiles = tiles.map(|(tile, update)| (Drawn::Tile(tile), SurfaceDraft::Tile(update)));
+            let tiles = tiles.map(|(tile, update)| (MeshKey::Tile(tile), SurfaceDraft::Tile(update)));
             let chunks = updates.chunks.into_iter();
-            let chunks = chunks.map(|(at, chunk)| (Drawn::Chunk(at), SurfaceDraft::Chunk(chunk)));
+            let chunks = chunks.map(|(at, chunk)| (MeshKey::Chunk(at), SurfaceDraft::Chunk(chunk)));
             let _span = info_span!("burrow_mesh").entered();
-            let surfaces = builder.build_all(tiles.chain(chunks).collect(), drawn_cut.as_deref());
+            let drafts = tiles.chain(chunks).chain(relit).collect();
+            let surfaces = builder.build_all(drafts, drawn_cut.as_deref());
             let nodes = builder.build_nodes(updates.nodes);
             let again = commit.receipts().iter().flat_map(|receipt| pieces_again(terrain, receipt));
             let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).chain(again).collect();
@@ -94,16 +106,31 @@ impl InFlight {
     }
 
     /// Builds the surfaces that the game changed itself.
-    pub fn unseen(number: u64, terrain: &Terrain, unseen: Unseen, builder: SurfaceBuilder) -> Self {
-        let drafts = unseen.drawn().map(|drawn| (drawn, terrain.world().draft(drawn))).collect();
+    pub fn pending_display(
+        number: u64,
+        terrain: &Terrain,
+        pending: PendingDisplay,
+        builder: SurfaceBuilder,
+    ) -> Self {
+        // What was there before is not known, so all ground near is lit again.
+        let mut drawn: BTreeSet<MeshKey> = pending.drawn().collect();
+        if builder.has_sky_light() {
+            drawn.extend(parts_near(terrain.world(), pending.drawn()));
+        }
+        let drafts = drawn.iter().map(|&drawn| (drawn, terrain.world().draft(drawn))).collect();
+        let builder = match builder.has_sky_light() {
+            true => builder.lit_by(&Arc::new(LitWorld::new(terrain.snapshot(), Vec::new()))),
+            false => builder,
+        };
         // Nodes are made from all of the world.
         let cut = terrain.drawn_cut().map(|cut| (terrain.snapshot(), Arc::clone(cut)));
         Self::start(number, None, move || {
             let _span = info_span!("burrow_mesh").entered();
             let surfaces = builder.build_all(drafts, cut.as_ref().map(|(_, cut)| cut.as_ref()));
-            let nodes = cut.map(|(world, cut)| world.redraw_tiles(&cut, unseen.drawn().map(Drawn::tile)));
+            let nodes =
+                cut.map(|(world, cut)| world.redraw_tiles(&cut, drawn.iter().map(|drawn| drawn.tile())));
             let nodes = builder.build_nodes(nodes.unwrap_or_default());
-            let (change, times) = (Change::Unseen(unseen), TaskTimes::default());
+            let (change, times) = (Change::PendingDisplay(pending), TaskTimes::default());
             TaskOutput { change, surfaces, nodes, pieces: Vec::new(), times }
         })
     }
@@ -121,9 +148,9 @@ impl InFlight {
         self.done.is_some()
     }
 
-    /// Whether its result is a transaction with edits or a step through history, and no piece of ground breaks off or comes
-    /// back. Debris is made and removed in `Update`: earlier, a piece would be nowhere for a frame, or twice. Other players'
-    /// edits come as parts, and their pieces besides.
+    /// Whether its result is a transaction with edits or a step through history, and no piece of ground breaks off or
+    /// comes back. Debris is made and removed in `Update`: earlier, a piece would be nowhere for a frame, or twice.
+    /// Other players' edits come as parts, and their pieces besides.
     pub fn is_plain(&self) -> bool {
         let Some(Ok(TaskOutput { change: Change::Transaction(commit), pieces, .. })) = &self.done else {
             return false;
@@ -139,6 +166,49 @@ impl InFlight {
         let is_own = !receipts.is_empty() && receipts.iter().all(is_own);
         is_own && pieces.is_empty()
     }
+}
+
+/// Lights the surfaces of a commit to a world, and adds what it only lights otherwise: tiles and chunks are returned.
+fn relight(
+    builder: SurfaceBuilder,
+    world: Arc<World>,
+    commit: &Commit,
+    updates: &mut MeshUpdates,
+) -> (SurfaceBuilder, Vec<(MeshKey, SurfaceDraft)>) {
+    if !builder.has_sky_light() {
+        return (builder, Vec::new());
+    }
+    let bricks = if commit.is_cut() { Vec::new() } else { commit.change().bricks };
+    let lit = Arc::new(LitWorld::new(world, bricks));
+    // Another world is loaded as a whole.
+    let is_relit = !commit.is_cut() && !commit.is_whole();
+    let parts = if is_relit {
+        let redrawn: HashSet<MeshKey> = {
+            let tiles = updates.tiles.iter().map(|(tile, _)| MeshKey::Tile(*tile));
+            tiles.chain(updates.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk))).collect()
+        };
+        relit_parts(&lit, |drawn| redrawn.contains(&drawn))
+    } else {
+        Vec::new()
+    };
+    if let Some(drawn) = commit.drawn_cut().filter(|_| is_relit) {
+        let redrawn: HashSet<Node> = updates.nodes.iter().map(|update| update.node).collect();
+        updates.nodes.extend(relit_nodes(&lit, drawn, |node| redrawn.contains(&node)));
+    }
+    let drafts = parts.into_iter().map(|drawn| (drawn, lit.before().draft(drawn))).collect();
+    (builder.lit_by(&lit), drafts)
+}
+
+/// The tiles and chunks that are so near to some that these may change their light.
+fn parts_near(world: &World, of: impl Iterator<Item = MeshKey>) -> Vec<MeshKey> {
+    let by = REACH / world.grid().size() + 1;
+    let near = |TilePos { x, z }| {
+        (x - by..=x + by).flat_map(move |x| (z - by..=z + by).map(move |z| TilePos { x, z }))
+    };
+    let tiles: HashSet<TilePos> = of.flat_map(|drawn| near(drawn.tile())).collect();
+    let chunks = world.drawn_chunks().filter(|chunk| tiles.contains(&chunk.tile())).map(MeshKey::Chunk);
+    let tiles = tiles.iter().filter(|tile| world.grid().has_tile(**tile)).map(|&tile| MeshKey::Tile(tile));
+    tiles.chain(chunks).collect()
 }
 
 /// Numbers tasks over all terrains, so that they are committed in the order in which they began.

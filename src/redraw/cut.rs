@@ -13,7 +13,7 @@ use super::source::SurfaceDraft;
 use crate::lattice::TilePos;
 use crate::lod::{Cut, Node};
 use crate::surface::SurfaceMesh;
-use crate::world::{Drawn, World};
+use crate::world::{MeshKey, World};
 
 /// The drawn part of a world: the nodes of a cut.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,14 +43,14 @@ pub struct NodeUpdate {
     /// Its own mesh, relative to its lowest column at y = 0; `None` if it is drawn by its tile and chunks, or not at all.
     pub mesh: Option<Arc<SurfaceMesh>>,
     /// Tile and chunks that are drawn from now on.
-    pub(crate) shown: Vec<(Drawn, SurfaceDraft)>,
+    pub(crate) shown: Vec<(MeshKey, SurfaceDraft)>,
     /// Tile and chunks that may have been drawn before and no longer are.
-    pub hidden: Vec<Drawn>,
+    pub hidden: Vec<MeshKey>,
 }
 
 impl NodeUpdate {
     /// The tile and chunks that are drawn from now on, with their surfaces.
-    pub fn shown(&self) -> impl Iterator<Item = (Drawn, Cow<'_, SurfaceMesh>)> {
+    pub fn shown(&self) -> impl Iterator<Item = (MeshKey, Cow<'_, SurfaceMesh>)> {
         self.shown.iter().map(|(drawn, draft)| (*drawn, draft.surface()))
     }
 }

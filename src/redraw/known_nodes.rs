@@ -1,7 +1,7 @@
 //! A cache of facts about the nodes of a world's quadtree, and the choice of cuts from them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -20,6 +20,17 @@ const KEPT_NODES: usize = 32_768;
 pub struct KnownNodes {
     facts: RwLock<FxHashMap<Node, GroundFacts>>,
     waiting: AtomicUsize,
+    settled: Mutex<Option<Settled>>,
+}
+
+/// What a cut was chosen from that stayed as it was: chosen from the same again, it stays so again. After most digs, nothing else has
+/// to be looked at, however many nodes there are.
+#[derive(PartialEq)]
+struct Settled {
+    cut: Cut,
+    choice: LodSettings,
+    eyes: Vec<Viewpoint>,
+    edited_nodes: u64,
 }
 
 impl KnownNodes {
@@ -39,6 +50,10 @@ impl KnownNodes {
         self.waiting.load(Ordering::Relaxed)
     }
 
+    fn settled(&self) -> MutexGuard<'_, Option<Settled>> {
+        self.settled.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn read(&self) -> RwLockReadGuard<'_, FxHashMap<Node, GroundFacts>> {
         self.facts.read().unwrap_or_else(PoisonError::into_inner)
     }
@@ -53,6 +68,15 @@ impl KnownNodes {
         eyes: &[Viewpoint],
         most: usize,
     ) -> Cut {
+        let now = Settled {
+            cut: cut.clone(),
+            choice: choice.clone(),
+            eyes: eyes.to_vec(),
+            edited_nodes: world.edited_nodes_version(),
+        };
+        if self.settled().as_ref() == Some(&now) {
+            return now.cut;
+        }
         self.learn(world, cut.grid(), cut.nodes());
         let target = {
             let facts = self.read();
@@ -79,6 +103,7 @@ impl KnownNodes {
         let changed = next.nodes().filter(|&node| !target.contains(node)).count();
         self.waiting.store(changed.max(step.new.len()), Ordering::Relaxed);
         self.forget(&next, KEPT_NODES);
+        *self.settled() = (next == *cut).then_some(now);
         next
     }
 
@@ -94,7 +119,9 @@ impl KnownNodes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
+    use crate::lod::View;
     use crate::terrain::{Terrain, TerrainSettings};
 
     #[test]
@@ -115,5 +142,51 @@ mod tests {
         rest.sort_unstable();
         drawn.sort_unstable();
         assert_eq!(rest, drawn);
+    }
+
+    /// What was chosen before has no influence beyond the cut itself.
+    #[test]
+    fn a_cut_is_chosen_as_if_none_had_been_chosen_before() {
+        let settings = TerrainSettings { chunk_size: 8, ..TerrainSettings::default() };
+        let mut terrain = Terrain::new(Ground::flat(320, 270, 40.0).unwrap(), &settings).unwrap();
+        let grid = terrain.world().lod_grid(u8::MAX);
+        let all = || {
+            (0..=grid.top()).flat_map(move |level| {
+                Cut::new(grid, move |node| node.level > level).nodes().collect::<Vec<_>>()
+            })
+        };
+        let fresh = |world: &World| {
+            let known = KnownNodes::default();
+            known.learn(world, grid, all());
+            known
+        };
+        let known = fresh(terrain.world());
+        let mut choice = LodSettings::default();
+        let mut eye = Viewpoint {
+            position: Vec3::new(160.0, 60.0, 140.0),
+            velocity: Vec3::ZERO,
+            pixels: 60.0,
+            view: View::Perspective,
+        };
+        let (mut cut, mut rng) = (Cut::coarsest(grid), fastrand::Rng::with_seed(6));
+        let (mut same, mut changed) = (0, 0);
+        for _ in 0..300 {
+            match rng.u32(0..8) {
+                0 => eye.position.x = rng.f32() * 320.0,
+                1 => choice.edited_pixels = 2.0 + 6.0 * rng.f32(),
+                2 => {
+                    let at = Vec3::new(rng.f32() * 320.0, 40.0, rng.f32() * 270.0);
+                    terrain.apply([Brush::dig(Shape::sphere(at, 3.0))]);
+                }
+                3 => drop(terrain.undo()),
+                _ => {}
+            }
+            let world = terrain.world();
+            let next = known.next_cut(world, &cut, &choice, &[eye], 40);
+            assert_eq!(next, fresh(world).next_cut(world, &cut, &choice, &[eye], 40));
+            *(if next == cut { &mut same } else { &mut changed }) += 1;
+            cut = next;
+        }
+        assert!(same > 30 && changed > 30, "{same} and {changed}");
     }
 }

@@ -6,6 +6,7 @@
 //! | `updates` | chunks and tiles that change, and their meshes |
 //! | `tiles`, `source` | tiles; what a mesh is made from |
 //! | `cut`, `nodes` | the cut that is drawn, and the nodes that change |
+//! | `relit` | surfaces whose light changes, but not their shape |
 //! | `node_facts`, `known_nodes` | facts about nodes by which a cut is chosen |
 //! | `stages` | how long each stage took |
 
@@ -15,6 +16,7 @@ mod dirty;
 mod known_nodes;
 mod node_facts;
 mod nodes;
+mod relit;
 mod source;
 mod stages;
 mod tiles;
@@ -26,6 +28,8 @@ pub(crate) use dirty::{dirty_cells, joined_mask};
 pub use known_nodes::KnownNodes;
 pub use node_facts::GroundFacts;
 pub(crate) use nodes::change_cut;
+#[cfg_attr(not(feature = "plugin"), allow(unused_imports))]
+pub(crate) use relit::{relit_nodes, relit_parts};
 #[cfg(feature = "plugin")]
 pub(crate) use source::SurfaceDraft;
 pub use source::TileUpdate;

@@ -12,7 +12,7 @@ use crate::lod::{Cut, Node};
 use crate::surface::ChunkSurface;
 use crate::surface::lod::{self, LodView, Stacks};
 use crate::surface::vertex::WorldView;
-use crate::world::{Drawn, World};
+use crate::world::{MeshKey, World};
 
 /// Tiles and chunks that a running transaction changes.
 pub(crate) type NewParts<'a> = (&'a [(TilePos, TileUpdate)], &'a [(ChunkPos, Arc<ChunkSurface>)]);
@@ -48,10 +48,13 @@ impl World {
 pub(crate) type NodeChanges = (Arc<DrawnCut>, Vec<NodeUpdate>);
 
 /// The updates that lead from one cut to another: removed nodes, new nodes, and nodes that touch them.
-pub(crate) fn change_cut(world: &World, drawn: &DrawnCut, choose: &ChooseCut) -> NodeChanges {
+pub(crate) fn change_cut(world: &World, drawn: &Arc<DrawnCut>, choose: &ChooseCut) -> NodeChanges {
     let chosen = choose(world, &drawn.cut);
     // A cut of another quadtree has no relation to this one.
     let cut = if chosen.grid() == drawn.cut.grid() { chosen } else { drawn.cut.clone() };
+    if cut == drawn.cut {
+        return (Arc::clone(drawn), Vec::new());
+    }
     let state = State::committed(world);
     let step = drawn.cut.changes_to(&cut);
     let mut nodes = step.new;
@@ -132,7 +135,7 @@ fn merged(areas: impl Iterator<Item = (Column, Column)>) -> Vec<(Column, Column)
 }
 
 /// A world as it is drawn: as committed, or with what a running transaction changes.
-struct State<'a> {
+pub(super) struct State<'a> {
     world: &'a World,
     view: WorldView<'a>,
     stacks: Stacks<'a>,
@@ -150,7 +153,7 @@ struct NewOver<'a> {
 }
 
 impl<'a> State<'a> {
-    fn committed(world: &'a World) -> Self {
+    pub fn committed(world: &'a World) -> Self {
         Self {
             world,
             view: world.view(),
@@ -178,7 +181,12 @@ impl<'a> State<'a> {
 
     /// The meshes of these nodes of a cut. Nodes of level 0 that were and are drawn by their parts are left out,
     /// because changed parts have their own updates.
-    fn updates(&self, cut: &Cut, nodes: &[Node], shows_parts: impl Fn(TilePos) -> bool) -> Vec<NodeUpdate> {
+    pub fn updates(
+        &self,
+        cut: &Cut,
+        nodes: &[Node],
+        shows_parts: impl Fn(TilePos) -> bool,
+    ) -> Vec<NodeUpdate> {
         let view = LodView::new(self.view, cut, self.stacks);
         // Most digs draw nothing here, so threads are not involved.
         let changing = nodes.iter().filter_map(|&node| {
@@ -197,7 +205,7 @@ impl<'a> State<'a> {
     }
 
     /// The tile and all chunks over it that draw something.
-    fn parts_over(&self, tile: TilePos) -> Vec<Drawn> {
+    fn parts_over(&self, tile: TilePos) -> Vec<MeshKey> {
         let size = self.world.grid.size();
         let mut chunks: Vec<ChunkPos> = Vec::new();
         let rows = self.world.rows_over(tile).unwrap_or(0..0);
@@ -209,14 +217,14 @@ impl<'a> State<'a> {
         chunks.extend(self.new_over(tile).iter().flat_map(|new| &new.chunks).map(|(chunk, _)| *chunk));
         chunks.sort_unstable();
         chunks.dedup();
-        std::iter::once(Drawn::Tile(tile)).chain(chunks.into_iter().map(Drawn::Chunk)).collect()
+        std::iter::once(MeshKey::Tile(tile)).chain(chunks.into_iter().map(MeshKey::Chunk)).collect()
     }
 
     /// The samples that a tile or chunk is built from.
-    fn draft(&self, drawn: Drawn) -> SurfaceDraft {
+    fn draft(&self, drawn: MeshKey) -> SurfaceDraft {
         let new = self.new_over(drawn.tile());
         match drawn {
-            Drawn::Tile(tile) => {
+            MeshKey::Tile(tile) => {
                 let new = new.and_then(|new| new.tile);
                 let old = || {
                     TileUpdate::new(self.world, &self.view, tile, |borders| {
@@ -225,7 +233,7 @@ impl<'a> State<'a> {
                 };
                 SurfaceDraft::Tile(new.cloned().unwrap_or_else(old))
             }
-            Drawn::Chunk(chunk) => {
+            MeshKey::Chunk(chunk) => {
                 let new = new.and_then(|new| new.chunks.iter().find(|(other, _)| *other == chunk));
                 match new {
                     Some((_, surface)) => SurfaceDraft::Chunk(Arc::clone(surface)),

@@ -9,7 +9,7 @@ use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{ChunkSurface, Indices, SurfaceMesh};
-use crate::world::{Drawn, UnmeshedChunk, World};
+use crate::world::{MeshKey, UnmeshedChunk, World};
 
 /// The mesh data of a tile. Its columns never change, so only its rings and indices do.
 #[derive(Clone, Debug)]
@@ -68,14 +68,14 @@ pub(crate) enum SurfaceDraft {
 
 impl World {
     /// The present input for the surface of a tile or chunk.
-    pub(crate) fn draft(&self, drawn: Drawn) -> SurfaceDraft {
+    pub(crate) fn draft(&self, drawn: MeshKey) -> SurfaceDraft {
         match drawn {
-            Drawn::Tile(tile) if self.grid.has_tile(tile) => {
+            MeshKey::Tile(tile) if self.grid.has_tile(tile) => {
                 let rings = |borders: &Borders| self.tile_rings(tile, borders);
                 SurfaceDraft::Tile(TileUpdate::new(self, &self.view(), tile, rings))
             }
-            Drawn::Tile(_) => SurfaceDraft::Nothing,
-            Drawn::Chunk(chunk) => {
+            MeshKey::Tile(_) => SurfaceDraft::Nothing,
+            MeshKey::Chunk(chunk) => {
                 let unmeshed = || self.unmeshed(chunk).map(|chunk| SurfaceDraft::Unmeshed(Arc::new(chunk)));
                 let kept = self.meshes.surfaces.get(chunk).cloned().map(SurfaceDraft::Chunk);
                 kept.or_else(unmeshed).unwrap_or(SurfaceDraft::Nothing)
@@ -155,7 +155,7 @@ mod tests {
                 assert!(**rings == Rings::new(&view, tile, &tile::borders(&view, tile)), "{tile:?}");
             }
         }
-        let outside = Drawn::Tile(TilePos { x: 90, z: 0 });
+        let outside = MeshKey::Tile(TilePos { x: 90, z: 0 });
         assert!(terrain.world().draft(outside).is_empty());
     }
 }

@@ -120,7 +120,7 @@ pub(crate) fn detach(entity: &mut EntityWorldMut, because: ClosedBecause) {
 }
 
 /// Reports worlds that are closed.
-pub(super) fn tell_closed(
+pub(super) fn report_closed(
     mut closing: ResMut<ClosingWorlds>,
     mut closed: MessageWriter<WorldClosed>,
     mut troubles: MessageWriter<StoreTroubleFound>,

@@ -16,11 +16,11 @@ use crate::terrain::Terrain;
 /// The longest time that an exiting app waits for the disk.
 pub(crate) const EXIT_WAIT: Duration = Duration::from_secs(10);
 
-/// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain. Scenes may hold
-/// it; the terrain itself they leave out.
+/// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain.
+/// Scenes may contain it; they leave out the terrain itself.
 ///
-/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed) says so. Changing it
-/// in its place is like inserting another one.
+/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed)
+/// says so. Changing it in its place is like inserting another one.
 ///
 /// | inserted on the same entity | what happens |
 /// | --- | --- |
@@ -62,7 +62,7 @@ pub struct WorldStore {
     /// The component that it was opened for.
     pub(super) saved: SavedWorld,
     /// The last point that was reported as durable.
-    pub(super) told: Option<SavePoint>,
+    pub(super) reported: Option<SavePoint>,
     /// The point that [`SaveNow`](super::SaveNow) waits for; `asked_again` if another was sent since.
     pub(super) asked: Option<SavePoint>,
     pub(super) asked_again: bool,
@@ -77,7 +77,7 @@ impl WorldStore {
         Self {
             store: Some(store),
             saved,
-            told: None,
+            reported: None,
             asked: None,
             asked_again: false,
             closing: ClosedBecause::Removed,
@@ -112,11 +112,11 @@ impl WorldStore {
     }
 }
 
-/// The plugin that opens and saves worlds is there.
+/// Exists if the plugin that opens and saves worlds was added.
 #[derive(Resource)]
 pub(super) struct SavesWorlds;
 
-/// Without the plugin a terrain would be held for ever, and nothing would say why.
+/// Warns if the plugin is missing: the terrain would be held for ever, without any message.
 pub(super) fn warn_without_plugin(world: &DeferredWorld, component: &str) {
     if world.get_resource::<SavesWorlds>().is_none() {
         error!("a {component} holds its terrain until there is a SavePlugin: add BurrowPlugins");
@@ -128,18 +128,18 @@ pub(super) fn warn_without_plugin(world: &DeferredWorld, component: &str) {
 pub(super) struct Unopened {
     pub since: Instant,
     /// Whether it was logged that there is no terrain.
-    pub told: bool,
+    pub reported: bool,
     /// What the world was to be read for before its terrain was removed.
     pub level: Option<LevelId>,
 }
 
 impl Unopened {
     pub fn new(level: Option<LevelId>) -> Self {
-        Self { since: Instant::now(), told: false, level }
+        Self { since: Instant::now(), reported: false, level }
     }
 }
 
-/// What tells a level from others: its ground and its sizes.
+/// What distinguishes a level from others: its ground and its sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LevelId {
     ground: u64,
@@ -164,7 +164,7 @@ impl LevelId {
 #[derive(Component)]
 pub(super) struct HeldHere;
 
-/// Holds a terrain; what is under way on it is done later.
+/// Holds a terrain. Its running transaction is begun again later.
 pub(super) fn hold_now(entity: &mut EntityWorldMut) {
     if let Some(mut terrain) = entity.get_mut::<Terrain>() {
         terrain.abandon();
@@ -174,9 +174,10 @@ pub(super) fn hold_now(entity: &mut EntityWorldMut) {
     }
 }
 
-/// Holds a terrain until its world is read. What is under way on it is done on the world that was read.
+/// Holds a terrain until its world is read. Its running transaction is then begun again on the world that was read.
 ///
-/// This is a hook, so that it comes before whatever observers do with the component, and looks whether the component is still there.
+/// It is a hook because hooks run before observers, which may remove the component again; so it checks that the
+/// component is still there.
 fn hold(mut world: DeferredWorld, context: HookContext) {
     warn_without_plugin(&world, "SavedWorld");
     world.commands().queue(move |world: &mut World| {

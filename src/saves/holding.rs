@@ -1,4 +1,4 @@
-//! Releases held terrains.
+//! Releases terrains that were held until their world or level was read.
 
 use bevy::prelude::*;
 
@@ -7,8 +7,8 @@ use super::level::{MakingLevel, StartLevel, Waiting};
 use super::reading::OpeningWorld;
 use crate::plugin::Held;
 
-/// Releases a terrain, unless its level or saved world is still being read, or the game holds it. Only this function removes
-/// [`Held`] in this module.
+/// Releases a terrain, unless its level or saved world is still being read, or the game holds it. Only this function
+/// removes [`Held`] in this module.
 pub(super) fn release(commands: &mut Commands, entity: Entity) {
     commands.queue(move |world: &mut World| {
         let Ok(mut entity) = world.get_entity_mut(entity) else { return };

@@ -103,8 +103,9 @@ impl AssetSaver for LevelSaver {
     }
 }
 
-/// The terrain of this entity begins as a level. Insert it with a terrain without edits, which gives the ground; the terrain is
-/// [`Held`](crate::plugin::Held) until the level is loaded, and begins without it where it can't be, which is logged as an error.
+/// The terrain of this entity begins as a level. Insert it with a terrain without edits, which gives the ground; the
+/// terrain is [`Held`](crate::plugin::Held) until the level is loaded, and begins without it where it can't be, which
+/// is logged as an error.
 ///
 /// With a [`SavedWorld`](super::SavedWorld) on the same entity, an existing world is continued, and only a new one
 /// starts from the level. That world saves only its differences from the level, and needs a level to be opened: if that
@@ -124,12 +125,12 @@ pub(super) struct MakingLevel(pub ThreadTask<Result<Terrain, RestoreLevelError>>
 #[derive(Component)]
 pub(super) struct Waiting {
     pub since: Instant,
-    pub told: bool,
+    pub reported: bool,
 }
 
 impl Waiting {
     pub fn new() -> Self {
-        Self { since: Instant::now(), told: false }
+        Self { since: Instant::now(), reported: false }
     }
 }
 

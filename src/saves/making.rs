@@ -56,8 +56,8 @@ pub(super) fn start_levels(
                     }
                 });
             }
-            Ok(None) if !wait.told && wait.since.elapsed() >= REPORT_AFTER => {
-                wait.told = true;
+            Ok(None) if !wait.reported && wait.since.elapsed() >= REPORT_AFTER => {
+                wait.reported = true;
                 warn!(
                     "{entity} still waits for its level {:?}: remove its StartLevel to begin without",
                     start.0

@@ -67,8 +67,9 @@ pub enum ClosedBecause {
     /// Its [`SavedWorld`](super::SavedWorld) was removed or replaced, or its entity despawned.
     #[default]
     Removed,
-    /// A [`Terrain`](crate::terrain::Terrain) over another ground, or of another size, was put in place of its own. Its `SavedWorld` was
-    /// removed, and nothing was written of that terrain: insert another `SavedWorld` with it to save that.
+    /// A [`Terrain`](crate::terrain::Terrain) over another ground, or of another size, was put in place of its own. Its
+    /// `SavedWorld` was removed, and nothing was written of that terrain: insert another `SavedWorld` with it to save
+    /// that.
     OtherTerrain,
     /// Its terrain is shared from now on, and the server saves what players share. Its `SavedWorld` was removed.
     Shared,

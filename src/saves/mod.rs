@@ -46,8 +46,8 @@ use bevy::prelude::*;
 
 use crate::plugin::{BeforeLoad, BurrowSystems};
 
-/// Commits are handed to the store, in `Update`. What a game [puts](WorldStore::put) before this is saved with the commits of this
-/// frame.
+/// Commits are handed to the store, in `Update`. What a game [puts](WorldStore::put) before this is saved with the
+/// commits of this frame.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SaveSystems;
 
@@ -86,7 +86,7 @@ impl Plugin for SavePlugin {
                     )
                         .chain()
                         .in_set(BeforeLoad::Worlds),
-                    (saving::save_commits, saving::save_now, saving::tell, closing::tell_closed)
+                    (saving::save_commits, saving::save_now, saving::report, closing::report_closed)
                         .chain()
                         .in_set(SaveSystems),
                 ),

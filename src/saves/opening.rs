@@ -17,18 +17,19 @@ use crate::store::{Store, StoreTrouble};
 use crate::terrain::Terrain;
 use crate::threads::free_later;
 
-/// Bytes of commits that wait at most until the store takes them, which it does each frame.
+/// Most bytes of commits that a terrain keeps until the store takes them, which it does each frame.
 const LOG_BYTES: usize = 64 << 20;
 
 /// How long a component waits for a terrain before that is logged.
-const TERRAIN_TOLD: Duration = Duration::from_secs(10);
+const REPORT_AFTER: Duration = Duration::from_secs(10);
 
-/// A world that is to be read is not being read for what was there before.
+/// Stops reading for a component that was there before, when another one is inserted.
 pub(super) fn begin_anew(new: On<Insert, Unopened>, mut commands: Commands) {
     commands.entity(new.entity).try_remove::<OpeningWorld>();
 }
 
-/// A component that the game has changed in its place is like another one that was inserted: what it named before is closed.
+/// Handles components that the game changed in place like newly inserted ones: the world that they named before is
+/// closed.
 pub(super) fn follow_changed(
     mut commands: Commands,
     changed: Query<
@@ -44,7 +45,7 @@ pub(super) fn follow_changed(
     }
 }
 
-/// A world is no longer wanted.
+/// Stops reading a world whose component was removed.
 pub(super) fn give_up(gone: On<Remove, SavedWorld>, mut commands: Commands) {
     commands.entity(gone.entity).try_remove::<(OpeningWorld, Unopened)>();
     release(&mut commands, gone.entity);
@@ -78,7 +79,7 @@ fn read_again(commands: &mut Commands, entity: Entity) {
     });
 }
 
-/// A terrain that is gone can't be read for.
+/// Waits for another terrain if the one that a world is read for was removed.
 pub(super) fn wait_for_terrain(
     gone: On<Remove, Terrain>,
     opening: Query<(), (With<OpeningWorld>, Allow<Disabled>)>,
@@ -116,7 +117,8 @@ pub(super) fn start_opening(
             Some(Ok(None)) => continue,
             Some(Ok(Some(level))) => Some((level.clone(), levels.path_of(start))),
         };
-        // For the game this is no change. A new world is made of the terrain as it is now, and what is committed from now on follows.
+        // For the game this is no change. A new world is made of the terrain as it is now, and what is committed from
+        // now on follows.
         let terrain = terrain.bypass_change_detection();
         terrain.abandon();
         terrain.keep_log(Some(LOG_BYTES));
@@ -134,7 +136,7 @@ pub(super) fn start_opening(
     }
 }
 
-/// Another level took the place of one that was removed while its world was read.
+/// Removes the component if another level took the place of the terrain whose world was being read.
 fn detach_unless_replaced(commands: &mut Commands, entity: Entity, saved: &SavedWorld) {
     let saved = saved.clone();
     commands.queue(move |world: &mut World| {
@@ -150,8 +152,8 @@ pub(super) fn warn_of_no_terrain(
     mut worlds: Query<(Entity, &SavedWorld, &mut Unopened), (Without<Terrain>, Allow<Disabled>)>,
 ) {
     for (entity, saved, mut unopened) in &mut worlds {
-        if !unopened.told && unopened.since.elapsed() >= TERRAIN_TOLD {
-            unopened.told = true;
+        if !unopened.reported && unopened.since.elapsed() >= REPORT_AFTER {
+            unopened.reported = true;
             warn!(
                 "the SavedWorld of {entity} waits for a terrain, and saves nothing in {}: insert it on the entity of the Terrain",
                 saved.path.display()
@@ -170,12 +172,12 @@ pub(super) fn finish_opening(
 ) {
     for (entity, mut terrain, mut opening) in &mut worlds {
         let saved = &Arc::clone(&opening.reader).saved;
-        let mut tell = |trouble| {
+        let mut report = |trouble| {
             warn!("the world in {}: {trouble}", saved.path.display());
             troubles.write(StoreTroubleFound { terrain: entity, trouble });
         };
-        if opening.tells_of_lock() {
-            tell(StoreTrouble::WaitsForLock);
+        if opening.reports_lock() {
+            report(StoreTrouble::WaitsForLock);
         }
         let Some(outcome) = opening.poll() else { continue };
         let now = terrain.world().version();
@@ -197,7 +199,7 @@ pub(super) fn finish_opening(
                     store
                 }
                 Found::Old(ReadWorld { store, terrain: mut read, troubles }) => {
-                    troubles.into_iter().for_each(&mut tell);
+                    troubles.into_iter().for_each(&mut report);
                     if now != opening.version {
                         warn!("what the game did to {entity} while its world was read is not in that");
                     }
@@ -217,8 +219,8 @@ pub(super) fn finish_opening(
     }
 }
 
-/// Lets a store follow the terrain of its component. If the game has removed or changed that meanwhile, the world is closed, and the one
-/// that the component names now is read.
+/// Lets a store follow the terrain of its component. If the game has removed or changed that meanwhile, the world is
+/// closed, and the one that the component names now is read.
 fn insert_store(commands: &mut Commands, entity: Entity, saved: SavedWorld, store: Store) {
     commands.queue(move |world: &mut World| {
         let path = saved.path.clone();

@@ -30,7 +30,7 @@ pub struct OpeningWorld {
     pub(super) version: Version,
     since: Instant,
     tried: Instant,
-    told: bool,
+    reported: bool,
 }
 
 impl OpeningWorld {
@@ -42,7 +42,7 @@ impl OpeningWorld {
     pub(super) fn new(reader: WorldReader, version: Version) -> Self {
         let now = Instant::now();
         let (reader, task) = (Arc::new(reader), None);
-        let mut opening = Self { reader, task, version, since: now, tried: now, told: false };
+        let mut opening = Self { reader, task, version, since: now, tried: now, reported: false };
         opening.begin();
         opening
     }
@@ -72,9 +72,9 @@ impl OpeningWorld {
     }
 
     /// Returns `true` once, when it should be reported that another process has the world open.
-    pub(super) fn tells_of_lock(&mut self) -> bool {
+    pub(super) fn reports_lock(&mut self) -> bool {
         let is_late = self.task.is_none() && self.since.elapsed() >= REPORT_LOCK_AFTER;
-        is_late && !std::mem::replace(&mut self.told, true)
+        is_late && !std::mem::replace(&mut self.reported, true)
     }
 }
 
@@ -126,8 +126,8 @@ pub(crate) struct WorldReader {
 }
 
 impl WorldReader {
-    /// A reader for this saved world. If there is none yet, it is created from the terrain, on the level if one is given. The
-    /// terrain's rules and loose settings also hold in a world that exists.
+    /// A reader for this saved world. If there is none yet, it is created from the terrain, on the level if one is
+    /// given. The terrain's rules and loose settings also hold in a world that exists.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
         let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));

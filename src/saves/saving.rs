@@ -65,7 +65,7 @@ pub(super) fn save_now(
 }
 
 /// Reports what has become durable, and troubles.
-pub(super) fn tell(
+pub(super) fn report(
     mut worlds: Query<(Entity, &mut WorldStore), Allow<Disabled>>,
     mut saved: MessageWriter<WorldSaved>,
     mut troubles: MessageWriter<StoreTroubleFound>,
@@ -82,8 +82,8 @@ pub(super) fn tell(
         if is_answered {
             world.asked = None;
         }
-        if is_answered || world.told.is_none_or(|told| told < durable) {
-            world.told = Some(durable);
+        if is_answered || world.reported.is_none_or(|reported| reported < durable) {
+            world.reported = Some(durable);
             saved.write(WorldSaved { terrain: entity, revision: durable.revision() });
         }
     }

@@ -28,7 +28,7 @@ pub(super) struct Checkpoint {
 type Entry = ([i32; 3], u64);
 
 impl Checkpoint {
-    /// Of a world at this frame.
+    /// The checkpoint of a world at this frame.
     pub fn of(mirror: &Mirror, frame: u64, metadata: Metadata) -> Self {
         let stored = mirror.regions.iter().filter(|(_, region)| region.is_stored);
         let regions = stored.map(|(at, region)| (*at, region.revision)).collect();
@@ -36,7 +36,7 @@ impl Checkpoint {
         Self { frame, metadata, regions, level, cells: None }
     }
 
-    /// Its bytes; none if it can't be encoded, which is never so.
+    /// Its bytes; empty if it can't be encoded, which never happens.
     pub fn encode(&self) -> Vec<u8> {
         let regions: Vec<Entry> =
             self.regions.iter().map(|(at, revision)| (at.0.to_array(), *revision)).collect();
@@ -47,7 +47,7 @@ impl Checkpoint {
         bytes
     }
 
-    /// The checkpoint of these bytes, if they are one.
+    /// Decodes a checkpoint; `None` if the bytes are not one.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         type Parts = (u64, Vec<Entry>, Metadata);
         let ((frame, regions, mut metadata), rest): (Parts, _) = postcard::take_from_bytes(bytes).ok()?;

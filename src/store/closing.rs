@@ -17,14 +17,14 @@ const LOOK: Duration = Duration::from_millis(1);
 pub(super) struct StoreThread(JoinHandle<()>);
 
 impl StoreThread {
-    /// Starts it. Should the work panic, that is reported.
+    /// Starts it. If the work panics, that is reported.
     pub fn start(shared: Arc<Shared>, work: impl FnOnce() + Send + 'static) -> Result<Self, StoreError> {
         let thread = std::thread::Builder::new().name("burrow store".into());
         let guarded = move || {
             if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
                 let why = message_of(&*panic);
                 shared.set_failing(Some(&why));
-                shared.tell(StoreTrouble::Ended(why));
+                shared.report_trouble(StoreTrouble::Ended(why));
             }
         };
         thread.spawn(guarded).map(Self).map_err(StoreError::files("starting the store's thread"))
@@ -47,7 +47,7 @@ fn message_of(panic: &(dyn Any + Send)) -> String {
 pub struct ClosingStore {
     shared: Arc<Shared>,
     thread: Option<StoreThread>,
-    /// Up to where everything should be durable.
+    /// The point up to which everything should be durable.
     point: SavePoint,
     /// Whether everything was sent to the thread.
     is_given: bool,

@@ -21,7 +21,7 @@ const CACHE: usize = 8 << 20;
 
 /// The format of database files that is written. The number stands in both commit slots of the header.
 pub(super) const FILE_FORMAT: u8 = 3;
-/// How database files begin, and where their commit slots do.
+/// The first bytes of database files, and the offsets of their commit slots.
 const FILE_MAGIC: &[u8] = b"redb\x1A\x0A\xA9\x0D\x0A";
 const SLOTS: [usize; 2] = [64, 192];
 
@@ -34,7 +34,7 @@ pub(super) enum DatabaseError {
     /// There is none.
     #[error("the file {DATABASE} is missing")]
     Missing,
-    /// The system refuses.
+    /// The system returned an error.
     #[error(transparent)]
     Files(#[from] io::Error),
     /// A newer version of the database's format.
@@ -55,7 +55,7 @@ impl DatabaseError {
     }
 }
 
-/// Whether the error means that the content of a file is invalid.
+/// Whether the error means that a file's content is invalid.
 fn is_about_content(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof)
 }

@@ -48,7 +48,8 @@ pub enum StoreError {
         /// The reason why it can't continue on this ground, and what to do.
         why: &'static str,
     },
-    /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse) holds.
+    /// The ground is not the one that the world was saved with, and [`BaseChanged::Refuse`](super::BaseChanged::Refuse)
+    /// holds.
     #[error(
         "the ground is not the one that the world was saved with{}: give that one, or allow `base_changed`, which moves the world",
         if *.regions == 0 { String::new() } else { format!(", and differs below {regions} saved regions") }
@@ -77,7 +78,7 @@ pub enum StoreError {
         /// The hash of the given level.
         found: u64,
     },
-    /// Nothing of it can be read, and there is no log from which to rebuild it.
+    /// Nothing of it can be read, and no log is left to rebuild it from.
     #[error("the world can't be read: {0}")]
     Unreadable(String),
     /// A part of a file takes more bytes than can be read, so it is neither read nor written.

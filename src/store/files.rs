@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use redb::StorageBackend;
 use redb::backends::FileBackend;
 
-/// Files below one folder. Paths are relative to it, with `/` between their parts. Errors should name the file, since they are shown
-/// to players as they are.
+/// Files below one folder. Paths are relative to it, with `/` between their parts. Errors should name the file, since
+/// they are shown to players as they are.
 pub trait Files: fmt::Debug + Send + Sync + 'static {
     /// The folder's name in messages.
     fn name(&self) -> String;
@@ -121,8 +121,8 @@ pub trait OpenFile: fmt::Debug + Send + Sync {
 pub struct Folder(PathBuf);
 
 impl Folder {
-    /// The files below a folder, which need not exist yet. A relative path, of which an empty one is one, is below the current
-    /// folder of now.
+    /// The files below a folder, which need not exist yet. A relative path, of which an empty one is one, is below the
+    /// current folder of now.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         let path: PathBuf = path.into();
         let path = if path.as_os_str().is_empty() { PathBuf::from(".") } else { path };
@@ -230,7 +230,8 @@ impl Files for Folder {
         self.with(path, |at| {
             let open = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(at);
             let file = match open {
-                // On a read-only disk a lock that exists can be held all the same; where there is none, nobody can write.
+                // On a read-only disk a lock that exists can be held all the same; where there is none, nobody can
+                // write.
                 Err(error) if is_read_only(&error) => match File::open(at) {
                     Err(missing) if missing.kind() == io::ErrorKind::NotFound => None,
                     opened => Some(opened.map_err(|_| error)?),
@@ -244,7 +245,8 @@ impl Files for Folder {
                     Err(TryLockError::Error(error)) => return Err(error),
                 }
             }
-            // A lock that looks stale may be removed while the world is open: the folder is locked too, where the system can do that.
+            // A lock that looks stale may be removed while the world is open: the folder is locked too, where the
+            // system can do that.
             let folder = File::open(folder).ok();
             if let Some(Err(TryLockError::WouldBlock)) = folder.as_ref().map(File::try_lock) {
                 return Ok(None);

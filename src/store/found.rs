@@ -10,7 +10,7 @@ use super::error::StoreError;
 use super::files::Files;
 use super::keys::{self, Key};
 use super::progress::{Progress, Work};
-use super::segment::{self, Bad, FRAME_LIMIT, Found, Frame, MOST_NUMBER};
+use super::segment::{self, Bad, FRAME_LIMIT, Found, Frame, MAX_NUMBER};
 use super::sources::{self, Source};
 use super::{checkpoint_copy, unsaved};
 use crate::format::bytes::Reader;
@@ -134,7 +134,7 @@ impl Contents {
             let own = found.frames.iter().map(|frame| frame.number);
             own.chain((found.length > 0).then_some(found.number))
         });
-        if numbers.max() > Some(MOST_NUMBER / 2) {
+        if numbers.max() > Some(MAX_NUMBER / 2) {
             return Err(StoreError::Unreadable(
                 "the numbers in its journal leave none for what follows".into(),
             ));
@@ -262,13 +262,13 @@ impl Contents {
         heads.chain(self.copies.iter().cloned())
     }
 
-    /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, with which most regions
-    /// agree. It is the database's, a segment's, or that of another file if the database has none.
+    /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, with which
+    /// most regions agree. It is the database's, a segment's, or that of another file if the database has none.
     pub fn choose_checkpoint(&self) -> Option<Checkpoint> {
         let heads: Vec<Checkpoint> = self.heads().collect();
         let others = if self.checkpoints.is_empty() { &self.other_checkpoints[..] } else { &[] };
-        // A damaged database may hold a checkpoint that was never finished, and other files may be old: they say nothing about what
-        // the latest state is.
+        // A damaged database may hold a checkpoint that was never finished, and other files may be old: they say
+        // nothing about what the latest state is.
         let finished = if self.damaged.is_none() { &self.checkpoints[..] } else { &[] };
         let known = heads.iter().chain(finished).map(|checkpoint| checkpoint.frame);
         let latest = known.chain([self.greatest_frame()]).max().unwrap_or_default();
@@ -345,8 +345,8 @@ impl Contents {
         frames.map(|frame| frame.number).max().unwrap_or_default()
     }
 
-    /// Whether the log leads to a checkpoint, as far as its last commit before it says: one of another branch of the same world
-    /// does not.
+    /// Whether the log leads to a checkpoint, as far as its last commit before it says: one of another branch of the
+    /// same world does not.
     pub fn leads_to(&self, checkpoint: &Checkpoint) -> bool {
         let metadata = &checkpoint.metadata;
         match self.last_commit(checkpoint.frame) {
@@ -381,8 +381,8 @@ impl Contents {
         self.regions.values().chain(self.other_regions.values()).flatten().any(|record| record.is_change)
     }
 
-    /// Whether what can't be read of a segment makes no difference to a world at a frame: frames that follow are part of it, or the
-    /// one that began there is.
+    /// Whether what can't be read of a segment makes no difference to a world at a frame: frames that follow are part
+    /// of it, or the one that began there is.
     pub fn is_harmless(&self, segment: u64, bad: &Bad, frame: u64) -> bool {
         let is_part = |own: &Frame| own.number <= frame;
         let is_after = |own: &Found, at: &Frame| {
@@ -422,7 +422,7 @@ fn decode_checkpoint(payload: &[u8]) -> Option<Checkpoint> {
     let checkpoint = Checkpoint::decode(payload)?;
     let Metadata { revision, next_field, .. } = checkpoint.metadata;
     let numbers = checkpoint.regions.values().copied().chain([checkpoint.frame, revision, next_field]);
-    (numbers.max() <= Some(MOST_NUMBER / 2)).then_some(checkpoint)
+    (numbers.max() <= Some(MAX_NUMBER / 2)).then_some(checkpoint)
 }
 
 /// Refuses a world that a newer version wrote to, because data that this version can't read is not damage.
@@ -490,7 +490,7 @@ mod tests {
     fn numbers_that_no_others_can_follow_are_none() {
         let ground = Arc::new(Ground::flat(64, 64, 4.0).unwrap());
         for which in ["frame", "revision", "field", "region"] {
-            for number in [u64::MAX, u64::MAX - 1, MOST_NUMBER + 1] {
+            for number in [u64::MAX, u64::MAX - 1, MAX_NUMBER + 1] {
                 let disk = world(&ground);
                 let expected = {
                     let opened = Store::open_in(

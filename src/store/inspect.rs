@@ -11,7 +11,8 @@ use super::found::Contents;
 use super::keys;
 use super::open_store::take_lock;
 use super::options::{BaseChanged, StoreOptions};
-use super::recover::{self, recover};
+use super::recover::recover;
+use super::replay_log::replay_all;
 use super::segment::{self, Bad};
 use super::shared::apply_game;
 use super::sources::has_world;
@@ -171,8 +172,8 @@ pub struct WorldCheck {
     pub replays: Option<bool>,
 }
 
-/// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the journal's
-/// tail, and, if it is whole, the log from the first commit on.
+/// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the
+/// journal's tail, and, if it is whole, the log from the first commit on.
 ///
 /// # Errors
 /// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.
@@ -196,8 +197,8 @@ pub fn check_in(
     look(files, &ground.into(), level, true)
 }
 
-/// Reads the world in a folder, over its ground and its level if it has one, without changing it, and without replaying its log from
-/// the first commit on.
+/// Reads the world in a folder, over its ground and its level if it has one, without changing it, and without replaying
+/// its log from the first commit on.
 ///
 /// # Errors
 /// As for [`check`].
@@ -229,7 +230,7 @@ fn look(
     let replays = is_asked.then(|| {
         let world = recovered.terrain.world();
         let level = recovered.mirror.level.as_ref();
-        let other = recover::replay_all(&contents, ground, recovered.settings(), level)
+        let other = replay_all(&contents, ground, recovered.settings(), level)
             .map_err(|why| format!("the log does not lead to the world: {why}"))?;
         let (found, expected) = (other.world().hash(), world.hash());
         match found == expected && other.world().revision() == world.revision() {
@@ -262,12 +263,12 @@ fn as_found(trouble: &StoreTrouble) -> String {
     }
 }
 
-/// Replays the log of the world in a folder from the first commit on, over this ground and its level if it has one, and verifies
-/// each commit. Returns the terrain.
+/// Replays the log of the world in a folder from the first commit on, over this ground and its level if it has one, and
+/// verifies each commit. Returns the terrain.
 ///
 /// # Errors
-/// When there is none, when it is open, when its ground is another one, and when the log does not reach back to the first commit or can't
-/// be replayed.
+/// When there is none, when it is open, when its ground is another one, and when the log does not reach back to the
+/// first commit or can't be replayed.
 pub fn replay(
     folder: impl AsRef<Path>,
     ground: impl Into<Arc<Ground>>,
@@ -284,5 +285,5 @@ pub fn replay(
     let level = BaseLevel::needed(name, level)?;
     BaseLevel::expect(level, name)?;
     let settings = checkpoint.as_ref().map_or_else(TerrainSettings::default, |own| own.metadata.settings);
-    recover::replay_all(&contents, &ground, settings, level)
+    replay_all(&contents, &ground, settings, level)
 }

@@ -152,8 +152,8 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
 /// Unchanged files are not written, and files of regions that became empty are removed. Nothing else in the folder is
 /// touched.
 ///
-/// After a crash the folder holds the old level or the new one: new files are complete before the first of the old ones is touched,
-/// and [`read_level_files`] reads new files that have not replaced the old ones yet.
+/// After a crash the folder holds the old level or the new one: new files are complete before the first of the old ones
+/// is touched, and [`read_level_files`] reads new files that have not replaced the old ones yet.
 ///
 /// # Errors
 /// When a file can't be written.

@@ -138,7 +138,7 @@ impl Mirror {
         dirty.into_iter().map(|at| (at, stored(&at).cloned())).collect()
     }
 
-    /// Counts regions as changed, since saving them failed.
+    /// Counts regions as changed again, because saving them failed.
     pub fn put_back(&mut self, regions: impl IntoIterator<Item = RegionPos>) {
         self.dirty.extend(regions);
     }

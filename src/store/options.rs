@@ -35,11 +35,11 @@ pub struct StoreOptions {
     pub checkpoint_commits: u64,
     /// Time after which a checkpoint is made, if anything changed.
     pub checkpoint_after: Duration,
-    /// Bytes of records that wait in memory while saving fails, and once more while the disk does not answer; beyond it they are
-    /// dropped, and the whole world is saved once that works.
+    /// Bytes of records that wait in memory while saving fails, and once more while the disk does not answer; beyond it
+    /// they are dropped, and the whole world is saved once that works.
     pub waiting_bytes: usize,
-    /// Bytes that a frame of the log may hold, 256 MiB at most. Commits and game data of more that come at once are saved by a
-    /// checkpoint instead, which leaves a gap in the log.
+    /// Bytes that a frame of the log may hold, 256 MiB at most. Commits and game data of more that come at once are
+    /// saved by a checkpoint instead, which leaves a gap in the log.
     pub frame_bytes: usize,
     /// The policy if the ground or the level has changed.
     pub base_changed: BaseChanged,
@@ -58,8 +58,8 @@ pub struct StoreOptions {
 }
 
 impl Default for StoreOptions {
-    /// A loss window of a second, 64 MiB of log and of a frame, checkpoints each minute or 4096 commits. Closing waits for the disk
-    /// as long as it takes.
+    /// A loss window of a second, 64 MiB of log and of a frame, checkpoints each minute or 4096 commits. Closing waits
+    /// for the disk as long as it takes.
     fn default() -> Self {
         Self {
             loss_window: Duration::from_secs(1),

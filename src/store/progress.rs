@@ -25,7 +25,7 @@ impl Progress {
         f32::from_bits(self.0.load(Ordering::Relaxed))
     }
 
-    /// The share is at least this from now on.
+    /// Raises the share to this, if it is lower.
     fn raise(&self, share: f32) {
         // Numbers that are not negative have the order of their bits.
         self.0.fetch_max(share.clamp(0.0, 1.0).to_bits(), Ordering::Relaxed);

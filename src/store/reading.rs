@@ -10,7 +10,7 @@ const BLOCK: usize = 64 << 10;
 const SECTOR: usize = 512;
 
 /// Sectors after which the disk counts as broken, not as one with bad sectors: each may take seconds.
-const MOST_BAD: usize = 256;
+const MAX_BAD: usize = 256;
 
 /// The bytes of a file.
 #[derive(Debug, Default)]
@@ -31,8 +31,8 @@ impl FileBytes {
 /// Reads all of a file that can be read.
 ///
 /// # Errors
-/// When there is no such file, when it must not be read, and when the disk answers no more: bad sectors are damage, a disk that is
-/// gone is not.
+/// When there is no such file, when it must not be read, and when the disk no longer answers: bad sectors are
+/// damage, a missing disk is not.
 pub(super) fn read_file(files: &dyn Files, path: &str) -> io::Result<FileBytes> {
     let error = match files.read(path) {
         Ok(bytes) => return Ok(FileBytes { bytes, unreadable: Vec::new() }),
@@ -54,7 +54,7 @@ pub(super) fn read_file(files: &dyn Files, path: &str) -> io::Result<FileBytes> 
                 continue;
             }
             bad += 1;
-            if bad > MOST_BAD {
+            if bad > MAX_BAD {
                 return Err(error);
             }
             match read.unreadable.last_mut().filter(|last| last.end == sector.start) {

@@ -1,10 +1,7 @@
 //! Recovers a world from its files: regions of the last checkpoint, then the journal's tail, verified frame by frame.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
-
-use glam::IVec3;
-use rayon::prelude::*;
 
 use super::base_level::BaseLevel;
 use super::checkpoint::Checkpoint;
@@ -12,28 +9,22 @@ use super::error::{StoreError, StoreTrouble};
 use super::found::Contents;
 use super::ground_size::GroundSize;
 use super::keys;
+use super::load_regions::{DECODE, changed_regions, load_regions, reach};
 use super::mirror::Mirror;
 use super::options::{BaseChanged, StoreOptions};
-use super::progress::{Progress, Work};
-use super::segment::{self, Frame};
-use super::shared::{GameData, apply_game};
-use crate::format::Batch;
+use super::progress::Work;
+use super::replay_log::{RECOVERED_ANEW, REPLAY, Replayed, bytes_of, replay_good, replaying};
+use super::segment;
+use super::shared::GameData;
 use crate::ground::Ground;
-use crate::lattice::{ChunkGrid, RegionPos};
-use crate::terrain::{
-    Asked, CommitRecord, Meshing, Order, Patch, ReplayError, RestoreError, Terrain, TerrainSettings,
-    WorkLimits, WorldParts,
-};
-use crate::volume::{Field, Fields};
+use crate::lattice::RegionPos;
+use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldParts};
 
-/// The shares of opening after which a world is recovered: as it is on the disk, and as one that has to be saved whole.
+/// The share of opening after which a world is recovered as it is on the disk.
 const RECOVERED: f32 = 0.97;
-const RECOVERED_ANEW: f32 = 0.75;
 
-/// What a byte of a region costs to decode and to put in place, and a byte of a commit to replay, in one unit.
-const DECODE: u64 = 1;
+/// The work of inserting a byte of a region, in the unit of [`DECODE`] and [`REPLAY`].
 const RESTORE: u64 = 2;
-const REPLAY: u64 = 32;
 
 /// A recovered world.
 pub(super) struct Recovered {
@@ -69,16 +60,6 @@ pub(super) struct Findings {
     pub remade: Option<u64>,
     /// Whether everything but the regions is lost.
     pub has_lost_rest: bool,
-}
-
-/// The end of a replay, and whether the world is compared with the log.
-struct Replayed {
-    terrain: Terrain,
-    game: GameData,
-    records: Vec<CommitRecord>,
-    frame: u64,
-    commits: u64,
-    refused: Option<String>,
 }
 
 /// Recovers a world from its files.
@@ -269,249 +250,6 @@ impl Recovered {
     }
 }
 
-/// Replays the whole log from the first commit on, and verifies it.
-pub(super) fn replay_all(
-    contents: &Contents,
-    ground: &Arc<Ground>,
-    settings: TerrainSettings,
-    level: Option<&BaseLevel>,
-) -> Result<Terrain, StoreError> {
-    let whole = contents.frames_from(1);
-    let last = contents.choose_checkpoint().map_or(0, |checkpoint| checkpoint.frame);
-    if whole.last().map_or(0, |last| last.number) < contents.greatest_frame().max(last) {
-        return Err(StoreError::LogNotWhole);
-    }
-    let empty = BaseLevel::first(level, ground, &settings)?;
-    let replayed = replay(empty, GameData::new(), &whole, true, &Work::until(None, 1.0, 0))?;
-    match replayed.refused {
-        Some(why) => Err(StoreError::LogRefused(why)),
-        None => Ok(replayed.terrain),
-    }
-}
-
-/// The work of replaying a log, after which the world has to be saved.
-fn replaying<'a>(progress: Option<&'a Progress>, frames: &[&Frame]) -> Work<'a> {
-    Work::until(progress, RECOVERED_ANEW, REPLAY * bytes_of(frames))
-}
-
-fn bytes_of(frames: &[&Frame]) -> u64 {
-    frames.iter().map(|frame| frame.bytes() as u64).sum()
-}
-
-/// The regions whose heights below are not those that they were saved with; all of them on another level.
-fn changed_regions(
-    contents: &Contents,
-    checkpoint: &Checkpoint,
-    ground: &Ground,
-    level: Option<&BaseLevel>,
-) -> BTreeSet<RegionPos> {
-    if BaseLevel::expect(level, checkpoint.level.as_ref()).is_err() {
-        return checkpoint.regions.keys().copied().collect();
-    }
-    if checkpoint.metadata.ground == ground.hash() {
-        return BTreeSet::new();
-    }
-    let mut hashes = BTreeMap::new();
-    let mut is_changed = |(at, revision): &(&RegionPos, &u64)| {
-        let now = *hashes.entry(at.column()).or_insert_with(|| ground.region_hash(at.column()));
-        contents.region(**at, **revision).is_some_and(|record| record.ground != now)
-    };
-    checkpoint.regions.iter().filter(|own| is_changed(own)).map(|(at, _)| *at).collect()
-}
-
-/// The parts of a world that a checkpoint has, and the regions that can't be read.
-fn load_regions(
-    contents: &Contents,
-    checkpoint: &Checkpoint,
-    ground: &Ground,
-    level: Option<&BaseLevel>,
-    grid: ChunkGrid,
-    has_lost_rest: bool,
-    work: &Work,
-) -> (WorldParts, Vec<RegionPos>) {
-    let metadata = &checkpoint.metadata;
-    let below = level.map(|level| level.parts(ground)).unwrap_or_default();
-    let (mut bricks, mut fields) = (below.change.bricks, below.change.fields);
-    if below.chunk_size != metadata.settings.chunk_size {
-        fields.clear();
-    }
-    let is_same_level = BaseLevel::expect(level, checkpoint.level.as_ref()).is_ok();
-    let decode = |(at, revision): &(RegionPos, u64)| {
-        let record = contents.region(*at, *revision);
-        let change = record.and_then(|record| record.decode(*at, ground).ok());
-        work.advance(DECODE * record.map_or(0, |record| record.bytes() as u64));
-        (*at, change)
-    };
-    let regions: Vec<(RegionPos, u64)> =
-        checkpoint.regions.iter().map(|(at, revision)| (*at, *revision)).collect();
-    let decoded: Vec<_> = regions.par_iter().map(decode).collect();
-    let mut damaged = Vec::new();
-    for (at, change) in decoded {
-        match change {
-            Some(change) => {
-                bricks.extend(change.bricks);
-                // Of chunks whose size is not known they can't be used.
-                if is_same_level && !has_lost_rest {
-                    fields.extend(change.fields);
-                }
-            }
-            None => damaged.push(at),
-        }
-    }
-    keep_latest(&mut bricks);
-    keep_latest(&mut fields);
-    bricks.retain(|(_, brick)| brick.is_some());
-    fields.retain(|(_, fields)| !fields.is_empty());
-    let next_field = metadata.next_field.max(below.change.next_field);
-    let mut change = Patch { bricks, fields, next_field };
-    if checkpoint.metadata.ground != ground.hash() {
-        fit_fields(&mut change, grid);
-    }
-    if !is_same_level || checkpoint.metadata.ground != ground.hash() {
-        // Fields of two levels may overlap and have one name: those of the new level continue, and grow. Beyond the rim
-        // of a smaller ground, edits reach into more chunks.
-        change.cover(grid);
-    }
-    let parts = WorldParts {
-        change,
-        chunk_size: metadata.settings.chunk_size,
-        revision: metadata.revision,
-        rules: metadata.rules.clone(),
-        loose: metadata.loose,
-    };
-    (parts, damaged)
-}
-
-/// Cuts fields off where their chunk ends on a ground of another size: the last chunk has one column more than others.
-fn fit_fields(change: &mut Patch, grid: ChunkGrid) {
-    for (chunk, fields) in &mut change.fields {
-        let own = grid.chunk_samples(*chunk).intersection(grid.edit_bounds());
-        let own = own.filter(|_| grid.has_tile(chunk.tile()));
-        if own.is_some_and(|own| fields.iter().all(|field| own.encloses(field.bounds))) {
-            continue;
-        }
-        let cut = |field: &Field| Some(Field { bounds: field.bounds.intersection(own?)?, ..*field });
-        *fields = Fields::restored(fields.iter().filter_map(cut).collect()).unwrap_or_default();
-    }
-    change.fields.retain(|(_, fields)| !fields.is_empty());
-}
-
-/// Sorts a list by key; of those with the same key the last stays.
-fn keep_latest<K: Copy + Ord, V>(list: &mut Vec<(K, V)>) {
-    list.sort_by_key(|(key, _)| *key);
-    list.dedup_by(|later, kept| {
-        let is_same = later.0 == kept.0;
-        if is_same {
-            std::mem::swap(later, kept);
-        }
-        is_same
-    });
-}
-
-/// Replays frames up to the first that does not fit, from the world that `begin` makes, and again without it: a world that was
-/// given a part of it can't be used.
-fn replay_good(
-    mut begin: impl FnMut() -> Result<Terrain, StoreError>,
-    game: &GameData,
-    frames: &[&Frame],
-    is_checked: bool,
-    work: &Work,
-) -> Result<Replayed, StoreError> {
-    let replayed = replay(begin()?, game.clone(), frames, is_checked, work)?;
-    if replayed.refused.is_none() {
-        return Ok(replayed);
-    }
-    let good: Vec<&Frame> = frames.iter().copied().filter(|frame| frame.number <= replayed.frame).collect();
-    Ok(Replayed { refused: replayed.refused, ..replay(begin()?, game.clone(), &good, is_checked, work)? })
-}
-
-/// Replays frames, and compares the world with each commit if `is_checked`. Stops before the first frame that does not fit.
-fn replay(
-    mut terrain: Terrain,
-    mut game: GameData,
-    frames: &[&Frame],
-    is_checked: bool,
-    work: &Work,
-) -> Result<Replayed, StoreError> {
-    terrain.set_meshing(Meshing::Never);
-    terrain.keep_log(Some(usize::MAX));
-    drop(terrain.take_log());
-    let (mut records, mut commits, mut refused, mut last, mut revision) = (Vec::new(), 0, None, 0, None);
-    let limits = terrain.work_limits();
-    terrain.set_work_limits(WorkLimits::UNBOUNDED);
-    for frame in frames {
-        let batch = frame.payload().and_then(|payload| Batch::decode(&payload, terrain.world().ground()));
-        let batch = match batch {
-            Ok(batch) => batch,
-            Err(why) => {
-                refused = Some(why.to_string());
-                break;
-            }
-        };
-        let cost = REPLAY * frame.bytes() as u64 / batch.commits.len().max(1) as u64;
-        let replayed = batch.commits.iter().try_for_each(|record| {
-            match is_checked {
-                true => drop(terrain.replay(record)?),
-                false => replay_unchecked(&mut terrain, record)?,
-            }
-            work.advance(cost);
-            Ok::<(), ReplayError>(())
-        });
-        if let Err(why) = replayed {
-            refused = Some(why.to_string());
-            break;
-        }
-        commits += batch.commits.len() as u64;
-        revision = batch.commits.last().map(|record| record.revision).or(revision);
-        records.append(&mut terrain.take_log());
-        apply_game(&mut game, &batch.game);
-        last = frame.number;
-    }
-    terrain.clear_history();
-    terrain.set_work_limits(limits);
-    terrain.set_meshing(Meshing::All);
-    terrain.keep_log(None);
-    if !is_checked && let Some(revision) = revision {
-        // Other transactions than those of the records may have led here, and bricks have come without fields.
-        let (ground, mut parts) = (terrain.world().shared_ground(), terrain.parts());
-        let has_grown = parts.change.cover(terrain.world().grid());
-        if has_grown || revision != parts.revision {
-            let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-            terrain = Terrain::restore(ground, &settings, WorldParts { revision, ..parts })?;
-        }
-    }
-    Ok(Replayed { terrain, game, records, frame: last, commits, refused })
-}
-
-/// Replays a record on a world that differs from the one it was made on. Edits that this world rejects are left out.
-fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), ReplayError> {
-    let orders = record.orders().map(|order| match order {
-        // Its fields are those of the other world.
-        Order::Parts { change, .. } => {
-            let bricks = change.bricks.clone();
-            Order::Parts { change: Arc::new(Patch { bricks, ..Patch::default() }), hash: None }
-        }
-        order => order,
-    });
-    // Without an entry, all of its edits were rejected.
-    if !record.entries.is_empty() {
-        let receipts = terrain.apply(orders);
-        let mut others = receipts.iter().filter(|receipt| receipt.asked != Asked::Edit);
-        if let Some(why) = others.find_map(|receipt| receipt.outcome.as_ref().err()) {
-            return Err(ReplayError::of(why, record.revision));
-        }
-    }
-    Ok(())
-}
-
-/// The cells along x and z that edited samples of bricks need.
-fn reach(change: &Patch) -> Option<GroundSize> {
-    let bounds = change.bricks.iter().filter_map(|(pos, brick)| brick.as_ref()?.edited_bounds(*pos));
-    let most = bounds.map(|bounds| bounds.max).reduce(IVec3::max)?;
-    let cells = |at: i32| u32::try_from(at).unwrap_or_default();
-    Some(GroundSize { width: cells(most.x), depth: cells(most.z) })
-}
-
 impl Findings {
     /// The troubles to report, given the copies of damaged records, the damage of the file of regions, and its copy.
     pub fn troubles(
@@ -551,6 +289,7 @@ mod tests {
     use super::super::{SimulatedDisk, Store};
     use super::*;
     use crate::brush::{Brush, Shape};
+    use crate::format::Batch;
     use crate::format::frame::WorldId;
 
     /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,

@@ -34,13 +34,13 @@ impl RegionFile {
         Self { open: None, next: Next::InPlace, least_frame: 0, kept: None }
     }
 
-    /// A file that can't be used as it is: the next checkpoint replaces it. What is left of an interrupted replacement has a
-    /// checkpoint of this frame or a later one.
+    /// A file that can't be used as it is: the next checkpoint replaces it. What is left of an interrupted replacement
+    /// has a checkpoint of this frame or a later one.
     pub fn damaged(least_frame: u64) -> Self {
         Self { next: Next::Whole(Old::Quarantined), least_frame, ..Self::new() }
     }
 
-    /// Makes the next checkpoint, which has to hold all regions, write the file as small as possible.
+    /// Makes the next checkpoint, which must hold all regions, write a file that is as small as possible.
     pub fn compact_next(&mut self) {
         if self.next == Next::InPlace {
             self.next = Next::Compact;
@@ -52,8 +52,8 @@ impl RegionFile {
         self.kept.as_deref()
     }
 
-    /// Opens the file where it is not open. Returns whether the next checkpoint has to hold all regions, since it goes into a new
-    /// file.
+    /// Opens the file where it is not open. Returns whether the next checkpoint has to hold all regions, since it goes
+    /// into a new file.
     pub fn ready(&mut self, files: &dyn Files) -> Result<bool, DatabaseError> {
         if !files.exists(DATABASE)? {
             (self.open, self.next) = (None, Next::Whole(Old::Quarantined));
@@ -79,8 +79,8 @@ impl RegionFile {
         Ok(true)
     }
 
-    /// Writes the records of the checkpoint at a frame, all or none: those that changed, or all of them, as [`ready`](Self::ready)
-    /// says.
+    /// Writes the records of the checkpoint at a frame, all or none: those that changed, or all of them, as
+    /// [`ready`](Self::ready) says.
     pub fn write(&mut self, files: &dyn Files, frame: u64, records: &[Change]) -> Result<(), DatabaseError> {
         self.write_records(files, records)?;
         self.least_frame = frame;

@@ -41,11 +41,11 @@ pub(super) fn path(segment: u64) -> String {
 
 /// The greatest number of a segment, a frame or a revision that is read, so that counting cannot overflow. No real
 /// world reaches it.
-pub(super) const MOST_NUMBER: u64 = 1 << 60;
+pub(super) const MAX_NUMBER: u64 = 1 << 60;
 
 /// The segment with this file name. Files that somebody else put there have other names.
 fn number_of(name: &str) -> Option<u64> {
-    let number = name.strip_suffix(".log")?.parse().ok().filter(|number| *number <= MOST_NUMBER)?;
+    let number = name.strip_suffix(".log")?.parse().ok().filter(|number| *number <= MAX_NUMBER)?;
     path(number).ends_with(&format!("/{name}")).then_some(number)
 }
 
@@ -61,8 +61,8 @@ fn key(frame: u64) -> [u8; 8] {
     frame.to_be_bytes()
 }
 
-/// Names a ground, the level on it, and how edits change them: frames that were written under another name can't be replayed
-/// exactly.
+/// Names a ground, the level on it, and how edits change them: frames that were written under another name can't be
+/// replayed exactly.
 pub(super) fn base(ground: &Ground, level: Option<&BaseLevel>) -> u64 {
     let level = level.map_or(0, |level| level.name().hash.rotate_left(1));
     // Any odd number keeps simulations apart.
@@ -197,7 +197,7 @@ fn read_entry(bytes: &[u8], at: usize, found: &mut Found, budget: &mut usize) ->
     let (length, number) = prefix.split_first_chunk::<4>()?;
     let length = u32::from_le_bytes(*length) as usize;
     let frame_number = u64::from_le_bytes(number.try_into().ok()?);
-    if frame_number > MOST_NUMBER {
+    if frame_number > MAX_NUMBER {
         return None;
     }
     let start = at + PREFIX;

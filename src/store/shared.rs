@@ -67,11 +67,11 @@ struct Report {
 }
 
 /// Troubles that are kept until they are taken.
-const MOST_TROUBLES: usize = 256;
+const MAX_TROUBLES: usize = 256;
 
 impl Report {
-    fn tell(&mut self, trouble: StoreTrouble) {
-        if self.troubles.len() == MOST_TROUBLES {
+    fn add(&mut self, trouble: StoreTrouble) {
+        if self.troubles.len() == MAX_TROUBLES {
             self.troubles.pop_front();
         }
         self.troubles.push_back(trouble);
@@ -94,8 +94,8 @@ impl Shared {
         report.durable = report.durable.max(Some(point));
     }
 
-    pub fn tell(&self, trouble: StoreTrouble) {
-        self.report().tell(trouble);
+    pub fn report_trouble(&self, trouble: StoreTrouble) {
+        self.report().add(trouble);
     }
 
     /// Sets the reason why saving fails, or `None` if it works.
@@ -118,7 +118,7 @@ impl Shared {
         let mut report = self.report();
         report.answer_due = None;
         if std::mem::take(&mut report.is_hanging) {
-            report.tell(StoreTrouble::SavedAgain);
+            report.add(StoreTrouble::SavedAgain);
         }
     }
 
@@ -127,7 +127,7 @@ impl Shared {
         let is_late = report.answer_due.is_some_and(|due| due <= Instant::now());
         if is_late && !report.is_hanging {
             report.is_hanging = true;
-            report.tell(StoreTrouble::Hanging);
+            report.add(StoreTrouble::Hanging);
         }
     }
 

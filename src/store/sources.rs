@@ -14,7 +14,7 @@ use crate::format::FormatError;
 use crate::format::frame::{self, Kind, WorldId};
 
 /// Files in quarantine that are looked at, the latest first.
-const MOST_KEPT: usize = 8;
+const MAX_KEPT: usize = 8;
 
 /// The records of a file.
 pub(super) enum Source {
@@ -121,11 +121,11 @@ pub(super) fn is_complete(files: &dyn Files, path: &str, least_frame: u64) -> bo
 /// Other files that may hold regions, the most recent first.
 pub(super) fn others(files: &dyn Files) -> io::Result<impl Iterator<Item = String>> {
     let kept = quarantine::of(files, DATABASE)?.into_iter().chain(quarantine::of(files, UNFINISHED)?);
-    Ok(std::iter::once(UNFINISHED.to_owned()).chain(kept.take(MOST_KEPT)))
+    Ok(std::iter::once(UNFINISHED.to_owned()).chain(kept.take(MAX_KEPT)))
 }
 
-/// Whether a folder holds anything of a world. Files without a byte do not count, nor does one that was not complete when the
-/// process ended that created the world.
+/// Whether a folder holds anything of a world. Files without a byte do not count, nor does one that was not complete
+/// when the process ended that created the world.
 pub(super) fn has_world(files: &dyn Files) -> io::Result<bool> {
     let holds_bytes = |path: &str| match files.open(path, Opening::Existing) {
         Ok(file) => Ok(file.length()? > 0),

@@ -25,7 +25,8 @@ use crate::terrain::{CommitRecord, LogEntry, Order, Patch, TerrainSettings, Worl
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
 
-/// How long the disk may take for a frame of the log and for a checkpoint, before it is reported that it does not answer.
+/// How long the disk may take for a frame of the log and for a checkpoint, before it is reported that it does not
+/// answer.
 const FRAME_TIME: Duration = Duration::from_secs(3);
 pub(super) const CHECKPOINT_TIME: Duration = Duration::from_secs(30);
 
@@ -160,7 +161,6 @@ pub(super) struct State {
 }
 
 impl Writer {
-    #[allow(clippy::too_many_arguments)]
     pub fn new(
         files: Arc<dyn Files>,
         options: StoreOptions,
@@ -376,7 +376,7 @@ impl Writer {
     fn leave_gap(&mut self) {
         if !self.state.has_gap {
             let revision = self.shared.durable().map_or(0, SavePoint::revision);
-            self.shared.tell(StoreTrouble::LogGap { revision });
+            self.shared.report_trouble(StoreTrouble::LogGap { revision });
         }
         self.give_up_waiting();
         self.checkpoint_soon();
@@ -466,7 +466,7 @@ impl Writer {
             None => RETRY.0,
         };
         if self.state.failing.as_ref().is_none_or(|failing| failing.why != why) {
-            self.shared.tell(StoreTrouble::NotSaved(why.into()));
+            self.shared.report_trouble(StoreTrouble::NotSaved(why.into()));
         }
         self.shared.set_failing(Some(why));
         self.state.failing = Some(Failing { wait, again: Instant::now() + wait, why: why.into() });
@@ -475,7 +475,7 @@ impl Writer {
 
     pub(super) fn succeed(&mut self) {
         if self.state.failing.take().is_some_and(|failing| !failing.why.is_empty()) {
-            self.shared.tell(StoreTrouble::SavedAgain);
+            self.shared.report_trouble(StoreTrouble::SavedAgain);
         }
         self.shared.set_failing(None);
     }

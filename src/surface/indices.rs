@@ -4,11 +4,11 @@ use std::ops::Range;
 
 /// The indices of a triangle mesh, three for each triangle.
 ///
-/// They have 16 bits in a mesh of up to [`Indices::MOST_SHORT`] vertices, 32 in a larger one: half the memory to keep,
+/// They have 16 bits in a mesh of up to [`Indices::MAX_SHORT`] vertices, 32 in a larger one: half the memory to keep,
 /// to copy at each edit and to upload to a GPU. Equal meshes have equal indices.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Indices {
-    /// 16 bits each, for up to [`Indices::MOST_SHORT`] vertices.
+    /// 16 bits each, for up to [`Indices::MAX_SHORT`] vertices.
     U16(Vec<u16>),
     /// 32 bits each, for larger meshes.
     U32(Vec<u32>),
@@ -23,13 +23,13 @@ impl Default for Indices {
 impl Indices {
     /// Vertices of a mesh that has indices of 16 bits at most. The largest index is left free, as it restarts triangle
     /// strips.
-    pub const MOST_SHORT: usize = u16::MAX as usize;
+    pub const MAX_SHORT: usize = u16::MAX as usize;
 
     /// These indices, for a mesh of `vertices` vertices. Indices that do not fit 16 bits are kept in 32, even if they
     /// are invalid.
     pub fn new(vertices: usize, list: Vec<u32>) -> Self {
         let short = || list.iter().map(|&index| u16::try_from(index).ok()).collect();
-        match (vertices <= Self::MOST_SHORT).then(short).flatten() {
+        match (vertices <= Self::MAX_SHORT).then(short).flatten() {
             Some(short) => Self::U16(short),
             None => Self::U32(list),
         }
@@ -37,7 +37,7 @@ impl Indices {
 
     /// An empty buffer with room for `indices` indices, for a mesh of `vertices` vertices.
     pub(crate) fn with_capacity(vertices: usize, indices: usize) -> Self {
-        if vertices <= Self::MOST_SHORT {
+        if vertices <= Self::MAX_SHORT {
             Self::U16(Vec::with_capacity(indices))
         } else {
             Self::U32(Vec::with_capacity(indices))
@@ -142,7 +142,7 @@ mod tests {
 
     /// As many vertices as there may be at most for 16 bits, or one more.
     fn vertices(is_long: bool) -> usize {
-        Indices::MOST_SHORT + usize::from(is_long)
+        Indices::MAX_SHORT + usize::from(is_long)
     }
 
     proptest! {

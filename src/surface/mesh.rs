@@ -1,4 +1,4 @@
-//! Vertices and meshes, local to the chunk or tile that draws them.
+//! Vertices with up to four materials, and meshes of them, local to the chunk or tile that draws them.
 
 use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,22 @@ impl MaterialMix {
         }
     }
 
+    /// The shares of the materials of some columns, each of which counts the same, in integers. The four with the largest
+    /// shares are kept.
+    pub fn of_columns(columns: impl Iterator<Item = ColumnMaterial>) -> Self {
+        let mut parts: Vec<(u8, i32)> = Vec::with_capacity(8);
+        for column in columns {
+            let mix = Self::column(column);
+            for (&id, &weight) in mix.ids.iter().zip(&mix.weights).filter(|(_, weight)| **weight > 0) {
+                match parts.iter_mut().find(|part| part.0 == id) {
+                    Some(part) => part.1 += i32::from(weight),
+                    None => parts.push((id, weight.into())),
+                }
+            }
+        }
+        Self::of_parts(&mut parts).unwrap_or_default()
+    }
+
     /// The mix at `step` of [`SNAP`] steps from `a` to `b`, in integers. Equal ends give themselves; where nothing has
     /// any weight, it is `a`.
     pub fn lerp(a: Self, b: Self, step: i32) -> Self {
@@ -56,10 +72,14 @@ impl MaterialMix {
                 }
             }
         }
-        let parts = &mut parts[..count];
+        Self::of_parts(&mut parts[..count]).unwrap_or(a)
+    }
+
+    /// The mix of materials by weight, each there once; `None` without any.
+    fn of_parts(parts: &mut [(u8, i32)]) -> Option<Self> {
         parts.sort_unstable_by_key(|&(id, weight)| (-weight, id));
-        let kept = &parts[..count.min(4)];
-        let Some(&(heaviest, _)) = kept.first() else { return a };
+        let kept = &parts[..parts.len().min(4)];
+        let &(heaviest, _) = kept.first()?;
         let total: i32 = kept.iter().map(|part| part.1).sum::<i32>().max(1);
         let mut result = Self::default();
         let mut rest = 255;
@@ -69,7 +89,7 @@ impl MaterialMix {
             rest -= weight * 255 / total;
         }
         (result.ids[0], result.weights[0]) = (heaviest, rest as u8);
-        result
+        Some(result)
     }
 }
 

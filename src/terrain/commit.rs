@@ -7,10 +7,13 @@ use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
 use super::resolve::{FieldChange, Resolved, install, patch_of};
-use crate::lattice::ChunkPos;
-use crate::redraw::{DrawnCut, MeshUpdates, Stages};
+#[cfg(all(feature = "plugin", feature = "scatter"))]
+use crate::lattice::LatticeBox;
+use crate::lattice::{ChunkPos, SNAP, TilePos};
+use crate::redraw::{DrawnCut, MeshUpdates, Stages, relit_parts};
 use crate::volume::UniformBricks;
-use crate::world::{NewSurfaces, Patch, World};
+use crate::world::sky::{LitWorld, SkyColumns, SkyLights};
+use crate::world::{MeshKey, NewSurfaces, Patch, World};
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
@@ -89,6 +92,34 @@ impl Commit {
         patch_of(&self.changes, self.whole.as_deref(), self.next_field)
     }
 
+    /// Computes the light of all surfaces that a commit to this world makes or lights otherwise, and returns the number of
+    /// their vertices: for benchmarks.
+    #[doc(hidden)]
+    pub fn light(&self, before: Arc<World>) -> usize {
+        let lit = LitWorld::new(before, self.change().bricks);
+        let tiles = self.meshes.tiles.iter().map(|(tile, _)| MeshKey::Tile(*tile));
+        let chunks = self.meshes.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk));
+        let redrawn: Vec<MeshKey> = tiles.chain(chunks).collect();
+        let relit = relit_parts(&lit, |drawn| redrawn.contains(&drawn));
+        let mut tiles: Vec<TilePos> = redrawn.iter().chain(&relit).map(|drawn| drawn.tile()).collect();
+        tiles.sort_unstable();
+        tiles.dedup();
+        let mut count = 0;
+        for tile in tiles {
+            let (low, high) = lit.before().grid().tile_cells(tile);
+            let mut lights = SkyColumns::new(lit.view(), low, high);
+            count += lights.lights().len();
+            for (chunk, surface) in self.meshes.chunks.iter().filter(|(chunk, _)| chunk.tile() == tile) {
+                let origin = lit.before().grid().origin(*chunk) * SNAP;
+                for vertex in &surface.mesh().vertices {
+                    std::hint::black_box(lights.light(origin + vertex.position));
+                }
+                count += surface.mesh().vertices.len();
+            }
+        }
+        count
+    }
+
     /// Hash of every edited sample, once this is committed: equal for equal edits of equal samples, whatever ran them.
     pub fn sample_hash(&self) -> u64 {
         self.sample_hash
@@ -112,6 +143,12 @@ impl Commit {
     /// Returns `true` if another world replaces this one, so that all meshes are made again.
     pub fn is_whole(&self) -> bool {
         self.whole.is_some()
+    }
+
+    /// Boxes around the bricks that it changes.
+    #[cfg(all(feature = "plugin", feature = "scatter"))]
+    pub(crate) fn changed_boxes(&self) -> impl Iterator<Item = LatticeBox> {
+        self.changes.iter().filter_map(|delta| delta.bounds)
     }
 
     /// The receipts of its orders.

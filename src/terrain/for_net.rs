@@ -8,7 +8,8 @@ use crate::volume::Brick;
 use crate::world::{TerrainError, TerrainSettings};
 
 impl Terrain {
-    /// A terrain with the same world, rules and settings, in which nothing waits. Both share the world until one of them changes.
+    /// A terrain with the same world, rules and settings, in which nothing waits. Both share the world until one of
+    /// them changes.
     ///
     /// # Errors
     /// Never, as this one has the same settings.
@@ -21,7 +22,8 @@ impl Terrain {
         Ok(fork)
     }
 
-    /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as they are.
+    /// Stores these bricks in place of equal ones, so that worlds that hold the same share them. Others are left as
+    /// they are.
     pub(crate) fn share_bricks<'a>(&mut self, bricks: impl IntoIterator<Item = (BrickPos, &'a Arc<Brick>)>) {
         for (pos, brick) in bricks {
             let Some(own) = self.world.bricks.get(&pos) else { continue };

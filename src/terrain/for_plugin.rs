@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::commit::Commit;
 use super::history::DeferredDrop;
 use super::model::{StaleCommit, Terrain};
+use super::pending_display::PendingDisplay;
 use super::receipt::{Asked, Receipt};
-use super::unseen::Unseen;
 use crate::redraw::DrawnCut;
 use crate::world::Version;
 
@@ -19,7 +19,7 @@ impl Terrain {
     /// Drops queued and running work, for which all receipts have been sent.
     pub(crate) fn forget(&mut self) {
         self.in_flight = None;
-        self.unseen = None;
+        self.pending_display = None;
         self.queue.clear();
     }
 
@@ -44,14 +44,14 @@ impl Terrain {
 
     /// From now on the plugin shows this world, and wants to know what else is committed to it.
     pub(crate) fn watch(&mut self) {
-        self.unseen = Some(Unseen::nothing(self.world.version()));
+        self.pending_display = Some(PendingDisplay::nothing(self.world.version()));
     }
 
     /// The changes that the game committed since `shown`; `None` if they are not known.
-    pub(crate) fn take_unseen(&mut self, shown: Version) -> Option<Unseen> {
+    pub(crate) fn take_pending_display(&mut self, shown: Version) -> Option<PendingDisplay> {
         let now = self.world.version();
-        let unseen = self.unseen.replace(Unseen::nothing(now))?;
-        (unseen.follows(shown) && unseen.version() == now).then_some(unseen)
+        let pending = self.pending_display.replace(PendingDisplay::nothing(now))?;
+        (pending.follows(shown) && pending.version() == now).then_some(pending)
     }
 
     /// The commit that rejects everything in the transaction with this ticket, because its task panicked; `None` if it
@@ -68,8 +68,8 @@ impl Terrain {
     }
 
     /// Drops changes that are not shown yet; the plugin then has to show the whole world again.
-    pub(crate) fn forget_unseen(&mut self) {
-        self.unseen = None;
+    pub(crate) fn forget_pending_display(&mut self) {
+        self.pending_display = None;
     }
 
     /// Sets the cut to draw from now on, or the whole world in full detail; the plugin shows it.
@@ -83,7 +83,7 @@ impl Terrain {
     pub(crate) fn take_over(&mut self, old: &mut Self) {
         old.abandon();
         self.queue.take_over(&mut old.queue);
-        self.queue.change_terms((&old.rules, &old.loose), (&self.rules, &self.loose));
+        self.queue.change_rules((&old.rules, &old.loose), (&self.rules, &self.loose));
         self.receipts.append(&mut old.receipts);
         if let Some(engine) = old.engine() {
             self.set_engine(engine.clone());
@@ -92,8 +92,8 @@ impl Terrain {
         self.set_meshing(old.meshing());
     }
 
-    /// Commits a transaction that the plugin began and shows. Returns the receipts of edits; the others are kept until they
-    /// are taken. The caller may drop the other data on another thread.
+    /// Commits a transaction that the plugin began and shows. Returns the receipts of edits; the others are kept until
+    /// they are taken. The caller may drop the other data on another thread.
     pub(crate) fn commit_shown(
         &mut self,
         commit: Commit,
@@ -101,8 +101,8 @@ impl Terrain {
         let (mut receipts, dropped) = self.install(commit)?;
         let others = receipts.extract_if(.., |receipt| receipt.asked != Asked::Edit);
         others.for_each(|receipt| self.answer(receipt));
-        if let Some(unseen) = &mut self.unseen {
-            *unseen = Unseen::nothing(self.world.version());
+        if let Some(pending) = &mut self.pending_display {
+            *pending = PendingDisplay::nothing(self.world.version());
         }
         Ok((receipts, dropped))
     }

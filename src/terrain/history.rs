@@ -97,8 +97,8 @@ impl UndoDelta {
         self.listed_bytes = self.change.field_bytes() + pieces;
     }
 
-    /// Adds what later edits of the same group replaced, and returns what earlier ones had replaced already. Takes as long as
-    /// there is to add, however long the stroke is.
+    /// Adds what later edits of the same group replaced, and returns what earlier ones had replaced already. Takes as
+    /// long as there is to add, however long the stroke is.
     fn extend(&mut self, later: Self) -> Patch {
         let reached = self.reached.get_or_insert_with(|| Reached::of(&self.change));
         let left = self.change.absorb(reached, later.change);
@@ -121,8 +121,8 @@ impl UndoDelta {
         }
     }
 
-    /// Bytes that dropping it frees, the counters of its `Arc` included. They do not depend on the number of commits that it took:
-    /// what helps to add later edits, and goes when none can come, is not counted.
+    /// Bytes that dropping it frees, the counters of its `Arc` included. They do not depend on the number of commits
+    /// that it took: what helps to add later edits, and goes when none can come, is not counted.
     fn bytes(&self) -> usize {
         let own = 2 * size_of::<usize>() + size_of::<Self>();
         let lists = size_of_val(&self.tags[..]) + self.change.list_bytes();

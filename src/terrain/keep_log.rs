@@ -23,7 +23,7 @@ impl Terrain {
                 self.abandon();
             }
         }
-        self.log_terms();
+        self.log_rules();
     }
 
     /// The records of the commits since the last call, in order; each is returned once.
@@ -37,20 +37,20 @@ impl Terrain {
         self.log.as_ref().is_some_and(|log| !log.is_empty())
     }
 
-    /// Whether the records that wait follow this revision, and one of them sets another ground: then the world is another one than before,
-    /// and the terrain is the same.
+    /// Whether the records that wait follow this revision, and one of them sets another ground: then the world is
+    /// another one than before, and the terrain is the same.
     #[cfg(feature = "store")]
     pub(crate) fn log_sets_ground_after(&self, revision: u64) -> bool {
         self.log.as_ref().is_some_and(|log| log.sets_ground_after(revision))
     }
 
-    /// Records the terms of later edits in the log, unless waiting edits obey other terms.
-    pub(super) fn log_terms(&mut self) {
+    /// Records the rules and loose settings of later edits in the log, unless waiting edits obey others.
+    pub(super) fn log_rules(&mut self) {
         if self.is_busy() || self.queue.len() > 0 {
             return;
         }
         if let Some(log) = &mut self.log {
-            log.enter_terms(&self.world, (self.rules.clone(), self.loose));
+            log.enter_rules(&self.world, (self.rules.clone(), self.loose));
         }
     }
 }

@@ -12,10 +12,10 @@ use crate::volume::DiggingRules;
 use crate::world::{Patch, World, brick_bytes};
 
 /// Rules and settings of loose pieces.
-type Terms = (Option<Arc<DiggingRules>>, Option<LooseSettings>);
+type Rules = (Option<Arc<DiggingRules>>, Option<LooseSettings>);
 
-/// The entries that lead from some terms to others; without terms before, all of them.
-fn changed_terms(before: Option<&Terms>, after: &Terms) -> impl Iterator<Item = LogEntry> + use<> {
+/// The entries that lead from some rules to others; without rules before, all of them.
+fn changed_rules(before: Option<&Rules>, after: &Rules) -> impl Iterator<Item = LogEntry> + use<> {
     let rules = before
         .is_none_or(|before| before.0 != after.0)
         .then(|| LogEntry::Order(Order::Rules(after.0.clone())));
@@ -27,8 +27,8 @@ fn changed_terms(before: Option<&Terms>, after: &Terms) -> impl Iterator<Item = 
 /// A record as its transaction makes it: all but what only the commit knows.
 #[derive(Default)]
 pub(super) struct RecordDraft {
-    /// The terms of the first and of the last edit that was applied. Entries say how those in between differ.
-    terms: Option<[Terms; 2]>,
+    /// The rules of the first and of the last edit that was applied. Entries say how those in between differ.
+    rules: Option<[Rules; 2]>,
     entries: Vec<LogEntry>,
     change: Patch,
     /// Bytes that the record may hold alone.
@@ -38,8 +38,8 @@ pub(super) struct RecordDraft {
 impl RecordDraft {
     /// The record of a commit, by the orders, their receipts, and what changes.
     pub fn new(submissions: &[Submission], receipts: &[Receipt], change: Patch) -> Self {
-        // With room for the first terms, if those before were others.
-        let (mut terms, mut entries) = (None::<[Terms; 2]>, Vec::with_capacity(submissions.len() + 2));
+        // With room for the first rules, if those before were others.
+        let (mut rules, mut entries) = (None::<[Rules; 2]>, Vec::with_capacity(submissions.len() + 2));
         for (submission, receipt) in submissions.iter().zip(receipts) {
             let (Ok(order), Ok(_)) = (&submission.order, &receipt.outcome) else { continue };
             if let Order::Undo | Order::Redo | Order::Parts { .. } = order {
@@ -47,21 +47,21 @@ impl RecordDraft {
                 continue;
             }
             if let Order::Edit(_) = order {
-                let own = (submission.terms.rules.clone(), submission.terms.loose);
-                let first = match terms.take() {
+                let current = (submission.context.rules.clone(), submission.context.loose);
+                let first = match rules.take() {
                     Some([first, last]) => {
-                        entries.extend(changed_terms(Some(&last), &own));
+                        entries.extend(changed_rules(Some(&last), &current));
                         first
                     }
-                    None => own.clone(),
+                    None => current.clone(),
                 };
-                terms = Some([first, own]);
+                rules = Some([first, current]);
             }
             entries.push(LogEntry::Order(order.clone()));
         }
         let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
         let bytes = bytes_of(&entries, &change) + room;
-        Self { terms, entries, change, bytes }
+        Self { rules, entries, change, bytes }
     }
 }
 
@@ -94,8 +94,8 @@ pub(super) struct CommitLog {
     /// Bytes of all of them.
     bytes: usize,
     limit: usize,
-    /// The terms that hold after the last record; `None` if nothing is known of them.
-    terms: Option<Terms>,
+    /// The rules that hold after the last record; `None` if nothing is known of them.
+    rules: Option<Rules>,
     /// Whether a commit was dropped after the last record that was taken. The first waiting record is a
     /// commit then: any other kind has the same revision as the dropped one, and would hide the gap.
     has_gap: bool,
@@ -104,31 +104,31 @@ pub(super) struct CommitLog {
 impl CommitLog {
     pub fn new(limit: usize) -> Self {
         let (records, sizes) = Default::default();
-        Self { records, sizes, bytes: 0, limit, terms: None, has_gap: false }
+        Self { records, sizes, bytes: 0, limit, rules: None, has_gap: false }
     }
 
     /// Records the commit that led to this world. Records that no longer fit are moved to `dropped`.
     pub fn enter(&mut self, world: &World, draft: RecordDraft, dropped: &mut Vec<CommitRecord>) {
-        let RecordDraft { terms, mut entries, mut change, mut bytes } = draft;
+        let RecordDraft { rules, mut entries, mut change, mut bytes } = draft;
         change.next_field = world.next_field;
-        if let Some([first, last]) = terms {
-            let told = changed_terms(self.terms.as_ref(), &first);
-            drop(entries.splice(0..0, told.inspect(|entry| bytes += rule_bytes(entry))));
-            self.terms = Some(last);
+        if let Some([first, last]) = rules {
+            let changes = changed_rules(self.rules.as_ref(), &first);
+            drop(entries.splice(0..0, changes.inspect(|entry| bytes += rule_bytes(entry))));
+            self.rules = Some(last);
         }
         let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
         self.push(record, bytes, dropped);
     }
 
-    /// Records new terms, if they differ from the previous ones.
-    pub fn enter_terms(&mut self, world: &World, terms: Terms) {
+    /// Records new rules, if they differ from the previous ones.
+    pub fn enter_rules(&mut self, world: &World, rules: Rules) {
         // The next edit logs them.
         if self.has_gap && self.records.is_empty() {
             return;
         }
-        let entries: Vec<LogEntry> = changed_terms(self.terms.as_ref(), &terms).collect();
+        let entries: Vec<LogEntry> = changed_rules(self.rules.as_ref(), &rules).collect();
         if !entries.is_empty() {
-            self.terms = Some(terms);
+            self.rules = Some(rules);
             let change = Patch { next_field: world.next_field, ..Patch::default() };
             let bytes = bytes_of(&entries, &change);
             let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
@@ -186,7 +186,7 @@ impl CommitLog {
             self.bytes -= self.sizes.pop_front().unwrap_or_default();
             dropped.extend(self.records.pop_front());
         }
-        // The dropped records may have held the current terms, so these are logged again.
-        self.terms = None;
+        // The dropped records may have held the current rules, so these are logged again.
+        self.rules = None;
     }
 }

@@ -29,6 +29,8 @@ mod order;
 #[cfg(test)]
 mod order_laws;
 mod parts_error;
+#[cfg(feature = "plugin")]
+mod pending_display;
 mod queue;
 mod receipt;
 mod record;
@@ -38,8 +40,6 @@ mod run;
 mod steps;
 mod submit;
 mod transaction;
-#[cfg(feature = "plugin")]
-mod unseen;
 mod work;
 
 pub use crate::loose::{LoosePiece, LooseSettings, PieceFate, PieceId, ReturnedPiece, Run};
@@ -55,9 +55,9 @@ pub use crate::surface::ChunkSurface;
 pub(crate) use crate::world::brick_over;
 #[cfg(any(feature = "plugin", test))]
 pub(crate) use crate::world::unique;
-#[doc(hidden)]
-pub use crate::world::{Drawn, Version};
 pub use crate::world::{Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, World};
+#[doc(hidden)]
+pub use crate::world::{MeshKey, MeshKey as Drawn, Version};
 pub use commit::Commit;
 #[doc(hidden)]
 pub use draft::Draft;
@@ -65,6 +65,8 @@ pub use history::History;
 pub use model::{StaleCommit, Terrain};
 pub use order::{Order, Request};
 pub use parts_error::PartsError;
+#[cfg(feature = "plugin")]
+pub(crate) use pending_display::PendingDisplay;
 #[cfg(feature = "plugin")]
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
@@ -74,5 +76,3 @@ pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]
 pub use resolve::FieldChange;
 pub use transaction::Transaction;
-#[cfg(feature = "plugin")]
-pub(crate) use unseen::Unseen;

@@ -8,11 +8,11 @@ use super::commit::Commit;
 use super::history::{DeferredDrop, Step, UndoStack};
 use super::log::CommitLog;
 use super::order::Order;
+#[cfg(feature = "plugin")]
+use super::pending_display::PendingDisplay;
 use super::queue::Queue;
 use super::receipt::{Receipt, Rejection};
 use super::transaction::Transaction;
-#[cfg(feature = "plugin")]
-use super::unseen::Unseen;
 use super::work::Work;
 use crate::backend::Engine;
 use crate::ground::Ground;
@@ -41,8 +41,9 @@ pub struct StaleCommit;
 /// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and
 /// overwrites any other; a parent may scale it further.
 ///
-/// To change levels, insert a new one on the same entity, with its own `SavedWorld` if it is saved. A terrain that is assigned
-/// through `&mut Terrain` is shown too, but edits that waited in the old one get no receipts, and its debris stays.
+/// To change levels, insert a new one on the same entity, with its own `SavedWorld` if it is saved. A terrain that is
+/// assigned through `&mut Terrain` is shown too, but edits that waited in the old one get no receipts, and its debris
+/// stays.
 pub struct Terrain {
     pub(super) world: Arc<World>,
     engine: Option<Engine>,
@@ -58,7 +59,7 @@ pub struct Terrain {
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Commits of the game since the plugin last showed the world; `None` while the plugin does not show it.
     #[cfg(feature = "plugin")]
-    pub(super) unseen: Option<Unseen>,
+    pub(super) pending_display: Option<PendingDisplay>,
 }
 
 impl fmt::Debug for Terrain {
@@ -105,7 +106,7 @@ impl Terrain {
             meshing: Meshing::default(),
             drawn_cut: None,
             #[cfg(feature = "plugin")]
-            unseen: None,
+            pending_display: None,
         })
     }
 
@@ -124,7 +125,7 @@ impl Terrain {
     pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
         rules.check()?;
         self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
-        self.log_terms();
+        self.log_rules();
         Ok(())
     }
 
@@ -158,7 +159,7 @@ impl Terrain {
     /// `None`, the default, turns that off. Terrains that must have equal worlds need equal settings.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
         self.loose = settings;
-        self.log_terms();
+        self.log_rules();
     }
 
     /// The settings of the search for loose pieces.
@@ -194,7 +195,7 @@ impl Terrain {
         let (work, estimate) = loop {
             let Some((orders, estimate)) = self.queue.take() else {
                 // Steps that found nothing may have been the last that waited.
-                self.log_terms();
+                self.log_rules();
                 return None;
             };
             let step = orders.first().and_then(|first| Step::of(first.asked()));
@@ -240,11 +241,11 @@ impl Terrain {
     /// When the commit is not that of the transaction under way; nothing is changed then.
     pub fn commit(&mut self, commit: Commit) -> Result<Vec<Receipt>, StaleCommit> {
         #[cfg(feature = "plugin")]
-        let news = self.unseen.is_some().then(|| Unseen::of(&commit, self.world.version()));
+        let news = self.pending_display.is_some().then(|| PendingDisplay::of(&commit, self.world.version()));
         let (receipts, _) = self.install(commit)?;
         #[cfg(feature = "plugin")]
-        if let (Some(unseen), Some(news)) = (&mut self.unseen, news) {
-            unseen.add(news, self.world.version());
+        if let (Some(pending), Some(news)) = (&mut self.pending_display, news) {
+            pending.add(news, self.world.version());
         }
         Ok(receipts)
     }
@@ -267,7 +268,7 @@ impl Terrain {
             copy = Some(std::mem::replace(&mut self.world, whole));
             self.drawn_cut = None;
             #[cfg(feature = "plugin")]
-            self.forget_unseen();
+            self.forget_pending_display();
         }
         if Arc::get_mut(&mut self.world).is_none()
             && let Some(copy) = copy.take_if(|copy| copy.version() == self.world.version())
@@ -281,7 +282,7 @@ impl Terrain {
         if let Some(log) = &mut self.log {
             log.enter(&self.world, record.unwrap_or_default(), &mut dropped.records);
         }
-        self.log_terms();
+        self.log_rules();
         dropped.copy = copy;
         let order = done.work.submissions().first().and_then(|first| first.order.as_ref().ok());
         let replaces_parts = order.is_some_and(Order::replaces_parts);

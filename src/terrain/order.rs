@@ -117,8 +117,8 @@ impl Order {
     }
 }
 
-/// Something to submit: a [`Brush`], an [`Edit`], an [`Order`], or a reference to one. An invalid brush can be submitted
-/// too, and gets its receipt in turn.
+/// Something to submit: a [`Brush`], an [`Edit`], an [`Order`], or a reference to one. An invalid brush can be
+/// submitted too, and gets its receipt in turn.
 #[derive(Clone, Debug)]
 pub struct Request {
     pub(super) tag: u64,

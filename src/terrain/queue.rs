@@ -16,8 +16,8 @@ use crate::volume::DiggingRules;
 /// Limits of a terrain's work, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
 /// A brick takes the CPU about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose pieces are
-/// not counted: each has a [budget](super::LooseSettings) that follows from its edit. A step through history counts as a fixed
-/// amount.
+/// not counted: each has a [budget](super::LooseSettings) that follows from its edit. A step through history counts as
+/// a fixed amount.
 ///
 /// [`Terrain::set_work_limits`]: super::Terrain::set_work_limits
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -54,7 +54,7 @@ pub(crate) enum Together {
 
 /// Everything about an edit that is fixed when it is submitted.
 #[derive(Clone, Debug)]
-pub(super) struct Terms {
+pub(super) struct SubmissionContext {
     /// Edits with the same number are one step of undo; later ones have greater numbers.
     pub group: u64,
     /// `None`: no restrictions.
@@ -63,7 +63,7 @@ pub(super) struct Terms {
     pub loose: Option<LooseSettings>,
 }
 
-impl Terms {
+impl SubmissionContext {
     fn is_same(&self, other: &Self) -> bool {
         let same_rules = match (&self.rules, &other.rules) {
             (None, None) => true,
@@ -80,7 +80,7 @@ pub(crate) struct Submission {
     pub tag: u64,
     /// Only edits are rejected before their turn comes.
     pub order: Result<Order, Rejection>,
-    pub(super) terms: Terms,
+    pub(super) context: SubmissionContext,
     work: u64,
 }
 
@@ -97,7 +97,7 @@ impl Submission {
 
     /// Returns `true` if it belongs to the same group, under the same rules and loose settings.
     pub(super) fn goes_with(&self, other: &Self) -> bool {
-        self.terms.is_same(&other.terms)
+        self.context.is_same(&other.context)
     }
 
     /// Whether it is a transaction of its own.
@@ -137,7 +137,12 @@ impl Queue {
         self.open = is_edit.then_some((together, group));
         self.work += work;
         let Request { tag, order, .. } = request;
-        self.submissions.push_back(Submission { tag, order, terms: Terms { group, rules, loose }, work });
+        self.submissions.push_back(Submission {
+            tag,
+            order,
+            context: SubmissionContext { group, rules, loose },
+            work,
+        });
     }
 
     /// Makes the next edit begin a new group.
@@ -194,18 +199,18 @@ impl Queue {
 
     /// Replaces the rules and loose settings of waiting orders that have these ones.
     #[cfg(all(feature = "plugin", feature = "store"))]
-    pub fn change_terms(
+    pub fn change_rules(
         &mut self,
         (old_rules, old_loose): (&Option<Arc<DiggingRules>>, &Option<LooseSettings>),
         (rules, loose): (&Option<Arc<DiggingRules>>, &Option<LooseSettings>),
     ) {
-        for Submission { terms, .. } in &mut self.submissions {
-            let is_old = match (&terms.rules, old_rules) {
+        for Submission { context, .. } in &mut self.submissions {
+            let is_old = match (&context.rules, old_rules) {
                 (Some(own), Some(old)) => Arc::ptr_eq(own, old),
                 (own, old) => own.is_none() && old.is_none(),
             };
-            if is_old && terms.loose == *old_loose {
-                (terms.rules, terms.loose) = (rules.clone(), *loose);
+            if is_old && context.loose == *old_loose {
+                (context.rules, context.loose) = (rules.clone(), *loose);
             }
         }
     }

@@ -8,8 +8,8 @@ use crate::lattice::{ChunkPos, LatticeBox};
 use crate::loose::{LoosePiece, ReturnedPiece};
 use crate::volume::{FieldId, MaterialCounts, Refused, RulesError, Scenario};
 
-/// What came of an order. Each brush, step through history, replacement of parts and ground that was submitted gets exactly
-/// one; rules and settings of loose pieces get one only if they are invalid.
+/// What came of an order. Each brush, step through history, replacement of parts and ground that was submitted gets
+/// exactly one; rules and settings of loose pieces get one only if they are invalid.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct Receipt {
@@ -83,9 +83,9 @@ impl Asked {
 
 /// What an order changed. An order that changed nothing, such as a dig in the air, leaves all of this empty.
 ///
-/// Inventories that follow receipts must follow those of undos and redos too. There, voxels of loose pieces count in `removed`
-/// and `added`, although an edit's `removed` leaves them out: what an inventory has to give for an undo is `added` less the
-/// materials of `returned`, and what it gets from a redo is `removed` less those of `cut_again`.
+/// Inventories that follow receipts must follow those of undos and redos too. There, voxels of loose pieces count in
+/// `removed` and `added`, although an edit's `removed` leaves them out: what an inventory has to give for an undo is
+/// `added` less the materials of `returned`, and what it gets from a redo is `removed` less those of `cut_again`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Applied {
     /// The scenario in each chunk whose samples changed, of an edit; more than one chunk is the paper's fifth scenario.
@@ -100,17 +100,18 @@ pub struct Applied {
     pub painted: MaterialCounts,
     /// Voxels that the terrain's [`DiggingRules`](crate::volume::DiggingRules) kept from changing, by reason.
     pub refused: Refused,
-    /// Pieces of ground that an edit cut off, where the terrain [looks for them](super::Terrain::set_loose). Those that are gone
-    /// are not among `removed`.
+    /// Pieces of ground that an edit cut off, where the terrain [looks for them](super::Terrain::set_loose). Those that
+    /// are gone are not among `removed`.
     pub loose: Vec<LoosePiece>,
-    /// Whether the search for loose pieces ended at its [budget](super::LooseSettings) before it had looked everywhere. Pieces
-    /// that it did not find stay as ground.
+    /// Whether the search for loose pieces ended at its [budget](super::LooseSettings) before it had looked everywhere.
+    /// Pieces that it did not find stay as ground.
     pub has_unsearched: bool,
     /// The tags of the undone or redone brushes, in order, without those that had changed nothing.
     pub tags: Vec<u64>,
     /// The pieces that had been cut off, and that are ground again: an undo brings them back.
     pub returned: Vec<ReturnedPiece>,
-    /// The pieces that a redo took out of the ground again, as receipts had listed them, each with the tag of its brush.
+    /// The pieces that a redo took out of the ground again, as receipts had listed them, each with the tag of its
+    /// brush.
     pub cut_again: Vec<(u64, LoosePiece)>,
 }
 
@@ -163,7 +164,8 @@ pub enum Rejection {
     /// The authority over a shared terrain, usually a server, refused it.
     #[error("the server refused it")]
     Refused,
-    /// Applying it panicked. World and history are unchanged, and the others of its transaction were applied without it.
+    /// Applying it panicked. World and history are unchanged, and the others of its transaction were applied without
+    /// it.
     #[error("applying it panicked: this is a bug in bevy_burrow")]
     Panicked,
 }

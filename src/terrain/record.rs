@@ -15,8 +15,8 @@ pub const SIMULATION: u32 = 1;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LogEntry {
-    /// An order that was carried out, under the rules and settings of the orders before it: an edit, another ground, or rules and
-    /// settings for what follows.
+    /// An order that was carried out, under the rules and settings of the orders before it: an edit, another ground, or
+    /// rules and settings for what follows.
     Order(Order),
     /// A step through history, or replaced parts: the record's [change](CommitRecord::change) contains them.
     Change,

@@ -29,7 +29,7 @@ use crate::world::World;
 
 /// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for
 /// more would take too long.
-const MOST_FAULTS: usize = 16;
+const MAX_FAULTS: usize = 16;
 
 /// A transaction panicked.
 #[derive(Debug)]
@@ -39,6 +39,15 @@ impl Transaction {
     /// Computes the commit on another engine than the terrain's own.
     pub fn run_on(self, engine: &Engine) -> Commit {
         Self { engine: Some(engine.clone()), ..self }.run()
+    }
+
+    /// Computes the commit on another engine than the terrain's own, and returns the world before it too. It must be dropped
+    /// before the commit is installed, otherwise that copies the world.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn run_with_world(self, engine: &Engine) -> (Commit, Arc<World>) {
+        let own = Self { engine: Some(engine.clone()), ..self };
+        let commit = own.attempt().unwrap_or_else(|_| own.clone().run_without_faults());
+        (commit, own.world)
     }
 
     /// Computes the commit. Runs on any thread; large transactions use the threads of the current rayon pool, and the
@@ -109,9 +118,9 @@ impl Transaction {
         }
         // This many are known to run together.
         let mut fine = 0;
-        for found in 1..=MOST_FAULTS {
+        for found in 1..=MAX_FAULTS {
             let fault = self.first_fault(&submissions, fine);
-            let rejected = if found == MOST_FAULTS { fault..submissions.len() } else { fault..fault + 1 };
+            let rejected = if found == MAX_FAULTS { fault..submissions.len() } else { fault..fault + 1 };
             for own in submissions.iter_mut().take(rejected.end).skip(rejected.start) {
                 if own.order.is_ok() {
                     own.order = Err(Rejection::Panicked);

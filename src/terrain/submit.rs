@@ -14,15 +14,15 @@ impl Terrain {
     /// Queues a brush, an edit or any other [order](Order), after everything that was submitted before. An edit is a
     /// separate step of undo, unless it is part of a [stroke](crate::brush::Brush::stroke).
     ///
-    /// The receipt comes with the commit of its transaction. An invalid order is rejected in turn, and one that exceeds the
-    /// [limits](Self::set_work_limits) [at once](Self::take_receipts). Rules and settings of loose pieces hold at once, for
-    /// later edits.
+    /// The receipt comes with the commit of its transaction. An invalid order is rejected in turn, and one that exceeds
+    /// the [limits](Self::set_work_limits) [at once](Self::take_receipts). Rules and settings of loose pieces hold at
+    /// once, for later edits.
     pub fn submit(&mut self, order: impl Into<Request>) {
         self.submit_all([order]);
     }
 
-    /// Queues brushes, edits and other orders. Edits that follow each other are one step of undo, except for those that are part
-    /// of strokes.
+    /// Queues brushes, edits and other orders. Edits that follow each other are one step of undo, except for those that
+    /// are part of strokes.
     ///
     /// ```
     /// # use bevy_burrow::prelude::*;
@@ -74,8 +74,8 @@ impl Terrain {
             }
             Ok(Order::Loose(settings)) => self.set_loose(settings),
             _ => {
-                let terms = (self.rules.clone(), self.loose);
-                self.queue.push(self.world.grid(), request, together, terms);
+                let rules = (self.rules.clone(), self.loose);
+                self.queue.push(self.world.grid(), request, together, rules);
             }
         }
         Ok(())
@@ -100,8 +100,8 @@ impl Terrain {
     /// thread. Returns their receipts; those of orders that waited are kept for
     /// [`take_receipts`](Self::take_receipts). Tools and tests want this; a game lets the plugin do it.
     ///
-    /// Edits that follow each other are one step of undo, except for strokes among them; a game that replays a journal may want
-    /// to [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.
+    /// Edits that follow each other are one step of undo, except for strokes among them; a game that replays a journal
+    /// may want to [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.
     ///
     /// A transaction that is under way elsewhere is given up first; its commit will be rejected as
     /// [stale](super::StaleCommit).
@@ -156,12 +156,12 @@ impl Terrain {
         receipts
     }
 
-    /// Receipts that no commit returned, in order; each is returned once. They are of orders that there was no room for, of
-    /// steps through history that found nothing to do when [`begin`](Self::begin) took them, and of orders that waited when
-    /// [`apply`](Self::apply) was called. If they are not taken, the latest 65,536 are kept.
+    /// Receipts that no commit returned, in order; each is returned once. They are of orders that there was no room
+    /// for, of steps through history that found nothing to do when [`begin`](Self::begin) took them, and of orders that
+    /// waited when [`apply`](Self::apply) was called. If they are not taken, the latest 65,536 are kept.
     ///
-    /// In a Bevy app the plugin takes those of edits and steps, and sends them as messages. Those of parts and grounds are
-    /// left here, also if the plugin commits them.
+    /// In a Bevy app the plugin takes those of edits and steps, and sends them as messages. Those of parts and grounds
+    /// are left here, also if the plugin commits them.
     pub fn take_receipts(&mut self) -> Vec<Receipt> {
         std::mem::take(&mut self.receipts).into()
     }

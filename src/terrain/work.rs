@@ -1,4 +1,4 @@
-//! The work of a transaction.
+//! The work of one transaction: edits in order, one other order, or another cut to draw.
 
 use std::sync::Arc;
 

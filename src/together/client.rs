@@ -8,21 +8,21 @@ use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::link::{Link, MOST_PENDING, PieceMessage, Standing, Worked};
+use super::link::{Link, MAX_PENDING, PieceMessage, Standing, Worked};
 use super::messages::{BulkLane, FromPlayer, OrderLane};
 use super::replicon::ToOwnServer;
 use super::service::Service;
 use super::shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
 use super::sharing::Sharing;
 use super::trouble::{SharingTrouble, SharingTroubleFound};
-use crate::net::{Client, ClientEvent, Kick, Lane, Refusal, ShownChange};
+use crate::net::{Client, ClientEvent, KickReason, Lane, Refusal, ShownChange};
 use crate::plugin::{BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Applied, Asked, Order, Receipt, Rejection, Terrain};
 use crate::threads::{ThreadTask, Threads, free_later};
 
 /// The writers of messages about edits.
 #[derive(SystemParam)]
-pub(super) struct Answers<'w> {
+pub(super) struct EditMessages<'w> {
     edited: MessageWriter<'w, GroundEdited>,
     joined: MessageWriter<'w, GroundJoined>,
     troubles: MessageWriter<'w, SharingTroubleFound>,
@@ -74,7 +74,7 @@ pub(super) fn send(
     mut sharing: ResMut<Sharing>,
     mut shared: Query<(Entity, &mut SharedTerrain, Option<&mut EditOutbox>, Option<&mut Terrain>, Has<Held>)>,
     mut disabled: Query<&mut SharedTerrain, (With<Disabled>, Allow<Disabled>)>,
-    mut answers: Answers,
+    mut edit_messages: EditMessages,
     mut messages: MessageWriter<FromPlayer>,
 ) {
     for mut shared in &mut disabled {
@@ -92,16 +92,16 @@ pub(super) fn send(
             shared.trouble = None;
             continue;
         }
-        let asks = outbox.map(take_asks).unwrap_or_default();
+        let requests = outbox.map(take_requests).unwrap_or_default();
         let trouble = match (terrain, active) {
             (Some(mut terrain), Some(active)) if active == entity => {
                 let terrain = terrain.bypass_change_detection();
-                let mut turn = Turn { entity, answers: &mut answers };
-                turn.send(*service, (shared, is_changed), terrain, asks, &mut messages)
+                let mut turn = Turn { entity, edit_messages: &mut edit_messages };
+                turn.send(*service, (shared, is_changed), terrain, requests, &mut messages)
             }
             (terrain, active) => {
-                asks.into_iter().for_each(|ask| answers.refuse(entity, ask, None));
-                answers.close(entity, shared.link.take(), &mut messages);
+                requests.into_iter().for_each(|request| edit_messages.refuse(entity, request, None));
+                edit_messages.close(entity, shared.link.take(), &mut messages);
                 let other = active.filter(|_| terrain.is_some()).map(SharingTrouble::AnotherIsShared);
                 Some(other.unwrap_or(SharingTrouble::NoTerrain))
             }
@@ -112,26 +112,26 @@ pub(super) fn send(
                 && !shared.was_served
             {
                 // As over other transports. The connection stays.
-                let why = if ours == theirs { Kick::ChunkSize } else { Kick::Ground };
-                answers.joined.write(GroundJoined { terrain: entity, event: ClientEvent::Kicked(why) });
+                let why = if ours == theirs { KickReason::ChunkSize } else { KickReason::Ground };
+                edit_messages.joined.write(GroundJoined { terrain: entity, event: ClientEvent::Kicked(why) });
             }
-            trouble.into_iter().for_each(|trouble| answers.warn(entity, trouble));
+            trouble.into_iter().for_each(|trouble| edit_messages.warn(entity, trouble));
         }
     }
 }
 
-/// Empties a list of what a player asked for.
-fn take_asks(mut outbox: Mut<EditOutbox>) -> Vec<Order> {
+/// Takes the requests of a player.
+fn take_requests(mut outbox: Mut<EditOutbox>) -> Vec<Order> {
     if outbox.orders.is_empty() {
         return Vec::new();
     }
     std::mem::take(&mut outbox.orders)
 }
 
-/// The turn of the terrain that is shared, in a frame.
+/// The shared terrain of a frame, and the messages about its edits.
 struct Turn<'a, 'w> {
     entity: Entity,
-    answers: &'a mut Answers<'w>,
+    edit_messages: &'a mut EditMessages<'w>,
 }
 
 impl Turn<'_, '_> {
@@ -141,22 +141,22 @@ impl Turn<'_, '_> {
         service: Service,
         (shared, is_changed): (&mut SharedTerrain, bool),
         terrain: &mut Terrain,
-        asks: Vec<Order>,
+        requests: Vec<Order>,
         messages: &mut MessageWriter<FromPlayer>,
     ) -> Option<SharingTrouble> {
         let ground = super::messages::GroundId::of(terrain.world());
         if shared.link.as_ref().is_some_and(|link| link.ground != ground) {
-            self.answers.close(self.entity, shared.link.take(), messages);
+            self.edit_messages.close(self.entity, shared.link.take(), messages);
         }
         if shared.link.is_none() {
             // A terrain that is there has valid settings.
             shared.link = Link::new(terrain, &shared.stamps).ok();
         }
         let link = shared.link.as_mut()?;
-        asks.into_iter().for_each(|ask| link.ask(ask));
+        requests.into_iter().for_each(|request| link.request(request));
         if terrain.rules() != link.rules.as_ref() {
             link.rules = terrain.rules().cloned();
-            self.answers.warn(self.entity, SharingTrouble::RulesIgnored);
+            self.edit_messages.warn(self.entity, SharingTrouble::RulesIgnored);
         }
         link.take_back_client();
         let standing = link.standing(service);
@@ -196,29 +196,29 @@ impl Turn<'_, '_> {
     /// Hands over what the player asked for, in order.
     fn hand_over(&mut self, link: &mut Link, client: &mut Client, standing: Standing) {
         let is_refused = matches!(standing, Standing::Refuses(_));
-        let mut room = MOST_PENDING.saturating_sub(client.pending());
-        for ask in std::mem::take(&mut link.asks) {
-            match ask {
+        let mut room = MAX_PENDING.saturating_sub(client.pending());
+        for request in std::mem::take(&mut link.requests) {
+            match request {
                 Order::Edit(edit) if !is_refused && room > 0 => {
                     link.is_full = false;
                     room -= 1;
-                    client.dig(edit);
+                    client.submit(edit);
                 }
                 Order::Undo if !is_refused => client.undo(None),
-                ask => {
-                    let is_full = !is_refused && ask.edit().is_some();
+                request => {
+                    let is_full = !is_refused && request.edit().is_some();
                     if is_full && !std::mem::replace(&mut link.is_full, true) {
-                        self.answers.warn(self.entity, SharingTrouble::TooManyPending(MOST_PENDING));
+                        self.edit_messages.warn(self.entity, SharingTrouble::TooManyPending(MAX_PENDING));
                     }
-                    self.answers.refuse(self.entity, ask, Some(link));
+                    self.edit_messages.refuse(self.entity, request, Some(link));
                 }
             }
         }
     }
 }
 
-/// Leaves the server while a terrain is disabled, as nobody reads what the server sends. The terrain joins again once it is enabled,
-/// and what waits for an answer is sent again.
+/// Leaves the server while a terrain is disabled, because it does not read messages of the server. The terrain joins
+/// again once it is enabled, and what waits for an answer is sent again.
 fn leave_meanwhile(link: &mut Link, service: Service, messages: &mut MessageWriter<FromPlayer>) {
     if link.greeted.is_none() {
         return;
@@ -253,8 +253,11 @@ fn change_server(
     }
 }
 
-/// Puts into terrains what is to be shown, and says what happened.
-pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>, mut answers: Answers) {
+/// Submits changes to the shown terrains, and reports what happened.
+pub(super) fn show(
+    mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>,
+    mut edit_messages: EditMessages,
+) {
     for (entity, mut shared, mut terrain) in &mut shared {
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
         let Some(mut client) = link.client.take() else { continue };
@@ -275,7 +278,7 @@ pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>
         }
         display.compare(terrain.world(), client.shown_hash());
         let broken = (display.is_broken && display.is_idle()).then(|| terrain.snapshot());
-        client.take_events().into_iter().for_each(|event| answers.tell(entity, link, event));
+        client.take_events().into_iter().for_each(|event| edit_messages.report(entity, link, event));
         let now = link.start.elapsed();
         link.task = Some(ThreadTask::start(Threads::Transactions, move || {
             client.advance(now);
@@ -285,20 +288,20 @@ pub(super) fn show(mut shared: Query<(Entity, &mut SharedTerrain, &mut Terrain)>
     }
 }
 
-/// Answers what waits for a terrain that is no longer shared, and tells the server.
+/// Answers what waits for a terrain that is no longer shared, and sends the server that it left.
 pub(super) fn close(
     gone: On<Discard, SharedTerrain>,
     mut shared: Query<(&mut SharedTerrain, Option<&mut EditOutbox>), Allow<Disabled>>,
-    mut answers: Answers,
+    mut edit_messages: EditMessages,
     mut messages: MessageWriter<FromPlayer>,
 ) {
     let Ok((mut shared, outbox)) = shared.get_mut(gone.entity) else { return };
-    answers.close(gone.entity, shared.link.take(), &mut messages);
-    let asks = outbox.map(take_asks).unwrap_or_default();
-    asks.into_iter().for_each(|ask| answers.refuse(gone.entity, ask, None));
+    edit_messages.close(gone.entity, shared.link.take(), &mut messages);
+    let requests = outbox.map(take_requests).unwrap_or_default();
+    requests.into_iter().for_each(|request| edit_messages.refuse(gone.entity, request, None));
 }
 
-impl Answers<'_> {
+impl EditMessages<'_> {
     /// Reports what is wrong.
     fn warn(&mut self, terrain: Entity, trouble: SharingTrouble) {
         warn!("{terrain}: {trouble}");
@@ -306,8 +309,8 @@ impl Answers<'_> {
     }
 
     /// Answers something that is not sent to a server.
-    fn refuse(&mut self, terrain: Entity, ask: Order, link: Option<&mut Link>) {
-        let why = match &ask {
+    fn refuse(&mut self, terrain: Entity, request: Order, link: Option<&mut Link>) {
+        let why = match &request {
             Order::Edit(edit) => {
                 link.into_iter().for_each(|link| link.answer(edit.tag()));
                 return self.refused(terrain, edit.tag(), None);
@@ -317,7 +320,7 @@ impl Answers<'_> {
             _ => Rejection::NothingToRedo,
         };
         link.into_iter().for_each(|link| link.undos = link.undos.saturating_sub(1));
-        self.stepped(terrain, ask.asked(), Err(why));
+        self.stepped(terrain, request.asked(), Err(why));
     }
 
     /// Answers what waits, and drops the link.
@@ -342,7 +345,7 @@ impl Answers<'_> {
         self.moved.write(HistoryMoved { terrain: Some(terrain), receipt: Receipt::of(step, outcome) });
     }
 
-    fn tell(&mut self, terrain: Entity, link: &mut Link, event: ClientEvent) {
+    fn report(&mut self, terrain: Entity, link: &mut Link, event: ClientEvent) {
         let edited = |tag, outcome| GroundEdited { terrain, tag, outcome };
         match event {
             ClientEvent::Predicted(receipt) => {
@@ -406,9 +409,9 @@ pub(super) fn send_last(mut shared: Query<&mut SharedTerrain>, mut messages: ToO
             std::thread::sleep(Duration::from_millis(1));
         }
         let Some(client) = link.client.as_mut().filter(|_| link.greeted.is_some()) else { continue };
-        for ask in link.asks.drain(..) {
-            match ask {
-                Order::Edit(edit) => client.dig(edit),
+        for request in link.requests.drain(..) {
+            match request {
+                Order::Edit(edit) => client.submit(edit),
                 Order::Undo => client.undo(None),
                 _ => {}
             }

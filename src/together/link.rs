@@ -8,18 +8,18 @@ use bevy::platform::time::Instant;
 use super::messages::GroundId;
 use super::service::Service;
 use super::trouble::SharingTrouble;
-use crate::net::{self, Client, Kick, Lane, ShownChange, Stamps};
+use crate::net::{self, Client, KickReason, Lane, ShownChange, Stamps};
 use crate::plugin::{LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Asked, Order, Terrain, TerrainError, TerrainSettings, Version, World};
 use crate::threads::{ThreadTask, Threads};
 use crate::volume::DiggingRules;
 
 /// Most edits that wait for the server's answer.
-pub(super) const MOST_PENDING: usize = 1 << 16;
+pub(super) const MAX_PENDING: usize = 1 << 16;
 
 /// What a shared terrain knows of its server.
 pub(super) struct Link {
-    /// `None` while a task works with it.
+    /// `None` while a task has it.
     pub client: Option<Client>,
     pub task: Option<ThreadTask<Worked>>,
     /// The ground that the client was made for.
@@ -28,13 +28,13 @@ pub(super) struct Link {
     pub greeted: Option<u64>,
     /// The [run](super::messages::Served::run) of the server that it has greeted last.
     pub run: u32,
-    /// Whether there was one.
+    /// Whether it has greeted any server.
     pub was_served: bool,
     /// The server of this invitation has sent the player away.
-    pub kicked: Option<(Kick, u64)>,
+    pub kicked: Option<(KickReason, u64)>,
     pub inbox: Vec<(Lane, Vec<u8>)>,
-    /// What the player asked for and the client has not got yet, in order.
-    pub asks: Vec<Order>,
+    /// Requests of the player that the client does not have yet, in order.
+    pub requests: Vec<Order>,
     /// Whether the limit of waiting edits is reached, so that no more are taken.
     pub is_full: bool,
     /// Tags of edits, and the number of undos, that are asked for and not answered.
@@ -76,7 +76,8 @@ pub(super) struct Display {
     pub is_broken: bool,
     /// All of it, to be put next.
     pub whole: Option<ShownChange>,
-    /// Messages about pieces, each with the number of answered changes at which it is sent: the ground changes with these.
+    /// Messages about pieces, each with the number of answered changes at which it is sent: the ground changes with
+    /// these.
     pub pieces: VecDeque<(u64, PieceMessage)>,
 }
 
@@ -92,7 +93,7 @@ pub(super) enum PieceMessage {
 pub(super) enum Standing {
     /// It follows the server that has sent this invitation.
     Follows(u64),
-    /// No server has said yet that it serves a ground. Edits wait for that.
+    /// No server has announced that it serves a ground. Edits wait until one does.
     Waits,
     /// There is no connection. Edits are shown, and wait for another one.
     Lost,
@@ -101,8 +102,8 @@ pub(super) enum Standing {
 }
 
 impl Link {
-    /// The client begins with what the terrain holds, such as the level that the game ships, so only regions that differ from the
-    /// server's have to come.
+    /// The client begins with what the terrain holds, such as the level that the game ships, so only regions that
+    /// differ from the server's have to come.
     ///
     /// # Errors
     /// When the terrain's settings are those of no terrain.
@@ -137,7 +138,7 @@ impl Link {
             was_served: false,
             kicked: None,
             inbox: Vec::new(),
-            asks: Vec::new(),
+            requests: Vec::new(),
             is_full: false,
             tags: VecDeque::new(),
             undos: 0,
@@ -164,12 +165,12 @@ impl Link {
     }
 
     /// Records a request of the player.
-    pub fn ask(&mut self, order: Order) {
+    pub fn request(&mut self, order: Order) {
         match order.edit() {
             Some(edit) => self.tags.push_back(edit.tag()),
             None => self.undos += 1,
         }
-        self.asks.push(order);
+        self.requests.push(order);
     }
 
     /// Records that an edit with this tag was answered.
@@ -220,7 +221,7 @@ fn is_change(asked: Asked) -> bool {
 }
 
 impl Display {
-    /// Of a terrain, in which changes of an earlier link may still wait.
+    /// The state for a terrain in which changes of an earlier link may still wait.
     fn of(terrain: &mut Terrain) -> Self {
         drop(terrain.take_receipts_of(is_change));
         Self {
@@ -254,8 +255,8 @@ impl Display {
         self.pieces.drain(..count).map(|(_, piece)| piece).collect()
     }
 
-    /// Compares what is shown with what should be, which has this hash, once nothing waits for the terrain. They differ where somebody
-    /// else has changed the terrain, for example with brushes that were under way when it became shared.
+    /// Compares what is shown with what should be, which has this hash, once nothing waits for the terrain. They differ
+    /// where somebody else has changed the terrain, for example with brushes that were under way when it became shared.
     pub fn compare(&mut self, shown: &World, hash: u64) {
         if self.is_idle() && !self.is_broken && shown.hash() != hash {
             self.is_broken = true;
@@ -263,7 +264,7 @@ impl Display {
         }
     }
 
-    /// Lets the pieces wait until all that should be shown is put.
+    /// Keeps messages about pieces until the whole world is shown.
     fn hold_pieces(&mut self) {
         let due = self.submitted + 1;
         self.pieces.iter_mut().for_each(|(at, _)| *at = due);

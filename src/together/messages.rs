@@ -1,4 +1,5 @@
-//! The messages that carry the bytes of clients and server. Each type is sent in a separate channel, reliably and in order.
+//! The messages that carry the bytes of clients and server. Each type is sent in a separate channel, reliably and in
+//! order.
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -51,7 +52,8 @@ impl Served {
 }
 
 impl FromPlayer {
-    /// Whether it was said to the server of another run than this one. It may arrive after that server was replaced.
+    /// Whether it is for the server of another run than this one. Such a message may arrive after a server was
+    /// replaced.
     pub fn is_for_another(&self, run: u32) -> bool {
         matches!(self, Self::Bytes(own, _) | Self::Left(own) if *own != run)
     }

@@ -1,9 +1,9 @@
 //! Multiplayer in Bevy: [`net`](crate::net) over [bevy_replicon], which provides clients, transport and replication.
 //!
-//! The server inserts a [`GroundServer`]. Each player has a terrain with a [`SharedTerrain`], made from the same ground; a player who
-//! is the host has one too. Write `Brush` messages as in single-player: edits show at once, are sent to the server, and
-//! are [confirmed](GroundEdited) once it has ordered them. [`Undo`](crate::plugin::Undo) asks the server to undo
-//! the player's last stroke, if `UndoPolicy` allows it.
+//! The server inserts a [`GroundServer`]. Each player has a terrain with a [`SharedTerrain`], made from the same
+//! ground; a player who is the host has one too. Write `Brush` messages as in single-player: edits show at once, are
+//! sent to the server, and are [confirmed](GroundEdited) once it has ordered them. [`Undo`](crate::plugin::Undo) asks
+//! the server to undo the player's last stroke, if `UndoPolicy` allows it.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;

@@ -8,7 +8,7 @@ use super::replicon::{Peer, Peers};
 use crate::net;
 
 /// The most bytes of a player's messages that wait while the server is busy. A player that sends more is kicked.
-const MOST_WAITING_BYTES: usize = 1 << 20;
+const MAX_WAITING_BYTES: usize = 1 << 20;
 
 /// The approximate overhead of a message in bytes.
 const MESSAGE_BYTES: usize = 128;
@@ -20,14 +20,14 @@ pub(super) struct Players {
     clients: HashMap<net::ClientId, Peer>,
     /// Removed clients: messages from them on the same connection are ignored.
     kicked: HashSet<Entity>,
-    /// Those among them whose player has spoken over another connection since, and who were not told so.
+    /// Those among them whose player has used another connection since, and which were not notified.
     replaced: Vec<Entity>,
     /// Bytes that wait for the server.
     waiting: HashMap<net::ClientId, usize>,
 }
 
 /// The meaning of a message.
-pub(super) enum Said {
+pub(super) enum PlayerMessage {
     /// A message of the client, the first one if it `begins`.
     Bytes {
         begins: bool,
@@ -36,7 +36,7 @@ pub(super) enum Said {
     /// The player has left.
     Leaves,
     /// The player has sent more than the server could handle.
-    TooMuch,
+    Flood,
     Nothing,
 }
 
@@ -48,10 +48,10 @@ impl Players {
     }
 
     /// Handles a message of a player.
-    pub fn hear(&mut self, player: net::ClientId, client: Peer, message: &FromPlayer) -> Said {
+    pub fn receive(&mut self, player: net::ClientId, client: Peer, message: &FromPlayer) -> PlayerMessage {
         let said = match message {
-            FromPlayer::Left(_) if self.clients.remove(&player).is_some() => Said::Leaves,
-            FromPlayer::Left(_) => return Said::Nothing,
+            FromPlayer::Left(_) if self.clients.remove(&player).is_some() => PlayerMessage::Leaves,
+            FromPlayer::Left(_) => return PlayerMessage::Nothing,
             // One that was too long is counted as an invalid message.
             FromPlayer::Bytes(..) | FromPlayer::TooLong => {
                 let earlier = self.clients.insert(player, client);
@@ -63,17 +63,17 @@ impl Players {
                 }
                 let bytes =
                     if let FromPlayer::Bytes(_, bytes) = message { bytes.clone() } else { Vec::new() };
-                Said::Bytes { begins, bytes }
+                PlayerMessage::Bytes { begins, bytes }
             }
         };
-        let length = if let Said::Bytes { bytes, .. } = &said { bytes.len() } else { 0 };
+        let length = if let PlayerMessage::Bytes { bytes, .. } = &said { bytes.len() } else { 0 };
         let waiting = self.waiting.entry(player).or_default();
         let before = *waiting;
         *waiting = waiting.saturating_add(length + MESSAGE_BYTES);
-        match (before <= MOST_WAITING_BYTES, *waiting <= MOST_WAITING_BYTES) {
+        match (before <= MAX_WAITING_BYTES, *waiting <= MAX_WAITING_BYTES) {
             (_, true) => said,
-            (true, false) => Said::TooMuch,
-            (false, false) => Said::Nothing,
+            (true, false) => PlayerMessage::Flood,
+            (false, false) => PlayerMessage::Nothing,
         }
     }
 
@@ -94,7 +94,7 @@ impl Players {
         Some(client)
     }
 
-    /// Returns the clients that are still connected, and whose player has spoken over another connection since.
+    /// Returns the clients that are still connected, and whose player has used another connection since.
     pub fn take_replaced(&mut self, peers: &Peers) -> Vec<Entity> {
         self.replaced.drain(..).filter(|client| peers.has(*client)).collect()
     }

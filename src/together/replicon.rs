@@ -1,5 +1,5 @@
-//! The transport: connections and messages of bevy_replicon. No other file names it, so another transport is another file with the
-//! same items.
+//! The transport: connections and messages of bevy_replicon. No other file names it, so another transport is another
+//! file with the same items.
 
 use bevy::ecs::message::MessageCursor;
 use bevy::ecs::schedule::IntoScheduleConfigs;
@@ -13,7 +13,7 @@ pub(super) use bevy_replicon::shared::backend::connected_client::NetworkId;
 use bevy_replicon::shared::message::ctx::{ClientSendCtx, ServerReceiveCtx};
 
 use super::messages::{BulkLane, FromPlayer, Invitation, OrderLane, Served};
-use crate::net::{self, Lane, MOST_TO_SERVER};
+use crate::net::{self, Lane, MAX_TO_SERVER};
 
 /// The most bytes of a [`FromPlayer`] in addition to its content.
 const OVERHEAD: usize = 16;
@@ -23,7 +23,8 @@ const NEEDS_REPLICON: &str = "TogetherPlugin does nothing: it needs RepliconPlug
     DefaultPlugins have and MinimalPlugins have not: add_plugins((MinimalPlugins, StatesPlugin, RepliconPlugins, BurrowPlugins, \
     TogetherPlugin)), and a transport such as RepliconRenetPlugins";
 
-/// Registers the messages; `forget_connection` runs when a client's connection ends. Returns `false` if replicon's plugins are missing.
+/// Registers the messages; `forget_connection` runs when a client's connection ends. Returns `false` if replicon's
+/// plugins are missing.
 pub(super) fn build<M>(
     app: &mut App,
     forget_connection: impl IntoScheduleConfigs<ScheduleSystem, M>,
@@ -50,7 +51,7 @@ fn write(_: &mut ClientSendCtx, message: &FromPlayer, bytes: &mut Vec<u8>) -> Re
 }
 
 fn read(_: &mut ServerReceiveCtx, bytes: &mut Bytes) -> Result<FromPlayer> {
-    if bytes.len() > MOST_TO_SERVER + OVERHEAD {
+    if bytes.len() > MAX_TO_SERVER + OVERHEAD {
         return Ok(FromPlayer::TooLong);
     }
     Ok(postcard_utils::from_buf(bytes)?)

@@ -9,9 +9,9 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::messages::Served;
-use super::players::{Players, Said};
+use super::players::{PlayerMessage, Players};
 use super::replicon::{FromPlayers, NetworkId, Peer, Peers, ReadMessages, ToPlayers, number};
-use crate::net::{self, Kick, Lane, Server, ServerEvent, ServerSettings, ToClient};
+use crate::net::{self, KickReason, Lane, Server, ServerEvent, ServerSettings, ToClient};
 use crate::saves::{AbandonedStores, ClosingWorlds, EXIT_WAIT, ReadWorld, SavedWorld, WorldReader};
 use crate::store::{Progress, Store, StoreError, StoreTrouble};
 use crate::terrain::Terrain;
@@ -20,11 +20,11 @@ use crate::threads::{ThreadTask, Threads};
 /// The server of a shared world: insert it in the server's app. Its [`Server`] owns a terrain that is not
 /// drawn; a player on the same machine has a [`SharedTerrain`](super::SharedTerrain) like all other players.
 ///
-/// Replacing or removing it saves what is not saved yet and closes its world, without a wait of the main thread; an app that exits
-/// waits for this at most ten seconds.
+/// When it is replaced or removed, the remaining edits are saved and its world is closed, without blocking the main
+/// thread; an app that exits waits for this, ten seconds at most.
 #[derive(Resource)]
 pub struct GroundServer {
-    work: Work,
+    state: State,
     /// The served world; `None` until it is there.
     served: Option<Served>,
     waiting: Vec<Request>,
@@ -40,17 +40,17 @@ pub struct GroundServer {
 }
 
 /// The state of the server.
-enum Work {
+enum State {
     /// Its world is being read.
-    Opening(ThreadTask<Result<(Box<Parts>, Vec<StoreTrouble>), StoreError>>, Progress),
-    Here(Box<Parts>),
-    UnderWay(ThreadTask<Box<Parts>>),
+    Opening(ThreadTask<Result<(Box<ServerState>, Vec<StoreTrouble>), StoreError>>, Progress),
+    Idle(Box<ServerState>),
+    Running(ThreadTask<Box<ServerState>>),
     /// Its world could not be read, or it is taken out for a moment.
-    Gone,
+    Unavailable,
 }
 
 /// The data that is sent to a thread and returned.
-struct Parts {
+struct ServerState {
     server: Server,
     store: Option<Store>,
     /// Whether it was logged that saving failed.
@@ -58,10 +58,10 @@ struct Parts {
 }
 
 /// The most requests of the game that wait until a world is read; further ones are dropped.
-const MOST_WAITING: usize = 1 << 14;
+const MAX_WAITING: usize = 1 << 14;
 
 /// A request that waits until the server is not busy.
-type Request = Box<dyn FnOnce(&mut Parts, Duration) + Send + Sync>;
+type Request = Box<dyn FnOnce(&mut ServerState, Duration) + Send + Sync>;
 
 /// An event of the ground's server.
 #[derive(Message, Clone, Debug)]
@@ -77,41 +77,45 @@ pub enum GroundServerEvent {
 impl GroundServer {
     /// Serves a world that is not saved.
     pub fn new(server: Server) -> Self {
-        Self::working(Work::Here(Box::new(Parts { server, store: None, has_failed: false })))
+        Self::with_state(State::Idle(Box::new(ServerState { server, store: None, has_failed: false })))
     }
 
-    /// Serves a saved world: the one in this folder on the ground of this terrain, or where there is none, the terrain, which is
-    /// saved there from now on. It is read on another thread; [`GroundServerEvent::Opened`] reports the result.
+    /// Serves a saved world: the one in this folder on the ground of this terrain, or where there is none, the terrain,
+    /// which is saved there from now on. It is read on another thread; [`GroundServerEvent::Opened`] reports the
+    /// result.
     pub fn saved(world: &SavedWorld, terrain: &Terrain, settings: ServerSettings) -> Self {
         let reader = WorldReader::new(world, terrain, None);
         let progress = reader.progress.clone();
         let task = ThreadTask::start(Threads::Background, move || {
             let ReadWorld { store, terrain, troubles } = reader.read()?;
             let server = Server::open(terrain, &store, settings);
-            Ok((Box::new(Parts { server, store: Some(store), has_failed: false }), troubles))
+            Ok((Box::new(ServerState { server, store: Some(store), has_failed: false }), troubles))
         });
-        Self::working(Work::Opening(task, progress))
+        Self::with_state(State::Opening(task, progress))
     }
 
     /// How much of a saved world is read, 0 to 1; `None` once it is.
     pub fn opening(&self) -> Option<f32> {
-        if let Work::Opening(_, progress) = &self.work { Some(progress.share()) } else { None }
+        if let State::Opening(_, progress) = &self.state { Some(progress.share()) } else { None }
     }
 
     /// Serves the world of an open store, for example on a [level](crate::store::StoreOptions::level). Use
     /// [`Server::open`] to make the server.
     pub fn with_store(server: Server, store: Store) -> Self {
         let data = store.game_data().clone();
-        let mut ground =
-            Self::working(Work::Here(Box::new(Parts { server, store: Some(store), has_failed: false })));
+        let mut ground = Self::with_state(State::Idle(Box::new(ServerState {
+            server,
+            store: Some(store),
+            has_failed: false,
+        })));
         ground.data = data;
         ground
     }
 
-    fn working(work: Work) -> Self {
-        let served = if let Work::Here(parts) = &work { Some(Served::by(&parts.server)) } else { None };
+    fn with_state(state: State) -> Self {
+        let served = if let State::Idle(parts) = &state { Some(Served::by(&parts.server)) } else { None };
         Self {
-            work,
+            state,
             served,
             waiting: Vec::new(),
             start: Instant::now(),
@@ -134,9 +138,9 @@ impl GroundServer {
         self.ask(move |parts, _| work(&mut parts.server));
     }
 
-    fn ask(&mut self, work: impl FnOnce(&mut Parts, Duration) + Send + Sync + 'static) {
-        let is_read = matches!(self.work, Work::Here(_) | Work::UnderWay(_));
-        if is_read || self.waiting.len() < MOST_WAITING {
+    fn ask(&mut self, work: impl FnOnce(&mut ServerState, Duration) + Send + Sync + 'static) {
+        let is_read = matches!(self.state, State::Idle(_) | State::Running(_));
+        if is_read || self.waiting.len() < MAX_WAITING {
             self.waiting.push(Box::new(work));
         }
     }
@@ -144,9 +148,9 @@ impl GroundServer {
     /// Serves this world if the saved one [can't be read](GroundServerEvent::Opened). Players that have connected
     /// meanwhile join it.
     pub fn serve_instead(&mut self, server: Server) {
-        if let Work::Gone = self.work {
+        if let State::Unavailable = self.state {
             self.served = Some(Served::by(&server));
-            self.work = Work::Here(Box::new(Parts { server, store: None, has_failed: false }));
+            self.state = State::Idle(Box::new(ServerState { server, store: None, has_failed: false }));
         }
     }
 
@@ -166,23 +170,24 @@ impl GroundServer {
         self.data.get(key).map(Vec::as_slice)
     }
 
-    /// The number of a player on the server: one more than the transport's [`NetworkId`], so it stays the same over connections. A
-    /// player on the server's own machine has the number 0.
+    /// The number of a player on the server: one more than the transport's [`NetworkId`], so it stays the same over
+    /// connections. A player on the server's own machine has the number 0.
     ///
-    /// The two greatest network ids have no number: [`net::ClientId::SERVER`] is returned, and such clients are not served. A transport
-    /// without network ids gives a new number to each connection, so a returning player counts as a new one.
+    /// The two greatest network ids have no number: [`net::ClientId::SERVER`] is returned, and such clients are not
+    /// served. A transport without network ids gives a new number to each connection, so a returning player counts as a
+    /// new one.
     pub fn player(client: Peer, ids: &Query<&NetworkId>) -> net::ClientId {
         let id = client.entity().and_then(|entity| ids.get(entity).ok());
         number(client, id).unwrap_or(net::ClientId::SERVER)
     }
 
-    /// Waits until all requests are done and saved, but no longer than ten seconds. An app that exits does this. A world that is still
-    /// being read has nothing to save.
+    /// Waits until all requests are done and saved, but no longer than ten seconds. An app that exits does this. A
+    /// world that is still being read has nothing to save.
     pub fn finish(&mut self) {
         let deadline = Instant::now() + EXIT_WAIT;
-        while let Work::UnderWay(_) = self.work {
-            if let Some(parts) = self.take_parts(|_| {}) {
-                self.work = Work::Here(parts);
+        while let State::Running(_) = self.state {
+            if let Some(parts) = self.take_state(|_| {}) {
+                self.state = State::Idle(parts);
             } else if Instant::now() > deadline {
                 error!("the last edits are not saved: the server is still busy");
                 self.has_timed_out = true;
@@ -192,7 +197,7 @@ impl GroundServer {
             }
         }
         let now = self.start.elapsed();
-        if let Work::Here(parts) = &mut self.work {
+        if let State::Idle(parts) = &mut self.state {
             self.waiting.drain(..).for_each(|request| request(parts, now));
             self.players.forget_waiting();
             parts.advance(now);
@@ -205,29 +210,29 @@ impl GroundServer {
     }
 
     /// Takes the server, if it is not busy.
-    fn take_parts(&mut self, mut tell: impl FnMut(GroundServerEvent)) -> Option<Box<Parts>> {
-        match std::mem::replace(&mut self.work, Work::Gone) {
-            Work::Here(parts) => return Some(parts),
-            Work::Gone => {}
-            Work::UnderWay(mut task) => match task.finish() {
-                None => self.work = Work::UnderWay(task),
+    fn take_state(&mut self, mut report: impl FnMut(GroundServerEvent)) -> Option<Box<ServerState>> {
+        match std::mem::replace(&mut self.state, State::Unavailable) {
+            State::Idle(parts) => return Some(parts),
+            State::Unavailable => {}
+            State::Running(mut task) => match task.finish() {
+                None => self.state = State::Running(task),
                 done => return done,
             },
-            Work::Opening(mut task, progress) => match task.finish() {
-                None => self.work = Work::Opening(task, progress),
+            State::Opening(mut task, progress) => match task.finish() {
+                None => self.state = State::Opening(task, progress),
                 Some(Ok((parts, troubles))) => {
                     // Values that were put meanwhile are newer.
                     let newer = std::mem::take(&mut self.data);
                     self.data.extend(parts.store.iter().flat_map(|store| store.game_data().clone()));
                     self.data.extend(newer);
                     self.served = Some(Served::by(&parts.server));
-                    troubles.into_iter().map(GroundServerEvent::Trouble).for_each(&mut tell);
-                    tell(GroundServerEvent::Opened(Ok(())));
+                    troubles.into_iter().map(GroundServerEvent::Trouble).for_each(&mut report);
+                    report(GroundServerEvent::Opened(Ok(())));
                     return Some(parts);
                 }
                 Some(Err(why)) => {
                     error!("the world is not served: {why}");
-                    tell(GroundServerEvent::Opened(Err(Arc::new(why))));
+                    report(GroundServerEvent::Opened(Err(Arc::new(why))));
                 }
             },
         }
@@ -235,14 +240,14 @@ impl GroundServer {
     }
 }
 
-/// Dropping it does not block: another thread finishes the requests that wait and closes the store. An app that exits waits for
-/// that thread.
+/// Dropping it does not block: another thread finishes the requests that wait and closes the store. An app that exits
+/// waits for that thread.
 impl Drop for GroundServer {
     fn drop(&mut self) {
-        let work = std::mem::replace(&mut self.work, Work::Gone);
+        let work = std::mem::replace(&mut self.state, State::Unavailable);
         let (waiting, now) = (std::mem::take(&mut self.waiting), self.start.elapsed());
         // What is being read has nothing to save yet, so no exit waits for it.
-        let has_to_save = matches!(work, Work::Here(_) | Work::UnderWay(_)) && !self.has_timed_out;
+        let has_to_save = matches!(work, State::Idle(_) | State::Running(_)) && !self.has_timed_out;
         let (closed, closing) = channel();
         Threads::Background.spawn(move || {
             let Some(mut parts) = work.wait() else { return };
@@ -259,19 +264,19 @@ impl Drop for GroundServer {
     }
 }
 
-impl Work {
+impl State {
     /// Waits for the server, on another thread than the main one; `None` if there is none.
-    fn wait(self) -> Option<Box<Parts>> {
+    fn wait(self) -> Option<Box<ServerState>> {
         match self {
-            Self::Here(parts) => Some(parts),
-            Self::UnderWay(task) => task.wait(),
+            Self::Idle(parts) => Some(parts),
+            Self::Running(task) => task.wait(),
             Self::Opening(task, _) => task.wait()?.ok().map(|(parts, _)| parts),
-            Self::Gone => None,
+            Self::Unavailable => None,
         }
     }
 }
 
-impl Parts {
+impl ServerState {
     fn advance(&mut self, now: Duration) {
         self.server.advance(now);
         if let Some(store) = &mut self.store
@@ -286,7 +291,7 @@ impl Parts {
 impl GroundServer {
     /// Reads messages of players. Without a world they are dropped: no player was invited.
     fn receive(&mut self, messages: &FromPlayers, peers: &Peers) {
-        let is_open = matches!(self.work, Work::Here(_) | Work::UnderWay(_));
+        let is_open = matches!(self.state, State::Idle(_) | State::Running(_));
         let mut said = Vec::new();
         for (peer, message) in messages.read(&mut self.read) {
             // What was said to another server says nothing to this one: its ground may be another.
@@ -295,20 +300,22 @@ impl GroundServer {
                 && is_ours
                 && let Some(number) = self.players.find(peer, peers)
             {
-                said.push((number, self.players.hear(number, peer, message)));
+                said.push((number, self.players.receive(number, peer, message)));
             }
         }
         for (player, said) in said {
             match said {
-                Said::Bytes { begins, bytes } => self.ask(move |parts, now| {
+                PlayerMessage::Bytes { begins, bytes } => self.ask(move |parts, now| {
                     if begins {
                         parts.server.connect(player, now);
                     }
                     parts.server.receive(player, &bytes, now);
                 }),
-                Said::Leaves => self.ask(move |parts, _| parts.server.disconnect(player)),
-                Said::TooMuch => self.ask(move |parts, _| parts.server.kick_for(player, Kick::Flood)),
-                Said::Nothing => {}
+                PlayerMessage::Leaves => self.ask(move |parts, _| parts.server.disconnect(player)),
+                PlayerMessage::Flood => {
+                    self.ask(move |parts, _| parts.server.kick_for(player, KickReason::Flood))
+                }
+                PlayerMessage::Nothing => {}
             }
         }
         for player in self.players.take_gone(peers) {
@@ -332,10 +339,10 @@ pub(super) fn serve(
     }
     ground.receive(&messages, &peers);
     for client in ground.players.take_replaced(&peers) {
-        to_players.send(client.into(), Lane::Order, ToClient::Kicked(Kick::ConnectedAgain).to_bytes());
+        to_players.send(client.into(), Lane::Order, ToClient::Kicked(KickReason::ConnectedAgain).to_bytes());
         to_players.disconnect(client);
     }
-    let parts = ground.take_parts(|event| {
+    let parts = ground.take_state(|event| {
         events.write(event);
     });
     let Some(mut parts) = parts else { return };
@@ -362,7 +369,7 @@ pub(super) fn serve(
             to_players.disconnect(client);
         }
     }
-    ground.work = Work::UnderWay(ThreadTask::start(Threads::Transactions, move || {
+    ground.state = State::Running(ThreadTask::start(Threads::Transactions, move || {
         parts.advance(now);
         parts
     }));

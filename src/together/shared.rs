@@ -10,14 +10,15 @@ use crate::net::{self, ClientEvent, Refusal, Stamps};
 use crate::plugin::EditOutbox;
 use crate::terrain::Receipt;
 
-/// Insert it with a [`Terrain`](crate::terrain::Terrain) of the same ground and chunk size as the server's: the world that players
-/// share takes its place, and brushes for it go to the server. A terrain that has edits already, such as those of a level, keeps what
-/// is the same on the server, and only regions that differ are sent. While the terrain is [`Held`](crate::plugin::Held), because its
-/// `StartLevel` is still loaded for example, it does not join yet.
+/// Insert it with a [`Terrain`](crate::terrain::Terrain) of the same ground and chunk size as the server's: the world
+/// that players share takes its place, and brushes for it go to the server. A terrain that has edits already, such as
+/// those of a level, keeps what is the same on the server, and only regions that differ are sent. While the terrain is
+/// [`Held`](crate::plugin::Held), because its `StartLevel` is still loaded for example, it does not join yet.
 ///
-/// It joins as soon as a server that this app is connected to, or this app itself, has a [`GroundServer`](super::GroundServer), and
-/// again whenever there is a new connection or another server. It may be despawned, removed and inserted again at any time, and another
-/// `Terrain` may be inserted on its entity. An app shares one terrain at a time: the first one, until it is gone.
+/// It joins as soon as a server that this app is connected to, or this app itself, has a
+/// [`GroundServer`](super::GroundServer), and again whenever there is a new connection or another server. It may be
+/// despawned, removed and inserted again at any time, and another `Terrain` may be inserted on its entity. An app
+/// shares one terrain at a time: the first one, until it is gone.
 ///
 /// If something keeps it from following a server, a [`SharingTroubleFound`](super::SharingTroubleFound) is sent.
 #[derive(Component, Default)]
@@ -82,8 +83,9 @@ fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lif
 pub enum EditOutcome {
     /// It is shown as the player's machine predicts it.
     Predicted(Receipt),
-    /// The server has ordered it, with this result for all players. `None` if the player was disconnected at that moment, so that the
-    /// result is not known; the [`BrushApplied`](crate::plugin::BrushApplied) then has an empty outcome.
+    /// The server has ordered it, with this result for all players. `None` if the player was disconnected at that
+    /// moment, so that the result is not known; the [`BrushApplied`](crate::plugin::BrushApplied) then has an empty
+    /// outcome.
     Confirmed(Option<Receipt>),
     /// It was refused, and is no longer shown. `None` if it could not be sent, or the player was disconnected when it
     /// was refused.

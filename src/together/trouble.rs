@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use crate::net::{Kick, Refusal};
+use crate::net::{KickReason, Refusal};
 
 /// The reason why a [`SharedTerrain`](super::SharedTerrain) follows no server, or refuses a request. The text contains
 /// the remedy.
@@ -32,12 +32,12 @@ pub enum SharingTrouble {
         /// The server's chunk size.
         their_chunks: i32,
     },
-    /// The server has sent the player away. Digs are refused until there is another connection. After [`Kick::ConnectedAgain`] there
-    /// should be none, as it would end the one that took its place.
+    /// The server has sent the player away. Digs are refused until there is another connection. After
+    /// [`KickReason::ConnectedAgain`] there should be none, as it would end the one that took its place.
     #[error("the server has sent this player away: {0}")]
-    Kicked(Kick),
-    /// Another terrain of this app is shared already, and a connection carries one ground. Digs on this one are refused until that one
-    /// is despawned or no longer shared.
+    Kicked(KickReason),
+    /// Another terrain of this app is shared already, and a connection carries one ground. Digs on this one are refused
+    /// until that one is despawned or no longer shared.
     #[error(
         "{0} is shared already, and an app shares one terrain at a time; remove SharedTerrain from one of them"
     )]

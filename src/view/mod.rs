@@ -43,8 +43,8 @@ mod vertex;
 
 #[doc(hidden)]
 pub use ground::{
-    GroundArrays, GroundArraysError, GroundLayer, GroundLayerImages, GroundLoading, GroundLook,
-    GroundMaterial, GroundPlugin, GroundQuality, GroundTextures, GroundTexturesError,
+    GroundArrays, GroundArraysError, GroundBase, GroundLayer, GroundLayerImages, GroundLoading, GroundLook,
+    GroundMaterial, GroundPlugin, GroundQuality, GroundTextureCache, GroundTextures, GroundTexturesError,
 };
 pub use material::TerrainMaterialPlugin;
 #[doc(hidden)]

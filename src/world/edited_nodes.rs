@@ -1,5 +1,7 @@
 //! The nodes of the quadtree that contain edits, kept up to date with each commit.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
@@ -12,7 +14,12 @@ use crate::lod::{LodGrid, Node};
 pub(crate) struct EditedNodes {
     /// At level 0 how many stacks of bricks hold samples of the node, and at coarser levels how many of its children are here.
     counts: FxHashMap<Node, u32>,
+    /// Differs from that of any other set of nodes in this process.
+    version: u64,
 }
+
+/// The last version of any set of nodes.
+static VERSIONS: AtomicU64 = AtomicU64::new(0);
 
 impl EditedNodes {
     /// Counts a stack of bricks that has become edited.
@@ -34,7 +41,11 @@ impl EditedNodes {
         loop {
             let count = self.counts.entry(node).or_default();
             *count += 1;
-            if *count > 1 || node.level == LodGrid::new(grid, u8::MAX).top() {
+            let is_new = *count == 1;
+            if is_new {
+                self.version = VERSIONS.fetch_add(1, Ordering::Relaxed) + 1;
+            }
+            if !is_new || node.level == LodGrid::new(grid, u8::MAX).top() {
                 return;
             }
             node = node.parent();
@@ -48,6 +59,7 @@ impl EditedNodes {
                 return;
             }
             self.counts.remove(&node);
+            self.version = VERSIONS.fetch_add(1, Ordering::Relaxed) + 1;
             if node.level == LodGrid::new(grid, u8::MAX).top() {
                 return;
             }
@@ -58,6 +70,11 @@ impl EditedNodes {
     /// Whether a node contains edits.
     pub fn contains(&self, node: Node) -> bool {
         self.counts.contains_key(&node)
+    }
+
+    /// A number that changes whenever a node gets its first edit or loses its last one. Equal numbers mean equal nodes.
+    pub fn version(&self) -> u64 {
+        self.version
     }
 
     /// Bytes of the table.

@@ -3,7 +3,7 @@
 use glam::{IVec3, Vec3};
 use rustc_hash::FxHashMap;
 
-use super::state::{Drawn, World};
+use super::state::{MeshKey, World};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP, TilePos};
 use crate::surface::{MaskView, SurfaceMesh, tile};
 use crate::volume::{Field, layers::ones};
@@ -50,14 +50,14 @@ impl World {
     }
 
     /// The tiles that touch a box of samples seen from above, and the chunks in it that draw something.
-    pub fn drawn_near(&self, samples: LatticeBox) -> Vec<Drawn> {
+    pub fn drawn_near(&self, samples: LatticeBox) -> Vec<MeshKey> {
         let Some(inside) = samples.intersection(self.grid.edit_bounds()) else { return Vec::new() };
         let (low, high) = (self.grid.chunk_of(inside.min), self.grid.chunk_of(inside.max));
         let tiles =
-            (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Drawn::Tile(TilePos { x, z })));
+            (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| MeshKey::Tile(TilePos { x, z })));
         let mut chunks = self.maybe_drawn_in(LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() });
         chunks.sort_unstable();
-        tiles.chain(chunks.into_iter().map(Drawn::Chunk)).collect()
+        tiles.chain(chunks.into_iter().map(MeshKey::Chunk)).collect()
     }
 
     /// The chunks with cells in a box that draw something or hold fields, in order.
@@ -197,7 +197,7 @@ mod tests {
         for tile in world.grid().tiles() {
             let rings: Vec<[Vec3; 3]> = world.ring_triangles(tile).collect();
             let mesh = tile::mesh(&world.view(), tile);
-            let origin = world.origin(Drawn::Tile(tile)).as_vec3();
+            let origin = world.origin(MeshKey::Tile(tile)).as_vec3();
             let all: Vec<[Vec3; 3]> = mesh
                 .triangles()
                 .map(|t| t.map(|vertex| origin + Vec3::from(vertex.position_f32())))
@@ -217,9 +217,9 @@ mod tests {
         let everything = world.drawn_near(LatticeBox { min: IVec3::splat(-9999), max: IVec3::splat(9999) });
         assert_eq!(everything.len(), world.drawn().count());
         let near = world.drawn_near(LatticeBox { min: IVec3::new(17, -99, 17), max: IVec3::new(30, 99, 30) });
-        assert_eq!(near.iter().filter(|drawn| matches!(drawn, Drawn::Tile(_))).count(), 1);
+        assert_eq!(near.iter().filter(|drawn| matches!(drawn, MeshKey::Tile(_))).count(), 1);
         for drawn in near {
-            if let Drawn::Chunk(chunk) = drawn {
+            if let MeshKey::Chunk(chunk) = drawn {
                 assert_eq!(chunk.tile(), TilePos { x: 1, z: 1 });
                 assert_eq!(world.chunk_surface(chunk), Some(&world.chunk_mesh(chunk)));
             }

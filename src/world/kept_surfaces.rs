@@ -9,7 +9,7 @@ use crate::lattice::{ChunkPos, shrink_if_sparse, table_bytes};
 use crate::surface::ChunkSurface;
 
 /// The most bytes of surfaces: some 1,500 chunks of 32 voxels that are dug all over.
-const MOST_BYTES: usize = 64 << 20;
+const MAX_BYTES: usize = 64 << 20;
 
 /// The surfaces of the chunks that changed last, none of them empty. A dig copies the unchanged parts of a kept surface; that of
 /// any other chunk is made again as a whole, which takes about as long as the dig itself in chunks of 32.
@@ -39,7 +39,7 @@ impl Default for KeptSurfaces {
             by_time: VecDeque::new(),
             time: 0,
             bytes: 0,
-            most_bytes: MOST_BYTES,
+            most_bytes: MAX_BYTES,
         }
     }
 }
@@ -142,7 +142,7 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::ground::{Ground, MaterialId};
     use crate::terrain::{Terrain, TerrainSettings};
-    use crate::world::{Drawn, World};
+    use crate::world::{MeshKey, World};
 
     fn any_brush(rng: &mut Rng) -> Brush {
         let at = Vec3::new(rng.f32() * 95.0, 4.0 + rng.f32() * 10.0, rng.f32() * 95.0);
@@ -155,7 +155,7 @@ mod tests {
     }
 
     /// All that is drawn.
-    fn drawn(world: &World) -> Vec<(Drawn, crate::surface::SurfaceMesh)> {
+    fn drawn(world: &World) -> Vec<(MeshKey, crate::surface::SurfaceMesh)> {
         world.drawn().filter(|(_, mesh)| !mesh.is_empty()).collect()
     }
 

@@ -1,4 +1,4 @@
-//! The surfaces that a world keeps.
+//! The surfaces that a world keeps: those of chunks and the rings of tiles, and how a commit swaps them.
 
 use std::sync::Arc;
 

@@ -11,6 +11,7 @@
 //! | `query`, `ray`, `triangles`, `inspect`, `heights` | heights, rays, debug views, export |
 //! | `memory` | the bytes that it takes |
 //! | `settings` | voxel size and chunk size |
+//! | `sky` | how much of the sky lights a place |
 
 mod change;
 mod edited_nodes;
@@ -27,6 +28,9 @@ mod query;
 mod ray;
 mod regions;
 mod settings;
+// Some of it is for meshes, which only the plugin makes.
+#[cfg_attr(not(feature = "plugin"), allow(dead_code, unused_imports))]
+pub(crate) mod sky;
 mod state;
 mod triangles;
 mod unmeshed;
@@ -41,6 +45,6 @@ pub(crate) use patch::{ChangedBrick, Overlay, Places, State};
 pub use query::{RayHit, Span};
 pub use settings::{TerrainError, TerrainSettings};
 pub(crate) use state::unique;
-pub use state::{Drawn, Version, World};
+pub use state::{MeshKey, Version, World};
 pub use unmeshed::Meshing;
 pub(crate) use unmeshed::{UnmeshedChunk, blocks_of};

@@ -21,16 +21,16 @@ use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 /// The pool of uniform bricks is not cleaned up while it holds fewer kinds.
 const FEW_KINDS: usize = 64;
 
-/// A mesh of the world.
+/// Identifies a mesh of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Drawn {
+pub enum MeshKey {
     /// A tile of the heightmap.
     Tile(TilePos),
     /// A chunk of marching cubes.
     Chunk(ChunkPos),
 }
 
-impl Drawn {
+impl MeshKey {
     /// The tile, or that over which the chunk lies.
     pub fn tile(self) -> TilePos {
         match self {
@@ -141,6 +141,11 @@ impl World {
         self.edited_nodes.contains(node)
     }
 
+    /// The [version](EditedNodes::version) of the nodes with edits.
+    pub(crate) fn edited_nodes_version(&self) -> u64 {
+        self.edited_nodes.version()
+    }
+
     /// Counts the commits.
     pub fn revision(&self) -> u64 {
         self.revision
@@ -222,19 +227,19 @@ impl World {
     }
 
     /// Where a mesh is placed: the lattice point that its positions count from.
-    pub fn origin(&self, drawn: Drawn) -> IVec3 {
+    pub fn origin(&self, drawn: MeshKey) -> IVec3 {
         match drawn {
-            Drawn::Tile(tile) => self.grid.tile_cells(tile).0.at(0),
-            Drawn::Chunk(chunk) => self.grid.origin(chunk),
+            MeshKey::Tile(tile) => self.grid.tile_cells(tile).0.at(0),
+            MeshKey::Chunk(chunk) => self.grid.origin(chunk),
         }
     }
 
     /// Everything that is drawn: tiles, then chunks, each in order.
-    pub fn drawn(&self) -> impl Iterator<Item = (Drawn, SurfaceMesh)> {
+    pub fn drawn(&self) -> impl Iterator<Item = (MeshKey, SurfaceMesh)> {
         let mut chunks: Vec<ChunkPos> = self.drawn_chunks().collect();
         chunks.sort_unstable();
-        let tiles = self.grid.tiles().map(|tile| (Drawn::Tile(tile), self.tile_mesh(tile)));
-        tiles.chain(chunks.into_iter().map(|chunk| (Drawn::Chunk(chunk), self.chunk_mesh(chunk))))
+        let tiles = self.grid.tiles().map(|tile| (MeshKey::Tile(tile), self.tile_mesh(tile)));
+        tiles.chain(chunks.into_iter().map(|chunk| (MeshKey::Chunk(chunk), self.chunk_mesh(chunk))))
     }
 
     /// Checks that everything that is drawn is one closed surface. Visits each triangle of the world.

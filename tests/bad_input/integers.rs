@@ -4,7 +4,7 @@ use bevy_burrow::brush::Evaluator;
 use bevy_burrow::lattice::{BrickPos, ChunkPos, Column, LIMIT, LatticeBox, TilePos};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::mask::cell_sheet;
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
@@ -71,7 +71,7 @@ fn meshes_of_arbitrary_chunks_and_tiles_return() {
         assert_eq!(world.tile_mesh(tile).is_empty(), !grid.has_tile(tile), "{tile:?}");
         assert!(grid.has_tile(tile) || world.ring_triangles(tile).count() == 0, "{tile:?}");
         assert!(world.fields_of(chunk).is_none() || draws(world), "{chunk:?}");
-        let _ = (world.origin(Drawn::Tile(tile)), world.origin(Drawn::Chunk(chunk)));
+        let _ = (world.origin(MeshKey::Tile(tile)), world.origin(MeshKey::Chunk(chunk)));
         let _ = (grid.chunk_samples(chunk), grid.chunk_cells(chunk), grid.tile_cells(tile));
     }
 }

@@ -55,14 +55,20 @@ pub fn settle(studio: &mut Studio) {
 
 /// Gives the only terrain levels of detail, for what the camera sees up to a distance.
 pub fn watch_levels(studio: &mut Studio, view_distance: f32) {
-    let far = Projection::from(PerspectiveProjection { far: 10_000.0, ..default() });
+    watch(studio, view_distance);
+    let world = studio.app.world_mut();
+    let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
+    world.entity_mut(terrain).insert(LevelsOfDetail { view_distance, ..default() });
+}
+
+/// Has the camera see up to a distance, and levels of detail be chosen for it.
+pub fn watch(studio: &mut Studio, view_distance: f32) {
+    let far = Projection::from(PerspectiveProjection { far: view_distance.max(8_000.0) * 1.25, ..default() });
     let camera = studio.camera;
     let world = studio.app.world_mut();
     world.entity_mut(camera).insert(far);
     // The studio turns its camera off while it waits.
     world.spawn((ChildOf(camera), DetailSource { picture_height: SIZE.1 as f32, ..default() }));
-    let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
-    world.entity_mut(terrain).insert(LevelsOfDetail { view_distance, ..default() });
 }
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {

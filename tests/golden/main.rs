@@ -10,6 +10,8 @@
 //! Vulkan driver; lavapipe is enough. Without one, the tests print a notice and pass; with `BURROW_REQUIRE=1` they
 //! fail.
 //!
+//! `make scenes` renders more views of one country, to be looked at: see `scenes.rs`.
+//!
 //! # A new scene
 //!
 //! Add a file with `pub fn shoot(studio: &mut Studio, album: &mut Album)`, and a line to the test below. A scene that
@@ -17,9 +19,11 @@
 #![cfg(feature = "examples")]
 
 mod album;
+mod borders;
 #[path = "../../examples/shared/capture.rs"]
 mod capture;
 mod debug_views;
+mod far;
 #[path = "../../examples/shared/holes.rs"]
 mod holes;
 mod landscape;
@@ -33,6 +37,7 @@ mod panel;
 mod pieces;
 mod return_of_ground;
 mod sameness;
+mod scenes;
 #[path = "../../examples/shared/shaders.rs"]
 mod shaders;
 mod studio;
@@ -56,10 +61,19 @@ fn ground_looks_as_approved() {
     tunnel::shoot(&mut studio, &mut album);
     sameness::shoot(&mut studio, &mut album);
     ways::shoot(&mut studio, &mut album);
+    ways::count_bindings(&mut studio, &mut album);
     own_textures::shoot(&mut studio, &mut album);
     return_of_ground::shoot(&mut studio, &mut album);
     pieces::shoot(&mut studio, &mut album);
     truth::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+#[test]
+fn borders_do_not_show_the_mesh() {
+    let Some(mut studio) = Studio::open(|_| {}) else { return };
+    let mut album = Album::default();
+    borders::shoot(&mut studio, &mut album);
     album.close();
 }
 
@@ -84,6 +98,15 @@ fn ground_has_no_holes() {
     let mut album = Album::default();
     whole::shoot(&mut studio, &mut album);
     album.close();
+}
+
+/// `cargo test --release --features examples --test golden -- --ignored --nocapture far_ground`
+#[test]
+#[ignore = "measures, and takes minutes on a software renderer"]
+fn far_ground_is_measured() {
+    let Some(mut studio) = Studio::open(|_| {}) else { return };
+    let found = far::measure(&mut studio);
+    assert!(found.iter().all(|(own, _)| (0.0..0.5).contains(own)), "{found:?}");
 }
 
 /// `BURROW_COMPARE=A:B` names two folders; each picture of A is compared with the one of that name in B.

@@ -8,6 +8,7 @@ use bevy::ecs::component::Mutable;
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::prelude::*;
 use bevy::render::render_resource::TextureFormat;
+use bevy::shader::Shader;
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::prelude::*;
 use image::RgbImage;
@@ -30,6 +31,8 @@ pub struct Studio {
     pub camera: Entity,
     sun: Entity,
     film: Handle<Image>,
+    /// A shader in place of the ground's own one.
+    shader: Option<Handle<Shader>>,
     _only: MutexGuard<'static, ()>,
 }
 
@@ -84,21 +87,41 @@ impl Studio {
                 CascadeShadowConfigBuilder { num_cascades: 2, maximum_distance: 120.0, ..default() }.build(),
             ))
             .id();
-        let mut studio = Self { app, camera, sun, film, _only: only };
+        let mut studio = Self { app, camera, sun, film, shader: None, _only: only };
         studio.sun(Vec3::new(1.0, 0.9, 0.4));
+        studio.replace_shader();
         Some(studio)
+    }
+
+    /// Draws the ground with the shader in the file that `BURROW_SHADER` names, if it does: changes can be tried without a build.
+    fn replace_shader(&mut self) {
+        let Some(path) = std::env::var_os("BURROW_SHADER") else { return };
+        let source = std::fs::read_to_string(path).expect("BURROW_SHADER names a shader");
+        let name = "embedded://bevy_burrow/view/ground/ground.wgsl";
+        let own = self.app.world().resource::<AssetServer>().load::<Shader>(name);
+        self.until("the ground's shader", |app| app.world().resource::<Assets<Shader>>().contains(&own));
+        let mut shaders = self.app.world_mut().resource_mut::<Assets<Shader>>();
+        shaders.insert(&own, Shader::from_wgsl(source, name)).expect("it is there");
+        self.shader = Some(own);
     }
 
     /// Replaces the terrain by a new one with this look, and waits until it is shown.
     pub fn terrain(&mut self, ground: Ground, look: GroundLook) {
+        self.terrain_with(ground, look);
+    }
+
+    /// Replaces the terrain by a new one with these components, a look among them, and waits until it is shown.
+    pub fn terrain_with(&mut self, ground: Ground, components: impl Bundle) {
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         self.close_terrain();
-        let entity = self.app.world_mut().spawn((terrain, look)).id();
+        let entity = self.app.world_mut().spawn((terrain, components)).id();
         self.until("the terrain's material", |app| {
             let mut tiles = app
                 .world_mut()
                 .query_filtered::<&ChildOf, (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>();
-            tiles.iter(app.world()).any(|tile| tile.parent() == entity)
+            let loading = app.world().get_resource::<GroundLoading>();
+            let are_ready = loading.is_some_and(GroundLoading::is_ready);
+            tiles.iter(app.world()).any(|tile| tile.parent() == entity) && are_ready
         });
     }
 

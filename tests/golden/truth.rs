@@ -18,7 +18,7 @@ use crate::own_textures::set_textures;
 use crate::studio::{SIZE, Studio};
 
 /// A colour for each material of the default look, far from all others and from what two others mix to.
-const COLORS: [[u8; 3]; 14] = [
+pub const COLORS: [[u8; 3]; 14] = [
     [255, 0, 0],
     [0, 255, 0],
     [0, 0, 255],
@@ -87,7 +87,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
 }
 
 /// A flat colour for each layer.
-fn flat(studio: &mut Studio) -> GroundTextures {
+pub fn flat(studio: &mut Studio) -> GroundTextures {
     let size = Extent3d { width: 4, height: 4, ..default() };
     let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
     let layer = |[r, g, b]: [u8; 3]| GroundLayerImages {

@@ -2,6 +2,8 @@
 
 use bevy::core_pipeline::prepass::{DeferredPrepass, DepthPrepass, MotionVectorPrepass, NormalPrepass};
 use bevy::prelude::*;
+use bevy::render::render_resource::{AsBindGroup, BindingType};
+use bevy::render::renderer::RenderDevice;
 use bevy_burrow::prelude::*;
 
 use crate::album::{Album, flip, threshold};
@@ -11,6 +13,9 @@ use crate::studio::Studio;
 /// Largest mean FLIP between forward and deferred, whose G-buffer has eight bits per colour channel. Measured: 0.009.
 const CLOSE: f32 = 0.015;
 
+/// Textures and samplers of the ground: many GPUs have 16 of either for a whole pass, of which Bevy's views take up to 13.
+const BINDINGS: (usize, usize) = (3, 2);
+
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
     set_up(studio);
     album.compare("ways", &studio.picture());
@@ -18,6 +23,18 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.app.world_mut().entity_mut(camera).insert((NormalPrepass, MotionVectorPrepass));
     album.compare("ways", &studio.picture());
     studio.app.world_mut().entity_mut(camera).remove::<(NormalPrepass, MotionVectorPrepass)>();
+}
+
+/// Counts what the ground binds.
+pub fn count_bindings(studio: &mut Studio, album: &mut Album) {
+    let device = studio.app.world().resource::<RenderDevice>();
+    let entries = GroundMaterial::bind_group_layout_entries(device, true);
+    let count = |is_one: fn(&BindingType) -> bool| entries.iter().filter(|entry| is_one(&entry.ty)).count();
+    let found = (
+        count(|binding| matches!(binding, BindingType::Texture { .. })),
+        count(|binding| matches!(binding, BindingType::Sampler(_))),
+    );
+    album.check(found == BINDINGS, || format!("the ground binds textures and samplers: {found:?}"));
 }
 
 /// Takes the picture with a studio whose materials are all deferred.

@@ -1,9 +1,9 @@
-//! The ground has no holes, whatever a camera's prepasses, antialiasing and shadows, a terrain's material, level of detail,
-//! rotation and scale.
+//! The ground has no holes, whatever a camera's prepasses, antialiasing and shadows, a terrain's material, level of
+//! detail, rotation and scale.
 //!
-//! What lies behind the ground is magenta, which no ground is. Cameras with a depth prepass draw only what has exactly the
-//! depth of the prepass: if the two passes place a vertex differently, if only by rounding, ground is missing. Software
-//! renderers seldom differ. `BURROW_COMBINATIONS=all` looks at all combinations, for a machine with a GPU.
+//! What lies behind the ground is magenta, which no ground is. Cameras with a depth prepass draw only what has exactly
+//! the depth of the prepass: if the two passes place a vertex differently, if only by rounding, ground is missing.
+//! Software renderers seldom differ. `BURROW_COMBINATIONS=all` looks at all combinations, for a machine with a GPU.
 
 use bevy::core_pipeline::prepass::{DeferredPrepass, DepthPrepass, MotionVectorPrepass, NormalPrepass};
 use bevy::core_pipeline::tonemapping::Tonemapping;

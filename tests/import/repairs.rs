@@ -5,7 +5,7 @@ use bevy_burrow::ground::{
     RawLayout, Repair, SampleKind,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::Drawn;
+use bevy_burrow::terrain::MeshKey;
 use glam::Vec3;
 
 /// Reads samples as a RAW file of floats.
@@ -174,7 +174,7 @@ fn a_dig_in_a_repaired_survey_costs_what_it_does_on_a_plain() {
         let ground = grid.into_ground(&ElevationScale::default()).expect("valid heights");
         let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
         terrain.apply([Brush::dig(Shape::sphere(Vec3::new(64.0, 2000.0, 64.0), 4.0))]);
-        terrain.world().drawn().filter(|(drawn, _)| matches!(drawn, Drawn::Chunk(_))).count()
+        terrain.world().drawn().filter(|(drawn, _)| matches!(drawn, MeshKey::Chunk(_))).count()
     };
     let declared = ImportOptions { no_data: Some(0.0), ..ImportOptions::default() };
     let needles = ImportOptions { outliers: Repair::Fill, ..ImportOptions::default() };

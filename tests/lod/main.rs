@@ -9,3 +9,4 @@ mod drawn;
 mod random;
 mod same;
 mod seams;
+mod shares;

@@ -27,6 +27,17 @@ pub const TICK: Duration = Duration::from_micros(2 * 16_667);
 /// Frames between two edits of a player.
 const EDIT: u64 = 12;
 
+/// The plants that stand in a world.
+#[cfg(feature = "scatter")]
+fn plants(world: &World) -> Vec<bevy_burrow::scatter::Plant> {
+    use bevy_burrow::scatter::{Clearance, Scatter, ScatterRules, Species};
+    let clearance = Clearance { radius: 1.5, height: 6.0 };
+    let tree = Species { spacing: 3.0, distance: 2.5, clearance, ..Species::named("tree") };
+    let scatter = Scatter::new(&ScatterRules { seed: 4, species: vec![tree, Species::named("grass")] });
+    let all = glam::DVec3::splat(1e6);
+    scatter.expect("valid rules").in_box(world, -all, all, |_| true)
+}
+
 /// The world that results from the order, entry by entry, and its hash at every number.
 pub struct Reference {
     terrain: Terrain,
@@ -39,7 +50,7 @@ pub struct Reference {
     pub done: Vec<(u64, ClientId, u64)>,
     /// Applied parts, by the player that asked for the undo.
     pub undone: BTreeMap<ClientId, Vec<Applied>>,
-    pub terms: usize,
+    pub rule_changes: usize,
 }
 
 impl Reference {
@@ -48,7 +59,17 @@ impl Reference {
         let hashes = BTreeMap::from([(0, terrain.world().hash())]);
         let ground = Arc::clone(ground);
         let undone = BTreeMap::new();
-        Self { terrain, ground, stamps, number: 0, hashes, loose: 0, done: Vec::new(), undone, terms: 0 }
+        Self {
+            terrain,
+            ground,
+            stamps,
+            number: 0,
+            hashes,
+            loose: 0,
+            done: Vec::new(),
+            undone,
+            rule_changes: 0,
+        }
     }
 
     /// Returns to the state of a restarted server.
@@ -69,18 +90,18 @@ impl Reference {
                 continue;
             }
             match entry {
-                Entry::Order { by: Some((author, own)), order: order @ Order::Edit(_) } => {
+                Entry::Order { by: Some((author, sequence)), order: order @ Order::Edit(_) } => {
                     self.terrain.submit(order);
                     while let Some(transaction) = self.terrain.begin() {
                         for receipt in self.terrain.commit(transaction.run()).expect("it waits for it") {
                             self.loose += receipt.outcome.map_or(0, |applied| applied.loose.len());
                         }
                     }
-                    self.done.push((number, author, own));
+                    self.done.push((number, author, sequence));
                 }
                 Entry::Order { order: order @ (Order::Rules(_) | Order::Loose(_)), .. } => {
                     assert_eq!(self.terrain.apply([order]), [], "valid rules");
-                    self.terms += 1;
+                    self.rule_changes += 1;
                 }
                 Entry::Order { by, order } => {
                     let restored = self.terrain.apply_one(order).outcome.expect("they fit");
@@ -209,7 +230,7 @@ impl Bot {
         }
         self.dug.insert(self.edits, frame);
         self.open.insert(self.edits);
-        self.client.dig(edit);
+        self.client.submit(edit);
         if self.is_undoing && self.rng.u32(0..30) == 0 {
             self.client.undo(None);
             self.undos += 1;
@@ -284,7 +305,7 @@ pub struct Play {
     rng: Rng,
     pub tamper: Option<Tamper>,
     /// Whether the server changes rules and settings.
-    pub changes_terms: bool,
+    pub changes_rules: bool,
     /// The longest time from an edit's arrival at the server until the server ordered it.
     pub up_lag: Duration,
 }
@@ -309,7 +330,7 @@ impl Play {
             frame: 0,
             rng: Rng::with_seed(bots),
             tamper: None,
-            changes_terms: false,
+            changes_rules: false,
             up_lag: Duration::ZERO,
         };
         (0..bots).for_each(|_| play.join());
@@ -363,7 +384,7 @@ impl Play {
     }
 
     fn serve(&mut self) {
-        if self.changes_terms && self.frame.is_multiple_of(180) {
+        if self.changes_rules && self.frame.is_multiple_of(180) {
             let rules = if self.rng.bool() {
                 random_rules(&mut self.rng, &self.ground)
             } else {
@@ -371,7 +392,7 @@ impl Play {
             };
             self.server.set_rules(rules).expect("valid rules");
         }
-        if self.changes_terms && self.frame % 240 == 120 {
+        if self.changes_rules && self.frame % 240 == 120 {
             let loose = LooseSettings { largest: 4000, crumbs: 9, debris: self.rng.u32(0..4000) };
             self.server.set_loose((self.rng.u32(0..4) > 0).then_some(loose));
         }
@@ -439,7 +460,7 @@ impl Play {
     /// Stops digging and waits until all worlds are equal.
     pub fn settle(&mut self) {
         self.bots.iter_mut().for_each(|bot| bot.is_digging = false);
-        self.changes_terms = false;
+        self.changes_rules = false;
         for _ in 0..40 {
             self.seconds(0.5);
             let last = self.server.epoch().number;
@@ -457,10 +478,12 @@ impl Play {
             assert_eq!(bot.client.world().hash(), hash, "{:?}", bot.id);
             assert_eq!(bot.shown.world().hash(), hash, "{:?}", bot.id);
             assert_eq!(names(bot.client.world()), names(self.server.terrain().world()), "{:?}", bot.id);
+            #[cfg(feature = "scatter")]
+            assert_eq!(plants(bot.client.world()), plants(self.server.terrain().world()), "{:?}", bot.id);
             assert_eq!(bot.client.figures().malformed, 0, "{:?}", bot.id);
         }
         let figures = self.server.figures();
-        assert_eq!((figures.malformed, figures.voids, figures.kicked), (0, 0, 0));
+        assert_eq!((figures.malformed, figures.failed, figures.kicked), (0, 0, 0));
     }
 }
 

@@ -8,8 +8,9 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::{ChunkPos, RegionPos};
 use bevy_burrow::net::{
-    BulkReader, ClientId, Entries, Entry, Epoch, Hello, Join, Kick, Lane, PROTOCOL, Refusal, RegionContent,
-    RegionHashes, Server, Stamps, Terms, ToClient, ToServer, Welcome, region_hash, touched_regions,
+    BulkReader, ClientId, Entries, Entry, Epoch, Hello, Join, KickReason, Lane, PROTOCOL, Refusal,
+    RegionContent, RegionHashes, RuleState, Server, Stamps, ToClient, ToServer, Welcome, region_hash,
+    touched_regions,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{Meshing, Patch, SIMULATION};
@@ -24,11 +25,7 @@ pub fn count(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
 }
 
-/// A ground of gentle hills.
-pub fn hills(side: u32) -> Arc<Ground> {
-    let height = |x: i32, z: i32| 20.0 + (f64::from(x) * 0.11).sin() + (f64::from(z) * 0.07).cos();
-    Arc::new(Ground::from_fn(side, side, height).expect("valid heights"))
-}
+pub use crate::load::hills;
 
 /// A terrain without meshes.
 pub fn terrain(ground: &Arc<Ground>) -> Terrain {
@@ -47,7 +44,7 @@ pub struct Follower {
     pub epoch: Option<Epoch>,
     /// The number of the last applied entry.
     pub number: u64,
-    pub last_own: u64,
+    pub last_sequence: u64,
     pub place: IVec3,
     /// Messages to send.
     pub out: Vec<ToServer>,
@@ -59,7 +56,7 @@ pub struct Follower {
     is_joining: bool,
     /// Regions that arrived for a number that is not reached yet.
     regions: Vec<RegionContent>,
-    table: Option<Box<Terms>>,
+    table: Option<Box<RuleState>>,
     touched: BTreeSet<RegionPos>,
     /// Hashes of the regions touched before each mark, until the server's hashes arrive.
     marks: BTreeMap<u64, BTreeMap<RegionPos, u64>>,
@@ -67,9 +64,9 @@ pub struct Follower {
     bulk: BulkReader,
     bulk_told: u64,
     pub refused: Vec<(u64, Refusal)>,
-    pub voids: Vec<u64>,
+    pub failed: Vec<u64>,
     pub durable: u64,
-    pub kicked: Option<Kick>,
+    pub kicked: Option<KickReason>,
     /// How it joined, each time.
     pub joins: Vec<&'static str>,
     /// Regions that differed and were fetched.
@@ -89,7 +86,7 @@ impl Follower {
             terrain: terrain(ground),
             epoch: None,
             number: 0,
-            last_own: 0,
+            last_sequence: 0,
             place: IVec3::ZERO,
             out: Vec::new(),
             waiting: VecDeque::new(),
@@ -103,7 +100,7 @@ impl Follower {
             bulk: BulkReader::default(),
             bulk_told: 0,
             refused: Vec::new(),
-            voids: Vec::new(),
+            failed: Vec::new(),
             durable: 0,
             kicked: None,
             joins: Vec::new(),
@@ -134,15 +131,15 @@ impl Follower {
     pub fn edit(&mut self, brushes: impl IntoIterator<Item = Brush>) {
         let edits: Vec<Edit> =
             brushes.into_iter().map(|brush| Edit::quantize(&brush).expect("a valid brush")).collect();
-        let first = self.last_own + 1;
-        self.last_own += edits.len() as u64;
+        let first = self.last_sequence + 1;
+        self.last_sequence += edits.len() as u64;
         self.out.push(ToServer::Edits { first, edits });
     }
 
     pub fn undo(&mut self, of: u64) -> u64 {
-        self.last_own += 1;
-        self.out.push(ToServer::Undo { own: self.last_own, of: ClientId(of) });
-        self.last_own
+        self.last_sequence += 1;
+        self.out.push(ToServer::Undo { sequence: self.last_sequence, of: ClientId(of) });
+        self.last_sequence
     }
 
     /// Sends its messages.
@@ -176,8 +173,8 @@ impl Follower {
                 // Old entries arrive in the other lane.
                 self.waiting.make_contiguous().sort_by_key(|(number, _)| *number);
             }
-            ToClient::Void { number } => self.voids.push(number),
-            ToClient::Refused { own, why } => self.refused.push((own, why)),
+            ToClient::Failed { number } => self.failed.push(number),
+            ToClient::Refused { sequence, why } => self.refused.push((sequence, why)),
             ToClient::Hashes { number, regions } => self.hashes.push_back((number, regions)),
             ToClient::Table { regions, .. } => self.compare(&regions),
             ToClient::Region(content) => self.regions.push(content),
@@ -189,7 +186,7 @@ impl Follower {
 
     fn begin(&mut self, welcome: Welcome) {
         assert_eq!(welcome.client, self.id);
-        self.last_own = self.last_own.max(welcome.own);
+        self.last_sequence = self.last_sequence.max(welcome.sequence);
         self.epoch = Some(welcome.epoch);
         self.waiting.clear();
         self.marks.clear();
@@ -197,28 +194,28 @@ impl Follower {
         self.touched.clear();
         self.awaited.clear();
         self.regions.clear();
-        let terms = match welcome.join {
-            Join::Log { voids } => {
-                assert!(voids.is_empty());
+        let state = match welcome.join {
+            Join::Log { failed } => {
+                assert!(failed.is_empty());
                 self.joins.push("log");
                 self.is_joining = false;
                 return;
             }
-            Join::Regions { regions, terms } => {
+            Join::Regions { regions, state } => {
                 self.joins.push("regions");
                 self.terrain = terrain(&self.ground);
                 self.is_joining = regions > 0;
-                terms
+                state
             }
-            Join::Compare { terms } => {
+            Join::Compare { state } => {
                 self.joins.push("compare");
-                self.table = Some(terms.clone());
-                terms
+                self.table = Some(state.clone());
+                state
             }
         };
         self.number = welcome.epoch.number;
-        self.terrain.set_rules(terms.rules.unwrap_or_default()).expect("valid rules");
-        self.terrain.set_loose(terms.loose);
+        self.terrain.set_rules(state.rules.unwrap_or_default()).expect("valid rules");
+        self.terrain.set_loose(state.loose);
     }
 
     fn compare(&mut self, regions: &RegionHashes) {
@@ -280,7 +277,7 @@ impl Follower {
     fn apply(&mut self, entry: Entry) {
         match entry {
             Entry::Order { by, order } => {
-                self.confirmed.extend(by.filter(|(by, _)| *by == self.id).map(|(_, own)| own));
+                self.confirmed.extend(by.filter(|(by, _)| *by == self.id).map(|(_, sequence)| sequence));
                 self.terrain.submit(order);
             }
             Entry::HashCheck => {

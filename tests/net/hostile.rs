@@ -7,7 +7,7 @@ use allocation_counter::measure;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    BulkReader, ClientId, Entries, Epoch, Hello, Kick, Lane, PROTOCOL, Rate, Reach, Refusal, Server,
+    BulkReader, ClientId, Entries, Epoch, Hello, KickReason, Lane, PROTOCOL, Rate, Reach, Refusal, Server,
     ServerSettings, Stamps, ToClient, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
@@ -20,7 +20,8 @@ use crate::worlds::any_random_brush;
 
 /// Bytes that a decoder may take regardless of the size of its input.
 const ANYWAY: u64 = 1 << 20;
-/// Bytes that a message to the server may take for each of its bytes: an edit is some 200 bytes, and at least 4 in a message.
+/// Bytes that a message to the server may take for each of its bytes: an edit is some 200 bytes, and at least 4 in a
+/// message.
 const TO_SERVER: u64 = 400;
 /// Bytes that a message to a client may take for each of its bytes: a brick of few bits takes a thousand bytes.
 const TO_CLIENT: u64 = 800;
@@ -148,8 +149,8 @@ impl Messages {
                 }
             }
         }
-        to_client.push(ToClient::Kicked(Kick::Flood).to_bytes());
-        to_client.push(ToClient::Void { number: 70 }.to_bytes());
+        to_client.push(ToClient::Kicked(KickReason::Flood).to_bytes());
+        to_client.push(ToClient::Failed { number: 70 }.to_bytes());
         to_client.push(ToClient::Durable { number: 70 }.to_bytes());
         for messages in [&mut to_server, &mut to_client] {
             messages.sort();
@@ -320,7 +321,7 @@ fn a_server_takes_any_messages() {
                 } else if bytes.len() == 2
                     && let Ok(ToClient::Kicked(why)) = ToClient::from_bytes(&bytes, &ground, &honest.stamps)
                 {
-                    kicks[usize::from(why == Kick::Flood)] += 1;
+                    kicks[usize::from(why == KickReason::Flood)] += 1;
                     begun += 1;
                     // A kicked client reconnects under a new number.
                     let again = ClientId(1000 + begun);
@@ -344,10 +345,10 @@ fn a_server_takes_any_messages() {
     assert!(figures.messages >= runs + begun);
     assert!(figures.malformed > runs / 10 && figures.kicked >= kicks[0] + kicks[1] && kicks[0] > 0);
     assert!(figures.ordered > runs / 1000, "few of them are ordered");
-    assert_eq!(figures.voids, 0);
+    assert_eq!(figures.failed, 0);
     assert!(server.clients().any(|client| client == honest.id), "an honest client was kicked");
-    assert_eq!(honest.confirmed, (1..=honest.last_own).collect::<Vec<_>>());
-    assert!(honest.last_own > 0 && honest.refused.is_empty());
+    assert_eq!(honest.confirmed, (1..=honest.last_sequence).collect::<Vec<_>>());
+    assert!(honest.last_sequence > 0 && honest.refused.is_empty());
 }
 
 /// The most memory that the process has taken.
@@ -385,9 +386,9 @@ fn a_flooder_is_kicked_and_nobody_else_notices() {
         }
         play(&mut server, &mut [&mut flooder, &mut honest], &mut now, 1);
         // Its edit is ordered in the frame in which it arrives, however much others send.
-        assert_eq!(honest.confirmed.last().copied().unwrap_or_default(), honest.last_own);
+        assert_eq!(honest.confirmed.last().copied().unwrap_or_default(), honest.last_sequence);
     }
-    assert_eq!((flooder.kicked, honest.kicked), (Some(Kick::Flood), None));
+    assert_eq!((flooder.kicked, honest.kicked), (Some(KickReason::Flood), None));
     assert!(kicked_at.is_some_and(|after| after < Duration::from_secs(10)), "{kicked_at:?}");
     assert!(honest.refused.is_empty());
     assert!(flooder.refused.iter().all(|(_, why)| *why == Refusal::Cost));

@@ -32,16 +32,16 @@ fn dig(play: &mut Play, edits: u64) {
 #[test]
 fn all_have_the_same_world_at_every_number() {
     let mut play = Play::new(&hills(96), 8, settings());
-    play.changes_terms = true;
+    play.changes_rules = true;
     dig(&mut play, count("BURROW_EDITS", 600));
     play.settle();
     let reference = &play.reference;
     let undone: usize = reference.undone.values().map(Vec::len).sum();
     println!(
-        "{} entries, {} undone, {} terms, {} loose pieces, {:?} of virtual time",
-        reference.number, undone, reference.terms, reference.loose, play.now
+        "{} entries, {} undone, {} changes of rules, {} loose pieces, {:?} of virtual time",
+        reference.number, undone, reference.rule_changes, reference.loose, play.now
     );
-    assert!(undone > 0 && reference.terms > 3 && reference.loose > 0);
+    assert!(undone > 0 && reference.rule_changes > 3 && reference.loose > 0);
     assert!(play.up_lag <= TICK);
     for bot in &play.bots {
         let figures = bot.client.figures();
@@ -351,7 +351,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
     let mut store = Store::create_in(Arc::new(disk.clone()), &mut saved, options()).expect("a new world");
     for run in 0..3 {
         // Nothing is ordered while no client is connected.
-        play.changes_terms = false;
+        play.changes_rules = false;
         let stamps = play.server.stamps_mut().clone();
         play.server = Server::open(saved, &store, settings());
         *play.server.stamps_mut() = stamps;
@@ -366,7 +366,7 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
         begin_again(&mut play);
         play.seconds(0.5);
         (0..3).for_each(|at| play.reconnect(at));
-        play.changes_terms = run == 1;
+        play.changes_rules = run == 1;
         let start = Instant::now();
         for step in 0.. {
             play.step();
@@ -443,11 +443,11 @@ fn each_edit_is_done_once_though_the_server_is_killed() {
         store = again;
         (0..5).for_each(|at| play.cut(at));
         let number = play.server.epoch().number;
-        let is_open = |author: ClientId, own| play.bots[author.0 as usize - 1].open.contains(&own);
-        for &(at, author, own) in &play.reference.done {
-            match (at <= number, is_open(author, own)) {
+        let is_open = |author: ClientId, sequence| play.bots[author.0 as usize - 1].open.contains(&sequence);
+        for &(at, author, sequence) in &play.reference.done {
+            match (at <= number, is_open(author, sequence)) {
                 (true, true) => unseen += 1,
-                (false, false) => drop(lost.insert((author, own))),
+                (false, false) => drop(lost.insert((author, sequence))),
                 _ => {}
             }
         }
@@ -457,17 +457,17 @@ fn each_edit_is_done_once_though_the_server_is_killed() {
     }
     play.settle();
     let mut done: Vec<(ClientId, u64)> =
-        play.reference.done.iter().map(|(_, author, own)| (*author, *own)).collect();
+        play.reference.done.iter().map(|(_, author, sequence)| (*author, *sequence)).collect();
     done.sort_unstable();
     println!("{kills} kills, {} edits, {unseen} saved and not confirmed, {} lost", done.len(), lost.len());
     assert!(unseen > 0, "no saved edit was unconfirmed");
     assert!(done.windows(2).all(|pair| pair[0] != pair[1]), "an edit was applied twice");
     for bot in &play.bots {
         assert!(bot.open.is_empty() && bot.answered == bot.edits());
-        for own in 1..=bot.edits() {
-            let is_done = done.binary_search(&(bot.id, own)).is_ok();
-            let is_known = bot.refused.contains(&own) || lost.contains(&(bot.id, own));
-            assert!(is_done != is_known, "{:?} {own}: done {is_done}", bot.id);
+        for sequence in 1..=bot.edits() {
+            let is_done = done.binary_search(&(bot.id, sequence)).is_ok();
+            let is_known = bot.refused.contains(&sequence) || lost.contains(&(bot.id, sequence));
+            assert!(is_done != is_known, "{:?} {sequence}: done {is_done}", bot.id);
         }
     }
 }

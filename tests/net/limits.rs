@@ -8,8 +8,8 @@ use allocation_counter::measure;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, Hello, Kick, Lane, MOST_OWN_JUMP, PROTOCOL, Rate, Reach, Refusal, Server,
-    ServerSettings, Stamps, ToClient, ToServer, UndoPolicy,
+    Client, ClientEvent, ClientId, Hello, KickReason, Lane, MAX_SEQUENCE_JUMP, PROTOCOL, Rate, Reach,
+    Refusal, Server, ServerSettings, Stamps, ToClient, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
@@ -114,7 +114,7 @@ impl Play {
     }
 
     fn dig(&mut self, at: usize, brush: &Brush) {
-        self.players[at].client.dig(edit(brush));
+        self.players[at].client.submit(edit(brush));
     }
 
     fn frames(&mut self, count: u32) {
@@ -147,8 +147,8 @@ impl Play {
     }
 }
 
-/// Additional bytes that the server holds after ten seconds in which a client digs, with or without fetching regions. It
-/// acknowledges nothing, and yet all of its edits are done.
+/// Additional bytes that the server holds after ten seconds in which a client digs, with or without fetching regions.
+/// It acknowledges nothing, and yet all of its edits are done.
 fn held(fetches: bool) -> i64 {
     let ground = flat(512);
     let mut dug = terrain(&ground);
@@ -312,7 +312,7 @@ fn after_a_stranger(first: u64) -> (usize, usize, usize) {
 
 #[test]
 fn whoever_comes_under_a_players_number_can_not_lock_that_player_out() {
-    for first in [1, MOST_OWN_JUMP, 1_000_000, u64::MAX / 2, u64::MAX - 4, u64::MAX - 1] {
+    for first in [1, MAX_SEQUENCE_JUMP, 1_000_000, u64::MAX / 2, u64::MAX - 4, u64::MAX - 1] {
         assert_eq!(after_a_stranger(first), (12, 0, 0), "{first}");
     }
 }
@@ -325,7 +325,7 @@ fn numbers_at_the_end_of_their_range_are_counted() {
         let mut server = Server::new(terrain(&ground), ServerSettings::default());
         let_in(&mut server, ONE, &ground, BEGIN);
         send(&mut server, ONE, first, vec![edit(&ball(30.0, 30.0, 2.0)); count], BEGIN);
-        server.receive(ONE, &ToServer::Undo { own: first, of: ONE }.to_bytes(), BEGIN);
+        server.receive(ONE, &ToServer::Undo { sequence: first, of: ONE }.to_bytes(), BEGIN);
         server.advance(BEGIN);
         assert_eq!((server.figures().malformed, server.figures().ordered), (2, 0), "{first} {count}");
     }
@@ -341,7 +341,7 @@ fn who_has_dug_for_long_goes_on_at_a_server_that_knows_less() {
     let mut first = 1;
     for _ in 0..3 {
         play.now += Duration::from_secs(1);
-        first += MOST_OWN_JUMP - 1;
+        first += MAX_SEQUENCE_JUMP - 1;
         send(&mut play.server, ONE, first, vec![edit(&ball(30.0, 30.0, 2.0))], play.now);
     }
     play.cut(at);
@@ -568,11 +568,11 @@ fn who_is_not_admitted_is_told_why() {
     play.server.set_admission(|client| if client == ClientId(2) { Err(42) } else { Ok(()) });
     let (a, b) = (play.join(1), play.join(2));
     assert!(play.players[a].client.has_joined() && !play.players[b].client.has_joined());
-    assert_eq!(play.players[b].events, [ClientEvent::Kicked(Kick::Refused(42))]);
+    assert_eq!(play.players[b].events, [ClientEvent::Kicked(KickReason::Refused(42))]);
     assert_eq!(play.server.clients().collect::<Vec<_>>(), [ONE]);
-    play.server.kick_for(ONE, Kick::Refused(7));
+    play.server.kick_for(ONE, KickReason::Refused(7));
     play.frames(2);
-    assert_eq!(play.players[a].events.last(), Some(&ClientEvent::Kicked(Kick::Refused(7))));
+    assert_eq!(play.players[a].events.last(), Some(&ClientEvent::Kicked(KickReason::Refused(7))));
 }
 
 fn image(side: u32) -> Arc<GreyImage> {

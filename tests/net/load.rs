@@ -1,8 +1,5 @@
-//! The cost of many players: bytes for each edit and client, and the server's time.
-//!
-//! ```text
-//! cargo test --release --no-default-features --features net,store --test net -- --ignored --nocapture load
-//! ```
+//! The cost of many players: bytes for each edit and client, and the server's time. `cargo bench --no-default-features
+//! --features net --bench players` prints a table of it.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,11 +7,9 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{ClientId, Hello, Lane, PROTOCOL, Server, ServerSettings, ToServer, UndoPolicy};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::SIMULATION;
+use bevy_burrow::terrain::{Meshing, SIMULATION};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
-
-use crate::follower::{hills, terrain};
 
 /// Frames of a server in a second.
 const FRAMES: u64 = 30;
@@ -27,46 +22,56 @@ const HEADERS: u64 = 40;
 struct Player {
     id: ClientId,
     at: Vec3,
-    own: u64,
+    sequence: u64,
 }
 
 impl Player {
     fn edit(&mut self, rng: &mut Rng, side: f32) -> ToServer {
-        self.own += 1;
+        self.sequence += 1;
         let step = Vec3::new(rng.f32() - 0.5, 0.2 * (rng.f32() - 0.5), rng.f32() - 0.5);
         self.at =
             (self.at + 3.0 * step).clamp(Vec3::new(4.0, 14.0, 4.0), Vec3::new(side - 4.0, 24.0, side - 4.0));
-        let shape = Shape::sphere(self.at, 2.0 + 0.5 * (self.own / 20 % 3) as f32);
+        let shape = Shape::sphere(self.at, 2.0 + 0.5 * (self.sequence / 20 % 3) as f32);
         // A player keeps a tool for some time.
-        let brush = match self.own / 10 % 8 {
+        let brush = match self.sequence / 10 % 8 {
             0..5 => Brush::dig(shape),
             5 | 6 => Brush::add(shape, MaterialId(2)),
             _ => Brush::smooth(shape, 0.5),
         };
-        let brush = brush.with_tag(self.own).with_stroke(self.own / 10);
-        ToServer::Edits { first: self.own, edits: vec![Edit::quantize(&brush).expect("a valid brush")] }
+        let brush = brush.with_tag(self.sequence).with_stroke(self.sequence / 10);
+        ToServer::Edits { first: self.sequence, edits: vec![Edit::quantize(&brush).expect("a valid brush")] }
     }
 }
 
-struct Load {
+/// What a run costs.
+#[allow(dead_code, reason = "the test reads only `bytes`, the benchmark `players` all of it")]
+pub struct Load {
     /// To a client, in the order lane, for each edit.
-    bytes: f64,
-    with_headers: f64,
+    pub bytes: f64,
+    pub with_headers: f64,
     /// From a client, for each edit.
-    up: f64,
-    cpu: Duration,
-    longest: Duration,
+    pub up: f64,
+    pub cpu: Duration,
+    pub longest: Duration,
+}
+
+/// Low hills.
+pub fn hills(side: u32) -> Arc<Ground> {
+    let height = |x: i32, z: i32| 20.0 + (f64::from(x) * 0.11).sin() + (f64::from(z) * 0.07).cos();
+    Arc::new(Ground::from_fn(side, side, height).expect("valid heights"))
 }
 
 /// `clients` players dig for `seconds` seconds.
-fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) -> Load {
+pub fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) -> Load {
     let mut rng = Rng::with_seed(clients);
     let side = ground.width() as f32;
-    let mut server = Server::new(terrain(ground), ServerSettings { undo, ..ServerSettings::default() });
+    let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
+    terrain.set_meshing(Meshing::Never);
+    let mut server = Server::new(terrain, ServerSettings { undo, ..ServerSettings::default() });
     let mut players: Vec<Player> = (1..=clients)
         .map(|id| {
             let at = Vec3::new(rng.f32() * side, 20.0, rng.f32() * side);
-            Player { id: ClientId(id), at, own: 0 }
+            Player { id: ClientId(id), at, sequence: 0 }
         })
         .collect();
     let hello = Hello {
@@ -114,9 +119,9 @@ fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) -> L
         let took = cpu_time() - before;
         (cpu, longest) = (cpu + took, longest.max(took));
         let first = outgoing.iter().filter(|(to, lane, _)| (*to, *lane) == (ClientId(1), Lane::Order));
-        let own: u64 = first.map(|(.., message)| message.len() as u64).sum();
-        bytes += own;
-        packets += u64::from(own > 0);
+        let sent: u64 = first.map(|(.., message)| message.len() as u64).sum();
+        bytes += sent;
+        packets += u64::from(sent > 0);
     }
     let figures = server.figures();
     assert_eq!((figures.edits, figures.refused, figures.malformed), (edits, 0, 0));
@@ -139,24 +144,4 @@ fn cpu_time() -> Duration {
 fn an_edit_takes_few_bytes_for_each_client() {
     let load = load(64, 4, UndoPolicy::Nobody, &hills(512));
     assert!(load.bytes <= 26.0, "{} bytes", load.bytes);
-}
-
-#[test]
-#[ignore = "prints a table of 60 seconds each"]
-fn load_table() {
-    let ground = hills(512);
-    println!(
-        "| clients | undo | bytes an edit | with headers | bytes up | server CPU, s of 60 | longest frame, ms |"
-    );
-    println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: |");
-    for undo in [UndoPolicy::Nobody, UndoPolicy::Own] {
-        for clients in [1, 8, 16, 32, 64] {
-            let Load { bytes, with_headers, up, cpu, longest } = load(clients, 60, undo, &ground);
-            println!(
-                "| {clients} | {undo:?} | {bytes:.1} | {with_headers:.1} | {up:.1} | {:.2} | {:.1} |",
-                cpu.as_secs_f64(),
-                longest.as_secs_f64() * 1000.0
-            );
-        }
-    }
 }

@@ -3,6 +3,7 @@
 mod bots;
 mod follower;
 mod hostile;
+mod joins;
 mod laws;
 mod limits;
 mod link;

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{
-    ClientId, Entry, Hello, Kick, Lane, Rate, Reach, Refusal, Server, ServerEvent, ServerSettings, ToClient,
-    ToServer, UndoPolicy, UnknownStamp,
+    ClientId, Entry, Hello, KickReason, Lane, Rate, Reach, Refusal, Server, ServerEvent, ServerSettings,
+    ToClient, ToServer, UndoPolicy, UnknownStamp,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
@@ -78,13 +78,13 @@ fn all_have_the_world_of_the_order() {
     agreed(&scene.server, &[&a, &b, &c]);
     assert_eq!([a.repairs, b.repairs, c.repairs], [0; 3]);
     let figures = scene.server.figures();
-    assert_eq!((figures.malformed, figures.voids, figures.repairs), (0, 0, 0));
+    assert_eq!((figures.malformed, figures.failed, figures.repairs), (0, 0, 0));
     // Each edit and undo is answered once.
     for follower in [&a, &b, &c] {
         let mut answers: Vec<u64> = follower.refused.iter().map(|(own, _)| *own).collect();
         answers.extend(&follower.confirmed);
         answers.sort_unstable();
-        assert_eq!(answers, (1..=follower.last_own).collect::<Vec<_>>());
+        assert_eq!(answers, (1..=follower.last_sequence).collect::<Vec<_>>());
     }
     assert!(a.confirmed.len() > 20, "{} edits only", a.confirmed.len());
 }
@@ -209,10 +209,10 @@ fn clients_of_another_kind_are_sent_away() {
         (a.kicked, a.joins.len())
     };
     assert_eq!(change(&|_| {}), (None, 1));
-    assert_eq!(change(&|hello| hello.protocol += 1), (Some(Kick::Protocol), 0));
-    assert_eq!(change(&|hello| hello.simulation += 1), (Some(Kick::Simulation), 0));
-    assert_eq!(change(&|hello| hello.ground += 1), (Some(Kick::Ground), 0));
-    assert_eq!(change(&|hello| hello.chunk_size += 1), (Some(Kick::ChunkSize), 0));
+    assert_eq!(change(&|hello| hello.protocol += 1), (Some(KickReason::Protocol), 0));
+    assert_eq!(change(&|hello| hello.simulation += 1), (Some(KickReason::Simulation), 0));
+    assert_eq!(change(&|hello| hello.ground += 1), (Some(KickReason::Ground), 0));
+    assert_eq!(change(&|hello| hello.chunk_size += 1), (Some(KickReason::ChunkSize), 0));
 }
 
 #[test]

@@ -252,7 +252,7 @@ impl Play {
                 for _ in 0..self.rng.u32(1..8) {
                     let (tag, edit) = (self.rng.u64(..), random_dig(&mut self.rng));
                     self.players[at].asked.insert(tag);
-                    self.players[at].client.dig(edit.clone().with_labels(tag, edit.stroke()));
+                    self.players[at].client.submit(edit.clone().with_labels(tag, edit.stroke()));
                 }
             }
         }
@@ -427,7 +427,7 @@ fn what_was_dug_without_a_connection_is_done_though_the_player_dug_elsewhere() {
         let (mut first, mut done) = (new_client(&ground, now), BTreeSet::new());
         let mut rng = Rng::with_seed(3);
         let mut dig = |client: &mut Client, tag: u64| {
-            client.dig(random_dig(&mut rng).with_labels(tag, None));
+            client.submit(random_dig(&mut rng).with_labels(tag, None));
         };
         let mut play = |server: &mut Server, client: &mut Client, now: &mut Duration| {
             for _ in 0..100 {

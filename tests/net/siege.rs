@@ -111,7 +111,7 @@ impl Attackers {
                 4 => {
                     let edits = vec![random_dig(&mut self.rng, 9.0).with_labels(0, Some(tick))];
                     send(ToServer::Edits { first: *own + 1, edits });
-                    send(ToServer::Undo { own: *own + 2, of: id });
+                    send(ToServer::Undo { sequence: *own + 2, of: id });
                     *own += 2;
                 }
                 // Floods with edits.
@@ -170,7 +170,7 @@ fn run(seconds: u64, is_attacked: bool) -> Outcome {
                 player.edits += 1;
                 player.sent.insert(player.edits, tick);
                 let edit = random_dig(&mut rng, 3.0).with_labels(player.edits, Some(player.edits));
-                player.client.dig(edit);
+                player.client.submit(edit);
             }
         }
         let start = Instant::now();

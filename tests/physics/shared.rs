@@ -1,5 +1,5 @@
-//! Matter is conserved for every player of a shared terrain: whatever players dig, take back, and are refused, the ground, the
-//! debris that a player sees and all inventories together have as many voxels as before.
+//! Matter is conserved for every player of a shared terrain: whatever players dig, take back, and are refused, the
+//! ground, the debris that a player sees and all inventories together have as many voxels as before.
 
 use std::time::{Duration, Instant};
 

@@ -1,6 +1,6 @@
 //! Colliders are created near sources and removed with them, and nothing falls where they are missing.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use avian3d::collider_tree::ColliderTreeOptimization;
 use avian3d::prelude::*;
@@ -267,8 +267,15 @@ fn an_app_without_a_physics_engine_still_runs() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, BurrowPlugins, TerrainPhysicsPlugin))
         .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(STEP)));
-    app.world_mut().spawn(level(32, 1.0));
+    let terrain = app.world_mut().spawn((level(32, 1.0), ColliderSource { radius: f32::INFINITY })).id();
     app.finish();
     app.cleanup();
+    let shown = |app: &mut App| app.world_mut().query::<&Tile>().iter(app.world()).count();
+    let start = Instant::now();
+    while shown(&mut app) == 0 {
+        assert!(start.elapsed() < Duration::from_secs(30), "the terrain is not loaded");
+        app.update();
+    }
     (0..20).for_each(|_| app.update());
+    assert!(app.world().get::<Terrain>(terrain).is_some());
 }

@@ -10,7 +10,7 @@ use bevy_burrow::physics::{ColliderSource, Debris, GroundBody};
 use bevy_burrow::plugin::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
-use bevy_burrow::terrain::Drawn;
+use bevy_burrow::terrain::MeshKey;
 
 use crate::stage::{Stage, level};
 
@@ -79,7 +79,7 @@ fn colliders_and_debris_come_while_another_terrain_loads() {
     });
     stage.app.world_mut().get_mut::<Transform>(source).expect("a place").translation =
         Vec3::new(120.0, 8.0, 120.0);
-    let here = Drawn::Tile(TilePos { x: 7, z: 7 });
+    let here = MeshKey::Tile(TilePos { x: 7, z: 7 });
     stage.frames_until("there is ground where the source is", |stage| {
         let world = stage.app.world_mut();
         let mut bodies = world.query::<&GroundBody>();

@@ -1,4 +1,5 @@
-//! The recipe for `big_space`: a terrain in a grid, far from everything, with a camera that carries the origin from cell to cell.
+//! The recipe for `big_space`: a terrain in a grid, far from everything, with a camera that carries the origin from
+//! cell to cell.
 #![cfg(feature = "examples")]
 
 use bevy::ecs::system::RunSystemOnce;

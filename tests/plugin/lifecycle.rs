@@ -1,6 +1,6 @@
-//! What a terrain may carry, crossed with what may happen to it in each phase of its life. After each event the same laws hold:
-//! every message is answered once, every applied brush has its ground, nothing waits for ever, nothing is left over, seams are
-//! flawless, the world is that of a plain model, and the folder of a saved world holds every dig.
+//! What a terrain may carry, crossed with what may happen to it in each phase of its life. After each event the same
+//! laws hold: every message is answered once, every applied brush has its ground, nothing waits for ever, nothing is
+//! left over, seams are flawless, the world is that of a plain model, and the folder of a saved world holds every dig.
 //!
 //! [`controls`] puts old faults back on purpose, which has to be found; [`flat`] looks whether anything grows.
 //!
@@ -573,7 +573,8 @@ impl Life {
         #[cfg(feature = "store")]
         {
             self.note_saved();
-            // A level is for its own ground. A saved world closes automatically where another level takes the place of its own.
+            // A level is for its own ground. A saved world closes automatically where another level takes the place of
+            // its own.
             self.stage.app.world_mut().entity_mut(self.terrain).remove::<StartLevel>();
             if self.rng.bool() {
                 self.stage.app.world_mut().entity_mut(self.terrain).remove::<SavedWorld>();
@@ -779,7 +780,8 @@ impl Life {
         }
     }
 
-    /// After another terrain was put in place, its world begins at once, or, if it is to be saved, perhaps some frames later.
+    /// After another terrain was put in place, its world begins at once, or, if it is to be saved, perhaps some frames
+    /// later.
     fn begin_again(&mut self) {
         if self.load.is_saved() && self.rng.bool() {
             self.frames();

@@ -1,4 +1,5 @@
-//! What the renderer is given: assets that are touched only when they change, one material for each part, one visibility class.
+//! What the renderer is given: assets that are touched only when they change, one material for each part, one
+//! visibility class.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::VisibilityClass;

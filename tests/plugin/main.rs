@@ -47,6 +47,8 @@ mod served;
 mod server;
 mod several_terrains;
 mod shown;
+#[cfg(feature = "render")]
+mod sky_light;
 mod stage;
 mod swap_budget;
 #[cfg(feature = "replicon")]

@@ -211,10 +211,12 @@ fn a_look_brings_slim_vertices_and_takes_them_away() {
     };
     all_have(&mut stage, 52, "before");
     stage.app.world_mut().entity_mut(terrain).insert(GroundLook::default());
-    all_have(&mut stage, 32, "with a look");
+    all_have(&mut stage, 36, "with a look");
     // One look in place of another one changes nothing.
     stage.app.world_mut().entity_mut(terrain).remove::<GroundLook>().insert(GroundLook::default());
-    all_have(&mut stage, 32, "with another look");
+    all_have(&mut stage, 36, "with another look");
+    stage.app.world_mut().entity_mut(terrain).insert(SkyLight::OFF);
+    all_have(&mut stage, 32, "without sky light");
     stage.app.world_mut().entity_mut(terrain).remove::<GroundLook>();
     all_have(&mut stage, 52, "after");
     // While it loads.

@@ -1,5 +1,5 @@
-//! Terrains below parents of all kinds: without a `Transform`, as the root of a floating origin is, moved by another plugin,
-//! mirrored and stretched.
+//! Terrains below parents of all kinds: without a `Transform`, as the root of a floating origin is, moved by another
+//! plugin, mirrored and stretched.
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::math::DVec3;

@@ -3,13 +3,13 @@
 use bevy::prelude::*;
 use bevy_burrow::plugin::{CommitAction, Part, ShownSurface, SurfaceProcessor, SurfaceProcessors};
 use bevy_burrow::surface::SurfaceMesh;
-use bevy_burrow::terrain::Drawn;
+use bevy_burrow::terrain::MeshKey;
 
 use crate::stage::{Stage, random_brushes, steep};
 
 /// The number of triangles of a tile or chunk.
 #[derive(Component)]
-struct Triangles(usize, Drawn);
+struct Triangles(usize, MeshKey);
 
 struct Counter;
 
@@ -25,7 +25,8 @@ impl SurfaceProcessor for Counter {
 /// Checks that every part has the data for the committed world.
 fn assert_counted(stage: &mut Stage, terrain: Entity) {
     let world = stage.app.world_mut();
-    let counted: Vec<(usize, Drawn)> = world.query::<&Triangles>().iter(world).map(|t| (t.0, t.1)).collect();
+    let counted: Vec<(usize, MeshKey)> =
+        world.query::<&Triangles>().iter(world).map(|t| (t.0, t.1)).collect();
     let model = stage.terrain(terrain).world();
     for (drawn, mesh) in model.drawn() {
         assert!(counted.contains(&(mesh.indices.len() / 3, drawn)), "{drawn:?} has stale data");

@@ -1,5 +1,6 @@
-//! Components of a saved world come and go in any order: the folder of a world holds its digs, and no terrain is held for ever.
-//! `BURROW_LIFECYCLES` is the number of random stories, from `BURROW_SEED` on. One that fails is reduced to the acts that it takes.
+//! Components of a saved world come and go in any order: the folder of a world holds its digs, and no terrain is held
+//! for ever. `BURROW_LIFECYCLES` is the number of random stories, from `BURROW_SEED` on. One that fails is reduced to
+//! the acts that it takes.
 #![cfg(feature = "store")]
 
 use std::panic::catch_unwind;

@@ -1,5 +1,5 @@
-//! The moments in which a world is opened and closed: whatever the game does in one of them, a world is saved in the folder that its
-//! component names, nothing is held for ever, and no folder stays locked.
+//! The moments in which a world is opened and closed: whatever the game does in one of them, a world is saved in the
+//! folder that its component names, nothing is held for ever, and no folder stays locked.
 #![cfg(feature = "store")]
 
 use std::path::PathBuf;
@@ -130,8 +130,8 @@ fn act(mut act: ResMut<Act>, mut commands: Commands, terrain: Single<Entity, Wit
 fn acting(place: usize, frame: u32, then: Option<SavedWorld>) -> App {
     let mut game = App::new();
     game.insert_resource(Act { frame, then });
-    // Commands of a system are applied together with those of systems nearby, so these run before, between and after those that open
-    // worlds, and added before and after them.
+    // Commands of a system are applied together with those of systems nearby, so these run before, between and after
+    // those that open worlds, and added before and after them.
     match place {
         0 => game.add_systems(Update, act.before_ignore_deferred(BurrowSystems::Load)),
         1 => game.add_systems(First, act),

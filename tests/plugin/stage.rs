@@ -62,8 +62,8 @@ impl Stage {
         Self::of(app)
     }
 
-    /// An app that has the plugin. Transactions end in a later frame than that in which they begin, unless a test sets it
-    /// otherwise: many say what happens between.
+    /// An app that has the plugin. Transactions end in a later frame than that in which they begin, unless a test sets
+    /// it otherwise: many say what happens between.
     pub fn of(mut app: App) -> Self {
         app.world_mut().get_resource_or_init::<BurrowSettings>().same_frame = Duration::ZERO;
         app.init_resource::<Receipts>()

@@ -1,7 +1,7 @@
 //! Brute force over all drawn triangles.
 
 use bevy_burrow::lattice::SNAP;
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use glam::DVec3;
 
 /// Tolerance between answers and drawn triangles, in voxels.
@@ -30,7 +30,7 @@ impl Triangles {
         let mut triangles = Self { triangles: Vec::new(), tiles: 0, squares, width, depth };
         for (drawn, mesh) in world.drawn() {
             let origin = world.origin(drawn).as_dvec3();
-            if matches!(drawn, Drawn::Tile(_)) {
+            if matches!(drawn, MeshKey::Tile(_)) {
                 triangles.tiles += mesh.indices.len() / 3;
             }
             for triangle in mesh.triangles() {

@@ -1,5 +1,6 @@
 //! Files are damaged in every way: bits flip, files end early, records are swapped, and older ones reappear.
-//! `BURROW_DAMAGES` is how often, and `BURROW_SEED` the number of the first damage, so that several processes can share the work.
+//! `BURROW_DAMAGES` is how often, and `BURROW_SEED` the number of the first damage, so that several processes can share
+//! the work.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;

@@ -7,7 +7,7 @@ use bevy_burrow::format::WorldId;
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreTrouble, from_bytes, inspect_in, to_bytes};
 use bevy_burrow::surface::SurfaceMesh;
-use bevy_burrow::terrain::{Drawn, Meshing, PartsError};
+use bevy_burrow::terrain::{MeshKey, Meshing, PartsError};
 use fastrand::Rng;
 
 use crate::play::{act, check_opened, count, open, options, save, state, terrain};
@@ -20,7 +20,7 @@ fn grounds(seed: u64) -> [Arc<Ground>; 2] {
     [seed, seed + 1].map(|index| Arc::new(random_ground_of_size(&mut rng, index, width, 70)))
 }
 
-fn drawn(terrain: &Terrain) -> BTreeMap<Drawn, SurfaceMesh> {
+fn drawn(terrain: &Terrain) -> BTreeMap<MeshKey, SurfaceMesh> {
     terrain.world().drawn().filter(|(_, mesh)| !mesh.indices.is_empty()).collect()
 }
 

@@ -1,5 +1,6 @@
-//! A process that digs is killed at random, also while it makes checkpoints, while it recovers, and, a quarter of the times, while it
-//! rebuilds a damaged database, with a log that is whole or not. `BURROW_KILLS` is how often, and `BURROW_SEED` the seed.
+//! A process that digs is killed at random, also while it makes checkpoints, while it recovers, and, a quarter of the
+//! times, while it rebuilds a damaged database, with a log that is whole or not. `BURROW_KILLS` is how often, and
+//! `BURROW_SEED` the seed.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};

@@ -8,7 +8,7 @@ use bevy_burrow::store::{Files, SimulatedDisk, Store, StoreOptions, inspect_in};
 use bevy_burrow::terrain::Meshing;
 use glam::Vec3;
 
-use crate::play::{count, open, options};
+use crate::play::{open, options};
 
 /// Bytes that can't be compressed.
 fn noise(bytes: usize, seed: u64) -> Vec<u8> {
@@ -143,40 +143,4 @@ fn the_log_takes_no_more_of_the_disk_than_it_may() {
     drop(store);
     let info = inspect_in(&disk).expect("a saved world");
     assert!(!info.is_log_whole && info.log_bytes >= on_disk && info.log_bytes <= log_bytes + 8192);
-}
-
-/// `BURROW_LOG_DIGS=100000 cargo test --release --no-default-features --features store --test store how_many_digs -- --ignored --nocapture`
-#[test]
-#[ignore = "it prints numbers"]
-fn how_many_digs_the_log_lasts() {
-    let digs = count("BURROW_LOG_DIGS", 20_000);
-    for (data, regions) in [(0, 1), (1 << 20, 10_000)] {
-        let side = (f64::from(regions).sqrt() as u32) * 64;
-        let options = StoreOptions { loss_window: Duration::from_secs(1), ..options(u64::MAX) };
-        let mut game = Game::new(side.max(128), options);
-        for number in 0..regions {
-            let across = side / 64;
-            game.dig_at((number % across * 64 + 32) as f32, (number / across * 64 + 32) as f32);
-        }
-        game.store.put("game", noise(data, 1));
-        game.store.checkpoint().expect("the disk works");
-        let before = game.log().1;
-        for number in 0..digs as u32 {
-            let (at, turn) = (f64::from(number) * 1.3, f64::from(number) * 0.013);
-            let place = [turn.cos(), turn.sin()].map(|part| (64.0 + (at * 0.31).min(50.0) * part) as f32);
-            game.dig_at(place[0], place[1]);
-            // Five digs a second: a frame each second, a checkpoint each minute.
-            match number % 300 {
-                299 => drop(game.store.checkpoint().expect("the disk works")),
-                _ if number % 5 == 4 => drop(game.store.flush().expect("the disk works")),
-                _ => {}
-            }
-        }
-        let bytes = game.log().1 - before;
-        let each = bytes as f64 / digs as f64;
-        println!(
-            "{data} bytes of data, {regions} regions: {each:.1} bytes a dig, so 64 MiB last {:.0} digs",
-            (f64::from(64 << 20) - before as f64) / each
-        );
-    }
 }

@@ -20,7 +20,6 @@ mod random;
 mod rebuild;
 mod sectors;
 mod sizes;
-mod times;
 mod trouble;
 #[path = "../worlds/mod.rs"]
 mod worlds;

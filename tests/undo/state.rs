@@ -6,7 +6,7 @@ use std::hash::{Hash, Hasher};
 use bevy_burrow::lattice::{Column, LIMIT, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
-use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::terrain::{MeshKey, World};
 use bevy_burrow::volume::Field;
 use glam::IVec3;
 use rustc_hash::FxHasher;
@@ -21,7 +21,7 @@ pub struct State {
     fields: BTreeMap<[i32; 3], Vec<Field>>,
     mask: Vec<Column>,
     /// Every bit of every mesh.
-    meshes: Vec<(Drawn, u64)>,
+    meshes: Vec<(MeshKey, u64)>,
     /// Bytes of the parts of which meshes and rings are assembled.
     parts: usize,
 }
@@ -99,7 +99,7 @@ fn mesh_hash(mesh: &SurfaceMesh) -> u64 {
 }
 
 /// The meshes that a renderer shows if it only applies the meshes in commits.
-pub struct DisplayedMeshes(HashMap<Drawn, SurfaceMesh>);
+pub struct DisplayedMeshes(HashMap<MeshKey, SurfaceMesh>);
 
 impl DisplayedMeshes {
     pub fn of(world: &World) -> Self {
@@ -112,10 +112,10 @@ impl DisplayedMeshes {
         while let Some(transaction) = terrain.begin() {
             let commit = transaction.run();
             for (tile, update) in &commit.meshes.tiles {
-                self.0.insert(Drawn::Tile(*tile), update.mesh());
+                self.0.insert(MeshKey::Tile(*tile), update.mesh());
             }
             for (chunk, surface) in &commit.meshes.chunks {
-                self.0.insert(Drawn::Chunk(*chunk), surface.mesh().clone());
+                self.0.insert(MeshKey::Chunk(*chunk), surface.mesh().clone());
             }
             receipts.extend(terrain.commit(commit).expect("no other commit"));
         }
@@ -123,25 +123,25 @@ impl DisplayedMeshes {
     }
 
     pub fn check(&self, world: &World, what: &str) {
-        let drawn: HashMap<Drawn, SurfaceMesh> = world.drawn().collect();
+        let drawn: HashMap<MeshKey, SurfaceMesh> = world.drawn().collect();
         for (drawn, mesh) in self.0.iter().filter(|(_, mesh)| !mesh.is_empty()) {
             assert!(world.drawn_mesh_is(*drawn, mesh), "{what}: {drawn:?} shows a stale mesh");
         }
-        let shown = |(drawn, mesh): &(&Drawn, &SurfaceMesh)| mesh.is_empty() || self.0.contains_key(drawn);
+        let shown = |(drawn, mesh): &(&MeshKey, &SurfaceMesh)| mesh.is_empty() || self.0.contains_key(drawn);
         assert!(drawn.iter().all(|pair| shown(&pair)), "{what}: something is not shown");
     }
 }
 
 /// Comparison of a drawn mesh with another one.
 trait MeshOf {
-    fn drawn_mesh_is(&self, drawn: Drawn, mesh: &SurfaceMesh) -> bool;
+    fn drawn_mesh_is(&self, drawn: MeshKey, mesh: &SurfaceMesh) -> bool;
 }
 
 impl MeshOf for World {
-    fn drawn_mesh_is(&self, drawn: Drawn, mesh: &SurfaceMesh) -> bool {
+    fn drawn_mesh_is(&self, drawn: MeshKey, mesh: &SurfaceMesh) -> bool {
         match drawn {
-            Drawn::Tile(tile) => self.tile_mesh(tile) == *mesh,
-            Drawn::Chunk(chunk) => self.chunk_mesh(chunk) == *mesh,
+            MeshKey::Tile(tile) => self.tile_mesh(tile) == *mesh,
+            MeshKey::Chunk(chunk) => self.chunk_mesh(chunk) == *mesh,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The formula by which a vertex shader computes its position, as text.
 //!
-//! Calls are replaced by what they return, variables by what they hold, so that equal text means equal operations in the
-//! same order on the same inputs. Code with branches is left out; a value that depends on it reads `branch`.
+//! Calls are replaced by what they return, variables by what they hold, so that equal text means equal operations in
+//! the same order on the same inputs. Code with branches is left out; a value that depends on it reads `branch`.
 
 use std::collections::HashMap;
 

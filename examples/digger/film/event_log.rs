@@ -61,7 +61,8 @@ fn log_items(
     log_change(format!("items {} {}", focus.0, serde_json::json!(names)), &mut last);
 }
 
-/// Logs the places of all visible texts whenever a page has opened, and of what is behind them: left, top, right, bottom.
+/// Logs the places of all visible texts whenever a page has opened, and of what is behind them: left, top, right,
+/// bottom.
 fn log_texts(
     state: Res<State<MenuPage>>,
     texts: Query<(Entity, &Text, &InheritedVisibility)>,
@@ -119,7 +120,7 @@ fn log_game(
     log_change(line, &mut last);
 }
 
-/// Logs the ground's hash: who plays together sees the same ground.
+/// Logs the ground's hash, which is equal for all players of a world.
 fn log_ground(terrains: Query<&Terrain, Changed<Terrain>>, mut last: Local<String>) {
     for terrain in &terrains {
         log_change(format!("ground {:016x}", terrain.world().hash()), &mut last);

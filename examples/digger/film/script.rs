@@ -80,8 +80,8 @@ fn play(options: &Options, renderer: Option<RenderResources>) -> Result<Report> 
     Ok(report)
 }
 
-/// A cut with everything that was dug and built at full detail, and what is next to it, so that levels of detail meet where
-/// nobody dug.
+/// A cut with everything that was dug and built at full detail, and what is next to it, so that levels of detail meet
+/// where nobody dug.
 fn edited_in_full(world: &Model) -> Cut {
     let grid = world.lod_grid(u8::MAX);
     let near = |Node { level, x, z }: Node| {

@@ -98,6 +98,10 @@ impl Studio {
                 app.insert_resource(GroundTextures::Baked { side: 512, anisotropy: 1 });
             }
             crate::game(app, engine, SettingsFile::default(), options.saved_world(), options.party());
+            // Without colliders: a scripted player does not walk round trees.
+            if options.plants {
+                app.add_plugins(crate::world::plants::PlantEffectsPlugin);
+            }
         });
         // One frame, for the systems that spawn the camera.
         app.update();
@@ -171,8 +175,8 @@ impl Studio {
         Ok(Land { model: self.terrain()?.world(), origin: ORIGIN })
     }
 
-    /// Is all ground drawn at the levels of detail that the camera needs? A camera that moved is noticed in the second
-    /// frame.
+    /// Whether all ground is drawn at the levels of detail that the camera needs. A camera that moved is noticed in the
+    /// second frame.
     pub fn is_detailed(&mut self) -> bool {
         let world = self.app.world_mut();
         let mut terrains = world.query::<(&Terrain, &ShownLevels)>();
@@ -367,7 +371,7 @@ impl Studio {
 
     /// Takes a picture through the player's eyes.
     pub fn shoot(&mut self, name: &str) -> Result {
-        // The ambient light adapts slowly.
+        // Whatever falls comes to rest.
         self.wait(90);
         if self.photographer.is_some() {
             self.wait_for_details()?;

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use bevy::prelude::*;
-use bevy_burrow::net::{ClientEvent, Kick, Rate, Reach, Server, ServerSettings, UndoPolicy};
+use bevy_burrow::net::{ClientEvent, KickReason, Rate, Reach, Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{GroundJoined, GroundServer, GroundServerEvent, SharedTerrain, TogetherPlugin};
 use bevy_replicon::prelude::*;
@@ -235,7 +235,11 @@ fn follow_host(
 ) {
     for message in joined.read() {
         if let ClientEvent::Kicked(why) = message.event {
-            hints.write(Hint(if why == Kick::Ground { texts::other_seed() } else { texts::removed(why) }));
+            hints.write(Hint(if why == KickReason::Ground {
+                texts::other_seed()
+            } else {
+                texts::removed(why)
+            }));
             *party = Party::Alone;
             commands.trigger(NewGame);
             commands.set_state(GameState::Title);

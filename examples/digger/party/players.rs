@@ -26,7 +26,7 @@ const POSE_EVERY: Duration = Duration::from_millis(50);
 /// How often they say who they are, until the host has heard it.
 const NAME_EVERY: Duration = Duration::from_millis(500);
 /// Most letters of a name.
-pub const MOST_LETTERS: usize = 16;
+pub const MAX_LETTERS: usize = 16;
 /// The greatest possible distance of a player from the middle of the world, in metres.
 const FAR: f32 = 20_000.0;
 /// The host's clock is taken over if it differs by this many hours.
@@ -110,7 +110,7 @@ pub fn voxel(place: Vec3) -> IVec3 {
 /// A name that can be shown.
 pub fn cleaned(name: &str) -> String {
     let visible = name.chars().filter(|letter| letter.is_ascii_graphic() || *letter == ' ');
-    let name: String = visible.take(MOST_LETTERS).collect();
+    let name: String = visible.take(MAX_LETTERS).collect();
     if name.trim().is_empty() { texts::SOMEBODY.into() } else { name.trim().into() }
 }
 

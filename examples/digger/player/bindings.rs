@@ -37,7 +37,7 @@ impl Binding {
         device(self) == device(other)
     }
 
-    /// Can its text be read again? Keys that no layout knows have only a number of the platform.
+    /// Whether its text can be read again. Keys that no layout knows have only a number of the platform.
     pub fn can_be_saved(self) -> bool {
         Self::try_from(String::from(self)) == Ok(self)
     }

@@ -7,9 +7,10 @@ use bevy::anti_alias::smaa::Smaa;
 use bevy::camera::{Hdr, ShadowLodOrigin};
 use bevy::core_pipeline::{prepass::DepthPrepass, tonemapping::Tonemapping};
 use bevy::light::{CascadeShadowConfig, CascadeShadowConfigBuilder, DirectionalLightShadowMap};
+use bevy::pbr::AtmosphereSettings;
 use bevy::post_process::bloom::Bloom;
 use bevy::prelude::*;
-use bevy::render::renderer::RenderAdapterInfo;
+use bevy::render::renderer::{RenderAdapter, RenderAdapterInfo, RenderDevice};
 use bevy_burrow::prelude::*;
 use software::draws_in_software;
 
@@ -17,6 +18,7 @@ use crate::player::Player;
 use crate::player::body::Body;
 use crate::player::headlamp;
 use crate::ui::settings::{DefaultSettings, Quality, Settings, SettingsFile};
+use crate::world::air;
 use crate::world::light::Sun;
 
 /// The camera that looks through the player's eyes.
@@ -27,8 +29,8 @@ pub struct PlayerCamera;
 #[derive(Component)]
 pub struct DetachedCamera;
 
-/// The camera's far plane, as a multiple of the view distance. Fog hides 95 % of what is at the view distance, and more than
-/// 99 % here, so that ground does not end in a line.
+/// The camera's far plane, as a multiple of the view distance. Fog hides 95 % of what is at the view distance, and more
+/// than 99 % here, so that ground does not end in a line.
 const FAR: f32 = 1.3;
 
 /// How hard the camera shakes from blows and explosions.
@@ -145,16 +147,16 @@ fn apply_settings(
     mut commands: Commands,
     settings: Res<Settings>,
     adapter: Option<Res<RenderAdapterInfo>>,
-    mut camera: Single<(Entity, &mut Projection, &mut DistanceFog), With<PlayerCamera>>,
+    device: (Option<Res<RenderAdapter>>, Option<Res<RenderDevice>>),
+    mut camera: Single<(Entity, &mut Projection), With<PlayerCamera>>,
     sun: Single<Entity, With<Sun>>,
     mut terrains: Query<(&mut GroundLook, &mut LevelsOfDetail)>,
 ) {
-    let (entity, projection, fog) = &mut *camera;
+    let (entity, projection) = &mut *camera;
     if let Projection::Perspective(lens) = &mut **projection {
         lens.fov = settings.field_of_view.to_radians();
         lens.far = FAR * settings.view_distance;
     }
-    fog.falloff = FogFalloff::from_visibility_squared(settings.view_distance);
     let (size, num_cascades, first_cascade_far_bound, maximum_distance) = match settings.quality {
         Quality::Low => (1024, 2, 20.0, 200.0),
         Quality::Medium => (2048, 4, 25.0, 900.0),
@@ -185,8 +187,22 @@ fn apply_settings(
         camera.insert(Msaa::Sample4).remove::<Smaa>();
     }
     if settings.quality == Quality::High {
-        camera.insert((Hdr, Bloom { intensity: 0.12, ..Bloom::NATURAL }));
+        camera.insert(Bloom { intensity: 0.12, ..Bloom::NATURAL });
     } else {
-        camera.remove::<(Hdr, Bloom)>();
+        camera.remove::<Bloom>();
+    }
+    let has_air =
+        settings.quality != Quality::Low && air::is_possible(device.0.as_deref(), device.1.as_deref());
+    if has_air {
+        let reach = FAR * settings.view_distance;
+        let air = AtmosphereSettings { aerial_view_lut_max_distance: reach, ..default() };
+        camera.insert((Hdr, air)).remove::<DistanceFog>();
+    } else {
+        let falloff = FogFalloff::from_visibility_squared(settings.view_distance);
+        let fog = DistanceFog { falloff, directional_light_exponent: 12.0, ..default() };
+        camera.insert(fog).remove::<AtmosphereSettings>();
+        if settings.quality != Quality::High {
+            camera.remove::<Hdr>();
+        }
     }
 }

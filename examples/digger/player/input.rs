@@ -85,7 +85,7 @@ pub struct Actions {
 }
 
 impl Actions {
-    /// Is it held down? A press shorter than a frame counts as held for that frame.
+    /// Whether it is held down. A press shorter than a frame counts as held for that frame.
     pub fn pressed(&self, action: Action) -> bool {
         self.buttons.pressed(action)
     }

@@ -91,8 +91,8 @@ fn dig(
     shake.add(if used.tool == Tool::Drill { 0.12 } else { 0.3 });
 }
 
-/// Tells the player why nothing happens. At the edge of the reach some blows hit and others don't: only when none has hit for a while,
-/// the player needs the hint.
+/// Tells the player why nothing happens. At the edge of the reach some blows hit and others don't: only when none has
+/// hit for a while, the player needs the hint.
 fn tell_reach(
     used: On<ToolUsed>,
     time: Res<Time>,

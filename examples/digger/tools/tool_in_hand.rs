@@ -31,7 +31,7 @@ struct DrillBit;
 #[derive(Component)]
 struct MaterialSample;
 
-/// Is the tool shown? Scripts hide it for pictures of the landscape.
+/// Whether the tool is shown. Scripts hide it for pictures of the landscape.
 #[derive(Resource)]
 pub struct ShowTool(pub bool);
 

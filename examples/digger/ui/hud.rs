@@ -35,7 +35,7 @@ const MAX_FINDS: usize = 4;
 #[derive(Message, Clone, Debug)]
 pub struct Hint(pub String);
 
-/// Is the display shown? Scripts hide it for pictures of the landscape.
+/// Whether the display is shown. Scripts hide it for pictures of the landscape.
 #[derive(Resource)]
 pub struct ShowHud(pub bool);
 

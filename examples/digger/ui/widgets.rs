@@ -156,8 +156,8 @@ fn scale_ui(
     }
 }
 
-/// The scale of the user interface, which is laid out for 1280 x 720, times the factor `wanted` as far as there is room. Menus
-/// need all of the window; during play, texts in a small window stay large enough to be read.
+/// The scale of the user interface, which is laid out for 1280 x 720, times the factor `wanted` as far as there is
+/// room. Menus need all of the window; during play, texts in a small window stay large enough to be read.
 pub fn scale_for(width: f32, height: f32, wanted: f32, is_playing: bool) -> f32 {
     let fit = (width / 1280.0).min(height / 720.0);
     let most = if is_playing { (width / 850.0).min(height / 470.0) } else { fit };

@@ -7,14 +7,18 @@ use bevy::prelude::*;
 
 use crate::player::camera::PlayerCamera;
 use crate::ui::settings::Settings;
+use crate::world::air::Air;
 use crate::world::landscape::NewGame;
-use crate::world::light::{Skylight, Sun};
+use crate::world::light::Sun;
 use crate::world::sky::SkyMaterial;
 
 /// The hour at which the sun is at [`SUN`](crate::world::light::SUN), where places for the script are searched.
 pub const AFTERNOON: f32 = 14.363;
 /// Sine and cosine of the angle by which the sun's path tilts to the south.
 const TILT: (f32, f32) = (0.6187, 0.7857);
+
+/// By how much the sun's light is weaker than it is in space: cameras keep Bevy's exposure, which suits it indoors.
+const EXPOSURE: f32 = 0.11;
 
 /// The time of day.
 #[derive(Resource, Clone, Copy, Debug)]
@@ -140,10 +144,17 @@ pub fn tick(time: Res<Time>, settings: Res<Settings>, mut clock: ResMut<Clock>) 
 }
 
 /// One light serves for both: the sun until it has set, then the moon. It is dark when it changes over.
-fn update_light(clock: Res<Clock>, mut sun: Single<(&mut DirectionalLight, &mut Transform), With<Sun>>) {
+fn update_light(
+    clock: Res<Clock>,
+    air: Res<Air>,
+    mut sun: Single<(&mut DirectionalLight, &mut Transform), With<Sun>>,
+) {
     let (light, place) = &mut *sun;
     let (sun_direction, moon) = (clock.sun(), clock.moon());
-    let (direction, color, illuminance) = if sun_direction.y > -0.07 {
+    let (direction, color, illuminance) = if sun_direction.y > -0.07 && *air == Air::Atmosphere {
+        // The air itself makes it red and weak when it is low.
+        (sun_direction, Vec3::ONE, lux::RAW_SUNLIGHT * EXPOSURE * smooth(-0.07, 0.0, sun_direction.y))
+    } else if sun_direction.y > -0.07 {
         let warmth = smooth(0.0, 0.32, sun_direction.y);
         let color = Vec3::new(1.0, 0.50, 0.22).lerp(Vec3::new(1.0, 0.87, 0.67), warmth);
         (sun_direction, color, lux::AMBIENT_DAYLIGHT * 1.05 * smooth(-0.05, 0.22, sun_direction.y))
@@ -162,15 +173,16 @@ fn update_light(clock: Res<Clock>, mut sun: Single<(&mut DirectionalLight, &mut 
 fn update_colors(
     clock: Res<Clock>,
     time: Res<Time>,
-    mut skylight: ResMut<Skylight>,
+    mut skylight: ResMut<GlobalAmbientLight>,
     mut skies: ResMut<Assets<SkyMaterial>>,
+    air: Res<Air>,
     mut fogs: Query<&mut DistanceFog, With<PlayerCamera>>,
     mut clear: ResMut<ClearColor>,
 ) {
     let (sun, moon) = (clock.sun(), clock.moon());
     let colors = Colors::at(sun.y);
     let linear = |c: Vec3| Color::linear_rgb(c.x, c.y, c.z);
-    *skylight = Skylight { color: linear(colors.ambient), brightness: colors.brightness };
+    (skylight.color, skylight.brightness) = (linear(colors.ambient), colors.brightness);
     clear.0 = linear(colors.horizon);
     for mut fog in &mut fogs {
         fog.color = linear(colors.horizon);
@@ -185,6 +197,12 @@ fn update_colors(
         sky.look.glow = colors.glow.extend(colors.spread);
         sky.look.cloud_light = colors.cloud_light.extend(1.0);
         sky.look.cloud_shade = colors.cloud_shade.extend(1.0);
+        if *air == Air::Atmosphere {
+            // Clouds, discs and stars alone: they are seen through the air, which adds its own light.
+            sky.look.zenith = Vec4::W;
+            sky.look.horizon = Vec4::W;
+            sky.look.glow = Vec4::ZERO;
+        }
         let stars = 1.5 * smooth(0.0, -0.22, sun.y);
         sky.look.drift = Vec4::new(stars, drift, 0.4 * drift, (clock.hour - 12.0) / 24.0 * TAU);
     }

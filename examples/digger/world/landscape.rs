@@ -68,8 +68,8 @@ pub const REAL_SIZE: [i32; 2] = [1206, 1029];
 /// Over this many cells inside its rim, the real land blends into the hills around it.
 const REAL_MARGIN: i32 = 64;
 
-/// The voxel at the origin of space: a corner of the real land. Numbers are small there, so what the player holds does not
-/// jitter.
+/// The voxel at the origin of space: a corner of the real land. Numbers are small there, so what the player holds does
+/// not jitter.
 pub const ORIGIN: IVec3 = IVec3::new(REAL_CORNER.x, 0, REAL_CORNER.z);
 
 /// One sample every three voxels: 1206 x 1029 cells, and 120 voxels from the lowest to the highest.

@@ -1,10 +1,12 @@
-//! The landscape, the light on it, and particles.
+//! The landscape, what grows on it, the light, and particles.
 
+pub mod air;
 pub mod day;
 pub mod debris;
 pub mod landscape;
 pub mod light;
 pub mod particles;
+pub mod plants;
 pub mod saves;
 pub mod sky;
 #[cfg(any(feature = "sound", test))]

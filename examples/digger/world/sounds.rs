@@ -38,7 +38,8 @@ const fn timbre(cutoff: f32, decay: f32, pitch: f32, share: f32) -> Timbre {
     Timbre { cutoff, decay, tone: (pitch, share) }
 }
 
-/// The timbre of each material, by id: rock, turf, sand, snow, clay, concrete, coal, gold, soil, sandstone, shale, bedrock.
+/// The timbre of each material, by id: rock, turf, sand, snow, clay, concrete, coal, gold, soil, sandstone, shale,
+/// bedrock.
 const TIMBRES: [Timbre; 12] = [
     timbre(3200.0, 0.06, 620.0, 0.35),
     timbre(700.0, 0.07, 110.0, 0.10),
@@ -236,7 +237,7 @@ mod playing {
         if feet.distance(*last) < STEP {
             return;
         }
-        // Whoever is put somewhere else has not walked there.
+        // A player that was moved somewhere else has not walked there.
         if feet.distance(std::mem::replace(&mut *last, feet)) < 2.0 * STEP
             && let Some(ground) = terrains.raycast(Ray3d::new(feet + Vec3::Y * 0.5, Dir3::NEG_Y), 2.0)
         {

@@ -1,5 +1,6 @@
-//! What the landscape is made of: turf, sand and snow on top, soil and clay below, then folded beds of rock with seams of
-//! coal and veins of gold. Skins are two or three voxels thick, so that steep slopes do not show in stripes what lies below.
+//! What the landscape is made of: turf, sand and snow on top, soil and clay below, then folded beds of rock with seams
+//! of coal and veins of gold. Skins are two or three voxels thick, so that steep slopes do not show in stripes what
+//! lies below.
 
 use bevy::math::Vec2;
 use bevy_burrow::prelude::*;

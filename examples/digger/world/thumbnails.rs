@@ -18,7 +18,8 @@ const FILE: &str = "thumbnail.png";
 /// Pixels of its longer side.
 const SIDE: u32 = 192;
 
-/// Takes a picture of the saved world when the player pauses: the display is hidden by then, and the menu not shown yet.
+/// Takes a picture of the saved world when the player pauses: the display is hidden by then, and the menu not shown
+/// yet.
 pub struct ThumbnailsPlugin;
 
 impl Plugin for ThumbnailsPlugin {

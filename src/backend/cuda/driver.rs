@@ -17,7 +17,7 @@ use web_time::Instant;
 
 use super::device::{Device, DeviceResult, Fault, HostMemory, Kernel, Launch, Mark};
 use super::layout::THREADS;
-use crate::backend::CardChoice;
+use crate::backend::GpuChoice;
 
 /// The kernels as PTX, compiled in advance.
 const PTX: &str = include_str!("kernels.ptx");
@@ -26,7 +26,7 @@ const PTX: &str = include_str!("kernels.ptx");
 const TIMED: u32 = 64;
 
 /// A GPU with the kernels loaded.
-pub(super) struct Card {
+pub(super) struct Gpu {
     context: Arc<CudaContext>,
     stream: Arc<CudaStream>,
     /// Recorded at the end of the work to wait for.
@@ -45,7 +45,7 @@ pub(super) struct Card {
 
 // SAFETY: the module and its functions belong to the context, which any thread may use once it is bound there.
 // Every method binds it first.
-unsafe impl Send for Card {}
+unsafe impl Send for Gpu {}
 
 /// Converts a driver error. Call only when the driver is known to be loaded.
 fn failed(error: DriverError) -> Fault {
@@ -71,7 +71,7 @@ fn no_device(error: DriverError) -> Fault {
 
 /// The device ordinal of a GPU, or `None` if CUDA does not list it. Call only when the driver is known to be
 /// loaded.
-fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
+fn number_of(gpu: &GpuChoice) -> Result<Option<usize>, Fault> {
     // Report missing devices before anything else.
     let count = CudaContext::device_count().map_err(no_device)?;
     let find = |is: &dyn Fn(sys::CUdevice) -> Result<bool, Fault>| {
@@ -82,16 +82,14 @@ fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
         }
         Ok(None)
     };
-    match card {
-        CardChoice::Default => Ok((count > 0).then_some(0)),
-        CardChoice::Ordinal(number) => {
-            Ok((i64::from(*number) < i64::from(count)).then_some(*number as usize))
-        }
-        CardChoice::Uuid(uuid) => find(&|device| {
+    match gpu {
+        GpuChoice::Default => Ok((count > 0).then_some(0)),
+        GpuChoice::Ordinal(number) => Ok((i64::from(*number) < i64::from(count)).then_some(*number as usize)),
+        GpuChoice::Uuid(uuid) => find(&|device| {
             let own = result::device::get_uuid(device).map_err(no_device)?;
             Ok(own.bytes.map(|byte| byte as u8) == *uuid)
         }),
-        CardChoice::PciBusId(id) => {
+        GpuChoice::PciBusId(id) => {
             let Ok(id) = CString::new(id.as_str()) else { return Ok(None) };
             let mut wanted = 0;
             // SAFETY: the text is null-terminated, and the call writes at most `wanted`.
@@ -106,24 +104,24 @@ fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
     }
 }
 
-impl Card {
+impl Gpu {
     /// Opens a GPU: the suggested one if the settings leave the choice open and CUDA has it.
-    pub fn open(card: &CardChoice, suggested: Option<&CardChoice>) -> Result<Self, Fault> {
-        Self::open_with(card, suggested, PTX)
+    pub fn open(gpu: &GpuChoice, suggested: Option<&GpuChoice>) -> Result<Self, Fault> {
+        Self::open_with(gpu, suggested, PTX)
     }
 
     /// Opens a GPU with other kernels.
-    pub fn open_with(card: &CardChoice, suggested: Option<&CardChoice>, ptx: &str) -> Result<Self, Fault> {
+    pub fn open_with(gpu: &GpuChoice, suggested: Option<&GpuChoice>, ptx: &str) -> Result<Self, Fault> {
         // SAFETY: only loads the driver's library, as every later call does.
         if !unsafe { sys::is_culib_present() } {
             return Err(Fault::NoDriver);
         }
-        let suggested = suggested.filter(|_| *card == CardChoice::Default);
+        let suggested = suggested.filter(|_| *gpu == GpuChoice::Default);
         let number = match suggested.map(number_of).transpose()?.flatten() {
             Some(number) => Some(number),
-            None => number_of(card)?,
+            None => number_of(gpu)?,
         };
-        let number = number.ok_or_else(|| Fault::NoDevice(format!("{card:?} is none of CUDA's")))?;
+        let number = number.ok_or_else(|| Fault::NoDevice(format!("{gpu:?} is none of CUDA's")))?;
         Self::open_number(number, ptx)
     }
 
@@ -167,7 +165,7 @@ impl Card {
     }
 }
 
-impl Drop for Card {
+impl Drop for Gpu {
     fn drop(&mut self) {
         if self.bind().is_ok() {
             // Running work may use the module and the memory freed next. If this fails, the device is lost anyway.
@@ -279,7 +277,7 @@ fn wait_for(event: &CudaEvent) -> Result<(), Fault> {
     Ok(())
 }
 
-impl Device for Card {
+impl Device for Gpu {
     fn name(&self) -> String {
         self.context.name().unwrap_or_else(|_| "CUDA device".into())
     }

@@ -60,7 +60,7 @@ use std::time::Duration;
 use web_time::Instant;
 
 use super::costs::{Costs, Load};
-use super::settings::{CardChoice, EngineSettings};
+use super::settings::{EngineSettings, GpuChoice};
 use super::{Backend, Choice, EngineState, lock};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::surface::block::Block;
@@ -78,7 +78,7 @@ pub(super) struct Cuda {
     /// Opens the device; `None` once opening has begun.
     pending: Mutex<Option<PendingDevice>>,
     /// The GPU that the game suggests if the settings leave the choice open.
-    suggested: Mutex<Option<CardChoice>>,
+    suggested: Mutex<Option<GpuChoice>>,
     shared: Arc<Shared>,
     /// Measured costs of both, for [`Backend::Auto`].
     costs: Mutex<Costs>,
@@ -99,7 +99,7 @@ struct Shared {
 
 /// How a device is opened.
 struct PendingDevice {
-    device: Box<dyn FnOnce(Option<CardChoice>) -> Result<Box<dyn Device>, Fault> + Send>,
+    device: Box<dyn FnOnce(Option<GpuChoice>) -> Result<Box<dyn Device>, Fault> + Send>,
     limits: Limits,
     /// What the self-test compares.
     sizes: self_test::Sizes,
@@ -128,9 +128,9 @@ fn try_lock<T>(mutex: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
 impl Cuda {
     /// The GPU that the settings choose, not opened yet.
     pub fn new(settings: &EngineSettings) -> Self {
-        let card = settings.card.clone();
-        let device = move |suggested: Option<CardChoice>| -> Result<Box<dyn Device>, Fault> {
-            Ok(Box::new(driver::Card::open(&card, suggested.as_ref())?))
+        let gpu = settings.gpu.clone();
+        let device = move |suggested: Option<GpuChoice>| -> Result<Box<dyn Device>, Fault> {
+            Ok(Box::new(driver::Gpu::open(&gpu, suggested.as_ref())?))
         };
         let limits = Limits::new(settings);
         Self::with_device(settings.backend == Backend::Auto, limits, self_test::FULL, device)
@@ -141,7 +141,7 @@ impl Cuda {
         is_auto: bool,
         limits: Limits,
         sizes: self_test::Sizes,
-        device: impl FnOnce(Option<CardChoice>) -> Result<Box<dyn Device>, Fault> + Send + 'static,
+        device: impl FnOnce(Option<GpuChoice>) -> Result<Box<dyn Device>, Fault> + Send + 'static,
     ) -> Self {
         Self {
             is_auto,
@@ -186,8 +186,8 @@ impl Cuda {
     }
 
     /// Suggests a GPU if the settings leave the choice open.
-    pub fn suggest(&self, card: CardChoice) {
-        *lock(&self.suggested) = Some(card);
+    pub fn suggest(&self, gpu: GpuChoice) {
+        *lock(&self.suggested) = Some(gpu);
     }
 
     pub fn state(&self) -> EngineState {
@@ -353,7 +353,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
 
 impl PendingDevice {
     /// Opens the device and runs its self-test.
-    fn open(self, suggested: Option<CardChoice>, usage: &Arc<Usage>) -> Result<Session, Fault> {
+    fn open(self, suggested: Option<GpuChoice>, usage: &Arc<Usage>) -> Result<Session, Fault> {
         let device = (self.device)(suggested)?;
         let (device, records) = self.limits.enforce(device, usage);
         let mut session = Session::new(device, records)?;

@@ -1,4 +1,4 @@
-//! The ball.
+//! The sphere.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! The ring.
+//! The torus: a ring with a round section.
 
 use std::f64::consts::PI;
 

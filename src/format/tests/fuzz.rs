@@ -1,5 +1,5 @@
-//! Decoders get any bytes, and valid ones that were changed: they never panic, never take much memory, and what they accept is
-//! written and read again as the same. `BURROW_FUZZ` is the number of runs of each.
+//! Decoders get any bytes, and valid ones that were changed: they never panic, never take much memory, and what they
+//! accept is written and read again as the same. `BURROW_FUZZ` is the number of runs of each.
 
 use allocation_counter::measure;
 use fastrand::Rng;
@@ -19,8 +19,8 @@ use crate::lattice::RegionPos;
 /// Bytes that a decoder may take besides what it makes of each byte of its input.
 const ANYWAY: u64 = 4 << 20;
 
-/// Runs a decoder on random bytes and on changed valid ones. `decode` says whether it accepts them; it may take `factor` bytes of
-/// memory for each of its input.
+/// Runs a decoder on random bytes and on changed valid ones. `decode` says whether it accepts them; it may take
+/// `factor` bytes of memory for each of its input.
 fn fuzz(name: &str, valid: &[Vec<u8>], factor: u64, mut decode: impl FnMut(&[u8]) -> bool) {
     let mut rng = Rng::with_seed(count("BURROW_SEED", 1));
     let (runs, mut accepted, mut most) = (count("BURROW_FUZZ", 2000), 0, 0);

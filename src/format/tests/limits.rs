@@ -17,7 +17,7 @@ fn random_limits(rng: &mut Rng, sizes: &[usize]) -> Limits {
     Limits { head: near(), region: near(), journal: near(), level_file: near(), packed_level: near() }
 }
 
-/// Was it written exactly if it can be read? Returns whether it was.
+/// Asserts that it is written exactly if it can be read. Returns whether it was written.
 fn agree<W, R>(written: Result<W, FormatError>, read: Result<R, FormatError>) -> bool {
     let is_too_large = |why: &FormatError| match why {
         FormatError::TooLarge { length, limit } => length > limit,

@@ -55,32 +55,3 @@ fn commits_of_a_tunnel_take_few_bytes() {
         assert!(bytes < most, "{commits} commits a frame: {bytes} bytes each");
     }
 }
-
-#[test]
-#[ignore = "measures times"]
-fn speed() {
-    let ground = worlds::hills(256);
-    for (name, brushes) in
-        [("scattered", worlds::scattered(&ground, 150, 1)), ("crater", worlds::crater(&ground))]
-    {
-        let mut terrain = worlds::terrain(&ground);
-        worlds::apply(&mut terrain, brushes);
-        let world = terrain.world();
-        let (mut encode, mut decode, mut samples) = (0.0, 0.0, 0);
-        for region in world.regions() {
-            let bricks: Vec<_> = world.bricks_in(region).collect();
-            samples += bricks.iter().map(|(_, brick)| layers::count(brick.edited())).sum::<u64>();
-            let start = std::time::Instant::now();
-            let payload = encode_region(bricks.iter().map(|(pos, brick)| (pos, *brick)), []);
-            let sealed = seal(Kind::Region, WORLD, &region_key(region), 1000, 3, &payload);
-            encode += start.elapsed().as_secs_f64();
-            let start = std::time::Instant::now();
-            let opened =
-                crate::format::frame::open(&sealed, Kind::Region, WORLD, &region_key(region), 1 << 23);
-            crate::format::decode_region(&opened.unwrap().payload, region, &ground).unwrap();
-            decode += start.elapsed().as_secs_f64();
-        }
-        let million = samples as f64 / 1e6;
-        println!("{name}: {:.1} / {:.1} million samples a second", million / encode, million / decode);
-    }
-}

@@ -1,4 +1,4 @@
-//! Test worlds to save.
+//! Worlds that the tests of the formats save.
 
 use std::sync::Arc;
 

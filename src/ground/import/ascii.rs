@@ -58,7 +58,7 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Decoded, Impo
                 Err(_) => wrong(number, format!("has {:?} in place of a number", short(word))),
             })?;
             if samples.len() as u64 == expected {
-                return Err(wrong(number, format!("goes on after {expected} samples")));
+                return Err(wrong(number, format!("continues after {expected} samples")));
             }
             samples.push(value as f32);
             // Text has decimal digits: what counts is whether the nearest f32 loses those that matter.

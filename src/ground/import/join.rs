@@ -105,12 +105,12 @@ impl ElevationGrid {
     }
 }
 
-/// All places from the first to the last one, as far as they can be told apart.
+/// The positions from the first to the last one, but at most one more than there are tiles: enough to show a gap.
 fn consecutive(sizes: &BTreeMap<i32, u32>) -> Vec<i32> {
     let (Some((&first, _)), Some((&last, _))) = (sizes.first_key_value(), sizes.last_key_value()) else {
         return Vec::new();
     };
-    // One gap is enough to be told of.
+    // One gap is enough to report.
     let most = sizes.len() as i64;
     (i64::from(first)..=i64::from(last)).take(most as usize + 1).map(|at| at as i32).collect()
 }

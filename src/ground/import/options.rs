@@ -1,4 +1,4 @@
-//! Settings of an import.
+//! Options of an import: how heights are read where a file does not say, and how voids are repaired.
 
 use super::error::ImportError;
 use super::kind::{HeightFormat, SampleKind};
@@ -84,8 +84,8 @@ pub enum Repair {
     Refuse,
 }
 
-/// The layout of a RAW file, which has no header. What is `None` is guessed from its length and its samples, and the
-/// report says so.
+/// The layout of a RAW file, which has no header. Options that are `None` are guessed from the file's length and
+/// samples, and the report says so.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RawLayout {

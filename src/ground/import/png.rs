@@ -56,7 +56,7 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Decoded, Impo
             rows.push(row.data(), width, z, &mut samples)?;
         }
     }
-    // What follows the samples tells whether the file is whole.
+    // The chunks after the samples show whether the file is whole.
     reader.finish().map_err(|error| damaged(FORMAT, error))?;
     if samples.len() as u64 != u64::from(width) * u64::from(height) {
         return Err(damaged(FORMAT, "it ends too early"));

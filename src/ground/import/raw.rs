@@ -1,4 +1,4 @@
-//! Heights from RAW files, which have no header: what is not given is guessed.
+//! Heights from RAW files, which have no header: options that are not given are guessed.
 
 use super::decoded::{Decoded, reserve};
 use super::doubts::{roughness, row_difference};
@@ -160,7 +160,7 @@ fn is_square(count: u64) -> bool {
     count.isqrt().pow(2) == count
 }
 
-/// Plausible widths of an image of so many samples: a square's alone, if it can be one.
+/// Plausible widths of an image with `count` samples: only that of a square, if it can be one.
 fn widths(count: u64, limits: &ImageLimits) -> Vec<u64> {
     let is_allowed = |&width: &u64| {
         let height = count / width;

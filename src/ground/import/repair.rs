@@ -21,7 +21,7 @@ const PROBES: usize = 1 << 16;
 /// Passes over filled samples that even them out.
 const SWEEPS: usize = 16;
 
-/// Passes that look for outliers: each finds those that lay beside one of the pass before.
+/// Passes that look for outliers: each finds those next to one of the previous pass.
 const PASSES: usize = 4;
 
 /// Numbers for the report.
@@ -229,7 +229,7 @@ fn repair_outliers(decoded: &mut Decoded, options: &ImportOptions) -> Result<u64
 }
 
 /// Returns `true` if a sample lies more than a distance above all samples around it, or below them. Of eight, one may
-/// be like it, so that pairs are found; at the rim and beside voids none.
+/// be like it, so that pairs are found; at the rim and next to voids none.
 fn is_outlier(samples: &[f32], index: usize, width: usize, distance: f64) -> bool {
     let value = f64::from(samples[index]);
     let (mut above, mut below, mut known) = (0, 0, 0);

@@ -1,4 +1,4 @@
-//! What an import found.
+//! The report of an import: format, range, voids and outliers, guesses and doubts.
 
 use std::fmt;
 

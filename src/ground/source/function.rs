@@ -1,4 +1,4 @@
-//! Heights from a function.
+//! A height source that calls a function on demand.
 
 use super::{ColumnGrid, HeightSource, checked_bounds, rounded};
 

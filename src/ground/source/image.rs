@@ -1,4 +1,4 @@
-//! Heights from a grey image.
+//! A height source that scales a grey image on demand.
 
 use super::{ColumnGrid, HeightSource, rounded};
 use crate::ground::image_heights::DetailNoise;

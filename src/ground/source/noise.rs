@@ -1,4 +1,4 @@
-//! Heights from noise.
+//! A height source that computes noise on demand.
 
 use super::{ColumnGrid, HeightSource, rounded};
 use crate::ground::GroundError;

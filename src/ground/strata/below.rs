@@ -1,4 +1,5 @@
-//! What a ground keeps of its strata.
+//! What a ground stores for its strata or material function: their records, the materials of the surface, and steep
+//! cells.
 
 use super::{OwnMaterials, SteepCells};
 use crate::ground::material::MaterialId;

@@ -6,13 +6,13 @@ use super::{Interval, MAX_COLUMN_CONDITIONS, MAX_STRATA, Strata, Stratum, Stratu
 use crate::ground::GroundError;
 
 /// Most voxels by which noise or folds move anything.
-const MOST_ROUGH: f32 = 127.0;
+const MAX_ROUGH: f32 = 127.0;
 /// Most voxels of any other length.
-const MOST_VOXELS: f32 = 32_768.0;
+const MAX_VOXELS: f32 = 32_768.0;
 /// Most voxels by which beds sink for each voxel along an axis.
-const MOST_DIP: f32 = 4.0;
+const MAX_DIP: f32 = 4.0;
 /// Most rise over run of a condition.
-const MOST_SLOPE: f32 = 65_536.0;
+const MAX_SLOPE: f32 = 65_536.0;
 
 fn check(
     is_right: bool,
@@ -44,10 +44,10 @@ impl Strata {
         let is_right = conditions <= MAX_COLUMN_CONDITIONS;
         check(is_right, "the number of strata with a slope or bounds", conditions as f32, "at most 16")?;
         for dip in self.bedding.dip.to_array() {
-            check(dip.abs() <= MOST_DIP, "the dip of the bedding", dip, "-4 to 4")?;
+            check(dip.abs() <= MAX_DIP, "the dip of the bedding", dip, "-4 to 4")?;
         }
         let fold = self.bedding.fold;
-        check((0.0..=MOST_ROUGH).contains(&fold), "the fold of the bedding", fold, "0 to 127")?;
+        check((0.0..=MAX_ROUGH).contains(&fold), "the fold of the bedding", fold, "0 to 127")?;
         check_scale("the scale of the bedding", self.bedding.scale)?;
         self.strata.iter().enumerate().try_for_each(|(index, stratum)| stratum.check(index))
     }
@@ -69,19 +69,19 @@ impl Stratum {
             let is_ordered = span.from.zip(span.to).is_none_or(|(from, to)| from <= to);
             check(is_ordered, name(parameter), span.from.unwrap_or_default(), "at most where it ends")
         };
-        span("the depth", self.depth, MOST_VOXELS, "-32768 to 32768")?;
-        span("the height", self.height, MOST_VOXELS, "-32768 to 32768")?;
-        span("the slope", self.slope, MOST_SLOPE, "-65536 to 65536")?;
-        check((0.0..=MOST_ROUGH).contains(&self.rough), name("the roughness"), self.rough, "0 to 127")?;
+        span("the depth", self.depth, MAX_VOXELS, "-32768 to 32768")?;
+        span("the height", self.height, MAX_VOXELS, "-32768 to 32768")?;
+        span("the slope", self.slope, MAX_SLOPE, "-65536 to 65536")?;
+        check((0.0..=MAX_ROUGH).contains(&self.rough), name("the roughness"), self.rough, "0 to 127")?;
         check_scale(name("the scale of the roughness"), self.rough_scale)?;
         match self.body {
             StratumBody::Fill => Ok(()),
             StratumBody::Bed { from, thickness, every } => {
-                check(from.abs() <= MOST_VOXELS, name("the lower face"), from, "-32768 to 32768")?;
-                let is_right = (1.0 / 256.0..=MOST_VOXELS).contains(&thickness);
+                check(from.abs() <= MAX_VOXELS, name("the lower face"), from, "-32768 to 32768")?;
+                let is_right = (1.0 / 256.0..=MAX_VOXELS).contains(&thickness);
                 check(is_right, name("the thickness"), thickness, "1/256 to 32768")?;
-                let every = every.unwrap_or(MOST_VOXELS);
-                let is_right = every >= thickness && every <= MOST_VOXELS;
+                let every = every.unwrap_or(MAX_VOXELS);
+                let is_right = every >= thickness && every <= MAX_VOXELS;
                 check(is_right, name("the distance of beds"), every, "from their thickness to 32768")
             }
             StratumBody::Vein { scale, share } | StratumBody::Pocket { scale, share } => {

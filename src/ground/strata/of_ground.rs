@@ -1,4 +1,4 @@
-//! Grounds with strata.
+//! Gives a ground strata or a material function, and queries the materials below its surface.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Preset strata.
+//! Preset strata: `alpine`, `desert` and `mine`.
 
 use glam::Vec2;
 

@@ -1,4 +1,4 @@
-//! Strata as integers.
+//! Strata as records of integers, as they are evaluated and hashed, on the CPU and on GPUs.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -4,7 +4,8 @@
 ///
 /// A cell is steep if two lattice levels or more separate the ends of one of its sides or of its diagonal, and not all
 /// voxels along these lines, its columns' tops included, are of the same material. A cell with more than
-/// [`MAX_FACE_LEVELS`](super::steep::MAX_FACE_LEVELS) on such a line is not: it shows its corners' materials, as a ground without strata does.
+/// [`MAX_FACE_LEVELS`](super::steep::MAX_FACE_LEVELS) on such a line is not: it shows its corners' materials, as a
+/// ground without strata does.
 #[derive(Clone, PartialEq)]
 pub(crate) struct SteepCells {
     /// Words along x.

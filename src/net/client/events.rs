@@ -1,6 +1,6 @@
 //! Events and statistics of a client.
 
-use super::super::message::{ClientId, Kick, Refusal};
+use super::super::message::{ClientId, KickReason, Refusal};
 use crate::lattice::RegionPos;
 use crate::terrain::{Applied, LoosePiece, Receipt, ReturnedPiece};
 
@@ -48,9 +48,9 @@ pub enum ClientEvent {
         /// The result. Its tag is 0.
         receipt: Receipt,
     },
-    /// Pieces of ground were cut off or are ground again, in what is shown from the next [change](super::Client::take_shown) on. Whatever a
-    /// game makes of pieces should follow this, and not the receipts of edits: predictions may have been wrong, the server may refuse
-    /// an edit, and other players undo theirs.
+    /// Pieces of ground were cut off or are ground again, in what is shown from the next
+    /// [change](super::Client::take_shown) on. Whatever a game makes of pieces should follow this, and not the receipts
+    /// of edits: predictions may have been wrong, the server may refuse an edit, and other players undo theirs.
     PiecesChanged {
         /// The tag of the edit that cut pieces off.
         tag: u64,
@@ -64,7 +64,7 @@ pub enum ClientEvent {
     /// These regions differed from the server's, and were fetched. This is a bug: of the plugin's or of a machine.
     Repaired(Vec<RegionPos>),
     /// The server has removed the client.
-    Kicked(Kick),
+    Kicked(KickReason),
 }
 
 /// Statistics of a client.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::super::message::{Lane, MOST_IMAGES, ToServer};
+use super::super::message::{Lane, MAX_IMAGES, ToServer};
 use super::super::stamps::StampId;
 use super::Client;
 use crate::ground::GreyImage;
@@ -26,7 +26,7 @@ impl Images {
     pub fn park(&mut self, lane: Lane, bytes: Vec<u8>, missing: BTreeSet<StampId>) -> Vec<Vec<u8>> {
         self.parked.push((lane, bytes));
         let new: Vec<StampId> = missing.into_iter().filter(|id| self.awaited.insert(*id)).collect();
-        new.chunks(MOST_IMAGES).map(|some| ToServer::Images { images: some.to_vec() }.to_bytes()).collect()
+        new.chunks(MAX_IMAGES).map(|some| ToServer::Images { images: some.to_vec() }.to_bytes()).collect()
     }
 }
 

@@ -5,11 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::IVec3;
 
 use super::super::message::{
-    Join, MOST_OWN_JUMP, MOST_REGIONS, RegionContent, RegionHashes, Terms, ToServer, Welcome,
+    Join, MAX_REGIONS, MAX_SEQUENCE_JUMP, RegionContent, RegionHashes, RuleState, ToServer, Welcome,
 };
 use super::super::regions::{region_hash, regions_of};
 use super::outbox::Outbox;
-use super::{Client, ClientEvent, MOST_NUMBER};
+use super::{Client, ClientEvent, MAX_NUMBER};
 use crate::brush::Edit;
 use crate::lattice::RegionPos;
 use crate::terrain::Patch;
@@ -17,11 +17,12 @@ use crate::terrain::Patch;
 /// The progress of a join.
 pub(super) enum Stage {
     /// There is no connection.
-    Apart,
-    /// It waits for its welcome.
-    Greeting,
-    /// Old entries arrive, up to the number `to`. The server has seen own edits up to `own`.
-    ByLog { to: u64, own: u64 },
+    Disconnected,
+    /// It has greeted and waits for its welcome.
+    AwaitingWelcome,
+    /// Old entries arrive, up to the number `to`. The server has seen edits of this client up to the
+    /// number `sequence`.
+    ByLog { to: u64, sequence: u64 },
     /// Regions at the number `to` arrive; `left` more are missing.
     ByRegions { to: u64, left: usize },
     /// The table of regions at a number arrives.
@@ -33,8 +34,8 @@ pub(super) enum Stage {
 impl Client {
     /// The server has welcomed it.
     pub(super) fn begin(&mut self, welcome: Welcome) {
-        let Welcome { client, epoch, own, reach, cost, left, join } = welcome;
-        if !matches!(self.stage, Stage::Greeting) || own.max(epoch.number) > MOST_NUMBER {
+        let Welcome { client, epoch, sequence, reach, cost, left, join } = welcome;
+        if !matches!(self.stage, Stage::AwaitingWelcome) || sequence.max(epoch.number) > MAX_NUMBER {
             self.figures.malformed += 1;
             return;
         }
@@ -47,101 +48,104 @@ impl Client {
         }
         self.id = Some(client);
         self.received = epoch.number;
-        self.next_own = self.next_own.max(own.saturating_add(1));
+        self.next_sequence = self.next_sequence.max(sequence.saturating_add(1));
         // Another world's server has seen nothing of this client, although it may know its player.
         let is_known = self.epoch.is_some_and(|known| known.world == epoch.world);
-        let seen = if is_known { own.min(self.sent) } else { 0 };
+        let seen = if is_known { sequence.min(self.sent) } else { 0 };
         self.sent = seen;
-        self.renumber(own, seen);
+        self.renumber(sequence, seen);
         // Undos are not sent again: by now they would be of other strokes.
         for _ in self.undos.split_off(&seen.saturating_add(1)) {
             self.events.push(ClientEvent::UndoRefused(None));
         }
         let to = epoch.number;
         self.is_part = !matches!(join, Join::Log { .. });
-        self.voids.clear();
+        self.failed.clear();
         // Until the join is finished, it keeps its old world.
         let known = self.epoch.map_or(0, |known| known.number);
         match join {
-            Join::Log { voids } => {
-                self.voids.extend(voids);
+            Join::Log { failed } => {
+                self.failed.extend(failed);
                 self.epoch = Some(super::Epoch { number: known, ..epoch });
-                self.stage = Stage::ByLog { to, own };
+                self.stage = Stage::ByLog { to, sequence };
             }
-            Join::Regions { regions, terms } => {
+            Join::Regions { regions, state } => {
                 self.epoch = Some(super::Epoch { number: to, ..epoch });
                 self.waiting.retain(|number, _| *number > to);
-                self.restart(&terms, false, own);
+                self.restart(&state, false, sequence);
                 self.stage = Stage::ByRegions { to, left: regions as usize };
             }
-            Join::Compare { terms } => {
+            Join::Compare { state } => {
                 self.epoch = Some(super::Epoch { number: to, ..epoch });
                 self.waiting.retain(|number, _| *number > to);
-                self.restart(&terms, true, own);
+                self.restart(&state, true, sequence);
                 self.stage = Stage::ByTable { to };
             }
         }
         self.events.push(ClientEvent::Welcomed { client, reach });
-        self.send_again(own);
+        self.send_again(sequence);
         self.finish_log();
         self.finish_regions();
     }
 
     /// Continues from another position of the order.
-    fn restart(&mut self, terms: &Terms, keeps_world: bool, own: u64) {
-        if self.replica.restart(terms, keeps_world).is_err() {
+    fn restart(&mut self, state: &RuleState, keeps_world: bool, sequence: u64) {
+        if self.replica.restart(state, keeps_world).is_err() {
             self.figures.malformed += 1;
         }
         // The answers to these were sent while the client was disconnected; if they were applied, the world contains
         // them.
-        for tag in self.take_answered(own) {
+        for tag in self.take_answered(sequence) {
             self.events.push(ClientEvent::Confirmed { tag, receipt: None });
         }
-        let undone = self.take_answered_undos(own).map(|_| ClientEvent::Undone(None));
+        let undone = self.take_answered_undos(sequence).map(|_| ClientEvent::Undone(None));
         self.events.extend(undone);
     }
 
     /// Removes pending edits up to a number; returns their tags.
-    fn take_answered(&mut self, own: u64) -> Vec<u64> {
+    fn take_answered(&mut self, sequence: u64) -> Vec<u64> {
         let answered: Vec<u64> =
-            self.replica.pending().map(|(number, _)| number).filter(|number| *number <= own).collect();
+            self.replica.pending().map(|(number, _)| number).filter(|number| *number <= sequence).collect();
         answered.iter().for_each(|number| self.settle_pieces(*number));
         answered.into_iter().filter_map(|number| Some(self.replica.take_back(number)?.tag())).collect()
     }
 
-    /// Forgets own undos up to a number; returns their numbers.
-    fn take_answered_undos(&mut self, own: u64) -> impl Iterator<Item = u64> + use<> {
-        let later = self.undos.split_off(&own.saturating_add(1));
+    /// Removes waiting undos up to a number; returns their numbers.
+    fn take_answered_undos(&mut self, sequence: u64) -> impl Iterator<Item = u64> + use<> {
+        let later = self.undos.split_off(&sequence.saturating_add(1));
         std::mem::replace(&mut self.undos, later).into_iter()
     }
 
-    /// Sends own edits that the server has not seen, and those from before the first welcome.
-    fn send_again(&mut self, own: u64) {
-        let pending = self.replica.pending().filter(|(number, _)| *number > own);
+    /// Sends edits that the server has not seen, and those from before the first welcome.
+    fn send_again(&mut self, sequence: u64) {
+        let pending = self.replica.pending().filter(|(number, _)| *number > sequence);
         let pending: Vec<(u64, Edit)> = pending.map(|(number, edit)| (number, edit.clone())).collect();
         pending.into_iter().for_each(|(number, edit)| self.send_edit(number, edit));
-        std::mem::take(&mut self.early).into_iter().for_each(|edit| self.dig(edit));
+        std::mem::take(&mut self.early).into_iter().for_each(|edit| self.submit(edit));
     }
 
-    /// Lets own edits that the server has not seen have numbers that it accepts. It has seen none beyond `seen`, although it may have
-    /// seen greater numbers of the same player: of another client. And it may know less than a server before it, so that numbers are too
-    /// far from the last one that it has seen.
-    fn renumber(&mut self, own: u64, seen: u64) {
-        let mut last = own;
+    /// Gives edits that the server has not seen numbers that it accepts. It has seen no edit of this client beyond
+    /// `seen`, but possibly greater numbers of the same player's earlier client. A restored server may also have seen
+    /// less than the one before it, so that pending numbers exceed its last one by too much.
+    fn renumber(&mut self, sequence: u64, seen: u64) {
+        let mut last = sequence;
         let mut unseen =
             self.replica.pending().map(|(number, _)| number).filter(|number| *number > seen).peekable();
-        let is_taken = unseen.peek().is_some_and(|number| *number <= own);
-        let is_far = unseen.chain([self.next_own]).any(|number| {
+        let is_taken = unseen.peek().is_some_and(|number| *number <= sequence);
+        let is_far = unseen.chain([self.next_sequence]).any(|number| {
             let jump = number.saturating_sub(last);
             last = number;
-            jump > MOST_OWN_JUMP / 2
+            jump > MAX_SEQUENCE_JUMP / 2
         });
         if is_taken || is_far {
-            let told =
-                self.replica.pending().filter(|(number, _)| (seen + 1..=self.told).contains(number)).count();
-            self.told = own + told as u64;
+            let reported = self
+                .replica
+                .pending()
+                .filter(|(number, _)| (seen + 1..=self.reported).contains(number))
+                .count();
+            self.reported = sequence + reported as u64;
             let before: Vec<u64> = self.replica.pending().map(|(number, _)| number).collect();
-            self.next_own = self.replica.renumber(seen, own);
+            self.next_sequence = self.replica.renumber(seen, sequence);
             let after = self.replica.pending().map(|(number, _)| number);
             self.pieces.renumber(before.into_iter().zip(after));
         }
@@ -149,14 +153,14 @@ impl Client {
 
     /// Finishes the join if all old entries are applied.
     pub(super) fn finish_log(&mut self) {
-        if let Stage::ByLog { to, own } = self.stage
+        if let Stage::ByLog { to, sequence } = self.stage
             && self.number() >= to
         {
             // They were refused while the client was away.
-            for tag in self.take_answered(own) {
+            for tag in self.take_answered(sequence) {
                 self.events.push(ClientEvent::Refused { tag, why: None });
             }
-            let refused = self.take_answered_undos(own).map(|_| ClientEvent::UndoRefused(None));
+            let refused = self.take_answered_undos(sequence).map(|_| ClientEvent::UndoRefused(None));
             self.events.extend(refused);
             self.follow_from_now();
         }
@@ -206,8 +210,8 @@ impl Client {
     fn fetch_more(&mut self) {
         let Stage::ByRegions { to, left } = self.stage else { return };
         let awaited = left.saturating_sub(self.wanted.len());
-        if !self.wanted.is_empty() && awaited <= MOST_REGIONS / 2 {
-            let count = self.wanted.len().min(MOST_REGIONS);
+        if !self.wanted.is_empty() && awaited <= MAX_REGIONS / 2 {
+            let count = self.wanted.len().min(MAX_REGIONS);
             let regions = self.wanted.drain(..count).collect();
             self.outgoing.push(ToServer::Fetch { number: to, regions }.to_bytes());
         }
@@ -246,8 +250,8 @@ impl Client {
     /// Makes later fields have the same names as on the server.
     pub(super) fn lower_names(&mut self, next_field: u64) {
         if self.replica.world().next_field() > next_field {
-            let terms = Terms { next_field, ..self.replica.terms() };
-            self.figures.malformed += u64::from(self.replica.restart(&terms, true).is_err());
+            let state = RuleState { next_field, ..self.replica.rule_state() };
+            self.figures.malformed += u64::from(self.replica.restart(&state, true).is_err());
         }
     }
 

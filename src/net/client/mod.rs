@@ -1,10 +1,10 @@
-//! The client: it shows its own edits at once, and follows the server's order.
+//! The client: it shows the player's edits at once, and follows the server's order.
 //!
 //! | file | what it does |
 //! | --- | --- |
 //! | `client` | the interface for games, and received messages |
 //! | `join` | catching up with the server: old entries, regions, a comparison |
-//! | `outbox` | sends own edits and undos as fast as the server's limits allow |
+//! | `outbox` | sends the player's edits and undos as fast as the server's limits allow |
 //! | `repair` | marks, and regions that differ |
 //! | `images` | images of stamps that are missing |
 //! | `replica` | the world of the order, and the shown world |
@@ -26,7 +26,7 @@ use glam::IVec3;
 use super::bulk::BulkReader;
 use super::encoding::{PIECE, entry_bytes};
 use super::message::{
-    ClientId, Entries, Entry, Epoch, Hello, Kick, Lane, PROTOCOL, Refusal, ToClient, ToServer,
+    ClientId, Entries, Entry, Epoch, Hello, KickReason, Lane, PROTOCOL, Refusal, ToClient, ToServer,
 };
 use super::price::{UNDO, UNDO_BYTES, cost};
 use super::replica::{Replica, ShownChange};
@@ -54,14 +54,14 @@ const ACK_BYTES: u64 = 16 << 10;
 const GREET_AGAIN: Duration = Duration::from_secs(1);
 
 /// Greater numbers are refused, so counting can never overflow.
-const MOST_NUMBER: u64 = u64::MAX / 2;
+const MAX_NUMBER: u64 = u64::MAX / 2;
 
 /// A client: bytes in, bytes out.
 ///
-/// In each frame, pass received messages to [`receive`](Self::receive) and edits of the player to [`dig`](Self::dig),
-/// send the messages of [`take_outgoing`](Self::take_outgoing), call [`advance`](Self::advance), which takes as long as
-/// its edits take, apply the changes of [`take_shown`](Self::take_shown) to the shown terrain, and handle the
-/// [events](Self::take_events).
+/// In each frame, pass received messages to [`receive`](Self::receive) and edits of the player to
+/// [`submit`](Self::submit), send the messages of [`take_outgoing`](Self::take_outgoing), call
+/// [`advance`](Self::advance), which takes as long as its edits take, apply the changes of
+/// [`take_shown`](Self::take_shown) to the shown terrain, and handle the [events](Self::take_events).
 pub struct Client {
     replica: Replica,
     stamps: Stamps,
@@ -96,17 +96,17 @@ pub struct Client {
     /// Regions that differ and were not asked for yet.
     wanted: VecDeque<RegionPos>,
     /// Entries to come that the server could not apply.
-    voids: BTreeSet<u64>,
+    failed: BTreeSet<u64>,
     /// Regions that are to be fetched, whatever their hashes are.
     doubtful: BTreeSet<RegionPos>,
     /// Whether the ground around the player has been complete once.
     is_playable: bool,
-    /// The number of the next own edit.
-    next_own: u64,
-    /// The greatest own number that the server of this world can have seen of this client.
+    /// The sequence number of the player's next edit or undo.
+    next_sequence: u64,
+    /// The greatest sequence number of this client that the server of this world can have seen.
     sent: u64,
-    /// The last own edit whose prediction was reported.
-    told: u64,
+    /// The sequence number of the last edit whose prediction was reported.
+    reported: u64,
     /// Edits from before the first welcome.
     early: Vec<Edit>,
     outbox: Outbox,
@@ -126,7 +126,6 @@ impl Client {
     /// When the chunk size or the voxel size is out of range.
     pub fn new(ground: impl Into<Arc<Ground>>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
         let replica = Replica::new(ground.into(), settings)?;
-        let (inbox, images, bulk, waiting, marks, reaches, early, undos, outgoing) = Default::default();
         Ok(Self {
             replica,
             stamps: Stamps::default(),
@@ -136,42 +135,42 @@ impl Client {
             id: None,
             epoch: None,
             is_part: false,
-            stage: Stage::Apart,
+            stage: Stage::Disconnected,
             now: Duration::ZERO,
             // Others may have greeted on the same connection.
             stream: WorldId::random().0 as u64 >> 1,
             greeted: Duration::ZERO,
             has_begun: [false; 2],
-            inbox,
-            images,
-            bulk,
+            inbox: VecDeque::new(),
+            images: Images::default(),
+            bulk: BulkReader::default(),
             acknowledged: (0, 0, Duration::ZERO),
-            waiting,
+            waiting: BTreeMap::new(),
             received: 0,
-            marks,
-            reaches,
+            marks: Marks::default(),
+            reaches: Reaches::default(),
             repair: None,
             wanted: VecDeque::new(),
-            voids: BTreeSet::new(),
+            failed: BTreeSet::new(),
             doubtful: BTreeSet::new(),
             is_playable: false,
-            next_own: 1,
+            next_sequence: 1,
             sent: 0,
-            told: 0,
-            early,
+            reported: 0,
+            early: Vec::new(),
             outbox: Outbox::new([0; 2], 0, Duration::ZERO),
-            undos,
+            undos: BTreeSet::new(),
             pieces: Pieces::default(),
-            outgoing,
+            outgoing: Vec::new(),
             shown: Vec::new(),
             events: Vec::new(),
             figures: ClientFigures::default(),
         })
     }
 
-    /// Begins with a world that is here already, such as the level that the game ships, instead of the pristine one: its
-    /// [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent. Call it before the
-    /// first [`connect`](Self::connect).
+    /// Begins with a world that is here already, such as the level that the game ships, instead of the pristine one:
+    /// its [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent.
+    /// Call it before the first [`connect`](Self::connect).
     ///
     /// # Errors
     /// When the parts do not fit the ground or the chunk size.
@@ -209,13 +208,13 @@ impl Client {
 
     /// Records that the connection is lost. Edits are still shown.
     pub fn disconnect(&mut self) {
-        self.stage = Stage::Apart;
+        self.stage = Stage::Disconnected;
         self.inbox.clear();
     }
 
     /// Begins a new stream.
     fn greet(&mut self) {
-        self.stage = Stage::Greeting;
+        self.stage = Stage::AwaitingWelcome;
         self.repair = None;
         self.stream = self.stream.wrapping_add(1);
         self.has_begun = [false; 2];
@@ -267,12 +266,12 @@ impl Client {
         self.replica.shown_hash()
     }
 
-    /// All that is to be put into a terrain that does not hold what it should, for example because a change was refused there. It takes the
-    /// place of everything that [`take_shown`](Self::take_shown) would return now.
+    /// All that is to be put into a terrain that does not hold what it should, for example because a change was refused
+    /// there. It takes the place of everything that [`take_shown`](Self::take_shown) would return now.
     pub fn show_whole(&mut self, shown: &World) -> ShownChange {
         let (_, receipts) = self.replica.update();
         self.shown.clear();
-        self.tell_predictions(receipts.unwrap_or_default());
+        self.report_predictions(receipts.unwrap_or_default());
         self.replica.whole(shown)
     }
 
@@ -289,25 +288,31 @@ impl Client {
 
     /// Submits an edit of the player: it is sent, and shown after the next [`advance`](Self::advance).
     /// [Events](ClientEvent) report its result by its tag.
-    pub fn dig(&mut self, edit: Edit) {
+    pub fn submit(&mut self, edit: Edit) {
         if self.id.is_none() {
             self.early.push(edit);
         } else if !self.stamps.can_send(&edit) {
             self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
         } else {
-            let own = self.next_own;
-            self.replica.predict(own, edit.clone());
-            self.next_own += 1;
+            let sequence = self.next_sequence;
+            self.replica.predict(sequence, edit.clone());
+            self.next_sequence += 1;
             // All others are sent with the next welcome.
             if self.is_welcome() {
-                self.send_edit(own, edit);
+                self.send_edit(sequence, edit);
             }
         }
     }
 
-    fn send_edit(&mut self, own: u64, edit: Edit) {
+    /// An earlier name of [`submit`](Self::submit).
+    #[doc(hidden)]
+    pub fn dig(&mut self, edit: Edit) {
+        self.submit(edit);
+    }
+
+    fn send_edit(&mut self, sequence: u64, edit: Edit) {
         let cost = cost(self.replica.world().grid(), &edit).unwrap_or_default();
-        self.outbox.edit(own, edit, cost);
+        self.outbox.edit(sequence, edit, cost);
     }
 
     /// Asks the server to undo the last stroke of a player, by default this one, before this position among the
@@ -318,14 +323,14 @@ impl Client {
             // By the time it could be sent, it may be of another stroke.
             return self.events.push(ClientEvent::UndoRefused(Some(Refusal::NotJoined)));
         };
-        self.undos.insert(self.next_own);
-        self.outbox.undo(self.next_own, of);
-        self.next_own += 1;
+        self.undos.insert(self.next_sequence);
+        self.outbox.undo(self.next_sequence, of);
+        self.next_sequence += 1;
     }
 
     /// Whether the server has welcomed it on this connection.
     fn is_welcome(&self) -> bool {
-        !matches!(self.stage, Stage::Apart | Stage::Greeting)
+        !matches!(self.stage, Stage::Disconnected | Stage::AwaitingWelcome)
     }
 
     /// Messages to the server, in order; each is returned once.
@@ -361,7 +366,9 @@ impl Client {
             self.read(lane, bytes);
         }
         self.read_bulk();
-        if matches!(self.stage, Stage::Greeting) && self.now.saturating_sub(self.greeted) >= GREET_AGAIN {
+        if matches!(self.stage, Stage::AwaitingWelcome)
+            && self.now.saturating_sub(self.greeted) >= GREET_AGAIN
+        {
             self.say_hello();
         }
         if self.replica.can_append() {
@@ -377,7 +384,7 @@ impl Client {
         if !self.is_history() {
             let (shown, receipts) = self.replica.update();
             self.shown.extend(shown);
-            self.tell_predictions(receipts.unwrap_or_default());
+            self.report_predictions(receipts.unwrap_or_default());
         }
     }
 
@@ -386,17 +393,17 @@ impl Client {
         matches!(self.stage, Stage::ByLog { .. }) && !self.is_playable
     }
 
-    fn tell_predictions(&mut self, receipts: Vec<Receipt>) {
+    fn report_predictions(&mut self, receipts: Vec<Receipt>) {
         let before = self.replica.pending().count().saturating_sub(receipts.len());
         let mut new = Vec::new();
-        for ((own, _), receipt) in self.replica.pending().skip(before).zip(receipts) {
-            if own > self.told {
-                self.told = own;
-                new.push((own, receipt));
+        for ((sequence, _), receipt) in self.replica.pending().skip(before).zip(receipts) {
+            if sequence > self.reported {
+                self.reported = sequence;
+                new.push((sequence, receipt));
             }
         }
-        for (own, receipt) in new {
-            self.predict_pieces(own, &receipt);
+        for (sequence, receipt) in new {
+            self.predict_pieces(sequence, &receipt);
             self.events.push(ClientEvent::Predicted(receipt));
         }
     }
@@ -437,8 +444,8 @@ impl Client {
             ToClient::Welcome(welcome) => self.begin(welcome),
             ToClient::Kicked(why) => self.leave(why),
             ToClient::Entries(entries) => self.take_entries(lane, entries),
-            ToClient::Void { number } => self.take_void(number),
-            ToClient::Refused { own, why } => self.take_refusal(own, why),
+            ToClient::Failed { number } => self.take_failed(number),
+            ToClient::Refused { sequence, why } => self.take_refusal(sequence, why),
             ToClient::Hashes { number, regions } => self.marks.take_theirs(number, regions),
             ToClient::Table { number, regions } => self.take_table(number, &regions),
             ToClient::Region(content) => self.take_region(content),
@@ -448,23 +455,23 @@ impl Client {
         }
     }
 
-    fn take_refusal(&mut self, own: u64, why: Refusal) {
-        self.outbox.answer(own, None, self.now);
-        if self.undos.remove(&own) {
+    fn take_refusal(&mut self, sequence: u64, why: Refusal) {
+        self.outbox.answer(sequence, None, self.now);
+        if self.undos.remove(&sequence) {
             self.events.push(ClientEvent::UndoRefused(Some(why)));
         } else if why == Refusal::NotJoined {
             // The server has forgotten the session: the edit is sent again.
             if self.is_welcome() {
                 self.greet();
             }
-        } else if let Some(edit) = self.replica.take_back(own) {
-            self.refuse_pieces(own);
+        } else if let Some(edit) = self.replica.take_back(sequence) {
+            self.refuse_pieces(sequence);
             self.events.push(ClientEvent::Refused { tag: edit.tag(), why: Some(why) });
         }
     }
 
-    fn leave(&mut self, why: Kick) {
-        self.stage = Stage::Apart;
+    fn leave(&mut self, why: KickReason) {
+        self.stage = Stage::Disconnected;
         self.events.push(ClientEvent::Kicked(why));
     }
 
@@ -557,19 +564,19 @@ impl Client {
     fn apply(&mut self, batch: Vec<Entry>) {
         let Some(mut epoch) = self.epoch else { return };
         let id = self.id;
-        let own = |entry: &Entry| entry.edit().and_then(|_| entry.number_of(id));
-        let is_told = !self.is_history();
-        let tag = |own| Some((own, self.replica.pending_edit(own)?.tag()));
-        let tags: BTreeMap<u64, u64> = batch.iter().filter_map(own).filter_map(tag).collect();
+        let sequence_of = |entry: &Entry| entry.edit().and_then(|_| entry.number_of(id));
+        let is_reported = !self.is_history();
+        let tag = |sequence| Some((sequence, self.replica.pending_edit(sequence)?.tag()));
+        let tags: BTreeMap<u64, u64> = batch.iter().filter_map(sequence_of).filter_map(tag).collect();
         for entry in &batch {
-            if let Some(own) = entry.number_of(id) {
+            if let Some(sequence) = entry.number_of(id) {
                 let cost = entry.parts().map(|_| UNDO + entry_bytes(entry) as u64 / UNDO_BYTES);
-                self.outbox.answer(own, cost, self.now);
+                self.outbox.answer(sequence, cost, self.now);
             }
         }
         let reach_of_parts = batch.first().and_then(|first| reach(first.parts()?));
         let ground = reach_of_parts.map(|reach| self.ground_pieces(Some(reach))).unwrap_or_default();
-        let applied = self.replica.apply(&batch, own);
+        let applied = self.replica.apply(&batch, sequence_of);
         let mut receipts = applied.receipts.into_iter();
         for entry in &batch {
             epoch.number += 1;
@@ -579,13 +586,13 @@ impl Client {
                     self.reaches.note(epoch.number, edit.reach());
                     let Some(receipt) = receipts.next() else { continue };
                     // Its player may have been here before, in another client.
-                    match own(entry).and_then(|own| tags.get(&own).copied()) {
+                    match sequence_of(entry).and_then(|sequence| tags.get(&sequence).copied()) {
                         Some(tag) => {
                             let receipt = Receipt { tag, ..receipt };
-                            self.confirm_pieces(own(entry), &receipt);
+                            self.confirm_pieces(sequence_of(entry), &receipt);
                             self.events.push(ClientEvent::Confirmed { tag, receipt: Some(receipt) });
                         }
-                        None if is_told => {
+                        None if is_reported => {
                             self.confirm_pieces(None, &receipt);
                             let author = by.map_or(ClientId::SERVER, |(author, _)| author);
                             self.events.push(ClientEvent::RemoteEdit { author, receipt });
@@ -600,11 +607,11 @@ impl Client {
                     let returned =
                         reach.map(|reach| self.check_pieces(Some(reach), &ground)).unwrap_or_default();
                     restored.iter_mut().for_each(|restored| restored.returned.clone_from(&returned));
-                    if entry.number_of(id).is_some_and(|own| self.undos.remove(&own)) {
+                    if entry.number_of(id).is_some_and(|sequence| self.undos.remove(&sequence)) {
                         self.events.push(ClientEvent::Undone(restored));
                     }
                     reach.into_iter().for_each(|reach| self.reaches.note(epoch.number, reach));
-                    if applied.is_void && is_missing {
+                    if applied.failed_locally && is_missing {
                         let regions = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos));
                         self.doubtful.extend(regions);
                     }

@@ -57,7 +57,7 @@ impl Pieces {
         self.gone.drain(..excess);
     }
 
-    /// Renumbers own edits: pairs of old and new numbers.
+    /// Renumbers edits: pairs of old and new sequence numbers.
     pub fn renumber(&mut self, numbers: impl Iterator<Item = (u64, u64)>) {
         let mut before = std::mem::take(&mut self.predicted);
         let renumbered = numbers.filter_map(|(old, new)| Some((new, before.remove(&old)?)));
@@ -88,17 +88,19 @@ impl Pieces {
 
 impl Client {
     /// Records the pieces of a predicted edit.
-    pub(super) fn predict_pieces(&mut self, own: u64, receipt: &Receipt) {
+    pub(super) fn predict_pieces(&mut self, sequence: u64, receipt: &Receipt) {
         let gone: Vec<Gone> = all(receipt).filter_map(|piece| Gone::of(receipt.tag, piece)).collect();
         if !gone.is_empty() {
-            self.pieces.predicted.insert(own, gone);
+            self.pieces.predicted.insert(sequence, gone);
         }
-        self.tell_pieces(receipt.tag, all(receipt).cloned().collect(), Vec::new());
+        self.report_pieces(receipt.tag, all(receipt).cloned().collect(), Vec::new());
     }
 
-    /// The server has ordered an edit, `own` if it is one of this client. Corrects wrong predictions.
-    pub(super) fn confirm_pieces(&mut self, own: Option<u64>, receipt: &Receipt) {
-        let mut predicted = own.and_then(|own| self.pieces.predicted.remove(&own)).unwrap_or_default();
+    /// The server has ordered an edit; `sequence` is its number if it is one of this client's. Corrects wrong
+    /// predictions.
+    pub(super) fn confirm_pieces(&mut self, sequence: Option<u64>, receipt: &Receipt) {
+        let mut predicted =
+            sequence.and_then(|sequence| self.pieces.predicted.remove(&sequence)).unwrap_or_default();
         let mut found = Vec::new();
         for piece in all(receipt) {
             match predicted.iter().position(|gone| gone.piece.id == piece.id && gone.piece.fate == piece.fate)
@@ -109,19 +111,19 @@ impl Client {
         }
         let tag = receipt.tag;
         self.pieces.add(all(receipt).filter_map(|piece| Gone::of(tag, piece)));
-        self.tell_pieces(tag, found, predicted.into_iter().map(|gone| gone.piece).collect());
+        self.report_pieces(tag, found, predicted.into_iter().map(|gone| gone.piece).collect());
     }
 
     /// Returns the pieces of a refused edit.
-    pub(super) fn refuse_pieces(&mut self, own: u64) {
-        let predicted = self.pieces.predicted.remove(&own).unwrap_or_default();
-        self.tell_pieces(0, Vec::new(), predicted.into_iter().map(|gone| gone.piece).collect());
+    pub(super) fn refuse_pieces(&mut self, sequence: u64) {
+        let predicted = self.pieces.predicted.remove(&sequence).unwrap_or_default();
+        self.report_pieces(0, Vec::new(), predicted.into_iter().map(|gone| gone.piece).collect());
     }
 
-    /// Handles an own edit that was answered while the client was disconnected. [`Self::check_pieces`] determines the
+    /// Handles an edit that was answered while the client was disconnected. [`Self::check_pieces`] determines the
     /// result.
-    pub(super) fn settle_pieces(&mut self, own: u64) {
-        let predicted = self.pieces.predicted.remove(&own).unwrap_or_default();
+    pub(super) fn settle_pieces(&mut self, sequence: u64) {
+        let predicted = self.pieces.predicted.remove(&sequence).unwrap_or_default();
         self.pieces.add(predicted);
     }
 
@@ -143,11 +145,11 @@ impl Client {
         before: &BTreeSet<usize>,
     ) -> Vec<ReturnedPiece> {
         let returned = self.pieces.take_ground(&self.ground_pieces(within), before);
-        self.tell_pieces(0, Vec::new(), returned.clone());
+        self.report_pieces(0, Vec::new(), returned.clone());
         returned
     }
 
-    fn tell_pieces(&mut self, tag: u64, found: Vec<LoosePiece>, returned: Vec<ReturnedPiece>) {
+    fn report_pieces(&mut self, tag: u64, found: Vec<LoosePiece>, returned: Vec<ReturnedPiece>) {
         if !found.is_empty() || !returned.is_empty() {
             self.events.push(ClientEvent::PiecesChanged { tag, found, returned });
         }

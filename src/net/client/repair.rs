@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use super::super::message::{Entry, MOST_REGIONS, RegionContent, RegionHashes, ToServer};
+use super::super::message::{Entry, MAX_REGIONS, RegionContent, RegionHashes, ToServer};
 use super::join::Stage;
 use super::{Client, ClientEvent};
 use crate::lattice::{BrickPos, LatticeBox, RegionPos};
@@ -10,16 +10,16 @@ use crate::net::replica::Replica;
 use crate::terrain::{Order, Patch};
 
 /// The most marks that wait for the other side.
-const MOST_MARKS: usize = 256;
+const MAX_MARKS: usize = 256;
 
 /// The most edits whose reach is remembered, in case the server fails to apply one.
-const MOST_REACHES: usize = 4096;
+const MAX_REACHES: usize = 4096;
 
-/// The most announced void entries.
-const MOST_VOIDS: usize = 1 << 16;
+/// The most announced failed entries.
+const MAX_FAILED: usize = 1 << 16;
 
-/// The most regions that are fetched because of one void entry.
-const MOST_VOID: usize = 512;
+/// The most regions that are fetched because of one failed entry.
+const MAX_DOUBTFUL: usize = 512;
 
 /// The hashes of both sides at marks.
 #[derive(Default)]
@@ -44,14 +44,14 @@ impl Marks {
         let touched = std::mem::take(&mut self.touched);
         let hashes = touched.into_iter().map(|region| (region, replica.region_hash(region))).collect();
         self.ours.insert(number, hashes);
-        while self.ours.len() > MOST_MARKS {
+        while self.ours.len() > MAX_MARKS {
             self.ours.pop_first();
         }
     }
 
     pub fn take_theirs(&mut self, number: u64, regions: RegionHashes) {
         self.theirs.insert(number, regions);
-        while self.theirs.len() > MOST_MARKS {
+        while self.theirs.len() > MAX_MARKS {
             self.theirs.pop_first();
         }
     }
@@ -76,11 +76,11 @@ impl Marks {
             for (&region, &hash) in &theirs {
                 // A region that was not touched here before the mark is unchanged since, unless it was touched later:
                 // then the next mark compares it.
-                let own = ours.get(&region).copied();
-                let own = own.or_else(|| {
+                let known = ours.get(&region).copied();
+                let known = known.or_else(|| {
                     (!self.is_touched_after(number, region)).then(|| replica.region_hash(region))
                 });
-                if own.is_some_and(|own| own != hash) {
+                if known.is_some_and(|known| known != hash) {
                     differing.insert(region);
                 }
             }
@@ -102,7 +102,7 @@ pub(super) struct Reaches(VecDeque<(u64, LatticeBox)>);
 
 impl Reaches {
     pub fn note(&mut self, number: u64, reach: LatticeBox) {
-        if self.0.len() == MOST_REACHES {
+        if self.0.len() == MAX_REACHES {
             self.0.pop_front();
         }
         self.0.push_back((number, reach));
@@ -150,7 +150,7 @@ impl Client {
         if differing.is_empty() {
             return;
         }
-        let wanted: BTreeSet<RegionPos> = differing.iter().take(MOST_REGIONS).copied().collect();
+        let wanted: BTreeSet<RegionPos> = differing.iter().take(MAX_REGIONS).copied().collect();
         self.doubtful = differing.difference(&wanted).copied().collect();
         let regions = wanted.iter().copied().collect();
         let from = self.number();
@@ -176,10 +176,10 @@ impl Client {
     }
 
     /// Handles an entry that the server could not apply.
-    pub(super) fn take_void(&mut self, number: u64) {
+    pub(super) fn take_failed(&mut self, number: u64) {
         if number > self.number() {
-            if self.voids.len() < MOST_VOIDS {
-                self.voids.insert(number);
+            if self.failed.len() < MAX_FAILED {
+                self.failed.insert(number);
             }
         } else if let Some(reach) = self.reaches.of(number) {
             let low = RegionPos::of(BrickPos::of(reach.min)).0;
@@ -187,23 +187,23 @@ impl Client {
             let regions = (low.x..=high.x)
                 .flat_map(|x| (low.y..=high.y).map(move |y| (x, y)))
                 .flat_map(|(x, y)| (low.z..=high.z).map(move |z| RegionPos(glam::IVec3::new(x, y, z))));
-            self.doubtful.extend(regions.take(MOST_VOID));
+            self.doubtful.extend(regions.take(MAX_DOUBTFUL));
         }
     }
 
     /// The entry to apply: one without effect if the server could not apply it.
     pub(super) fn valid(&mut self, number: u64, entry: Entry) -> Entry {
-        if !self.voids.remove(&number) {
+        if !self.failed.remove(&number) {
             return entry;
         }
         match entry.number_of(self.id) {
-            Some(own) if entry.edit().is_some() => {
-                if let Some(edit) = self.replica.take_back(own) {
-                    self.refuse_pieces(own);
+            Some(sequence) if entry.edit().is_some() => {
+                if let Some(edit) = self.replica.take_back(sequence) {
+                    self.refuse_pieces(sequence);
                     self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
                 }
             }
-            Some(own) if entry.parts().is_some() && self.undos.remove(&own) => {
+            Some(sequence) if entry.parts().is_some() && self.undos.remove(&sequence) => {
                 self.events.push(ClientEvent::UndoRefused(None));
             }
             _ => {}

@@ -9,7 +9,7 @@ use crate::brush::Edit;
 use crate::lattice::RegionPos;
 use crate::net::encoding::entry_bytes;
 use crate::net::message::{Entry, Refusal, RegionHashes, ToClient};
-use crate::net::price::{MOST_UNDO_BYTES, UNDO, UNDO_BYTES};
+use crate::net::price::{MAX_UNDO_BYTES, UNDO, UNDO_BYTES};
 use crate::net::regions::{Steps, touched_regions};
 use crate::terrain::{Order, Patch, Receipt};
 
@@ -42,15 +42,15 @@ impl Server {
         let (by, order) = match entry {
             Entry::Order { by, order } => (by, order),
             Entry::HashCheck => {
-                self.tell_hashes(number);
+                self.send_hashes(number);
                 self.applied = number;
                 return 1;
             }
         };
         if let Order::Parts { change, .. } = order {
             self.put_parts(number, &change);
-            if let Some((client, own)) = by {
-                self.own_numbers.apply(client, own, number);
+            if let Some((client, sequence)) = by {
+                self.sequences.apply(client, sequence, number);
             }
             self.applied = number;
             return change.bricks.len() as u64 + 1;
@@ -61,7 +61,8 @@ impl Server {
         1
     }
 
-    /// How many edits at the front go into one transaction: all in a row, or where strokes are kept, those of one stroke.
+    /// How many edits at the front go into one transaction: all in a row, or where strokes are kept, those of one
+    /// stroke.
     fn edits_together(&self, most: u64) -> usize {
         let keeps_strokes = self.settings.undo != UndoPolicy::Nobody;
         let (mut work, mut first) = (0_u64, None);
@@ -85,8 +86,8 @@ impl Server {
         for (number, Ordered { entry, labels: (tag, label), cost }) in
             (first..).zip(self.waiting.drain(..count))
         {
-            if let Entry::Order { by: Some((author, own)), order: Order::Edit(edit) } = entry {
-                self.own_numbers.apply(author, own, number);
+            if let Entry::Order { by: Some((author, sequence)), order: Order::Edit(edit) } = entry {
+                self.sequences.apply(author, sequence, number);
                 stroke = Some((author, label));
                 edits.push(edit.with_labels(tag, label));
                 work += cost;
@@ -97,7 +98,7 @@ impl Server {
         self.applied += count as u64;
         for (number, receipt) in (first..).zip(receipts) {
             if receipt.is_local_failure() {
-                self.void(number);
+                self.fail(number);
             }
         }
         work.max(1)
@@ -138,19 +139,19 @@ impl Server {
         if receipt.outcome.is_ok() {
             self.touch(change, steps);
         } else if receipt.is_local_failure() {
-            self.void(number);
+            self.fail(number);
         }
         // Otherwise nothing changed, and the same holds on all machines.
     }
 
-    pub(super) fn void(&mut self, number: u64) {
-        self.figures.voids += 1;
-        self.voids.insert(number);
-        self.tell(ServerEvent::Void(number));
-        self.send_to_all(&ToClient::Void { number });
+    pub(super) fn fail(&mut self, number: u64) {
+        self.figures.failed += 1;
+        self.failed.insert(number);
+        self.report(ServerEvent::EntryFailed(number));
+        self.send_to_all(&ToClient::Failed { number });
     }
 
-    fn tell_hashes(&mut self, number: u64) {
+    fn send_hashes(&mut self, number: u64) {
         let touched = std::mem::take(&mut self.touched);
         let regions = self.hashes_of(touched);
         self.send_to_all(&ToClient::Hashes { number, regions });
@@ -170,9 +171,9 @@ impl Server {
             NoUndo::Touched => Refusal::Touched,
         });
         let entry = change.and_then(|change| {
-            let entry = Entry::of(request.by, request.own, Order::parts(change, None));
+            let entry = Entry::of(request.by, request.sequence, Order::parts(change, None));
             let bytes = entry_bytes(&entry);
-            if bytes <= MOST_UNDO_BYTES { Ok((entry, bytes)) } else { Err(Refusal::TooLarge) }
+            if bytes <= MAX_UNDO_BYTES { Ok((entry, bytes)) } else { Err(Refusal::TooLarge) }
         });
         match entry {
             Ok((entry, bytes)) => {
@@ -182,7 +183,7 @@ impl Server {
                 self.apply_some(u64::MAX)
             }
             Err(why) => {
-                self.refuse(request.by, request.own, why);
+                self.refuse(request.by, request.sequence, why);
                 1
             }
         }

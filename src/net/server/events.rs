@@ -2,7 +2,7 @@
 
 use crate::lattice::RegionPos;
 
-use crate::net::message::{ClientId, Kick};
+use crate::net::message::{ClientId, KickReason};
 
 /// An event for a game or an operator.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,11 +11,12 @@ pub enum ServerEvent {
     /// A client has joined, or has come back after a gap.
     Joined(ClientId),
     /// A client was kicked: its connection should be closed once what waits for it is sent.
-    Kicked(ClientId, Kick),
-    /// A client's world differed, and it fetched these regions. This is a bug: of the plugin's, of the client's, or of its machine.
+    Kicked(ClientId, KickReason),
+    /// A client's world differed, and it fetched these regions. This is a bug: of the plugin's, of the client's, or of
+    /// its machine.
     Repaired(ClientId, Vec<RegionPos>),
     /// An entry could not be applied. This is a bug of the plugin's.
-    Void(u64),
+    EntryFailed(u64),
 }
 
 /// Statistics of a server since its start.
@@ -34,7 +35,7 @@ pub struct ServerFigures {
     /// Entries that were ordered.
     pub ordered: u64,
     /// Entries that could not be applied.
-    pub voids: u64,
+    pub failed: u64,
     /// Clients that were kicked.
     pub kicked: u64,
     /// Clients whose session was restarted, because a world was kept for them and they acknowledged nothing.

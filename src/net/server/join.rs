@@ -12,7 +12,7 @@ use super::sender::Snapshot;
 use super::session::{Fetch, Stage};
 use super::{Server, ServerEvent};
 use crate::lattice::RegionPos;
-use crate::net::message::{ClientId, Epoch, Hello, Join, Kick, Lane, RegionHashes, ToClient, Welcome};
+use crate::net::message::{ClientId, Epoch, Hello, Join, KickReason, Lane, RegionHashes, ToClient, Welcome};
 use crate::net::regions::{region_hash, regions_of};
 
 /// The shortest interval between answers to fetches: each one keeps a state of the world, whose index is copied once it
@@ -35,16 +35,16 @@ impl Server {
     pub(super) fn greet(&mut self, client: ClientId, stream: Option<u64>, hello: Hello) {
         let world = self.terrain.world();
         let checks = [
-            (hello.protocol == crate::net::PROTOCOL, Kick::Protocol),
-            (hello.simulation == crate::terrain::SIMULATION, Kick::Simulation),
-            (hello.ground == world.ground().hash(), Kick::Ground),
-            (i64::from(hello.chunk_size) == i64::from(world.grid().size()), Kick::ChunkSize),
+            (hello.protocol == crate::net::PROTOCOL, KickReason::Protocol),
+            (hello.simulation == crate::terrain::SIMULATION, KickReason::Simulation),
+            (hello.ground == world.ground().hash(), KickReason::Ground),
+            (i64::from(hello.chunk_size) == i64::from(world.grid().size()), KickReason::ChunkSize),
         ];
         if let Some((_, why)) = checks.into_iter().find(|(is_same, _)| !is_same) {
             return self.kick_for(client, why);
         }
         if let Err(reason) = (self.admission)(client) {
-            return self.kick_for(client, Kick::Refused(reason));
+            return self.kick_for(client, KickReason::Refused(reason));
         }
         let Some(session) = self.sessions.get_mut(&client) else { return };
         let is_repeated = stream.is_some() && stream == session.stream;
@@ -66,7 +66,7 @@ impl Server {
                 Stage::Greeted(hello)
                     if !self.later.iter().any(|later| later.is_of(*client))
                         && self.kept.as_ref().is_none_or(|kept: &Kept| {
-                            kept.is_for(&hello, self.epoch.run, self.own_numbers.last_applied(*client))
+                            kept.is_for(&hello, self.epoch.run, self.sequences.last_applied(*client))
                         })
                         && self.players.player(*client).greetings.spend(now, 1) =>
                 {
@@ -111,7 +111,7 @@ impl Server {
         let welcome = Welcome {
             client,
             epoch: Epoch { number, ..self.epoch },
-            own: self.own_numbers.last(client),
+            sequence: self.sequences.last(client),
             reach: self.settings.reach.map(|reach| reach.allowed()),
             cost: [self.settings.cost.per_second, self.settings.cost.burst],
             left: self.players.player(client).cost.left(now),
@@ -129,7 +129,7 @@ impl Server {
             self.outgoing.push((client, Lane::Bulk, mark.to_bytes()));
         }
         self.send(client, &ToClient::Welcome(welcome));
-        self.tell(ServerEvent::Joined(client));
+        self.report(ServerEvent::Joined(client));
     }
 
     /// The messages with all entries after a number, if the log has them and they take fewer bytes than the regions
@@ -145,28 +145,28 @@ impl Server {
                 return None;
             }
         }
-        let voids = self.voids.range(number.saturating_add(1)..).copied().collect();
-        Some((Join::Log { voids }, Bulk::Messages(messages)))
+        let failed = self.failed.range(number.saturating_add(1)..).copied().collect();
+        Some((Join::Log { failed }, Bulk::Messages(messages)))
     }
 
     /// All regions, nearest first.
     fn all_regions(&mut self, place: IVec3) -> (u64, (Join, Bulk)) {
-        let (world, terms) = self.keep();
+        let (world, state) = self.keep();
         let mut regions: Vec<RegionPos> = regions_of(&world.1).into_iter().collect();
         regions.sort_by_cached_key(|region| squared_distance(*region, place));
-        let join = Join::Regions { regions: regions.len() as u32, terms: Box::new(terms) };
+        let join = Join::Regions { regions: regions.len() as u32, state: Box::new(state) };
         (world.0, (join, Bulk::Regions(world, regions)))
     }
 
     /// The table of all regions. The world is kept for the client until it continues.
     fn compare(&mut self, client: ClientId) -> (u64, (Join, Bulk)) {
-        let (world, terms) = self.keep();
+        let (world, state) = self.keep();
         let table = self.table(&world);
         let number = world.0;
         if let Some(session) = self.sessions.get_mut(&client) {
             session.compared = Some(world);
         }
-        (number, (Join::Compare { terms: Box::new(terms) }, Bulk::Messages(vec![table])))
+        (number, (Join::Compare { state: Box::new(state) }, Bulk::Messages(vec![table])))
     }
 
     /// The hashes of all regions of the kept world, in a message.
@@ -215,7 +215,7 @@ impl Server {
         }
         for (client, regions) in repaired {
             self.figures.repairs += regions.len() as u64;
-            self.tell(ServerEvent::Repaired(client, regions));
+            self.report(ServerEvent::Repaired(client, regions));
         }
     }
 
@@ -248,6 +248,7 @@ impl Server {
             for (client, session) in self.sessions.range_mut(turn) {
                 let was_short = self.encodings.is_short();
                 let bucket = &mut self.players.player(*client).bulk;
+                bucket.set_rate(now, session.bulk.rate());
                 while let Some(piece) = session.bulk.next_piece(bucket, now, &mut self.encodings) {
                     let message = ToClient::Piece(piece).to_bytes();
                     self.figures.bulk_bytes += message.len() as u64;

@@ -1,15 +1,15 @@
 //! Older states of the world that are kept while clients download them.
 //!
-//! Once the server's world changes, each that is kept takes as much memory as its index and what has changed since. So clients that come
-//! at about the same time share one, and clients that make no progress lose theirs, so few worlds are kept for any
-//! number of clients.
+//! Once the server's world changes, each that is kept takes as much memory as its index and what has changed since. So
+//! clients that come at about the same time share one, and clients that make no progress lose theirs, so few worlds are
+//! kept for any number of clients.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use super::Server;
 use super::sender::Snapshot;
-use crate::net::message::{Hello, Lane, Terms, ToClient};
+use crate::net::message::{Hello, Lane, RuleState, ToClient};
 
 /// The greatest age of a world that new clients get, together with later entries.
 const SHARED: Duration = Duration::from_secs(1);
@@ -17,7 +17,7 @@ const SHARED: Duration = Duration::from_secs(1);
 /// The world that new clients get.
 pub struct Kept {
     pub world: Snapshot,
-    pub terms: Terms,
+    pub state: RuleState,
     /// The message with the hashes of its regions, once a client has needed it.
     pub table: Option<Arc<[u8]>>,
     since: Duration,
@@ -26,25 +26,25 @@ pub struct Kept {
 impl Server {
     /// Drops the shared world once it is too old, or the log no longer has all later entries.
     pub(super) fn forget_kept(&mut self, now: Duration) {
-        let (first, voids) = (self.log.first(), &self.voids);
+        let (first, failed) = (self.log.first(), &self.failed);
         self.kept.take_if(|Kept { world: (number, _), since, .. }| {
-            let is_void = voids.range(number.saturating_add(1)..).next().is_some();
-            now.saturating_sub(*since) >= SHARED || first > number.saturating_add(1) || is_void
+            let has_failed = failed.range(number.saturating_add(1)..).next().is_some();
+            now.saturating_sub(*since) >= SHARED || first > number.saturating_add(1) || has_failed
         });
     }
 
-    /// The world that clients get now, with its number and terms.
-    pub(super) fn keep(&mut self) -> (Snapshot, Terms) {
+    /// The world that clients get now, with its number and state.
+    pub(super) fn keep(&mut self) -> (Snapshot, RuleState) {
         let (now, number) = (self.now, self.applied);
         let kept = self.kept.get_or_insert_with(|| {
-            let terms = Terms {
+            let state = RuleState {
                 rules: self.terrain.rules().cloned(),
                 loose: self.terrain.loose().copied(),
                 next_field: self.terrain.world().next_field(),
             };
-            Kept { world: (number, self.terrain.snapshot()), terms, table: None, since: now }
+            Kept { world: (number, self.terrain.snapshot()), state, table: None, since: now }
         });
-        (kept.world.clone(), kept.terms.clone())
+        (kept.world.clone(), kept.state.clone())
     }
 
     /// Restarts sessions of clients for which a world is kept and that make no progress.

@@ -7,10 +7,10 @@
 //! | `session`, `players` | a connected client, data that is kept for its player |
 //! | `receive`, `validation` | received messages, and the reasons to refuse edits |
 //! | `order_log` | the latest entries, in long messages |
-//! | `own_numbers` | the last numbers of players' own edits |
+//! | `sequences` | the last sequence numbers of players' edits |
 //! | `apply` | applies entries to the world |
 //! | `strokes` | strokes that can be undone |
-//! | `join`, `sender` | clients that join, reconnect, or differ; the bulk lane |
+//! | `join`, `sender`, `pace` | clients that join, reconnect, or differ; the bulk lane; how fast it is |
 //! | `kept` | older states of the world that are kept for joining clients |
 //! | `save` | a server that survives a restart |
 
@@ -21,12 +21,13 @@ mod kept;
 #[cfg(feature = "store")]
 mod keys;
 mod order_log;
-mod own_numbers;
+mod pace;
 mod players;
 mod receive;
 #[cfg(feature = "store")]
 mod save;
 mod sender;
+mod sequences;
 mod session;
 mod settings;
 mod strokes;
@@ -40,7 +41,7 @@ use std::time::Duration;
 use glam::IVec3;
 
 use super::encoding::{OrderWriter, entry_bytes};
-use super::message::{ClientId, Entry, Epoch, Kick, Lane, MOST_TO_CLIENT, ToClient};
+use super::message::{ClientId, Entry, Epoch, KickReason, Lane, MAX_TO_CLIENT, ToClient};
 use super::never_shown;
 use super::regions::RegionSums;
 use super::stamps::Stamps;
@@ -52,9 +53,9 @@ use crate::volume::{DiggingRules, RulesError};
 pub use events::{ServerEvent, ServerFigures};
 use kept::Kept;
 use order_log::OrderLog;
-use own_numbers::OwnNumbers;
 use players::Players;
 use sender::Encodings;
+use sequences::Sequences;
 use session::Session;
 pub use settings::{Reach, ServerSettings, UndoPolicy};
 use strokes::Strokes;
@@ -66,7 +67,7 @@ pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
 pub type Admission = Box<dyn Fn(ClientId) -> Result<(), u32> + Send + Sync>;
 
 /// The most events that wait to be taken.
-const MOST_EVENTS: usize = 4096;
+const MAX_EVENTS: usize = 4096;
 
 /// A message with entries is sent once it has this many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
@@ -91,7 +92,7 @@ struct Ordered {
 /// An undo that waits until all entries before it are applied, because only then its result is known.
 struct UndoRequest {
     by: ClientId,
-    own: u64,
+    sequence: u64,
     of: ClientId,
 }
 
@@ -134,7 +135,7 @@ pub struct Server {
     writer: OrderWriter,
     log: OrderLog,
     /// Entries of the log that could not be applied.
-    voids: BTreeSet<u64>,
+    failed: BTreeSet<u64>,
     /// Whether the order leads from the pristine world to this one.
     is_whole: bool,
     /// An undo and all later entries, which get numbers after the undo has one, so it applies to everything before it.
@@ -153,7 +154,7 @@ pub struct Server {
     marked: u64,
     sessions: BTreeMap<ClientId, Session>,
     players: Players,
-    own_numbers: OwnNumbers,
+    sequences: Sequences,
     /// The world that new clients get.
     kept: Option<Kept>,
     /// When fetches were answered last.
@@ -191,7 +192,7 @@ impl Server {
             && world.next_field() == 0
             && world.bricks().next().is_none()
             && world.fields().next().is_none();
-        let terms = (terrain.rules().cloned().map(Arc::new), terrain.loose().copied());
+        let (rules, loose) = (terrain.rules().cloned().map(Arc::new), terrain.loose().copied());
         let run = WorldId::random().0 as u64;
         let mut server = Self {
             terrain,
@@ -206,7 +207,7 @@ impl Server {
             waiting_cost: 0,
             writer: OrderWriter::default(),
             log: OrderLog::new(settings.log_bytes, number),
-            voids: BTreeSet::new(),
+            failed: BTreeSet::new(),
             is_whole,
             later: VecDeque::new(),
             strokes: Strokes::new(settings.undo_bytes),
@@ -219,7 +220,7 @@ impl Server {
             marked: number,
             sessions: BTreeMap::new(),
             players: Players::new(settings),
-            own_numbers: OwnNumbers::default(),
+            sequences: Sequences::default(),
             kept: None,
             fetched: Duration::ZERO,
             durable: number,
@@ -230,10 +231,10 @@ impl Server {
             figures: ServerFigures::default(),
         };
         // What holds already is part of what leads from the pristine world.
-        if let (true, Some(rules)) = (is_whole, terms.0) {
+        if let (true, Some(rules)) = (is_whole, rules) {
             server.order(Entry::of_server(Order::Rules(Some(rules))));
         }
-        if let (true, Some(loose)) = (is_whole, terms.1) {
+        if let (true, Some(loose)) = (is_whole, loose) {
             server.order(Entry::of_server(Order::Loose(Some(loose))));
         }
         server
@@ -259,7 +260,7 @@ impl Server {
         self.durable
     }
 
-    /// Marks all entries up to this number as saved, and tells clients so: for games that save in another way.
+    /// Marks all entries up to this number as saved, and informs clients: for games that save in another way.
     pub fn set_durable(&mut self, number: u64) {
         if number > self.durable && number <= self.applied {
             self.durable = number;
@@ -288,8 +289,8 @@ impl Server {
     }
 
     /// Sets a function that decides at each greeting whether a player may join. `Err` rejects the player with
-    /// [`Kick::Refused`] and a number chosen by the game. By default all players may join. To remove a player that has
-    /// joined already, see [`kick_for`](Self::kick_for).
+    /// [`KickReason::Refused`] and a number chosen by the game. By default all players may join. To remove a player
+    /// that has joined already, see [`kick_for`](Self::kick_for).
     pub fn set_admission(&mut self, admission: impl Fn(ClientId) -> Result<(), u32> + Send + Sync + 'static) {
         self.admission = Box::new(admission);
     }
@@ -302,7 +303,7 @@ impl Server {
         self.sessions.insert(client, Session::new(&self.settings, now));
         self.players.player(client);
         self.players.trim(|client| self.sessions.contains_key(&client));
-        self.own_numbers.trim(|client| self.sessions.contains_key(&client));
+        self.sequences.trim(|client| self.sessions.contains_key(&client));
     }
 
     /// Removes a disconnected client. Messages that wait for it are dropped.
@@ -313,16 +314,16 @@ impl Server {
 
     /// Removes a client. It is notified; close its connection then.
     pub fn kick(&mut self, client: ClientId) {
-        self.kick_for(client, Kick::ByGame);
+        self.kick_for(client, KickReason::ByGame);
     }
 
     /// Removes a client and sends it the reason; close its connection then.
-    pub fn kick_for(&mut self, client: ClientId, why: Kick) {
+    pub fn kick_for(&mut self, client: ClientId, why: KickReason) {
         if self.sessions.remove(&client).is_some() {
             self.figures.kicked += 1;
             self.outgoing.retain(|(to, ..)| *to != client);
             self.send(client, &ToClient::Kicked(why));
-            self.tell(ServerEvent::Kicked(client, why));
+            self.report(ServerEvent::Kicked(client, why));
         }
     }
 
@@ -388,7 +389,7 @@ impl Server {
     /// When they take more bytes than a message may; split them then.
     pub fn put(&mut self, change: Patch) -> Result<(), FormatError> {
         let entry = Entry::of_server(Order::parts(change, None));
-        let (length, limit) = (entry_bytes(&entry) as u64, MOST_TO_CLIENT as u64 / 2);
+        let (length, limit) = (entry_bytes(&entry) as u64, MAX_TO_CLIENT as u64 / 2);
         if length > limit {
             return Err(FormatError::TooLarge { length, limit });
         }
@@ -396,9 +397,9 @@ impl Server {
         Ok(())
     }
 
-    fn order_edit(&mut self, author: ClientId, own: u64, edit: Edit, cost: u64) {
+    fn order_edit(&mut self, author: ClientId, sequence: u64, edit: Edit, cost: u64) {
         let labels = (edit.tag(), edit.stroke());
-        let entry = Entry::of(author, own, Order::Edit(edit.with_labels(0, None)));
+        let entry = Entry::of(author, sequence, Order::Edit(edit.with_labels(0, None)));
         self.enter(Ordered { entry, labels, cost });
     }
 
@@ -461,8 +462,8 @@ impl Server {
         }
     }
 
-    fn tell(&mut self, event: ServerEvent) {
-        if self.events.len() == MOST_EVENTS {
+    fn report(&mut self, event: ServerEvent) {
+        if self.events.len() == MAX_EVENTS {
             self.events.pop_front();
         }
         self.events.push_back(event);
@@ -478,7 +479,7 @@ impl Server {
         }
         self.apply();
         self.log.trim(self.applied);
-        self.voids = self.voids.split_off(&self.log.first());
+        self.failed = self.failed.split_off(&self.log.first());
         self.forget_kept(now);
         self.drop_stuck(now);
         self.welcome_all(now);
@@ -500,4 +501,4 @@ impl Server {
 }
 
 #[cfg(test)]
-mod void_tests;
+mod failed_tests;

@@ -73,7 +73,8 @@ impl OrderLog {
         }
     }
 
-    /// Messages with all entries after a number, which may hold entries before it too. `None` if some are gone or to come.
+    /// Messages with all entries after a number, which may hold entries before it too. `None` if some are gone or to
+    /// come.
     pub fn after(&self, number: u64) -> Option<Vec<Arc<[u8]>>> {
         if self.first > number.saturating_add(1) || number > self.last {
             return None;

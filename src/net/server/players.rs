@@ -6,13 +6,14 @@ use std::time::Duration;
 
 use glam::IVec3;
 
+use super::pace::Pace;
 use super::settings::ServerSettings;
 use crate::net::bucket::{Bucket, Rate};
 use crate::net::message::ClientId;
 
 /// The most players that are remembered, in addition to connected ones and administrators. A player that was forgotten
 /// starts with full buckets.
-const MOST_PLAYERS: usize = 1 << 14;
+const MAX_PLAYERS: usize = 1 << 14;
 
 /// The rate of answered greetings; others wait.
 const GREETINGS: Rate = Rate { per_second: 1, burst: 8 };
@@ -39,7 +40,7 @@ impl Player {
             flood: full(settings.cost.times(settings.flood)),
             malformed: full(settings.malformed),
             greetings: full(GREETINGS),
-            bulk: full(settings.bulk),
+            bulk: full(Pace::new(settings).rate()),
             place: None,
             is_administrator: false,
             used: 0,
@@ -74,7 +75,7 @@ impl Players {
 
     /// Forgets the players that have been away for the longest time, if there are too many.
     pub fn trim(&mut self, is_connected: impl Fn(ClientId) -> bool) {
-        if self.players.len() <= MOST_PLAYERS {
+        if self.players.len() <= MAX_PLAYERS {
             return;
         }
         let is_kept = |client: ClientId, player: &Player| player.is_administrator || is_connected(client);
@@ -96,15 +97,15 @@ mod tests {
         let mut players = Players::new(ServerSettings::default());
         players.player(ClientId(1)).is_administrator = true;
         let connected = ClientId(2);
-        for id in 2..4 * MOST_PLAYERS as u64 {
+        for id in 2..4 * MAX_PLAYERS as u64 {
             assert!(players.player(ClientId(id)).cost.spend(Duration::ZERO, 1));
             players.trim(|client| client == connected);
-            assert!(players.players.len() <= MOST_PLAYERS + 2);
+            assert!(players.players.len() <= MAX_PLAYERS + 2);
         }
         assert!(players.get(ClientId(1)).is_some_and(|player| player.is_administrator));
         assert!(players.get(connected).is_some() && players.get(ClientId(3)).is_none());
         let burst = ServerSettings::default().cost.burst;
-        let last = ClientId(4 * MOST_PLAYERS as u64 - 1);
+        let last = ClientId(4 * MAX_PLAYERS as u64 - 1);
         assert_eq!(players.player(last).cost.left(Duration::ZERO), burst - 1, "nothing is refilled");
     }
 }

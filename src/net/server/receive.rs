@@ -3,14 +3,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::own_numbers::OwnNumber;
+use super::sequences::SequenceCheck;
 use super::session::Fetch;
 use super::{Later, Server, UndoRequest};
 use crate::brush::Edit;
 use crate::format::bricks::is_possible;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
-use crate::net::message::{ClientId, Kick, MOST_REGIONS, Refusal, ToClient, ToServer};
+use crate::net::message::{ClientId, KickReason, MAX_REGIONS, Refusal, ToClient, ToServer};
 use crate::net::price::{UNDO, cost};
 use crate::net::stamps::StampId;
 
@@ -23,9 +23,9 @@ const REGION: u64 = 1;
 const BYTES: u64 = 64;
 
 /// Most messages and regions that wait in a client's bulk lane before it may fetch more.
-const MOST_JOBS: usize = 2 * MOST_REGIONS;
+const MAX_JOBS: usize = 2 * MAX_REGIONS;
 /// Most bytes of an image that is sent: no stamp has larger ones.
-const MOST_IMAGE: usize = 2 * 256 * 256;
+const MAX_IMAGE: usize = 2 * 256 * 256;
 
 impl Server {
     /// Handles a message of a client. Any bytes are answered, or counted as invalid.
@@ -52,7 +52,7 @@ impl Server {
             Ok((ToServer::Edits { first, edits }, unknown)) => {
                 self.receive_edits(client, first, edits, &unknown, now)
             }
-            Ok((ToServer::Undo { own, of }, _)) => self.receive_undo(client, own, of, now),
+            Ok((ToServer::Undo { sequence, of }, _)) => self.receive_undo(client, sequence, of, now),
             Ok((message, _)) => {
                 // Messages of an earlier stream are ignored.
                 let has_joined = self.sessions.get(&client).is_some_and(|session| session.has_joined());
@@ -63,7 +63,7 @@ impl Server {
         if !is_valid {
             self.figures.malformed += 1;
             if self.sessions.contains_key(&client) && !self.players.player(client).malformed.spend(now, 1) {
-                self.kick_for(client, Kick::Malformed);
+                self.kick_for(client, KickReason::Malformed);
             }
         }
     }
@@ -82,7 +82,7 @@ impl Server {
     fn may_go_on(&mut self, client: ClientId, cost: u64, now: Duration) -> bool {
         let may = self.players.player(client).flood.spend(now, cost);
         if !may {
-            self.kick_for(client, Kick::Flood);
+            self.kick_for(client, KickReason::Flood);
         }
         may
     }
@@ -100,17 +100,17 @@ impl Server {
             return false;
         }
         for (place, edit) in edits.into_iter().enumerate() {
-            let own = first + place as u64;
+            let sequence = first + place as u64;
             self.figures.edits += 1;
             if !self.sessions.get(&client).is_some_and(|session| session.takes_edits()) {
                 // It counts as not seen: the client may send it again once it has joined.
-                self.refuse(client, own, Refusal::NotJoined);
+                self.refuse(client, sequence, Refusal::NotJoined);
                 continue;
             }
-            match self.own_numbers.judge(client, own) {
-                OwnNumber::New => self.own_numbers.note(client, own),
-                OwnNumber::Old => continue,
-                OwnNumber::Impossible => return false,
+            match self.sequences.judge(client, sequence) {
+                SequenceCheck::New => self.sequences.note(client, sequence),
+                SequenceCheck::Old => continue,
+                SequenceCheck::Impossible => return false,
             }
             // One that is too large is refused, however often it comes: that is no flood.
             let cost = cost(self.terrain.world().grid(), &edit).unwrap_or_default();
@@ -119,26 +119,26 @@ impl Server {
                 return true;
             }
             if unknown.contains(&place) {
-                self.refuse(client, own, Refusal::UnknownStamp);
+                self.refuse(client, sequence, Refusal::UnknownStamp);
                 continue;
             }
             match self.validate(client, &edit, now) {
-                Ok(cost) => self.order_edit(client, own, edit, cost),
-                Err(why) => self.refuse(client, own, why),
+                Ok(cost) => self.order_edit(client, sequence, edit, cost),
+                Err(why) => self.refuse(client, sequence, why),
             }
         }
         true
     }
 
-    fn receive_undo(&mut self, client: ClientId, own: u64, of: ClientId, now: Duration) -> bool {
+    fn receive_undo(&mut self, client: ClientId, sequence: u64, of: ClientId, now: Duration) -> bool {
         if !self.sessions.get(&client).is_some_and(|session| session.takes_edits()) {
-            self.refuse(client, own, Refusal::NotJoined);
+            self.refuse(client, sequence, Refusal::NotJoined);
             return true;
         }
-        match self.own_numbers.judge(client, own) {
-            OwnNumber::New => self.own_numbers.note(client, own),
-            OwnNumber::Old => return true,
-            OwnNumber::Impossible => return false,
+        match self.sequences.judge(client, sequence) {
+            SequenceCheck::New => self.sequences.note(client, sequence),
+            SequenceCheck::Old => return true,
+            SequenceCheck::Impossible => return false,
         }
         if !self.may_go_on(client, UNDO, now) {
             return true;
@@ -146,9 +146,9 @@ impl Server {
         match self.validate_undo(client, of, now) {
             Ok(()) => {
                 self.waiting_cost += UNDO;
-                self.later.push_back(Later::Undo(UndoRequest { by: client, own, of }));
+                self.later.push_back(Later::Undo(UndoRequest { by: client, sequence, of }));
             }
-            Err(why) => self.refuse(client, own, why),
+            Err(why) => self.refuse(client, sequence, why),
         }
         true
     }
@@ -162,7 +162,7 @@ impl Server {
     ) -> bool {
         let Some(session) = self.sessions.get(&client) else { return true };
         let is_valid = number <= self.epoch.number
-            && session.regions_waiting().saturating_add(regions.len()) <= MOST_JOBS
+            && session.regions_waiting().saturating_add(regions.len()) <= MAX_JOBS
             && regions.iter().all(|region| is_possible(*region));
         if is_valid
             && self.may_go_on(client, REGION * regions.len() as u64, now)
@@ -175,7 +175,7 @@ impl Server {
 
     fn receive_ack(&mut self, client: ClientId, bulk: u64, number: u64) -> bool {
         let Some(session) = self.sessions.get_mut(&client) else { return true };
-        if number > self.epoch.number || !session.bulk.acknowledge(bulk) {
+        if number > self.epoch.number || !session.bulk.acknowledge(bulk, self.now) {
             return false;
         }
         session.acknowledged = number;
@@ -187,7 +187,7 @@ impl Server {
     /// Sends images that a client lacks, each once.
     fn receive_images(&mut self, client: ClientId, images: Vec<StampId>) -> bool {
         for id in images {
-            let is_small = |image: &&Arc<GreyImage>| size_of_val(image.samples()) <= MOST_IMAGE;
+            let is_small = |image: &&Arc<GreyImage>| size_of_val(image.samples()) <= MAX_IMAGE;
             let Some(image) = self.stamps.get(id).filter(is_small) else { return false };
             let Some(session) = self.sessions.get_mut(&client) else { return true };
             if session.images.insert(id) {
@@ -197,8 +197,8 @@ impl Server {
         true
     }
 
-    pub(super) fn refuse(&mut self, client: ClientId, own: u64, why: Refusal) {
+    pub(super) fn refuse(&mut self, client: ClientId, sequence: u64, why: Refusal) {
         self.figures.refused += 1;
-        self.send(client, &ToClient::Refused { own, why });
+        self.send(client, &ToClient::Refused { sequence, why });
     }
 }

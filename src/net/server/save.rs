@@ -3,13 +3,14 @@
 use std::collections::VecDeque;
 
 use super::keys::{NUMBER, RESERVED, prefix};
-use super::own_numbers::{Applied, MOST_OWN, OwnNumbers};
+use super::sequences::{Applied, MAX_SEQUENCE, Sequences};
 use super::{Server, ServerSettings};
 use crate::net::message::ClientId;
 use crate::store::{Store, StoreError};
 use crate::terrain::Terrain;
 
-/// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its world holds.
+/// Below [`RESERVED`], the beginning of keys under which a store keeps the number of the last edit of a player that its
+/// world holds.
 const KEY: &str = "own/";
 
 /// What a server has passed to its store.
@@ -30,9 +31,9 @@ impl Saving {
 }
 
 impl Server {
-    /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or one that a store
-    /// was created of. What its clients send again that the world holds already is not done twice: the last numbers of the 1024
-    /// players who dug last are saved with it.
+    /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or
+    /// one that a store was created of. What its clients send again that the world holds already is not done twice: the
+    /// last numbers of the 1024 players who dug last are saved with it.
     pub fn open(terrain: Terrain, store: &Store, settings: ServerSettings) -> Self {
         let number = store
             .get(&format!("{}{NUMBER}", prefix(store)))
@@ -41,7 +42,7 @@ impl Server {
         // Numbers near the end of their range were never given.
         let number = number.filter(|number| *number < u64::MAX / 2).unwrap_or_default();
         let mut server = Self::at(terrain, store.world_id(), number, settings);
-        server.own_numbers = OwnNumbers::open(store);
+        server.sequences = Sequences::open(store);
         server.saving = Saving::at(store.revision(), number);
         server
     }
@@ -55,7 +56,7 @@ impl Server {
     pub fn save(&mut self, store: &mut Store) -> Result<(), StoreError> {
         if self.saving.number != self.applied {
             store.put(format!("{RESERVED}{NUMBER}"), self.applied.to_le_bytes());
-            self.own_numbers.save(store);
+            self.sequences.save(store);
             store.follow(&mut self.terrain)?;
             self.saving.number = self.applied;
             // Without a commit among the records, they are certainly saved once the next commit is.
@@ -73,14 +74,14 @@ impl Server {
     }
 }
 
-impl OwnNumbers {
+impl Sequences {
     /// Sends changed numbers to a store.
     pub fn save(&mut self, store: &mut Store) {
         for client in std::mem::take(&mut self.changed) {
             let key = format!("{RESERVED}{KEY}{}", client.0);
             match self.applied.get(&client) {
-                Some(Applied { own, number }) => {
-                    store.put(key, [own.to_le_bytes(), number.to_le_bytes()].concat());
+                Some(Applied { sequence, number }) => {
+                    store.put(key, [sequence.to_le_bytes(), number.to_le_bytes()].concat());
                 }
                 None => store.remove(key),
             }
@@ -94,14 +95,14 @@ impl OwnNumbers {
         for (key, bytes) in store.game_data().range(prefix.clone()..) {
             let Some(id) = key.strip_prefix(&prefix) else { break };
             if let Ok(id) = id.parse()
-                && let Some((own, number)) = bytes.split_first_chunk()
+                && let Some((sequence, number)) = bytes.split_first_chunk()
                 && let Ok(number) = number.try_into()
             {
-                let [own, number] = [*own, number].map(u64::from_le_bytes);
+                let [sequence, number] = [*sequence, number].map(u64::from_le_bytes);
                 // One beyond the limit was never an honest player's.
-                if own <= MOST_OWN {
-                    numbers.note(ClientId(id), own);
-                    numbers.applied.insert(ClientId(id), Applied { own, number });
+                if sequence <= MAX_SEQUENCE {
+                    numbers.note(ClientId(id), sequence);
+                    numbers.applied.insert(ClientId(id), Applied { sequence, number });
                 }
             }
         }
@@ -115,7 +116,7 @@ mod tests {
 
     use super::*;
     use crate::ground::Ground;
-    use crate::net::server::own_numbers::MOST_SAVED;
+    use crate::net::server::sequences::MAX_SAVED;
     use crate::store::{SimulatedDisk, StoreOptions};
     use crate::terrain::TerrainSettings;
 
@@ -125,8 +126,8 @@ mod tests {
         let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         let disk = Arc::new(SimulatedDisk::new());
         let mut store = Store::create_in(disk, &mut terrain, StoreOptions::default()).expect("a new world");
-        let mut numbers = OwnNumbers::default();
-        let most = MOST_SAVED as u64;
+        let mut numbers = Sequences::default();
+        let most = MAX_SAVED as u64;
         (1..=most).for_each(|id| numbers.apply(ClientId(id), 10 * id, id));
         numbers.save(&mut store);
         assert!(numbers.changed.is_empty());
@@ -141,10 +142,12 @@ mod tests {
         store.put(key("/6001"), [0; 17]);
         store.put(key("/6002"), [255; 16]);
         store.put(format!("{RESERVED}number"), [0; 8]);
-        let again = OwnNumbers::open(&store);
-        assert_eq!(again.players(), MOST_SAVED);
-        for (id, own) in [(1, 77), (2, 0), (3, 30), (most, 10 * most), (5000, 3), (6000, 0), (u64::MAX, 0)] {
-            assert_eq!(again.last(ClientId(id)), own, "{id}");
+        let again = Sequences::open(&store);
+        assert_eq!(again.players(), MAX_SAVED);
+        for (id, sequence) in
+            [(1, 77), (2, 0), (3, 30), (most, 10 * most), (5000, 3), (6000, 0), (u64::MAX, 0)]
+        {
+            assert_eq!(again.last(ClientId(id)), sequence, "{id}");
         }
     }
 }

@@ -4,10 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::pace::Pace;
 use super::settings::ServerSettings;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
-use crate::net::bucket::Bucket;
+use crate::net::bucket::{Bucket, Rate};
 use crate::net::bulk::put_message;
 use crate::net::message::{RegionContent, ToClient};
 use crate::net::regions::chunks_of;
@@ -125,7 +126,7 @@ impl Encodings {
     }
 }
 
-/// The bulk lane of a client: limited in bytes a second, and in unacknowledged bytes by the window.
+/// The bulk lane of a client: limited in bytes a second and in unacknowledged bytes, both by its [pace](Pace).
 pub struct BulkSender {
     jobs: VecDeque<Job>,
     /// Regions among these.
@@ -141,7 +142,7 @@ pub struct BulkSender {
     /// progress again.
     noted: u64,
     least: u64,
-    window: u64,
+    pace: Pace,
     piece: usize,
 }
 
@@ -157,7 +158,7 @@ impl BulkSender {
             acknowledged: 0,
             noted: 0,
             least: (settings.window / 8).min(settings.bulk.per_second).max(1),
-            window: settings.window,
+            pace: Pace::new(settings),
             piece: (settings.piece as u64).min(settings.bulk.burst).min(settings.window).max(1) as usize,
         }
     }
@@ -210,8 +211,16 @@ impl BulkSender {
         goes_on
     }
 
+    /// The rate at which it may send.
+    pub fn rate(&self) -> Rate {
+        self.pace.rate()
+    }
+
     /// Records the number of bytes that have arrived. Returns `false` if it is impossible.
-    pub fn acknowledge(&mut self, bytes: u64) -> bool {
+    pub fn acknowledge(&mut self, bytes: u64, now: Duration) -> bool {
+        if self.acknowledged < bytes && bytes <= self.sent {
+            self.pace.acknowledge(bytes, self.sent, now);
+        }
         self.acknowledged = self.acknowledged.max(bytes.min(self.sent));
         bytes <= self.sent
     }
@@ -224,23 +233,29 @@ impl BulkSender {
         encodings: &mut Encodings,
     ) -> Option<Vec<u8>> {
         if self.at == self.stream.len() {
-            let message = self.next_message(encodings)?;
+            let Some(message) = self.next_message(encodings) else {
+                self.pace.stop();
+                return None;
+            };
             self.stream.clear();
             self.at = 0;
             put_message(&mut self.stream, &message);
         }
         let rest = self.stream.get(self.at..)?;
         let on_the_way = self.sent - self.acknowledged;
-        let room = self.window.saturating_sub(on_the_way).min(bucket.left(now));
         let whole = rest.len().min(self.piece);
-        // A tiny piece is not worth a message.
-        let is_worth_it = room >= whole as u64;
-        if !is_worth_it || !bucket.spend(now, whole as u64) {
+        // Only whole ones: a tiny piece is not worth a message.
+        if self.pace.window().saturating_sub(on_the_way) < whole as u64 {
+            self.pace.hold();
+            return None;
+        }
+        if !bucket.spend(now, whole as u64) {
             return None;
         }
         let piece = rest.get(..whole)?.to_vec();
         self.at += whole;
         self.sent += whole as u64;
+        self.pace.send(self.sent, now);
         Some(piece)
     }
 

@@ -1,4 +1,4 @@
-//! The limits of a server.
+//! Settings of a server: budgets of clients, reach, undo, and how much is kept.
 
 use std::time::Duration;
 
@@ -56,9 +56,11 @@ pub struct ServerSettings {
     pub undo_bytes: usize,
     /// Bytes of old entries that are kept for clients that reconnect.
     pub log_bytes: usize,
-    /// Bytes of the bulk lane for each client.
+    /// The most bytes of the bulk lane for each client. The lane begins at 256 KiB a second, or this rate if it is lower, and becomes
+    /// faster as long as acknowledgements show that the client's line carries it.
     pub bulk: Rate,
-    /// Bytes of each lane that a client may not have acknowledged. In the order lane, one message is sent in any case.
+    /// Bytes of each lane that a client may not have acknowledged. In the order lane, one message is sent in any case; in the bulk
+    /// lane, there are more in proportion to its rate.
     pub window: u64,
     /// Most bytes of a piece of the bulk lane.
     pub piece: usize,
@@ -81,7 +83,7 @@ impl Default for ServerSettings {
             undo: UndoPolicy::Nobody,
             undo_bytes: 64 << 20,
             log_bytes: 8 << 20,
-            bulk: Rate { per_second: 256 << 10, burst: 32 << 10 },
+            bulk: Rate { per_second: 2 << 20, burst: 256 << 10 },
             window: 512 << 10,
             piece: 1 << 10,
             // Some 40 ms, however much comes at once; at 30 frames a second, all that 64 players may spend.

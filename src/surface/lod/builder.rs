@@ -3,6 +3,7 @@
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
+use super::shares::{FinerShares, Shares, shares_in};
 use crate::ground::{Ground, GroundPage};
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{Indices, MaterialMix, SurfaceMesh, Vertex};
@@ -18,6 +19,8 @@ pub(super) struct Builder {
     vertices: Vec<Vertex>,
     indices: Vec<Number>,
     places: FxHashMap<IVec3, Number>,
+    /// Of the columns.
+    shares: Shares,
 }
 
 /// The vertex of a page's column with this number, relative to the column `low` at y = 0.
@@ -38,11 +41,15 @@ impl Builder {
         let columns = [along(low.x, high.x), along(low.z, high.z)];
         let [xs, zs] = &columns;
         let mut vertices = Vec::with_capacity(xs.len() * zs.len() + 4 * (xs.len() + zs.len()));
-        let page = ground.page(low, stride, [xs.len(), zs.len()]);
+        let counts @ [across, down] = [xs.len(), zs.len()];
+        // With those around, by which shares are found.
+        let page = ground.page(low.offset(-stride, -stride), stride, [across + 2, down + 2]);
+        let shares = shares_in(ground, &page, low, stride, counts);
+        let inside = |at: usize| (at / across + 1) * (across + 2) + at % across + 1;
         let places = zs.iter().flat_map(|&z| xs.iter().map(move |&x| Column::new(x, z)));
-        vertices.extend(places.enumerate().map(|(at, column)| page_vertex(&page, at, column, low)));
+        vertices.extend(places.enumerate().map(|(at, column)| page_vertex(&page, inside(at), column, low)));
         let indices = Vec::with_capacity((xs.len() - 1) * (zs.len() - 1) * 6);
-        Self { columns, stride, vertices, indices, places: FxHashMap::default() }
+        Self { columns, stride, vertices, indices, places: FxHashMap::default(), shares }
     }
 
     /// How many columns there are along x and along z.
@@ -99,7 +106,25 @@ impl Builder {
         }
     }
 
-    pub fn finish(self) -> SurfaceMesh {
+    /// The mesh, whose vertices of untouched ground have the shares of the materials that they stand for.
+    pub fn finish(mut self, finer: &FinerShares) -> SurfaceMesh {
+        let low = Column::new(self.columns[0][0], self.columns[1][0]);
+        for number in 0..self.vertices.len() {
+            let position = self.vertices[number].position;
+            if (position.x | position.z) & (SNAP - 1) != 0 {
+                continue;
+            }
+            let column = low.offset(position.x / SNAP, position.z / SNAP);
+            let own = || {
+                let own = self.column_at(column)? as usize;
+                Some((self.shares.alone[own], self.shares.mixes[own]))
+            };
+            let Some((alone, mix)) = finer.get(column).or_else(own) else { continue };
+            // Where edits show, a vertex has their materials.
+            if self.vertices[number].materials == MaterialMix::column(alone) {
+                self.vertices[number].materials = mix;
+            }
+        }
         SurfaceMesh { indices: Indices::new(self.vertices.len(), self.indices), vertices: self.vertices }
     }
 }

@@ -7,6 +7,7 @@ use rustc_hash::FxHashMap;
 use super::Fault;
 use super::builder::{Builder, Number, page_vertex};
 use super::edge::{Edge, shared_height_vertex};
+use super::shares::FinerShares;
 use super::sides::{Cell, Interval, SIDES};
 use super::view::LodView;
 use super::volumetric::Volumetric;
@@ -20,7 +21,9 @@ use crate::surface::{SurfaceMesh, Vertex, cases};
 pub(super) fn mesh(view: &LodView, node: Node) -> SurfaceMesh {
     let mut drawing = Drawing::new(view, node);
     drawing.draw();
-    drawing.builder.finish()
+    let counts = drawing.builder.column_counts();
+    let Drawing { low, high, stride, beside, .. } = drawing;
+    drawing.builder.finish(&FinerShares::new(view, low, high, stride, beside, counts))
 }
 
 /// A node under construction.

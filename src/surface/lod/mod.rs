@@ -17,6 +17,7 @@ mod drawing;
 mod edge;
 mod finest;
 mod near_bricks;
+mod shares;
 mod sides;
 mod view;
 mod volumetric;

@@ -27,9 +27,9 @@ pub(crate) fn draft_group(
     group: &[Submission],
 ) -> (Draft, LoosePieces) {
     let edits: Vec<&Edit> = group.iter().filter_map(|submission| submission.edit()).collect();
-    let terms = group.first().map(|first| &first.terms);
-    let rules = terms.and_then(|terms| terms.rules.as_deref());
-    match terms.and_then(|terms| terms.loose.as_ref()) {
+    let context = group.first().map(|first| &first.context);
+    let rules = context.and_then(|context| context.rules.as_deref());
+    match context.and_then(|context| context.loose.as_ref()) {
         Some(settings) => one_by_one(world, drafter, &edits, rules, settings),
         None => (drafter.draft(&edits, rules), LoosePieces::new()),
     }

@@ -18,8 +18,8 @@ pub use field_log::FieldChange;
 pub(crate) use parts::world_of;
 pub(crate) use resolved::{Resolved, install, patch_of};
 
-/// Resolves the orders of a transaction: edits, or one order of another kind; `target` is the content that a step through
-/// history restores.
+/// Resolves the orders of a transaction: edits, or one order of another kind; `target` is the content that a step
+/// through history restores.
 pub(super) fn orders(scene: Scene, submissions: &[Submission], target: Option<&UndoDelta>) -> Resolved {
     let single = match submissions {
         [own] => own.order.as_ref().ok().map(|order| (own, order)),

@@ -31,7 +31,7 @@ pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resol
         return Resolved { receipts, ..Resolved::nothing(world) };
     }
     let mut effect = EditEffect::default();
-    let rules = submission.terms.rules.as_deref();
+    let rules = submission.context.rules.as_deref();
     let found = Stages::time(&mut stages.edit, || {
         edits::reset(world.samples(), world.grid, edit, rules, &mut effect)
     });
@@ -58,7 +58,7 @@ pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resol
     let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let tags = if found.is_empty() { Vec::new() } else { vec![tag] };
     let replaced = change.patch.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
-    let delta = UndoDelta::new(change, replaced, submission.terms.group, (tags, Vec::new()));
+    let delta = UndoDelta::new(change, replaced, submission.context.group, (tags, Vec::new()));
     let EditEffect { removed, added, painted, refused, .. } = effect;
     let applied = Applied { chunks, bounds, removed, added, painted, refused, ..Applied::default() };
     stages.whole = start.elapsed();

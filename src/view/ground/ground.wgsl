@@ -5,20 +5,30 @@
     decal::clustered::apply_decals,
     mesh_functions,
     mesh_view_bindings::view,
-    pbr_fragment::pbr_input_from_standard_material,
+    pbr_fragment::pbr_input_from_vertex_output,
+    pbr_types,
 }
 
 #ifdef PREPASS_PIPELINE
 #import bevy_pbr::{
-    pbr_deferred_functions::deferred_output,
+    pbr_prepass_functions::calculate_motion_vector,
     prepass_io::{FragmentOutput, VertexOutput},
 }
+#ifdef DEFERRED_PREPASS
+#import bevy_pbr::pbr_deferred_functions::deferred_output
+#endif
 #else
 #import bevy_pbr::{
     forward_io::{FragmentOutput, VertexOutput},
     pbr_functions::{apply_pbr_lighting, main_pass_post_lighting_processing},
-    pbr_types::STANDARD_MATERIAL_FLAGS_UNLIT_BIT,
 }
+#ifdef SCREEN_SPACE_AMBIENT_OCCLUSION
+#import bevy_pbr::{
+    lighting::perceptualRoughnessToRoughness,
+    mesh_view_bindings::screen_space_ambient_occlusion_texture,
+    ssao_utils::ssao_multibounce,
+}
+#endif
 #endif
 
 #ifdef VISIBILITY_RANGE_DITHER
@@ -44,6 +54,8 @@ struct Ground {
     place: mat4x4<f32>,
     layers: array<Layer, 16>,
     tints: array<Tint, 16>,
+    // The strength of the large relief of each layer.
+    broad: array<vec4<f32>, 4>,
     near: f32,
     far: f32,
     variety: f32,
@@ -52,11 +64,19 @@ struct Ground {
     voxel: f32,
 }
 
+// What this material has in common with Bevy's standard one.
+struct Base {
+    color: vec4<f32>,
+    reflectance: f32,
+    is_unlit: u32,
+    has_fog: u32,
+}
+
+@group(#{MATERIAL_BIND_GROUP}) @binding(99) var<uniform> base: Base;
 @group(#{MATERIAL_BIND_GROUP}) @binding(100) var<uniform> ground: Ground;
 @group(#{MATERIAL_BIND_GROUP}) @binding(101) var albedo_texture: texture_2d_array<f32>;
-@group(#{MATERIAL_BIND_GROUP}) @binding(102) var albedo_sampler: sampler;
+@group(#{MATERIAL_BIND_GROUP}) @binding(102) var layer_sampler: sampler;
 @group(#{MATERIAL_BIND_GROUP}) @binding(103) var relief_texture: texture_2d_array<f32>;
-@group(#{MATERIAL_BIND_GROUP}) @binding(104) var relief_sampler: sampler;
 @group(#{MATERIAL_BIND_GROUP}) @binding(105) var noise_texture: texture_3d<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(106) var noise_sampler: sampler;
 
@@ -67,6 +87,9 @@ struct Vertex {
 #ifdef GROUND_ATTRIBUTES
     @location(8) ids: vec4<u32>,
     @location(9) weights: vec4<f32>,
+#endif
+#ifdef GROUND_SKY_LIGHT
+    @location(10) sky_light: vec4<f32>,
 #endif
 }
 
@@ -84,6 +107,10 @@ struct Varying {
     // Up to four layers, the same at all corners of a triangle, and the weight of each.
     @location(5) @interpolate(flat) layers: vec4<u32>,
     @location(6) weights: vec4<f32>,
+#endif
+#ifdef GROUND_SKY_LIGHT
+    // The share of the sky that lights this place, and how many voxels it was dug below the surface, `CUT_VOXELS` at most.
+    @location(7) sky_light: vec2<f32>,
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -132,6 +159,9 @@ fn vertex(in: Vertex) -> Varying {
     out.layers = min(in.ids, vec4(u32(ground.layer_count) - 1u));
     out.weights = in.weights;
 #endif
+#ifdef GROUND_SKY_LIGHT
+    out.sky_light = in.sky_light.xy * vec2(1.0, CUT_VOXELS);
+#endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
     let previous = mesh_functions::get_previous_world_from_local(in.instance_index);
@@ -141,9 +171,42 @@ fn vertex(in: Vertex) -> Varying {
     return out;
 }
 
-// How much coarser colours are far away, and how rough the ground is there.
-const FAR_BLUR: f32 = 3.0;
-const FAR_ROUGHNESS: f32 = 0.92;
+// Borders between layers: the size of a cell on the screen in pixels, how many voxels the noise spans, its strength, and the
+// largest power of two by which it multiplies a weight, near the camera and where cells are larger than voxels.
+const BORDER_PIXELS: f32 = 9.0;
+const BORDER_VOXELS: f32 = 5.0;
+const BORDER_NOISE: f32 = 6.0;
+const BORDER_MOST: f32 = 2.0;
+const BORDER_MOST_FAR: f32 = 2.6;
+// How much heights move a border, how wide it is, and the share from which on a second layer can show.
+const HEIGHT_SHIFT: f32 = 0.4;
+const BORDER_WIDTH: f32 = 0.10;
+const BORDER_START: f32 = 0.30;
+
+// How many times larger textures are far away, and how much coarser than a pixel asks for. Each time that the distance grows by
+// `FAR_STEP`, they do too: ground looks as rough as the same ground nearer by.
+const FAR_SCALE: f32 = 6.0;
+const FAR_STEP: f32 = 4.0;
+const FAR_BLUR: f32 = 2.0;
+// How many texels along its side a texture has at most, far away.
+const FAR_TEXELS: f32 = 64.0;
+const SOFT_TEXELS: f32 = 72.0;
+// The part of a step, on a scale of logarithms, in which one size gives way to the next one.
+const FAR_MIX: f32 = 0.2;
+// The relief is larger and turned the other way, so that the repetition of both does not add up.
+const RELIEF_SCALE: f32 = 2.3;
+// Metres from the camera up to which the large relief shows, and from which it has faded.
+const BROAD_NEAR: f32 = 900.0;
+const BROAD_FAR: f32 = 3000.0;
+const FAR_ROUGHNESS: f32 = 0.95;
+const STEEP_TINT: vec3<f32> = vec3(0.62, 0.56, 0.50);
+
+// Dug faces: how deep meshes tell, by how many voxels the height of the texture moves their rim, their colour, and that of the
+// band below the rim.
+const CUT_VOXELS: f32 = 8.0;
+const CUT_CRUMBS: f32 = 0.7;
+const CUT_TINT: vec3<f32> = vec3(0.90, 0.86, 0.82);
+const RIM_TINT: vec3<f32> = vec3(0.62, 0.55, 0.49);
 
 // Sides from which textures are laid on: along x, y, z.
 const X: u32 = 0u;
@@ -163,6 +226,11 @@ struct Site {
     next_weight: f32,
     // 0 near, 1 far.
     far: f32,
+    // How many times larger textures are there, and how much the next size shows.
+    scale: f32,
+    next_scale: f32,
+    // How much of the large relief shows: 1, and 0 farther away.
+    broad: f32,
 }
 
 // What textures say: colour and height; occlusion and roughness; by how much the normal leans.
@@ -218,7 +286,7 @@ fn albedo_at(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> vec4<f3
     // The sampler of the noise repeats and filters too, but alike in all directions.
     return textureSampleGrad(albedo_texture, noise_sampler, uv, layer, dx, dy);
 #else
-    return textureSampleGrad(albedo_texture, albedo_sampler, uv, layer, dx, dy);
+    return textureSampleGrad(albedo_texture, layer_sampler, uv, layer, dx, dy);
 #endif
 }
 
@@ -227,7 +295,7 @@ fn relief_at(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> vec4<f3
 #ifdef WITHOUT_ANISOTROPY
     return textureSampleGrad(relief_texture, noise_sampler, uv, layer, dx, dy);
 #else
-    return textureSampleGrad(relief_texture, relief_sampler, uv, layer, dx, dy);
+    return textureSampleGrad(relief_texture, layer_sampler, uv, layer, dx, dy);
 #endif
 }
 
@@ -298,16 +366,49 @@ fn near_side(layer: u32, side: u32, site: Site) -> Texels {
     return Texels(pair.albedo, pair.relief.zw, off_side(lean, side));
 }
 
-// A layer far from the camera, laid on from one side: its colours alone, six times as large.
-fn far_side(layer: u32, side: u32, site: Site) -> vec4<f32> {
-    let scale = ground.layers[layer].per_metre / 6.0;
+// How strong the large relief of a layer is.
+fn broad_relief(layer: u32) -> f32 {
+    return ground.broad[layer >> 2u][layer & 3u];
+}
+
+// A layer far from the camera, laid on from one side, several times as large.
+fn far_side(layer: u32, side: u32, site: Site, times: f32) -> Texels {
+    let settings = ground.layers[layer];
+    let scale = settings.per_metre / times;
     // Turned, so that large and small do not lie alike; but bedded rock keeps its beds level.
-    let way = select(vec2(0.8, 0.6), vec2(1.0, 0.0), is_bedded(layer) && side != Y);
+    let is_level = is_bedded(layer) && side != Y;
+    let way = select(vec2(0.8, 0.6), vec2(1.0, 0.0), is_level);
     let turn = mat2x2<f32>(way.x, way.y, -way.y, way.x);
-    // From coarser levels: joints six times as large as they are would be seen as what they are.
-    let size = f32(textureDimensions(albedo_texture).x) * scale * FAR_BLUR;
+    let at = on_side(site.place, side) * scale;
+    let texture = texture_of(layer, side);
+    let size = f32(textureDimensions(albedo_texture).x) * scale;
     let level = 0.5 * log2(max(dot(site.dx, site.dx), dot(site.dy, site.dy))) + log2(size);
-    return textureSampleLevel(albedo_texture, noise_sampler, turn * on_side(site.place, side) * scale, texture_of(layer, side), level);
+    // From coarse levels: joints and stones several times as large as they are would be seen as what they are.
+    let coarse = max(level + log2(FAR_BLUR), log2(f32(textureDimensions(albedo_texture).x) / FAR_TEXELS));
+    let color = textureSampleLevel(albedo_texture, noise_sampler, turn * at, texture, coarse);
+    let broad = broad_relief(layer);
+    let strength = site.broad * broad;
+    if strength <= 0.0 {
+        return Texels(color, vec2(1.0, FAR_ROUGHNESS), vec3(0.0));
+    }
+    // The other way round.
+    let large = select(1.0 / RELIEF_SCALE, 1.0, is_level);
+    // That of layer 0, as other layers have stones and blades in it; but beds are beds at any size. Soft layers have none of its
+    // cracks.
+    let soft = (1.0 - smoothstep(0.5, 0.75, broad)) * log2(f32(textureDimensions(relief_texture).x) / SOFT_TEXELS);
+    let relief = textureSampleLevel(
+        relief_texture, noise_sampler, (at * turn) * large, select(0, texture, is_level), max(level + log2(large), soft));
+    let lean = turn * ((relief.xy * 2.0 - 1.0) * strength);
+    return Texels(color, vec2(mix(1.0, relief.z, strength), FAR_ROUGHNESS), off_side(lean, side));
+}
+
+// A layer far from the camera, from the sides that show.
+fn far_at(layer: u32, site: Site, times: f32) -> Texels {
+    var texels = far_side(layer, site.side, site, times);
+    if site.next_weight > 0.0 {
+        texels = mix_texels(texels, far_side(layer, site.next_side, site, times), site.next_weight);
+    }
+    return texels;
 }
 
 // Another texture shows from above: the layer's own has beds.
@@ -330,11 +431,11 @@ fn layer_at(layer: u32, site: Site) -> Texels {
         }
     }
     if site.far > 0.0 {
-        var color = far_side(layer, site.side, site);
-        if site.next_weight > 0.0 {
-            color = mix(color, far_side(layer, site.next_side, site), site.next_weight);
+        var broad = far_at(layer, site, site.scale);
+        if site.next_scale > 0.0 {
+            broad = mix_texels(broad, far_at(layer, site, FAR_STEP * site.scale), site.next_scale);
         }
-        texels = mix_texels(texels, Texels(color, vec2(1.0, FAR_ROUGHNESS), vec3(0.0)), site.far);
+        texels = mix_texels(texels, broad, site.far);
     }
     texels.color = vec4(texels.color.rgb * ground.tints[layer].color, texels.color.a);
     return texels;
@@ -346,15 +447,55 @@ struct Choice {
     share: f32,
 }
 
-// Noise moves the borders between layers: together with heights by less than half the way to the next vertex.
-fn choose(in: Varying, place: vec3<f32>) -> Choice {
+// How many octaves cells of the ground are larger than a voxel at a distance from the camera: levels of detail draw cells of
+// several pixels.
+fn octave_of(distance: f32) -> f32 {
+    // An orthographic lens shows all distances alike.
+    let depth = select(distance, 1.0, view.clip_from_view[3][3] == 1.0);
+    let pixels_per_metre = 0.5 * view.viewport.w * view.clip_from_view[1][1] / depth;
+    return max(log2(BORDER_PIXELS / (pixels_per_metre * ground.voxel)), 0.0);
+}
+
+// Noise of about the size of a cell.
+fn border_noise(place: vec3<f32>, octave: f32) -> vec4<f32> {
+    let metres = BORDER_VOXELS * ground.voxel * exp2(floor(octave));
+    let noise = noise_at(place, metres);
+    if octave <= 0.0 {
+        return noise;
+    }
+    return mix(noise, noise_at(place, 2.0 * metres), fract(octave));
+}
+
+// The noise of a layer: no two layers have the same one. By the layer's number, since its place in the list may be another one
+// in the next mesh.
+fn noise_of(noise: vec4<f32>, layer: u32) -> f32 {
+    return dot(noise, select(vec4(-0.5), vec4(0.5), (vec4(layer) & vec4(1u, 2u, 4u, 8u)) != vec4(0u)));
+}
+
+// Noise moves the borders between layers. It multiplies weights, so a layer shows only where a corner of the triangle has it, and
+// near the camera a border strays from the middle between two corners by less than half a voxel.
+fn choose(in: Varying, site: Site, distance: f32) -> Choice {
 #ifdef GROUND_ATTRIBUTES
     let layers = in.layers;
     var weights = in.weights;
+    let across = dpdx(in.weights);
+    let down = dpdy(in.weights);
     if max(max(weights.x, weights.y), max(weights.z, weights.w)) < 0.999 {
-        let patches = clamp(1.0 + noise_at(place, 4.5), vec4(0.7), vec4(1.3));
-        // By the layer's number: its place in the list may be another one in the next mesh.
-        weights *= vec4(patches[layers.x & 3u], patches[layers.y & 3u], patches[layers.z & 3u], patches[layers.w & 3u]);
+        let octave = octave_of(distance);
+        let noise = border_noise(site.place, octave);
+        var rise =
+            vec4(noise_of(noise, layers.x), noise_of(noise, layers.y), noise_of(noise, layers.z), noise_of(noise, layers.w));
+        // Only differences count: what all that show have in common would use up the limit.
+        rise = BORDER_NOISE * (rise - dot(weights, rise));
+        // Weights that change slowly move little: or borders would stray farther than half a cell.
+        let along = dot(site.dx, site.dy);
+        let squares = vec2(dot(site.dx, site.dx), dot(site.dy, site.dy));
+        let area = max(squares.x * squares.y - along * along, 1e-12);
+        let slopes = across * across * squares.y - 2.0 * along * across * down + down * down * squares.x;
+        let slope = sqrt(max(max(max(slopes.x, slopes.y), max(slopes.z, slopes.w)), 0.0) / area);
+        let share = min(slope * ground.voxel * exp2(octave), 1.0);
+        let most = vec4(share * mix(BORDER_MOST, BORDER_MOST_FAR, min(octave, 1.0)));
+        weights *= exp2(clamp(rise, -most, most));
     }
     // The winner and the loser of each half.
     let is_left = weights.xz >= weights.yw;
@@ -385,6 +526,53 @@ fn facing(normal: vec3<f32>, ground_normal: vec3<f32>, eye: vec3<f32>) -> vec3<f
     return normalize(normal + max(lacking, 0.0) * eye);
 }
 
+// Depth and motion alone, behind the vertex stage of `prepass.wgsl`.
+#ifdef GROUND_PLAIN_PREPASS
+#ifdef PREPASS_FRAGMENT
+@fragment
+fn fragment(in: VertexOutput) -> FragmentOutput {
+#ifdef VISIBILITY_RANGE_DITHER
+    pbr_functions::visibility_range_dither(in.position, in.visibility_range_dither);
+#endif
+    var out: FragmentOutput;
+#ifdef UNCLIPPED_DEPTH_ORTHO_EMULATION
+    out.frag_depth = in.unclipped_depth;
+#endif
+#ifdef MOTION_VECTOR_PREPASS
+    out.motion_vector = calculate_motion_vector(in.world_position, in.previous_world_position);
+#endif
+    return out;
+}
+#else
+@fragment
+fn fragment(in: VertexOutput) {
+#ifdef VISIBILITY_RANGE_DITHER
+    pbr_functions::visibility_range_dither(in.position, in.visibility_range_dither);
+#endif
+}
+#endif
+#else
+// The share of ambient and indirect light that reaches a place: that of the sky above it.
+fn sky_light_of(in: Varying) -> f32 {
+#ifdef GROUND_SKY_LIGHT
+    return in.sky_light.x;
+#else
+    return 1.0;
+#endif
+}
+
+// How much a place is a dug face, and how much it is the band below the rim of one, whose edge crumbles: by the height of the
+// texture there.
+fn cut_of(in: Varying, height: f32) -> vec2<f32> {
+#ifdef GROUND_SKY_LIGHT
+    let deep = in.sky_light.y + CUT_CRUMBS * (height - 0.5) * smoothstep(0.0, 0.3, in.sky_light.y);
+    let cut = smoothstep(0.1, 0.4, deep);
+    return vec2(cut, cut * (1.0 - smoothstep(0.9, 2.6, deep)));
+#else
+    return vec2(0.0);
+#endif
+}
+
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutput {
 #ifdef VISIBILITY_RANGE_DITHER
@@ -407,7 +595,11 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
 #ifdef VERTEX_COLORS
     plain.color = vec4(1.0);
 #endif
-    var pbr_input = pbr_input_from_standard_material(plain, is_front);
+    var pbr_input = pbr_input_from_vertex_output(plain, is_front, false);
+    pbr_input.material.flags = pbr_types::STANDARD_MATERIAL_FLAGS_ALPHA_MODE_OPAQUE
+        | select(0u, pbr_types::STANDARD_MATERIAL_FLAGS_UNLIT_BIT, base.is_unlit != 0u)
+        | select(0u, pbr_types::STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT, base.has_fog != 0u);
+    pbr_input.material.reflectance = vec3(base.reflectance);
 
     var site: Site;
     let place = place_from_world(in.instance_index);
@@ -417,20 +609,25 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     site.dy = dpdy(site.place);
     site.normal = normalize(turn * in.world_normal);
     face(&site);
-    site.far = smoothstep(ground.near, ground.far, length(view.world_position - in.world_position.xyz));
+    let distance = length(view.world_position - in.world_position.xyz);
+    site.far = smoothstep(ground.near, ground.far, distance);
+    site.broad = 1.0 - smoothstep(BROAD_NEAR, BROAD_FAR, distance);
+    let steps = max(log2(distance / ground.far) / log2(FAR_STEP), 0.0);
+    site.scale = FAR_SCALE * pow(FAR_STEP, floor(steps));
+    site.next_scale = smoothstep(1.0 - FAR_MIX, 1.0, fract(steps));
 
-    let choice = choose(in, site.place);
+    let choice = choose(in, site, distance);
     let best = choice.layers.x;
     let next = choice.layers.y;
     var texels = layer_at(best, site);
     var metallic = ground.layers[best].metallic;
-    // A height counts at most three times as much as another one: what is much weaker does not show.
-    if choice.share > 0.05 {
+    if choice.share > BORDER_START {
         let other = layer_at(next, site);
         // What stands high covers what lies low.
-        let scores = vec2(1.0 - choice.share, choice.share) * (vec2(texels.color.a, other.color.a) + 0.5);
-        let cubes = scores * scores * scores;
-        let share = cubes.y / (cubes.x + cubes.y);
+        let most = 0.5 - BORDER_WIDTH - BORDER_START;
+        let rise = clamp(HEIGHT_SHIFT * (other.color.a - texels.color.a), -most, most);
+        // Half on the border itself, from either side.
+        let share = smoothstep(0.5 - BORDER_WIDTH, 0.5 + BORDER_WIDTH, choice.share + rise);
         texels = mix_texels(texels, other, share);
         metallic = mix(metallic, ground.layers[next].metallic, share);
     }
@@ -438,21 +635,57 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     // No two places have quite the same tint.
     color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(in.mood.x, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-in.mood.x, 0.0));
     color *= 1.0 + (0.16 + 0.3 * site.far) * in.mood.y;
+    // Dug faces are fresh: moist, rough, and darkest below the rim, where roots and crumbs are.
+    let cut = cut_of(in, texels.color.a) * min(2.0 * ground.variety, 1.0);
+    color *= mix(vec3(1.0), CUT_TINT, cut.x) * mix(vec3(1.0), RIM_TINT, cut.y);
+    texels.finish.y = mix(texels.finish.y, 1.0, 0.5 * cut.x);
+    texels.finish.x *= 1.0 - 0.25 * cut.y;
+    texels.lean *= 1.0 + 0.35 * cut.x;
+    let lean = texels.lean - dot(texels.lean, site.normal) * site.normal;
+    let bent = normalize(site.normal + lean);
+    // Nothing gathers on steep ground: it is darker, and warmer than what lies above and below.
+    color *= mix(vec3(1.0), STEEP_TINT, ground.variety * site.far * smoothstep(0.1, 0.6, 1.0 - bent.y));
 
-    pbr_input.material.base_color = vec4(pbr_input.material.base_color.rgb * color, 1.0);
+    pbr_input.material.base_color = vec4(base.color.rgb * color, 1.0);
     pbr_input.material.perceptual_roughness = clamp(texels.finish.y, 0.089, 1.0);
     pbr_input.material.metallic = metallic;
-    pbr_input.diffuse_occlusion *= texels.finish.x;
-    pbr_input.specular_occlusion *= texels.finish.x;
-    let lean = texels.lean - dot(texels.lean, site.normal) * site.normal;
-    pbr_input.N = facing(normalize(normalize(site.normal + lean) * turn), normalize(in.world_normal), pbr_input.V);
-    apply_decals(&pbr_input);
+    let open_sky = texels.finish.x * sky_light_of(in);
+    pbr_input.diffuse_occlusion = vec3(open_sky);
+    pbr_input.specular_occlusion = open_sky;
+    pbr_input.N = facing(normalize(bent * turn), normalize(in.world_normal), pbr_input.V);
+    // What changes from pixel to pixel would sparkle: it is rough (Tokuyoshi and Kaplanyan 2019).
+    let bend_x = dpdx(pbr_input.N);
+    let bend_y = dpdy(pbr_input.N);
+    let variance = min(0.5 * (dot(bend_x, bend_x) + dot(bend_y, bend_y)), 0.2);
+    let roughness = pbr_input.material.perceptual_roughness;
+    pbr_input.material.perceptual_roughness = sqrt(sqrt(min(roughness * roughness * roughness * roughness + variance, 1.0)));
+#ifdef SCREEN_SPACE_AMBIENT_OCCLUSION
+    // As Bevy's standard material has it (Lagarde and Rousiers 2014).
+    let open = textureLoad(screen_space_ambient_occlusion_texture, vec2<i32>(in.position.xy), 0i).r;
+    let dullness = exp2(-16.0 * perceptualRoughnessToRoughness(pbr_input.material.perceptual_roughness) - 1.0);
+    let facing_eye = max(dot(pbr_input.N, pbr_input.V), 0.0001);
+    pbr_input.diffuse_occlusion *= ssao_multibounce(open, pbr_input.material.base_color.rgb);
+    pbr_input.specular_occlusion *= saturate(pow(facing_eye + open, dullness) - 1.0 + open);
+#endif
 
 #ifdef PREPASS_PIPELINE
+#ifdef DEFERRED_PREPASS
+    apply_decals(&pbr_input);
     return deferred_output(plain, pbr_input);
 #else
     var out: FragmentOutput;
-    if (pbr_input.material.flags & STANDARD_MATERIAL_FLAGS_UNLIT_BIT) == 0u {
+#ifdef NORMAL_PREPASS
+    out.normal = vec4(0.5 * pbr_input.N + 0.5, 1.0);
+#endif
+#ifdef MOTION_VECTOR_PREPASS
+    out.motion_vector = calculate_motion_vector(in.world_position, in.previous_world_position);
+#endif
+    return out;
+#endif
+#else
+    apply_decals(&pbr_input);
+    var out: FragmentOutput;
+    if base.is_unlit == 0u {
         out.color = apply_pbr_lighting(pbr_input);
     } else {
         out.color = pbr_input.material.base_color;
@@ -461,3 +694,4 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     return out;
 #endif
 }
+#endif

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use crate::plugin::SlimVertices;
+use crate::plugin::{SkyLight, SlimVertices};
 
 /// Most layers of a ground; ids from the last one on share it.
 pub const MAX_LAYERS: usize = 16;
@@ -22,14 +22,14 @@ pub const MAX_LAYERS: usize = 16;
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default)]
-#[require(SlimVertices)]
+#[require(SlimVertices, SkyLight)]
 pub struct GroundLook {
     /// The layers, by number; [`MAX_LAYERS`] at most.
     pub layers: Vec<GroundLayer>,
     /// Distances from the camera in metres: up to the first, textures have their own scale; beyond the second, six times it,
-    /// and colours alone.
+    /// four times as much each time that the distance grows as much, with a large relief that fades out until 3 km.
     pub distance: (f32, f32),
-    /// The variation of tints from place to place, 0 to 1.
+    /// The variation of tints from place to place, and far away by slope, and on dug faces: 0 to 1.
     pub variety: f32,
     /// The texture fetches per pixel.
     pub quality: GroundQuality,
@@ -43,6 +43,9 @@ pub struct GroundLayer {
     pub metres: f32,
     /// The strength of its relief: 1 as in its texture, 0 flat.
     pub relief: f32,
+    /// The strength of its large relief, far from the camera, which is that of layer 0 or, if it has another [`top`](Self::top), its
+    /// own: 1 for crags, less for what lies smooth, 0 for works.
+    pub broad_relief: f32,
     /// How metallic it is, 0 to 1.
     pub metallic: f32,
     /// Its colours are multiplied by this.
@@ -56,7 +59,15 @@ pub struct GroundLayer {
 
 impl Default for GroundLayer {
     fn default() -> Self {
-        Self { metres: 4.0, relief: 1.0, metallic: 0.0, tint: LinearRgba::WHITE, has_pieces: true, top: None }
+        Self {
+            metres: 4.0,
+            relief: 1.0,
+            broad_relief: 0.5,
+            metallic: 0.0,
+            tint: LinearRgba::WHITE,
+            has_pieces: true,
+            top: None,
+        }
     }
 }
 
@@ -75,23 +86,23 @@ pub enum GroundQuality {
 impl Default for GroundLook {
     /// The look for [`GroundTextures::Baked`](super::GroundTextures::Baked).
     fn default() -> Self {
-        let layer = |metres, relief| GroundLayer { metres, relief, ..default() };
-        let bedded = |metres, top| GroundLayer { top: Some(top), ..layer(metres, 1.0) };
-        let ore = |metres, metallic| GroundLayer { metallic, ..layer(metres, 1.0) };
+        let layer = |metres, broad_relief| GroundLayer { metres, broad_relief, ..default() };
+        let bedded = |metres, top| GroundLayer { top: Some(top), ..layer(metres, 0.9) };
+        let ore = |metres, metallic| GroundLayer { metallic, ..layer(metres, 0.8) };
         Self {
             layers: vec![
                 layer(6.0, 1.0),
-                layer(3.0, 0.8),
-                layer(4.0, 1.0),
-                layer(6.0, 1.0),
-                layer(4.0, 1.0),
-                GroundLayer { has_pieces: false, ..layer(4.0, 1.0) },
-                layer(2.5, 1.0),
+                GroundLayer { relief: 0.8, ..layer(3.0, 0.4) },
+                layer(4.0, 0.35),
+                layer(6.0, 0.4),
+                layer(4.0, 0.5),
+                GroundLayer { has_pieces: false, ..layer(4.0, 0.0) },
+                layer(2.5, 0.8),
                 ore(2.5, 0.35),
-                layer(3.0, 1.0),
+                layer(3.0, 0.5),
                 bedded(5.0, 14),
                 bedded(4.0, 15),
-                layer(2.5, 1.0),
+                layer(2.5, 0.7),
                 ore(2.5, 0.2),
                 ore(2.5, 0.25),
             ],

@@ -1,26 +1,95 @@
 //! The material: bindings and pipelines of `ground.wgsl`.
 
 use bevy::asset::Asset;
+use bevy::material::OpaqueRendererMethod;
 use bevy::mesh::{Mesh, MeshVertexBufferLayoutRef};
 use bevy::pbr::{
-    ExtendedMaterial, MaterialExtension, MaterialExtensionKey, MaterialExtensionPipeline, StandardMaterial,
+    ExtendedMaterial, MaterialExtension, MaterialExtensionKey, MaterialExtensionPipeline, MaterialPipeline,
+    MaterialPipelineKey,
 };
 use bevy::prelude::*;
 use bevy::reflect::TypePath;
 use bevy::render::render_resource::{
-    AsBindGroup, RenderPipelineDescriptor, ShaderType, SpecializedMeshPipelineError,
+    AsBindGroup, Face, RenderPipelineDescriptor, ShaderType, SpecializedMeshPipelineError,
 };
 use bevy::shader::{ShaderDefVal, ShaderRef};
 
 use super::super::vertex::prepass_vertex_shader;
 use super::look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
-use crate::plugin::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
+use crate::plugin::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT};
 
-/// The material of terrains with a [`GroundLook`]: Bevy's `StandardMaterial`, whose colour, roughness and relief come from
+/// The material of terrains with a [`GroundLook`]: lit like Bevy's `StandardMaterial`, with colour, roughness and relief from
 /// layers of texture. Shadows, fog, clustered decals, prepasses and deferred rendering work as they do there.
 ///
 /// Meshes without the attributes of a terrain show layer 0.
-pub type GroundMaterial = ExtendedMaterial<StandardMaterial, GroundExtension>;
+pub type GroundMaterial = ExtendedMaterial<GroundBase, GroundExtension>;
+
+/// What a [`GroundMaterial`] has in common with Bevy's `StandardMaterial`, without that material's textures and samplers, of
+/// which GPUs have few: none of its fields has one.
+#[derive(Asset, AsBindGroup, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+#[uniform(99, BaseUniform)]
+pub struct GroundBase {
+    /// The colours of all layers are multiplied by this.
+    pub base_color: Color,
+    /// How much non-metals reflect, as in `StandardMaterial`: 0 to 1.
+    pub reflectance: f32,
+    /// Whether the ground shows its colours without any light.
+    pub unlit: bool,
+    /// Whether a camera's `DistanceFog` applies.
+    pub fog_enabled: bool,
+    /// Forward or deferred rendering.
+    pub opaque_render_method: OpaqueRendererMethod,
+}
+
+impl Default for GroundBase {
+    fn default() -> Self {
+        Self {
+            base_color: Color::WHITE,
+            reflectance: 0.3,
+            unlit: false,
+            fog_enabled: true,
+            opaque_render_method: OpaqueRendererMethod::Auto,
+        }
+    }
+}
+
+/// A [`GroundBase`], as `ground.wgsl` has it.
+#[derive(ShaderType, Clone, Copy, Debug)]
+pub(super) struct BaseUniform {
+    color: Vec4,
+    reflectance: f32,
+    is_unlit: u32,
+    has_fog: u32,
+}
+
+impl From<&GroundBase> for BaseUniform {
+    fn from(base: &GroundBase) -> Self {
+        Self {
+            color: base.base_color.to_linear().to_vec4(),
+            reflectance: base.reflectance,
+            is_unlit: base.unlit.into(),
+            has_fog: base.fog_enabled.into(),
+        }
+    }
+}
+
+impl Material for GroundBase {
+    fn opaque_render_method(&self) -> OpaqueRendererMethod {
+        self.opaque_render_method
+    }
+
+    fn specialize(
+        _: &MaterialPipeline,
+        descriptor: &mut RenderPipelineDescriptor,
+        _: &MeshVertexBufferLayoutRef,
+        _: MaterialPipelineKey<Self>,
+    ) -> Result<(), SpecializedMeshPipelineError> {
+        // In all passes alike: with a depth prepass, ground would be missing otherwise.
+        descriptor.primitive.cull_mode = Some(Face::Back);
+        Ok(())
+    }
+}
 
 /// The part of a [`GroundMaterial`] that is not Bevy's.
 #[derive(Asset, AsBindGroup, TypePath, Clone, Debug, PartialEq)]
@@ -28,13 +97,12 @@ pub type GroundMaterial = ExtendedMaterial<StandardMaterial, GroundExtension>;
 pub struct GroundExtension {
     #[uniform(100)]
     pub(super) uniform: GroundUniform,
-    /// Colours (sRGB) and, in alpha, heights of the layers.
+    /// Colours (sRGB) and, in alpha, heights of the layers. Its sampler is that of `relief` too.
     #[texture(101, dimension = "2d_array")]
     #[sampler(102)]
     pub albedo: Option<Handle<Image>>,
     /// x and y of the layers' normals, occlusion, roughness.
     #[texture(103, dimension = "2d_array")]
-    #[sampler(104)]
     pub relief: Option<Handle<Image>>,
     /// Four kinds of noise in space.
     #[texture(105, dimension = "3d", visibility(vertex, fragment))]
@@ -86,6 +154,8 @@ pub(super) struct GroundUniform {
     pub place: Mat4,
     layers: [LayerUniform; MAX_LAYERS],
     tints: [TintUniform; MAX_LAYERS],
+    /// The strength of the large relief of each layer.
+    broad: [Vec4; MAX_LAYERS / 4],
     near: f32,
     far: f32,
     variety: f32,
@@ -111,6 +181,9 @@ impl GroundUniform {
             tints: std::array::from_fn(|at| {
                 let GroundLayer { tint, top, .. } = layer(at);
                 TintUniform { color: tint.to_vec3(), top: top.map_or(-1.0, f32::from) }
+            }),
+            broad: std::array::from_fn(|four| {
+                Vec4::from_array(std::array::from_fn(|at| layer(4 * four + at).broad_relief))
             }),
             near: look.distance.0,
             far: look.distance.1.max(look.distance.0 + 0.1),
@@ -146,6 +219,9 @@ impl MaterialExtension for GroundExtension {
     fn prepass_vertex_shader() -> ShaderRef {
         prepass_vertex_shader()
     }
+    fn prepass_fragment_shader() -> ShaderRef {
+        SHADER.into()
+    }
     fn deferred_vertex_shader() -> ShaderRef {
         SHADER.into()
     }
@@ -159,10 +235,19 @@ impl MaterialExtension for GroundExtension {
         layout: &MeshVertexBufferLayoutRef,
         key: MaterialExtensionKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
-        let has = |name: &str| descriptor.vertex.shader_defs.contains(&ShaderDefVal::from(name));
-        // Depth, shadows and motion take the attributes that Bevy's prepass does.
+        let definitions = descriptor.vertex.shader_defs.clone();
+        let has = |name: &str| definitions.contains(&ShaderDefVal::from(name));
         if has("PREPASS_PIPELINE") && !has("DEFERRED_PREPASS") {
-            return Ok(());
+            match &mut descriptor.fragment {
+                // Normals have relief, which takes what the main pass takes.
+                Some(fragment) if has("NORMAL_PREPASS") => descriptor.vertex.shader = fragment.shader.clone(),
+                // Depth, shadows and motion take the attributes that Bevy's prepass does.
+                fragment => {
+                    let fragment = fragment.iter_mut();
+                    fragment.for_each(|fragment| fragment.shader_defs.push("GROUND_PLAIN_PREPASS".into()));
+                    return Ok(());
+                }
+            }
         }
         let mut attributes = vec![
             Mesh::ATTRIBUTE_POSITION.at_shader_location(0),
@@ -174,6 +259,15 @@ impl MaterialExtension for GroundExtension {
                 own.iter().zip(8..).map(|(attribute, location)| attribute.at_shader_location(location)),
             );
             let definition = ShaderDefVal::from("GROUND_ATTRIBUTES");
+            descriptor.vertex.shader_defs.push(definition.clone());
+            if let Some(fragment) = &mut descriptor.fragment {
+                fragment.shader_defs.push(definition);
+            }
+        }
+        // Pieces have none.
+        if layout.0.contains(ATTRIBUTE_SKY_LIGHT.id) {
+            attributes.push(ATTRIBUTE_SKY_LIGHT.at_shader_location(10));
+            let definition = ShaderDefVal::from("GROUND_SKY_LIGHT");
             descriptor.vertex.shader_defs.push(definition.clone());
             if let Some(fragment) = &mut descriptor.fragment {
                 fragment.shader_defs.push(definition);

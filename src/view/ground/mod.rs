@@ -10,25 +10,29 @@
 //! # How layers meet
 //!
 //! The corners of a triangle list the same materials, each with a weight that is blended between them: linear along any edge,
-//! whichever triangle one comes from. A pixel samples its two strongest layers, less the weight of the third one, so that none
-//! comes or goes with a jump. Which of the two is on top is decided by their heights. So what shows is always what a vertex of
-//! the triangle has, and a border strays from the middle between two vertices by less than half their distance.
+//! whichever triangle one comes from. Noise of about the size of a cell multiplies the weights, so that borders do not run along
+//! edges of triangles. A pixel samples its two strongest layers, less the weight of the third one, so that none comes or goes
+//! with a jump, and where both weigh nearly the same their heights decide which is on top. So what shows is always what a vertex
+//! of the triangle has, and a border strays from the middle between two vertices by less than half their distance.
 
 mod bake;
+mod cache;
 mod fit;
 mod look;
 mod material;
 mod noise;
 mod pack;
+mod paint;
 mod palette;
 mod pieces;
 #[cfg(test)]
 mod stage;
 mod textures;
 
+pub use cache::GroundTextureCache;
 pub use fit::GroundTexturesError;
 pub use look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
-pub use material::{GroundExtension, GroundMaterial};
+pub use material::{GroundBase, GroundExtension, GroundMaterial};
 pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
 
@@ -38,7 +42,7 @@ use bevy::prelude::*;
 
 use super::vertex::VertexPlugin;
 use crate::plugin::{
-    BurrowSystems, GroundPiece, SlimVertices, propagate_look, remove_inherited, warn_of_textures,
+    BurrowSystems, GroundPiece, SkyLight, SlimVertices, propagate_look, remove_inherited, warn_of_textures,
     warn_of_undrawn,
 };
 use crate::terrain::Terrain;
@@ -123,7 +127,6 @@ fn add_materials(
         if current.is_some_and(fits) {
             continue;
         }
-        let base = StandardMaterial { reflectance: 0.3, ..default() };
         let extension = GroundExtension {
             uniform: GroundUniform::new(look, place),
             albedo: Some(textures.albedo.clone()),
@@ -132,7 +135,7 @@ fn add_materials(
             without_anisotropy: textures.without_anisotropy,
             quality: look.quality,
         };
-        let base = current.map_or(base, |current| current.base.clone());
+        let base = current.map_or_else(GroundBase::default, |current| current.base.clone());
         let own = materials.add(GroundMaterial { base, extension });
         commands.entity(entity).try_insert((OwnMaterial(own.id()), MeshMaterial3d(own)));
     }
@@ -140,7 +143,7 @@ fn add_materials(
 
 /// Restores vertex colours on a terrain that lost its look.
 fn thicken_vertices(gone: On<Remove, GroundLook>, mut commands: Commands) {
-    commands.entity(gone.entity).try_remove::<SlimVertices>();
+    commands.entity(gone.entity).try_remove::<(SlimVertices, SkyLight)>();
 }
 
 /// Removes the material of a terrain that has lost its look and has no other material.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::GroundTextures;
 use super::bake::array;
+use super::paint::{levels, mean_roughness};
 
 /// Most texels along a side.
 const MAX_SIDE: u32 = 4096;
@@ -116,7 +117,8 @@ pub struct GroundArrays {
 
 impl GroundArrays {
     /// Packs the pictures of all layers, in the order of their numbers. Takes up to seconds, over all of rayon's threads:
-    /// work for a task or a loading screen. Colours are averaged as light, normals keep their length. Samplers repeat,
+    /// work for a task or a loading screen. Colours are averaged as light, normals keep their length, and what they vary by
+    /// makes smaller versions rougher, so that nothing sparkles far away. Samplers repeat,
     /// with fourfold anisotropic filtering, which software renderers skip; both images can be given other samplers.
     ///
     /// # Errors
@@ -135,10 +137,12 @@ impl GroundArrays {
             .collect();
         // The first error by number, whichever came first.
         let packed: Vec<_> = packed.into_iter().collect::<Result<_, _>>()?;
+        let count = packed.len() as u32;
         let (albedo, relief): (Vec<_>, Vec<_>) = packed.into_iter().unzip();
+        let array = |layers: Vec<Vec<u8>>, format| array(layers.concat(), count, side, format, ANISOTROPY);
         Ok(Self {
-            albedo: array(&albedo, side, TextureFormat::Rgba8UnormSrgb, ANISOTROPY),
-            relief: array(&relief, side, TextureFormat::Rgba8Unorm, ANISOTROPY),
+            albedo: array(albedo, TextureFormat::Rgba8UnormSrgb),
+            relief: array(relief, TextureFormat::Rgba8Unorm),
         })
     }
 
@@ -203,39 +207,21 @@ fn texels(mut image: Image) -> Result<Texels, IntoDynamicImageError> {
     Ok(image.try_into_dynamic()?.into_rgba8().pixels().map(|texel| texel.0).collect())
 }
 
-/// A picture and all its mip levels, one after another.
-fn levels(picture: Texels, side: u32, mean: fn([[u8; 4]; 4]) -> [u8; 4]) -> Vec<u8> {
-    let mut bytes = picture.as_flattened().to_vec();
-    let (mut level, mut side) = (picture, side as usize);
-    while side > 1 {
-        let half = side / 2;
-        level = (0..half * half)
-            .map(|texel| {
-                let at = 2 * (texel / half) * side + 2 * (texel % half);
-                mean([at, at + 1, at + side, at + side + 1].map(|at| level[at]))
-            })
-            .collect();
-        bytes.extend_from_slice(level.as_flattened());
-        side = half;
-    }
-    bytes
-}
-
 /// Colours are averaged as light.
 fn mean_color(four: [[u8; 4]; 4]) -> [u8; 4] {
     let [a, b, c, d] = four.map(|texel| LinearRgba::from(Srgba::from_u8_array(texel)));
     Srgba::from((a + b + c + d) / 4.0).to_u8_array()
 }
 
-/// Normals are averaged as directions.
+/// Normals are averaged as directions; the more they vary, the rougher is the mean.
 fn mean_relief(four: [[u8; 4]; 4]) -> [u8; 4] {
     let [a, b, c, d] = four.map(|[x, y, ..]| {
         let lean = Vec2::new(x.into(), y.into()) / 127.5 - 1.0;
         lean.extend((1.0 - lean.length_squared()).max(0.0).sqrt())
     });
     let lean = ((a + b + c + d).normalize_or(Vec3::Z).truncate() + 1.0) * 127.5;
-    let mean = |channel: usize| four.map(|texel| f32::from(texel[channel])).iter().sum::<f32>() / 4.0;
-    [lean.x, lean.y, mean(2), mean(3)].map(|value| value.round() as u8)
+    let occlusion = four.map(|texel| f32::from(texel[2])).iter().sum::<f32>() / 4.0;
+    [lean.x, lean.y, occlusion, 255.0 * mean_roughness(four)].map(|value| value.round() as u8)
 }
 
 #[cfg(test)]
@@ -272,7 +258,10 @@ mod tests {
         assert_eq!(mean_color([black, white, white, black]), [188, 188, 188, 128]);
         // 45 degrees to the right and 45 down: a plain mean is 172.5.
         let [right, down] = [[217, 128, 0, 10], [128, 217, 0, 20]];
-        assert_eq!(mean_relief([right, right, down, down]), [179, 179, 0, 15]);
+        let [x, y, occlusion, roughness] = mean_relief([right, right, down, down]);
+        assert_eq!([x, y, occlusion], [179, 179, 0]);
+        // Smooth and bent as much as a sphere's eighth: rough.
+        assert!(roughness > 150, "{roughness}");
     }
 
     #[test]

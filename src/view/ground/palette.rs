@@ -47,9 +47,9 @@ pub(super) const RECIPES: [Recipe; 16] = [
         metres: 3.0,
         paint: turf,
         scatter: Some(Scatter {
-            count: 26_000,
-            size: [0.045, 0.0028],
-            colors: [[0.13, 0.19, 0.07], [0.44, 0.48, 0.21]],
+            count: 24_000,
+            size: [0.055, 0.0032],
+            colors: [[0.115, 0.17, 0.055], [0.43, 0.48, 0.20]],
         }),
     },
     Recipe { name: "sand", relief: 0.07, metres: 4.0, paint: sand, scatter: None },
@@ -103,52 +103,73 @@ fn rock(u: f32, v: f32) -> Point {
     Point { color: lit(color, dark), height, roughness: 0.88 + 0.08 * grain }
 }
 
-/// The soil between blades of grass.
+/// The ground between blades of grass: moss, dead leaves of grass and bare earth, in patches.
 fn turf(u: f32, v: f32) -> Point {
     let clump = octaves(u, v, 10, 4, 21);
-    let color = mix([0.12, 0.14, 0.06], [0.23, 0.24, 0.11], 0.5 + 0.5 * clump);
-    Point { color, height: 0.18 + 0.12 * clump, roughness: 0.95 }
+    let patch = octaves(u, v, 3, 4, 22);
+    let litter = ridges(u + 0.02 * clump, v, 34, 2, 23);
+    let color = mix([0.125, 0.135, 0.06], [0.24, 0.25, 0.11], 0.5 + 0.5 * clump);
+    let color = mix(color, [0.25, 0.19, 0.115], 0.65 * smooth(0.10, 0.45, patch + 0.3 * clump));
+    let color = mix(color, [0.47, 0.41, 0.23], 0.5 * smooth(0.90, 0.97, litter));
+    Point { color, height: 0.18 + 0.12 * clump + 0.05 * litter, roughness: 0.95 }
 }
 
-/// Ripples of fine grains.
+/// Ripples of fine grains, blown over a surface that dips and swells, with coarser grains in the troughs.
 fn sand(u: f32, v: f32) -> Point {
-    let bend = 0.05 * octaves(u, v, 3, 3, 31);
-    let phase = (v + bend) * 16.0;
+    let swell = octaves(u, v, 2, 3, 34);
+    let bend = 0.05 * octaves(u, v, 3, 3, 31) + 0.012 * octaves(u, v, 11, 2, 36);
+    let phase = (v + bend) * 18.0;
     let wave = phase - phase.floor();
     // Gentle on one side and steep on the other, like blown sand.
-    let ripple = if wave < 0.7 { smooth(0.0, 0.7, wave) } else { 1.0 - smooth(0.7, 1.0, wave) };
-    let calm = smooth(-0.35, 0.35, octaves(u, v, 3, 2, 32));
+    let ripple = if wave < 0.72 { smooth(0.0, 0.72, wave) } else { 1.0 - smooth(0.72, 1.0, wave) };
+    let calm = 0.25 + 0.75 * smooth(-0.45, 0.25, octaves(u, v, 3, 2, 32));
     let grain = gradient(u, v, 170, 33);
-    let height = 0.35 + 0.32 * ripple * calm + 0.15 * octaves(u, v, 5, 3, 34) + 0.05 * grain;
-    let tone = 0.5 + 0.22 * octaves(u, v, 6, 3, 35) + 0.16 * grain + 0.18 * (ripple - 0.5) * calm;
-    let color = mix([0.66, 0.54, 0.36], [0.86, 0.76, 0.57], tone.clamp(0.0, 1.0));
-    Point { color, height: height.clamp(0.0, 1.0), roughness: 0.93 }
-}
-
-/// Soft drifts with a crust.
-fn snow(u: f32, v: f32) -> Point {
-    let drift = octaves(u, v, 3, 4, 41);
-    let crust = octaves(u, v, 36, 3, 42);
-    let height = 0.5 + 0.35 * drift + 0.05 * crust;
-    let color =
-        mix([0.80, 0.85, 0.92], [0.955, 0.965, 0.98], (0.55 + 0.5 * drift + 0.25 * crust).clamp(0.0, 1.0));
-    Point { color, height: height.clamp(0.0, 1.0), roughness: 0.62 + 0.12 * crust }
-}
-
-/// Red-brown, smooth, cracked where it dried.
-fn clay(u: f32, v: f32) -> Point {
-    let (wu, wv) = (u + 0.02 * octaves(u, v, 6, 3, 51), v + 0.02 * octaves(u, v, 6, 3, 52));
-    let plate = cells(wu, wv, 8, 53);
-    let crack = smooth(0.0, 0.06, plate.second - plate.nearest);
-    let smear = octaves(u, v, 5, 4, 54);
-    let grain = octaves(u, v, 60, 2, 55);
-    let height = (0.62 + 0.22 * smear + 0.05 * grain) * (0.55 + 0.45 * crack);
-    let tone = (0.5 + 0.35 * smear + 0.12 * grain + 0.2 * (plate.name - 0.5)).clamp(0.0, 1.0);
-    let color = mix([0.35, 0.215, 0.145], [0.57, 0.385, 0.275], tone);
+    let coarse = smooth(0.35, 0.7, gradient(u, v, 96, 37)) * (1.0 - ripple * calm);
+    let height = 0.38 + 0.22 * (ripple - 0.4) * calm + 0.26 * swell + 0.05 * grain;
+    let tone =
+        0.5 + 0.20 * octaves(u, v, 6, 3, 35) + 0.14 * grain + 0.16 * (ripple - 0.5) * calm + 0.16 * swell;
+    let color = mix([0.65, 0.53, 0.355], [0.87, 0.77, 0.58], tone.clamp(0.0, 1.0));
     Point {
-        color: lit(color, 0.6 + 0.4 * crack),
+        color: mix(color, [0.50, 0.41, 0.30], 0.5 * coarse),
         height: height.clamp(0.0, 1.0),
-        roughness: 0.72 + 0.1 * grain,
+        roughness: 0.93,
+    }
+}
+
+/// Soft drifts, carved by the wind, with a crust that glitters where it froze.
+fn snow(u: f32, v: f32) -> Point {
+    let (wu, wv) = (u + 0.05 * octaves(u, v, 3, 3, 43), v + 0.02 * octaves(u, v, 5, 3, 44));
+    let drift = octaves(u, v, 2, 4, 41);
+    let carved = ridges(wu, wv, 5, 3, 45);
+    let ridge = smooth(0.62, 0.98, carved);
+    let crust = octaves(u, v, 48, 3, 42);
+    let ice = smooth(0.15, 0.55, octaves(u, v, 4, 4, 46));
+    let height = 0.40 + 0.34 * drift + 0.20 * ridge + 0.035 * crust * (1.0 - 0.6 * ice);
+    let tone = (0.50 + 0.42 * drift + 0.22 * ridge + 0.22 * crust).clamp(0.0, 1.0);
+    let color = mix([0.76, 0.825, 0.915], [0.955, 0.965, 0.98], tone);
+    let color = mix(color, [0.80, 0.865, 0.935], 0.45 * ice);
+    Point { color, height: height.clamp(0.0, 1.0), roughness: 0.70 + 0.10 * crust - 0.16 * ice }
+}
+
+/// Red-brown and dense: smeared where it is moist, cracked where it dried.
+fn clay(u: f32, v: f32) -> Point {
+    let (wu, wv) = (u + 0.03 * octaves(u, v, 6, 4, 51), v + 0.03 * octaves(u, v, 6, 4, 52));
+    let plate = cells(wu, wv, 7, 53);
+    let dry = smooth(-0.20, 0.25, octaves(u, v, 3, 3, 56));
+    let crack = 1.0 - dry * (1.0 - smooth(0.0, 0.07, plate.second - plate.nearest));
+    let smear = octaves(u, v, 5, 5, 54);
+    let drag = octaves(u, v + 0.04 * smear, 18, 3, 57);
+    let grain = octaves(u, v, 60, 2, 55);
+    // Dry plates curl up at their rims.
+    let curl = dry * smooth(0.35, 0.05, plate.second - plate.nearest);
+    let height = (0.50 + 0.20 * smear + 0.10 * drag + 0.05 * grain + 0.10 * curl) * (0.50 + 0.50 * crack);
+    let tone =
+        (0.42 + 0.30 * smear + 0.16 * drag + 0.10 * grain + 0.22 * dry * (plate.name - 0.3)).clamp(0.0, 1.0);
+    let color = mix([0.33, 0.20, 0.135], [0.59, 0.40, 0.29], tone);
+    Point {
+        color: lit(color, 0.62 + 0.38 * crack),
+        height: height.clamp(0.0, 1.0),
+        roughness: 0.66 + 0.20 * dry + 0.1 * grain,
     }
 }
 
@@ -183,14 +204,24 @@ fn facets(u: f32, v: f32, period: i32, seed: u32) -> (f32, f32, f32) {
     ((0.5 + 0.7 * tilt).clamp(0.0, 1.0), edge, big.name)
 }
 
-/// Black and shiny.
+/// Black blocks in bands, dull ones and shiny ones.
 fn coal(u: f32, v: f32) -> Point {
-    let (tilt, edge, name) = facets(u, v, 9, 71);
-    let (small, chip, _) = facets(u, v, 24, 75);
-    let height = (0.7 * tilt + 0.3 * small) * (0.4 + 0.6 * edge) * (0.85 + 0.15 * chip);
-    let tone = 0.3 + 0.5 * name * small + 0.1 * octaves(u, v, 40, 2, 79);
-    let color = mix([0.045, 0.045, 0.05], [0.17, 0.17, 0.185], tone.clamp(0.0, 1.0));
-    Point { color: lit(color, 0.5 + 0.5 * edge), height, roughness: 0.34 + 0.3 * name }
+    let bend = 0.02 * octaves(u, v, 5, 3, 70);
+    let (band, _) = laminae(u, v + bend, 10, 0.03, 69);
+    let (tilt, edge, name) = facets(u, v, 8, 71);
+    let (small, chip, chipped) = facets(u, v, 25, 75);
+    let open = smooth(-0.25, 0.3, octaves(u, v, 4, 3, 68));
+    let joint = 1.0 - open * (1.0 - edge);
+    let height =
+        (0.12 + 0.55 * tilt + 0.30 * small + 0.12 * band) * (0.5 + 0.5 * joint) * (0.88 + 0.12 * chip);
+    let shiny = smooth(0.45, 0.7, band + 0.25 * (chipped - 0.5));
+    let tone = 0.25 + 0.4 * name * small + 0.18 * octaves(u, v, 40, 3, 79) + 0.15 * (1.0 - shiny);
+    let color = mix([0.040, 0.040, 0.046], [0.175, 0.172, 0.178], tone.clamp(0.0, 1.0));
+    Point {
+        color: lit(color, 0.6 + 0.4 * joint),
+        height: height.clamp(0.0, 1.0),
+        roughness: 0.78 - 0.34 * shiny + 0.08 * chipped,
+    }
 }
 
 /// Nuggets and threads in dark quartz. The metal is high and the stone low, so where a vein thins out, the metal
@@ -211,16 +242,30 @@ fn gold(u: f32, v: f32) -> Point {
     Point { color: mix(lit(stone, 0.85 + 0.15 * edge), shine, metal), height, roughness: 0.75 - 0.40 * metal }
 }
 
-/// Rust-red lumps in dark stone, with a dull shine where they broke.
+/// Bands and lumps of red ore in dark stone, streaked by rust where water ran over them.
 fn iron(u: f32, v: f32) -> Point {
+    let (wu, wv) = (u + 0.05 * octaves(u, v, 4, 4, 125), v + 0.05 * octaves(u, v, 4, 4, 128));
     let (tilt, edge, name) = facets(u, v, 9, 121);
-    let lump = cells(u + 0.02 * octaves(u, v, 9, 3, 125), v, 11, 126);
-    let ore = 1.0 - smooth(0.22, 0.42, lump.nearest);
-    let stone = mix([0.20, 0.185, 0.18], [0.34, 0.315, 0.30], 0.5 * name + 0.4 * tilt);
-    let rust =
-        mix([0.33, 0.15, 0.09], [0.62, 0.33, 0.20], (0.5 + 0.6 * octaves(u, v, 22, 3, 127)).clamp(0.0, 1.0));
-    let height = (0.34 * tilt * (0.5 + 0.5 * edge) + 0.5 * ore).clamp(0.0, 1.0);
-    Point { color: mix(lit(stone, 0.8 + 0.2 * edge), rust, ore), height, roughness: 0.80 - 0.22 * ore * name }
+    let band = smooth(0.02, 0.32, octaves(wu, wv, 3, 4, 129));
+    let lump = cells(wu, wv, 13, 126);
+    let size = 0.18 + 0.34 * lump.name;
+    let ore = (1.0 - smooth(0.6 * size, size, lump.nearest)) * smooth(0.25, 0.5, lump.name + 0.5 * band);
+    let ore = (0.85 * band + ore).min(1.0);
+    let streak = 0.6 * smooth(0.0, 0.5, octaves(u + 0.01 * tilt, v, 12, 3, 124));
+    let stone = mix([0.20, 0.185, 0.18], [0.35, 0.325, 0.31], 0.5 * name + 0.4 * tilt);
+    let stone = mix(stone, [0.42, 0.25, 0.165], 0.55 * streak);
+    let rust = mix(
+        [0.27, 0.12, 0.08],
+        [0.60, 0.31, 0.185],
+        (0.45 + 0.7 * octaves(u, v, 22, 4, 127)).clamp(0.0, 1.0),
+    );
+    let rough = octaves(u, v, 30, 3, 130);
+    let height = (0.10 + 0.38 * tilt * (0.5 + 0.5 * edge) + 0.34 * ore + 0.10 * rough * ore).clamp(0.0, 1.0);
+    Point {
+        color: mix(lit(stone, 0.75 + 0.25 * edge), rust, ore),
+        height,
+        roughness: 0.84 - 0.20 * ore * lump.name,
+    }
 }
 
 /// Green crusts and threads of bright metal in pale stone.
@@ -237,22 +282,47 @@ fn copper(u: f32, v: f32) -> Point {
     Point { color, height, roughness: 0.82 - 0.35 * thread }
 }
 
-/// Crumbs, pebbles, and rootlets.
+/// Crumbs, clods, stones of all sizes, and rootlets.
 fn soil(u: f32, v: f32) -> Point {
     let crumb = octaves(u, v, 20, 4, 91);
-    let clod = cells(u + 0.01 * crumb, v, 18, 92);
+    let (wu, wv) = (u + 0.012 * crumb, v + 0.012 * octaves(u, v, 20, 3, 97));
+    let clod = cells(wu, wv, 18, 92);
     let lump = 1.0 - smooth(0.1, 0.6, clod.nearest);
-    let stone = cells(u, v, 14, 93);
-    let pebble = if stone.name > 0.74 { 1.0 - smooth(0.16, 0.30, stone.nearest) } else { 0.0 };
-    let height = (0.35 + 0.2 * crumb + 0.25 * lump + 0.3 * pebble).clamp(0.0, 1.0);
-    let tone =
-        (0.45 + 0.4 * crumb + 0.25 * (clod.name - 0.5) + 0.2 * octaves(u, v, 4, 3, 94)).clamp(0.0, 1.0);
-    let earth = mix([0.17, 0.115, 0.07], [0.38, 0.27, 0.175], tone);
+    let (large, on_large) = pebble(u, v, 9, 0.80, 93);
+    let (small, on_small) = pebble(u, v, 27, 0.72, 98);
+    let stone = if large > small { large } else { small };
+    let name = if large > small { on_large } else { on_small };
+    let height = (0.30 + 0.2 * crumb + 0.22 * lump + 0.34 * stone).clamp(0.0, 1.0);
+    let damp = octaves(u, v, 3, 4, 94);
+    let tone = (0.42 + 0.4 * crumb + 0.22 * (clod.name - 0.5) + 0.26 * damp).clamp(0.0, 1.0);
+    let earth = mix([0.16, 0.105, 0.062], [0.39, 0.275, 0.18], tone);
     let root = smooth(0.93, 0.985, ridges(u + 0.02 * crumb, v, 5, 1, 95))
         * smooth(-0.2, 0.3, octaves(u, v, 4, 2, 96));
-    let earth = mix(earth, [0.50, 0.41, 0.28], 0.7 * root);
-    let color = mix(earth, [0.47, 0.43, 0.37], pebble * (0.6 + 0.4 * stone.name));
-    Point { color: lit(color, 0.7 + 0.45 * height), height, roughness: 0.95 - 0.1 * pebble }
+    let earth = mix(earth, [0.50, 0.41, 0.28], 0.6 * root);
+    let grey = mix([0.34, 0.29, 0.235], [0.53, 0.48, 0.41], name);
+    let color = mix(earth, grey, smooth(0.05, 0.35, stone));
+    Point { color: lit(color, 0.7 + 0.45 * height), height, roughness: 0.95 - 0.08 * stone }
+}
+
+/// Stones that lie apart, irregular: one in each of some cells. The height, and a random number for each stone.
+fn pebble(u: f32, v: f32, period: i32, seldom: f32, seed: u32) -> (f32, f32) {
+    let bump = 0.10 / period as f32;
+    let (wu, wv) = (
+        u + bump * octaves(u, v, 2 * period, 2, seed + 1),
+        v + bump * octaves(u, v, 2 * period, 2, seed + 2),
+    );
+    let stone = cells(wu, wv, period, seed);
+    if stone.name < seldom {
+        return (0.0, 0.0);
+    }
+    let number = (stone.name - seldom) / (1.0 - seldom);
+    let size = 0.16 + 0.26 * (number * 7.0 % 1.0);
+    // Longer one way than the other, and flat on top.
+    let slant = number * 13.0 % 1.0;
+    let across = stone.offset[0] * slant + stone.offset[1] * (1.0 - slant);
+    let far = (stone.nearest * stone.nearest + 0.9 * across * across) / (size * size);
+    let dome = (1.0 - far).max(0.0);
+    ((2.0 * dome).min(0.75 + 0.25 * dome), number * 29.0 % 1.0)
 }
 
 /// Layers along `v`, each with a number and a thickness of its own: laminae of sediment. The number, and the way to the next
@@ -348,22 +418,30 @@ fn shale_color(u: f32, v: f32, tone: f32) -> [f32; 3] {
     mix(color, [0.40, 0.32, 0.255], 0.35 * smooth(0.1, 0.6, octaves(u, v, 4, 5, 116)))
 }
 
-/// Round stones of many colours.
+/// Broken stones of many colours and sizes, worn at their corners.
 fn gravel(u: f32, v: f32) -> Point {
-    let big = cells(u, v, 11, 121);
-    let small = cells(u, v, 26, 122);
-    let dome = |cell: &super::noise::Cell, size: f32| {
-        (1.0 - (cell.nearest / size) * (cell.nearest / size)).max(0.0).sqrt()
+    let bump = octaves(u, v, 40, 3, 123);
+    let (wu, wv) = (u + 0.010 * octaves(u, v, 16, 3, 124), v + 0.010 * octaves(u, v, 16, 3, 125));
+    let stone_at = |period: i32, seed: u32| {
+        let stone = cells(wu, wv, period, seed);
+        let lean = [stone.name * 13.0 % 1.0 - 0.5, stone.name * 29.0 % 1.0 - 0.5];
+        let tilt = 0.5 + 0.9 * (stone.offset[0] * lean[0] + stone.offset[1] * lean[1]);
+        let edge = stone.second - stone.nearest;
+        let body = smooth(0.02, 0.34, edge);
+        (body * (0.55 + 0.45 * tilt), body, stone.name)
     };
-    let (a, b) = (dome(&big, 0.52), 0.6 * dome(&small, 0.55));
-    let (height, name, is_big) = if a > b { (a, big.name, 1.0) } else { (b, small.name, 0.0) };
-    let grain = octaves(u, v, 60, 2, 123);
-    let stone = mix([0.32, 0.30, 0.28], [0.66, 0.63, 0.58], name);
-    let stone = mix(stone, [0.50, 0.38, 0.29], if name * 17.0 % 1.0 > 0.7 { 0.6 } else { 0.0 });
-    let color = mix([0.15, 0.13, 0.11], stone, smooth(0.1, 0.45, height));
+    let (big, small) = (stone_at(9, 121), stone_at(24, 122));
+    // Large ones lie among small ones.
+    let is_large = big.2 > 0.52 && big.1 > 0.25;
+    let (height, body, name) =
+        if is_large { (0.30 + 0.70 * big.0, big.1, big.2) } else { (0.55 * small.0, small.1, small.2) };
+    let stone = mix([0.34, 0.325, 0.305], [0.66, 0.635, 0.59], name * 3.0 % 1.0);
+    let stone = mix(stone, [0.49, 0.375, 0.29], if name * 17.0 % 1.0 > 0.68 { 0.65 } else { 0.0 });
+    let stone = mix(stone, [0.27, 0.285, 0.30], if name * 23.0 % 1.0 > 0.75 { 0.7 } else { 0.0 });
+    let color = mix([0.16, 0.135, 0.11], stone, smooth(0.1, 0.6, body));
     Point {
-        color: lit(color, 0.8 + 0.1 * grain + 0.1 * is_big),
-        height: (0.1 + 0.85 * height).clamp(0.0, 1.0),
-        roughness: 0.8,
+        color: lit(color, 0.88 + 0.16 * bump),
+        height: (0.08 + 0.85 * height + 0.04 * bump).clamp(0.0, 1.0),
+        roughness: 0.84,
     }
 }

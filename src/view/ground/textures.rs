@@ -7,7 +7,8 @@ use bevy::prelude::*;
 use bevy::render::render_resource::WgpuFeatures;
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 
-use super::bake::{Baked, Meter, bake};
+use super::bake::{Layers, Meter};
+use super::cache::{GroundTextureCache, fetch_or_paint};
 use super::fit::{ArrayMismatch, GroundTexturesError, is_anisotropic, layers};
 use super::look::GroundLook;
 use crate::threads::{ThreadTask, Threads};
@@ -18,7 +19,8 @@ use crate::threads::{ThreadTask, Threads};
 #[reflect(Resource, Default)]
 #[non_exhaustive]
 pub enum GroundTextures {
-    /// The project's own, painted from noise in a task when the first [`GroundLook`](super::GroundLook) comes:
+    /// The project's own, painted from noise in a task when the first [`GroundLook`](super::GroundLook) comes, coarse ones at
+    /// once and fine ones after some seconds, or read from a [`GroundTextureCache`]:
     /// 0 rock, 1 grass, 2 sand, 3 snow, 4 clay, 5 concrete, 6 coal, 7 gold, 8 soil, 9 sandstone, 10 shale, 11 gravel,
     /// 12 iron, 13 copper; 14 and 15 are 9 and 10 as they look from above, see [`GroundLayer::top`](super::GroundLayer::top).
     /// The bytes are equal on every machine. They are kept when the last look is removed, so the next one need not
@@ -56,10 +58,12 @@ impl Default for GroundTextures {
 #[derive(Resource, Default)]
 pub struct GroundLoading {
     meter: Meter,
-    task: Option<ThreadTask<Baked>>,
+    task: Option<ThreadTask<Painted>>,
     /// What the current textures were made for.
     wanted: Option<GroundTextures>,
     baked: Option<[Handle<Image>; 3]>,
+    /// Whether these are as fine as the settings ask for.
+    is_fine: bool,
     pub(super) ready: Option<Textures>,
     /// Whether `ready` has the textures that the settings ask for.
     is_current: bool,
@@ -89,6 +93,21 @@ struct Answers {
     progress: f32,
     is_ready: bool,
     failure: Option<String>,
+}
+
+/// Texels along a side of the textures that are shown while finer ones are painted.
+const COARSE: u32 = 64;
+
+/// What a task painted.
+struct Painted {
+    layers: Layers,
+    images: [Image; 3],
+}
+
+impl Painted {
+    fn new(layers: Layers, anisotropy: u16) -> Self {
+        Self { images: layers.clone().into_images(anisotropy), layers }
+    }
 }
 
 /// The images of a material.
@@ -121,7 +140,8 @@ impl Renderer {
 
 impl GroundLoading {
     /// From 0 (nothing requested, or just started) to 1 (all terrains are textured). While other textures are made,
-    /// terrains keep the old ones, and this starts again at 0. After a [`failure`](Self::failure) it never reaches 1.
+    /// terrains keep the old ones, or else show coarse ones, and this starts again at 0. After a [`failure`](Self::failure) it
+    /// never reaches 1.
     pub fn progress(&self) -> f32 {
         if self.is_current { 1.0 } else { self.meter.progress().min(0.99) }
     }
@@ -167,6 +187,7 @@ impl GroundLoading {
 pub(super) fn load_textures(
     mut loading: ResMut<GroundLoading>,
     settings: Res<GroundTextures>,
+    cache: Option<Res<GroundTextureCache>>,
     looks: Query<(Entity, &GroundLook)>,
     mut images: ResMut<Assets<Image>>,
     server: Option<Res<AssetServer>>,
@@ -175,6 +196,7 @@ pub(super) fn load_textures(
 ) {
     let renderer = Renderer::new(device.as_deref(), adapter.as_deref());
     let unseen = loading.bypass_change_detection();
+    unseen.paint(&settings, cache.as_deref(), &looks, &mut images);
     unseen.proceed(&settings, &looks, &mut images, server.as_deref(), renderer);
     // Marked as changed only if an answer of its methods changes.
     let answers = loading.answers();
@@ -184,6 +206,37 @@ pub(super) fn load_textures(
 }
 
 impl GroundLoading {
+    /// Has textures painted, first coarse and then fine.
+    fn paint(
+        &mut self,
+        settings: &GroundTextures,
+        cache: Option<&GroundTextureCache>,
+        looks: &Query<(Entity, &GroundLook)>,
+        images: &mut ResMut<Assets<Image>>,
+    ) {
+        if looks.is_empty() && self.wanted.is_none() {
+            return;
+        }
+        if self.wanted.as_ref() != Some(settings) {
+            self.begin(settings);
+        }
+        let Some(Painted { layers, images: painted }) = self.task.as_mut().and_then(ThreadTask::finish)
+        else {
+            return;
+        };
+        self.baked = Some(painted.map(|image| images.add(image)));
+        let (side, anisotropy) = size_of(settings);
+        self.is_fine = layers.side == side;
+        let fine = (!self.is_fine).then(|| {
+            let folder = cache.and_then(|cache| cache.0.clone());
+            let meter = self.meter.clone();
+            ThreadTask::start(Threads::Background, move || {
+                Painted::new(fetch_or_paint(folder.as_deref(), &layers, side, &meter), anisotropy)
+            })
+        });
+        self.task = fine;
+    }
+
     fn proceed(
         &mut self,
         settings: &GroundTextures,
@@ -192,16 +245,6 @@ impl GroundLoading {
         server: Option<&AssetServer>,
         renderer: Renderer,
     ) {
-        if looks.is_empty() && self.wanted.is_none() {
-            return;
-        }
-        if self.wanted.as_ref() != Some(settings) {
-            self.begin(settings);
-        }
-        if let Some(baked) = self.task.as_mut().and_then(ThreadTask::finish) {
-            self.task = None;
-            self.baked = Some([baked.albedo, baked.relief, baked.noise].map(|image| images.add(image)));
-        }
         let Some([albedo, relief, noise]) = self.baked.clone() else { return };
         let read = |albedo: Handle<Image>, relief: Handle<Image>| {
             let filters = [&albedo, &relief].map(|image| images.get(image).is_some_and(is_anisotropic));
@@ -214,6 +257,11 @@ impl GroundLoading {
             GroundTextures::Baked { .. } => baked.clone(),
             GroundTextures::Images { albedo, relief } => read(albedo.clone(), relief.clone()),
         };
+        // Until the fine ones are painted, coarse ones are better than none.
+        if !self.is_fine {
+            self.ready.get_or_insert(baked);
+            return;
+        }
         // In every frame, since images may change, and drawing with invalid ones would end the app.
         let find = |name, handle: &Handle<Image>| match (images.get(handle), server) {
             (Some(image), _) => layers(name, image, renderer.features).map(Some),
@@ -260,18 +308,25 @@ impl GroundLoading {
     /// Starts to make other textures.
     fn begin(&mut self, settings: &GroundTextures) {
         self.wanted = Some(settings.clone());
-        // Noise is needed in any case; with a game's own images the layers are baked at the smallest size.
-        let (side, anisotropy) = match settings {
-            GroundTextures::Baked { side, anisotropy } => {
-                (side.clamp(&16, &2048).next_power_of_two(), *anisotropy)
-            }
-            GroundTextures::Images { .. } => (16, 1),
-        };
         self.meter = Meter::default();
-        (self.baked, self.is_current, self.was_sound) = (None, false, false);
+        (self.baked, self.is_fine, self.is_current, self.was_sound) = (None, false, false, false);
         (self.failure, self.misfit) = (None, None);
-        let meter = self.meter.clone();
-        self.task = Some(ThreadTask::start(Threads::Background, move || bake(side, anisotropy, &meter)));
+        let (side, anisotropy) = size_of(settings);
+        let side = side.min(COARSE);
+        self.task = Some(ThreadTask::start(Threads::Background, move || {
+            Painted::new(Layers::paint(side, &Meter::default()), anisotropy)
+        }));
+    }
+}
+
+/// Texels along a side of what is painted, and anisotropy.
+fn size_of(settings: &GroundTextures) -> (u32, u16) {
+    match settings {
+        GroundTextures::Baked { side, anisotropy } => {
+            (side.clamp(&16, &2048).next_power_of_two(), *anisotropy)
+        }
+        // Noise is needed in any case; with a game's own images the layers are painted at the smallest size.
+        GroundTextures::Images { .. } => (16, 1),
     }
 }
 
@@ -327,7 +382,32 @@ mod tests {
         mut images: ResMut<Assets<Image>>,
     ) {
         let renderer = Renderer { features: WgpuFeatures::empty(), is_software: true };
+        loading.paint(&settings, None, &looks, &mut images);
         loading.proceed(&settings, &looks, &mut images, None, renderer);
+    }
+
+    #[test]
+    fn coarse_textures_are_shown_until_fine_ones_are_painted() {
+        let mut app = app();
+        app.insert_resource(GroundTextures::Baked { side: 2 * COARSE, anisotropy: 1 });
+        let side = |app: &App| {
+            let ready = loading(app).ready.as_ref()?;
+            let images = app.world().resource::<Assets<Image>>();
+            Some(images.get(&ready.albedo).expect("it is kept").width())
+        };
+        update_until(&mut app, "coarse ones", |loading| loading.ready.is_some());
+        assert_eq!((side(&app), loading(&app).is_ready()), (Some(COARSE), false));
+        assert!(loading(&app).progress() < 1.0);
+        update_until(&mut app, "fine ones", GroundLoading::is_ready);
+        assert_eq!(side(&app), Some(2 * COARSE));
+        // Others are worn until their successors are as fine as they shall be.
+        app.insert_resource(GroundTextures::Baked { side: 4 * COARSE, anisotropy: 1 });
+        app.update();
+        update_until(&mut app, "finer ones", |loading| {
+            assert!(loading.ready.is_some());
+            loading.is_ready()
+        });
+        assert_eq!(side(&app), Some(4 * COARSE));
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Negative controls: fixed faults are rebuilt on purpose from public parts, and the laws of the matrix find each of them.
+//! Negative controls: fixed faults are rebuilt on purpose from public parts, and the laws of the matrix find each of
+//! them.
 
 use super::*;
 
@@ -36,7 +37,8 @@ fn happen(life: &mut Life, event: Event) {
     life.frames();
 }
 
-/// Bevy drops messages after two frames: brushes that were sent while the plugin's systems were gated were never answered.
+/// Bevy drops messages after two frames: brushes that were sent while the plugin's systems were gated were never
+/// answered.
 #[test]
 fn brushes_that_are_dropped_while_systems_are_gated_are_found() {
     fn forget(runs: Res<Runs>, mut brushes: ResMut<Messages<TargetedBrush>>) {

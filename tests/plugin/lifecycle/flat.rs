@@ -1,5 +1,6 @@
-//! Nothing grows: entities, components, meshes and memory are the same after many levels, digs and undos, with everything on.
-//! `BURROW_ROUNDS` is the number of rounds, each of which digs, undoes, walks and occasionally goes to another level.
+//! Nothing grows: entities, components, meshes and memory are the same after many levels, digs and undos, with
+//! everything on. `BURROW_ROUNDS` is the number of rounds, each of which digs, undoes, walks and occasionally goes to
+//! another level.
 
 use avian3d::prelude::PhysicsPlugins;
 use bevy_burrow::physics::{ColliderSource, DebrisPlugin, TerrainPhysicsPlugin};

@@ -2,7 +2,7 @@
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
-use bevy_burrow::net::{self, ClientEvent, Kick};
+use bevy_burrow::net::{self, ClientEvent, KickReason};
 use bevy_burrow::together::{EditOutcome, GroundJoined, GroundServer, SharedTerrain, SharingTrouble};
 use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;
@@ -119,10 +119,10 @@ fn who_is_kicked_stays_out_of_the_ground_while_connected() {
     let player = party.shared(0).id().expect("it has joined");
     party.server.world_mut().resource_mut::<GroundServer>().with(move |server| server.kick(player));
     party.rounds_until("it is told", |party| party.shared(0).trouble().is_some());
-    let kicked = SharingTrouble::Kicked(Kick::ByGame);
+    let kicked = SharingTrouble::Kicked(KickReason::ByGame);
     assert_eq!(party.shared(0).trouble(), Some(kicked));
     let joined = party.players[0].0.recorded::<GroundJoined>();
-    assert!(joined.iter().any(|joined| joined.event == ClientEvent::Kicked(Kick::ByGame)));
+    assert!(joined.iter().any(|joined| joined.event == ClientEvent::Kicked(KickReason::ByGame)));
     // This transport closes no connections.
     let before = party.terrain_hash(1);
     party.dig_at(0, 30.0, 30.0);

@@ -1,4 +1,5 @@
-//! Pieces that break off shared ground: each is in the ground or a body, for every player, whatever the server says later.
+//! Pieces that break off shared ground: each is in the ground or a body, for every player, whatever the server says
+//! later.
 
 use std::time::Duration;
 

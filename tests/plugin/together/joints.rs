@@ -1,5 +1,5 @@
-//! Where the parts of a session meet: levels, play alone, undos under way, changes of server while somebody joins, and players who
-//! come twice.
+//! Where the parts of a session meet: levels, play alone, undos under way, changes of server while somebody joins, and
+//! players who come twice.
 
 use std::sync::mpsc::channel;
 use std::sync::{Mutex, PoisonError};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_burrow::format::Level;
-use bevy_burrow::net::{Kick, Server, ServerSettings};
+use bevy_burrow::net::{KickReason, Server, ServerSettings};
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble};
 use bevy_replicon::prelude::*;
@@ -84,7 +84,8 @@ impl Party {
     }
 }
 
-/// Bytes that are sent to a player that joins this level and begins with a terrain, which is held until a level is loaded if `is_asset`.
+/// Bytes that are sent to a player that joins this level and begins with a terrain, which is held until a level is
+/// loaded if `is_asset`.
 fn bytes_to_join(level: &Terrain, begins: Terrain, is_asset: bool) -> u64 {
     let mut built = copy_of(level, large_ground());
     built.apply([Brush::dig(Shape::sphere(Vec3::new(200.0, 40.0, 200.0), 8.0))]);
@@ -274,7 +275,7 @@ fn who_connects_twice_plays_over_the_later_connection() {
     party.join();
     party.rounds_until("the later one joins", |party| party.shared(1).has_joined());
     party.rounds_until("the earlier one has a trouble", |party| party.shared(0).trouble().is_some());
-    assert_eq!(party.shared(0).trouble(), Some(SharingTrouble::Kicked(Kick::ConnectedAgain)));
+    assert_eq!(party.shared(0).trouble(), Some(SharingTrouble::Kicked(KickReason::ConnectedAgain)));
     let messages = party.ask(|server| server.figures().messages);
     for turn in 0..10 {
         party.dig_at(0, 20.0 + 5.0 * turn as f32, 20.0);

@@ -4,7 +4,7 @@ use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
 
-use crate::party::players::MOST_LETTERS;
+use crate::party::players::MAX_LETTERS;
 use crate::player::game_state::MenuPage;
 use crate::ui::settings::Settings;
 use crate::ui::widgets::{self, Activated, GOLD, MenuInputDisabled, WHITE, text};
@@ -51,7 +51,7 @@ impl Field {
     /// The text to change, and how many letters it may have.
     fn of_mut<'a>(self, settings: &'a mut Settings, draft: &'a mut Draft) -> (&'a mut String, usize) {
         match self {
-            Self::PlayerName => (&mut settings.name, MOST_LETTERS),
+            Self::PlayerName => (&mut settings.name, MAX_LETTERS),
             Self::Address => (&mut settings.host_address, 48),
             Self::WorldName => (&mut draft.name, 24),
             Self::Seed => (&mut draft.seed, 9),

@@ -30,8 +30,8 @@ pub struct Question {
     pub back: MenuPage,
 }
 
-/// Opens the page, and does something if the player says so. Cancelling is the first answer, so that no key pressed twice loses
-/// anything.
+/// Opens the page, and does something if the player says so. Cancelling is the first answer, so that no key pressed
+/// twice loses anything.
 pub fn ask(
     commands: &mut Commands,
     back: MenuPage,

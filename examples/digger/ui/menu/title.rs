@@ -153,7 +153,7 @@ fn ask_for_new_game(_: On<Activated>, mut commands: Commands) {
     question::ask(&mut commands, MenuPage::Menu, texts::NEW_UNSAVED, texts::NEW_WORLD, begin);
 }
 
-/// Does the window have the focus? The game captures the mouse, so it must not start while the player uses another
+/// Whether the window has the focus. The game captures the mouse, so it must not start while the player uses another
 /// window. Scripts have no window.
 fn has_focus(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
     windows.iter().all(|window| window.focused)

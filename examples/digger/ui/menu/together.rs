@@ -98,7 +98,7 @@ mod tests {
     use bevy::input::keyboard::{Key, KeyboardInput};
 
     use super::*;
-    use crate::party::players::MOST_LETTERS;
+    use crate::party::players::MAX_LETTERS;
     use crate::test_support::tap_key;
     use crate::ui::menu::item_at;
     use crate::ui::widgets::MenuInputDisabled;
@@ -150,7 +150,7 @@ mod tests {
         assert_eq!(app.world().resource::<Settings>().name, "Bob");
         activate(&mut app, 0);
         write_text(&mut app, &"y".repeat(40));
-        assert_eq!(app.world().resource::<Settings>().name.len(), MOST_LETTERS);
+        assert_eq!(app.world().resource::<Settings>().name.len(), MAX_LETTERS);
         press(&mut app, Key::Escape);
         assert_eq!(app.world().resource::<Settings>().name, "Bob");
     }

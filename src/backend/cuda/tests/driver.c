@@ -37,7 +37,7 @@ int cuDeviceGetByPCIBusId(int* device, const char* id) {
 }
 
 int cuDeviceGetName(char* name, int length, int device) {
-    snprintf(name, length, "card %d", device - FIRST_HANDLE);
+    snprintf(name, length, "gpu %d", device - FIRST_HANDLE);
     return 0;
 }
 

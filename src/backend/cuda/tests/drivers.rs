@@ -36,7 +36,7 @@ fn a_device_passes_the_whole_self_test() {
 /// Runs in a separate process, started by the test below.
 #[test]
 #[ignore = "looks at the machine's driver"]
-fn tell_what_the_driver_says() {
+fn print_what_the_driver_reports() {
     let engine = Engine::new(crate::backend::Backend::Cuda);
     println!("state: {:?}", engine.wait(Duration::from_secs(30)));
     compare(&mut Rng::with_seed(3), 3, &engine);
@@ -77,7 +77,7 @@ fn a_driver_without_a_device_is_no_device() {
             "int cuInit(unsigned flags) {{ (void)flags; return {code}; }}\n\
              int cuGetErrorName(int code, const char** name) {{ (void)code; *name = \"{name}\"; return 0; }}\n"
         );
-        let Some(text) = with_driver(name, &source, "tell_what_the_driver_says") else { return };
+        let Some(text) = with_driver(name, &source, "print_what_the_driver_reports") else { return };
         assert!(text.contains(&format!("Lost(\"there is no CUDA device: {name}\")")), "{text}");
     }
 }
@@ -86,29 +86,29 @@ fn a_driver_without_a_device_is_no_device() {
 #[test]
 #[ignore = "needs the stand-in driver with three GPUs"]
 fn open_each_of_three_gpus() {
-    let open = |card: &CardChoice, suggested: Option<&CardChoice>| match Card::open(card, suggested) {
-        Ok(card) => Ok(card.name()),
+    let open = |gpu: &GpuChoice, suggested: Option<&GpuChoice>| match Gpu::open(gpu, suggested) {
+        Ok(gpu) => Ok(gpu.name()),
         Err(Fault::NoDevice(why)) => Err(why),
         Err(fault) => panic!("{fault}"),
     };
-    let bus = |id: &str| CardChoice::PciBusId(id.into());
-    let default = CardChoice::Default;
+    let bus = |id: &str| GpuChoice::PciBusId(id.into());
+    let default = GpuChoice::Default;
     for number in 0..3u32 {
-        let name = Ok(format!("card {number}"));
-        let all = [CardChoice::Ordinal(number), CardChoice::Uuid([70 + number as u8; 16])];
-        for card in all.into_iter().chain([bus(&format!("0000:0{}:00.0", number + 1))]) {
-            assert_eq!(open(&card, None), name);
+        let name = Ok(format!("gpu {number}"));
+        let all = [GpuChoice::Ordinal(number), GpuChoice::Uuid([70 + number as u8; 16])];
+        for gpu in all.into_iter().chain([bus(&format!("0000:0{}:00.0", number + 1))]) {
+            assert_eq!(open(&gpu, None), name);
             // The suggestion is used only if no GPU was chosen.
-            assert_eq!(open(&card, Some(&CardChoice::Ordinal(1))), name);
-            assert_eq!(open(&default, Some(&card)), name);
+            assert_eq!(open(&gpu, Some(&GpuChoice::Ordinal(1))), name);
+            assert_eq!(open(&default, Some(&gpu)), name);
         }
     }
-    let others = [CardChoice::Ordinal(3), CardChoice::Ordinal(u32::MAX), CardChoice::Uuid([9; 16])];
-    for card in others.into_iter().chain(["0000:09:00.0", "", "anywhere", "0000:01:00.0\0"].map(bus)) {
-        assert!(open(&card, None).is_err_and(|why| why.contains("none of CUDA's")), "{card:?}");
-        assert_eq!(open(&default, Some(&card)), Ok("card 0".into()));
+    let others = [GpuChoice::Ordinal(3), GpuChoice::Ordinal(u32::MAX), GpuChoice::Uuid([9; 16])];
+    for gpu in others.into_iter().chain(["0000:09:00.0", "", "anywhere", "0000:01:00.0\0"].map(bus)) {
+        assert!(open(&gpu, None).is_err_and(|why| why.contains("none of CUDA's")), "{gpu:?}");
+        assert_eq!(open(&default, Some(&gpu)), Ok("gpu 0".into()));
     }
-    assert_eq!(open(&default, None), Ok("card 0".into()));
+    assert_eq!(open(&default, None), Ok("gpu 0".into()));
 }
 
 #[test]
@@ -126,11 +126,11 @@ fn cpu_time() -> Option<Duration> {
 #[test]
 #[ignore = "needs the stand-in driver that answers slowly"]
 fn wait_for_a_slow_gpu() {
-    let mut card = Card::open(&CardChoice::Default, None).expect("a card");
+    let mut gpu = Gpu::open(&GpuChoice::Default, None).expect("a GPU");
     // Only the waits are timed. Other load makes them longer, but this thread no busier.
     let (Some(before), start) = (cpu_time(), std::time::Instant::now()) else { return };
-    card.wait().expect("the GPU works");
-    let mark = card.mark().expect("a mark");
+    gpu.wait().expect("the GPU works");
+    let mark = gpu.mark().expect("a mark");
     mark.wait().expect("the GPU works");
     let (took, busy) = (start.elapsed(), cpu_time().expect("available above") - before);
     // A spinning thread would be busy all the time.

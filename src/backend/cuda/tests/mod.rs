@@ -17,21 +17,21 @@ use fastrand::Rng;
 
 use super::async_copies::AsyncCopies;
 use super::device::Device;
-use super::driver::Card;
+use super::driver::Gpu;
 use super::emulator_process::Emulator;
 use super::zero_copy::ZeroCopy;
 use super::*;
 use crate::backend::Engine;
 use crate::prelude::*;
 use crate::surface::Indices;
-use crate::terrain::{Drawn, World};
+use crate::terrain::{MeshKey, World};
 
 pub(super) use crate::worlds;
 
 /// A device to test, if any. If there is a GPU that cannot be opened, the test fails.
 pub(super) fn device() -> Option<Box<dyn Device>> {
-    match Card::open(&CardChoice::Default, None) {
-        Ok(card) => Some(Box::new(card)),
+    match Gpu::open(&GpuChoice::Default, None) {
+        Ok(gpu) => Some(Box::new(gpu)),
         Err(Fault::NoDriver | Fault::NoDevice(_)) => Some(Box::new(Emulator::start()?)),
         Err(fault) => panic!("the GPU can't be tested: {fault}"),
     }
@@ -55,7 +55,7 @@ fn engine(device: Box<dyn Device>, records: usize) -> Engine {
 }
 
 /// All drawn meshes, as bits.
-fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Indices)> {
+fn drawn(world: &World) -> Vec<(MeshKey, Vec<u8>, Indices)> {
     let bits = |vertex: &crate::surface::Vertex| {
         let mut bytes = Vec::with_capacity(32);
         vertex.position.to_array().iter().for_each(|part| bytes.extend(part.to_le_bytes()));

@@ -114,13 +114,13 @@ fn waiting_for_a_gpu_opens_it() {
 #[test]
 fn the_gpu_that_a_game_suggests_is_opened() {
     let (said, heard) = std::sync::mpsc::channel();
-    let device = move |card| {
-        said.send(card).expect("the test listens");
+    let device = move |gpu| {
+        said.send(gpu).expect("the test listens");
         Err(Fault::NoDriver)
     };
     let engine = Engine::from_cuda(Cuda::with_device(true, limits(0), &[], device));
-    let card = CardChoice::PciBusId("0000:01:00.0".into());
-    engine.suggest_card(card.clone());
+    let gpu = GpuChoice::PciBusId("0000:01:00.0".into());
+    engine.suggest_gpu(gpu.clone());
     engine.wait(Duration::from_secs(9));
-    assert_eq!(heard.recv(), Ok(Some(card)));
+    assert_eq!(heard.recv(), Ok(Some(gpu)));
 }

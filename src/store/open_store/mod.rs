@@ -1,10 +1,19 @@
 //! The store: a saved world that a game or server has open.
+//!
+//! | file | what it holds |
+//! | --- | --- |
+//! | `open_store` | creating, opening and closing a world |
+//! | `saving` | commits for the store's thread, and what of them is durable |
+//! | `game_data` | data of the game, saved with the commits |
+
+mod game_data;
+mod saving;
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use super::closing::{ClosingStore, StoreThread};
@@ -20,10 +29,10 @@ use super::recover::recover;
 use super::region_file::RegionFile;
 use super::segment::base;
 use super::settle::settle;
-use super::shared::{GameChange, GameData, SavePoint, Shared, apply_game};
+use super::shared::{GameData, SavePoint, Shared};
 use super::sources::has_world;
 use super::unsaved;
-use super::writer::{Answer, Content, Given, Message, Writer};
+use super::writer::{Message, Writer};
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, Order, Patch, Terrain, TerrainSettings, Version};
@@ -143,7 +152,7 @@ impl Store {
         let world = WorldId::random();
         let ground = terrain.world().shared_ground();
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let terms = (parts.rules.clone(), parts.loose);
+        let (rules, loose) = (parts.rules.clone(), parts.loose);
         let (grid, level) = (terrain.world().grid(), options.level.clone());
         let progress = options.progress.clone();
         let mirror = Mirror::new(grid, parts, hash, data.clone(), level);
@@ -151,8 +160,8 @@ impl Store {
         let is_whole = revision == 0 && mirror.is_as_level() && data.is_empty();
         let mut entries = Vec::new();
         if is_whole {
-            entries.extend(terms.0.map(|rules| LogEntry::Order(Order::Rules(Some(Arc::new(rules))))));
-            entries.extend(terms.1.map(|loose| LogEntry::Order(Order::Loose(Some(loose)))));
+            entries.extend(rules.map(|rules| LogEntry::Order(Order::Rules(Some(Arc::new(rules))))));
+            entries.extend(loose.map(|loose| LogEntry::Order(Order::Loose(Some(loose)))));
         }
         let frame = u64::from(!is_whole);
         let shared = Arc::new(Shared::default());
@@ -183,11 +192,11 @@ impl Store {
     /// Opens the world in a folder over the ground that it was saved with.
     ///
     /// # Errors
-    /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below has changed
-    /// and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is missing, and when
-    /// nothing of it can be read. Also when a file that can't be read at the moment holds something that no other file
-    /// has, and when this ground has no room for edits that were made on a ground of another size. Nothing is changed
-    /// then. All other problems are reported in [`Opened::troubles`].
+    /// When there is none, when it is open already, when a newer version saved it, when the ground or the level below
+    /// has changed and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is
+    /// missing, and when nothing of it can be read. Also when a file that can't be read at the moment holds something
+    /// that no other file has, and when this ground has no room for edits that were made on a ground of another size.
+    /// Nothing is changed then. All other problems are reported in [`Opened::troubles`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -296,255 +305,6 @@ impl Store {
             most_queued: waiting_bytes.max(LEAST_QUEUED),
             close_timeout,
         })
-    }
-
-    /// Takes the records of a terrain's commits, so that they become durable. Call it as often as you like: it takes
-    /// microseconds, and does nothing if there are no new commits. If it is another terrain of the same size, the whole
-    /// terrain replaces the saved one.
-    ///
-    /// While the limit on data that waits for a disk is reached, nothing is taken. Once there is room, the [whole
-    /// terrain](Self::append_whole) is saved.
-    ///
-    /// # Errors
-    /// [`StoreError::OtherSize`] if the terrain has another size than the saved world; then nothing is taken;
-    /// [`StoreError::Ended`] when the store's thread has panicked.
-    pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
-        let is_next = self.follows(terrain) && !self.has_gap;
-        let revision = terrain.world().revision();
-        if is_next && !terrain.has_log() && self.unsent.is_empty() && revision == self.point.revision {
-            return Ok(());
-        }
-        self.check_size(terrain)?;
-        self.ground = terrain.world().ground().hash();
-        let records = terrain.take_log();
-        if self.is_full() {
-            self.has_gap = true;
-            return self.check_thread();
-        }
-        let last = records.last().map_or(self.point.revision, |record| record.revision);
-        if is_next && last == revision && self.continues(&records) {
-            self.version = terrain.world().version();
-            return self.append(records);
-        }
-        // Records were dropped, or never kept.
-        terrain.keep_log(Some(LOG_BYTES));
-        self.append_whole(terrain)
-    }
-
-    /// Whether this is the last given terrain, with or without later commits.
-    pub(crate) fn follows(&self, terrain: &Terrain) -> bool {
-        terrain.world().version().is_same_world(self.version)
-            || terrain.log_sets_ground_after(self.point.revision)
-    }
-
-    /// Replaces the last given terrain by one that was made from the same parts.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn adopt(&mut self, terrain: &Terrain) {
-        self.version = terrain.world().version();
-    }
-
-    /// Whether this terrain is another state of the saved world: it has the same ground and size.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn is_of(&self, terrain: &Terrain) -> bool {
-        self.follows(terrain)
-            || self.check_size(terrain).is_ok() && terrain.world().ground().hash() == self.ground
-    }
-
-    fn check_size(&self, terrain: &Terrain) -> Result<(), StoreError> {
-        let (saved, given) = (self.size, WorldSize::of(terrain));
-        if saved == given { Ok(()) } else { Err(StoreError::OtherSize { saved, given }) }
-    }
-
-    /// Whether more data waits for the thread than allowed.
-    fn is_full(&self) -> bool {
-        self.shared.queued() > self.most_queued
-    }
-
-    fn check_thread(&self) -> Result<(), StoreError> {
-        let is_running = self.open.as_ref().is_some_and(|(_, thread)| !thread.is_done());
-        if is_running { Ok(()) } else { Err(StoreError::Ended) }
-    }
-
-    /// Whether every record follows the previous one.
-    fn continues(&self, records: &[CommitRecord]) -> bool {
-        let mut at = self.point.revision;
-        records.iter().all(|record| {
-            let follows = record.revision == at.saturating_add(record.is_commit().into());
-            at = record.revision;
-            follows
-        })
-    }
-
-    /// Takes records of commits, so that they become durable, together with everything that was [put](Self::put) since
-    /// the last ones.
-    ///
-    /// # Errors
-    /// [`StoreError::Gap`] when they do not follow those that were taken before; [`StoreError::Full`] when too much waits for a disk
-    /// that does not answer. None is taken then. [`StoreError::Ended`] when the store's thread has panicked.
-    pub fn append(&mut self, records: Vec<CommitRecord>) -> Result<(), StoreError> {
-        if self.has_gap || !self.continues(&records) {
-            let found = records.first().map_or(0, |record| record.revision);
-            return Err(StoreError::Gap { at: self.point.revision, found });
-        }
-        let revision = records.last().map_or(self.point.revision, |record| record.revision);
-        self.give(SavePoint { revision, ..self.point }, Content::Commits(records))
-    }
-
-    /// Takes the whole terrain, if records are missing or another terrain replaces the last one. It is durable with the
-    /// next checkpoint, which is made at once.
-    ///
-    /// # Errors
-    /// [`StoreError::OtherSize`] when the terrain has another size than the saved world; [`StoreError::Full`] when too
-    /// much waits for a disk that does not answer. Nothing is taken then. [`StoreError::Ended`] when the store's thread
-    /// has panicked.
-    pub fn append_whole(&mut self, terrain: &Terrain) -> Result<(), StoreError> {
-        self.check_size(terrain)?;
-        let world = terrain.world();
-        let (parts, hash) = (Box::new(terrain.parts()), world.hash());
-        let is_other = !self.follows(terrain);
-        let point = SavePoint {
-            revision: parts.revision,
-            terrain: self.point.terrain + u64::from(is_other),
-            ..self.point
-        };
-        self.give(point, Content::Whole(parts, world.shared_ground(), hash))?;
-        (self.version, self.has_gap) = (world.version(), false);
-        Ok(())
-    }
-
-    /// Sends content that leads to a point, with the game's data since the last time.
-    fn give(&mut self, point: SavePoint, content: Content) -> Result<(), StoreError> {
-        if self.is_full() {
-            return Err(StoreError::Full);
-        }
-        let game = std::mem::take(&mut self.unsent).into_iter().collect();
-        let given = Given { point: SavePoint { number: point.number + 1, ..point }, content, game };
-        let (bytes, point) = (given.bytes(), given.point);
-        self.shared.add_queued(bytes);
-        self.send(Message::Save(given))?;
-        self.point = point;
-        Ok(())
-    }
-
-    /// Sends the game's data. While commits are missing, it waits for the world with them.
-    fn send_game(&mut self) -> Result<(), StoreError> {
-        if self.unsent.is_empty() || self.has_gap { Ok(()) } else { self.append(Vec::new()) }
-    }
-
-    fn send(&self, message: Message) -> Result<(), StoreError> {
-        let sent = self.open.as_ref().map(|(messages, _)| messages.send(message));
-        sent.and_then(Result::ok).ok_or(StoreError::Ended)
-    }
-
-    /// The revision up to which the last given terrain is durable, together with the game's data at that time: it would
-    /// survive a loss of power. 0 also if nothing of it is durable yet; [`durable_point`](Self::durable_point)
-    /// distinguishes the two.
-    pub fn durable(&self) -> u64 {
-        self.durable_point().map_or(0, SavePoint::revision)
-    }
-
-    /// The last point up to which everything is durable; `None` if nothing of the last given terrain is.
-    pub fn durable_point(&self) -> Option<SavePoint> {
-        self.shared.durable().filter(|durable| durable.is_same_terrain(self.point))
-    }
-
-    /// Whether everything up to a point is durable.
-    pub fn is_durable(&self, point: SavePoint) -> bool {
-        self.shared.durable() >= Some(point)
-    }
-
-    /// The point up to which everything was taken.
-    pub fn point(&self) -> SavePoint {
-        self.point
-    }
-
-    /// The revision of the last record that was taken.
-    pub fn revision(&self) -> u64 {
-        self.point.revision
-    }
-
-    fn ask(&mut self, wait: Duration, message: impl FnOnce(Answer) -> Message) -> Result<u64, StoreError> {
-        self.send_game()?;
-        let (answer, answered) = channel();
-        self.send(message(answer))?;
-        answered.recv_timeout(wait).map_err(|error| match error {
-            RecvTimeoutError::Timeout => StoreError::TimedOut,
-            RecvTimeoutError::Disconnected => StoreError::Ended,
-        })?
-    }
-
-    /// Waits until everything taken is durable, and returns its revision.
-    ///
-    /// # Errors
-    /// When it can't be saved for now.
-    pub fn flush(&mut self) -> Result<u64, StoreError> {
-        self.flush_within(Duration::MAX)
-    }
-
-    /// Waits until everything taken is durable, but no longer than this, and returns its revision.
-    ///
-    /// # Errors
-    /// When it can't be saved for now; [`StoreError::TimedOut`] when the disk does not answer in time.
-    pub fn flush_within(&mut self, wait: Duration) -> Result<u64, StoreError> {
-        self.ask(wait, Message::Flush)
-    }
-
-    /// Waits for a checkpoint of everything that was taken, so that nothing has to be replayed. Checkpoints are also
-    /// made regularly, and when the store is dropped.
-    ///
-    /// # Errors
-    /// When it can't be saved for now.
-    pub fn checkpoint(&mut self) -> Result<u64, StoreError> {
-        self.ask(Duration::MAX, Message::Checkpoint)
-    }
-
-    /// Asks for a checkpoint without waiting for it.
-    ///
-    /// # Errors
-    /// [`StoreError::Ended`] when the store's thread has panicked.
-    pub fn request_checkpoint(&mut self) -> Result<(), StoreError> {
-        self.send_game()?;
-        // Nobody waits for the answer.
-        self.send(Message::Checkpoint(channel().0))
-    }
-
-    /// Makes a checkpoint, and makes the file of regions as small as possible.
-    ///
-    /// # Errors
-    /// When it can't be saved for now.
-    pub fn compact(&mut self) -> Result<u64, StoreError> {
-        self.ask(Duration::MAX, Message::Compact)
-    }
-
-    /// Stores data of the game under a key, such as an inventory or the time of day. It becomes durable together with
-    /// the commits of the next [`append`](Self::append) or [`follow`](Self::follow): after a crash both are there, or
-    /// neither.
-    pub fn put(&mut self, key: impl Into<String>, bytes: impl Into<Vec<u8>>) {
-        let (key, bytes) = (key.into(), bytes.into());
-        // An unchanged value takes no room in the log.
-        if self.get(&key) != Some(&bytes[..]) {
-            self.change_game((key, Some(bytes)));
-        }
-    }
-
-    /// Removes data of the game.
-    pub fn remove(&mut self, key: impl Into<String>) {
-        self.change_game((key.into(), None));
-    }
-
-    fn change_game(&mut self, change: GameChange) {
-        apply_game(&mut self.game, std::slice::from_ref(&change));
-        self.unsent.insert(change.0, change.1);
-    }
-
-    /// Data of the game.
-    pub fn get(&self, key: &str) -> Option<&[u8]> {
-        self.game.get(key).map(Vec::as_slice)
-    }
-
-    /// All data of the game, by key.
-    pub fn game_data(&self) -> &BTreeMap<String, Vec<u8>> {
-        &self.game
     }
 
     /// Troubles since the last call, to show to a player or an operator. If they are not taken, the latest 256 are

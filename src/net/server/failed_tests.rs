@@ -49,7 +49,7 @@ impl Play {
     }
 
     fn dig(&mut self, id: u64, edit: Edit) {
-        self.clients.get_mut(&ClientId(id)).expect("a client").0.dig(edit);
+        self.clients.get_mut(&ClientId(id)).expect("a client").0.submit(edit);
     }
 
     /// To the clients go the messages that wait.
@@ -94,7 +94,7 @@ impl Play {
     /// The server fails at the next entry.
     fn fail_at_next(&mut self) {
         assert!(self.server.waiting.pop_front().is_some());
-        self.server.void(self.server.applied + 1);
+        self.server.fail(self.server.applied + 1);
         self.server.applied += 1;
     }
 
@@ -129,7 +129,7 @@ impl Play {
 const REFUSED: fn(&ClientEvent) -> bool = |event| matches!(event, ClientEvent::Refused { why: None, .. });
 
 #[test]
-fn a_void_entry_that_clients_have_applied_is_mended() {
+fn clients_that_applied_a_failed_entry_fetch_its_regions() {
     let mut play = Play::new();
     let pristine = play.agreed();
     play.dig(1, dig(40.0, 40.0));
@@ -138,7 +138,7 @@ fn a_void_entry_that_clients_have_applied_is_mended() {
     assert!(play.clients.values().all(|(client, _)| client.world().hash() != pristine), "they are ahead");
     play.apply_without_room();
     assert_eq!(play.agreed(), pristine);
-    assert_eq!(play.server.figures().voids, 1);
+    assert_eq!(play.server.figures().failed, 1);
     assert!(play.repairs().iter().all(|repairs| *repairs > 0));
     // Later names of fields are equal too.
     play.dig(2, dig(80.0, 80.0));
@@ -148,13 +148,13 @@ fn a_void_entry_that_clients_have_applied_is_mended() {
 }
 
 #[test]
-fn a_void_entry_that_clients_have_not_applied_does_nothing() {
+fn a_failed_entry_that_clients_have_not_applied_does_nothing() {
     let mut play = Play::new();
     let pristine = play.agreed();
     play.dig(1, dig(40.0, 40.0).with_labels(7, None));
     play.collect();
     play.apply_without_room();
-    // The entry and that it is void come together.
+    // The entry and the report of its failure arrive together.
     assert_eq!(play.agreed(), pristine);
     assert_eq!((play.events(1, REFUSED), play.events(2, REFUSED)), (1, 0));
     assert_eq!(play.events(1, |event| matches!(event, ClientEvent::Confirmed { .. })), 0);
@@ -162,7 +162,7 @@ fn a_void_entry_that_clients_have_not_applied_does_nothing() {
 }
 
 #[test]
-fn who_comes_later_by_the_log_is_without_void_entries_too() {
+fn a_client_that_joins_later_by_the_log_skips_failed_entries_too() {
     let mut play = Play::new();
     play.dig(1, dig(30.0, 30.0));
     play.agreed();
@@ -184,7 +184,7 @@ fn who_comes_later_by_the_log_is_without_void_entries_too() {
 }
 
 #[test]
-fn void_parts_are_mended() {
+fn regions_of_failed_parts_are_fetched() {
     let mut play = Play::new();
     let pristine = play.agreed();
     let mut other = terrain(&play.ground);

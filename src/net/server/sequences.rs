@@ -1,30 +1,30 @@
-//! The last numbers of players' own edits, so that edits which a client sends again are not applied twice.
+//! The last sequence numbers of players' edits, so that edits which a client sends again are not applied twice.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::net::message::{ClientId, MOST_OWN_JUMP};
+use crate::net::message::{ClientId, MAX_SEQUENCE_JUMP};
 
 /// The most players whose numbers are remembered, in addition to those that are connected.
-const MOST_SEEN: usize = 1 << 16;
+const MAX_SEEN: usize = 1 << 16;
 
 /// No player has numbers beyond this one, so that counting on can never overflow.
-pub(super) const MOST_OWN: u64 = u64::MAX / 2;
+pub(super) const MAX_SEQUENCE: u64 = u64::MAX / 2;
 
 /// The most players whose numbers are saved: the most recent ones.
-pub(super) const MOST_SAVED: usize = 1024;
+pub(super) const MAX_SAVED: usize = 1024;
 
 /// The last edit of a player that the world holds.
 #[derive(Clone, Copy)]
 pub(super) struct Applied {
-    /// Its number at the player.
-    pub own: u64,
-    /// That in the order.
+    /// Its sequence number.
+    pub sequence: u64,
+    /// Its number in the order.
     pub number: u64,
 }
 
-/// How a player's number relates to earlier ones.
+/// How a sequence number relates to earlier ones of its player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OwnNumber {
+pub enum SequenceCheck {
     New,
     /// It was seen before.
     Old,
@@ -32,17 +32,17 @@ pub enum OwnNumber {
     Impossible,
 }
 
-/// The last number that was seen.
+/// The last sequence number of a player that was seen.
 #[derive(Clone, Copy, Default)]
 struct Seen {
-    own: u64,
+    sequence: u64,
     /// Counts the uses of all players.
     used: u64,
 }
 
-/// The last numbers of all players' edits.
+/// The last sequence numbers of all players' edits.
 #[derive(Default)]
-pub struct OwnNumbers {
+pub struct Sequences {
     seen: BTreeMap<ClientId, Seen>,
     uses: u64,
     pub(super) applied: BTreeMap<ClientId, Applied>,
@@ -50,7 +50,7 @@ pub struct OwnNumbers {
     pub(super) changed: BTreeSet<ClientId>,
 }
 
-impl OwnNumbers {
+impl Sequences {
     /// How many players' numbers are known.
     #[cfg(all(test, feature = "store"))]
     pub fn players(&self) -> usize {
@@ -59,32 +59,32 @@ impl OwnNumbers {
 
     /// The last number that was seen.
     pub fn last(&self, client: ClientId) -> u64 {
-        self.seen.get(&client).map_or(0, |seen| seen.own)
+        self.seen.get(&client).map_or(0, |seen| seen.sequence)
     }
 
     /// Classifies a received number.
-    pub fn judge(&self, client: ClientId, own: u64) -> OwnNumber {
+    pub fn judge(&self, client: ClientId, sequence: u64) -> SequenceCheck {
         let last = self.last(client);
-        if own == 0 || own > last.saturating_add(MOST_OWN_JUMP).min(MOST_OWN) {
-            OwnNumber::Impossible
-        } else if own > last {
-            OwnNumber::New
+        if sequence == 0 || sequence > last.saturating_add(MAX_SEQUENCE_JUMP).min(MAX_SEQUENCE) {
+            SequenceCheck::Impossible
+        } else if sequence > last {
+            SequenceCheck::New
         } else {
-            OwnNumber::Old
+            SequenceCheck::Old
         }
     }
 
     /// Records that a number was seen.
-    pub fn note(&mut self, client: ClientId, own: u64) {
+    pub fn note(&mut self, client: ClientId, sequence: u64) {
         self.uses += 1;
         let seen = self.seen.entry(client).or_default();
-        *seen = Seen { own: own.max(seen.own), used: self.uses };
+        *seen = Seen { sequence: sequence.max(seen.sequence), used: self.uses };
     }
 
     /// Forgets the players that have been silent for the longest time, if there are too many; `is_kept` selects players
     /// that stay in any case.
     pub fn trim(&mut self, is_kept: impl Fn(ClientId) -> bool) {
-        if self.seen.len() <= MOST_SEEN {
+        if self.seen.len() <= MAX_SEEN {
             return;
         }
         let away = self.seen.iter().filter(|(client, _)| !is_kept(**client));
@@ -96,14 +96,14 @@ impl OwnNumbers {
     }
 
     /// Records that an edit of a player was applied.
-    pub fn apply(&mut self, client: ClientId, own: u64, number: u64) {
+    pub fn apply(&mut self, client: ClientId, sequence: u64, number: u64) {
         if client == ClientId::SERVER {
             return;
         }
-        let last = self.applied.entry(client).or_insert(Applied { own, number });
-        *last = Applied { own: own.max(last.own), number };
+        let last = self.applied.entry(client).or_insert(Applied { sequence, number });
+        *last = Applied { sequence: sequence.max(last.sequence), number };
         self.changed.insert(client);
-        if self.applied.len() > MOST_SAVED
+        if self.applied.len() > MAX_SAVED
             && let Some((&oldest, _)) = self.applied.iter().min_by_key(|(_, last)| last.number)
         {
             self.applied.remove(&oldest);
@@ -123,10 +123,10 @@ mod tests {
 
     #[test]
     fn what_came_is_not_new_again_and_nothing_jumps_far() {
-        use OwnNumber::{Impossible, New, Old};
-        let mut numbers = OwnNumbers::default();
-        let far = 6 + MOST_OWN_JUMP;
-        for (id, own, expected) in [
+        use SequenceCheck::{Impossible, New, Old};
+        let mut numbers = Sequences::default();
+        let far = 6 + MAX_SEQUENCE_JUMP;
+        for (id, sequence, expected) in [
             (1, 0, Impossible),
             (1, 1, New),
             (1, 1, Old),
@@ -137,29 +137,29 @@ mod tests {
             (1, far + 1, Impossible),
             (1, u64::MAX, Impossible),
             (1, far, New),
-            (3, MOST_OWN_JUMP + 1, Impossible),
+            (3, MAX_SEQUENCE_JUMP + 1, Impossible),
         ] {
-            assert_eq!(numbers.judge(ClientId(id), own), expected, "{id} {own}");
+            assert_eq!(numbers.judge(ClientId(id), sequence), expected, "{id} {sequence}");
             if expected == New {
-                numbers.note(ClientId(id), own);
+                numbers.note(ClientId(id), sequence);
             }
         }
         assert_eq!([1, 2, 3].map(|id| numbers.last(ClientId(id))), [far, 1, 0]);
-        numbers.note(ClientId(4), MOST_OWN);
-        assert_eq!(numbers.judge(ClientId(4), MOST_OWN + 1), Impossible);
+        numbers.note(ClientId(4), MAX_SEQUENCE);
+        assert_eq!(numbers.judge(ClientId(4), MAX_SEQUENCE + 1), Impossible);
     }
 
     #[test]
     fn the_table_is_bounded_and_keeps_who_was_there_last() {
-        let mut numbers = OwnNumbers::default();
-        let most = 2 * MOST_SEEN as u64;
+        let mut numbers = Sequences::default();
+        let most = 2 * MAX_SEEN as u64;
         for id in 1..=most {
             numbers.note(ClientId(id), 9);
             if id % 1024 == 0 {
                 numbers.trim(|client| client == ClientId(1));
             }
         }
-        assert!(numbers.seen.len() <= MOST_SEEN + 1024);
+        assert!(numbers.seen.len() <= MAX_SEEN + 1024);
         assert_eq!([1, 2, most].map(|id| numbers.last(ClientId(id))), [9, 0, 9]);
     }
 }

@@ -5,17 +5,17 @@ use std::collections::BTreeSet;
 use super::commit::Commit;
 use super::resolve::FieldChange;
 use crate::lattice::ChunkPos;
-use crate::world::{Drawn, Version, World};
+use crate::world::{MeshKey, Version, World};
 
-/// Changes of a world that is shown.
-pub(crate) struct Unseen {
+/// Tiles, chunks and fields that changed, and the versions before and after.
+pub(crate) struct PendingDisplay {
     from: Version,
     to: Version,
-    drawn: BTreeSet<Drawn>,
+    drawn: BTreeSet<MeshKey>,
     fields: Vec<(ChunkPos, FieldChange)>,
 }
 
-impl Unseen {
+impl PendingDisplay {
     /// Nothing yet, on top of what is shown.
     pub(super) fn nothing(shown: Version) -> Self {
         Self { from: shown, to: shown, drawn: BTreeSet::new(), fields: Vec::new() }
@@ -37,7 +37,7 @@ impl Unseen {
     }
 
     /// The tiles and chunks that changed, each once.
-    pub fn drawn(&self) -> impl Iterator<Item = Drawn> {
+    pub fn drawn(&self) -> impl Iterator<Item = MeshKey> {
         self.drawn.iter().copied()
     }
 
@@ -54,8 +54,8 @@ impl Unseen {
     /// The changes of a commit to the world at this version. They are read from its lists, because the game may have
     /// taken its meshes.
     pub(super) fn of(commit: &Commit, before: Version) -> Self {
-        let tiles = commit.kept.rings.iter().map(|(tile, _)| Drawn::Tile(*tile));
-        let chunks = commit.kept.chunks.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));
+        let tiles = commit.kept.rings.iter().map(|(tile, _)| MeshKey::Tile(*tile));
+        let chunks = commit.kept.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk));
         Self { drawn: tiles.chain(chunks).collect(), fields: commit.news.clone(), ..Self::nothing(before) }
     }
 

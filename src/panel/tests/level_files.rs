@@ -1,0 +1,107 @@
+//! Tests of the buttons for files: unsaved changes, questions, levels that are replaced.
+
+use super::*;
+
+/// How often the app was asked to end. Messages themselves are gone after two frames.
+#[derive(Resource, Default)]
+struct Exits(usize);
+
+/// An editor without a window, whose level is in a folder of its own.
+fn editor(name: &str) -> (App, Entity, std::path::PathBuf) {
+    let folder = std::env::temp_dir().join(format!("burrow_files_{}_{name}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    let mut app = App::new();
+    app.insert_resource(BurrowPanel { level: folder.clone(), ..BurrowPanel::default() })
+        .init_resource::<Files>()
+        .add_message::<PanelAction>()
+        .add_message::<Undo>()
+        .add_message::<Redo>()
+        .add_message::<AppExit>()
+        .init_resource::<Exits>()
+        .add_systems(Update, (level::finish, files::answer, perform_actions, files::watch).chain())
+        .add_systems(Last, |mut exits: MessageReader<AppExit>, mut count: ResMut<Exits>| {
+            count.0 += exits.read().count();
+        });
+    let terrain = app.world_mut().spawn(flat(1.0)).id();
+    app.update();
+    (app, terrain, folder)
+}
+
+/// Performs an action, answers its question if there is an answer, and waits until nothing is running.
+fn act(app: &mut App, action: PanelAction, answer: Option<&str>) -> bool {
+    app.world_mut().write_message(action);
+    app.update();
+    let is_asked = app.world().resource::<Files>().is_asking();
+    if let Some(answer) = answer {
+        app.world_mut().resource_mut::<Files>().reply(answer);
+    }
+    for _ in 0..10_000 {
+        app.update();
+        let is_busy = matches!(app.world().resource::<BurrowPanel>().note, Some(Note::Busy(_)));
+        if !is_busy && app.world().resource::<Messages<PanelAction>>().is_empty() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    app.update();
+    is_asked
+}
+
+fn dig_at(app: &mut App, terrain: Entity, x: f32) -> u64 {
+    let mut terrain = app.world_mut().get_mut::<Terrain>(terrain).expect("it is there");
+    terrain.apply([dig(x)]);
+    let hash = terrain.world().hash();
+    app.update();
+    hash
+}
+
+fn hash(app: &App, terrain: Entity) -> u64 {
+    app.world().get::<Terrain>(terrain).expect("it is there").world().hash()
+}
+
+#[test]
+fn unsaved_changes_are_marked_and_asked_about_before_they_are_lost() {
+    let (mut app, terrain, folder) = editor("unsaved");
+    let pristine = hash(&app, terrain);
+    assert!(!app.world().resource::<Files>().is_unsaved);
+    let saved = dig_at(&mut app, terrain, 20.0);
+    assert!(app.world().resource::<Files>().is_unsaved);
+    assert!(!act(&mut app, PanelAction::SaveLevel, None), "nothing is there to be replaced");
+    assert!(folder.exists() && !app.world().resource::<Files>().is_unsaved);
+    assert!(!act(&mut app, PanelAction::SaveLevel, None), "the level that is open");
+    let changed = dig_at(&mut app, terrain, 40.0);
+    for action in [PanelAction::LoadLevel, PanelAction::NewLevel, PanelAction::Quit] {
+        assert!(act(&mut app, action, Some(texts::CANCEL)), "{action:?}");
+        assert_eq!(hash(&app, terrain), changed, "{action:?}");
+        assert_eq!(app.world().resource::<Exits>().0, 0);
+    }
+    assert!(act(&mut app, PanelAction::LoadLevel, Some(texts::DISCARD)));
+    assert_eq!(hash(&app, terrain), saved);
+    assert!(!act(&mut app, PanelAction::NewLevel, None), "all is saved");
+    assert_eq!(hash(&app, terrain), pristine);
+    assert!(!app.world().resource::<Files>().is_unsaved);
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn saving_before_one_quits_quits_once_it_is_saved() {
+    let (mut app, terrain, folder) = editor("quit");
+    let changed = dig_at(&mut app, terrain, 20.0);
+    assert!(act(&mut app, PanelAction::Quit, Some(texts::SAVE_CHANGES)));
+    assert_eq!(app.world().resource::<Exits>().0, 1);
+    assert!(!act(&mut app, PanelAction::LoadLevel, None));
+    assert_eq!(hash(&app, terrain), changed);
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn another_level_is_replaced_only_after_a_question() {
+    let (mut app, terrain, folder) = editor("replace");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    dig_at(&mut app, terrain, 20.0);
+    for (answer, is_unsaved) in [(texts::CANCEL, true), (texts::REPLACE, false)] {
+        assert!(act(&mut app, PanelAction::SaveLevel, Some(answer)));
+        assert_eq!(app.world().resource::<Files>().is_unsaved, is_unsaved, "{answer}");
+    }
+    std::fs::remove_dir_all(folder).expect("removed");
+}

@@ -1,0 +1,50 @@
+//! Follows commits: plants go and return in the frame of their ground.
+
+use bevy::prelude::*;
+
+use super::{News, PlantRemoved, PlantReturned, ShownPlants, transform_of};
+use crate::plugin::{GroundChanged, Places, TerrainEntities};
+use crate::scatter::PlantChange;
+use crate::terrain::Terrain;
+
+/// Checks the plants whose ground a commit changed in this frame.
+pub(super) fn follow_commits(
+    mut changed: MessageReader<GroundChanged>,
+    mut terrains: Query<(&Terrain, &TerrainEntities, &mut ShownPlants)>,
+    places: Places,
+    mut removed: MessageWriter<PlantRemoved>,
+    mut returned: MessageWriter<PlantReturned>,
+) {
+    for GroundChanged { terrain, versions: [before, after], boxes } in changed.read() {
+        let Ok((model, _, mut shown)) = terrains.get_mut(*terrain) else { continue };
+        let ShownPlants { patches: Some(patches), version, news, .. } = &mut *shown else { continue };
+        if version.is_none_or(|version| !version.is_same_world(*after)) {
+            continue; // Another world: loaded again as a whole.
+        }
+        let world = model.world();
+        // This system runs twice in a frame.
+        if *version == Some(world.version()) {
+            continue;
+        }
+        let changes: Vec<PlantChange> = match boxes {
+            Some(boxes) if *version == Some(*before) => {
+                boxes.iter().flat_map(|&samples| patches.update(world, Some(samples))).collect()
+            }
+            _ => patches.update(world, None),
+        };
+        *version = Some(*after);
+        if changes.is_empty() {
+            continue;
+        }
+        let place = places.of(*terrain).unwrap_or_default();
+        for change in changes {
+            let (terrain, plant, transform) = (*terrain, change.plant, transform_of(&change.plant, &place));
+            if change.stands {
+                returned.write(PlantReturned { terrain, plant, transform });
+            } else {
+                removed.write(PlantRemoved { terrain, plant, transform });
+            }
+            news.push(News::Changed(change));
+        }
+    }
+}

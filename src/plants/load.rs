@@ -1,0 +1,164 @@
+//! Which patches are loaded: those around cameras and sources, made in a task.
+
+use std::sync::Arc;
+
+use bevy::platform::collections::HashSet;
+use bevy::prelude::*;
+
+use super::{News, PlantSource, Plants, ShownPlants};
+use crate::plugin::{Places, TerrainEntities};
+use crate::scatter::{PatchPos, Plant, PlantPatches, Scatter};
+use crate::terrain::Terrain;
+use crate::threads::{ThreadTask, Threads, free_later};
+
+/// The most cells whose patches one task makes.
+const CELLS: i32 = 1 << 16;
+
+/// The place of a camera, or of a source with its radius, in voxels of the terrain.
+pub(super) type Viewer = (Vec2, Option<f32>);
+
+/// A task that makes patches.
+pub(super) struct LoadTask(ThreadTask<Vec<(PatchPos, Vec<Plant>)>>);
+
+impl std::fmt::Debug for LoadTask {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("LoadTask")
+    }
+}
+
+/// Reads rules that are new or changed.
+pub(super) fn read_rules(mut changed: Query<(Entity, &Plants, &mut ShownPlants), Changed<Plants>>) {
+    for (entity, Plants(rules), mut shown) in &mut changed {
+        let scatter =
+            Scatter::new(rules).map_err(|error| error!("the terrain {entity} has no plants: {error}"));
+        shown.clear();
+        shown.patches = scatter.ok().map(|scatter| PlantPatches::new(Arc::new(scatter)));
+    }
+}
+
+impl ShownPlants {
+    /// Drops all patches.
+    fn clear(&mut self) {
+        let scatter = self.scatter().cloned();
+        free_later(std::mem::replace(&mut self.patches, scatter.map(PlantPatches::new)));
+        (self.task, self.version, self.is_settled) = (None, None, false);
+        self.news.push(News::Cleared);
+    }
+}
+
+/// Loads patches that cameras and sources are near to, and drops those that none is near to.
+pub(super) fn choose_patches(
+    mut terrains: Query<(Entity, &Terrain, &TerrainEntities, &mut ShownPlants)>,
+    viewers: Query<(Entity, Option<&PlantSource>), Or<(With<Camera3d>, With<PlantSource>)>>,
+    places: Places,
+) {
+    for (entity, terrain, entities, mut shown) in &mut terrains {
+        let world = terrain.world();
+        let is_same = |version: &crate::terrain::Version| version.is_same_world(world.version());
+        if shown.patches.is_none() || !entities.show(world) && shown.version.as_ref().is_some_and(is_same) {
+            continue;
+        }
+        if shown.version.as_ref().is_some_and(|version| !is_same(version)) {
+            shown.clear();
+        }
+        let version = Some(world.version());
+        let shown = &mut *shown;
+        let Some(patches) = &mut shown.patches else { continue };
+        if shown.version != version {
+            // Follows commits that were not seen, where a game gates their systems.
+            for change in patches.update(world, None) {
+                shown.news.push(News::Changed(change));
+            }
+            shown.version = version;
+        }
+        if let Some(LoadTask(task)) = &mut shown.task {
+            let Some(done) = task.check() else { continue };
+            shown.task = None;
+            for (pos, plants) in done.unwrap_or_default() {
+                patches.insert(world, pos, plants);
+                shown.news.push(News::Loaded(pos));
+            }
+        }
+        let Some(place) = places.of(entity) else { continue };
+        let (inverse, voxel) = (place.affine().inverse(), terrain.voxel_size());
+        let viewers: Vec<Viewer> = viewers
+            .iter()
+            .filter_map(|(viewer, source)| {
+                let at = inverse.transform_point3(places.of(viewer)?.translation());
+                at.is_finite().then(|| (at.xz(), source.map(|source| source.radius / voxel)))
+            })
+            .collect();
+        let near = |(a, b): (&Viewer, &Viewer)| a.0.distance(b.0) < 1.0 && a.1 == b.1;
+        let is_settled = shown.is_settled && viewers.len() == shown.viewers.len();
+        if is_settled && viewers.iter().zip(&shown.viewers).all(near) {
+            continue;
+        }
+        shown.viewers.clone_from(&viewers);
+        let scatter = Arc::clone(patches.scatter());
+        let wanted = wanted(&scatter, (world.ground().width(), world.ground().depth()), &viewers);
+        let far: Vec<PatchPos> =
+            patches.iter().map(|(pos, _)| pos).filter(|pos| !wanted.kept.contains(pos)).collect();
+        for pos in far {
+            free_later(patches.remove(pos));
+            shown.news.push(News::Unloaded(pos));
+        }
+        let mut missing: Vec<(f32, PatchPos)> =
+            wanted.near.into_iter().filter(|(_, pos)| patches.get(*pos).is_none()).collect();
+        shown.is_settled = missing.is_empty();
+        if shown.is_settled {
+            continue;
+        }
+        missing.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut cells = 0;
+        let first = missing.into_iter().map(|(_, pos)| pos).take_while(|pos| {
+            let fits = cells < CELLS;
+            cells += scatter.patch_size(pos.species).pow(2);
+            fits
+        });
+        let (first, ground): (Vec<PatchPos>, _) = (first.collect(), world.shared_ground());
+        shown.task = Some(LoadTask(ThreadTask::start(Threads::Background, move || {
+            first.into_iter().map(|pos| (pos, scatter.patch(&ground, pos))).collect()
+        })));
+    }
+}
+
+/// The patches that viewers want.
+struct Wanted {
+    /// Those to be loaded, with their distance.
+    near: Vec<(f32, PatchPos)>,
+    /// Those, and some more that stay if they are there.
+    kept: HashSet<PatchPos>,
+}
+
+fn wanted(scatter: &Scatter, world: (i32, i32), viewers: &[Viewer]) -> Wanted {
+    let mut wanted = Wanted { near: Vec::new(), kept: HashSet::default() };
+    let mut near = HashSet::new();
+    for (species, own) in (0..=u8::MAX).zip(scatter.species()) {
+        let size = scatter.patch_size(species);
+        let side = size as f32;
+        for &(at, radius) in viewers {
+            let radius = radius.unwrap_or(own.view.end).clamp(0.0, 65536.0);
+            // Half a patch more keeps one from coming and going.
+            let kept = radius + side / 2.0;
+            let along = |at: f32, cells: i32| {
+                let first = ((at - kept) / side).floor() as i32;
+                let last = ((at + kept) / side).floor() as i32;
+                first.max(0)..=last.min((cells - 1) / size)
+            };
+            for z in along(at.y, world.1) {
+                for x in along(at.x, world.0) {
+                    let low = Vec2::new(x as f32, z as f32) * side;
+                    let apart = at.distance(at.clamp(low, low + side));
+                    let pos = PatchPos { species, x, z };
+                    if apart <= kept {
+                        wanted.kept.insert(pos);
+                    }
+                    if apart <= radius && near.insert(pos) {
+                        wanted.near.push((apart, pos));
+                    }
+                }
+            }
+        }
+    }
+    wanted
+}
