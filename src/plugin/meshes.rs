@@ -15,7 +15,7 @@ use bevy::mesh::{
 use super::palettes::{Arranged, Palettes};
 use super::{MaterialColors, MeshBytes, SkyLight};
 use crate::ground::Ground;
-use crate::lattice::{Column, ONE, SNAP};
+use crate::lattice::{Column, LatticeBox, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex, tile};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
 use crate::world::sky::{LitWorld, SkyColumns, SkyLights, SparseSky};
@@ -130,9 +130,10 @@ impl MeshBuilder {
         }
     }
 
-    /// Builds the mesh of a surface that has all of its vertices, without sky light.
-    pub(crate) fn build_whole(&self, origin: IVec3, surface: &SurfaceMesh) -> BuiltMesh {
-        self.build_lit(origin, surface, &mut TileLights::default())
+    /// Builds the mesh of a piece that broke off. It keeps the light of the place that it leaves.
+    pub(super) fn build_piece(&self, bounds: LatticeBox, surface: &SurfaceMesh) -> BuiltMesh {
+        let columns = [bounds.min, bounds.max].map(|corner| Column::new(corner.x, corner.z));
+        self.build_lit(bounds.min, surface, &mut TileLights::new(Some(self), columns.into()))
     }
 
     fn build_lit(&self, origin: IVec3, surface: &SurfaceMesh, lights: &mut TileLights) -> BuiltMesh {
@@ -516,6 +517,11 @@ mod tests {
     }
 
     /// All data of a Bevy mesh, as bytes.
+    /// The mesh of a surface that has all of its vertices.
+    fn whole(builder: &MeshBuilder, origin: IVec3, surface: &SurfaceMesh) -> BuiltMesh {
+        builder.build_lit(origin, surface, &mut TileLights::default())
+    }
+
     fn bytes_of(ready: BuiltMesh) -> Option<(Vec<Vec<u8>>, Option<Indices>, Aabb)> {
         let (mesh, (bounds, ..)) = ready?;
         let attributes = mesh.attributes().map(|(_, values)| values.get_bytes().to_vec());
@@ -549,7 +555,7 @@ mod tests {
                 let Some(mesh) = mesh else { continue };
                 let columns = world.lod_grid(level).columns(node);
                 let found = bytes_of(builder.build_node(columns, node.stride(), &mesh));
-                assert!(found == bytes_of(builder.build_whole(columns.0.at(0), &mesh)), "{node:?}");
+                assert!(found == bytes_of(whole(&builder, columns.0.at(0), &mesh)), "{node:?}");
                 compared += 1;
             }
         }
@@ -586,7 +592,7 @@ mod tests {
                             None,
                             &mut TileLights::default(),
                         ));
-                        assert!(found == bytes_of(builder.build_whole(origin, &update.mesh())), "{tile:?}");
+                        assert!(found == bytes_of(whole(builder, origin, &update.mesh())), "{tile:?}");
                         compared += usize::from(found.is_some());
                     }
                 }

@@ -144,7 +144,7 @@ impl LoosePieceFound {
 
     fn build(&self, mesh_builder: &MeshBuilder) -> Option<Mesh> {
         let surface = self.piece.mesh.as_ref()?;
-        mesh_builder.build_whole(self.piece.bounds.min, surface).map(|(mesh, _)| mesh)
+        mesh_builder.build_piece(self.piece.bounds, surface).map(|(mesh, _)| mesh)
     }
 
     /// Builds its mesh in the task.

@@ -8,7 +8,7 @@ use image::RgbImage;
 /// Mean FLIP above which a picture counts as different.
 ///
 /// On one machine, pictures are identical (0). A spot of another material, 4 m wide in a picture of about 20 m,
-/// gives 0.018; a camera that moves by a quarter of a pixel gives 0.022. `sameness.rs` measures both.
+/// gives 0.018; a camera that moves by a quarter of a pixel gives 0.027. `sameness.rs` measures both.
 const THRESHOLD: f32 = 0.01;
 
 /// The threshold, or the value of `BURROW_FLIP`: another renderer filters textures and shadows a little differently.

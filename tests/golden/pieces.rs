@@ -10,7 +10,7 @@ use crate::studio::Studio;
 
 /// Mean FLIP between a block in the ground and the same block cut off, whose normals come from its own samples. It is
 /// less than when the camera moves by a quarter of a pixel, and a quarter of what shifted textures give.
-const CUT_OFF: f32 = 0.022;
+const CUT_OFF: f32 = 0.024;
 /// Mean FLIP between a piece at its origin and a moved piece, under the same light.
 const MOVED: f32 = 0.004;
 

@@ -165,9 +165,11 @@ impl Bindings {
         self.0.get(&action).map_or(&[], Vec::as_slice)
     }
 
-    /// The label of an action's first binding.
+    /// The label of an action's first binding, "-" if it has none. Gamepads count only where they are compiled in.
     pub fn first(&self, action: Action, labels: &Labels) -> String {
-        self.of(action).first().map_or_else(|| "-".into(), |binding| labels.of(*binding))
+        let mut usable =
+            self.of(action).iter().filter(|binding| cfg!(feature = "gamepad") || !matches!(binding, Binding::Pad(_)));
+        usable.next().map_or_else(|| "-".into(), |binding| labels.of(*binding))
     }
 
     /// Replaces an action's bindings of the same device: a gamepad button leaves keys and mouse buttons as they are. If

@@ -178,10 +178,11 @@ const BORDER_VOXELS: f32 = 5.0;
 const BORDER_NOISE: f32 = 6.0;
 const BORDER_MOST: f32 = 2.0;
 const BORDER_MOST_FAR: f32 = 2.6;
-// How much heights move a border, how wide it is, and the share from which on a second layer can show.
+// How much heights move a border, and how wide it is: near the camera, and where cells are larger than voxels, as their weights
+// are the shares of what lies in them.
 const HEIGHT_SHIFT: f32 = 0.4;
 const BORDER_WIDTH: f32 = 0.10;
-const BORDER_START: f32 = 0.30;
+const BORDER_WIDTH_FAR: f32 = 0.25;
 
 // How many times larger textures are far away, and how much coarser than a pixel asks for. Each time that the distance grows by
 // `FAR_STEP`, they do too: ground looks as rough as the same ground nearer by.
@@ -441,10 +442,11 @@ fn layer_at(layer: u32, site: Site) -> Texels {
     return texels;
 }
 
-// The two strongest layers of a place, and the share of the second one, 0 to 0.5.
+// The two strongest layers of a place, the share of the second one, 0 to 0.5, and how wide the border between them is.
 struct Choice {
     layers: vec2<u32>,
     share: f32,
+    width: f32,
 }
 
 // How many octaves cells of the ground are larger than a voxel at a distance from the camera: levels of detail draw cells of
@@ -478,10 +480,10 @@ fn choose(in: Varying, site: Site, distance: f32) -> Choice {
 #ifdef GROUND_ATTRIBUTES
     let layers = in.layers;
     var weights = in.weights;
+    let octave = octave_of(distance);
     let across = dpdx(in.weights);
     let down = dpdy(in.weights);
     if max(max(weights.x, weights.y), max(weights.z, weights.w)) < 0.999 {
-        let octave = octave_of(distance);
         let noise = border_noise(site.place, octave);
         var rise =
             vec4(noise_of(noise, layers.x), noise_of(noise, layers.y), noise_of(noise, layers.z), noise_of(noise, layers.w));
@@ -513,9 +515,10 @@ fn choose(in: Varying, site: Site, distance: f32) -> Choice {
     let best = select(winners.y, winners.x, is_first);
     let next = select(select(losers.y, losers.x, is_first), select(winners.x, winners.y, is_first), is_rival);
     // Less what the third one has, so that none comes or goes with a jump.
-    return Choice(vec2(best, next), (second - third) / max(won.x + won.y - rival + second - 2.0 * third, 0.00001));
+    let share = (second - third) / max(won.x + won.y - rival + second - 2.0 * third, 0.00001);
+    return Choice(vec2(best, next), share, mix(BORDER_WIDTH, BORDER_WIDTH_FAR, min(octave, 1.0)));
 #else
-    return Choice(vec2(0u), 0.0);
+    return Choice(vec2(0u), 0.0, BORDER_WIDTH);
 #endif
 }
 
@@ -621,13 +624,12 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     let next = choice.layers.y;
     var texels = layer_at(best, site);
     var metallic = ground.layers[best].metallic;
-    if choice.share > BORDER_START {
+    if choice.share > 0.5 - 2.0 * choice.width {
         let other = layer_at(next, site);
         // What stands high covers what lies low.
-        let most = 0.5 - BORDER_WIDTH - BORDER_START;
-        let rise = clamp(HEIGHT_SHIFT * (other.color.a - texels.color.a), -most, most);
+        let rise = clamp(HEIGHT_SHIFT * (other.color.a - texels.color.a), -choice.width, choice.width);
         // Half on the border itself, from either side.
-        let share = smoothstep(0.5 - BORDER_WIDTH, 0.5 + BORDER_WIDTH, choice.share + rise);
+        let share = smoothstep(0.5 - choice.width, 0.5 + choice.width, choice.share + rise);
         texels = mix_texels(texels, other, share);
         metallic = mix(metallic, ground.layers[next].metallic, share);
     }

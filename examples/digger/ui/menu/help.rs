@@ -25,8 +25,8 @@ impl Plugin for HelpPlugin {
     }
 }
 
-/// Keys, and what they do.
-fn lines(bindings: &Bindings, labels: &Labels) -> [(String, &'static str); 14] {
+/// Keys, and what they do. An action without a key is left out.
+fn lines(bindings: &Bindings, labels: &Labels) -> Vec<(String, &'static str)> {
     use Action as A;
     let keys = |actions: &[Action], separator: &str| {
         let keys = actions.iter().map(|action| bindings.first(*action, labels));
@@ -48,8 +48,7 @@ fn lines(bindings: &Bindings, labels: &Labels) -> [(String, &'static str); 14] {
         keys(&[A::Panel], ""),
         keys(&[A::Pause], ""),
     ];
-    let mut words = texts::HELP_KEYS.into_iter();
-    all.map(|keys| (keys, words.next().unwrap_or_default()))
+    all.into_iter().zip(texts::HELP_KEYS).filter(|(keys, _)| keys != "-").collect()
 }
 
 fn open(mut commands: Commands, settings: Res<Settings>, labels: Res<Labels>, images: Option<Res<Images>>) {
