@@ -167,8 +167,10 @@ impl Bindings {
 
     /// The label of an action's first binding, "-" if it has none. Gamepads count only where they are compiled in.
     pub fn first(&self, action: Action, labels: &Labels) -> String {
-        let mut usable =
-            self.of(action).iter().filter(|binding| cfg!(feature = "gamepad") || !matches!(binding, Binding::Pad(_)));
+        let mut usable = self
+            .of(action)
+            .iter()
+            .filter(|binding| cfg!(feature = "gamepad") || !matches!(binding, Binding::Pad(_)));
         usable.next().map_or_else(|| "-".into(), |binding| labels.of(*binding))
     }
 
