@@ -1,4 +1,5 @@
-//! The cost of plants: `cargo bench --features examples --bench plants [-- WIDTH HEIGHT FRAMES] [small] [entities] [dig]`.
+//! The cost of plants: `cargo bench --features examples --bench plants [-- WIDTH HEIGHT FRAMES] [small] [entities] [dig]
+//! [grass] [trees] [prepass] [aliased]`.
 //!
 //! A million blades of grass (tufts of eight) and 20,000 trees within sight on a hilly world of 2 x 2 km, over the same view
 //! without plants and over an empty one, with shadows and without, for several view distances. Frames are drawn without a
@@ -6,16 +7,19 @@
 //! thread until the frame is handed to the GPU.
 //!
 //! `small` has a tenth of everything, for software renderers. `entities` draws each plant as an entity of its own, with shared
-//! meshes and materials, as Bevy batches them by itself. `dig` compares digs with plants and without: transaction and commit.
+//! meshes and materials, as Bevy batches them by itself. `grass` and `trees` draw only these. The camera has a depth
+//! prepass with `prepass`, and no MSAA with `aliased`. `dig` compares digs with plants and without: transaction and commit.
 
 #[path = "../examples/shared/offscreen.rs"]
 mod offscreen;
 #[path = "../examples/shared/plant_meshes.rs"]
 mod plant_meshes;
 
+use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 use bevy::camera::RenderTarget;
+use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::prelude::*;
 use bevy::render::render_resource::{PollType, TextureFormat};
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
@@ -52,10 +56,15 @@ fn rules(distance: f32, share: f32) -> ScatterRules {
     let grass = Species {
         spacing: 0.8,
         size: (0.7, 1.5),
-        view: ViewDistances { detail: view, end: view, shadows: 30.0 },
+        view: ViewDistances { detail: 25.0, end: view, shadows: 30.0 },
         ..Species::named("grass")
     };
-    ScatterRules { seed: 1, species: vec![tree, grass] }
+    let mut species = vec![tree, grass];
+    species.retain(|species| match species.name.as_str() {
+        "fir" => !is_asked("grass"),
+        _ => !is_asked("trees"),
+    });
+    ScatterRules { seed: 1, species }
 }
 
 fn ground() -> Ground {
@@ -88,6 +97,12 @@ impl View {
         let projection = Projection::from(PerspectiveProjection { far: 4000.0, ..default() });
         let place = Transform::from_translation(at).looking_to(Vec3::new(1.0, -0.12, 0.4), Vec3::Y);
         let camera = world.spawn((Camera3d::default(), RenderTarget::from(film), projection, place)).id();
+        if is_asked("prepass") {
+            world.entity_mut(camera).insert(DepthPrepass);
+        }
+        if is_asked("aliased") {
+            world.entity_mut(camera).insert(Msaa::Off);
+        }
         let light = DirectionalLight { illuminance: 10_000.0, ..default() };
         let sun =
             world.spawn((light, Transform::from_xyz(1.0, 0.9, 0.4).looking_at(Vec3::ZERO, Vec3::Y))).id();
@@ -114,7 +129,7 @@ impl View {
     }
 
     /// Shows these plants, and returns how many of each species there are.
-    fn plant(&mut self, rules: ScatterRules) -> Vec<usize> {
+    fn plant(&mut self, rules: ScatterRules) -> HashMap<&'static str, usize> {
         let world = self.app.world_mut();
         let mut meshes = world.resource_mut::<Assets<Mesh>>();
         let material =
@@ -129,7 +144,7 @@ impl View {
         };
         let looks = vec![
             look("fir", plant_meshes::fir(), Some(plant_meshes::far_fir()), 0.004),
-            look("grass", plant_meshes::grass(), None, 0.15),
+            look("grass", plant_meshes::grass(), Some(plant_meshes::far_grass()), 0.15),
         ];
         world.entity_mut(self.terrain).insert((Plants(rules), PlantLooks(looks)));
         self.app.update();
@@ -142,17 +157,19 @@ impl View {
         self.counts()
     }
 
-    fn counts(&self) -> Vec<usize> {
+    fn counts(&self) -> HashMap<&'static str, usize> {
+        let mut counts = HashMap::from([("fir", 0), ("grass", 0)]);
         let shown = self.app.world().get::<ShownPlants>(self.terrain);
-        let Some(patches) = shown.and_then(ShownPlants::patches) else { return Vec::new() };
-        let mut counts = vec![0; patches.scatter().species().len()];
+        let Some(patches) = shown.and_then(ShownPlants::patches) else { return counts };
         let eye =
             self.app.world().get::<Transform>(self.camera).map_or(Vec3::ZERO, |place| place.translation);
         for (pos, patch) in patches.iter() {
-            let end = patches.scatter().species()[usize::from(pos.species)].view.end;
+            let species = &patches.scatter().species()[usize::from(pos.species)];
+            let end = species.view.end;
             let is_near =
                 |plant: &&bevy_burrow::scatter::Plant| plant.position().as_vec3().distance(eye) < end;
-            counts[usize::from(pos.species)] += patch.standing().filter(is_near).count();
+            let name = if species.name == "fir" { "fir" } else { "grass" };
+            *counts.entry(name).or_default() += patch.standing().filter(is_near).count();
         }
         counts
     }
@@ -232,31 +249,30 @@ fn main() {
         "| shadows | view | blades | trees | frame ms | app ms | times the view without plants, less an empty frame |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- |");
-    let mut empty = [0.0; 2];
-    let mut bare = [0.0; 2];
+    let (mut empty, mut bare) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
     for (index, has_shadows) in [false, true].into_iter().enumerate() {
         view.set_shadows(has_shadows);
-        bare[index] = view.time(frames)[0];
+        bare[index] = view.time(frames);
         let before = view.turn_away();
-        empty[index] = view.time(frames)[0];
+        empty[index] = view.time(frames);
         if let (Some(before), Some(mut place)) =
             (before, view.app.world_mut().get_mut::<Transform>(view.camera))
         {
             *place = before;
         }
-        println!("| {has_shadows} | empty | 0 | 0 | {:.2} | | |", empty[index]);
-        println!("| {has_shadows} | no plants | 0 | 0 | {:.2} | | 1 |", bare[index]);
+        for (name, [frame, app], times) in [("empty", empty[index], ""), ("no plants", bare[index], "1")] {
+            println!("| {has_shadows} | {name} | 0 | 0 | {frame:.2} | {app:.2} | {times} |");
+        }
     }
     for distance in DISTANCES {
         let counts = view.plant(rules(distance, share));
         for (index, has_shadows) in [false, true].into_iter().enumerate() {
             view.set_shadows(has_shadows);
             let [frame, app] = view.time(frames);
-            let times = (frame - empty[index]) / (bare[index] - empty[index]).max(1e-3);
-            let blades = counts[1] * plant_meshes::BLADES as usize;
+            let times = (frame - empty[index][0]) / (bare[index][0] - empty[index][0]).max(1e-3);
+            let (blades, trees) = (counts["grass"] * plant_meshes::BLADES as usize, counts["fir"]);
             println!(
-                "| {has_shadows} | {distance} | {blades} | {} | {frame:.2} | {app:.2} | {times:.2} |",
-                counts[0]
+                "| {has_shadows} | {distance} | {blades} | {trees} | {frame:.2} | {app:.2} | {times:.2} |"
             );
         }
     }

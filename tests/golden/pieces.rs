@@ -5,7 +5,7 @@ use bevy_burrow::prelude::*;
 use image::RgbImage;
 use image::imageops::crop_imm;
 
-use crate::album::{Album, flip};
+use crate::album::{Album, flip, keep};
 use crate::studio::Studio;
 
 /// Mean FLIP between a block in the ground and the same block cut off, whose normals come from its own samples. It is
@@ -62,6 +62,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let above = |picture: &RgbImage| crop_imm(picture, 0, 0, picture.width(), 190).to_image();
     let (apart, _) = flip(&above(&whole), &above(&cut));
     println!("a block cut off below: FLIP {apart:.5}");
+    keep("piece", "in_the_ground", &whole);
     album.check(apart < CUT_OFF, || format!("a block looks different once it is cut off: FLIP {apart:.5}"));
 
     // The piece alone, then far away and turned, with camera and sun turned along.

@@ -80,14 +80,14 @@ pub fn rules() -> ScatterRules {
             view: view(60.0, 60.0, 0.0),
             ..small("flower")
         },
-        Species { spacing: 0.6, size: (0.7, 1.5), view: view(110.0, 110.0, 0.0), ..small("grass") },
+        Species { spacing: 0.6, size: (0.7, 1.5), view: view(25.0, 110.0, 0.0), ..small("grass") },
     ];
     ScatterRules { seed: 11, species }
 }
 
 /// The meshes of each species: near, far, sway, whether it follows the slope.
 fn looks(meshes: &mut Assets<Mesh>) -> Vec<PlantLook> {
-    use plant_meshes::{bush, far_fir, far_oak, fir, flower, grass, oak, stone};
+    use plant_meshes::{bush, far_fir, far_grass, far_oak, fir, flower, grass, oak, stone};
     let mut look = |species: &str, mesh: Mesh, far: Option<Mesh>, sway: f32, follows_slope: bool| PlantLook {
         species: species.into(),
         mesh: meshes.add(mesh),
@@ -109,7 +109,7 @@ fn looks(meshes: &mut Assets<Mesh>) -> Vec<PlantLook> {
         look("bush", bush(), None, 0.02, false),
         look("stone", stone(), None, 0.0, true),
         look("flower", flower(), None, 0.12, true),
-        look("grass", grass(), None, 0.15, true),
+        look("grass", grass(), Some(far_grass()), 0.15, true),
     ]
 }
 
