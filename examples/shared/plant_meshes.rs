@@ -131,15 +131,15 @@ pub fn grass() -> Mesh {
     blades.build()
 }
 
-/// A tuft of grass for farther away: few blades, each a wide triangle.
+/// A tuft of grass for farther away: few blades, each a wider triangle.
 pub fn far_grass() -> Mesh {
-    let blades = (0..3).fold(Builder::default(), |mut all, blade| {
-        let out = Vec2::from_angle((blade as f32 + 0.3) / 3.0 * TAU);
-        let side = Vec3::new(-out.y, 0.0, out.x) * 0.2;
-        let foot = Vec3::new(out.x, 0.0, out.y) * 0.05 - Vec3::Y * 0.05;
-        let tip = Vec3::new(out.x, 0.0, out.y) * 0.25 + Vec3::Y * (0.38 + 0.06 * blade as f32);
-        let low = BLADE.0.lerp(BLADE.1, 0.3);
-        let corners = [(foot - side, low), (foot + side, low), (tip, BLADE.1)];
+    let blades = (0..4).fold(Builder::default(), |mut all, blade| {
+        let out = Vec2::from_angle((blade as f32 + 0.3) / 4.0 * TAU);
+        let side = Vec3::new(-out.y, 0.0, out.x) * 0.07;
+        let foot = Vec3::new(out.x, 0.0, out.y) * 0.16 - Vec3::Y * 0.05;
+        let tip = Vec3::new(out.x, 0.0, out.y) * 0.3 + Vec3::Y * (0.36 + 0.05 * blade as f32);
+        let low = BLADE.0.lerp(BLADE.1, 0.2);
+        let corners = [(foot - side, low), (foot + side, low), (tip, BLADE.0.lerp(BLADE.1, 0.85))];
         let corners = corners.map(|(at, color)| all.vertex(at, Vec3::Y, color));
         all.indices.extend(corners);
         all

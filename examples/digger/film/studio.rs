@@ -382,13 +382,16 @@ impl Studio {
         let frames = if self.is_warm { 3 } else { 6 };
         self.is_warm = true;
         let drawn = &mut self.drawn;
-        photographer.shoot_after(frames, &mut self.app, &path, |app| draw(app, drawn))?;
+        // Nothing sways from one picture to the next.
+        self.app.world_mut().resource_mut::<Time<Virtual>>().pause();
+        let first = photographer.shoot_after(frames, &mut self.app, &path, |app| draw(app, drawn));
         // Ground that is missing in it is there without the prepass.
         let (camera, whole) = (self.eyes, path.with_extension("whole.png"));
         self.app.world_mut().entity_mut(camera).remove::<DepthPrepass>();
-        let shot = photographer.shoot_after(2, &mut self.app, &whole, |app| draw(app, drawn));
+        let second = photographer.shoot_after(2, &mut self.app, &whole, |app| draw(app, drawn));
         self.app.world_mut().entity_mut(camera).insert(DepthPrepass);
-        shot?;
+        self.app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+        first.and(second)?;
         let [drawn, reference] =
             [&path, &whole].map(|path| image::open(path).map(image::DynamicImage::into_rgb8));
         let found = holes::count_against(&self.app, camera, &drawn?, &reference?, HOLES_WITHIN);
