@@ -123,6 +123,21 @@ pub enum BrushError {
         /// Samples given.
         actual: usize,
     },
+    /// A path has too few or too many points.
+    #[error(
+        "the path has {count} points, but it must have {least} to {most}: divide a longer one into brushes of one stroke"
+    )]
+    PathPoints {
+        /// Its points.
+        count: usize,
+        /// Least points.
+        least: usize,
+        /// Most points.
+        most: usize,
+    },
+    /// A road is built in a shape that is no corridor.
+    #[error("a road needs a corridor: make the brush by `Brush::road`")]
+    NoCorridor,
     /// The blend of a deserialised edit is missing where its operation sculpts, or given where it does not.
     #[error("a `blend` belongs to operations that sculpt, and to no others")]
     Blend,
