@@ -67,6 +67,16 @@ fn full_power() -> u8 {
     FULL_POWER
 }
 
+/// Checks what concerns a shape and an operation together.
+fn check_together(shape: &QuantizedShape, operation: &Operation) -> Result<(), BrushError> {
+    match operation {
+        Operation::Road if shape.road().is_none() => Err(BrushError::NoCorridor),
+        // An edit has one image that networks send by its name.
+        Operation::Stamp { .. } if shape.image().is_some() => Err(BrushError::StampInGrid),
+        _ => Ok(()),
+    }
+}
+
 impl Edit {
     /// Rounds a brush to integers, halves to even, and checks it.
     ///
@@ -82,9 +92,7 @@ impl Edit {
             Some(custom) => QuantizedShape::quantize_custom(custom)?,
             None => QuantizedShape::quantize(&brush.shape)?,
         };
-        if brush.operation == Operation::Road && shape.road().is_none() {
-            return Err(BrushError::NoCorridor);
-        }
+        check_together(&shape, &brush.operation)?;
         Ok(Self {
             shape,
             operation: QuantizedOperation::quantize(&brush.operation)?,
@@ -104,9 +112,7 @@ impl Edit {
     pub fn check(&self) -> Result<(), BrushError> {
         self.shape.check()?;
         self.operation.check()?;
-        if self.operation == QuantizedOperation::Road && self.shape.road().is_none() {
-            return Err(BrushError::NoCorridor);
-        }
+        check_together(&self.shape, &self.operation.operation())?;
         if self.blend.is_some() != (self.kind() == Kind::Sculpt) {
             return Err(BrushError::Blend);
         }
@@ -170,16 +176,19 @@ impl Edit {
         Self { tag, stroke, ..self }
     }
 
-    /// The image of the stamp, if it is one.
+    /// The image of the stamp, if it is one; of a [`ShapeGrid`](super::ShapeGrid), the image that holds its samples.
     pub fn stamp_image(&self) -> Option<&Arc<GreyImage>> {
-        self.operation.stamp_image()
+        self.shape.image().or_else(|| self.operation.stamp_image())
     }
 
-    /// The edit with another image, if it is a stamp; otherwise as it is.
+    /// The edit with another image, if it is a stamp or its shape is a grid; otherwise as it is.
     ///
     /// # Errors
-    /// When the image has a size that no stamp may have.
+    /// When the image has a size that no stamp may have, or holds no grid.
     pub fn with_stamp_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        if self.shape.image().is_some() {
+            return Ok(Self { shape: self.shape.with_image(image)?, ..self });
+        }
         Ok(Self { operation: self.operation.with_stamp_image(image)?, ..self })
     }
 

@@ -50,7 +50,7 @@ fn custom_shape(far: f32, size: f32) -> impl Strategy<Value = AnyShape> {
     let points = prop::collection::vec((vector(size / 2.0), 0.25..(size / 2.0).max(0.5)), 2..6);
     let path = (vector(far), points, any::<bool>()).prop_map(|(at, points, is_smooth)| {
         let points = points.into_iter().map(|(by, radius)| (at + by, radius));
-        if is_smooth { Path::spline(points) } else { Path::polyline(points) }
+        if is_smooth { BrushPath::spline(points) } else { BrushPath::polyline(points) }
     });
     (path, any::<bool>(), 0.5..size, 0.0..size).prop_map(
         |(path, is_corridor, above, below)| match is_corridor {

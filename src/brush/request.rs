@@ -156,7 +156,7 @@ impl Brush {
     ///
     /// let ground = Ground::from_fn(64, 64, |x, _| 20.0 + f64::from(x % 16) * 0.5)?;
     /// let mut terrain = Terrain::new(ground, &TerrainSettings::default())?;
-    /// let path = Path::polyline([4.0, 60.0].map(|x| (Vec3::new(x, 23.0, 32.0), 2.5)));
+    /// let path = BrushPath::polyline([4.0, 60.0].map(|x| (Vec3::new(x, 23.0, 32.0), 2.5)));
     /// let road = Corridor::new(path, 8.0, 6.0);
     /// // The road, and its pavement.
     /// let receipts = terrain.apply([Brush::road(road.clone(), 3.0), Brush::paint(road, MaterialId(2))]);

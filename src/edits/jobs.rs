@@ -94,7 +94,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::brush::{BAND, Brush, Edit, Path, Shape};
+    use crate::brush::{BAND, Brush, BrushPath, Edit, Shape};
     use crate::lattice::ChunkGrid;
 
     fn prepared(brush: &Brush) -> PreparedEdit {
@@ -113,7 +113,7 @@ mod tests {
                 match rng.u8(..3) {
                     0 => Brush::dig(Shape::sphere(a, size)),
                     1 => Brush::dig(Shape::capsule(a, a.lerp(b, 0.3), size * 0.2)),
-                    _ => Brush::dig(Path::spline([a, a.lerp(b, 0.2), b].map(|at| (at, radius)))),
+                    _ => Brush::dig(BrushPath::spline([a, a.lerp(b, 0.2), b].map(|at| (at, radius)))),
                 }
             };
             let edits: Vec<PreparedEdit> = (0..count).map(|_| prepared(&brush(&mut rng))).collect();
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_long_path_is_assigned_to_the_bricks_along_it() {
-        let path = Path::polyline([
+        let path = BrushPath::polyline([
             (Vec3::new(9.0, 0.0, 7.0), 2.0),
             (Vec3::new(6900.0, 40.0, 3000.0), 4.0),
             (Vec3::new(100.0, 0.0, 7900.0), 1.0),

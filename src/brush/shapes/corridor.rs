@@ -4,7 +4,7 @@ use glam::{IVec3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{larger, smaller};
-use super::path::{LONGEST, Path, QuantizedPath};
+use super::path::{BrushPath, LONGEST, QuantizedPath};
 use super::round_cone::RoundCone;
 use super::union::{Bounds, Piece, Union};
 use super::{Outline, ShapeGeometry};
@@ -24,7 +24,7 @@ const HEIGHT: f32 = 256.0;
 pub struct Corridor {
     /// The path along its floor, with half the width at each point as radius.
     #[serde(flatten)]
-    pub path: Path,
+    pub path: BrushPath,
     /// Height above the path in voxels: 0 to 256.
     pub above: f32,
     /// Depth below the path in voxels: 0 to 256.
@@ -33,7 +33,7 @@ pub struct Corridor {
 
 impl Corridor {
     /// The corridor from `below` voxels below a path to `above` voxels above it.
-    pub fn new(path: Path, above: f32, below: f32) -> Self {
+    pub fn new(path: BrushPath, above: f32, below: f32) -> Self {
         Self { path, above, below }
     }
 

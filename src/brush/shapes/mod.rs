@@ -28,6 +28,8 @@ mod cuboid;
 mod curve;
 mod cylinder;
 mod distance;
+mod grid;
+mod mesh_grid;
 mod numbers;
 mod outline;
 mod path;
@@ -35,6 +37,8 @@ mod round_cone;
 mod sphere;
 mod torus;
 mod union;
+
+use std::sync::Arc;
 
 use glam::{IVec3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
@@ -45,8 +49,10 @@ pub use corridor::Corridor;
 pub use cuboid::Cuboid;
 pub use curve::Curve;
 pub use cylinder::Cylinder;
+pub use grid::{GridShape, ShapeGrid};
+pub use mesh_grid::MeshGrid;
 pub use numbers::{Numbers, Units, Voxels};
-pub use path::Path;
+pub use path::BrushPath;
 pub use sphere::Sphere;
 pub use torus::Torus;
 
@@ -54,12 +60,14 @@ use corridor::QuantizedCorridor;
 pub(super) use corridor::Road;
 use distance::Distance;
 pub(super) use distance::{larger, smaller};
+use grid::QuantizedGrid;
 use numbers::{Check, Convert, Kind, Quantize, Restore, Transform};
 use outline::Outline;
 use path::QuantizedPath;
 
 use super::BrushError;
 use super::quantize::{self, check_extent};
+use crate::ground::GreyImage;
 use crate::lattice::ONE;
 
 /// The integer geometry of a shape. All methods except `check` may rely on checked numbers.
@@ -99,7 +107,7 @@ pub(crate) struct Extent {
 }
 
 macro_rules! shapes {
-    ($($(#[$attribute:meta])* $name:ident,)*; $($custom:ident($quantized:ident) = $fields:expr,)*) => {
+    ($($(#[$attribute:meta])* $name:ident,)*; $($custom:ident($public:ident, $quantized:ident) = $fields:expr,)*) => {
         /// The shape of a brush, in voxels of terrain space; in a [`Brush`](super::Brush) that is a message of the
         /// plugin's, in units of world space.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -115,7 +123,7 @@ macro_rules! shapes {
         #[non_exhaustive]
         #[allow(missing_docs, reason = "each variant is the struct of its name")]
         pub enum CustomShape {
-            $($custom($custom),)*
+            $($custom($public),)*
         }
 
         /// Any shape: what brushes are made with.
@@ -124,7 +132,7 @@ macro_rules! shapes {
         #[serde(tag = "shape", rename_all = "snake_case")]
         pub enum AnyShape {
             $($(#[$attribute])* $name($name),)*
-            $($custom($custom),)*
+            $($custom($public),)*
         }
 
         impl AnyShape {
@@ -164,8 +172,8 @@ macro_rules! shapes {
             }
         }
 
-        $(impl From<$custom> for AnyShape {
-            fn from(shape: $custom) -> Self {
+        $(impl From<$public> for AnyShape {
+            fn from(shape: $public) -> Self {
                 Self::$custom(shape)
             }
         })*
@@ -349,6 +357,14 @@ macro_rules! shapes {
                 }
             }
 
+            /// At most the distance of a point, changing no faster than the point moves.
+            pub(super) fn least(&self, x: f32, y: f32, z: f32) -> f32 {
+                match self {
+                    $(Self::$name(form) => form.least(x, y, z),)*
+                    $(Self::$custom(form) => form.least(x, y, z),)*
+                }
+            }
+
             /// Hands out the rows of eight points along x at these y and z.
             pub(super) fn rows(
                 &self,
@@ -389,8 +405,9 @@ shapes! {
     Torus,
     Curve,
     ;
-    Path(QuantizedPath) = ["points", "smooth"],
-    Corridor(QuantizedCorridor) = ["points", "smooth", "above", "below"],
+    Path(BrushPath, QuantizedPath) = ["points", "smooth"],
+    Corridor(Corridor, QuantizedCorridor) = ["points", "smooth", "above", "below"],
+    Grid(GridShape, QuantizedGrid) = ["grid", "center", "rotation", "scale"],
 }
 
 impl Shape {
@@ -424,7 +441,7 @@ impl Shape {
 impl ShapeSdf {
     /// Whether only the CPU computes distances of the shape.
     pub(super) fn is_for_cpu(&self) -> bool {
-        matches!(self, Self::Curve(_) | Self::Path(_) | Self::Corridor(_))
+        matches!(self, Self::Curve(_) | Self::Path(_) | Self::Corridor(_) | Self::Grid(_))
     }
 }
 
@@ -449,6 +466,22 @@ impl QuantizedShape {
             Self::Path(path) => Some(path.volume_within(grow)),
             Self::Corridor(corridor) => Some(corridor.volume_within(grow)),
             _ => None,
+        }
+    }
+
+    /// The image that holds the shape's samples, if it is a grid.
+    pub(super) fn image(&self) -> Option<&Arc<GreyImage>> {
+        match self {
+            Self::Grid(grid) => Some(grid.image()),
+            _ => None,
+        }
+    }
+
+    /// The shape with another image that holds its samples, if it is a grid.
+    pub(super) fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        match self {
+            Self::Grid(grid) => Ok(Self::Grid(grid.with_image(image)?)),
+            other => Ok(other),
         }
     }
 

@@ -36,7 +36,7 @@ const PIECES: i32 = 32;
 /// use glam::Vec3;
 ///
 /// let mut terrain = Terrain::new(Ground::flat(64, 64, 20.0)?, &TerrainSettings::default())?;
-/// let path = Path::spline([
+/// let path = BrushPath::spline([
 ///     (Vec3::new(4.0, 20.0, 4.0), 3.0),
 ///     (Vec3::new(20.0, 12.0, 30.0), 2.0),
 ///     (Vec3::new(50.0, 14.0, 40.0), 4.5),
@@ -46,7 +46,7 @@ const PIECES: i32 = 32;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Path {
+pub struct BrushPath {
     /// Its points in voxels, 2 to 256 of them, each with its radius.
     #[serde(with = "list")]
     pub points: Arc<[(Vec3, f32)]>,
@@ -55,7 +55,7 @@ pub struct Path {
     pub is_smooth: bool,
 }
 
-impl Path {
+impl BrushPath {
     /// A path of straight lines between points, each with its radius.
     pub fn polyline(points: impl IntoIterator<Item = (Vec3, f32)>) -> Self {
         Self { points: points.into_iter().collect(), is_smooth: false }
@@ -131,7 +131,7 @@ mod list {
     }
 }
 
-/// A [`Path`] in integers: its first point, and from each point to the next. Lengths in 1/256 voxel.
+/// A [`BrushPath`] in integers: its first point, and from each point to the next. Lengths in 1/256 voxel.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::brush) struct QuantizedPath {
@@ -145,7 +145,7 @@ pub(in crate::brush) struct QuantizedPath {
 
 impl QuantizedPath {
     /// Rounds a path to integers, halves to even.
-    pub fn quantize(path: &Path) -> Result<Self, BrushError> {
+    pub fn quantize(path: &BrushPath) -> Result<Self, BrushError> {
         check_count(path.points.len())?;
         let point = |&(at, radius): &(Vec3, f32)| {
             Ok::<_, BrushError>((quantize::point("points", at)?, quantize::size("radius", radius)?))
@@ -156,10 +156,10 @@ impl QuantizedPath {
     }
 
     /// As a brush has it.
-    pub fn restored(&self) -> Path {
+    pub fn restored(&self) -> BrushPath {
         let points =
             self.corners().map(|(at, radius)| (restored_point(sum(self.from, at)), voxels(radius))).collect();
-        Path { points, is_smooth: self.is_smooth }
+        BrushPath { points, is_smooth: self.is_smooth }
     }
 
     /// Its points relative to the first one, with their radii.
@@ -292,7 +292,7 @@ mod tests {
     }
 
     /// A random path through up to 256 points.
-    fn random_path(rng: &mut Rng) -> Path {
+    fn random_path(rng: &mut Rng) -> BrushPath {
         let count = if rng.u8(..8) == 0 { rng.usize(100..=256) } else { rng.usize(2..12) };
         let side = [6.0, 24.0, 60.0][rng.usize(..3)];
         let mut at = Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 40.0;
@@ -302,7 +302,7 @@ mod tests {
                 (at, 0.25 + rng.f32() * 5.0)
             })
             .collect();
-        if rng.bool() { Path::spline(points) } else { Path::polyline(points) }
+        if rng.bool() { BrushPath::spline(points) } else { BrushPath::polyline(points) }
     }
 
     /// Distance to the hull of two balls, by the best of many balls between them.
@@ -318,7 +318,7 @@ mod tests {
     }
 
     /// The ends of the pieces of a path by their definition, from the brush's own numbers, in voxels.
-    fn plain_nodes(path: &Path) -> Vec<(DVec3, f64)> {
+    fn plain_nodes(path: &BrushPath) -> Vec<(DVec3, f64)> {
         let points: Vec<(DVec3, f64)> =
             path.points.iter().map(|&(at, radius)| (at.as_dvec3(), f64::from(radius))).collect();
         if !path.is_smooth {
@@ -410,7 +410,7 @@ mod tests {
 
     #[test]
     fn paths_have_limits_and_say_what_to_do() {
-        let path = |count: usize| Path::spline((0..count).map(|i| (Vec3::X * i as f32, 1.0)));
+        let path = |count: usize| BrushPath::spline((0..count).map(|i| (Vec3::X * i as f32, 1.0)));
         let error = |path: Path| Edit::quantize(&Brush::dig(path)).expect_err("refused");
         for count in [0, 1, 257] {
             let BrushError::PathPoints { count: said, .. } = error(path(count)) else { panic!("{count}") };
@@ -420,7 +420,7 @@ mod tests {
         for count in [2, 256] {
             Edit::quantize(&Brush::dig(path(count))).expect("valid").check().expect("valid");
         }
-        let line = |to: Vec3, radius| Path::polyline([(Vec3::ZERO, 1.0), (to, radius)]);
+        let line = |to: Vec3, radius| BrushPath::polyline([(Vec3::ZERO, 1.0), (to, radius)]);
         assert!(matches!(error(line(Vec3::X, 0.1)), BrushError::TooSmall { what: "radius", .. }));
         assert!(matches!(error(line(Vec3::X, f32::NAN)), BrushError::NotFinite { what: "radius", .. }));
         assert!(matches!(error(line(Vec3::NAN, 1.0)), BrushError::NotFinite { what: "points", .. }));
