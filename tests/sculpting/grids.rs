@@ -153,9 +153,15 @@ fn a_grid_of_a_ball_is_that_ball_at_any_rotation_and_scale() {
             let by = (Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 0.5) * 18.0 * scale;
             let point = (center + by).round().as_ivec3();
             let [found, exact] = [&edit, &ball].map(|edit| edit.evaluator().distance(point));
+            let cell = 256.0 * scale;
+            if exact as f32 > 2.5 * cell {
+                // Outside the grid, what is known is how far the grid is.
+                assert!(found as f32 > cell && found <= exact + cell as i32 / 4, "{found}, not {exact}");
+                continue;
+            }
             // Linear between samples of a curved surface; in the middle it is a cone.
-            let most = if exact > 0 { 30.0 } else { 80.0 };
-            assert!(((found - exact).abs() as f32) < 4.0 + most * scale, "{found}, not {exact}");
+            let most = if exact as f32 > -4.0 * cell { 0.1 } else { 0.9 };
+            assert!(((found - exact).abs() as f32) < 4.0 + most * cell, "{found}, not {exact}");
         }
         assert!(edit.reach().contains(center.as_ivec3()));
     }

@@ -144,7 +144,7 @@ fn paths_roads_and_grids_are_replayed_from_the_journal_and_read_from_a_checkpoin
         drop(store);
         let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
         assert_eq!(state(&opened.terrain), state(&first));
-        assert_eq!(opened.replayed > 0, commits == 1000);
+        assert!(opened.replayed > 0 || commits == 1);
     }
 }
 
