@@ -9,7 +9,7 @@ use crate::measured::{assert_closed, bumpy, heights, terrain};
 
 /// 1,000 of them with `BURROW_SPLINES`.
 fn path_count() -> u64 {
-    std::env::var("BURROW_SPLINES").ok().and_then(|count| count.parse().ok()).unwrap_or(12)
+    std::env::var("BURROW_SPLINES").ok().and_then(|count| count.parse().ok()).unwrap_or(6)
 }
 
 /// A random path below and above the surface.
@@ -116,12 +116,12 @@ fn road_density(
     }
     places.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some(&(beside, up)) = places.first() else { return Some(own) };
+    if beside >= 0.0 {
+        return Some(own);
+    }
     let is_unclear = |other: &(f64, f64)| other.0 - beside < 0.05 && (other.1 - up).abs() > 0.01;
     if places.iter().any(is_unclear) {
         return None;
-    }
-    if beside >= 0.0 {
-        return Some(own);
     }
     // In the middle between road and ceiling, or road and floor, the target jumps to what was there.
     if (2.0 * up - above).abs() < 0.04 || (2.0 * up + below).abs() < 0.04 {
@@ -182,7 +182,7 @@ fn roads_have_the_densities_of_their_definition() {
         ground.undo();
         assert_eq!((ground.world().hash(), ground.world().bricks().count()), (hash, 0), "seed {seed}");
     }
-    assert!(changed > 3000, "{changed}");
+    assert!(changed > 1500, "{changed}");
 }
 
 #[test]

@@ -523,6 +523,24 @@ mod tests {
         best
     }
 
+    #[cfg(feature = "cuda")]
+    #[test]
+    fn shapes_of_many_numbers_are_for_the_cpu() {
+        let path = BrushPath::polyline([(Vec3::ZERO, 1.0), (Vec3::X * 9.0, 2.0)]);
+        let grid = ShapeGrid::from_fn(glam::UVec3::splat(5), |at| at.as_vec3().length() - 3.0).unwrap();
+        let customs: [AnyShape; 3] = [
+            path.clone().into(),
+            Corridor::new(path, 1.0, 1.0).into(),
+            GridShape::new(grid, Vec3::ONE).into(),
+        ];
+        for shape in customs {
+            let brush = crate::brush::Brush::dig(shape);
+            assert!(crate::brush::Edit::quantize(&brush).unwrap().evaluator().is_for_cpu(), "{brush:?}");
+        }
+        let brush = crate::brush::Brush::dig(Shape::sphere(Vec3::ONE, 2.0));
+        assert!(!crate::brush::Edit::quantize(&brush).unwrap().evaluator().is_for_cpu());
+    }
+
     #[test]
     fn the_middle_is_as_deep_as_it_is_said_to_be() {
         let base = Vec3::new(-3.3, 100.7, 8.05);
