@@ -126,7 +126,7 @@ impl Edit {
     }
 
     /// The custom shape, if it has one, in floats as in a brush.
-    pub fn custom_shape(&self) -> Option<CustomShape> {
+    pub fn custom_shape(&self) -> Option<Arc<CustomShape>> {
         self.shape.shape().parts().1
     }
 

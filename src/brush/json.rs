@@ -1,6 +1,7 @@
 //! Brushes as flat objects, such as lines of JSON.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::de::{Error, IgnoredAny};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -103,7 +104,7 @@ impl From<Brush> for Line {
         let like = Brush::plain(shape, operation.clone()).blend;
         let is_sculpting = operation.is_sculpting();
         Self {
-            shape: custom.map_or_else(|| shape.into(), AnyShape::from),
+            shape: custom.map_or_else(|| shape.into(), |custom| Arc::unwrap_or_clone(custom).into()),
             operation,
             roughness,
             tag,

@@ -1,5 +1,7 @@
 //! The brush: an edit that a game requests, in floats.
 
+use std::sync::Arc;
+
 #[cfg(feature = "plugin")]
 use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 #[cfg(feature = "plugin")]
@@ -44,7 +46,7 @@ pub struct Brush {
     /// around that one.
     pub shape: Shape,
     /// A shape that takes the place of `shape`: a path, for example.
-    pub custom: Option<CustomShape>,
+    pub custom: Option<Arc<CustomShape>>,
     /// The operation.
     pub operation: Operation,
     /// Bumps on the shape's surface; `None` for a smooth one.
@@ -219,7 +221,8 @@ impl Brush {
     /// refuses or that is deformed.
     #[must_use]
     pub fn transformed(&self, rotation: Quat, translation: Vec3, scale: f32) -> Self {
-        let custom = self.custom.as_ref().map(|custom| custom.transformed(rotation, translation, scale));
+        let custom =
+            self.custom.as_ref().map(|custom| Arc::new(custom.transformed(rotation, translation, scale)));
         Self {
             shape: match &custom {
                 Some(custom) => custom.around(),
@@ -254,7 +257,7 @@ impl Brush {
         let mut brush = self.placed_in(scale, rotation, translation);
         // The rest of the transform into the terrain.
         let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;
-        brush.custom = brush.custom.map(|custom| custom.stretched(|arrow| rest * arrow));
+        brush.custom = brush.custom.map(|custom| Arc::new(custom.stretched(|arrow| rest * arrow)));
         brush.shape = match &brush.custom {
             Some(custom) => custom.around(),
             None => brush.shape.stretched(|arrow| rest * arrow),

@@ -137,12 +137,12 @@ macro_rules! shapes {
 
         impl AnyShape {
             /// The parts that a brush holds: for a custom shape, with a box around it.
-            pub(super) fn parts(self) -> (Shape, Option<CustomShape>) {
+            pub(super) fn parts(self) -> (Shape, Option<Arc<CustomShape>>) {
                 match self {
                     $(Self::$name(shape) => (Shape::$name(shape), None),)*
                     $(Self::$custom(shape) => {
                         let custom = CustomShape::$custom(shape);
-                        (custom.around(), Some(custom))
+                        (custom.around(), Some(Arc::new(custom)))
                     })*
                 }
             }

@@ -411,7 +411,7 @@ mod tests {
     #[test]
     fn paths_have_limits_and_say_what_to_do() {
         let path = |count: usize| BrushPath::spline((0..count).map(|i| (Vec3::X * i as f32, 1.0)));
-        let error = |path: Path| Edit::quantize(&Brush::dig(path)).expect_err("refused");
+        let error = |path: BrushPath| Edit::quantize(&Brush::dig(path)).expect_err("refused");
         for count in [0, 1, 257] {
             let BrushError::PathPoints { count: said, .. } = error(path(count)) else { panic!("{count}") };
             assert_eq!(said, count);
@@ -445,7 +445,7 @@ mod tests {
             assert_eq!(Edit::quantize(&Brush::from(&edit)).expect("valid"), edit);
             let line = serde_json::to_string(&brush).expect("a brush");
             let again: Brush = serde_json::from_str(&line).expect("a brush");
-            assert_eq!(again.custom, Some(CustomShape::Path(path)));
+            assert_eq!(again.custom.as_deref(), Some(&CustomShape::Path(path)));
             assert_eq!(Edit::quantize(&again).expect("valid"), edit);
         }
         let line =
