@@ -250,10 +250,9 @@ mod tests {
     #[test]
     fn meshes_of_bevy_become_grids() {
         // Both have their seams' vertices twice.
-        for (mesh, radius) in [
-            (Mesh::from(Sphere::new(3.0).mesh().uv(24, 16)), 3.0),
-            (Mesh::from(Cuboid::from_length(6.0)), 3.0),
-        ] {
+        for (mesh, radius) in
+            [(Sphere::new(3.0).mesh().uv(24, 16), 3.0), (Mesh::from(Cuboid::from_length(6.0)), 3.0)]
+        {
             let MeshGrid { grid, middle, cell } = ShapeGrid::from_bevy_mesh(&mesh, 40).expect("closed");
             assert!(middle.length() < 1e-3);
             let center = (grid.size().as_ivec3() - 1) / 2;
