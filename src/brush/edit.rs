@@ -10,9 +10,14 @@ use super::quantized_operation::QuantizedOperation;
 use super::roughness::QuantizedRoughness;
 use super::sculpt_kernel::SculptKernel;
 use super::shapes::QuantizedShape;
-use super::{BAND, Blend, Brush, BrushError, Evaluator, FULL_POWER, Kind, Operation, Roughness, Shape};
+use super::{
+    BAND, Blend, Brush, BrushError, CustomShape, Evaluator, FULL_POWER, Kind, Operation, Roughness, Shape,
+};
 use crate::ground::GreyImage;
 use crate::lattice::{LatticeBox, ONE};
+
+/// Diagonal of a brick of 8 voxels, rounded up, in 1/256 voxel.
+const BRICK_DIAGONAL: i32 = 14 * ONE;
 
 /// A brush in integers: the same edit changes the same samples to the same bits on every machine.
 ///
@@ -62,6 +67,16 @@ fn full_power() -> u8 {
     FULL_POWER
 }
 
+/// Checks what concerns a shape and an operation together.
+fn check_together(shape: &QuantizedShape, operation: &Operation) -> Result<(), BrushError> {
+    match operation {
+        Operation::Road if shape.road().is_none() => Err(BrushError::NoCorridor),
+        // An edit has one image that networks send by its name.
+        Operation::Stamp { .. } if shape.image().is_some() => Err(BrushError::StampInGrid),
+        _ => Ok(()),
+    }
+}
+
 impl Edit {
     /// Rounds a brush to integers, halves to even, and checks it.
     ///
@@ -73,8 +88,13 @@ impl Edit {
     pub fn quantize(brush: &Brush) -> Result<Self, BrushError> {
         let roughness = brush.roughness.as_ref().map(QuantizedRoughness::quantize).transpose()?;
         let sculpts = brush.operation.is_sculpting();
+        let shape = match &brush.custom {
+            Some(custom) => QuantizedShape::quantize_custom(custom)?,
+            None => QuantizedShape::quantize(&brush.shape)?,
+        };
+        check_together(&shape, &brush.operation)?;
         Ok(Self {
-            shape: QuantizedShape::quantize(&brush.shape)?,
+            shape,
             operation: QuantizedOperation::quantize(&brush.operation)?,
             blend: sculpts.then(|| QuantizedBlend::quantize(&brush.blend)).transpose()?,
             power: brush.power,
@@ -92,6 +112,7 @@ impl Edit {
     pub fn check(&self) -> Result<(), BrushError> {
         self.shape.check()?;
         self.operation.check()?;
+        check_together(&self.shape, &self.operation.operation())?;
         if self.blend.is_some() != (self.kind() == Kind::Sculpt) {
             return Err(BrushError::Blend);
         }
@@ -99,9 +120,14 @@ impl Edit {
         self.roughness.map_or(Ok(()), |roughness| roughness.check())
     }
 
-    /// The shape, in floats as in a brush.
+    /// The shape, in floats as in a brush; of a custom shape, a box around it.
     pub fn shape(&self) -> Shape {
-        self.shape.shape()
+        self.shape.shape().parts().0
+    }
+
+    /// The custom shape, if it has one, in floats as in a brush.
+    pub fn custom_shape(&self) -> Option<Arc<CustomShape>> {
+        self.shape.shape().parts().1
     }
 
     /// Bumps on the shape's surface, in floats as in a brush.
@@ -150,16 +176,19 @@ impl Edit {
         Self { tag, stroke, ..self }
     }
 
-    /// The image of the stamp, if it is one.
+    /// The image of the stamp, if it is one; of a [`ShapeGrid`](super::ShapeGrid), the image that holds its samples.
     pub fn stamp_image(&self) -> Option<&Arc<GreyImage>> {
-        self.operation.stamp_image()
+        self.shape.image().or_else(|| self.operation.stamp_image())
     }
 
-    /// The edit with another image, if it is a stamp; otherwise as it is.
+    /// The edit with another image, if it is a stamp or its shape is a grid; otherwise as it is.
     ///
     /// # Errors
-    /// When the image has a size that no stamp may have.
+    /// When the image has a size that no stamp may have, or holds no grid.
     pub fn with_stamp_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        if self.shape.image().is_some() {
+            return Ok(Self { shape: self.shape.with_image(image)?, ..self });
+        }
         Ok(Self { operation: self.operation.with_stamp_image(image)?, ..self })
     }
 
@@ -168,10 +197,24 @@ impl Edit {
     /// At the rim of the lattice the box reaches beyond its [limits](super#limits) by at most some thousand
     /// voxels; the world cuts it.
     pub fn reach(&self) -> LatticeBox {
-        // Two more units for the rounding of the distance.
-        let grow = BAND + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2;
+        let grow = self.band();
         let (low, high) = self.shape.bounds();
         LatticeBox { min: (low - grow + (ONE - 1)).div_euclid(IVec3::splat(ONE)), max: (high + grow) >> 8 }
+    }
+
+    /// Distance outside the shape up to which samples may change.
+    fn band(&self) -> i32 {
+        // Two more units for the rounding of the distance.
+        BAND + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2
+    }
+
+    /// At least the number of bricks that the edit may change, where that is known to be much less than the bricks in
+    /// its [`reach`](Self::reach).
+    #[cfg_attr(not(feature = "net"), expect(dead_code))]
+    pub(crate) fn most_bricks(&self) -> Option<u64> {
+        // Every point of a brick that is reached lies within its diagonal.
+        let volume = self.shape.volume_within(self.band() + BRICK_DIAGONAL)?;
+        Some((volume / f64::from(8 * ONE).powi(3)).ceil() as u64)
     }
 
     /// The edit's signed distance function, ready to evaluate.
@@ -184,8 +227,10 @@ impl Edit {
 /// plane may be rounded once more.
 impl From<&Edit> for Brush {
     fn from(edit: &Edit) -> Self {
+        let (shape, custom) = edit.shape.shape().parts();
         Self {
-            shape: edit.shape(),
+            shape,
+            custom,
             operation: edit.operation(),
             roughness: edit.roughness(),
             tag: edit.tag(),

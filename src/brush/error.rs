@@ -123,6 +123,48 @@ pub enum BrushError {
         /// Samples given.
         actual: usize,
     },
+    /// A path has too few or too many points.
+    #[error(
+        "the path has {count} points, but it must have {least} to {most}: divide a longer one into brushes of one stroke"
+    )]
+    PathPoints {
+        /// Its points.
+        count: usize,
+        /// Least points.
+        least: usize,
+        /// Most points.
+        most: usize,
+    },
+    /// A grid of distances has too few or too many samples along a side.
+    #[error("the grid has {size:?} samples, but a side must have {least} to {most}")]
+    GridSize {
+        /// Samples along x, y and z.
+        size: [u32; 3],
+        /// Least samples along a side.
+        least: u32,
+        /// Most samples along a side.
+        most: u32,
+    },
+    /// The image of a deserialised grid does not hold one.
+    #[error("the image holds no grid of distances: make it by `ShapeGrid`")]
+    NoGrid,
+    /// A stamp is pressed within a grid.
+    #[error("a stamp cannot be pressed within a grid: give the brush another shape")]
+    StampInGrid,
+    /// A mesh has no triangles, no extent, or triangles whose corners have no position.
+    #[error("the mesh has no list of triangles with positions, or all of them are one point")]
+    NoTriangles,
+    /// A mesh has a hole, or its triangles face different ways.
+    #[error(
+        "{edges} edges of the mesh are open: close its holes, and let all triangles that share an edge face the same way"
+    )]
+    OpenMesh {
+        /// Edges with more triangles on the one side than on the other.
+        edges: usize,
+    },
+    /// A road is built in a shape that is no corridor.
+    #[error("a road needs a corridor: make the brush by `Brush::road`")]
+    NoCorridor,
     /// The blend of a deserialised edit is missing where its operation sculpts, or given where it does not.
     #[error("a `blend` belongs to operations that sculpt, and to no others")]
     Blend,

@@ -100,9 +100,10 @@ impl Evaluator {
         let corner = (max - middle).as_dvec3() * f64::from(ONE);
         let diagonal = (corner.x * corner.x + corner.y * corner.y + corner.z * corner.z).sqrt();
 
-        let mut distance = [0.0];
-        self.smooth(middle.x, middle.as_ivec3(), &mut distance);
-        let distance = round(distance[0]);
+        let [x, y, z] = std::array::from_fn(|axis| {
+            units(middle[axis], self.origin_voxel[axis], self.origin_fraction[axis])
+        });
+        let distance = round(self.form.least(x, y, z));
         // A generous bound on the rounding to f32 at this distance.
         let rounding = 16 + (distance >> 14);
         let amplitude = self.roughness.map_or(0, |roughness| roughness.amplitude);

@@ -1,11 +1,12 @@
 //! Brushes as flat objects, such as lines of JSON.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::de::{Error, IgnoredAny};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::{Brush, FULL_POWER, Operation, Roughness, Shape, is_default};
+use super::{AnyShape, Brush, FULL_POWER, Operation, Roughness, is_default};
 use crate::ground::MaterialId;
 
 impl Serialize for Brush {
@@ -25,7 +26,7 @@ impl<'de> Deserialize<'de> for Brush {
 #[serde(rename = "Brush")]
 pub(super) struct Line {
     #[serde(flatten)]
-    shape: Shape,
+    shape: AnyShape,
     #[serde(flatten)]
     operation: Operation,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -66,8 +67,9 @@ impl TryFrom<Line> for Brush {
     type Error = String;
 
     fn try_from(line: Line) -> Result<Self, String> {
+        let shape = line.shape.fields();
         let brush = Self::plain(line.shape, line.operation);
-        let (shape, operation) = (brush.shape.fields(), brush.operation.fields());
+        let operation = brush.operation.fields();
         let is_sculpting = brush.operation.is_sculpting();
         let material = line.new_ground.material;
         let is_own = |field: &str| {
@@ -97,12 +99,12 @@ impl TryFrom<Line> for Brush {
 
 impl From<Brush> for Line {
     fn from(brush: Brush) -> Self {
-        let Brush { shape, operation, roughness, tag, stroke, blend, power } = brush;
+        let Brush { shape, custom, operation, roughness, tag, stroke, blend, power } = brush;
         // Only what differs from the default blend of such a brush.
         let like = Brush::plain(shape, operation.clone()).blend;
         let is_sculpting = operation.is_sculpting();
         Self {
-            shape,
+            shape: custom.map_or_else(|| shape.into(), |custom| Arc::unwrap_or_clone(custom).into()),
             operation,
             roughness,
             tag,
@@ -121,7 +123,7 @@ mod tests {
     use glam::{Quat, Vec2, Vec3};
 
     use super::*;
-    use crate::brush::Stamp;
+    use crate::brush::{Shape, Stamp};
     use crate::ground::GreyImage;
 
     fn parse(json: &str) -> Result<Brush, String> {

@@ -45,13 +45,33 @@ fn shape(far: f32, size: f32) -> impl Strategy<Value = Shape> {
     ]
 }
 
+/// Paths and corridors up to about `size` voxels around places up to `far` voxels out.
+fn custom_shape(far: f32, size: f32) -> impl Strategy<Value = AnyShape> {
+    let points = prop::collection::vec((vector(size / 2.0), 0.25..(size / 2.0).max(0.5)), 2..6);
+    let path = (vector(far), points, any::<bool>()).prop_map(|(at, points, is_smooth)| {
+        let points = points.into_iter().map(|(by, radius)| (at + by, radius));
+        if is_smooth { BrushPath::spline(points) } else { BrushPath::polyline(points) }
+    });
+    (path, any::<bool>(), 0.5..size, 0.0..size).prop_map(
+        |(path, is_corridor, above, below)| match is_corridor {
+            true => Corridor::new(path, above, below).into(),
+            false => path.into(),
+        },
+    )
+}
+
+/// Shapes and custom shapes.
+fn any_shape(far: f32, size: f32) -> impl Strategy<Value = AnyShape> {
+    prop_oneof![3 => shape(far, size).prop_map(AnyShape::from), 2 => custom_shape(far, size)]
+}
+
 fn roughness() -> impl Strategy<Value = Option<Roughness>> {
     prop::option::of(
         (0.0f32..8.0, 1.0f32..20.0, any::<u32>()).prop_map(|(a, s, seed)| Roughness::new(a, s, seed)),
     )
 }
 
-fn edit(shape: Shape, roughness: Option<Roughness>) -> Edit {
+fn edit(shape: impl Into<AnyShape>, roughness: Option<Roughness>) -> Edit {
     Edit::quantize(&Brush { roughness, ..Brush::dig(shape) }).unwrap()
 }
 
@@ -90,6 +110,7 @@ fn wild_brush() -> impl Strategy<Value = Brush> {
     (shape, wild_operation(), blend, roughness, any::<u64>(), stroke, any::<u8>()).prop_map(
         |(shape, operation, blend, roughness, tag, stroke, power)| Brush {
             shape,
+            custom: None,
             operation,
             blend,
             roughness,
@@ -192,7 +213,7 @@ fn to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
 
 proptest! {
     #[test]
-    fn reach_encloses_every_sample_that_may_change(shape in shape(30.0, 7.0), roughness in roughness()) {
+    fn reach_encloses_every_sample_that_may_change(shape in any_shape(30.0, 7.0), roughness in roughness()) {
         let edit = edit(shape, roughness);
         let (reach, evaluator) = (edit.reach(), edit.evaluator());
         let beyond = reach.grown(3);
@@ -209,12 +230,12 @@ proptest! {
 
     #[test]
     fn the_brush_of_an_edit_asks_for_that_edit(
-        shape in shape(30_000.0, 60.0), roughness in roughness(), operation in wild_operation(), tag: u64, power: u8,
+        shape in any_shape(30_000.0, 60.0), roughness in roughness(), operation in wild_operation(), tag: u64, power: u8,
     ) {
-        let brush = Brush { operation, roughness, ..Brush::dig(shape) }.with_tag(tag).with_power(power);
+        let brush = Brush { operation, roughness, ..Brush::dig(shape.clone()) }.with_tag(tag).with_power(power);
         let Ok(edit) = Edit::quantize(&brush) else { return Ok(()) };
         let again = Edit::quantize(&Brush::from(&edit)).unwrap();
-        let is_turned = matches!(edit.shape(), Shape::Cuboid(_) | Shape::Torus(_));
+        let is_turned = matches!(shape, AnyShape::Cuboid(_) | AnyShape::Torus(_));
         if !is_turned && !matches!(edit.operation(), Operation::Flatten { .. } | Operation::Stamp { .. }) {
             prop_assert_eq!(&again, &edit);
         }
@@ -226,7 +247,7 @@ proptest! {
     }
 
     #[test]
-    fn reach_is_tight_without_roughness(shape in shape(30.0, 20.0)) {
+    fn reach_is_tight_without_roughness(shape in any_shape(30.0, 20.0)) {
         let edit = edit(shape, None);
         let (reach, evaluator) = (edit.reach(), edit.evaluator());
         // On every side, some sample of the outermost two layers is within the band or nearly so.
@@ -243,7 +264,7 @@ proptest! {
 
     #[test]
     fn out_of_reach_is_never_a_lie(
-        shape in shape(20.0, 8.0), roughness in roughness(), size in prop::array::uniform3(1..70),
+        shape in any_shape(20.0, 8.0), roughness in roughness(), size in prop::array::uniform3(1..70),
     ) {
         let (edit, size) = (edit(shape, roughness), IVec3::from_array(size));
         let (around, evaluator) = (edit.reach().grown(12), edit.evaluator());
@@ -264,7 +285,7 @@ proptest! {
 
     #[test]
     fn a_row_is_its_samples(
-        shape in shape(32_000.0, 60.0), roughness in roughness(), start in prop::array::uniform3(-90..90), length in 0usize..100,
+        shape in any_shape(32_000.0, 60.0), roughness in roughness(), start in prop::array::uniform3(-90..90), length in 0usize..100,
     ) {
         let edit = edit(shape, roughness);
         let start = edit.reach().min + IVec3::from_array(start);
@@ -277,7 +298,7 @@ proptest! {
 
     #[test]
     fn distance_changes_no_faster_than_the_point(
-        shape in shape(100.0, 90.0), p in prop::array::uniform3(-300..300), by in prop::array::uniform3(-9..=9)
+        shape in any_shape(100.0, 90.0), p in prop::array::uniform3(-300..300), by in prop::array::uniform3(-9..=9)
     ) {
         let evaluator = edit(shape, None).evaluator();
         let (p, by) = (IVec3::from_array(p), IVec3::from_array(by));
@@ -302,10 +323,10 @@ proptest! {
     }
 
     #[test]
-    fn roughness_stays_in_its_amplitude(shape in shape(30.0, 20.0), roughness in roughness(), p in prop::array::uniform3(-60..60)) {
+    fn roughness_stays_in_its_amplitude(shape in any_shape(30.0, 20.0), roughness in roughness(), p in prop::array::uniform3(-60..60)) {
         let p = IVec3::from_array(p);
         let amplitude = roughness.map_or(0.0, |roughness| roughness.amplitude * 256.0);
-        let change = edit(shape, roughness).evaluator().distance(p) - edit(shape, None).evaluator().distance(p);
+        let change = edit(shape.clone(), roughness).evaluator().distance(p) - edit(shape, None).evaluator().distance(p);
         prop_assert!((change.abs() as f32) <= amplitude + 1.5);
     }
 

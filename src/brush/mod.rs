@@ -31,7 +31,11 @@
 //! | coordinates along y, heights | -[`LIMIT`] | [`LIMIT`] |
 //! | radius, half side | 1/4 voxel | |
 //! | axis of a cylinder or cone | 1/4 voxel | |
-//! | side of the box around the shape | | 1024 voxels |
+//! | side of the box around the shape | | 1024 voxels; 8192 for a path or a corridor |
+//! | points of a path | 2 | 256 |
+//! | samples along a side of a grid | 3 | 128 |
+//! | voxels between samples of a grid | 1/16 | 64 |
+//! | height of a corridor above and below its path | 0 | 256 voxels |
 //! | volume of the shape itself | | 2^25 voxels |
 //! | roughness amplitude | 0 | 8 voxels |
 //! | roughness scale | 1 voxel | 256 voxels |
@@ -121,7 +125,9 @@ pub use roughness::Roughness;
 #[cfg(feature = "cuda")]
 pub(crate) use sculpt_kernel::SculptOp;
 pub(crate) use sculpt_kernel::{FARTHEST, SculptKernel, Stencil, is_moved};
-pub use shapes::Shape;
+#[doc(hidden)]
+pub use shapes::AnyShape;
+pub use shapes::{BrushPath, Corridor, CustomShape, GridShape, MeshGrid, Shape, ShapeGrid};
 pub use stamp::Stamp;
 
 use crate::lattice::ONE;

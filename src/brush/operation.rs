@@ -92,6 +92,10 @@ pub enum Operation {
     /// dig back. The terrain's rules hold: a sample is reset entirely, or refused. Ground that loses its support does
     /// not fall.
     Reset,
+    /// Makes the ground a road along the path of a [`Corridor`](super::Corridor): level across, with air above it and
+    /// ground below it, as far as the corridor goes up and down. It fades into the ground at its sides over the falloff,
+    /// its shoulders. Ground higher than the corridor stays as the roof of a tunnel, and air below it as a culvert.
+    Road,
 }
 
 impl Operation {
@@ -112,7 +116,7 @@ impl Operation {
     pub(super) fn fields(&self) -> &'static [&'static str] {
         match self {
             Self::Dig | Self::Add { .. } | Self::Paint { .. } => &[],
-            Self::Smooth | Self::Sharpen | Self::Reset => &[],
+            Self::Smooth | Self::Sharpen | Self::Reset | Self::Road => &[],
             Self::Flatten { .. } => &["point", "normal"],
             Self::Level { .. } => &["height"],
             Self::Raise { .. } | Self::Lower { .. } => &["amount"],
@@ -166,7 +170,8 @@ impl Operation {
             | Self::Sharpen
             | Self::Raise { .. }
             | Self::Lower { .. }
-            | Self::Reset => {}
+            | Self::Reset
+            | Self::Road => {}
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::lattice::{LIMIT, ONE, REACH};
 /// Least radius, half side and axis.
 const LEAST: i32 = ONE / 4;
 /// Longest side of the box around a shape.
-const LONGEST: i32 = 1024 * ONE;
+pub(super) const LONGEST: i32 = 1024 * ONE;
 /// Most volume of a shape, in cubic voxels.
 const VOLUME: f64 = (1 << 25) as f64;
 /// What the components of integer quaternions and directions mean 1 by.
@@ -54,10 +54,11 @@ pub(super) fn voxels(units: i32) -> f32 {
 }
 
 /// Checks that a shape with this bounding box, and of this volume in cubic voxels, is small enough.
-pub(super) fn check_extent((low, high): (IVec3, IVec3), volume: f64) -> Result<(), BrushError> {
+/// The box may have sides up to `longest`.
+pub(super) fn check_extent((low, high): (IVec3, IVec3), volume: f64, longest: i32) -> Result<(), BrushError> {
     let side = (high - low).max_element();
-    if side > LONGEST {
-        return Err(too_large("box", voxels(side), voxels(LONGEST)));
+    if side > longest {
+        return Err(too_large("box", voxels(side), voxels(longest)));
     }
     if volume > VOLUME { Err(too_large("volume", volume as f32, VOLUME as f32)) } else { Ok(()) }
 }

@@ -36,6 +36,7 @@ pub(super) enum QuantizedOperation {
     Stamp { stamp: QuantizedStamp },
     Terrace { step: i32, base: i32 },
     Reset,
+    Road,
 }
 
 impl QuantizedOperation {
@@ -59,6 +60,7 @@ impl QuantizedOperation {
                 Self::Terrace { step: in_range("step", *step, STEP.0, STEP.1)?, base: height("base", *base)? }
             }
             Operation::Reset => Self::Reset,
+            Operation::Road => Self::Road,
         })
     }
 
@@ -97,6 +99,7 @@ impl QuantizedOperation {
             Self::Stamp { stamp } => Operation::Stamp { stamp: stamp.stamp() },
             Self::Terrace { step, base } => Operation::Terrace { step: voxels(*step), base: voxels(*base) },
             Self::Reset => Operation::Reset,
+            Self::Road => Operation::Road,
         }
     }
 

@@ -1,12 +1,14 @@
 //! The brush: an edit that a game requests, in floats.
 
+use std::sync::Arc;
+
 #[cfg(feature = "plugin")]
 use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 #[cfg(feature = "plugin")]
 use glam::Mat3A;
 use glam::{Quat, Vec3};
 
-use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
+use super::{AnyShape, Blend, Corridor, CustomShape, FULL_POWER, Operation, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
 /// A request to change the ground, in voxels of terrain space. A brush sent to the plugin as a message is in world
@@ -40,8 +42,11 @@ use crate::ground::MaterialId;
     reflect(opaque, Clone, Debug, PartialEq, Serialize, Deserialize)
 )]
 pub struct Brush {
-    /// Where.
+    /// Where. With a custom shape it is not used; constructors and [`transformed`](Self::transformed) set it to a box
+    /// around that one.
     pub shape: Shape,
+    /// A shape that takes the place of `shape`: a path, for example.
+    pub custom: Option<Arc<CustomShape>>,
     /// The operation.
     pub operation: Operation,
     /// Bumps on the shape's surface; `None` for a smooth one.
@@ -60,9 +65,11 @@ pub struct Brush {
 }
 
 impl Brush {
-    fn new(shape: Shape, operation: Operation) -> Self {
+    fn new(shape: impl Into<AnyShape>, operation: Operation) -> Self {
+        let (shape, custom) = shape.into().parts();
         Self {
             shape,
+            custom,
             operation,
             roughness: None,
             tag: 0,
@@ -73,7 +80,7 @@ impl Brush {
     }
 
     /// The brush of an operation, as the functions below make it.
-    pub(super) fn plain(shape: Shape, operation: Operation) -> Self {
+    pub(super) fn plain(shape: impl Into<AnyShape>, operation: Operation) -> Self {
         match operation {
             Operation::Stamp { stamp } => Self::stamp(shape, stamp),
             operation => Self::new(shape, operation),
@@ -81,65 +88,87 @@ impl Brush {
     }
 
     /// A brush that takes ground away.
-    pub fn dig(shape: Shape) -> Self {
+    pub fn dig(shape: impl Into<AnyShape>) -> Self {
         Self::new(shape, Operation::Dig)
     }
 
     /// A brush that fills its shape with ground.
-    pub fn add(shape: Shape, material: MaterialId) -> Self {
+    pub fn add(shape: impl Into<AnyShape>, material: MaterialId) -> Self {
         Self::new(shape, Operation::Add { material })
     }
 
     /// A brush that changes the material of the ground in its shape.
-    pub fn paint(shape: Shape, material: MaterialId) -> Self {
+    pub fn paint(shape: impl Into<AnyShape>, material: MaterialId) -> Self {
         Self::new(shape, Operation::Paint { material })
     }
 
     /// A brush that evens out its shape; `strength` is 0 to 1.
-    pub fn smooth(shape: Shape, strength: f32) -> Self {
+    pub fn smooth(shape: impl Into<AnyShape>, strength: f32) -> Self {
         Self::new(shape, Operation::Smooth).with_strength(strength)
     }
 
     /// A brush that deepens bumps and edges; `strength` is 0 to 1.
-    pub fn sharpen(shape: Shape, strength: f32) -> Self {
+    pub fn sharpen(shape: impl Into<AnyShape>, strength: f32) -> Self {
         Self::new(shape, Operation::Sharpen).with_strength(strength)
     }
 
     /// A brush that makes its surface a plane through `point`, with the air where `normal` points to: floors, walls and
     /// ceilings.
-    pub fn flatten(shape: Shape, point: Vec3, normal: Vec3) -> Self {
+    pub fn flatten(shape: impl Into<AnyShape>, point: Vec3, normal: Vec3) -> Self {
         Self::new(shape, Operation::Flatten { point, normal })
     }
 
     /// A brush that makes the ground level at a height.
-    pub fn level(shape: Shape, height: f32) -> Self {
+    pub fn level(shape: impl Into<AnyShape>, height: f32) -> Self {
         Self::new(shape, Operation::Level { height })
     }
 
     /// A brush that raises the ground by `amount` voxels.
-    pub fn raise(shape: Shape, amount: f32) -> Self {
+    pub fn raise(shape: impl Into<AnyShape>, amount: f32) -> Self {
         Self::new(shape, Operation::Raise { amount })
     }
 
     /// A brush that lowers the ground by `amount` voxels.
-    pub fn lower(shape: Shape, amount: f32) -> Self {
+    pub fn lower(shape: impl Into<AnyShape>, amount: f32) -> Self {
         Self::new(shape, Operation::Lower { amount })
     }
 
     /// A brush that gives the ground in its shape the relief of an image. It fades over a single voxel at the rim of
     /// the image and of the shape, by default.
-    pub fn stamp(shape: Shape, stamp: Stamp) -> Self {
+    pub fn stamp(shape: impl Into<AnyShape>, stamp: Stamp) -> Self {
         Self::new(shape, Operation::Stamp { stamp }).with_falloff(1.0)
     }
 
     /// A brush that cuts slopes into steps of a height, with a tread at height 0.
-    pub fn terrace(shape: Shape, step: f32) -> Self {
+    pub fn terrace(shape: impl Into<AnyShape>, step: f32) -> Self {
         Self::new(shape, Operation::Terrace { step, base: 0.0 })
     }
 
     /// A brush that returns the ground in its shape to what it was before any edit.
-    pub fn reset(shape: Shape) -> Self {
+    pub fn reset(shape: impl Into<AnyShape>) -> Self {
         Self::new(shape, Operation::Reset)
+    }
+
+    /// A brush that builds a road along a corridor's path, as wide as the corridor, with shoulders on both sides that
+    /// slope back to the ground over `shoulder` voxels (0 to 64). See [`Operation::Road`].
+    ///
+    /// ```
+    /// use bevy_burrow::prelude::*;
+    /// use glam::Vec3;
+    ///
+    /// let ground = Ground::from_fn(64, 64, |x, _| 20.0 + f64::from(x % 16) * 0.5)?;
+    /// let mut terrain = Terrain::new(ground, &TerrainSettings::default())?;
+    /// let path = BrushPath::polyline([4.0, 60.0].map(|x| (Vec3::new(x, 23.0, 32.0), 2.5)));
+    /// let road = Corridor::new(path, 8.0, 6.0);
+    /// // The road, and its pavement.
+    /// let receipts = terrain.apply([Brush::road(road.clone(), 3.0), Brush::paint(road, MaterialId(2))]);
+    /// assert!(receipts.iter().all(|receipt| receipt.outcome.is_ok()));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn road(corridor: Corridor, shoulder: f32) -> Self {
+        // A shoulder that is no number is refused as a falloff.
+        let path = corridor.path.widened(if shoulder > 0.0 { shoulder } else { 0.0 });
+        Self::new(Corridor { path, ..corridor }, Operation::Road).with_falloff(shoulder)
     }
 
     /// The brush with another strength, if it sculpts: 0 to 1.
@@ -192,8 +221,14 @@ impl Brush {
     /// refuses or that is deformed.
     #[must_use]
     pub fn transformed(&self, rotation: Quat, translation: Vec3, scale: f32) -> Self {
+        let custom =
+            self.custom.as_ref().map(|custom| Arc::new(custom.transformed(rotation, translation, scale)));
         Self {
-            shape: self.shape.transformed(rotation, translation, scale),
+            shape: match &custom {
+                Some(custom) => custom.around(),
+                None => self.shape.transformed(rotation, translation, scale),
+            },
+            custom,
             operation: self.operation.transformed(rotation, translation, scale),
             roughness: self.roughness.map(|roughness| Roughness {
                 amplitude: roughness.amplitude * scale,
@@ -222,7 +257,11 @@ impl Brush {
         let mut brush = self.placed_in(scale, rotation, translation);
         // The rest of the transform into the terrain.
         let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;
-        brush.shape = brush.shape.stretched(|arrow| rest * arrow);
+        brush.custom = brush.custom.map(|custom| Arc::new(custom.stretched(|arrow| rest * arrow)));
+        brush.shape = match &brush.custom {
+            Some(custom) => custom.around(),
+            None => brush.shape.stretched(|arrow| rest * arrow),
+        };
         brush.operation.stretch(rest);
         brush
     }

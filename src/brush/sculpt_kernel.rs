@@ -19,12 +19,14 @@
 //!   higher than before, however often; and raising on fills the pit that is left of it.
 //! - Neither makes a sample `DEPTH` that was not cut off.
 
+use std::sync::Arc;
+
 use glam::IVec3;
 
 use super::DEPTH;
 use super::blend::QuantizedBlend;
 use super::quantized_operation::{QuantizedOperation, above_plane};
-use super::shapes::QuantizedShape;
+use super::shapes::{QuantizedShape, Road};
 #[cfg(feature = "cuda")]
 use super::{quantize::measure, stamp::StampParams};
 use crate::ground::MaterialId;
@@ -192,16 +194,20 @@ pub(crate) struct SculptKernel {
     blend: QuantizedBlend,
     /// Depth of the shape's middle.
     deep: i32,
+    /// The road, if that is built.
+    road: Option<Arc<Road>>,
 }
 
 impl SculptKernel {
     /// The kernel of a checked operation.
     pub(super) fn new(operation: &QuantizedOperation, blend: QuantizedBlend, shape: &QuantizedShape) -> Self {
-        let deep = match operation {
-            QuantizedOperation::Stamp { stamp } => shape.deepest().min(stamp.deep()),
+        let road = shape.road().filter(|_| *operation == QuantizedOperation::Road);
+        let deep = match (operation, &road) {
+            (QuantizedOperation::Stamp { stamp }, _) => shape.deepest().min(stamp.deep()),
+            (_, Some((_, half_width))) => *half_width,
             _ => shape.deepest(),
         };
-        Self { operation: operation.clone(), blend, deep }
+        Self { operation: operation.clone(), blend, deep, road: road.map(|(road, _)| Arc::new(road)) }
     }
 
     /// The material of new ground, if the operation has one.
@@ -214,6 +220,15 @@ impl SculptKernel {
     pub fn density(&self, at: IVec3, outside: i32, around: impl FnOnce() -> Stencil) -> Option<i32> {
         if outside > 0 {
             return None;
+        }
+        if let Some(road) = &self.road {
+            let place = road.at(at)?;
+            let weight = self.blend.weight(place.beside, self.deep);
+            if weight == 0 {
+                return None;
+            }
+            let own = around().own();
+            return Some(own + part(i64::from(road.target(place, own)) - i64::from(own), weight));
         }
         let mut outside = outside;
         let target = match &self.operation {
@@ -305,7 +320,8 @@ impl SculptKernel {
             QuantizedOperation::Dig
             | QuantizedOperation::Add { .. }
             | QuantizedOperation::Paint { .. }
-            | QuantizedOperation::Reset => {
+            | QuantizedOperation::Reset
+            | QuantizedOperation::Road => {
                 return None;
             }
         };

@@ -71,10 +71,10 @@ const HEIGHT: f32 = 256.0;
 /// The name that errors use for the length they report, which is half of the stamp's.
 const HALF: &str = "half the stamp size";
 
-/// The samples of an image of an allowed size.
+/// The samples of an image.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(transparent)]
-pub(super) struct Relief(#[serde(with = "image")] Arc<GreyImage>);
+pub(super) struct ImageSamples(#[serde(with = "image")] pub(super) Arc<GreyImage>);
 
 /// An image as an object: `width`, `height`, and `samples` from 0 to 65535, row by row.
 mod image {
@@ -106,16 +106,16 @@ mod image {
 }
 
 /// What the samples are counts, not how finely they were once stored.
-impl PartialEq for Relief {
+impl PartialEq for ImageSamples {
     fn eq(&self, other: &Self) -> bool {
         let of = |relief: &Self| (relief.0.width(), relief.0.height());
         of(self) == of(other) && self.0.samples() == other.0.samples()
     }
 }
 
-impl Eq for Relief {}
+impl Eq for ImageSamples {}
 
-impl Hash for Relief {
+impl Hash for ImageSamples {
     fn hash<H: Hasher>(&self, state: &mut H) {
         (self.0.width(), self.0.height(), self.0.samples()).hash(state);
     }
@@ -127,7 +127,7 @@ fn check_sides(width: u32, height: u32) -> Result<(), BrushError> {
     if is_fine { Ok(()) } else { Err(BrushError::StampSize { width, height, least, most }) }
 }
 
-impl Relief {
+impl ImageSamples {
     /// The grey at a place, in 1/256 of a step between samples; 65535 * 2^16 for white.
     fn at(&self, x: i64, y: i64) -> i64 {
         let cell = |at: i64, side: u32| {
@@ -149,7 +149,7 @@ pub(super) struct QuantizedStamp {
     rotation: [i16; 4],
     half: [i32; 2],
     height: i32,
-    relief: Relief,
+    relief: ImageSamples,
 }
 
 impl QuantizedStamp {
@@ -160,7 +160,7 @@ impl QuantizedStamp {
             rotation: turn(stamp.rotation)?,
             half: [size(HALF, stamp.size.x / 2.0)?, size(HALF, stamp.size.y / 2.0)?],
             height: in_range("stamp height", stamp.height, -HEIGHT, HEIGHT)?,
-            relief: Relief(Arc::clone(&stamp.image)),
+            relief: ImageSamples(Arc::clone(&stamp.image)),
         })
     }
 
@@ -170,7 +170,7 @@ impl QuantizedStamp {
 
     pub fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
         check_sides(image.width(), image.height())?;
-        Ok(Self { relief: Relief(image), ..self })
+        Ok(Self { relief: ImageSamples(image), ..self })
     }
 
     pub fn check(&self) -> Result<(), BrushError> {

@@ -1,6 +1,10 @@
 //! Counts the voxels that a brush covers.
 
 use super::{Brush, BrushError, Edit};
+use crate::lattice::LatticeBox;
+
+/// Log2 of the side of cells that are looked at together.
+const CELL: i32 = 6;
 
 impl Brush {
     /// Counts the voxels within the brush's shape, roughness included: the most that it digs, adds or paints. A game
@@ -24,12 +28,18 @@ impl Brush {
     pub fn voxel_count(&self) -> Result<u64, BrushError> {
         let edit = Edit::quantize(self)?;
         let (reach, evaluator) = (edit.reach(), edit.evaluator());
-        let mut distances = vec![0; reach.size().x as usize];
-        let mut voxels = 0;
-        for z in reach.min.z..=reach.max.z {
-            for y in reach.min.y..=reach.max.y {
-                evaluator.row(reach.min.with_y(y).with_z(z), &mut distances);
-                voxels += distances.iter().filter(|distance| **distance < 0).count() as u64;
+        let cells = LatticeBox { min: reach.min >> CELL, max: reach.max >> CELL };
+        let (mut distances, mut voxels) = ([0; 1 << CELL], 0);
+        for at in cells.points() {
+            let own = LatticeBox { min: at << CELL, max: (at << CELL) + (1 << CELL) - 1 };
+            // Long paths leave most of the box around them empty.
+            let Some(own) = own.intersection(reach).filter(|own| !evaluator.is_out_of_reach(*own)) else {
+                continue;
+            };
+            let row = &mut distances[..own.size().x as usize];
+            for (z, y) in (own.min.z..=own.max.z).flat_map(|z| (own.min.y..=own.max.y).map(move |y| (z, y))) {
+                evaluator.row(own.min.with_y(y).with_z(z), row);
+                voxels += row.iter().filter(|distance| **distance < 0).count() as u64;
             }
         }
         Ok(voxels)

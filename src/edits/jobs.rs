@@ -2,7 +2,7 @@
 //!
 //! Where there are many, threads share the bricks in slabs, one brick thick along x, whose results stand one
 //! after the other in order. Long thin brushes come near few bricks of the box around them, so up to 8x8x8
-//! bricks are tested together before each is tested alone.
+//! bricks are tested together before each is tested alone; more of them for paths, which may be very long.
 
 use rayon::prelude::*;
 
@@ -61,15 +61,30 @@ fn sort(jobs: &mut Vec<Job>) {
 
 /// Adds jobs for those of some bricks that an edit may reach.
 fn add(edits: &[PreparedEdit], edit: u32, bricks: LatticeBox, jobs: &mut Vec<Job>) {
-    let own = &edits[edit as usize];
+    // Only paths are longer than some hundred bricks.
+    let is_long = (bricks.max - bricks.min).max_element() >= 1 << (2 * TESTED_TOGETHER);
+    let level = TESTED_TOGETHER * if is_long { 3 } else { 1 };
+    add_within(&edits[edit as usize], edit, bricks, level, jobs);
+}
+
+/// Log2 of the sides of boxes, in smaller boxes or bricks, that are tested together.
+const TESTED_TOGETHER: u32 = 3;
+
+/// Adds jobs, after boxes with sides of `1 << level` bricks were tested, and smaller ones inside those.
+fn add_within(own: &PreparedEdit, edit: u32, bricks: LatticeBox, level: u32, jobs: &mut Vec<Job>) {
     let reaches =
         |bricks: LatticeBox| own.reaches(LatticeBox { min: bricks.min << 3, max: (bricks.max << 3) + 7 });
-    let boxes = LatticeBox { min: bricks.min >> 3, max: bricks.max >> 3 };
-    for at in boxes.points() {
-        let own = bricks.intersection(LatticeBox { min: at << 3, max: (at << 3) + 7 });
-        let Some(own) = own.filter(|&own| reaches(own)) else { continue };
-        let near = own.points().filter(|&at| reaches(LatticeBox::point(at)));
+    if level == 0 {
+        let near = bricks.points().filter(|&at| reaches(LatticeBox::point(at)));
         jobs.extend(near.map(|at| Job { pos: BrickPos(at), edit }));
+        return;
+    }
+    let boxes = LatticeBox { min: bricks.min >> level, max: bricks.max >> level };
+    for at in boxes.points() {
+        let inside = LatticeBox { min: at << level, max: (at << level) + ((1 << level) - 1) };
+        if let Some(inside) = bricks.intersection(inside).filter(|&inside| reaches(inside)) {
+            add_within(own, edit, inside, level - TESTED_TOGETHER, jobs);
+        }
     }
 }
 
@@ -79,7 +94,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::brush::{BAND, Brush, Edit, Shape};
+    use crate::brush::{BAND, Brush, BrushPath, Edit, Shape};
     use crate::lattice::ChunkGrid;
 
     fn prepared(brush: &Brush) -> PreparedEdit {
@@ -94,9 +109,11 @@ mod tests {
             let brush = |rng: &mut Rng| {
                 let mut at = || Vec3::new(rng.f32(), rng.f32() * 0.3, rng.f32()) * 300.0 - 40.0;
                 let (a, b) = (at(), at());
-                match rng.bool() {
-                    true => Brush::dig(Shape::sphere(a, size)),
-                    false => Brush::dig(Shape::capsule(a, a.lerp(b, 0.3), size * 0.2)),
+                let radius = 0.3 + size * 0.2;
+                match rng.u8(..3) {
+                    0 => Brush::dig(Shape::sphere(a, size)),
+                    1 => Brush::dig(Shape::capsule(a, a.lerp(b, 0.3), size * 0.2)),
+                    _ => Brush::dig(BrushPath::spline([a, a.lerp(b, 0.2), b].map(|at| (at, radius)))),
                 }
             };
             let edits: Vec<PreparedEdit> = (0..count).map(|_| prepared(&brush(&mut rng))).collect();
@@ -116,6 +133,25 @@ mod tests {
             let reached = |job: &Job| edits[job.edit as usize].reaches(job.pos().samples());
             assert!(jobs.iter().all(reached), "{count} of {size}");
         }
+    }
+
+    #[test]
+    fn a_long_path_is_assigned_to_the_bricks_along_it() {
+        let path = BrushPath::polyline([
+            (Vec3::new(9.0, 0.0, 7.0), 2.0),
+            (Vec3::new(6900.0, 40.0, 3000.0), 4.0),
+            (Vec3::new(100.0, 0.0, 7900.0), 1.0),
+        ]);
+        let edit = Edit::quantize(&Brush::dig(path.clone())).unwrap();
+        let own = [PreparedEdit::new(ChunkGrid::new(32, 8192, 8192), &edit, None)];
+        let jobs = jobs(&own);
+        for (step, pair) in (0..=200).flat_map(|step| path.points.windows(2).map(move |pair| (step, pair))) {
+            let at = pair[0].0.lerp(pair[1].0, step as f32 / 200.0).as_ivec3() >> 3;
+            assert!(jobs.iter().any(|job| job.pos.0 == at), "no job at brick {at}");
+        }
+        assert!((2000..30_000).contains(&jobs.len()), "{}", jobs.len());
+        let around = BrickPos::range(own[0].reach.expect("in the world")).volume();
+        assert!(edit.most_bricks().is_some_and(|most| most >= jobs.len() as u64 && most < around / 20));
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub const MAX_UNDO_BYTES: usize = 1 << 20;
 /// of the world.
 pub fn cost(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     let weight = if edit.blend().is_some() { SCULPTED } else { 1 };
-    let bricks = BrickPos::range(reach(grid, edit)?).volume();
+    let around = BrickPos::range(reach(grid, edit)?).volume();
+    let bricks = edit.most_bricks().map_or(around, |most| most.min(around));
     Some(EDIT + weight * bricks)
 }

@@ -10,7 +10,7 @@ use bevy_burrow::net::{Client, ClientEvent, ClientId, Lane, Rate, Server, Server
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
 use fastrand::Rng;
-use glam::{IVec3, Vec3};
+use glam::{IVec3, UVec3, Vec3};
 
 use crate::follower::{count, hills, terrain};
 
@@ -417,6 +417,51 @@ fn a_greeting_that_nobody_heard_is_repeated() {
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
     assert_eq!(client.world().hash(), server.terrain().world().hash());
     assert_eq!(server.figures().malformed, 0);
+}
+
+#[test]
+fn paths_roads_and_grids_reach_everybody() {
+    let ((mut server, ground), mut now) = (quick(128, 20), Duration::from_secs(1));
+    server.connect(ID, now);
+    let mut client = new_client(&ground, now);
+    while !client.has_joined() {
+        pump(&mut server, &mut client, &mut now);
+    }
+    let path = |y: f32| {
+        BrushPath::spline([10.0, 40.0, 66.0, 90.0].map(|x| (Vec3::new(x, y - 0.05 * x, 20.0 + 0.6 * x), 2.0)))
+    };
+    let road = Corridor::new(path(3.0), 6.0, 9.0);
+    for (tag, brush) in (1..).zip([Brush::dig(path(-8.0)), Brush::road(road, 2.0)]) {
+        let before = server.terrain().world().hash();
+        client.submit(Edit::quantize(&brush.with_tag(tag)).expect("valid"));
+        client.advance(now);
+        (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
+        assert_ne!(server.terrain().world().hash(), before, "brush {tag}");
+        assert_eq!(client.world().hash(), server.terrain().world().hash());
+    }
+    assert_eq!((server.figures().malformed, server.figures().refused), (0, 0));
+    // A grid is named: the client gets it once.
+    let grid = ShapeGrid::from_fn(UVec3::splat(40), |at| (at - 20).as_vec3().length() - 15.5).expect("valid");
+    let shape = |x: f32| GridShape::new(grid.clone(), Vec3::new(x, 2.0, 70.0)).with_scale(0.5);
+    let edit = |x: f32| Edit::quantize(&Brush::dig(shape(x))).expect("valid");
+    assert!(server.edit(edit(50.0)).is_err(), "nobody can get it");
+    server.stamps_mut().add(Arc::clone(grid.image()));
+    let sent = |server: &Server| server.figures().bulk_bytes;
+    let before = sent(&server);
+    for x in [50.0, 56.0, 30.0] {
+        server.edit(edit(x)).expect("it is in the list");
+        (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
+        assert_eq!(client.world().hash(), server.terrain().world().hash());
+    }
+    let bytes = 2 * 40 * 40 * 40;
+    assert!((bytes..bytes + bytes / 4).contains(&(sent(&server) - before)), "{}", sent(&server) - before);
+    // Clients that have it dig with it too.
+    client.submit(edit(90.0).with_labels(9, None));
+    (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
+    assert_eq!(client.world().hash(), server.terrain().world().hash());
+    assert_eq!((server.figures().malformed, server.figures().refused), (0, 0));
+    // One that joins later gets the same world.
+    assert!(joins_again(&mut server, &ground, &mut now).is_some());
 }
 
 /// A player digs without a connection on one machine, and meanwhile plays on another one.

@@ -2,8 +2,11 @@
 
 mod bookkeeping;
 mod given_back;
+mod grids;
 mod measured;
 mod moved;
+mod neighbours;
+mod paths;
 mod planes;
 mod rim;
 mod smoothed;

@@ -10,7 +10,7 @@ use bevy_burrow::store::{
 };
 use bevy_burrow::terrain::Meshing;
 use fastrand::Rng;
-use glam::Vec3;
+use glam::{UVec3, Vec3};
 
 use crate::play::{act, ground, open, options, save, state, terrain};
 
@@ -110,6 +110,42 @@ fn undo_goes_on_after_a_checkpoint_and_is_gone_after_a_restart() {
     let (_, opened) = open(&disk, &ground).expect("it can be opened");
     assert_eq!(state(&opened.terrain), state(&first));
     assert_eq!(opened.terrain.history(), History::default());
+}
+
+/// A tunnel along a path, a road over it, and a shape of any form.
+fn path_edits() -> [Brush; 3] {
+    let path = |y: f32, radius: f32| {
+        let at = |x: f32| (Vec3::new(x, y + 0.1 * x, 12.0 + 0.7 * x), radius);
+        BrushPath::spline([4.0, 17.0, 31.0, 52.0, 66.0].map(at))
+    };
+    let road = Corridor::new(path(4.0, 2.5), 9.0, 7.0);
+    let grid = ShapeGrid::from_fn(UVec3::splat(13), |at| (at - 6).as_vec3().abs().element_sum() - 5.0);
+    let shape = GridShape::new(grid.expect("a valid size"), Vec3::new(40.0, 3.0, 50.0)).with_scale(1.7);
+    [
+        Brush::dig(path(-6.0, 2.0)).with_tag(7),
+        Brush::road(road, 3.0).with_material(MaterialId(2)),
+        Brush::add(shape, MaterialId(1)),
+    ]
+}
+
+#[test]
+fn paths_roads_and_grids_are_replayed_from_the_journal_and_read_from_a_checkpoint() {
+    // No checkpoint before the restart, or one after each commit.
+    for commits in [1000, 1] {
+        let (disk, ground) = (SimulatedDisk::new(), ground(3));
+        let mut first = terrain(&ground);
+        let mut store =
+            Store::create_in(Arc::new(disk.clone()), &mut first, options(commits)).expect("a new world");
+        for brush in path_edits() {
+            let outcome = first.apply_one(brush).outcome.expect("it is valid");
+            assert!(outcome.removed.total() + outcome.added.total() > 100, "{outcome:?}");
+            save(&mut store, &mut first).expect("the thread runs");
+        }
+        drop(store);
+        let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
+        assert_eq!(state(&opened.terrain), state(&first));
+        assert!(opened.replayed > 0 || commits == 1);
+    }
 }
 
 /// Two grounds that differ over one column of regions, and a world that was dug everywhere on the first.

@@ -1,13 +1,13 @@
 //! The tube along a curve, with a radius that varies.
 
 use std::f64::consts::PI;
-use std::ops::Range;
 
 use glam::{DVec3, IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::distance::{Axis, Distance, larger, length, smaller};
+use super::round_cone::RoundCone;
 use super::sphere::ball;
+use super::union::Union;
 use super::{Convert, Extent, Kind, Numbers, Outline, Shape, ShapeGeometry, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::{difference, measure};
@@ -134,7 +134,7 @@ impl Curve<Units> {
 }
 
 impl ShapeGeometry for Curve<Units> {
-    type Distance = CurveDistance;
+    type Distance = Union<RoundCone>;
 
     fn origin(&self) -> [i32; 3] {
         self.from
@@ -160,123 +160,8 @@ impl ShapeGeometry for Curve<Units> {
         PI * f64::from(radius).powi(2) * length + ball(radius)
     }
 
-    fn distance(&self) -> CurveDistance {
-        let pieces = self.steps().windows(2).map(|pair| RoundCone::new(pair[0], pair[1])).collect();
-        CurveDistance { pieces }
-    }
-}
-
-/// The hull of two balls.
-#[derive(Clone, Copy, Debug)]
-struct RoundCone {
-    /// Middle of the first ball.
-    from: [f32; 3],
-    unit: [f32; 3],
-    length: f32,
-    radii: [f32; 2],
-    /// Sine and cosine of the slope of its side.
-    slope: [f32; 2],
-}
-
-impl RoundCone {
-    fn new((from, from_radius): ([i32; 3], f32), (to, to_radius): ([i32; 3], f32)) -> Self {
-        let Axis { unit, length } = Axis::of(difference(to, from));
-        let floats = |at: [i32; 3]| at.map(|v| v as f32);
-        if length <= (from_radius - to_radius).abs() {
-            // One ball holds the other.
-            let (at, radius) = if from_radius > to_radius { (from, from_radius) } else { (to, to_radius) };
-            return Self {
-                from: floats(at),
-                unit: [0.0; 3],
-                length: 0.0,
-                radii: [radius; 2],
-                slope: [0.0, 1.0],
-            };
-        }
-        let sine = (from_radius - to_radius) / length;
-        let slope = [sine, (1.0 - sine * sine).sqrt()];
-        Self { from: floats(from), unit, length, radii: [from_radius, to_radius], slope }
-    }
-
-    #[inline(always)]
-    fn at(&self, x: f32, y: f32, z: f32) -> f32 {
-        let (x, y, z) = (x - self.from[0], y - self.from[1], z - self.from[2]);
-        let [ux, uy, uz] = self.unit;
-        let along = x * ux + (y * uy + z * uz);
-        let off = length(x - along * ux, y - along * uy, z - along * uz);
-        let [sine, cosine] = self.slope;
-        let foot = cosine * along - sine * off;
-        let end = self.length;
-        if foot < 0.0 {
-            length(x, y, z) - self.radii[0]
-        } else if foot > cosine * end {
-            length(x - end * ux, y - end * uy, z - end * uz) - self.radii[1]
-        } else {
-            (cosine * off + sine * along) - self.radii[0]
-        }
-    }
-}
-
-/// The least of the distances to the pieces. Only the CPU computes it.
-#[derive(Clone, Debug)]
-pub struct CurveDistance {
-    pieces: Vec<RoundCone>,
-}
-
-impl CurveDistance {
-    /// Distances to some pieces alone.
-    fn nearest(pieces: &[RoundCone], xs: &[f32], y: f32, z: f32, out: &mut [f32]) {
-        out.fill(f32::MAX);
-        for piece in pieces {
-            for (out, &x) in out.iter_mut().zip(xs) {
-                *out = smaller(*out, piece.at(x, y, z));
-            }
-        }
-    }
-
-    /// The pieces that may be the nearest one to some point of a box: all others are farther away there than one of
-    /// these.
-    fn near(&self, [xs, ys, zs]: &[[f32; 8]; 3]) -> Vec<RoundCone> {
-        let middle = |all: &[f32; 8]| (all[0] + all[7]) / 2.0;
-        let half = |all: &[f32; 8]| (all[7] - all[0]) / 2.0;
-        let radius = length(half(xs), half(ys), half(zs));
-        let at = |piece: &RoundCone| piece.at(middle(xs), middle(ys), middle(zs));
-        let nearest = self.pieces.iter().map(at).fold(f32::MAX, smaller);
-        // Distances change no faster than the point moves; and some units for their rounding, more of them far away.
-        let most = nearest + 2.0 * radius + larger(64.0, nearest.abs() / 4096.0);
-        self.pieces.iter().filter(|piece| at(piece) <= most).copied().collect()
-    }
-}
-
-impl Distance for CurveDistance {
-    #[inline(always)]
-    fn at(&self, x: f32, y: f32, z: f32) -> f32 {
-        self.pieces.iter().map(|piece| piece.at(x, y, z)).fold(f32::MAX, smaller)
-    }
-
-    fn constants(&self) -> Vec<f32> {
-        Vec::new()
-    }
-
-    fn run(&self, xs: &[f32], y: f32, z: f32, out: &mut [f32]) {
-        Self::nearest(&self.pieces, xs, y, z, out);
-    }
-
-    fn rows(
-        &self,
-        points: &[[f32; 8]; 3],
-        y: Range<usize>,
-        z: Range<usize>,
-        mut each: impl FnMut(usize, usize, [f32; 8]),
-    ) {
-        let (near, [xs, ys, zs]) = (self.near(points), points);
-        for y in y {
-            for z in z.clone() {
-                let mut distances = [0.0; 8];
-                Self::nearest(&near, xs, ys[y], zs[z], &mut distances);
-                each(y, z, distances);
-            }
-        }
+    fn distance(&self) -> Union<RoundCone> {
+        Union::new(self.steps().windows(2).map(|pair| RoundCone::new(pair[0], pair[1])).collect())
     }
 }
 

@@ -11,6 +11,12 @@ pub trait Distance {
     /// Distance of the point (x, y, z).
     fn at(&self, x: f32, y: f32, z: f32) -> f32;
 
+    /// At most the distance of the point, changing no faster than the point moves.
+    #[inline]
+    fn least(&self, x: f32, y: f32, z: f32) -> f32 {
+        self.at(x, y, z)
+    }
+
     /// At most twelve numbers that the distance is computed from, as `kernels/shapes.cuh` reads them.
     #[cfg_attr(not(feature = "cuda"), expect(dead_code))]
     fn constants(&self) -> Vec<f32>;

@@ -23,40 +23,60 @@ macro_rules! convert {
 
 mod capsule;
 mod cone;
+mod corridor;
 mod cuboid;
 mod curve;
 mod cylinder;
 mod distance;
+mod grid;
+mod mesh_grid;
 mod numbers;
 mod outline;
+mod path;
+mod round_cone;
 mod sphere;
 mod torus;
+mod union;
+
+use std::sync::Arc;
 
 use glam::{IVec3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 pub use capsule::Capsule;
 pub use cone::Cone;
+pub use corridor::Corridor;
 pub use cuboid::Cuboid;
 pub use curve::Curve;
 pub use cylinder::Cylinder;
+pub use grid::{GridShape, ShapeGrid};
+pub use mesh_grid::MeshGrid;
 pub use numbers::{Numbers, Units, Voxels};
+pub use path::BrushPath;
 pub use sphere::Sphere;
 pub use torus::Torus;
 
+use corridor::QuantizedCorridor;
+pub(super) use corridor::Road;
 use distance::Distance;
 pub(super) use distance::{larger, smaller};
+use grid::QuantizedGrid;
 use numbers::{Check, Convert, Kind, Quantize, Restore, Transform};
 use outline::Outline;
+use path::QuantizedPath;
 
 use super::BrushError;
-use super::quantize::check_extent;
+use super::quantize::{self, check_extent};
+use crate::ground::GreyImage;
 use crate::lattice::ONE;
 
 /// The integer geometry of a shape. All methods except `check` may rely on checked numbers.
 pub(super) trait ShapeGeometry {
     /// Its distance function.
     type Distance: Distance;
+
+    /// Longest side of the box around it.
+    const LONGEST: i32 = quantize::LONGEST;
 
     /// The point that distances are computed relative to.
     fn origin(&self) -> [i32; 3];
@@ -87,7 +107,7 @@ pub(crate) struct Extent {
 }
 
 macro_rules! shapes {
-    ($($(#[$attribute:meta])* $name:ident,)*) => {
+    ($($(#[$attribute:meta])* $name:ident,)*; $($custom:ident($public:ident, $quantized:ident) = $fields:expr,)*) => {
         /// The shape of a brush, in voxels of terrain space; in a [`Brush`](super::Brush) that is a message of the
         /// plugin's, in units of world space.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,23 +118,119 @@ macro_rules! shapes {
             $($(#[$attribute])* $name($name),)*
         }
 
+        /// A shape of more numbers than a [`Shape`] holds.
+        #[derive(Clone, Debug, PartialEq)]
+        #[non_exhaustive]
+        #[allow(missing_docs, reason = "each variant is the struct of its name")]
+        pub enum CustomShape {
+            $($custom($public),)*
+        }
+
+        /// Any shape: what brushes are made with.
+        #[doc(hidden)]
+        #[derive(Clone, Debug, Serialize, Deserialize)]
+        #[serde(tag = "shape", rename_all = "snake_case")]
+        pub enum AnyShape {
+            $($(#[$attribute])* $name($name),)*
+            $($custom($public),)*
+        }
+
+        impl AnyShape {
+            /// The parts that a brush holds: for a custom shape, with a box around it.
+            pub(super) fn parts(self) -> (Shape, Option<Arc<CustomShape>>) {
+                match self {
+                    $(Self::$name(shape) => (Shape::$name(shape), None),)*
+                    $(Self::$custom(shape) => {
+                        let custom = CustomShape::$custom(shape);
+                        (custom.around(), Some(Arc::new(custom)))
+                    })*
+                }
+            }
+
+            /// The names of its fields.
+            pub(super) fn fields(&self) -> Vec<&'static str> {
+                match self {
+                    $(Self::$name(shape) => Shape::$name(*shape).fields(),)*
+                    $(Self::$custom(_) => $fields.to_vec(),)*
+                }
+            }
+        }
+
+        impl From<Shape> for AnyShape {
+            fn from(shape: Shape) -> Self {
+                match shape {
+                    $(Shape::$name(shape) => Self::$name(shape),)*
+                }
+            }
+        }
+
+        impl From<CustomShape> for AnyShape {
+            fn from(shape: CustomShape) -> Self {
+                match shape {
+                    $(CustomShape::$custom(shape) => Self::$custom(shape),)*
+                }
+            }
+        }
+
+        $(impl From<$public> for AnyShape {
+            fn from(shape: $public) -> Self {
+                Self::$custom(shape)
+            }
+        })*
+
+        impl CustomShape {
+            /// Hands out the ends of lines that show the shape.
+            pub fn outline(&self, mut line: impl FnMut(Vec3, Vec3)) {
+                let mut outline = Outline::new(&mut line);
+                match self {
+                    $(Self::$custom(shape) => shape.outline(&mut outline),)*
+                }
+            }
+
+            /// The box around it.
+            pub(super) fn around(&self) -> Shape {
+                let (low, high) = match self {
+                    $(Self::$custom(shape) => shape.bounds(),)*
+                };
+                Shape::cuboid((low + high) / 2.0, (high - low) / 2.0)
+            }
+
+            /// The shape after every point p moved to `turn * (p * scale) + shift`.
+            pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
+                match self {
+                    $(Self::$custom(shape) => Self::$custom(shape.transformed(turn, shift, scale)),)*
+                }
+            }
+
+            /// The shape with its points stretched, and its sizes as they were.
+            #[cfg(feature = "plugin")]
+            pub(super) fn stretched(&self, stretch: impl Fn(Vec3) -> Vec3) -> Self {
+                match self {
+                    $(Self::$custom(shape) => Self::$custom(shape.stretched(&stretch)),)*
+                }
+            }
+        }
+
         /// A [`Shape`] in integers.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
         pub(super) enum QuantizedShape {
             $($name($name<Units>),)*
+            $($custom($quantized),)*
         }
 
         /// A shape's distance function.
         #[derive(Clone, Debug)]
         pub(super) enum ShapeSdf {
             $($name(<$name<Units> as ShapeGeometry>::Distance),)*
+            $($custom(<$quantized as ShapeGeometry>::Distance),)*
         }
 
         /// The shapes' numbers, by which `kernels/shapes.cuh` knows them.
         #[cfg(feature = "cuda")]
         enum Number {
             $($name,)*
+            $($custom,)*
         }
 
         /// The names of all shapes, in the order of their numbers.
@@ -152,10 +268,20 @@ macro_rules! shapes {
         }
 
         impl QuantizedShape {
-            fn restore(&self) -> Result<Shape, BrushError> {
+            fn restore(&self) -> Result<AnyShape, BrushError> {
                 Ok(match self {
-                    $(Self::$name(shape) => Shape::$name(shape.convert(&mut Restore)?),)*
+                    $(Self::$name(shape) => AnyShape::$name(shape.convert(&mut Restore)?),)*
+                    $(Self::$custom(shape) => AnyShape::$custom(shape.restored()),)*
                 })
+            }
+
+            /// Rounds a custom shape to integers, halves to even, and checks it.
+            pub(super) fn quantize_custom(shape: &CustomShape) -> Result<Self, BrushError> {
+                let quantized = match shape {
+                    $(CustomShape::$custom(shape) => Self::$custom($quantized::quantize(shape)?),)*
+                };
+                quantized.check()?;
+                Ok(quantized)
             }
 
             /// Checks that the shape is within every limit. Accepts any integers; all other functions rely on this
@@ -166,14 +292,24 @@ macro_rules! shapes {
                         shape.convert(&mut Check)?;
                         shape.check()?;
                     })*
+                    $(Self::$custom(shape) => shape.check()?,)*
                 }
-                check_extent(self.bounds(), self.volume())
+                check_extent(self.bounds(), self.volume(), self.longest())
+            }
+
+            /// Longest side of the box around such a shape.
+            fn longest(&self) -> i32 {
+                match self {
+                    $(Self::$name(_) => <$name<Units> as ShapeGeometry>::LONGEST,)*
+                    $(Self::$custom(_) => <$quantized as ShapeGeometry>::LONGEST,)*
+                }
             }
 
             /// The point that distances are computed relative to.
             pub(super) fn origin(&self) -> IVec3 {
                 IVec3::from_array(match self {
                     $(Self::$name(shape) => shape.origin(),)*
+                    $(Self::$custom(shape) => shape.origin(),)*
                 })
             }
 
@@ -181,6 +317,7 @@ macro_rules! shapes {
             pub(super) fn bounds(&self) -> (IVec3, IVec3) {
                 match self {
                     $(Self::$name(shape) => shape.bounds(),)*
+                    $(Self::$custom(shape) => shape.bounds(),)*
                 }
             }
 
@@ -188,6 +325,7 @@ macro_rules! shapes {
             pub(super) fn deepest(&self) -> i32 {
                 let deepest = match self {
                     $(Self::$name(shape) => shape.deepest(),)*
+                    $(Self::$custom(shape) => shape.deepest(),)*
                 };
                 deepest.max(1)
             }
@@ -196,6 +334,7 @@ macro_rules! shapes {
             fn volume(&self) -> f64 {
                 let volume = match self {
                     $(Self::$name(shape) => shape.volume(),)*
+                    $(Self::$custom(shape) => shape.volume(),)*
                 };
                 volume / f64::from(ONE * ONE * ONE)
             }
@@ -204,6 +343,7 @@ macro_rules! shapes {
             pub(super) fn form(&self) -> ShapeSdf {
                 match self {
                     $(Self::$name(shape) => ShapeSdf::$name(shape.distance()),)*
+                    $(Self::$custom(shape) => ShapeSdf::$custom(shape.distance()),)*
                 }
             }
         }
@@ -213,6 +353,15 @@ macro_rules! shapes {
             pub(super) fn run(&self, xs: &[f32], y: f32, z: f32, out: &mut [f32]) {
                 match self {
                     $(Self::$name(form) => form.run(xs, y, z, out),)*
+                    $(Self::$custom(form) => form.run(xs, y, z, out),)*
+                }
+            }
+
+            /// At most the distance of a point, changing no faster than the point moves.
+            pub(super) fn least(&self, x: f32, y: f32, z: f32) -> f32 {
+                match self {
+                    $(Self::$name(form) => form.least(x, y, z),)*
+                    $(Self::$custom(form) => form.least(x, y, z),)*
                 }
             }
 
@@ -226,6 +375,7 @@ macro_rules! shapes {
             ) {
                 match self {
                     $(Self::$name(form) => form.rows(points, y, z, each),)*
+                    $(Self::$custom(form) => form.rows(points, y, z, each),)*
                 }
             }
 
@@ -234,6 +384,7 @@ macro_rules! shapes {
             pub(super) fn constants(&self) -> (u32, [f32; 12]) {
                 let (kind, own) = match self {
                     $(Self::$name(form) => (Number::$name, form.constants()),)*
+                    $(Self::$custom(form) => (Number::$custom, form.constants()),)*
                 };
                 let mut all = [0.0; 12];
                 all.iter_mut().zip(own).for_each(|(place, value)| *place = value);
@@ -253,6 +404,10 @@ shapes! {
     Cone,
     Torus,
     Curve,
+    ;
+    Path(BrushPath, QuantizedPath) = ["points", "smooth"],
+    Corridor(Corridor, QuantizedCorridor) = ["points", "smooth", "above", "below"],
+    Grid(GridShape, QuantizedGrid) = ["grid", "center", "rotation", "scale"],
 }
 
 impl Shape {
@@ -286,7 +441,7 @@ impl Shape {
 impl ShapeSdf {
     /// Whether only the CPU computes distances of the shape.
     pub(super) fn is_for_cpu(&self) -> bool {
-        matches!(self, Self::Curve(_))
+        matches!(self, Self::Curve(_) | Self::Path(_) | Self::Corridor(_) | Self::Grid(_))
     }
 }
 
@@ -299,9 +454,43 @@ impl QuantizedShape {
     }
 
     /// The shape as a brush has it.
-    pub(super) fn shape(&self) -> Shape {
+    pub(super) fn shape(&self) -> AnyShape {
         // Restoring fails for no number.
-        self.restore().unwrap_or(Shape::sphere(Vec3::ZERO, 0.0))
+        self.restore().unwrap_or(Shape::sphere(Vec3::ZERO, 0.0).into())
+    }
+
+    /// At least the volume of all that lies within a distance of the shape, in cubes of 1/256 voxel, where that is known
+    /// to be much less than the volume of a box around it.
+    pub(super) fn volume_within(&self, grow: i32) -> Option<f64> {
+        match self {
+            Self::Path(path) => Some(path.volume_within(grow)),
+            Self::Corridor(corridor) => Some(corridor.volume_within(grow)),
+            _ => None,
+        }
+    }
+
+    /// The image that holds the shape's samples, if it is a grid.
+    pub(super) fn image(&self) -> Option<&Arc<GreyImage>> {
+        match self {
+            Self::Grid(grid) => Some(grid.image()),
+            _ => None,
+        }
+    }
+
+    /// The shape with another image that holds its samples, if it is a grid.
+    pub(super) fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        match self {
+            Self::Grid(grid) => Ok(Self::Grid(grid.with_image(image)?)),
+            other => Ok(other),
+        }
+    }
+
+    /// The road along the shape, and half its width where it is widest; only a corridor has one.
+    pub(super) fn road(&self) -> Option<(Road, i32)> {
+        match self {
+            Self::Corridor(corridor) => Some((corridor.road(), corridor.widest())),
+            _ => None,
+        }
     }
 }
 
@@ -332,6 +521,24 @@ mod tests {
             half *= 0.8;
         }
         best
+    }
+
+    #[cfg(feature = "cuda")]
+    #[test]
+    fn shapes_of_many_numbers_are_for_the_cpu() {
+        let path = BrushPath::polyline([(Vec3::ZERO, 1.0), (Vec3::X * 9.0, 2.0)]);
+        let grid = ShapeGrid::from_fn(glam::UVec3::splat(5), |at| at.as_vec3().length() - 3.0).unwrap();
+        let customs: [AnyShape; 3] = [
+            path.clone().into(),
+            Corridor::new(path, 1.0, 1.0).into(),
+            GridShape::new(grid, Vec3::ONE).into(),
+        ];
+        for shape in customs {
+            let brush = crate::brush::Brush::dig(shape);
+            assert!(crate::brush::Edit::quantize(&brush).unwrap().evaluator().is_for_cpu(), "{brush:?}");
+        }
+        let brush = crate::brush::Brush::dig(Shape::sphere(Vec3::ONE, 2.0));
+        assert!(!crate::brush::Edit::quantize(&brush).unwrap().evaluator().is_for_cpu());
     }
 
     #[test]

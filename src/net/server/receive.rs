@@ -24,8 +24,8 @@ const BYTES: u64 = 64;
 
 /// Most messages and regions that wait in a client's bulk lane before it may fetch more.
 const MAX_JOBS: usize = 2 * MAX_REGIONS;
-/// Most bytes of an image that is sent: no stamp has larger ones.
-const MAX_IMAGE: usize = 2 * 256 * 256;
+/// Most bytes of an image that is sent: no stamp and no grid has larger ones.
+const MAX_IMAGE: usize = 2 * 128 * (128 * 128 + 1);
 
 impl Server {
     /// Handles a message of a client. Any bytes are answered, or counted as invalid.

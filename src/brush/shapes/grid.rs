@@ -1,0 +1,385 @@
+//! Shapes of any form: signed distances on a grid, which a brush places with any rotation and scale.
+
+use std::sync::Arc;
+
+use glam::{IVec3, Quat, UVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::distance::Distance;
+use super::{Outline, Shape, ShapeGeometry};
+use crate::brush::quantize::{self, check_point, check_turn, in_range, matrix, voxels};
+use crate::brush::stamp::ImageSamples;
+use crate::brush::{BrushError, is_default};
+use crate::ground::GreyImage;
+use crate::lattice::ONE;
+
+/// Least and most samples along a side of a grid.
+pub(super) const SIDES: (u32, u32) = (3, 128);
+
+/// Least and most voxels between two samples.
+const SCALE: (f32, f32) = (1.0 / 16.0, 64.0);
+
+/// What a distance of 0 is stored as.
+const ZERO: i32 = 1 << 15;
+
+/// Signed distances on a grid, in 1/256 of its cells: negative inside. The outermost samples are outside.
+///
+/// A grid is made once, of a function or of a [closed mesh](Self::from_mesh), and shared by all brushes that use it. Its
+/// samples are kept as a [`GreyImage`], so that everything that names the images of stamps by their content, such as
+/// [`Stamps`](crate::net::Stamps) of networks, names grids too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ShapeGrid(ImageSamples);
+
+impl ShapeGrid {
+    /// A grid of as many samples as `size` says, 3 to 128 along each side. `distance` gets the position of a sample,
+    /// counted in cells from the corner, and returns how many cells it is outside the shape; negative inside.
+    ///
+    /// Surfaces are best where these are real distances, at least within four voxels of the surface. The outermost
+    /// samples count as outside.
+    ///
+    /// ```
+    /// use bevy_burrow::prelude::*;
+    /// use glam::{IVec3, UVec3, Vec3};
+    ///
+    /// let mut terrain = Terrain::new(Ground::flat(64, 64, 20.0)?, &TerrainSettings::default())?;
+    /// let mound = Brush::add(Shape::sphere(Vec3::new(12.0, 20.0, 12.0), 5.0), MaterialId(0));
+    /// assert!(terrain.apply_one(mound).outcome.is_ok());
+    /// // What was built there, as a shape.
+    /// let samples = terrain.world().samples();
+    /// let corner = IVec3::new(4, 16, 4);
+    /// let grid = ShapeGrid::from_fn(UVec3::splat(17), |at| samples.distance(corner + at) as f32 / 256.0)?;
+    /// // The same again elsewhere, larger and turned.
+    /// let copy = GridShape::new(grid, Vec3::new(40.0, 22.0, 40.0)).with_scale(1.5);
+    /// let receipt = terrain.apply_one(Brush::add(copy, MaterialId(3)));
+    /// assert!(receipt.outcome.is_ok_and(|applied| applied.added.total() > 500));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`BrushError::GridSize`], or [`BrushError::NotFinite`] for a distance that is not a number.
+    pub fn from_fn(size: UVec3, mut distance: impl FnMut(IVec3) -> f32) -> Result<Self, BrushError> {
+        check_size(size)?;
+        let mut cells = Vec::with_capacity(size.element_product() as usize);
+        for at in points(size) {
+            let value = distance(at);
+            if value.is_nan() {
+                return Err(BrushError::NotFinite { what: "distance", value });
+            }
+            cells.push((value * ONE as f32).round_ties_even() as i32);
+        }
+        Self::of(size, &cells)
+    }
+
+    /// The grid of distances in 1/256 cell: x fastest, then y, then z.
+    pub(super) fn of(size: UVec3, distances: &[i32]) -> Result<Self, BrushError> {
+        check_size(size)?;
+        // A first row says how many rows a layer has, and how many layers there are.
+        let mut samples = vec![0; size.x as usize];
+        (samples[0], samples[1]) = (size.y as u16, size.z as u16);
+        samples.extend(points(size).zip(distances).map(|(at, &distance)| {
+            let is_rim = at.cmpeq(IVec3::ZERO).any() || at.cmpeq(size.as_ivec3() - 1).any();
+            let distance = if is_rim { distance.max(1) } else { distance };
+            (distance.clamp(1 - ZERO, ZERO - 1) + ZERO) as u16
+        }));
+        let image = GreyImage::from_samples(size.x, size.y * size.z + 1, samples);
+        image.map(|image| Self(ImageSamples(Arc::new(image)))).map_err(|_| wrong_size(size))
+    }
+
+    /// The grid in an image; `None` unless it holds one.
+    fn in_image(image: Arc<GreyImage>) -> Option<Self> {
+        let grid = Self(ImageSamples(image));
+        let (size, image) = (grid.size(), grid.image());
+        if check_size(size).is_err() || (image.width(), image.height()) != (size.x, size.y * size.z + 1) {
+            return None;
+        }
+        let is_rim = |at: IVec3| at.cmpeq(IVec3::ZERO).any() || at.cmpeq(size.as_ivec3() - 1).any();
+        points(size).all(|at| !is_rim(at) || grid.distance(at) > 0).then_some(grid)
+    }
+
+    /// Samples along each side.
+    pub fn size(&self) -> UVec3 {
+        let image = self.image();
+        match image.samples() {
+            [layer, layers, ..] if image.width() > 1 => {
+                UVec3::new(image.width(), (*layer).into(), (*layers).into())
+            }
+            _ => UVec3::ZERO,
+        }
+    }
+
+    /// The image that holds its samples: the name under which networks send it.
+    pub fn image(&self) -> &Arc<GreyImage> {
+        &self.0.0
+    }
+
+    /// Distance outside the shape at a sample, in 1/256 cell. Samples beyond the grid are those at its rim.
+    pub fn distance(&self, at: IVec3) -> i32 {
+        let size = self.size().as_ivec3();
+        let at = at.clamp(IVec3::ZERO, (size - 1).max(IVec3::ZERO));
+        i32::from(self.image().grey(at.x as u32, (at.z * size.y + at.y + 1) as u32)) - ZERO
+    }
+}
+
+/// The samples of a grid, in the order in which they are stored.
+pub(super) fn points(size: UVec3) -> impl Iterator<Item = IVec3> {
+    let size = size.as_ivec3();
+    let rows = (0..size.z).flat_map(move |z| (0..size.y).map(move |y| (y, z)));
+    rows.flat_map(move |(y, z)| (0..size.x).map(move |x| IVec3::new(x, y, z)))
+}
+
+fn wrong_size(size: UVec3) -> BrushError {
+    BrushError::GridSize { size: size.to_array(), least: SIDES.0, most: SIDES.1 }
+}
+
+pub(super) fn check_size(size: UVec3) -> Result<(), BrushError> {
+    let is_fine = size.to_array().iter().all(|side| (SIDES.0..=SIDES.1).contains(side));
+    if is_fine { Ok(()) } else { Err(wrong_size(size)) }
+}
+
+/// A [`ShapeGrid`] that a brush places in the terrain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GridShape {
+    /// The distances.
+    pub grid: ShapeGrid,
+    /// Where the middle of the grid lies.
+    pub center: Vec3,
+    /// From the grid's axes to those of the terrain; of length 1.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub rotation: Quat,
+    /// Voxels between two samples of the grid: 1/16 to 64.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f32,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn is_one(scale: &f32) -> bool {
+    *scale == 1.0
+}
+
+impl GridShape {
+    /// A grid around a point, with a voxel between two samples.
+    pub fn new(grid: ShapeGrid, center: Vec3) -> Self {
+        Self { grid, center, rotation: Quat::IDENTITY, scale: 1.0 }
+    }
+
+    /// The shape turned.
+    #[must_use]
+    pub fn with_rotation(self, rotation: Quat) -> Self {
+        Self { rotation, ..self }
+    }
+
+    /// The shape with another number of voxels between two samples.
+    #[must_use]
+    pub fn with_scale(self, scale: f32) -> Self {
+        Self { scale, ..self }
+    }
+
+    pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
+        Self {
+            grid: self.grid.clone(),
+            center: turn * (self.center * scale) + shift,
+            rotation: turn * self.rotation,
+            scale: self.scale * scale,
+        }
+    }
+
+    #[cfg(feature = "plugin")]
+    pub(super) fn stretched(&self, stretch: &impl Fn(Vec3) -> Vec3) -> Self {
+        Self { center: stretch(self.center), ..self.clone() }
+    }
+
+    /// Half the sides of the grid.
+    fn half(&self) -> Vec3 {
+        (self.grid.size().as_vec3() - 1.0) * self.scale / 2.0
+    }
+
+    pub(super) fn bounds(&self) -> (Vec3, Vec3) {
+        let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+        let half: Vec3 = axes.iter().map(|&axis| (self.rotation * (axis * self.half())).abs()).sum();
+        (self.center - half, self.center + half)
+    }
+
+    pub(super) fn outline(&self, outline: &mut Outline) {
+        Shape::turned_cuboid(self.center, self.half(), self.rotation).outline(|a, b| outline.line(a, b));
+    }
+}
+
+/// A [`GridShape`] in integers.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::brush) struct QuantizedGrid {
+    center: [i32; 3],
+    rotation: [i16; 4],
+    /// 1/256 voxel between two samples.
+    scale: i32,
+    samples: ImageSamples,
+}
+
+impl QuantizedGrid {
+    /// Rounds a placed grid to integers, halves to even.
+    pub fn quantize(shape: &GridShape) -> Result<Self, BrushError> {
+        Ok(Self {
+            center: quantize::point("center", shape.center)?,
+            rotation: quantize::turn(shape.rotation)?,
+            scale: in_range("scale", shape.scale, SCALE.0, SCALE.1)?,
+            samples: shape.grid.0.clone(),
+        })
+    }
+
+    /// As a brush has it.
+    pub fn restored(&self) -> GridShape {
+        GridShape {
+            grid: ShapeGrid(self.samples.clone()),
+            center: quantize::restored_point(self.center),
+            rotation: quantize::restored_turn(self.rotation),
+            scale: voxels(self.scale),
+        }
+    }
+
+    /// The image that holds the samples.
+    pub fn image(&self) -> &Arc<GreyImage> {
+        &self.samples.0
+    }
+
+    /// The same place with another grid, which an image holds. An image of 2 x 2 black samples stands for one that is
+    /// still to come: the shape is empty.
+    pub fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        let shape = Self { samples: ImageSamples(image), ..self };
+        shape.grid()?;
+        Ok(shape)
+    }
+
+    /// The grid; `None` while it is still to come.
+    fn grid(&self) -> Result<Option<ShapeGrid>, BrushError> {
+        let image = self.image();
+        let is_to_come = (image.width(), image.height()) == (2, 2) && image.samples() == [0; 4];
+        match ShapeGrid::in_image(Arc::clone(image)) {
+            None if is_to_come => Ok(None),
+            None => Err(BrushError::NoGrid),
+            grid => Ok(grid),
+        }
+    }
+
+    /// Half the sides of the grid.
+    fn half(&self) -> [i32; 3] {
+        let size = ShapeGrid(self.samples.clone()).size();
+        size.to_array().map(|side| side.saturating_sub(1) as i32 * self.scale / 2)
+    }
+}
+
+impl ShapeGeometry for QuantizedGrid {
+    type Distance = GridDistance;
+
+    fn origin(&self) -> [i32; 3] {
+        self.center
+    }
+
+    fn check(&self) -> Result<(), BrushError> {
+        check_point("center", self.center)?;
+        check_turn(self.rotation)?;
+        in_range("scale", voxels(self.scale), SCALE.0, SCALE.1)?;
+        self.grid().map(drop)
+    }
+
+    fn bounds(&self) -> (IVec3, IVec3) {
+        let (rows, squared) = matrix(self.rotation);
+        let half = self.half().map(i64::from);
+        let side = |row: [i64; 3]| {
+            let sum: i64 = row.iter().zip(half).map(|(part, half)| part.abs() * half).sum();
+            (sum / squared) as i32 + 1
+        };
+        let (center, around) = (IVec3::from_array(self.center), IVec3::from_array(rows.map(side)));
+        (center - around, center + around)
+    }
+
+    fn deepest(&self) -> i32 {
+        let least = self.image().samples().iter().skip(self.image().width() as usize).min();
+        let inside = least.map_or(0, |&least| i64::from(ZERO) - i64::from(least));
+        (inside.max(0) * i64::from(self.scale) / i64::from(ONE)) as i32
+    }
+
+    fn volume(&self) -> f64 {
+        self.half().iter().map(|&half| 2.0 * f64::from(half)).product()
+    }
+
+    fn distance(&self) -> GridDistance {
+        let (rows, squared) = matrix(self.rotation);
+        let grid = ShapeGrid(self.samples.clone());
+        GridDistance {
+            rows,
+            squared,
+            scale: self.scale.into(),
+            size: grid.size().to_array().map(i64::from),
+            grid,
+        }
+    }
+}
+
+/// Distances between the samples of a grid, in integers. Only the CPU computes them.
+#[derive(Clone, Debug)]
+pub struct GridDistance {
+    /// Rows of the rotation's matrix, and what to divide them by.
+    rows: [[i64; 3]; 3],
+    squared: i64,
+    scale: i64,
+    size: [i64; 3],
+    grid: ShapeGrid,
+}
+
+impl GridDistance {
+    /// The place in the grid nearest to a point, in 1/256 cell from its corner, and how far from it the point is.
+    fn locate(&self, at: [f32; 3]) -> ([i64; 3], f64) {
+        let (from, mut beyond) = (at.map(|v| v as i64), 0.0);
+        let place = std::array::from_fn(|axis| {
+            let along: i64 = (0..3).map(|i| self.rows[i][axis] * from[i]).sum();
+            let local = (along + self.squared / 2).div_euclid(self.squared);
+            let last = (self.size[axis] - 1).max(0) * 256;
+            let place = (local * 256).div_euclid(self.scale) + last / 2;
+            let inside = place.clamp(0, last);
+            let excess = (place - inside) as f64 * self.scale as f64 / 256.0;
+            beyond += excess * excess;
+            inside
+        });
+        (place, beyond.sqrt())
+    }
+
+    /// The distance at a place in the grid, in 1/256 voxel.
+    fn inside(&self, place: [i64; 3]) -> i64 {
+        let cell: [i64; 3] = std::array::from_fn(|axis| (place[axis] >> 8).min(self.size[axis] - 2));
+        let part: [i64; 3] = std::array::from_fn(|axis| place[axis] - (cell[axis] << 8));
+        let (image, size) = (self.grid.image(), self.size);
+        let sample = |x: i64, y: i64, z: i64| {
+            let row = (cell[2] + z) * size[1] + cell[1] + y + 1;
+            i64::from(image.grey((cell[0] + x) as u32, row as u32)) - i64::from(ZERO)
+        };
+        let along = |y: i64, z: i64| sample(0, y, z) * (256 - part[0]) + sample(1, y, z) * part[0];
+        let layer = |z: i64| along(0, z) * (256 - part[1]) + along(1, z) * part[1];
+        let sum = layer(0) * (256 - part[2]) + layer(1) * part[2];
+        (sum * self.scale + (1 << 31)) >> 32
+    }
+}
+
+impl Distance for GridDistance {
+    #[inline(always)]
+    fn at(&self, x: f32, y: f32, z: f32) -> f32 {
+        if self.size.iter().any(|&side| side < 2) {
+            return f32::MAX;
+        }
+        let (place, beyond) = self.locate([x, y, z]);
+        let inside = self.inside(place) as f32;
+        if beyond > 0.0 { inside.max(beyond as f32) } else { inside }
+    }
+
+    /// Distances between any samples may change faster than the point moves; the distance to the grid does not.
+    fn least(&self, x: f32, y: f32, z: f32) -> f32 {
+        self.locate([x, y, z]).1 as f32
+    }
+
+    fn constants(&self) -> Vec<f32> {
+        Vec::new()
+    }
+}
