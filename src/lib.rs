@@ -397,7 +397,9 @@ mod worlds;
 pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::BurrowPlugins;
-    pub use crate::brush::{Blend, Brush, BrushError, Edit, Operation, Roughness, Shape, Stamp};
+    pub use crate::brush::{
+        Blend, Brush, BrushError, Edit, Operation, Paste, Prefab, PrefabError, Roughness, Shape, Stamp,
+    };
     pub use crate::ground::{
         Bedding, ColumnMaterial, Detail, GreyImage, Ground, HeightSource, ImageLimits, ImageScale, Interval,
         MaterialControl, MaterialId, MaterialRule, NoiseHeights, NoiseKind, Strata, Stratum, StratumBody,

@@ -6,7 +6,7 @@ use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 use glam::Mat3A;
 use glam::{Quat, Vec3};
 
-use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
+use super::{Blend, FULL_POWER, Operation, Paste, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
 /// A request to change the ground, in voxels of terrain space. A brush sent to the plugin as a message is in world
@@ -140,6 +140,11 @@ impl Brush {
     /// A brush that returns the ground in its shape to what it was before any edit.
     pub fn reset(shape: Shape) -> Self {
         Self::new(shape, Operation::Reset)
+    }
+
+    /// A brush that pastes a prefab, all of it.
+    pub fn paste(paste: Paste) -> Self {
+        Self::new(paste.shape(), Operation::Paste { paste })
     }
 
     /// The brush with another strength, if it sculpts: 0 to 1.

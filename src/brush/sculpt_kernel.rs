@@ -305,7 +305,8 @@ impl SculptKernel {
             QuantizedOperation::Dig
             | QuantizedOperation::Add { .. }
             | QuantizedOperation::Paint { .. }
-            | QuantizedOperation::Reset => {
+            | QuantizedOperation::Reset
+            | QuantizedOperation::Paste { .. } => {
                 return None;
             }
         };

@@ -14,6 +14,7 @@
 //! | `sky` | how much of the sky lights a place |
 
 mod change;
+mod copy;
 mod edited_nodes;
 mod heights;
 mod inspect;
