@@ -38,7 +38,7 @@ impl World {
         let LatticeBox { min, max } = samples;
         let size = max.as_i64vec3() - min.as_i64vec3() + 1;
         let [width, height, depth] = size.to_array();
-        if size.max_element() > i64::from(i32::MAX) {
+        if size.max_element() > i64::from(i32::MAX) || size.min_element() < 1 {
             return Err(PrefabError::Size { width, height, depth });
         }
         let (size, from_min) = (size.as_ivec3(), anchor.saturating_sub(min));
