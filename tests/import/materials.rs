@@ -34,15 +34,14 @@ fn decode(entry: &Value) -> Result<(MaterialMap, MaterialReport), ImportError> {
         let files: Vec<Vec<u8>> = list("splats").iter().map(read).collect();
         return MaterialMap::decode_splats(&files, &SplatOptions { layers, deep, ..SplatOptions::default() });
     }
-    let ids = list("of")
-        .iter()
-        .map(|own| (own[0].as_u64().expect("an id") as u16, material(&own[1]).expect("one")));
+    let id = |own: &Value| (own[0].as_u64().expect("an id") as u16, material(&own[1]).expect("a material"));
+    let ids = list("of").iter().map(id).collect();
     let byte = |value: &Value| value.as_u64().expect("a part of a colour") as u8;
     let colours = list("colours");
     let colours = colours
         .iter()
         .map(|own| ([0, 1, 2].map(|part| byte(&own[0][part])), material(&own[1]).expect("one")));
-    let options = IdOptions { ids: ids.collect(), colours: colours.collect(), deep, ..IdOptions::default() };
+    let options = IdOptions { ids, colours: colours.collect(), deep, ..IdOptions::default() };
     MaterialMap::decode_ids(&read(&entry["ids"]), &options)
 }
 
