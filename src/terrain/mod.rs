@@ -55,7 +55,6 @@ pub use crate::surface::ChunkSurface;
 pub(crate) use crate::world::brick_over;
 #[cfg(any(feature = "plugin", test))]
 pub(crate) use crate::world::unique;
-#[doc(hidden)]
 pub use crate::world::{GlbError, SplatMaps};
 pub use crate::world::{Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, World};
 #[doc(hidden)]

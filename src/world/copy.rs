@@ -11,7 +11,8 @@ use crate::volume::{Sample, resolve};
 
 impl World {
     /// Copies all samples of a box, edited or not, with their materials. `anchor` is the point of the world that comes to
-    /// lie where the prefab is pasted; it may lie outside the box.
+    /// lie where the prefab is pasted; it may lie outside the box. Large boxes take seconds: copy them from a
+    /// [snapshot](crate::terrain::Terrain::snapshot), on another thread.
     ///
     /// ```
     /// use bevy_burrow::lattice::LatticeBox;

@@ -310,3 +310,28 @@ fn what_no_prefab_can_be_is_refused_with_a_reason() {
         assert!(Edit::quantize(&Brush::paste(wrong.clone())).is_err(), "{wrong:?}");
     }
 }
+
+#[test]
+fn a_paste_is_written_as_a_line_of_json_and_as_an_edit() {
+    let mut rng = Rng::with_seed(3);
+    let terrain = edited(&mut rng, 3);
+    let from = some_box(&mut rng, terrain.world());
+    let prefab = terrain.world().copy(from, from.min).expect("it lies in the world");
+    let paste = Paste::new(prefab, Vec3::new(3.5, -2.0, 9.0)).turned_about_z(3).mirrored().edited_only();
+    for paste in [paste.clone(), Paste { scale: 2.0, ..paste }] {
+        let brush = Brush::paste(paste).with_tag(4).with_power(9);
+        let line = serde_json::to_string(&brush).expect("a line");
+        assert!(line.contains(r#""op":"paste""#));
+        assert_eq!(serde_json::from_str::<Brush>(&line).expect("its own line"), brush);
+        let edit = Edit::quantize(&brush).expect("a valid brush");
+        let written = serde_json::to_string(&edit).expect("an edit");
+        assert_eq!(serde_json::from_str::<Edit>(&written).expect("its own edit"), edit);
+        assert_eq!(Edit::quantize(&Brush::from(&edit)).expect("valid"), edit);
+        // Damage is refused.
+        for (from, to) in [(r#""scale":256"#, r#""scale":0"#), (r#""scale":512"#, r#""scale":-9"#)] {
+            if written.contains(from) {
+                assert!(serde_json::from_str::<Edit>(&written.replace(from, to)).is_err());
+            }
+        }
+    }
+}

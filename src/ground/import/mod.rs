@@ -50,6 +50,7 @@ mod report;
 mod tiff;
 mod write;
 
+pub use super::material_map::MaterialMap;
 pub use error::ImportError;
 pub use grid::ElevationGrid;
 pub use join::{ElevationTile, TileEdges, tile_place};
