@@ -74,6 +74,7 @@
 //! | --- | --- |
 //! | a landscape | [`Ground`](ground::Ground) from an image, noise or a function; [`MaterialControl`](ground::MaterialControl) |
 //! | heights from TIFF, EXR, satellites, tiles | [`ElevationGrid`](ground::ElevationGrid) |
+//! | materials from splat maps and id maps | [`MaterialMap`](ground::MaterialMap) |
 //! | to put it into the world | the [`Terrain`](terrain::Terrain) component; `BurrowPlugins` |
 //! | another level | a new [`Terrain`](terrain::Terrain), inserted in place of the old one |
 //! | ground to the horizon | `LevelsOfDetail` on the terrain; [`Ground::from_source`](ground::Ground::from_source) |
@@ -82,6 +83,8 @@
 //! | several players | `GroundServer` and `SharedTerrain` (feature `replicon`); `net` for other transports (feature `net`) |
 //! | to dig, build, paint | [`Brush`](brush::Brush) messages; [`Shape`](brush::Shape), [`Roughness`](brush::Roughness) |
 //! | to sculpt | [`Brush::smooth`](brush::Brush::smooth), `flatten`, `level`, `raise`, `stamp`, `reset`, ...; [`Blend`](brush::Blend) |
+//! | to copy a place and paste it | [`World::copy`](terrain::World::copy), [`Paste`](brush::Paste) |
+//! | glTF of the surface | [`World::to_glb`](terrain::World::to_glb) |
 //! | ground that resists | [`Terrain::set_rules`](terrain::Terrain::set_rules) with [`DiggingRules`](volume::DiggingRules) |
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to undo it | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
@@ -398,8 +401,8 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::BurrowPlugins;
     pub use crate::brush::{
-        Blend, Brush, BrushError, BrushPath, Corridor, Edit, GridShape, Operation, Roughness, Shape,
-        ShapeGrid, Stamp,
+        Blend, Brush, BrushError, BrushPath, Corridor, Edit, GridShape, Operation, Paste, Prefab,
+        PrefabError, Roughness, Shape, ShapeGrid, Stamp,
     };
     pub use crate::ground::{
         Bedding, ColumnMaterial, Detail, GreyImage, Ground, HeightSource, ImageLimits, ImageScale, Interval,

@@ -29,6 +29,10 @@
 //! drawn together. Then `mesh.obj` has a group for each square, `node_X_Z_level_L`, `report.json` has nodes and
 //! triangles by level in `levels`, and `seams` is the report of what was written.
 //!
+//! `--glb` also writes `mesh.glb`, the same triangles as binary glTF with normals, colours and materials; `--splats`
+//! writes the materials of the surface as `splat_0.png` and so on, whose layers `report.json` lists; `--elevation` writes
+//! the topmost ground as `elevation.png`, `.asc`, `.tif` or `.exr` (the last two with the feature `import`).
+//!
 //! | exit code | when |
 //! | --- | --- |
 //! | 0 | all files were written; edits that lie outside the world are named in the report |
@@ -43,6 +47,7 @@ mod brush_lines;
 mod json;
 mod lod;
 mod obj;
+mod others;
 #[path = "../shared/output.rs"]
 mod output;
 mod play;
@@ -111,6 +116,15 @@ struct Args {
     /// Edits in one transaction; the result is the same, only the timings differ
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     batch: u32,
+    /// Also write mesh.glb
+    #[arg(long)]
+    glb: bool,
+    /// Also write the materials of the surface, as splat_0.png and so on
+    #[arg(long)]
+    splats: bool,
+    /// Also write the topmost ground, as elevation.png and so on
+    #[arg(long, value_name = "FORMAT")]
+    elevation: Option<others::Elevation>,
     /// Folder for mesh.obj and report.json; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -204,6 +218,7 @@ fn write(
         Some(levels) => obj::write_levels(levels, out),
         None => obj::write(world, out),
     })?;
+    others::write(args, world, &mut staging, report)?;
     report.timings.write_ms = milliseconds(start);
     staging.write("report.json", |out| write_json(out, report))?;
     if let Some(probes) = probes {

@@ -39,6 +39,12 @@ pub struct Report {
     /// Figures of the drawn mesh at each level, if levels of detail were requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub levels: Option<Vec<LevelFigures>>,
+    /// The material of each channel of the splat maps, if they were requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub splat_layers: Option<Vec<u8>>,
+    /// Heights of black and white in elevation.png, in voxels, if it was requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub elevation_range: Option<[f32; 2]>,
     pub timings: Timings,
 }
 
@@ -169,6 +175,8 @@ impl Report {
             bytes: ByteFigures { world: memory, edits: memory.edits(), mesh_obj: 0 },
             seams,
             levels: levels.map(Levels::figures),
+            splat_layers: None,
+            elevation_range: None,
             timings,
         }
     }

@@ -486,3 +486,28 @@ fn positions_are_written_exactly() {
         assert_eq!(written.parse::<f64>(), Ok(steps as f64 / 4096.0));
     }
 }
+
+#[test]
+fn further_files_hold_the_same_mesh_and_surface() {
+    let temp = TempFolder::new();
+    temp.put_hills();
+    let edits = temp.put("edits.jsonl", DIG);
+    let more = ["--glb", "--splats", "--elevation", "png", "--strata", "alpine"];
+    let report = temp.run(&edits, &more).expect("a good script");
+    let file = fs::read(temp.path("out/mesh.glb")).expect("a mesh");
+    let length = u32::from_le_bytes(file[12..16].try_into().expect("4 bytes")) as usize;
+    let json: Value = serde_json::from_slice(&file[20..20 + length]).expect("valid JSON");
+    let indices = json["meshes"].as_array().expect("meshes").iter().map(|mesh| {
+        let accessor = mesh["primitives"][0]["indices"].as_u64().expect("indices") as usize;
+        json["accessors"][accessor]["count"].as_u64().expect("a count")
+    });
+    assert_eq!(indices.sum::<u64>(), 3 * temp.mesh().triangles.len() as u64);
+    let layers = report["splat_layers"].as_array().expect("layers").len();
+    assert!(layers > 0);
+    for number in 0..4 {
+        let path = temp.path(&format!("out/splat_{number}.png"));
+        assert_eq!(path.exists(), number * 4 < layers);
+    }
+    assert!(report["elevation_range"][0].as_f64() < report["elevation_range"][1].as_f64());
+    assert!(temp.path("out/elevation.png").exists());
+}

@@ -6,12 +6,14 @@ use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
 use super::blend::QuantizedBlend;
+use super::paste::PasteSource;
 use super::quantized_operation::QuantizedOperation;
 use super::roughness::QuantizedRoughness;
 use super::sculpt_kernel::SculptKernel;
 use super::shapes::QuantizedShape;
 use super::{
-    BAND, Blend, Brush, BrushError, CustomShape, Evaluator, FULL_POWER, Kind, Operation, Roughness, Shape,
+    BAND, Blend, Brush, BrushError, CustomShape, Evaluator, FULL_POWER, Kind, Operation, Prefab, Roughness,
+    Shape,
 };
 use crate::ground::GreyImage;
 use crate::lattice::{LatticeBox, ONE};
@@ -190,6 +192,23 @@ impl Edit {
             return Ok(Self { shape: self.shape.with_image(image)?, ..self });
         }
         Ok(Self { operation: self.operation.with_stamp_image(image)?, ..self })
+    }
+
+    /// The prefab, if it pastes one.
+    pub fn prefab(&self) -> Option<&Arc<Prefab>> {
+        self.operation.prefab()
+    }
+
+    /// The edit with another prefab, if it pastes one; otherwise as it is.
+    #[cfg(feature = "net")]
+    #[must_use]
+    pub(crate) fn with_prefab(self, prefab: Arc<Prefab>) -> Self {
+        Self { operation: self.operation.with_prefab(prefab), ..self }
+    }
+
+    /// The samples that it pastes, if it does.
+    pub(crate) fn paste_source(&self) -> Option<PasteSource<'_>> {
+        self.operation.paste().map(|paste| paste.source())
     }
 
     /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6).

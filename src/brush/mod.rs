@@ -99,6 +99,8 @@ mod json;
 #[cfg(test)]
 mod laws;
 mod operation;
+mod paste;
+mod prefab;
 mod quantize;
 mod quantized_operation;
 #[cfg(feature = "plugin")]
@@ -118,6 +120,12 @@ pub use error::BrushError;
 pub use evaluator::Evaluator;
 pub(crate) use operation::Kind;
 pub use operation::Operation;
+pub use paste::Paste;
+pub(crate) use paste::{PasteSource, ground_level};
+pub(crate) use prefab::PrefabSample;
+#[doc(hidden)]
+pub use prefab::{MAX_PREFAB_SAMPLES, MAX_PREFAB_SIDE};
+pub use prefab::{Prefab, PrefabError};
 #[cfg(feature = "plugin")]
 pub(crate) use reach::reaches;
 pub use request::Brush;

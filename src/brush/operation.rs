@@ -5,13 +5,13 @@ use glam::Mat3A;
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{DEPTH, Stamp, is_default};
+use super::{DEPTH, Paste, Stamp, is_default};
 use crate::ground::MaterialId;
 
 /// The operation inside the shape.
 ///
-/// Dig, add, paint and reset look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All
-/// others *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change
+/// Dig, add, paint, reset and paste look at one sample at a time, all but the last as far as [`BAND`](super::BAND) beyond
+/// their shape. All others *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change
 /// nothing outside. Beyond the world's rim they assume that everything continues as at the rim.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case")]
@@ -96,6 +96,12 @@ pub enum Operation {
     /// ground below it, as far as the corridor goes up and down. It fades into the ground at its sides over the falloff,
     /// its shoulders. Ground higher than the corridor stays as the roof of a tunnel, and air below it as a culvert.
     Road,
+    /// Puts a copy of another place here, as far as it lies inside the shape. It changes nothing outside, not even
+    /// within [`BAND`](super::BAND). The terrain's rules hold: a sample is pasted entirely, or refused.
+    Paste {
+        /// The copy, and where it goes.
+        paste: Paste,
+    },
 }
 
 impl Operation {
@@ -109,7 +115,7 @@ impl Operation {
 
     /// Returns `true` if it sculpts. Only then the brush's [`Blend`](super::Blend) is used.
     pub fn is_sculpting(&self) -> bool {
-        !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Reset)
+        !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Reset | Self::Paste { .. })
     }
 
     /// The names of its fields in a line of JSON, in addition to those of the blend.
@@ -121,6 +127,7 @@ impl Operation {
             Self::Level { .. } => &["height"],
             Self::Raise { .. } | Self::Lower { .. } => &["amount"],
             Self::Stamp { .. } => &["stamp"],
+            Self::Paste { .. } => &["paste"],
             Self::Terrace { .. } => &["step", "height"],
         }
     }
@@ -146,6 +153,14 @@ impl Operation {
                     ..stamp.clone()
                 },
             },
+            Self::Paste { paste } => Self::Paste {
+                paste: Paste {
+                    at: point(paste.at),
+                    rotation: turn * paste.rotation,
+                    scale: paste.scale * scale,
+                    ..paste.clone()
+                },
+            },
             same => same.clone(),
         }
     }
@@ -163,6 +178,7 @@ impl Operation {
             Self::Level { height } => lift(height),
             Self::Terrace { step, base } => [step, base].into_iter().for_each(lift),
             Self::Stamp { stamp } => stretch(&mut stamp.center),
+            Self::Paste { paste } => stretch(&mut paste.at),
             Self::Dig
             | Self::Add { .. }
             | Self::Paint { .. }
@@ -184,12 +200,14 @@ pub(crate) enum Kind {
     Paint { material: MaterialId },
     Sculpt,
     Reset,
+    Paste,
 }
 
 impl Kind {
     /// The density of a sample after a dig, an add or a paint, from its density `before` and its signed distance to the
     /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt
-    /// look at more than that, and a reset at the ground: for them, it gives `before`.
+    /// look at more than that, a reset at the ground and a paste at its prefab: for them, it gives
+    /// `before`.
     ///
     /// A shape counts as [`DEPTH`] deep at most: beyond, no surface shows the difference, and the middle of a large
     /// cave or hill is all one number. Applying an operation twice is the same as once, and neither a dig ever adds
@@ -200,7 +218,7 @@ impl Kind {
         match self {
             Self::Dig => before.max(-outside),
             Self::Add { .. } => before.min(outside),
-            Self::Paint { .. } | Self::Sculpt | Self::Reset => before,
+            Self::Paint { .. } | Self::Sculpt | Self::Reset | Self::Paste => before,
         }
     }
 
@@ -210,6 +228,11 @@ impl Kind {
             Self::Add { material } | Self::Paint { material } => Some(material),
             _ => None,
         }
+    }
+
+    /// Whether an edit of this kind is a transaction of its own, for which no backend has jobs.
+    pub fn is_alone(self) -> bool {
+        matches!(self, Self::Reset | Self::Paste)
     }
 }
 

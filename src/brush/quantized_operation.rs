@@ -5,12 +5,13 @@ use std::sync::Arc;
 use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
+use super::paste::QuantizedPaste;
 use super::quantize::{
     check_direction, check_point, direction, in_range, measure, point, restored_direction, restored_point,
     voxels,
 };
 use super::stamp::QuantizedStamp;
-use super::{BrushError, Kind, Operation};
+use super::{BrushError, Kind, Operation, Prefab};
 use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::{LIMIT, ONE};
 
@@ -37,6 +38,7 @@ pub(super) enum QuantizedOperation {
     Terrace { step: i32, base: i32 },
     Reset,
     Road,
+    Paste { paste: QuantizedPaste },
 }
 
 impl QuantizedOperation {
@@ -61,6 +63,7 @@ impl QuantizedOperation {
             }
             Operation::Reset => Self::Reset,
             Operation::Road => Self::Road,
+            Operation::Paste { paste } => Self::Paste { paste: QuantizedPaste::quantize(paste)? },
         })
     }
 
@@ -74,6 +77,7 @@ impl QuantizedOperation {
             Self::Level { height } => check_point("height", [0, *height, 0]),
             Self::Raise { amount: by } | Self::Lower { amount: by } => amount(voxels(*by)).map(drop),
             Self::Stamp { stamp } => stamp.check(),
+            Self::Paste { paste } => paste.check(),
             Self::Terrace { step, base } => {
                 in_range("step", voxels(*step), STEP.0, STEP.1)?;
                 check_point("base", [0, *base, 0])
@@ -100,6 +104,7 @@ impl QuantizedOperation {
             Self::Terrace { step, base } => Operation::Terrace { step: voxels(*step), base: voxels(*base) },
             Self::Reset => Operation::Reset,
             Self::Road => Operation::Road,
+            Self::Paste { paste } => Operation::Paste { paste: paste.paste() },
         }
     }
 
@@ -119,6 +124,25 @@ impl QuantizedOperation {
         }
     }
 
+    /// What is pasted, and where.
+    pub fn paste(&self) -> Option<&QuantizedPaste> {
+        if let Self::Paste { paste } = self { Some(paste) } else { None }
+    }
+
+    /// The prefab that is pasted.
+    pub fn prefab(&self) -> Option<&Arc<Prefab>> {
+        self.paste().map(QuantizedPaste::prefab)
+    }
+
+    /// With another prefab, if it pastes one.
+    #[cfg(feature = "net")]
+    pub fn with_prefab(self, prefab: Arc<Prefab>) -> Self {
+        match self {
+            Self::Paste { paste } => Self::Paste { paste: paste.with_prefab(prefab) },
+            other => other,
+        }
+    }
+
     /// The kind of its operation.
     pub fn kind(&self) -> Kind {
         match *self {
@@ -126,6 +150,7 @@ impl QuantizedOperation {
             Self::Add { material } => Kind::Add { material },
             Self::Paint { material } => Kind::Paint { material },
             Self::Reset => Kind::Reset,
+            Self::Paste { .. } => Kind::Paste,
             _ => Kind::Sculpt,
         }
     }

@@ -8,7 +8,7 @@ use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 use glam::Mat3A;
 use glam::{Quat, Vec3};
 
-use super::{AnyShape, Blend, Corridor, CustomShape, FULL_POWER, Operation, Roughness, Shape, Stamp};
+use super::{AnyShape, Blend, Corridor, CustomShape, FULL_POWER, Operation, Paste, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
 /// A request to change the ground, in voxels of terrain space. A brush sent to the plugin as a message is in world
@@ -169,6 +169,11 @@ impl Brush {
         // A shoulder that is no number is refused as a falloff.
         let path = corridor.path.widened(if shoulder > 0.0 { shoulder } else { 0.0 });
         Self::new(Corridor { path, ..corridor }, Operation::Road).with_falloff(shoulder)
+    }
+
+    /// A brush that pastes a prefab, all of it.
+    pub fn paste(paste: Paste) -> Self {
+        Self::new(paste.shape(), Operation::Paste { paste })
     }
 
     /// The brush with another strength, if it sculpts: 0 to 1.

@@ -321,7 +321,8 @@ impl SculptKernel {
             | QuantizedOperation::Add { .. }
             | QuantizedOperation::Paint { .. }
             | QuantizedOperation::Reset
-            | QuantizedOperation::Road => {
+            | QuantizedOperation::Road
+            | QuantizedOperation::Paste { .. } => {
                 return None;
             }
         };

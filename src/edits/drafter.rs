@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::batches::{MAX_BRICKS, batches};
 use super::delta::{EditDelta, enter_effects};
 use super::effect::{DraftedBrick, EditEffect, MergedBricks, Overlay};
+use super::paste::paste;
 use super::prepared::PreparedEdits;
 use super::prepared_edit::PreparedEdit;
 use crate::brush::Edit;
@@ -61,6 +62,15 @@ impl<'a> Drafter<'a> {
     /// Applies edits to the current samples. [Lay](Overlay::lay) the draft's bricks over these before the
     /// next draft.
     pub fn draft(&mut self, edits: &[&Edit], rules: Option<&DiggingRules>) -> Draft {
+        // A paste is a transaction of its own.
+        if let [edit] = edits
+            && let Some(source) = edit.paste_source()
+        {
+            let mut deltas = paste(self.samples(), self.grid, edit, &source, rules);
+            let mut draft = Draft { effects: vec![EditEffect::default()], ..Draft::default() };
+            add(&mut draft, 0, 1, &mut deltas, &mut self.hash, &mut self.uniform);
+            return Draft { hash: self.hash, ..draft };
+        }
         let edits: Vec<PreparedEdit> =
             edits.iter().map(|edit| PreparedEdit::new(self.grid, edit, rules)).collect();
         let lengths: Vec<usize> = batches(&edits, MAX_BRICKS).into_iter().map(|batch| batch.len()).collect();

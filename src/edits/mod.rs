@@ -7,7 +7,8 @@
 //!
 //! Edits that read samples around those they change, such as sculpting or those that
 //! [rules](crate::volume::DiggingRules) restrict, take the slower path of `stencil_edit`; all others are applied row by
-//! row by `plain_edit`. A reset, which takes bricks away, goes none of these ways: see `reset`.
+//! row by `plain_edit`. A reset, which takes bricks away, goes none of these ways: see `reset`. Nor does a paste,
+//! which looks its samples up: see `paste`.
 
 mod batches;
 mod brick_editor;
@@ -16,6 +17,7 @@ mod drafter;
 mod effect;
 mod jobs;
 mod padded_brick;
+mod paste;
 mod plain_edit;
 mod prepared;
 mod prepared_edit;

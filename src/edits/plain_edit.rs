@@ -30,8 +30,8 @@ impl BrickEditor<'_> {
                     let row = self.paint((y, z), outside, lanes, material, counts);
                     layer | of_row(row, z)
                 }),
-                // They look at stored samples alone: see `edits::reset`.
-                Kind::Reset => 0,
+                // They are no jobs: see `edits::reset` and `edits::paste`.
+                Kind::Reset | Kind::Paste => 0,
                 _ => self.carve(y, rows, lanes, operation, counts),
             };
         }

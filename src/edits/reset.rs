@@ -12,7 +12,7 @@ use super::rule_scope::{BatchRules, BrickRules};
 use crate::brush::{BAND, Edit};
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
 use crate::volume::layers::{self, Layers, of_row, offset};
-use crate::volume::{Brick, DiggingRules, SampleView, VoxelOutcome, pristine_layers};
+use crate::volume::{Brick, DiggingRules, SampleView, pristine_layers};
 
 /// A brick that a reset changed.
 pub(crate) struct ResetBrick {
@@ -87,15 +87,7 @@ fn keep_allowed(
         let (before, pristine) = (around.density(local), ground.distance(point));
         let (own, new) = (view.material(point), ground.material(point));
         let is_painted = before < 0 && pristine < 0 && own != new;
-        let refused = if rules.is_protected(point) {
-            Some(VoxelOutcome::Protected)
-        } else if is_painted && rules.rules.is_unbreakable(own) {
-            Some(VoxelOutcome::Unbreakable)
-        } else {
-            let (allowed, outcome) =
-                rules.judge(view, point, prepared.power, &around.around(local), pristine);
-            outcome.filter(|_| allowed != pristine)
-        };
+        let refused = rules.refusal(view, point, prepared.power, &around.around(local), pristine, is_painted);
         let Some(outcome) = refused else { continue };
         samples[index >> 6] &= !(1 << (index & 63));
         if (before < 0) != (pristine < 0) || is_painted {

@@ -98,6 +98,27 @@ impl<'a> BrickRules<'a> {
         }
         (allowed, outcome)
     }
+
+    /// The reason why rules forbid to replace a sample by another one with the proposed density, if they do: samples
+    /// are replaced entirely or not at all. `is_painted` says whether it stays solid and gets another material.
+    pub fn refusal(
+        &self,
+        view: &SampleView,
+        at: IVec3,
+        power: u8,
+        around: &Stencil,
+        proposed: i32,
+        is_painted: bool,
+    ) -> Option<VoxelOutcome> {
+        if self.is_protected(at) {
+            return Some(VoxelOutcome::Protected);
+        }
+        if is_painted && self.rules.is_unbreakable(view.material(at)) {
+            return Some(VoxelOutcome::Unbreakable);
+        }
+        let (allowed, outcome) = self.judge(view, at, power, around, proposed);
+        outcome.filter(|_| allowed != proposed)
+    }
 }
 
 #[cfg(test)]

@@ -24,6 +24,8 @@ pub enum Kind {
     LevelFile,
     /// The differences of a region from the level below.
     RegionChange,
+    /// A prefab.
+    Prefab,
 }
 
 /// Identifies a world uniquely.

@@ -9,6 +9,7 @@
 //! | `batch`, `edits`, `change` | commits, for journals |
 //! | `metadata` | a world without its regions |
 //! | `portable` | a whole world as one file |
+//! | `prefab` | a prefab as a file |
 //! | `level` | a designer's level: a folder of files, or one packed file |
 //! | `container`, `bytes`, `plain`, `limits` | shared by the others |
 //!
@@ -31,6 +32,7 @@ pub(crate) mod metadata;
 pub(crate) mod plain;
 pub(crate) mod portable;
 pub(crate) mod predict;
+pub(crate) mod prefab;
 pub(crate) mod region;
 pub(crate) mod residuals;
 
@@ -46,6 +48,7 @@ pub use metadata::Metadata;
 pub use portable::{PortableHead, SavedRegion, read_portable_head};
 #[doc(hidden)]
 pub use portable::{PortableWorld, read_portable, write_portable};
+pub use prefab::{read_prefab, write_prefab};
 #[cfg(any(feature = "net", feature = "store", test))]
 pub(crate) use region::{decode_region, encode_region};
 

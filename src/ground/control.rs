@@ -1,8 +1,11 @@
 //! Material control: decides the materials of columns.
 
+use std::sync::Arc;
+
 use super::error::GroundError;
 use super::grey_image::GreyImage;
 use super::material::{ColumnMaterial, MaterialId};
+use super::material_map::MaterialMap;
 use super::rules::MaterialRule;
 use crate::lattice::hash::hash_words;
 
@@ -39,6 +42,8 @@ pub enum MaterialControl {
         /// The material of the deep.
         base: MaterialId,
     },
+    /// As a map has it: each column's materials are those of the nearest sample.
+    Map(Arc<MaterialMap>),
 }
 
 impl Default for MaterialControl {
@@ -65,6 +70,7 @@ impl MaterialControl {
                 check_base(base)?;
                 map.samples().iter().try_for_each(|sample| id(*sample).check("an id of the material map"))
             }
+            Self::Map(map) => map.check(),
         }
     }
 }
@@ -93,6 +99,7 @@ impl MaterialControl {
                 hash_words([3, base.0.into(), overlay.0.into(), of_image(mask)])
             }
             Self::Ids { map, base } => hash_words([4, base.0.into(), of_image(map)]),
+            Self::Map(map) => hash_words([5, map.hash()]),
         }
     }
 
@@ -102,6 +109,7 @@ impl MaterialControl {
             Self::Uniform(_) => 0,
             Self::Rules { rules, .. } => size_of_val(rules.as_slice()),
             Self::Blend { mask: image, .. } | Self::Ids { map: image, .. } => size_of_val(image.samples()),
+            Self::Map(map) => map.bytes(),
         };
         size_of::<Self>() + own
     }

@@ -36,6 +36,10 @@ impl MaterialControl {
                 let overlay = id(ground.stretched(map, column).nearest());
                 ColumnMaterial { base: *base, overlay, blend: 255 }
             }
+            Self::Map(map) => {
+                let [x, z] = ground.place_on((map.width(), map.height()), column).map(LinePosition::nearest);
+                map.column(x, z)
+            }
         }
     }
 }
@@ -63,17 +67,19 @@ impl Ground {
 
     /// Where a column of the world lies on an image stretched over it.
     pub(super) fn stretched<'a>(&self, image: &'a GreyImage, column: Column) -> ImagePoint<'a> {
+        let [x, z] = self.place_on((image.width(), image.height()), column);
+        ImagePoint { image, x, z }
+    }
+
+    /// Where a column of the world lies on samples of this size, along x and z.
+    fn place_on(&self, (width, height): (u32, u32), column: Column) -> [LinePosition; 2] {
         let along = |column: i32, cells: i32, samples: u32| {
             LinePosition::of_long(
                 u64::from(column.unsigned_abs()) * u64::from(samples - 1),
                 cells.unsigned_abs(),
             )
         };
-        ImagePoint {
-            image,
-            x: along(column.x, self.width(), image.width()),
-            z: along(column.z, self.depth(), image.height()),
-        }
+        [along(column.x, self.width(), width), along(column.z, self.depth(), height)]
     }
 }
 
@@ -94,8 +100,7 @@ impl ImagePoint<'_> {
 
     /// The sample nearest to here.
     fn nearest(&self) -> u16 {
-        let nearest = |at: LinePosition| at.sample + u32::from(at.fraction >= 0.5);
-        self.image.grey(nearest(self.x), nearest(self.z))
+        self.image.grey(self.x.nearest(), self.z.nearest())
     }
 }
 

@@ -172,6 +172,11 @@ impl LinePosition {
         let fraction = f64::from((parts % per_sample) as u32) / f64::from(parts_per_sample);
         Self { sample: (parts / per_sample) as u32, fraction }
     }
+
+    /// The nearest sample; in the middle between two, the later one.
+    pub fn nearest(self) -> u32 {
+        self.sample + u32::from(self.fraction >= 0.5)
+    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@
 //! | noise | [`Ground::from_noise`], or [`Ground::from_noise_fn`] for any function of the crate [`noise`] |
 //! | anything of these and more, computed where it is needed | a [`HeightSource`], then [`Ground::from_source`] |
 //! | materials by slope, height or image | [`Ground::with_materials`] |
+//! | materials of splat maps and id maps | [`MaterialMap`], [`MaterialControl::Map`] |
 //! | strata and ore below the surface | [`Ground::with_strata`], [`Ground::with_material_fn`] |
 //!
 //! Equal input gives equal bits on every machine: heights and materials are computed with additions,
@@ -26,6 +27,7 @@ mod grey_image;
 mod image_heights;
 pub mod import;
 mod material;
+mod material_map;
 mod noise_heights;
 mod noise_params;
 mod noise_rows;
@@ -51,12 +53,15 @@ pub use image_heights::MAX_VOXELS_PER_SAMPLE;
 pub use image_heights::{Detail, ImageScale};
 #[doc(hidden)]
 pub use import::{
-    ElevationGrid, ElevationScale, ElevationTile, HeightFormat, HeightScale, ImportError, ImportNote,
-    ImportOptions, ImportReport, RawLayout, Repair, SampleKind, TileEdges, tile_place,
+    ElevationGrid, ElevationScale, ElevationTile, HeightFormat, HeightScale, IdOptions, ImportError,
+    ImportNote, ImportOptions, ImportReport, MAX_LAYERS, MaterialNote, MaterialReport, RawLayout, Repair,
+    SampleKind, SplatOptions, TileEdges, tile_place,
 };
 #[doc(hidden)]
 pub use material::OVERLAY_DEPTH;
 pub use material::{ColumnMaterial, MaterialId};
+#[doc(hidden)]
+pub use material_map::MaterialMap;
 #[doc(hidden)]
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE};
 pub use noise_heights::{NoiseHeights, NoiseKind};

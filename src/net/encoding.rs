@@ -9,12 +9,12 @@ use std::sync::Arc;
 
 use super::message::*;
 use super::stamps::{StampId, Stamps};
-use crate::brush::Edit;
+use crate::brush::{Edit, Prefab};
 use crate::format::bytes::{Reader, put_bytes, put_number};
 use crate::format::change::{put_change, read_change};
 use crate::format::edits::EditSequence;
 use crate::format::fields::{point, put_point};
-use crate::format::{FormatError, WorldId, decode_region, encode_region, plain};
+use crate::format::{FormatError, WorldId, decode_region, encode_region, plain, read_prefab, write_prefab};
 use crate::ground::{GreyImage, Ground};
 use crate::lattice::RegionPos;
 use crate::terrain::Order;
@@ -45,6 +45,7 @@ const MAX_PACKED: usize = 64 << 10;
 const STREAM: u8 = 11;
 const GREET: u8 = 12;
 const IMAGE: u8 = 13;
+const PREFAB: u8 = 14;
 
 /// Heads of edits are smaller.
 const RULES: u8 = 128;
@@ -259,6 +260,10 @@ impl ToClient {
                 put_number(&mut to, image.height().into());
                 image.samples().iter().for_each(|sample| to.extend_from_slice(&sample.to_le_bytes()));
             }
+            Self::Prefab(prefab) => {
+                to.push(PREFAB);
+                to.extend_from_slice(&write_prefab(prefab));
+            }
         }
         to
     }
@@ -327,6 +332,7 @@ impl ToClient {
             STREAM => Self::Stream { stream: reader.number()? },
             GREET => Self::Greet,
             IMAGE => Self::Image(read_image(&mut reader)?),
+            PREFAB => Self::Prefab(Arc::new(read_prefab(std::mem::take(&mut reader.0))?)),
             _ => return Err(FormatError::Invalid("tag of a message")),
         };
         reader.end()?;
@@ -376,10 +382,13 @@ fn at_place<T: Copy>(all: &[T], place: u8) -> Result<T, FormatError> {
 
 /// Appends an edit; `before` stands between its head and the rest.
 fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, coder: &mut EditSequence) {
-    let unnamed = edit.stamp_image().and_then(|image| {
+    let image = edit.stamp_image().map(|image| StampId::of(image));
+    let name = image.or_else(|| edit.prefab().map(|prefab| StampId::of_prefab(prefab)));
+    let unnamed = name.and_then(|name| {
         to.push(STAMP);
-        to.extend_from_slice(&StampId::of(image).0.to_le_bytes());
-        edit.clone().with_stamp_image(no_image()?).ok()
+        to.extend_from_slice(&name.0.to_le_bytes());
+        let edit = edit.clone().with_prefab(Arc::new(Prefab::placeholder()));
+        edit.with_stamp_image(no_image()?).ok()
     });
     let at = to.len();
     to.push(0);
@@ -395,7 +404,7 @@ struct ReadEdit<T> {
     /// The data in between.
     before: T,
     edit: Edit,
-    /// The image of its stamp, if it is missing: the edit has another one then.
+    /// The image of its stamp or its prefab, if it is missing: the edit has another one then.
     missing: Option<StampId>,
 }
 
@@ -412,7 +421,11 @@ fn read_edit<T>(
     let before = before(reader)?;
     let edit = coder.read(head, reader)?;
     let (edit, missing) = match (stamp.map(StampId), edit.stamp_image()) {
-        (None, None) => (edit, None),
+        (None, None) if edit.prefab().is_none() => (edit, None),
+        (Some(id), None) if edit.prefab().is_some() => match stamps.prefab(id) {
+            Some(prefab) => (edit.with_prefab(Arc::clone(prefab)), None),
+            None => (edit, Some(id)),
+        },
         (Some(id), Some(_)) => match stamps.get(id) {
             Some(image) => {
                 let error = |error| FormatError::Edit(format!("{error}"));

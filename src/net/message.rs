@@ -30,7 +30,7 @@ use std::sync::Arc;
 use glam::IVec3;
 
 use super::stamps::StampId;
-use crate::brush::Edit;
+use crate::brush::{Edit, Prefab};
 use crate::format::WorldId;
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
@@ -38,7 +38,7 @@ use crate::terrain::{LooseSettings, Order, Patch};
 use crate::volume::{Brick, DiggingRules, Fields};
 
 /// The version of the protocol. It changes whenever the encoding of messages does.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 
 /// Most bytes of a message to a server.
 pub const MAX_TO_SERVER: usize = 64 << 10;
@@ -206,7 +206,7 @@ pub enum ToServer {
         /// The number that the client's world is at.
         number: u64,
     },
-    /// Asks for images of stamps that the client does not have.
+    /// Asks for images of stamps, and for prefabs, that the client does not have.
     Images {
         /// At most [`MAX_IMAGES`].
         images: Vec<StampId>,
@@ -344,6 +344,8 @@ pub enum ToClient {
     Greet,
     /// An image that the client asked for.
     Image(Arc<GreyImage>),
+    /// A prefab that the client asked for.
+    Prefab(Arc<Prefab>),
 }
 
 /// The reason why an edit or an undo was refused.

@@ -6,7 +6,7 @@ use super::record::CommitRecord;
 
 impl Terrain {
     /// Keeps a record of each commit until it is [taken](Self::take_log); `None` keeps none and
-    /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps, the
+    /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps and prefabs, the
     /// oldest are dropped. A reader that finds a gap between [revisions](CommitRecord::revision), or whose
     /// last record does not have the [world's revision](super::World::revision), has to read [all of the
     /// world](Self::parts).

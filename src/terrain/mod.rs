@@ -55,6 +55,7 @@ pub use crate::surface::ChunkSurface;
 pub(crate) use crate::world::brick_over;
 #[cfg(any(feature = "plugin", test))]
 pub(crate) use crate::world::unique;
+pub use crate::world::{GlbError, SplatMaps};
 pub use crate::world::{Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, World};
 #[doc(hidden)]
 pub use crate::world::{MeshKey, MeshKey as Drawn, Version};

@@ -82,9 +82,9 @@ impl Order {
         if let Self::Edit(edit) = self { Some(edit) } else { None }
     }
 
-    /// Whether it is a transaction of its own: anything but an edit, and a reset.
+    /// Whether it is a transaction of its own: anything but an edit, a reset, and a paste.
     pub(super) fn is_alone(&self) -> bool {
-        self.edit().is_none_or(|edit| edit.kind() == Kind::Reset)
+        self.edit().is_none_or(|edit| edit.kind().is_alone())
     }
 
     /// Its work, in bricks.

@@ -14,7 +14,9 @@
 //! | `sky` | how much of the sky lights a place |
 
 mod change;
+mod copy;
 mod edited_nodes;
+mod glb;
 mod heights;
 mod inspect;
 mod kept_surfaces;
@@ -31,11 +33,13 @@ mod settings;
 // Some of it is for meshes, which only the plugin makes.
 #[cfg_attr(not(feature = "plugin"), allow(dead_code, unused_imports))]
 pub(crate) mod sky;
+mod splats;
 mod state;
 mod triangles;
 mod unmeshed;
 
 pub(crate) use change::{Change, Reached, brick_bytes, replaced_bytes};
+pub use glb::GlbError;
 pub use memory::Memory;
 pub(crate) use meshes::NewSurfaces;
 pub(crate) use parts::{brick_over, columns_of};
@@ -44,6 +48,7 @@ pub use patch::Patch;
 pub(crate) use patch::{ChangedBrick, Overlay, Places, State};
 pub use query::{RayHit, Span};
 pub use settings::{TerrainError, TerrainSettings};
+pub use splats::SplatMaps;
 pub(crate) use state::unique;
 pub use state::{MeshKey, Version, World};
 pub use unmeshed::Meshing;

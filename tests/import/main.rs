@@ -2,6 +2,8 @@
 
 mod damage;
 mod export;
+mod glb;
+mod materials;
 mod repairs;
 mod sizes;
 mod table;

@@ -155,6 +155,75 @@ pub enum ImportError {
         /// Its value.
         value: f32,
     },
+    /// A material map is not a PNG file.
+    #[error("this is no PNG file: export splat maps and id maps as PNG, without loss")]
+    MapFormat,
+    /// A splat map has a palette.
+    #[error(
+        "the splat map has a palette, whose entries are no weights: export it with colours, or read it as an id map"
+    )]
+    MapPalette,
+    /// Splat maps have several sizes.
+    #[error(
+        "splat map {file} is {width} x {height}, but the first is {} x {}: export all of them at one size",
+        first.0, first.1
+    )]
+    MapSize {
+        /// The file's place in the list.
+        file: usize,
+        /// Its samples in a row.
+        width: u32,
+        /// Its rows.
+        height: u32,
+        /// The size of the first one.
+        first: (u32, u32),
+    },
+    /// Layers and channels of splat maps do not fit.
+    #[error(
+        "{named} channels are named and {layers} of them have a layer, but the splat maps have {channels} channels, and \
+         1 to {most} layers are possible: name a material or `None` for each channel"
+    )]
+    Layers {
+        /// Channels that `SplatOptions::layers` names.
+        named: usize,
+        /// Those of them with a material.
+        layers: usize,
+        /// Channels of all files.
+        channels: usize,
+        /// Most layers.
+        most: usize,
+    },
+    /// A sample of an id map has no material.
+    #[error("{found} at sample ({x}, {z}) has no material: name one in `IdOptions`, or correct the map")]
+    UnknownId {
+        /// The id or the colour.
+        found: String,
+        /// Column of the sample.
+        x: u32,
+        /// Its row.
+        z: u32,
+    },
+    /// A surface has more materials than splat maps have channels.
+    #[error(
+        "the surface has {found} materials, but splat maps hold {most}: export fewer materials, or an id map"
+    )]
+    TooManyMaterials {
+        /// Materials of the surface.
+        found: usize,
+        /// Most layers.
+        most: usize,
+    },
+    /// The distance between samples is no whole number of voxels.
+    #[error(
+        "samples that are {spacing} apart do not fit voxels of {voxel_size}: choose a voxel size that goes into the \
+         distance 1 to 64 times, and project files in degrees to metres first"
+    )]
+    Spacing {
+        /// Distance between samples in the unit of the file.
+        spacing: f64,
+        /// The side of a voxel in the same unit.
+        voxel_size: f64,
+    },
     /// An option is out of its range.
     #[error("the option {name} is {value}: it must be {allowed}")]
     Option {

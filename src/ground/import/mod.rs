@@ -23,6 +23,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A [`MaterialMap`](super::MaterialMap) holds materials: of splat maps, whose channels are weights, and of id maps.
+//!
 //! **Voids** are samples without a value: NaN, infinity, the value that the file or [`ImportOptions`] declares, and
 //! well-known ones such as -9999 that lie far outside of all others. **Outliers** are single samples far above or below
 //! all that surrounds them. [`Repair`] chooses what becomes of either. The report counts both.
@@ -36,6 +38,7 @@ mod exr;
 mod grid;
 mod join;
 mod kind;
+mod materials;
 mod onto_ground;
 mod open;
 mod options;
@@ -47,10 +50,12 @@ mod report;
 mod tiff;
 mod write;
 
+pub use super::material_map::MaterialMap;
 pub use error::ImportError;
 pub use grid::ElevationGrid;
 pub use join::{ElevationTile, TileEdges, tile_place};
 pub use kind::{HeightFormat, SampleKind};
+pub use materials::{IdOptions, MAX_LAYERS, MaterialNote, MaterialReport, SplatOptions};
 pub use onto_ground::{ElevationScale, HeightScale};
 pub use options::{ImportOptions, RawLayout, Repair};
 pub use report::{ImportNote, ImportReport};

@@ -12,6 +12,20 @@ use super::options::ImportOptions;
 use super::repair::repair;
 use super::report::ImportReport;
 use super::{ascii, png, raw};
+use crate::ground::{ImageError, ImageLimits};
+
+/// The bytes of a file, if it is not larger than the limits allow.
+pub(super) fn read_file(path: &Path, limits: &ImageLimits) -> Result<Vec<u8>, ImportError> {
+    let failed = |error: std::io::Error| ImportError::File {
+        path: path.display().to_string(),
+        reason: error.to_string(),
+    };
+    let (bytes, limit) = (fs::metadata(path).map_err(failed)?.len(), limits.max_file_bytes);
+    if bytes > limit {
+        return Err(ImageError::FileSize { bytes, limit }.into());
+    }
+    fs::read(path).map_err(failed)
+}
 
 impl ElevationGrid {
     /// Reads a file. Its name matters only for `.hgt`, which has no header.
@@ -23,18 +37,9 @@ impl ElevationGrid {
         options: &ImportOptions,
     ) -> Result<(Self, ImportReport), ImportError> {
         let path = path.as_ref();
-        let failed = |error: std::io::Error| ImportError::File {
-            path: path.display().to_string(),
-            reason: error.to_string(),
-        };
-        let bytes = fs::metadata(path).map_err(failed)?.len();
-        let limit = options.limits.max_file_bytes;
-        if bytes > limit {
-            return Err(crate::ground::ImageError::FileSize { bytes, limit }.into());
-        }
         let is_hgt = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hgt"));
         let format = options.format.or(is_hgt.then_some(HeightFormat::Hgt));
-        Self::decode(&fs::read(path).map_err(failed)?, &ImportOptions { format, ..options.clone() })
+        Self::decode(&read_file(path, &options.limits)?, &ImportOptions { format, ..options.clone() })
     }
 
     /// Decodes the bytes of a file.

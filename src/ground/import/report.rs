@@ -2,7 +2,10 @@
 
 use std::fmt;
 
+use super::error::ImportError;
 use super::kind::{HeightFormat, SampleKind};
+use super::onto_ground::{ElevationScale, HeightScale};
+use crate::ground::MAX_VOXELS_PER_SAMPLE;
 
 /// What was read from a file. [`Display`](fmt::Display) gives it as text, a line for each note.
 #[derive(Clone, Debug, PartialEq)]
@@ -150,6 +153,25 @@ impl fmt::Display for ImportNote {
                 write!(f, "{count} samples differ between tiles that share an edge, by up to {largest}")
             }
         }
+    }
+}
+
+impl ImportReport {
+    /// The scale of a file in metres for voxels of `voxel_size` metres: samples as far apart as the file says, heights
+    /// in metres. Where the file says nothing, its samples are a voxel apart.
+    ///
+    /// # Errors
+    /// [`ImportError::Spacing`] if the samples are not 1 to 64 whole voxels apart, as those of files in degrees are not.
+    pub fn scale(&self, voxel_size: f64) -> Result<ElevationScale, ImportError> {
+        let heights = HeightScale::Units { voxels_per_unit: voxel_size.recip(), base: 0.0 };
+        let [x, z] = self.spacing.unwrap_or([voxel_size; 2]);
+        let voxels = (x / voxel_size).round();
+        let fits = |spacing: f64| (spacing / voxel_size - voxels).abs() <= voxels / 100.0;
+        let is_possible = (1.0..=f64::from(MAX_VOXELS_PER_SAMPLE)).contains(&voxels);
+        if !is_possible || voxel_size <= 0.0 || !fits(x) || !fits(z) {
+            return Err(ImportError::Spacing { spacing: if fits(x) { z } else { x }, voxel_size });
+        }
+        Ok(ElevationScale { voxels_per_sample: voxels as u32, heights, detail: None })
     }
 }
 

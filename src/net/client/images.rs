@@ -1,4 +1,4 @@
-//! Images of stamps that this client lacks: entries with them wait until the server has sent them.
+//! Images of stamps and prefabs that this client lacks: entries with them wait until the server has sent them.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::super::message::{Lane, MAX_IMAGES, ToServer};
 use super::super::stamps::StampId;
 use super::Client;
+use crate::brush::Prefab;
 use crate::ground::GreyImage;
 
 /// Messages that wait for images.
@@ -38,6 +39,20 @@ impl Client {
             return;
         }
         self.stamps.add(image);
+        self.read_parked();
+    }
+
+    /// Adds a prefab: messages that waited for it are read again.
+    pub(super) fn take_prefab(&mut self, prefab: Arc<Prefab>) {
+        let is_awaited = self.images.awaited.remove(&StampId::of_prefab(&prefab));
+        if !is_awaited || self.stamps.add_prefab(prefab).is_none() {
+            self.figures.malformed += 1;
+            return;
+        }
+        self.read_parked();
+    }
+
+    fn read_parked(&mut self) {
         for (lane, bytes) in std::mem::take(&mut self.images.parked) {
             self.read(lane, bytes);
         }

@@ -452,6 +452,7 @@ impl Client {
             ToClient::Durable { number } => self.events.push(ClientEvent::Durable(number)),
             ToClient::Piece(piece) => self.bulk.add(&piece),
             ToClient::Image(image) => self.take_image(image),
+            ToClient::Prefab(prefab) => self.take_prefab(prefab),
         }
     }
 

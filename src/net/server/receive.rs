@@ -184,14 +184,19 @@ impl Server {
         true
     }
 
-    /// Sends images that a client lacks, each once.
+    /// Sends images and prefabs that a client lacks, each once.
     fn receive_images(&mut self, client: ClientId, images: Vec<StampId>) -> bool {
         for id in images {
             let is_small = |image: &&Arc<GreyImage>| size_of_val(image.samples()) <= MAX_IMAGE;
-            let Some(image) = self.stamps.get(id).filter(is_small) else { return false };
+            let image = self.stamps.get(id).filter(is_small);
+            let prefab = self.stamps.prefab(id);
+            if image.is_none() && prefab.is_none() {
+                return false;
+            }
             let Some(session) = self.sessions.get_mut(&client) else { return true };
             if session.images.insert(id) {
-                session.bulk.push_image(Arc::clone(image));
+                image.map(Arc::clone).into_iter().for_each(|image| session.bulk.push_image(image));
+                prefab.map(Arc::clone).into_iter().for_each(|prefab| session.bulk.push_prefab(prefab));
             }
         }
         true

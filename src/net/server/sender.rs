@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::pace::Pace;
 use super::settings::ServerSettings;
+use crate::brush::Prefab;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
 use crate::net::bucket::{Bucket, Rate};
@@ -61,6 +62,8 @@ pub enum Job {
     Message(Arc<[u8]>),
     /// An image.
     Image(Arc<GreyImage>),
+    /// A prefab.
+    Prefab(Arc<Prefab>),
     /// A region of the lane's world, followed by `left` others. It is encoded when its turn comes.
     Region { pos: RegionPos, left: u32 },
 }
@@ -173,6 +176,11 @@ impl BulkSender {
         self.jobs.push_front(Job::Image(image));
     }
 
+    /// Adds a prefab, likewise.
+    pub fn push_prefab(&mut self, prefab: Arc<Prefab>) {
+        self.jobs.push_front(Job::Prefab(prefab));
+    }
+
     /// Whether regions of this world can be added: of another one only where no regions wait.
     pub fn takes(&self, number: u64) -> bool {
         self.world.as_ref().is_none_or(|(other, _)| *other == number)
@@ -266,6 +274,7 @@ impl BulkSender {
         match self.jobs.pop_front()? {
             Job::Message(bytes) => Some(bytes),
             Job::Image(image) => Some(ToClient::Image(image).to_bytes().into()),
+            Job::Prefab(prefab) => Some(ToClient::Prefab(prefab).to_bytes().into()),
             Job::Region { pos, left } => {
                 let bytes: Arc<[u8]> = region_bytes(self.world.as_ref()?, pos, left).into();
                 encodings.note(bytes.len());

@@ -175,8 +175,8 @@ pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Eva
         operation: match operation {
             Kind::Dig => 0,
             Kind::Add { .. } => 1,
-            // Resets never come here: see `edits::reset`.
-            Kind::Paint { .. } | Kind::Sculpt | Kind::Reset => 2,
+            // Resets and pastes never come here: see `edits::reset` and `edits::paste`.
+            Kind::Paint { .. } | Kind::Sculpt | Kind::Reset | Kind::Paste => 2,
         },
         material: operation.material().map_or(0, |material| material.0.into()),
         is_rough: of.roughness.is_some().into(),
