@@ -247,6 +247,7 @@
 //! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
 //! | [`terrain`] | orders, transactions, history, the commit log; exports what the three above have for games |
 //! | `scatter` | where plants stand, and whether they still do |
+//! | `navigation` | where agents can walk |
 //! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
 //! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `plants`, `debug`, `panel` | everything else that uses Bevy |
@@ -323,6 +324,8 @@
 //! | `picking` | Bevy's pointer events on the ground, with the `TerrainHit` as extra data | |
 //! | `replicon` | multiplayer over bevy_replicon | |
 //! | `scatter` | plants and stones that go and return with their ground | |
+//! | `navigation` | where agents can walk, as polygons of tiles | |
+//! | `landmass` | navigation meshes for `bevy_landmass`, replaced with each commit | `navigation`, `plugin` |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
@@ -358,6 +361,8 @@ pub mod lattice;
 #[doc(hidden)]
 pub mod lod;
 mod loose;
+#[cfg(feature = "navigation")]
+pub mod navigation;
 #[cfg(feature = "net")]
 pub mod net;
 #[cfg(feature = "egui")]
