@@ -89,6 +89,7 @@
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for the game's own textures |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
+//! | paths over ground that is dug | `Navigation`, `NavigationSource` and the `NavigationPlugin` of `paths` (feature `landmass`) |
 //! | plants and stones that follow the ground | `Plants`, `PlantLooks` and the `plants` plugins (feature `scatter`) |
 //! | other cameras, no shadows | `RenderLayers`, `NotShadowCaster`, `NotShadowReceiver` on the terrain |
 //! | more from the same surfaces, in the same commit | `SurfaceProcessor`s |
@@ -250,7 +251,7 @@
 //! | `navigation` | where agents can walk |
 //! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
-//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `plants`, `debug`, `panel` | everything else that uses Bevy |
+//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `plants`, `paths`, `debug`, `panel` | everything else that uses Bevy |
 //!
 //! # How the seam closes
 //!
@@ -367,6 +368,8 @@ pub mod navigation;
 pub mod net;
 #[cfg(feature = "egui")]
 pub mod panel;
+#[cfg(feature = "landmass")]
+pub mod paths;
 #[cfg(feature = "avian")]
 pub mod physics;
 #[cfg(all(feature = "plugin", feature = "scatter"))]

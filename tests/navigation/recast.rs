@@ -10,7 +10,7 @@ use bevy_burrow::lattice::{Column, SNAP};
 use bevy_burrow::navigation::{WalkSettings, WalkableCell};
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
-use glam::{UVec3, Vec3A};
+use glam::{UVec3, Vec3};
 use rerecast::{Aabb3d, AreaType, HeightfieldBuilder, TriMesh};
 
 use crate::{all_cells, random_dug_world, walker, world_count};
@@ -40,8 +40,8 @@ fn walkable(world: &World, settings: &WalkSettings) -> Vec<(Column, f32)> {
     let bounds = mesh.compute_aabb().expect("some ground");
     let (width, depth) = (world.ground().width() as f32, world.ground().depth() as f32);
     let aabb = Aabb3d {
-        min: Vec3A::new(0.0, bounds.min.y.floor() - 1.0, 0.0),
-        max: Vec3A::new(width, bounds.max.y.ceil() + 1.0, depth),
+        min: Vec3::new(0.0, bounds.min.y.floor() - 1.0, 0.0),
+        max: Vec3::new(width, bounds.max.y.ceil() + 1.0, depth),
     };
     let mut field = HeightfieldBuilder { aabb, cell_size: 1.0, cell_height: STEP }.build().expect("a field");
     let climb = (settings.step.max(settings.slope) / STEP).floor() as u16;
