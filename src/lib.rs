@@ -453,6 +453,7 @@ mod guide {
         Brushes "docs/guide/src/brushes.md"
         Materials "docs/guide/src/materials.md"
         Plants "docs/guide/src/plants.md"
+        Paths "docs/guide/src/paths.md"
         Physics "docs/guide/src/physics.md"
         Undo "docs/guide/src/undo.md"
         Events "docs/guide/src/events.md"
@@ -469,7 +470,7 @@ mod guide {
         Explosions "docs/guide/src/recipes/explosions.md"
         Journal "docs/guide/src/recipes/journal.md"
         Water "docs/guide/src/recipes/water.md"
-        Navigation "docs/guide/src/recipes/navigation.md"
+        Surfaces "docs/guide/src/recipes/surfaces.md"
         Cameras "docs/guide/src/recipes/cameras.md"
         FloatingOrigin "docs/guide/src/recipes/floating-origin.md"
     }

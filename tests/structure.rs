@@ -9,9 +9,35 @@ use std::path::Path;
 
 /// The modules of the crate, from the ground up. Each imports only those before it.
 const MODULES: &[&str] = &[
-    "threads", "lattice", "lod", "ground", "brush", "volume", "edits", "surface", "dense", "backend",
-    "world", "loose", "redraw", "terrain", "scatter", "navigation", "format", "store", "net", "plugin", "view", "saves",
-    "plugins", "together", "physics", "plants", "paths", "debug", "panel",
+    "threads",
+    "lattice",
+    "lod",
+    "ground",
+    "brush",
+    "volume",
+    "edits",
+    "surface",
+    "dense",
+    "backend",
+    "world",
+    "loose",
+    "redraw",
+    "terrain",
+    "scatter",
+    "navigation",
+    "format",
+    "store",
+    "net",
+    "plugin",
+    "view",
+    "saves",
+    "plugins",
+    "together",
+    "physics",
+    "plants",
+    "paths",
+    "debug",
+    "panel",
 ];
 
 /// The most names that the documentation shows in public modules, and functions of `Terrain`. What a game needs is

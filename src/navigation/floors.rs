@@ -7,7 +7,6 @@ use crate::terrain::World;
 use crate::volume::layers::ones;
 use crate::volume::{Brick, Layers, solid_layers};
 
-
 /// The height of a ceiling that is not there.
 pub(super) const SKY: i32 = i32::MAX;
 

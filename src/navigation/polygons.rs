@@ -84,7 +84,9 @@ impl WalkableTile {
         border.corners.iter().for_each(|&floor| is_corner[floor] = true);
         let rectangles = self.rectangles();
         for rectangle in &rectangles {
-            self.outline(rectangle).filter(|(_, turns)| *turns).for_each(|(floor, _)| is_corner[floor] = true);
+            self.outline(rectangle)
+                .filter(|(_, turns)| *turns)
+                .for_each(|(floor, _)| is_corner[floor] = true);
         }
         let mut polygons = NavPolygons {
             pos: self.pos(),
@@ -230,7 +232,8 @@ impl Rectangle {
         let height = |x: usize, z: usize| i64::from(self.heights[z * ROW + x]) - base;
         let (b, c, d) = (height(0, self.depth), height(self.width, self.depth), height(self.width, 0));
         // Four times the area times the plane's height.
-        let (middle, rise_x, rise_z) = ((b + c + d) * width * depth, (d + c - b) * depth, (b + c - d) * width);
+        let (middle, rise_x, rise_z) =
+            ((b + c + d) * width * depth, (d + c - b) * depth, (b + c - d) * width);
         let (scale, most) = (4 * width * depth, 4 * width * depth * i64::from(precision));
         (0..=self.depth).all(|z| {
             let row = middle + rise_z * (2 * z as i64 - depth) - rise_x * width;

@@ -44,7 +44,9 @@ impl WalkSettings {
 #[non_exhaustive]
 pub enum WalkError {
     /// A number is out of its range, or not a number.
-    #[error("the {name} of an agent is {value} voxels, and must be from {least} to {most}: change the settings, or the size of voxels")]
+    #[error(
+        "the {name} of an agent is {value} voxels, and must be from {least} to {most}: change the settings, or the size of voxels"
+    )]
     OutOfRange {
         /// The field of [`WalkSettings`].
         name: &'static str,

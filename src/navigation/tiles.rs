@@ -44,7 +44,11 @@ impl NavTilePos {
     }
 
     /// The tiles of a world that may change when these samples do.
-    pub fn affected(world: &World, samples: LatticeBox, walker: &Walker) -> impl Iterator<Item = Self> + use<> {
+    pub fn affected(
+        world: &World,
+        samples: LatticeBox,
+        walker: &Walker,
+    ) -> impl Iterator<Item = Self> + use<> {
         // A cell depends on columns as far away as its reach, and a tile on the cells around it.
         let reach = walker.reach() + 1;
         let low = Column::of(samples.min).offset(-reach, -reach);

@@ -1,7 +1,5 @@
 //! Which cells of a tile are walkable.
 
-use glam::IVec3;
-
 use super::floors::Floors;
 use super::links::{Axis, Links};
 use super::settings::Walker;
@@ -50,18 +48,15 @@ impl WalkableTile {
 
     /// Its walkable cells, row by row, those above each other from below.
     pub fn cells(&self) -> impl Iterator<Item = WalkableCell> {
-        self.columns().flat_map(move |(cell, column)| {
-            let floors = self.floors.of(column).filter(|&floor| self.is_walkable(floor));
-            floors.filter_map(move |floor| {
-                let heights = self.links.corners(floor)?.map(|corner| self.floors.floor[corner]);
-                Some(WalkableCell { cell, heights })
-            })
-        })
+        self.columns().flat_map(|(cell, _)| self.cells_of(cell))
     }
 
     /// Number of walkable cells.
     pub fn cell_count(&self) -> usize {
-        self.columns().flat_map(|(_, column)| self.floors.of(column)).filter(|&floor| self.walkable[floor]).count()
+        self.columns()
+            .flat_map(|(_, column)| self.floors.of(column))
+            .filter(|&floor| self.walkable[floor])
+            .count()
     }
 
     /// The cells of the tile with the indices of their lowest columns, row by row.
@@ -97,10 +92,16 @@ impl WalkableTile {
         })
     }
 
-    /// Whether an agent can stand on the cell below a lattice point: the walkable cell nearest in height, if any.
-    pub fn cell_under(&self, point: IVec3) -> Option<WalkableCell> {
-        let below = self.cells().filter(|cell| cell.cell == Column::of(point));
-        below.min_by_key(|cell| cell.heights[0].abs_diff(point.y.saturating_mul(crate::lattice::ONE)))
+    /// The walkable cells above each other at a place, from below; none outside the tile.
+    pub fn cells_of(&self, cell: Column) -> impl Iterator<Item = WalkableCell> {
+        let (low, side) = (self.floors.low, self.floors.side);
+        let is_own = NavTilePos::of_cell(cell) == self.pos;
+        let column = is_own.then(|| (cell.z - low.z) as usize * side + (cell.x - low.x) as usize);
+        let floors = column.into_iter().flat_map(|column| self.floors.of(column));
+        floors.filter(|&floor| self.is_walkable(floor)).filter_map(move |floor| {
+            let heights = self.links.corners(floor)?.map(|corner| self.floors.floor[corner]);
+            Some(WalkableCell { cell, heights })
+        })
     }
 }
 

@@ -67,7 +67,10 @@ fn mesh(polygons: &NavPolygons, scale: f32) -> Option<Arc<ValidNavigationMesh3d>
         height_mesh: None,
     };
     let checked = mesh.validate();
-    checked.map_err(|error| error!("the tile {:?} has no navigation mesh: {error}", polygons.pos())).ok().map(Arc::new)
+    checked
+        .map_err(|error| error!("the tile {:?} has no navigation mesh: {error}", polygons.pos()))
+        .ok()
+        .map(Arc::new)
 }
 
 /// Makes islands of tiles that are done. Waits for those that the commit of the last frame changed.
@@ -92,7 +95,9 @@ pub(super) fn replace_islands(
         for (number, built) in done {
             for (pos, mesh) in built {
                 // Newer ones may be done already, and tiles may be gone.
-                let Some(tile) = tiles.tiles.get_mut(&pos).filter(|tile| tile.build < number) else { continue };
+                let Some(tile) = tiles.tiles.get_mut(&pos).filter(|tile| tile.build < number) else {
+                    continue;
+                };
                 tile.build = number;
                 show(navigation, pos, tile, mesh, (&mut meshes, &handles), &mut commands);
             }

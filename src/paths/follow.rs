@@ -17,7 +17,8 @@ pub(super) fn follow_commits(
     for GroundChanged { terrain, versions: [before, after], boxes } in changed.read() {
         let Ok(model) = terrains.get(*terrain) else { continue };
         let world = model.world();
-        for (_, mut tiles) in navigations.iter_mut().filter(|(navigation, _)| navigation.terrain == *terrain) {
+        for (_, mut tiles) in navigations.iter_mut().filter(|(navigation, _)| navigation.terrain == *terrain)
+        {
             let tiles = tiles.bypass_change_detection();
             let (Some(version), Some(walker)) = (tiles.version, tiles.walker.clone()) else { continue };
             // Another world is loaded again as a whole. This system runs twice in a frame.
@@ -26,7 +27,8 @@ pub(super) fn follow_commits(
             }
             let mut stale: Vec<NavTilePos> = match boxes {
                 Some(boxes) if version == *before => {
-                    let affected = boxes.iter().flat_map(|&samples| NavTilePos::affected(world, samples, &walker));
+                    let affected =
+                        boxes.iter().flat_map(|&samples| NavTilePos::affected(world, samples, &walker));
                     affected.filter(|pos| tiles.tiles.contains_key(pos)).collect()
                 }
                 _ => tiles.tiles.keys().copied().collect(),

@@ -82,7 +82,12 @@ impl NavigationTiles {
     }
 
     /// Drops the tiles that are not wanted, and adds those that are missing, in this order.
-    pub(super) fn choose(&mut self, wanted: Vec<NavTilePos>, kept: &HashSet<NavTilePos>, commands: &mut Commands) {
+    pub(super) fn choose(
+        &mut self,
+        wanted: Vec<NavTilePos>,
+        kept: &HashSet<NavTilePos>,
+        commands: &mut Commands,
+    ) {
         self.tiles.retain(|pos, tile| {
             let stays = kept.contains(pos);
             if !stays {

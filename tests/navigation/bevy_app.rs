@@ -97,7 +97,8 @@ fn has_path(app: &App, archipelago: Entity, from: Vec3, to: Vec3) -> bool {
         vertical_preference_ratio: 2.0,
         animation_link_max_vertical_distance: 1.0,
     };
-    let (Ok(from), Ok(to)) = (archipelago.sample_point(from, &near), archipelago.sample_point(to, &near)) else {
+    let (Ok(from), Ok(to)) = (archipelago.sample_point(from, &near), archipelago.sample_point(to, &near))
+    else {
         return false;
     };
     archipelago.find_path(&from, &to, &default(), PermittedAnimationLinks::All).is_ok()
@@ -226,7 +227,8 @@ fn two_terrains_share_an_archipelago_and_may_be_moved() {
     wait_for_tiles(&mut app, other);
     let to_second = |place: Transform, at: Vec3| place.transform_point(at);
     assert!(!has_path(&app, archipelago, to_second(place, SOUTH), to_second(place, NORTH)));
-    let (from, to) = (to_second(place, Vec3::new(48.0, 12.0, 36.0)), to_second(place, Vec3::new(48.0, 12.0, 60.0)));
+    let (from, to) =
+        (to_second(place, Vec3::new(48.0, 12.0, 36.0)), to_second(place, Vec3::new(48.0, 12.0, 60.0)));
     commit(&mut app, second, send(Brush::dig(Shape::capsule(from, to, 3.5))));
     app.update();
     assert!(has_path(&app, archipelago, to_second(place, SOUTH), to_second(place, NORTH)));
@@ -249,8 +251,10 @@ fn islands_are_where_sources_are() {
     let area = NavigationArea::NearSources;
     let navigation = Navigation { terrain, archipelago, agent: AGENT, area };
     let navigation = app.world_mut().spawn(navigation).id();
-    let source =
-        app.world_mut().spawn((NavigationSource { radius: 40.0 }, Transform::from_xyz(100.0, 0.0, 100.0))).id();
+    let source = app
+        .world_mut()
+        .spawn((NavigationSource { radius: 40.0 }, Transform::from_xyz(100.0, 0.0, 100.0)))
+        .id();
     wait_for_tiles(&mut app, navigation);
     let near = |app: &App, at: Vec3| has_path(app, archipelago, at, at + Vec3::X);
     let [here, there] = [100.0, 400.0].map(|at| Vec3::new(at, 10.0, at));
@@ -301,5 +305,84 @@ fn islands_are_those_of_the_ground_after_any_edits() {
         for ((pos, _, polygons), made) in islands.into_iter().zip(&made) {
             assert_eq!((pos, polygons), (made.pos(), made), "step {step}");
         }
+    }
+}
+
+/// A thousand agents cross hilly ground that is dug 20 times a second; prints how long frames take.
+///
+/// ```text
+/// cargo test --release --features examples --test navigation -- --ignored --nocapture thousand
+/// ```
+#[test]
+#[ignore = "prints figures"]
+fn a_thousand_agents_while_the_ground_is_dug() {
+    use bevy::time::TimeUpdateStrategy;
+    let number = |name: &str, default: usize| {
+        std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
+    };
+    let (agents, side) = (number("BURROW_AGENTS", 1000), number("BURROW_SIDE", 512) as u32);
+    for digs in [false, true] {
+        let (mut app, archipelago) = empty_app(true);
+        app.world_mut().resource_mut::<BurrowSettings>().same_frame = BurrowSettings::default().same_frame;
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_micros(16_667)));
+        let waves = |x: u32, z: u32| 20.0 + 4.0 * ((f64::from(x) * 0.07).sin() + (f64::from(z) * 0.09).cos());
+        let ground = Ground::from_fn(side, side, waves).expect("finite");
+        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+        let terrain = app.world_mut().spawn(terrain).id();
+        let area = NavigationArea::Everywhere;
+        let navigation = app.world_mut().spawn(Navigation { terrain, archipelago, agent: AGENT, area }).id();
+        wait_for_tiles(&mut app, navigation);
+        let mut rng = Rng::with_seed(3);
+        let place = |rng: &mut Rng| {
+            let [x, z] = [0, 1].map(|_| 4.0 + rng.f32() * (side as f32 - 8.0));
+            Vec3::new(x, waves(x as u32, z as u32) as f32, z)
+        };
+        for _ in 0..agents {
+            let (at, to) = (place(&mut rng), place(&mut rng));
+            app.world_mut().spawn((
+                Transform::from_translation(at),
+                Agent3dBundle {
+                    agent: default(),
+                    settings: AgentSettings { radius: 0.4, desired_speed: 3.0, max_speed: 4.0 },
+                    archipelago_ref: ArchipelagoRef3d::new(archipelago),
+                },
+                AgentTarget3d::Point(to),
+            ));
+        }
+        app.add_systems(
+            Update,
+            |mut agents: Query<(&mut Transform, &AgentDesiredVelocity3d)>,
+             terrain: Single<&Terrain>,
+             time: Res<Time>| {
+                for (mut place, wanted) in &mut agents {
+                    place.translation += wanted.velocity() * time.delta_secs();
+                    let [x, z] = [place.translation.x, place.translation.z].map(f64::from);
+                    place.translation.y = terrain.world().height(x, z).unwrap_or_default() as f32;
+                }
+            },
+        );
+        let mut times = Vec::new();
+        for frame in 0..360 {
+            if digs && frame % 3 == 0 {
+                send(Brush::dig(Shape::sphere(place(&mut rng), 2.5)))(&mut app);
+            }
+            let start = Instant::now();
+            app.update();
+            times.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        let mut states = app.world_mut().query::<&AgentState>();
+        let moving = states.iter(app.world()).filter(|state| **state == AgentState::Moving).count();
+        let bytes = tiles(app.world(), navigation).bytes();
+        let polygons: usize =
+            tiles(app.world(), navigation).islands().map(|(.., polygons)| polygons.len()).sum();
+        times.drain(..60);
+        times.sort_by(f64::total_cmp);
+        println!(
+            "{agents} agents, {side} x {side} voxels, digs: {digs}: {moving} move; frame median {:.2} ms, 95 % {:.2}, \
+             most {:.2}; {polygons} polygons of {bytes} bytes",
+            times[times.len() / 2],
+            times[times.len() * 95 / 100],
+            times[times.len() - 1]
+        );
     }
 }

@@ -106,8 +106,11 @@ fn a_tunnel_has_a_floor_below_the_one_above() {
     assert_eq!(above, before);
     assert!((100..400).contains(&below.len()), "{}", below.len());
     for cell in &below {
-        let at = DVec3::new(f64::from(cell.cell.x), f64::from(cell.heights[0]) / 256.0, f64::from(cell.cell.z));
-        assert!(terrain.world().is_solid(at - 0.1 * DVec3::Y) && !terrain.world().is_solid(at + 0.1 * DVec3::Y));
+        let at =
+            DVec3::new(f64::from(cell.cell.x), f64::from(cell.heights[0]) / 256.0, f64::from(cell.cell.z));
+        assert!(
+            terrain.world().is_solid(at - 0.1 * DVec3::Y) && !terrain.world().is_solid(at + 0.1 * DVec3::Y)
+        );
     }
     terrain.undo();
     assert_eq!(all_cells(terrain.world(), &walker), before);

@@ -73,7 +73,8 @@ fn polygons_cover_the_cells_near_to_their_ground() {
             for cell in tile.cells() {
                 let (_, apart) = polygon_under(&polygons, &cell).expect("a polygon below each cell");
                 // Of the plane that its vertices are near to, of those vertices, and of the middle between corners.
-                let most = 3.0 * f64::from(settings.precision) + 2.0 * f64::from(settings.step.max(settings.slope));
+                let most =
+                    3.0 * f64::from(settings.precision) + 2.0 * f64::from(settings.step.max(settings.slope));
                 assert!(apart <= most, "world {index}: {apart} over {cell:?}");
             }
         }
@@ -142,11 +143,16 @@ impl Numbered {
 fn overlap_in_line([p, q]: [IVec3; 2], [r, s]: [IVec3; 2]) -> bool {
     let along = |point: IVec3| if p.x == q.x { point.z } else { point.x };
     let across = |point: IVec3| if p.x == q.x { point.x } else { point.z };
-    if across(r) != across(p) || across(s) != across(p) || (along(q) - along(p)).signum() != (along(r) - along(s)).signum() {
+    if across(r) != across(p)
+        || across(s) != across(p)
+        || (along(q) - along(p)).signum() != (along(r) - along(s)).signum()
+    {
         return false;
     }
-    let (low, high) =
-        (along(p).min(along(q)).max(along(r).min(along(s))), along(p).max(along(q)).min(along(r).max(along(s))));
+    let (low, high) = (
+        along(p).min(along(q)).max(along(r).min(along(s))),
+        along(p).max(along(q)).min(along(r).max(along(s))),
+    );
     let height = |[a, b]: [IVec3; 2], at: i32| {
         f64::from(a.y) + f64::from(b.y - a.y) * f64::from(at - along(a)) / f64::from(along(b) - along(a))
     };

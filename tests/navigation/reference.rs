@@ -66,7 +66,8 @@ impl<'a> Reference<'a> {
             let others = self.floors.get(&to)?.iter().map(|&(floor, _)| (to, floor));
             let can_go = |&other: &Floor| {
                 let roofs = [self.ceiling(from), self.ceiling(other)].into_iter().flatten();
-                (from.1 - other.1).abs() <= climb && roofs.min().is_none_or(|roof| roof - from.1.max(other.1) >= height)
+                (from.1 - other.1).abs() <= climb
+                    && roofs.min().is_none_or(|roof| roof - from.1.max(other.1) >= height)
             };
             others.filter(can_go).min_by_key(|other| (from.1 - other.1).abs())
         };
@@ -122,11 +123,14 @@ fn touched_cells(radius: f64) -> HashSet<(i32, i32)> {
     let is_touched = |&(x, z): &(i32, i32)| {
         let steps = 64;
         let parts = (0..=steps).map(|part| f64::from(part) / f64::from(steps));
-        let points: Vec<(f64, f64)> = parts.clone().flat_map(|u| parts.clone().map(move |v| (u, v))).collect();
+        let points: Vec<(f64, f64)> =
+            parts.clone().flat_map(|u| parts.clone().map(move |v| (u, v))).collect();
         let apart = |low: f64| (low - low.clamp(0.0, 1.0)).abs();
         points.into_iter().any(|(u, v)| {
             // From the corner nearest to the cell at the origin.
-            let along = |cell: i32, part: f64| if cell < 0 { f64::from(cell) + 1.0 - part } else { f64::from(cell) + part };
+            let along = |cell: i32, part: f64| {
+                if cell < 0 { f64::from(cell) + 1.0 - part } else { f64::from(cell) + part }
+            };
             let is_possible = x == 0 || z == 0 || u + v >= 1.0;
             is_possible && apart(along(x, u)).hypot(apart(along(z, v))) < radius - 1e-9
         })

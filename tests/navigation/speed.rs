@@ -25,7 +25,8 @@ fn speed_of_tiles() {
             terrain.apply([brush]);
         }
         let world = terrain.world();
-        let walker = walker(&WalkSettings { radius: 0.4, height: 1.8, step: 0.5, slope: 1.0, precision: 0.5 });
+        let walker =
+            walker(&WalkSettings { radius: 0.4, height: 1.8, step: 0.5, slope: 1.0, precision: 0.5 });
         let tiles: Vec<NavTilePos> = NavTilePos::all(world).collect();
         let mut times = [Vec::new(), Vec::new()];
         let (mut cells, mut polygons, mut bytes) = (0, 0, 0);
@@ -36,7 +37,8 @@ fn speed_of_tiles() {
             let start = Instant::now();
             let made = tile.polygons();
             times[1].push(start.elapsed());
-            (cells, polygons, bytes) = (cells + made.cell_count(), polygons + made.len(), bytes + made.bytes());
+            (cells, polygons, bytes) =
+                (cells + made.cell_count(), polygons + made.len(), bytes + made.bytes());
         }
         let count = tiles.len() as f64 * 2.0;
         let median = times.map(|mut times| {
@@ -45,8 +47,13 @@ fn speed_of_tiles() {
         });
         println!(
             "{name}: cells {:.0} us (99 %: {:.0}), polygons {:.0} us (99 %: {:.0}); per tile {:.0} cells, {:.1} polygons, {:.0} bytes",
-            median[0].0, median[0].1, median[1].0, median[1].1,
-            cells as f64 / count, polygons as f64 / count, bytes as f64 / count
+            median[0].0,
+            median[0].1,
+            median[1].0,
+            median[1].1,
+            cells as f64 / count,
+            polygons as f64 / count,
+            bytes as f64 / count
         );
     }
 }
