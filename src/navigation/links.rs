@@ -110,10 +110,11 @@ fn is_linked(floors: &Floors, walker: &Walker, a: usize, b: usize) -> bool {
 /// Whether a cell between linked floors is flat enough, or no more than a step, and high enough in its middle too.
 fn is_passable(floors: &Floors, walker: &Walker, corners: [usize; 4]) -> bool {
     let [a, b, c, d] = corners.map(|corner| i64::from(floors.floor[corner]));
-    let is_flat = |rise_x: i64, rise_z: i64| rise_x * rise_x + rise_z * rise_z <= walker.squared_slope;
+    // Twice the rise in the middle of the cell.
+    let (rise_x, rise_z) = (c - b + d - a, b - a + c - d);
+    let is_flat = rise_x * rise_x + rise_z * rise_z <= 4 * walker.squared_slope;
     let range = a.max(b).max(c).max(d) - a.min(b).min(c).min(d);
-    // The two triangles that are drawn of undug ground.
-    let is_walkable = is_flat(c - b, b - a) && is_flat(d - a, c - d) || range <= i64::from(walker.step);
+    let is_walkable = is_flat || range <= i64::from(walker.step);
     let ceilings = corners.map(|corner| i64::from(floors.ceiling[corner]));
     if !is_walkable || ceilings == [i64::from(SKY); 4] {
         return is_walkable;

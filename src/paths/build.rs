@@ -120,10 +120,10 @@ fn show(
         return;
     };
     tile.polygons = Some(Arc::new(polygons));
-    let nav_mesh = NavMesh3d { nav_mesh };
+    let nav_mesh = || NavMesh3d { nav_mesh: Arc::clone(&nav_mesh) };
     if let Some(handle) = tile.island.and_then(|island| handles.get(island).ok()) {
         // Landmass takes the mesh of the handle before agents move in this frame.
-        if meshes.insert(&handle.0, nav_mesh).is_ok() {
+        if meshes.insert(&handle.0, nav_mesh()).is_ok() {
             return;
         }
     }
@@ -131,7 +131,7 @@ fn show(
     let island = Island3dBundle {
         island: Island,
         archipelago_ref: ArchipelagoRef3d::new(navigation.archipelago),
-        nav_mesh: NavMeshHandle(meshes.add(nav_mesh)),
+        nav_mesh: NavMeshHandle(meshes.add(nav_mesh())),
     };
     let origin = pos.origin().at(0).as_vec3();
     // A terrain may be despawned in this frame.

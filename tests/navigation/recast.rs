@@ -8,12 +8,13 @@ use std::collections::HashMap;
 
 use bevy_burrow::lattice::{Column, SNAP};
 use bevy_burrow::navigation::{WalkSettings, WalkableCell};
+use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
 use glam::{UVec3, Vec3};
 use rerecast::{Aabb3d, AreaType, HeightfieldBuilder, TriMesh};
 
-use crate::{all_cells, random_dug_world, walker, world_count};
+use crate::{all_cells, random_works, walker, world_count};
 
 /// Voxels in a step of height of its fields.
 const STEP: f32 = 0.125;
@@ -66,13 +67,34 @@ fn walkable(world: &World, settings: &WalkSettings) -> Vec<(Column, f32)> {
     found
 }
 
+/// Hills that an agent can mostly walk on, with tunnels, pits, walls and bridges.
+fn random_hills(rng: &mut Rng) -> Terrain {
+    let noise = NoiseHeights {
+        seed: rng.u32(..),
+        amplitude: 4.0 + 12.0 * rng.f64(),
+        scale: 40.0 + 60.0 * rng.f64(),
+        base: 20.0,
+        ..NoiseHeights::default()
+    };
+    let ground = Ground::from_noise(rng.u32(64..128), rng.u32(64..128), &noise).expect("a valid ground");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("a valid terrain");
+    for _ in 0..rng.usize(5..30) {
+        let brush = random_works(rng, terrain.world());
+        terrain.apply([brush]);
+    }
+    terrain
+}
+
+/// Both count whole cells. `rerecast` counts those as walkable ground that are so in part, before it takes a rim of whole cells
+/// away; here a rim begins where a cell is not wholly walkable. So on small patches of even ground in steep worlds it finds more,
+/// up to where an agent of this radius touches the wall.
 #[test]
 fn nearly_all_that_recast_finds_is_walkable() {
     let (mut both, mut theirs, mut ours) = (0, 0, 0);
     let mut worst = (1.0, 0);
     for index in 0..world_count(8) {
         let mut rng = Rng::with_seed(5000 + index);
-        let terrain = random_dug_world(&mut rng, index);
+        let terrain = random_hills(&mut rng);
         let settings = WalkSettings { radius: 0.6, height: 2.0, step: 0.5, slope: 1.0, precision: 0.5 };
         let mut cells: HashMap<Column, Vec<WalkableCell>> = HashMap::new();
         for cell in all_cells(terrain.world(), &walker(&settings)) {

@@ -84,7 +84,7 @@ impl<'a> Reference<'a> {
         debug_assert_eq!(a, floor.0);
         let [a, b, c, d] = floors.map(|floor| floor.1);
         let slope = whole(self.settings.slope, f32::floor).pow(2);
-        let is_flat = (c - b).pow(2) + (b - a).pow(2) <= slope && (d - a).pow(2) + (c - d).pow(2) <= slope;
+        let is_flat = ((c - b) + (d - a)).pow(2) + ((b - a) + (c - d)).pow(2) <= 4 * slope;
         let range = [a, b, c, d].iter().max().unwrap() - [a, b, c, d].iter().min().unwrap();
         let far = 1i64 << 40;
         let [ra, rb, rc, rd] = floors.map(|floor| self.ceiling(floor).unwrap_or(far));
