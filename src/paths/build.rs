@@ -38,9 +38,9 @@ impl std::fmt::Debug for Build {
 
 impl NavigationTiles {
     /// Starts to build tiles of a world.
-    pub(super) fn build(&mut self, world: &Ground, tiles: Vec<NavTilePos>, is_urgent: bool) {
+    pub(super) fn build(&mut self, world: Arc<Ground>, tiles: Vec<NavTilePos>, is_urgent: bool) {
         let Some(walker) = self.walker.clone() else { return };
-        let (world, scale) = (world.clone(), self.scale);
+        let scale = self.scale;
         let threads = if is_urgent { Threads::Transactions } else { Threads::Background };
         let task = ThreadTask::start(threads, move || {
             let built = tiles.into_iter().map(|pos| {
@@ -62,7 +62,11 @@ fn mesh(polygons: &NavPolygons, scale: f32) -> Option<Arc<ValidNavigationMesh3d>
     let vertices = polygons.vertices().iter().map(|vertex| vertex.as_vec3() / SNAP as f32 * scale);
     let mesh = NavigationMesh::<ThreeD> {
         vertices: vertices.collect(),
-        polygons: polygons.iter().map(|own| own.iter().map(|&vertex| vertex as usize).collect()).collect(),
+        // Landmass wants them clockwise, seen from above, where y points up.
+        polygons: polygons
+            .iter()
+            .map(|own| own.iter().rev().map(|&vertex| vertex as usize).collect())
+            .collect(),
         polygon_type_indices: vec![0; polygons.len()],
         height_mesh: None,
     };
@@ -76,11 +80,13 @@ fn mesh(polygons: &NavPolygons, scale: f32) -> Option<Arc<ValidNavigationMesh3d>
 /// Makes islands of tiles that are done. Waits for those that the commit of the last frame changed.
 pub(super) fn replace_islands(
     mut navigations: Query<(&Navigation, &mut NavigationTiles)>,
-    mut meshes: ResMut<Assets<NavMesh3d>>,
+    meshes: Option<ResMut<Assets<NavMesh3d>>>,
     handles: Query<&NavMeshHandle3d>,
     wait: Res<Wait>,
     mut commands: Commands,
 ) {
+    // Without landmass' plugin, nothing is shown.
+    let Some(mut meshes) = meshes else { return };
     let start = Instant::now();
     for (navigation, mut tiles) in &mut navigations {
         let tiles = tiles.bypass_change_detection();
@@ -139,10 +145,11 @@ fn show(
     tile.island = Some(commands.spawn(bundle).id());
     if let Some(island) = tile.island {
         commands.queue(move |world: &mut World| {
-            match world.get_entity(terrain).is_ok() {
-                true => drop(world.entity_mut(island).insert(ChildOf(terrain))),
-                false => drop(world.despawn(island)),
-            };
+            if world.get_entity(terrain).is_err() {
+                world.despawn(island);
+            } else if let Ok(mut island) = world.get_entity_mut(island) {
+                island.insert(ChildOf(terrain));
+            }
         });
     }
 }

@@ -32,8 +32,10 @@ pub(super) fn choose_tiles(
             continue;
         };
         let scale = place.scale().x;
-        if navigation.is_changed() || tiles.walker.is_none() || tiles.scale != scale {
-            let is_new = navigation.is_changed() || tiles.scale != scale;
+        // A turned terrain has a scale that is rounded in another way.
+        let is_scaled = (tiles.scale - scale).abs() > 1e-4 * scale;
+        if navigation.is_changed() || tiles.walker.is_none() || is_scaled {
+            let is_new = navigation.is_changed() || is_scaled;
             tiles.clear(&mut commands);
             tiles.scale = scale;
             let walker = Walker::new(&navigation.agent.scaled(1.0 / scale));
@@ -83,7 +85,7 @@ pub(super) fn choose_tiles(
         if !tiles.missing.is_empty() && !is_loading {
             let rest = tiles.missing.split_off(tiles.missing.len().min(TILES));
             let first = std::mem::replace(&mut tiles.missing, rest);
-            tiles.build(world, first, false);
+            tiles.build(terrain.snapshot(), first, false);
         }
     }
 }

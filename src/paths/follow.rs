@@ -35,11 +35,11 @@ pub(super) fn follow_commits(
             };
             stale.sort_unstable();
             stale.dedup();
-            tiles.version = Some(world.version());
+            tiles.version = Some(*after);
             // Those that were not begun yet are built from the latest world anyway.
             stale.retain(|pos| !tiles.missing.contains(pos));
             if !stale.is_empty() {
-                tiles.build(world, stale, true);
+                tiles.build(model.snapshot(), stale, true);
             }
         }
     }

@@ -113,7 +113,7 @@ fn tunnel() -> Brush {
 }
 
 fn send(message: impl Message) -> impl FnOnce(&mut App) {
-    move |app| {
+    move |app: &mut App| {
         app.world_mut().write_message(message).expect("the plugin added it");
     }
 }
@@ -170,11 +170,11 @@ fn nothing_is_left_of_what_is_gone() {
         assert_eq!(island_count(&mut app), 9);
         let world = app.world_mut();
         match case {
-            0 => drop(world.despawn(terrain)),
-            1 => drop(world.entity_mut(terrain).remove::<Terrain>()),
-            2 => drop(world.despawn(navigation)),
-            3 => drop(world.entity_mut(navigation).remove::<Navigation>()),
-            _ => drop((world.despawn(navigation), world.despawn(terrain))),
+            0 => assert!(world.despawn(terrain)),
+            1 => assert!(world.entity_mut(terrain).take::<Terrain>().is_some()),
+            2 => assert!(world.despawn(navigation)),
+            3 => assert!(world.entity_mut(navigation).take::<Navigation>().is_some()),
+            _ => assert!(world.despawn(navigation) && world.despawn(terrain)),
         }
         for _ in 0..3 {
             app.update();

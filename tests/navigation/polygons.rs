@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 
+use bevy_burrow::ground::MaterialId;
 use bevy_burrow::lattice::{Column, SNAP};
 use bevy_burrow::navigation::{NAV_TILE, NavPolygons, NavTilePos, WalkSettings, WalkableCell, WalkableTile};
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
-use glam::IVec3;
+use glam::{IVec3, Vec3};
 
 use crate::{random_dug_world, random_settings, walker, world_count};
 
@@ -196,5 +197,35 @@ fn polygons_are_connected_where_cells_are() {
         groups.dedup();
         let firsts = pairs.chunk_by(|a, b| a.0 == b.0).count();
         assert_eq!((firsts, groups.len()), (count, count), "world {index}, {settings:?}");
+    }
+}
+
+/// Polygons of a fixed world, as one number: equal on every machine. If the definition of what is walkable changes on purpose, so
+/// does this number.
+#[test]
+fn polygons_are_the_same_on_every_machine_and_for_every_chunk_size() {
+    for chunk_size in [8, 16, 32] {
+        let heights = |x: u32, z: u32| 20.0 + f64::from((x * 7 + z * 3) % 11) / 8.0 + f64::from(x / 16);
+        let ground = Ground::from_fn(80, 80, heights).expect("finite");
+        let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
+        let mut terrain = Terrain::new(ground, &settings).expect("a valid terrain");
+        let [from, to] = [Vec3::new(10.0, 14.0, 20.0), Vec3::new(70.0, 17.0, 50.0)];
+        terrain.apply([
+            Brush::dig(Shape::capsule(from, to, 3.5)),
+            Brush::dig(Shape::sphere(Vec3::new(40.0, 22.0, 40.0), 6.0)),
+            Brush::add(Shape::cuboid(Vec3::new(60.0, 28.0, 20.0), Vec3::new(9.0, 1.0, 3.0)), MaterialId(1)),
+        ]);
+        let walker = walker(&WalkSettings { radius: 0.4, height: 1.8, ..WalkSettings::default() });
+        let mut hash = 0xcbf2_9ce4_8422_2325u64;
+        let mut count = |number: i32| hash = (hash ^ u64::from(number as u32)).wrapping_mul(0x0100_0000_01b3);
+        for pos in NavTilePos::all(terrain.world()) {
+            let polygons = WalkableTile::new(terrain.world(), pos, &walker).polygons();
+            polygons.vertices().iter().for_each(|vertex| vertex.to_array().into_iter().for_each(&mut count));
+            for polygon in polygons.iter() {
+                count(polygon.len() as i32);
+                polygon.iter().for_each(|&index| count(index as i32));
+            }
+        }
+        assert_eq!(hash, 0, "chunks of {chunk_size}: {hash:#018x}");
     }
 }
