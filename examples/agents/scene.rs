@@ -32,7 +32,7 @@ const MIDDLE: Vec3 = Vec3::new(50.0, 8.0, 46.0);
 pub struct Paths(pub Entity);
 
 /// Heights of plains with a ridge across them, and a pass through it.
-fn height(x: u32, z: u32) -> f64 {
+fn height(x: i32, z: i32) -> f64 {
     let (x, z) = (f64::from(x), f64::from(z));
     let waves = 0.6 * ((x * 0.23).sin() + (z * 0.31 + x * 0.1).cos());
     let ridge = (14.0 - (z - f64::from(PASS.y)).abs()).clamp(0.0, 6.0) * 2.5;

@@ -23,7 +23,7 @@ const NORTH: Vec3 = Vec3::new(48.0, 10.0, 84.0);
 
 /// A plain with a steep ridge across it.
 fn ridge() -> Ground {
-    let height = |z: u32| 10.0 + 20.0 * f64::from(8_u32.saturating_sub(z.abs_diff(48)).min(4)) / 4.0;
+    let height = |z: i32| 10.0 + 20.0 * f64::from((8 - (z - 48).abs()).clamp(0, 4)) / 4.0;
     Ground::from_fn(96, 96, |_, z| height(z)).expect("finite")
 }
 
@@ -325,7 +325,7 @@ fn a_thousand_agents_while_the_ground_is_dug() {
         let (mut app, archipelago) = empty_app(true);
         app.world_mut().resource_mut::<BurrowSettings>().same_frame = BurrowSettings::default().same_frame;
         app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_micros(16_667)));
-        let waves = |x: u32, z: u32| 20.0 + 4.0 * ((f64::from(x) * 0.07).sin() + (f64::from(z) * 0.09).cos());
+        let waves = |x: i32, z: i32| 20.0 + 4.0 * ((f64::from(x) * 0.07).sin() + (f64::from(z) * 0.09).cos());
         let ground = Ground::from_fn(side, side, waves).expect("finite");
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
         let terrain = app.world_mut().spawn(terrain).id();
@@ -335,7 +335,7 @@ fn a_thousand_agents_while_the_ground_is_dug() {
         let mut rng = Rng::with_seed(3);
         let place = |rng: &mut Rng| {
             let [x, z] = [0, 1].map(|_| 4.0 + rng.f32() * (side as f32 - 8.0));
-            Vec3::new(x, waves(x as u32, z as u32) as f32, z)
+            Vec3::new(x, waves(x as i32, z as i32) as f32, z)
         };
         for _ in 0..agents {
             let (at, to) = (place(&mut rng), place(&mut rng));

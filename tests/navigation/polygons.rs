@@ -205,7 +205,7 @@ fn polygons_are_connected_where_cells_are() {
 #[test]
 fn polygons_are_the_same_on_every_machine_and_for_every_chunk_size() {
     for chunk_size in [8, 16, 32] {
-        let heights = |x: u32, z: u32| 20.0 + f64::from((x * 7 + z * 3) % 11) / 8.0 + f64::from(x / 16);
+        let heights = |x: i32, z: i32| 20.0 + f64::from((x * 7 + z * 3) % 11) / 8.0 + f64::from(x / 16);
         let ground = Ground::from_fn(80, 80, heights).expect("finite");
         let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
         let mut terrain = Terrain::new(ground, &settings).expect("a valid terrain");

@@ -16,9 +16,20 @@ use bevy_burrow::prelude::*;
 #[test]
 #[ignore = "prints figures"]
 fn speed_of_tiles() {
-    for (name, digs) in [("undug", 0), ("dug", 800)] {
+    let hills = || {
+        let noise =
+            NoiseHeights { seed: 5, amplitude: 14.0, scale: 60.0, base: 20.0, ..NoiseHeights::default() };
+        Ground::from_noise(512, 512, &noise).expect("a valid ground")
+    };
+    let mountains = || worlds::steep_real_ground(512, 512, 100, 100, 80.0);
+    for (name, ground, digs) in [
+        ("plain", Ground::flat(512, 512, 20.0).expect("a valid ground"), 0),
+        ("hills", hills(), 0),
+        ("dug hills", hills(), 800),
+        ("mountains", mountains(), 0),
+        ("dug mountains", mountains(), 800),
+    ] {
         let mut rng = Rng::with_seed(1);
-        let ground = worlds::steep_real_ground(512, 512, 100, 100, 80.0);
         let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("a valid terrain");
         for _ in 0..digs {
             let brush = random_works(&mut rng, terrain.world());
