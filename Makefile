@@ -1,7 +1,7 @@
 # bevy_burrow: diggable ground for Bevy. `make help` lists what can be done.
 #
 # One feature set and one profile for everything that compiles Bevy, so that it is compiled once:
-#   without Bevy   cargo ... --no-default-features --features cuda,net,store,import,scatter   the model: tests, soak
+#   without Bevy   cargo ... --no-default-features --features cuda,net,store,import,scatter,navigation   the model: tests, soak
 #   with Bevy      cargo ... --release --features examples           the plugin and the examples
 #
 # Builds are in CARGO_TARGET_DIR, outside the clone unless set otherwise.
@@ -10,23 +10,23 @@ SHELL := /bin/sh
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
 
-WITHOUT_BEVY := --no-default-features --features cuda,net,store,import,scatter
+WITHOUT_BEVY := --no-default-features --features cuda,net,store,import,scatter,navigation
 comma := ,
 # What somebody may choose besides. Each set with Bevy has other features of Bevy's crates, so that much is checked anew.
-SETS_WITHOUT_BEVY := '' format store net import scatter cuda,net,store,import,scatter
-SETS_WITH_BEVY := default plugin replicon render avian egui debug render,scatter examples,gamepad examples,sound
+SETS_WITHOUT_BEVY := '' format store net import scatter navigation cuda,net,store,import,scatter,navigation
+SETS_WITH_BEVY := default plugin replicon render avian egui debug render,scatter landmass examples,gamepad examples,sound
 # Features besides: `make run MORE=gamepad` or MORE=gamepad,sound compiles some crates more.
 WITH_BEVY := --release --features examples$(MORE:%=$(comma)%)
 # `make run` has sound where it compiles: on Linux that takes ALSA's headers.
 SOUND = $(shell { [ "$$(uname -s)" != Linux ] || pkg-config --exists alsa 2>/dev/null; } && echo $(comma)sound)
 
-# Tests of the plugin open with #![cfg(feature = ...)]; the others test the model, and need not run twice. Those of plants have
-# parts of both kinds.
+# Tests of the plugin open with #![cfg(feature = ...)]; the others test the model, and need not run twice. Those of plants and of
+# navigation have parts of both kinds.
 PLUGIN_TESTS := $(patsubst tests/%,--test %,$(patsubst %/main,%,$(basename \
-	$(shell grep -ls '^.!.cfg.feature' tests/*.rs tests/*/main.rs)))) --test scatter
+	$(shell grep -ls '^.!.cfg.feature' tests/*.rs tests/*/main.rs)))) --test scatter --test navigation
 
 # Examples that leave pictures without a display.
-DRAWING := digger sculpt physics custom_material
+DRAWING := digger sculpt physics custom_material agents
 
 # Random worlds of `make soak`.
 WORLDS ?= 10000

@@ -92,6 +92,7 @@
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for the game's own textures |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
+//! | paths over ground that is dug | `Navigation`, `NavigationSource` and the `NavigationPlugin` of `paths` (feature `landmass`) |
 //! | plants and stones that follow the ground | `Plants`, `PlantLooks` and the `plants` plugins (feature `scatter`) |
 //! | other cameras, no shadows | `RenderLayers`, `NotShadowCaster`, `NotShadowReceiver` on the terrain |
 //! | more from the same surfaces, in the same commit | `SurfaceProcessor`s |
@@ -250,9 +251,10 @@
 //! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
 //! | [`terrain`] | orders, transactions, history, the commit log; exports what the three above have for games |
 //! | `scatter` | where plants stand, and whether they still do |
+//! | `navigation` | where agents can walk |
 //! | `format` | worlds and levels as bytes |
 //! | `store`, `net` | saved worlds and levels; multiplayer without a transport |
-//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `plants`, `debug`, `panel` | everything else that uses Bevy |
+//! | `plugin`, `view`, `saves`, `plugins`, `together`, `physics`, `plants`, `paths`, `debug`, `panel` | everything else that uses Bevy |
 //!
 //! # How the seam closes
 //!
@@ -326,6 +328,8 @@
 //! | `picking` | Bevy's pointer events on the ground, with the `TerrainHit` as extra data | |
 //! | `replicon` | multiplayer over bevy_replicon | |
 //! | `scatter` | plants and stones that go and return with their ground | |
+//! | `navigation` | where agents can walk, as polygons of tiles | |
+//! | `landmass` | navigation meshes for `bevy_landmass`, replaced with each commit | `navigation`, `plugin` |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
@@ -361,10 +365,14 @@ pub mod lattice;
 #[doc(hidden)]
 pub mod lod;
 mod loose;
+#[cfg(feature = "navigation")]
+pub mod navigation;
 #[cfg(feature = "net")]
 pub mod net;
 #[cfg(feature = "egui")]
 pub mod panel;
+#[cfg(feature = "landmass")]
+pub mod paths;
 #[cfg(feature = "avian")]
 pub mod physics;
 #[cfg(all(feature = "plugin", feature = "scatter"))]
@@ -451,6 +459,7 @@ mod guide {
         Brushes "docs/guide/src/brushes.md"
         Materials "docs/guide/src/materials.md"
         Plants "docs/guide/src/plants.md"
+        Paths "docs/guide/src/paths.md"
         Physics "docs/guide/src/physics.md"
         Undo "docs/guide/src/undo.md"
         Events "docs/guide/src/events.md"
@@ -467,7 +476,7 @@ mod guide {
         Explosions "docs/guide/src/recipes/explosions.md"
         Journal "docs/guide/src/recipes/journal.md"
         Water "docs/guide/src/recipes/water.md"
-        Navigation "docs/guide/src/recipes/navigation.md"
+        Surfaces "docs/guide/src/recipes/surfaces.md"
         Cameras "docs/guide/src/recipes/cameras.md"
         FloatingOrigin "docs/guide/src/recipes/floating-origin.md"
     }

@@ -27,7 +27,7 @@ struct Example {
     black: f32,
 }
 
-const EXAMPLES: [Example; 5] = [
+const EXAMPLES: [Example; 6] = [
     Example {
         name: "digger",
         arguments: "--headless --width 640 --height 360",
@@ -57,6 +57,7 @@ const EXAMPLES: [Example; 5] = [
         ground: 0.6,
         black: 0.05,
     },
+    Example { name: "agents", arguments: "--headless", pictures: 4, ground: 0.5, black: 0.05 },
     Example { name: "custom_material", arguments: "--headless", pictures: 2, ground: 0.6, black: 0.05 },
 ];
 

@@ -24,9 +24,9 @@ use super::{
     LoosePieceFound, MaterialColors, SkyLight, SlimVertices,
 };
 use crate::lattice::ChunkPos;
-#[cfg(feature = "scatter")]
+#[cfg(any(feature = "scatter", feature = "landmass"))]
 use crate::lattice::LatticeBox;
-#[cfg(feature = "scatter")]
+#[cfg(any(feature = "scatter", feature = "landmass"))]
 use crate::terrain::Version;
 use crate::terrain::{Asked, FieldChange, MeshKey, Receipt, Rejection, Terrain, World as TerrainWorld};
 use crate::threads::free_later;
@@ -99,12 +99,12 @@ pub(super) struct CommitMessages<'w> {
     receipts: MessageWriter<'w, BrushApplied>,
     history: HistoryMessages<'w>,
     found: MessageWriter<'w, LoosePieceFound>,
-    #[cfg(feature = "scatter")]
+    #[cfg(any(feature = "scatter", feature = "landmass"))]
     changed: MessageWriter<'w, GroundChanged>,
 }
 
 /// A commit changed the ground of a terrain in this frame.
-#[cfg(feature = "scatter")]
+#[cfg(any(feature = "scatter", feature = "landmass"))]
 #[derive(Message, Clone, Debug)]
 pub(crate) struct GroundChanged {
     pub terrain: Entity,
@@ -245,7 +245,7 @@ fn commit(
         Change::PendingDisplay(pending) => {
             let is_shown = pending.is_of(terrain.world()) && pending.follows(entities.shown);
             if is_shown {
-                #[cfg(feature = "scatter")]
+                #[cfg(any(feature = "scatter", feature = "landmass"))]
                 messages.changed.write(GroundChanged {
                     terrain: entity,
                     versions: [entities.shown, pending.version()],
@@ -299,13 +299,13 @@ fn commit(
     }
     let is_whole = commit.is_whole();
     let fields = commit.field_news().to_vec();
-    #[cfg(feature = "scatter")]
+    #[cfg(any(feature = "scatter", feature = "landmass"))]
     let (boxes, before) = (commit.changed_boxes().collect(), terrain.world().version());
     let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return false };
     if !waste.is_empty() {
         free_later(waste);
     }
-    #[cfg(feature = "scatter")]
+    #[cfg(any(feature = "scatter", feature = "landmass"))]
     messages.changed.write(GroundChanged {
         terrain: entity,
         versions: [before, terrain.world().version()],

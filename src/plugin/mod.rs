@@ -51,14 +51,14 @@ mod settings;
 mod task;
 mod times;
 
-#[cfg(feature = "scatter")]
+#[cfg(any(feature = "scatter", feature = "landmass"))]
 pub(crate) use commit::GroundChanged;
 pub use components::{
     Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SkyLight, SlimVertices, Tile,
 };
 #[doc(hidden)]
 pub use components::{GroundPieces, MeshBytes, ShownSurface};
-#[cfg(any(feature = "avian", feature = "scatter"))]
+#[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
 pub(crate) use entities::TerrainEntities;
 #[cfg(feature = "avian")]
 pub(crate) use entities::trigger_if_alive;
@@ -82,7 +82,7 @@ pub use messages::{
 };
 #[cfg(feature = "picking")]
 pub use picking::TerrainPickingPlugin;
-#[cfg(any(feature = "avian", feature = "scatter"))]
+#[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
 pub(crate) use places::Places;
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 pub use propagate::TerrainPropagatePlugin;
@@ -151,7 +151,7 @@ pub(crate) enum BeforeLoad {
 }
 
 /// Systems that look at what was just committed, still in [`BurrowSystems::Commit`].
-#[cfg(any(feature = "replicon", feature = "scatter"))]
+#[cfg(any(feature = "replicon", feature = "scatter", feature = "landmass"))]
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct FollowCommits;
 
@@ -224,9 +224,9 @@ impl Plugin for TerrainPlugin {
                     (lod::begin_lod_changes, commit::begin_transactions).chain().in_set(BurrowSystems::Begin),
                 ),
             );
-        #[cfg(feature = "scatter")]
+        #[cfg(any(feature = "scatter", feature = "landmass"))]
         app.add_message::<GroundChanged>();
-        #[cfg(any(feature = "replicon", feature = "scatter"))]
+        #[cfg(any(feature = "replicon", feature = "scatter", feature = "landmass"))]
         app.configure_sets(
             Update,
             FollowCommits.in_set(BurrowSystems::Commit).after(commit::commit_transactions),

@@ -7,7 +7,7 @@ use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
 use super::resolve::{FieldChange, Resolved, install, patch_of};
-#[cfg(all(feature = "plugin", feature = "scatter"))]
+#[cfg(all(feature = "plugin", any(feature = "scatter", feature = "landmass")))]
 use crate::lattice::LatticeBox;
 use crate::lattice::{ChunkPos, SNAP, TilePos};
 use crate::redraw::{DrawnCut, MeshUpdates, Stages, relit_parts};
@@ -146,7 +146,7 @@ impl Commit {
     }
 
     /// Boxes around the bricks that it changes.
-    #[cfg(all(feature = "plugin", feature = "scatter"))]
+    #[cfg(all(feature = "plugin", any(feature = "scatter", feature = "landmass")))]
     pub(crate) fn changed_boxes(&self) -> impl Iterator<Item = LatticeBox> {
         self.changes.iter().filter_map(|delta| delta.bounds)
     }

@@ -1,0 +1,142 @@
+//! A ridge with a pass, a sun and a camera; mouse and keys.
+
+#[path = "../shared/flight.rs"]
+mod flight;
+
+use bevy::prelude::*;
+use bevy_burrow::navigation::{NavTilePos, WalkSettings, WalkableTile, Walker};
+use bevy_burrow::paths::bevy_landmass::debug::EnableLandmassDebug;
+use bevy_burrow::paths::bevy_landmass::prelude::*;
+use bevy_burrow::paths::{Navigation, NavigationArea, archipelago_options};
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::Version;
+
+use crate::figures::Figure;
+
+/// Cells along a side of the landscape.
+pub const SIDE: u32 = 96;
+/// The middle of the pass along x, and of the ridge along z.
+pub const PASS: Vec2 = Vec2::new(30.0, 48.0);
+/// Height of the plains.
+pub const PLAIN: f32 = 10.0;
+
+/// A figure's size, in metres, and what it climbs.
+pub const AGENT: WalkSettings =
+    WalkSettings { radius: 0.4, height: 1.8, step: 0.4, slope: 1.0, precision: 0.3 };
+
+const EYE: Vec3 = Vec3::new(62.0, 52.0, -6.0);
+const MIDDLE: Vec3 = Vec3::new(50.0, 8.0, 46.0);
+
+/// The archipelago of the figures.
+#[derive(Resource)]
+pub struct Paths(pub Entity);
+
+/// Heights of plains with a ridge across them, and a pass through it.
+fn height(x: i32, z: i32) -> f64 {
+    let (x, z) = (f64::from(x), f64::from(z));
+    let waves = 0.6 * ((x * 0.23).sin() + (z * 0.31 + x * 0.1).cos());
+    let ridge = (14.0 - (z - f64::from(PASS.y)).abs()).clamp(0.0, 6.0) * 2.5;
+    let pass = ((x - f64::from(PASS.x)).abs() - 4.0).clamp(0.0, 5.0) / 5.0;
+    f64::from(PLAIN) + waves + ridge * pass
+}
+
+pub fn set_up(mut commands: Commands, mut materials: ResMut<Assets<StandardMaterial>>) -> Result {
+    let grass_on_rock = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 200 };
+    let ground =
+        Ground::from_fn(SIDE, SIDE, height)?.with_materials(&MaterialControl::Uniform(grass_on_rock))?;
+    let material = materials.add(StandardMaterial { perceptual_roughness: 1.0, ..default() });
+    let terrain = Terrain::new(ground, &TerrainSettings { chunk_size: 16, ..default() })?;
+    let terrain = commands.spawn((terrain, MeshMaterial3d(material))).id();
+    let archipelago = commands.spawn(Archipelago3d::new(archipelago_options(&AGENT, 1.0))).id();
+    commands.spawn(Navigation { terrain, archipelago, agent: AGENT, area: NavigationArea::Everywhere });
+    commands.insert_resource(Paths(archipelago));
+    commands.spawn((
+        DirectionalLight { shadow_maps_enabled: true, ..default() },
+        Transform::from_xyz(1.0, 1.2, -0.6).looking_at(Vec3::ZERO, Vec3::Y),
+    ));
+    commands.insert_resource(GlobalAmbientLight { brightness: 500.0, ..default() });
+    commands.insert_resource(ClearColor(Color::srgb(0.62, 0.76, 0.95)));
+    commands.spawn((
+        Camera3d::default(),
+        flight::free_camera(20.0, 60.0),
+        Transform::from_translation(EYE).looking_at(MIDDLE, Vec3::Y),
+    ));
+    Ok(())
+}
+
+/// Digs and builds where the cursor points.
+pub fn use_mouse(
+    mouse: Res<ButtonInput<MouseButton>>,
+    window: Single<&Window>,
+    camera: Single<(&Camera, &GlobalTransform)>,
+    terrains: Terrains,
+    time: Res<Time>,
+    mut rest: Local<f32>,
+    mut brushes: MessageWriter<Brush>,
+) {
+    *rest -= time.delta_secs();
+    let digs = mouse.pressed(MouseButton::Left);
+    let (camera, place) = *camera;
+    if *rest > 0.0 || !(digs || mouse.pressed(MouseButton::Middle)) {
+        return;
+    }
+    if let Some(cursor) = window.cursor_position()
+        && let Ok(ray) = camera.viewport_to_world(place, cursor)
+        && let Some(hit) = terrains.raycast(ray, 500.0)
+    {
+        *rest = 0.1;
+        let ball = Shape::sphere(hit.position, 3.0);
+        brushes.write(if digs { Brush::dig(ball) } else { Brush::add(ball, MaterialId(2)) });
+    }
+}
+
+/// Shows meshes, and sends the figures back.
+pub fn press_keys(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut shows: ResMut<EnableLandmassDebug>,
+    mut figures: Query<(&mut Figure, &mut AgentTarget3d)>,
+) {
+    if keys.just_pressed(KeyCode::KeyG) {
+        shows.0 = !shows.0;
+    }
+    if keys.just_pressed(KeyCode::KeyR) {
+        for (mut figure, mut target) in &mut figures {
+            let Figure { home, goal } = *figure;
+            *figure = Figure { home: goal, goal: home };
+            *target = AgentTarget3d::Point(home);
+        }
+    }
+}
+
+/// Draws the stretches of air above floors, up to the height of a figure; green where it can stand.
+pub fn draw_spans(
+    terrain: Single<&Terrain>,
+    shows: Res<EnableLandmassDebug>,
+    mut gizmos: Gizmos,
+    mut drawn: Local<(Option<Version>, Vec<(Vec3, Vec3, bool)>)>,
+) -> Result {
+    if !shows.0 {
+        return Ok(());
+    }
+    let world = terrain.world();
+    if drawn.0 != Some(world.version()) {
+        let (walker, mut lines) = (Walker::new(&AGENT)?, Vec::new());
+        for pos in NavTilePos::all(world) {
+            let tile = WalkableTile::new(world, pos, &walker);
+            for (column, floor, ceiling) in tile.spans() {
+                let is_own = |cell: &bevy_burrow::navigation::WalkableCell| cell.heights[0] == floor;
+                let can_stand = tile.cells_of(column).any(|cell| is_own(&cell));
+                let [low, high] = [floor, ceiling.unwrap_or(i32::MAX)].map(|height| height as f32 / 256.0);
+                let foot = Vec3::new(column.x as f32, low, column.z as f32);
+                lines.push((foot, foot.with_y(high.min(low + AGENT.height)), can_stand));
+            }
+        }
+        *drawn = (Some(world.version()), lines);
+    }
+    for &(from, to, can_stand) in &drawn.1 {
+        let color =
+            if can_stand { Color::srgba(0.1, 0.9, 0.3, 0.35) } else { Color::srgba(0.9, 0.2, 0.1, 0.35) };
+        gizmos.line(from, to, color);
+    }
+    Ok(())
+}

@@ -1,0 +1,136 @@
+//! The tiles of a navigation that are loaded, and their islands.
+
+use std::sync::Arc;
+
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::Allow;
+use bevy::platform::collections::{HashMap, HashSet};
+use bevy::prelude::*;
+
+use super::Navigation;
+use super::build::Build;
+use crate::navigation::{NavPolygons, NavTilePos, Walker};
+use crate::terrain::Version;
+
+/// The tiles of a [`Navigation`] that are loaded.
+#[derive(Component, Debug, Default)]
+pub struct NavigationTiles {
+    /// The agent in voxels; `None` until settings without an error were read.
+    pub(super) walker: Option<Arc<Walker>>,
+    /// Metres of a voxel in world space.
+    pub(super) scale: f32,
+    /// The world that the tiles are up to date with, or are being built for.
+    pub(super) version: Option<Version>,
+    pub(super) tiles: HashMap<NavTilePos, LoadedTile>,
+    /// Tiles that are not being built yet.
+    pub(super) missing: Vec<NavTilePos>,
+    pub(super) builds: Vec<Build>,
+    /// Number of builds so far.
+    pub(super) count: u64,
+    /// The sources of the last choice.
+    pub(super) sources: Vec<(Vec2, f32)>,
+    pub(super) is_chosen: bool,
+}
+
+/// A tile that is loaded, or waits to be.
+#[derive(Debug, Default)]
+pub(super) struct LoadedTile {
+    /// The number of the build that made it; 0 before the first.
+    pub build: u64,
+    pub polygons: Option<Arc<NavPolygons>>,
+    pub island: Option<Entity>,
+}
+
+impl NavigationTiles {
+    /// Number of tiles, with and without an island.
+    pub fn len(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Returns `true` if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.tiles.is_empty()
+    }
+
+    /// Whether tiles are still being built for the first time.
+    pub fn is_loading(&self) -> bool {
+        self.walker.is_some() && (!self.is_chosen || self.tiles.values().any(|tile| tile.build == 0))
+    }
+
+    /// Whether a change of the ground is still on its way to landmass.
+    pub fn is_building(&self) -> bool {
+        !self.builds.is_empty() || !self.missing.is_empty()
+    }
+
+    /// The islands, in no order: the tile, its entity and its polygons.
+    pub fn islands(&self) -> impl Iterator<Item = (NavTilePos, Entity, &NavPolygons)> {
+        self.tiles.iter().filter_map(|(&pos, tile)| Some((pos, tile.island?, tile.polygons.as_deref()?)))
+    }
+
+    /// Bytes of the polygons of all tiles, without those of landmass.
+    pub fn bytes(&self) -> usize {
+        self.islands().map(|(.., polygons)| polygons.bytes()).sum()
+    }
+
+    /// Drops all tiles and despawns their islands.
+    pub(super) fn clear(&mut self, commands: &mut Commands) {
+        for (_, tile) in self.tiles.drain() {
+            despawn(tile.island, commands);
+        }
+        let (walker, scale, count) = (self.walker.take(), self.scale, self.count);
+        *self = Self { walker, scale, count, ..Self::default() };
+    }
+
+    /// Drops the tiles that are not wanted, and adds those that are missing, in this order.
+    pub(super) fn choose(
+        &mut self,
+        wanted: Vec<NavTilePos>,
+        kept: &HashSet<NavTilePos>,
+        commands: &mut Commands,
+    ) {
+        self.tiles.retain(|pos, tile| {
+            let stays = kept.contains(pos);
+            if !stays {
+                despawn(tile.island, commands);
+            }
+            stays
+        });
+        self.missing.retain(|pos| kept.contains(pos));
+        for pos in wanted {
+            if !self.tiles.contains_key(&pos) {
+                self.tiles.insert(pos, LoadedTile::default());
+                self.missing.push(pos);
+            }
+        }
+        self.is_chosen = true;
+    }
+}
+
+pub(super) fn despawn(island: Option<Entity>, commands: &mut Commands) {
+    if let Some(island) = island {
+        commands.entity(island).try_despawn();
+    }
+}
+
+/// Despawns the islands of a navigation that is removed or despawned.
+pub(super) fn remove_islands(
+    gone: On<Remove, Navigation>,
+    mut navigations: Query<&mut NavigationTiles, Allow<Disabled>>,
+    mut commands: Commands,
+) {
+    if let Ok(mut tiles) = navigations.get_mut(gone.entity) {
+        tiles.clear(&mut commands);
+        tiles.walker = None;
+    }
+}
+
+/// Despawns the islands of a navigation that is disabled.
+pub(super) fn disable(
+    disabled: On<Add, Disabled>,
+    mut navigations: Query<&mut NavigationTiles, Allow<Disabled>>,
+    mut commands: Commands,
+) {
+    if let Ok(mut tiles) = navigations.get_mut(disabled.entity) {
+        tiles.clear(&mut commands);
+    }
+}

@@ -1,0 +1,388 @@
+//! Islands follow commits: a path through a tunnel exists in the frame after the commit that opened it.
+
+use std::time::{Duration, Instant};
+
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::Allow;
+use bevy::mesh::MeshPlugin;
+use bevy::prelude::*;
+use bevy_burrow::navigation::{NavTilePos, WalkSettings, WalkableTile, Walker};
+use bevy_burrow::paths::bevy_landmass::{PermittedAnimationLinks, PointSampleDistance3d, prelude::*};
+use bevy_burrow::paths::{
+    Navigation, NavigationArea, NavigationPlugin, NavigationSource, NavigationTiles, archipelago_options,
+};
+use bevy_burrow::prelude::*;
+use fastrand::Rng;
+
+use crate::random_works;
+
+const AGENT: WalkSettings = WalkSettings { radius: 0.4, height: 1.8, step: 0.4, slope: 1.0, precision: 0.3 };
+
+const SOUTH: Vec3 = Vec3::new(48.0, 10.0, 12.0);
+const NORTH: Vec3 = Vec3::new(48.0, 10.0, 84.0);
+
+/// A plain with a steep ridge across it.
+fn ridge() -> Ground {
+    let height = |z: i32| 10.0 + 20.0 * f64::from((8 - (z - 48).abs()).clamp(0, 4)) / 4.0;
+    Ground::from_fn(96, 96, |_, z| height(z)).expect("finite")
+}
+
+fn terrain() -> Terrain {
+    Terrain::new(ridge(), &TerrainSettings { chunk_size: 16, ..default() }).expect("valid")
+}
+
+fn empty_app(same_frame: bool) -> (App, Entity) {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin))
+        .add_plugins(Landmass3dPlugin::default().in_schedule(PreUpdate))
+        .add_plugins((BurrowPlugins, NavigationPlugin { wait: Duration::from_secs(60) }));
+    app.finish();
+    app.cleanup();
+    app.world_mut().resource_mut::<BurrowSettings>().same_frame =
+        Duration::from_secs(if same_frame { 60 } else { 0 });
+    let archipelago = app.world_mut().spawn(Archipelago3d::new(archipelago_options(&AGENT, 1.0))).id();
+    (app, archipelago)
+}
+
+/// An app with a terrain and its navigation, which is loaded: terrain, archipelago, navigation.
+fn app(same_frame: bool, agent: WalkSettings) -> (App, [Entity; 3]) {
+    let (mut app, archipelago) = empty_app(same_frame);
+    let terrain = app.world_mut().spawn(terrain()).id();
+    let area = NavigationArea::Everywhere;
+    let navigation = app.world_mut().spawn(Navigation { terrain, archipelago, agent, area }).id();
+    wait_for_tiles(&mut app, navigation);
+    (app, [terrain, archipelago, navigation])
+}
+
+fn wait(app: &mut App, is_done: impl Fn(&World) -> bool) {
+    let start = Instant::now();
+    while !is_done(app.world()) {
+        assert!(start.elapsed() < Duration::from_secs(300), "it never came");
+        app.update();
+        std::thread::sleep(Duration::from_micros(500));
+    }
+}
+
+fn tiles(world: &World, navigation: Entity) -> &NavigationTiles {
+    world.get::<NavigationTiles>(navigation).expect("the state of a navigation")
+}
+
+fn wait_for_tiles(app: &mut App, navigation: Entity) {
+    app.update();
+    wait(app, |world| {
+        let tiles = tiles(world, navigation);
+        !tiles.is_empty() && !tiles.is_loading() && !tiles.is_building()
+    });
+    app.update();
+}
+
+/// Updates until the commit that changes the ground has been made, and not once more.
+fn commit(app: &mut App, terrain: Entity, ask: impl FnOnce(&mut App)) {
+    let hash = |app: &App| app.world().get::<Terrain>(terrain).expect("a terrain").world().hash();
+    let before = hash(app);
+    ask(app);
+    let start = Instant::now();
+    while hash(app) == before {
+        assert!(start.elapsed() < Duration::from_secs(300), "the commit never came");
+        app.update();
+    }
+}
+
+fn has_path(app: &App, archipelago: Entity, from: Vec3, to: Vec3) -> bool {
+    let archipelago = app.world().get::<Archipelago3d>(archipelago).expect("an archipelago");
+    let near = PointSampleDistance3d {
+        horizontal_distance: 1.0,
+        distance_above: 2.0,
+        distance_below: 2.0,
+        vertical_preference_ratio: 2.0,
+        animation_link_max_vertical_distance: 1.0,
+    };
+    let (Ok(from), Ok(to)) = (archipelago.sample_point(from, &near), archipelago.sample_point(to, &near))
+    else {
+        return false;
+    };
+    archipelago.find_path(&from, &to, &default(), PermittedAnimationLinks::All).is_ok()
+}
+
+fn island_count(app: &mut App) -> usize {
+    app.world_mut().query_filtered::<(), (With<Island>, Allow<Disabled>)>().iter(app.world()).count()
+}
+
+fn tunnel() -> Brush {
+    Brush::dig(Shape::capsule(Vec3::new(48.0, 12.0, 36.0), Vec3::new(48.0, 12.0, 60.0), 3.5))
+}
+
+fn send(message: impl Message) -> impl FnOnce(&mut App) {
+    move |app: &mut App| {
+        app.world_mut().write_message(message).expect("the plugin added it");
+    }
+}
+
+#[test]
+fn a_path_through_a_tunnel_exists_in_the_frame_after_the_commit() {
+    for same_frame in [false, true] {
+        let (mut app, [terrain, archipelago, _]) = app(same_frame, AGENT);
+        assert!(has_path(&app, archipelago, SOUTH, SOUTH + 20.0 * Vec3::X), "along the ridge");
+        for _ in 0..3 {
+            assert!(!has_path(&app, archipelago, SOUTH, NORTH), "before the tunnel");
+            commit(&mut app, terrain, send(tunnel()));
+            app.update();
+            assert!(has_path(&app, archipelago, SOUTH, NORTH), "through the tunnel");
+            commit(&mut app, terrain, send(Undo { terrain: Some(terrain) }));
+            app.update();
+            assert!(!has_path(&app, archipelago, SOUTH, NORTH), "after undo");
+        }
+    }
+}
+
+#[test]
+fn agents_that_do_not_fit_have_no_path() {
+    for agent in [WalkSettings { radius: 4.0, ..AGENT }, WalkSettings { height: 9.0, ..AGENT }] {
+        let (mut app, [terrain, archipelago, _]) = app(true, agent);
+        commit(&mut app, terrain, send(tunnel()));
+        app.update();
+        assert!(has_path(&app, archipelago, SOUTH, SOUTH + 20.0 * Vec3::X));
+        assert!(!has_path(&app, archipelago, SOUTH, NORTH), "{agent:?}");
+    }
+}
+
+#[test]
+fn settings_with_an_error_have_no_islands() {
+    let (mut app, archipelago) = empty_app(true);
+    let terrain = app.world_mut().spawn(terrain()).id();
+    let agent = WalkSettings { radius: f32::NAN, ..AGENT };
+    let area = NavigationArea::Everywhere;
+    let navigation = app.world_mut().spawn(Navigation { terrain, archipelago, agent, area }).id();
+    for _ in 0..50 {
+        app.update();
+    }
+    assert_eq!((island_count(&mut app), tiles(app.world(), navigation).len()), (0, 0));
+    app.world_mut().get_mut::<Navigation>(navigation).expect("it").agent = AGENT;
+    wait_for_tiles(&mut app, navigation);
+    assert_eq!(island_count(&mut app), 9);
+}
+
+#[test]
+fn nothing_is_left_of_what_is_gone() {
+    // The terrain, its component, the navigation, its component, and both.
+    for case in 0..5 {
+        let (mut app, [terrain, archipelago, navigation]) = app(true, AGENT);
+        assert_eq!(island_count(&mut app), 9);
+        let world = app.world_mut();
+        match case {
+            0 => assert!(world.despawn(terrain)),
+            1 => assert!(world.entity_mut(terrain).take::<Terrain>().is_some()),
+            2 => assert!(world.despawn(navigation)),
+            3 => assert!(world.entity_mut(navigation).take::<Navigation>().is_some()),
+            _ => assert!(world.despawn(navigation) && world.despawn(terrain)),
+        }
+        for _ in 0..3 {
+            app.update();
+        }
+        assert_eq!(island_count(&mut app), 0, "case {case}");
+        assert!(!has_path(&app, archipelago, SOUTH, SOUTH + Vec3::X), "case {case}");
+    }
+}
+
+#[test]
+fn disabled_terrains_and_navigations_have_no_islands() {
+    let (mut app, [terrain, archipelago, navigation]) = app(true, AGENT);
+    for entity in [terrain, navigation] {
+        app.world_mut().entity_mut(entity).insert(Disabled);
+        for _ in 0..3 {
+            app.update();
+        }
+        assert_eq!(island_count(&mut app), 0);
+        app.world_mut().entity_mut(entity).remove::<Disabled>();
+        wait_for_tiles(&mut app, navigation);
+        assert!(has_path(&app, archipelago, SOUTH, SOUTH + 20.0 * Vec3::X));
+    }
+}
+
+#[test]
+fn another_world_has_other_islands() {
+    let (mut app, [terrain, archipelago, navigation]) = app(true, AGENT);
+    assert!(!has_path(&app, archipelago, SOUTH, NORTH));
+    let flat = Ground::flat(96, 96, 10.0).expect("valid");
+    let flat = Terrain::new(flat, &TerrainSettings::default()).expect("valid");
+    app.world_mut().entity_mut(terrain).insert(flat);
+    app.update();
+    wait(&mut app, |world| {
+        let tiles = tiles(world, navigation);
+        tiles.len() == 9 && !tiles.is_loading() && tiles.islands().all(|(.., polygons)| polygons.len() == 1)
+    });
+    app.update();
+    app.update();
+    assert!(has_path(&app, archipelago, SOUTH, NORTH));
+}
+
+#[test]
+fn two_terrains_share_an_archipelago_and_may_be_moved() {
+    let (mut app, [first, archipelago, _]) = app(true, AGENT);
+    let place = Transform::from_xyz(0.0, 100.0, 300.0).with_rotation(Quat::from_rotation_y(1.0));
+    let second = app.world_mut().spawn((terrain(), place)).id();
+    let area = NavigationArea::Everywhere;
+    let other = Navigation { terrain: second, archipelago, agent: AGENT, area };
+    let other = app.world_mut().spawn(other).id();
+    wait_for_tiles(&mut app, other);
+    let to_second = |place: Transform, at: Vec3| place.transform_point(at);
+    assert!(!has_path(&app, archipelago, to_second(place, SOUTH), to_second(place, NORTH)));
+    let (from, to) =
+        (to_second(place, Vec3::new(48.0, 12.0, 36.0)), to_second(place, Vec3::new(48.0, 12.0, 60.0)));
+    commit(&mut app, second, send(Brush::dig(Shape::capsule(from, to, 3.5))));
+    app.update();
+    assert!(has_path(&app, archipelago, to_second(place, SOUTH), to_second(place, NORTH)));
+    assert!(!has_path(&app, archipelago, SOUTH, NORTH), "on the first one");
+    let moved = Transform::from_xyz(-500.0, 7.0, 0.0);
+    *app.world_mut().get_mut::<Transform>(second).expect("a place") = moved;
+    app.update();
+    app.update();
+    assert!(has_path(&app, archipelago, to_second(moved, SOUTH), to_second(moved, NORTH)));
+    assert!(!has_path(&app, archipelago, to_second(place, SOUTH), to_second(place, SOUTH)));
+    assert_ne!(first, second);
+}
+
+#[test]
+fn islands_are_where_sources_are() {
+    let (mut app, archipelago) = empty_app(true);
+    let ground = Ground::flat(512, 512, 10.0).expect("valid");
+    let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    let terrain = app.world_mut().spawn(terrain).id();
+    let area = NavigationArea::NearSources;
+    let navigation = Navigation { terrain, archipelago, agent: AGENT, area };
+    let navigation = app.world_mut().spawn(navigation).id();
+    let source = app
+        .world_mut()
+        .spawn((NavigationSource { radius: 40.0 }, Transform::from_xyz(100.0, 0.0, 100.0)))
+        .id();
+    wait_for_tiles(&mut app, navigation);
+    let near = |app: &App, at: Vec3| has_path(app, archipelago, at, at + Vec3::X);
+    let [here, there] = [100.0, 400.0].map(|at| Vec3::new(at, 10.0, at));
+    assert!(near(&app, here) && !near(&app, there));
+    assert!((5..20).contains(&tiles(app.world(), navigation).len()));
+    app.world_mut().get_mut::<Transform>(source).expect("a place").translation = there;
+    app.update();
+    wait_for_tiles(&mut app, navigation);
+    assert!(!near(&app, here) && near(&app, there));
+    app.world_mut().despawn(source);
+    app.update();
+    app.update();
+    assert_eq!(island_count(&mut app), 0);
+}
+
+#[test]
+fn islands_are_those_of_the_ground_after_any_edits() {
+    let (mut app, [terrain, _, navigation]) = app(false, AGENT);
+    let mut rng = Rng::with_seed(5);
+    let walker = Walker::new(&AGENT).expect("valid");
+    for step in 0..40 {
+        for _ in 0..rng.usize(0..4) {
+            match rng.u8(0..5) {
+                0 => send(Undo { terrain: Some(terrain) })(&mut app),
+                1 => send(Redo { terrain: Some(terrain) })(&mut app),
+                _ => {
+                    let world = app.world().get::<Terrain>(terrain).expect("a terrain").world().clone();
+                    send(random_works(&mut rng, &world))(&mut app);
+                }
+            }
+        }
+        app.update();
+        if step % 8 != 7 {
+            continue;
+        }
+        for _ in 0..3 {
+            wait(&mut app, |world| world.get::<Terrain>(terrain).is_some_and(|terrain| !terrain.is_busy()));
+            app.update();
+        }
+        wait(&mut app, |world| !tiles(world, navigation).is_building());
+        let world = app.world().get::<Terrain>(terrain).expect("a terrain").world();
+        let mut islands = tiles(app.world(), navigation).islands().collect::<Vec<_>>();
+        islands.sort_by_key(|island| island.0);
+        let made = NavTilePos::all(world).map(|pos| WalkableTile::new(world, pos, &walker).polygons());
+        let mut made: Vec<_> = made.filter(|polygons| !polygons.is_empty()).collect();
+        made.sort_by_key(|polygons| polygons.pos());
+        assert_eq!(islands.len(), made.len());
+        for ((pos, _, polygons), made) in islands.into_iter().zip(&made) {
+            assert_eq!((pos, polygons), (made.pos(), made), "step {step}");
+        }
+    }
+}
+
+/// A thousand agents cross hilly ground that is dug 20 times a second; prints how long frames take.
+///
+/// ```text
+/// cargo test --release --features examples --test navigation -- --ignored --nocapture thousand
+/// ```
+#[test]
+#[ignore = "prints figures"]
+fn a_thousand_agents_while_the_ground_is_dug() {
+    use bevy::time::TimeUpdateStrategy;
+    let number = |name: &str, default: usize| {
+        std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
+    };
+    let (agents, side) = (number("BURROW_AGENTS", 1000), number("BURROW_SIDE", 512) as u32);
+    for digs in [false, true] {
+        let (mut app, archipelago) = empty_app(true);
+        app.world_mut().resource_mut::<BurrowSettings>().same_frame = BurrowSettings::default().same_frame;
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_micros(16_667)));
+        let waves = |x: i32, z: i32| 20.0 + 4.0 * ((f64::from(x) * 0.07).sin() + (f64::from(z) * 0.09).cos());
+        let ground = Ground::from_fn(side, side, waves).expect("finite");
+        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+        let terrain = app.world_mut().spawn(terrain).id();
+        let area = NavigationArea::Everywhere;
+        let navigation = app.world_mut().spawn(Navigation { terrain, archipelago, agent: AGENT, area }).id();
+        wait_for_tiles(&mut app, navigation);
+        let mut rng = Rng::with_seed(3);
+        let place = |rng: &mut Rng| {
+            let [x, z] = [0, 1].map(|_| 4.0 + rng.f32() * (side as f32 - 8.0));
+            Vec3::new(x, waves(x as i32, z as i32) as f32, z)
+        };
+        for _ in 0..agents {
+            let (at, to) = (place(&mut rng), place(&mut rng));
+            app.world_mut().spawn((
+                Transform::from_translation(at),
+                Agent3dBundle {
+                    agent: default(),
+                    settings: AgentSettings { radius: 0.4, desired_speed: 3.0, max_speed: 4.0 },
+                    archipelago_ref: ArchipelagoRef3d::new(archipelago),
+                },
+                AgentTarget3d::Point(to),
+            ));
+        }
+        app.add_systems(
+            Update,
+            |mut agents: Query<(&mut Transform, &AgentDesiredVelocity3d)>,
+             terrain: Single<&Terrain>,
+             time: Res<Time>| {
+                for (mut place, wanted) in &mut agents {
+                    place.translation += wanted.velocity() * time.delta_secs();
+                    let [x, z] = [place.translation.x, place.translation.z].map(f64::from);
+                    place.translation.y = terrain.world().height(x, z).unwrap_or_default() as f32;
+                }
+            },
+        );
+        let mut times = Vec::new();
+        for frame in 0..360 {
+            if digs && frame % 3 == 0 {
+                send(Brush::dig(Shape::sphere(place(&mut rng), 2.5)))(&mut app);
+            }
+            let start = Instant::now();
+            app.update();
+            times.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        let mut states = app.world_mut().query::<&AgentState>();
+        let moving = states.iter(app.world()).filter(|state| **state == AgentState::Moving).count();
+        let bytes = tiles(app.world(), navigation).bytes();
+        let polygons: usize =
+            tiles(app.world(), navigation).islands().map(|(.., polygons)| polygons.len()).sum();
+        times.drain(..60);
+        times.sort_by(f64::total_cmp);
+        println!(
+            "{agents} agents, {side} x {side} voxels, digs: {digs}: {moving} move; frame median {:.2} ms, 95 % {:.2}, \
+             most {:.2}; {polygons} polygons of {bytes} bytes",
+            times[times.len() / 2],
+            times[times.len() * 95 / 100],
+            times[times.len() - 1]
+        );
+    }
+}
