@@ -16,9 +16,9 @@ use crate::lattice::{Column, ONE};
 /// Least and most scale.
 const SCALE: (f32, f32) = (0.125, 8.0);
 
-/// A [`Prefab`] at a place: its anchor comes to lie at [`at`](Self::at).
+/// A [`Prefab`] at a place: its anchor is placed at [`at`](Self::at).
 ///
-/// It is exact where the anchor comes to lie on a lattice point, the scale is 1, and the rotation is one of the 24 of
+/// It is exact where the anchor is placed on a lattice point, the scale is 1, and the rotation is one of the 24 of
 /// quarter turns: then every sample is one of the prefab's, mirrored or not. Otherwise densities are interpolated
 /// between the eight nearest samples, in integers, and materials are those of the nearest solid one.
 ///

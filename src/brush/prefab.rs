@@ -185,7 +185,7 @@ impl Prefab {
         self.size
     }
 
-    /// From the lowest sample to the anchor, which comes to lie where the prefab is pasted.
+    /// From the lowest sample to the anchor, which is placed where the prefab is pasted.
     pub fn anchor(&self) -> IVec3 {
         self.anchor
     }

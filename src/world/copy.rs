@@ -10,8 +10,8 @@ use crate::lattice::{Column, LIMIT, LatticeBox};
 use crate::volume::{Sample, resolve};
 
 impl World {
-    /// Copies all samples of a box, edited or not, with their materials. `anchor` is the point of the world that comes to
-    /// lie where the prefab is pasted; it may lie outside the box. Large boxes take seconds: copy them from a
+    /// Copies all samples of a box, edited or not, with their materials. `anchor` is the point of the world that is
+    /// placed where the prefab is pasted; it may lie outside the box. Large boxes take seconds: copy them from a
     /// [snapshot](crate::terrain::Terrain::snapshot), on another thread.
     ///
     /// ```

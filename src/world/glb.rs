@@ -169,7 +169,7 @@ impl Glb {
 fn mixed(mix: MaterialMix, colour: &dyn Fn(MaterialId) -> Vec3) -> Vec3 {
     let parts = mix.ids.iter().zip(mix.weights).filter(|(_, weight)| *weight > 0);
     let all = parts.map(|(&id, weight)| colour(MaterialId(id)) * f32::from(weight) / 255.0).sum::<Vec3>();
-    // What is no number is black.
+    // NaN becomes black.
     Vec3::from_array(all.to_array().map(|part| if part > 0.0 { part.min(1.0) } else { 0.0 }))
 }
 

@@ -257,7 +257,7 @@ impl MaterialMap {
     }
 
     /// Decodes splat maps: PNG files of one size, whose channels are the weights of layers, up to 16 of them. Files
-    /// with one channel are masks of one layer, and an alpha channel beside grey is ignored.
+    /// with one channel are masks of one layer, and an alpha channel next to grey is ignored.
     ///
     /// Each sample shows the layer with the greatest weight, of equal ones the first. Weights need not sum up to
     /// anything, and files may have 8 and 16 bits; all of it is computed in integers.
