@@ -31,6 +31,8 @@ pub fn spawn(
             0..FIRST => Vec3::new(PASS.x - 4.5 + 3.0 * row(number), PLAIN, 24.0),
             _ => Vec3::new(PASS.x - 4.0 + 3.0 * row(number % 4), PLAIN, 4.0 + 3.0 * row(number / 4)),
         };
+        // The first ones are through the pass before the others come near.
+        let speed = if number < FIRST { 5.0 } else { 3.0 };
         let goal = Vec3::new(34.0 + 3.0 * row(number), PLAIN, 80.0);
         let color = Color::hsl(360.0 * number as f32 / COUNT as f32, 0.85, 0.5);
         let figure = commands
@@ -40,7 +42,7 @@ pub fn spawn(
                 Visibility::default(),
                 Agent3dBundle {
                     agent: default(),
-                    settings: AgentSettings { radius: AGENT.radius, desired_speed: 5.0, max_speed: 6.0 },
+                    settings: AgentSettings { radius: AGENT.radius, desired_speed: speed, max_speed: 6.0 },
                     archipelago_ref: ArchipelagoRef3d::new(paths.0),
                 },
                 AgentTarget3d::Point(goal),
