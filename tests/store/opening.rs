@@ -141,6 +141,7 @@ fn paths_roads_and_grids_are_replayed_from_the_journal_and_read_from_a_checkpoin
             assert!(outcome.removed.total() + outcome.added.total() > 100, "{outcome:?}");
             save(&mut store, &mut first).expect("the thread runs");
         }
+        store.flush().expect("the disk works");
         // Power is lost: closing the store would make a checkpoint.
         let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
         assert_eq!(state(&opened.terrain), state(&first));
