@@ -61,7 +61,7 @@ fn play(options: &Options) -> Result<bool> {
         let moment = match chapter {
             Chapter::Crossing => (5.0, "crossing"),
             Chapter::Wall => (2.0, "wall"),
-            Chapter::Tunnel => (15.0, "tunnel"),
+            Chapter::Tunnel => (11.0, "tunnel"),
             Chapter::Arrived => (0.5, "arrived"),
         };
         if seconds >= moment.0 && !pictures.contains(&moment.1) {
