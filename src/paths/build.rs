@@ -9,7 +9,7 @@ use bevy_landmass::prelude::*;
 use bevy_landmass::{NavMeshHandle, NavigationMesh};
 
 use super::Navigation;
-use super::tiles::{LoadedTile, NavigationTiles, despawn};
+use super::tiles::{Build, BuiltTile, LoadedTile, NavigationTiles, despawn};
 use crate::lattice::SNAP;
 use crate::navigation::{NavPolygons, NavTilePos, WalkableTile};
 use crate::terrain::World as Ground;
@@ -18,23 +18,6 @@ use crate::threads::{ThreadTask, Threads};
 /// See [`NavigationPlugin::wait`](super::NavigationPlugin::wait).
 #[derive(Resource)]
 pub(super) struct Wait(pub Duration);
-
-/// A tile that was built, and its mesh; `None` where nothing is walkable.
-type BuiltTile = (NavTilePos, Option<(NavPolygons, Arc<ValidNavigationMesh3d>)>);
-
-/// A task that builds tiles.
-pub(super) struct Build {
-    number: u64,
-    /// Whether a commit changed these tiles, so that agents may be on them.
-    pub is_urgent: bool,
-    task: ThreadTask<Vec<BuiltTile>>,
-}
-
-impl std::fmt::Debug for Build {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Build").field("number", &self.number).finish_non_exhaustive()
-    }
-}
 
 impl NavigationTiles {
     /// Starts to build tiles of a world.

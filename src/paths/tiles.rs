@@ -6,11 +6,12 @@ use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::Allow;
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
+use bevy_landmass::prelude::*;
 
 use super::Navigation;
-use super::build::Build;
 use crate::navigation::{NavPolygons, NavTilePos, Walker};
 use crate::terrain::Version;
+use crate::threads::ThreadTask;
 
 /// The tiles of a [`Navigation`] that are loaded.
 #[derive(Component, Debug, Default)]
@@ -39,6 +40,23 @@ pub(super) struct LoadedTile {
     pub build: u64,
     pub polygons: Option<Arc<NavPolygons>>,
     pub island: Option<Entity>,
+}
+
+/// A tile that was built, and its mesh; `None` where nothing is walkable.
+pub(super) type BuiltTile = (NavTilePos, Option<(NavPolygons, Arc<ValidNavigationMesh3d>)>);
+
+/// A task that builds tiles.
+pub(super) struct Build {
+    pub number: u64,
+    /// Whether a commit changed these tiles, so that agents may be on them.
+    pub is_urgent: bool,
+    pub task: ThreadTask<Vec<BuiltTile>>,
+}
+
+impl std::fmt::Debug for Build {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Build").field("number", &self.number).finish_non_exhaustive()
+    }
 }
 
 impl NavigationTiles {
