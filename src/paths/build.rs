@@ -9,11 +9,14 @@ use bevy_landmass::prelude::*;
 use bevy_landmass::{NavMeshHandle, NavigationMesh};
 
 use super::Navigation;
-use super::tiles::{Build, BuiltTile, LoadedTile, NavigationTiles, despawn};
+use super::tiles::{Build, LoadedTile, NavigationTiles, despawn};
 use crate::lattice::SNAP;
 use crate::navigation::{NavPolygons, NavTilePos, WalkableTile};
 use crate::terrain::World as Ground;
 use crate::threads::{ThreadTask, Threads};
+
+/// The most tiles that one task builds.
+pub(super) const TILES: usize = 32;
 
 /// See [`NavigationPlugin::wait`](super::NavigationPlugin::wait).
 #[derive(Resource)]
@@ -21,19 +24,23 @@ pub(super) struct Wait(pub Duration);
 
 impl NavigationTiles {
     /// Starts to build tiles of a world.
-    pub(super) fn build(&mut self, world: Arc<Ground>, tiles: Vec<NavTilePos>, is_urgent: bool) {
+    pub(super) fn build(&mut self, world: &Arc<Ground>, tiles: &[NavTilePos], is_urgent: bool) {
         let Some(walker) = self.walker.clone() else { return };
         let scale = self.scale;
         let threads = if is_urgent { Threads::Transactions } else { Threads::Background };
-        let task = ThreadTask::start(threads, move || {
-            let built = tiles.into_iter().map(|pos| {
-                let polygons = WalkableTile::new(&world, pos, &walker).polygons();
-                (pos, mesh(&polygons, scale).map(|mesh| (polygons, mesh)))
+        for tiles in tiles.chunks(TILES) {
+            let (world, walker, own) = (Arc::clone(world), Arc::clone(&walker), tiles.to_vec());
+            let task = ThreadTask::start(threads, move || {
+                let built = own.into_iter().map(|pos| {
+                    let polygons = WalkableTile::new(&world, pos, &walker).polygons();
+                    (pos, mesh(&polygons, scale).map(|mesh| (polygons, mesh)))
+                });
+                built.collect()
             });
-            built.collect()
-        });
-        self.count += 1;
-        self.builds.push(Build { number: self.count, is_urgent, task });
+            self.count += 1;
+            let (number, tiles) = (self.count, tiles.to_vec());
+            self.builds.push(Build { number, tiles, is_awaited: is_urgent, is_urgent, task });
+        }
     }
 }
 
@@ -75,10 +82,12 @@ pub(super) fn replace_islands(
         let tiles = tiles.bypass_change_detection();
         let mut done = Vec::new();
         tiles.builds.retain_mut(|build| {
-            let time = if build.is_urgent { wait.0.saturating_sub(start.elapsed()) } else { Duration::ZERO };
+            let is_awaited = std::mem::take(&mut build.is_awaited);
+            let time = if is_awaited { wait.0.saturating_sub(start.elapsed()) } else { Duration::ZERO };
             let Some(result) = build.task.check_within(time) else { return true };
-            // A task that panicked has logged why; its tiles stay as they are.
-            done.push((build.number, result.unwrap_or_default()));
+            // A task that panicked has logged why. Its tiles have no islands: those before may be of ground that is gone.
+            let empty = |_| build.tiles.iter().map(|&pos| (pos, None)).collect();
+            done.push((build.number, result.unwrap_or_else(empty)));
             false
         });
         for (number, built) in done {

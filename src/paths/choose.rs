@@ -5,15 +5,13 @@ use std::sync::Arc;
 use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
+use super::build::TILES;
 use super::tiles::NavigationTiles;
 use super::{Navigation, NavigationArea, NavigationSource};
 use crate::lattice::Column;
 use crate::navigation::{NAV_TILE, NavTilePos, Walker};
 use crate::plugin::{Places, TerrainEntities};
 use crate::terrain::{Terrain, World};
-
-/// The most tiles that one task of those that load builds.
-const TILES: usize = 32;
 
 /// Reads settings that changed, chooses tiles, and starts to build those that are missing.
 pub(super) fn choose_tiles(
@@ -33,12 +31,15 @@ pub(super) fn choose_tiles(
         };
         let scale = place.scale().x;
         // A turned terrain has a scale that is rounded in another way.
-        let is_scaled = (tiles.scale - scale).abs() > 1e-4 * scale;
+        let is_scaled = (tiles.scale - scale).abs() > 1e-4 * scale.abs();
         if navigation.is_changed() || tiles.walker.is_none() || is_scaled {
             let is_new = navigation.is_changed() || is_scaled;
             tiles.clear(&mut commands);
             tiles.scale = scale;
-            let walker = Walker::new(&navigation.agent.scaled(1.0 / scale));
+            let walker = match scale {
+                ..0.0 => Err("its terrain is mirrored, which landmass cannot follow".to_owned()),
+                _ => Walker::new(&navigation.agent.scaled(1.0 / scale)).map_err(|error| error.to_string()),
+            };
             if let Err(error) = &walker
                 && is_new
             {
@@ -56,7 +57,7 @@ pub(super) fn choose_tiles(
         }
         if tiles.version.is_some() && tiles.version != Some(world.version()) {
             // Follows commits that were not seen, where a game gates their systems.
-            tiles.missing = tiles.tiles.keys().copied().collect();
+            tiles.miss_all();
         }
         tiles.version = Some(world.version());
         if navigation.area == NavigationArea::Everywhere {
@@ -85,7 +86,7 @@ pub(super) fn choose_tiles(
         if !tiles.missing.is_empty() && !is_loading {
             let rest = tiles.missing.split_off(tiles.missing.len().min(TILES));
             let first = std::mem::replace(&mut tiles.missing, rest);
-            tiles.build(terrain.snapshot(), first, false);
+            tiles.build(&terrain.snapshot(), &first, false);
         }
     }
 }

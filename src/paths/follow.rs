@@ -39,7 +39,7 @@ pub(super) fn follow_commits(
             // Those that were not begun yet are built from the latest world anyway.
             stale.retain(|pos| !tiles.missing.contains(pos));
             if !stale.is_empty() {
-                tiles.build(model.snapshot(), stale, true);
+                tiles.build(&model.snapshot(), &stale, true);
             }
         }
     }

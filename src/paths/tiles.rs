@@ -48,7 +48,10 @@ pub(super) type BuiltTile = (NavTilePos, Option<(NavPolygons, Arc<ValidNavigatio
 /// A task that builds tiles.
 pub(super) struct Build {
     pub number: u64,
-    /// Whether a commit changed these tiles, so that agents may be on them.
+    pub tiles: Vec<NavTilePos>,
+    /// Whether the next frame waits for it: a commit changed these tiles, so agents may be on them.
+    pub is_awaited: bool,
+    /// Whether a commit changed these tiles.
     pub is_urgent: bool,
     pub task: ThreadTask<Vec<BuiltTile>>,
 }
@@ -97,6 +100,15 @@ impl NavigationTiles {
         }
         let (walker, scale, count) = (self.walker.take(), self.scale, self.count);
         *self = Self { walker, scale, count, ..Self::default() };
+    }
+
+    /// All tiles are to be built again: those that wait already first, then the oldest.
+    pub(super) fn miss_all(&mut self) {
+        let waiting: HashSet<NavTilePos> = self.missing.iter().copied().collect();
+        let others = self.tiles.iter().filter(|(pos, _)| !waiting.contains(*pos));
+        let mut others: Vec<(u64, NavTilePos)> = others.map(|(&pos, tile)| (tile.build, pos)).collect();
+        others.sort_unstable();
+        self.missing.extend(others.into_iter().map(|(_, pos)| pos));
     }
 
     /// Drops the tiles that are not wanted, and adds those that are missing, in this order.

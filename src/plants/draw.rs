@@ -17,7 +17,7 @@ use bevy::render::storage::ShaderBuffer;
 
 use super::material::{PlantExtension, PlantMaterial, PlantUniform};
 use super::slots::{Record, Slots};
-use super::{News, PlantSystems, ShownPlants};
+use super::{News, NewsList, PlantSystems, ShownPlants};
 use crate::scatter::{PatchPos, Plant, PlantPatch, Species};
 use crate::terrain::Terrain;
 
@@ -38,6 +38,7 @@ impl Plugin for PlantDrawingPlugin {
         bevy::asset::embedded_asset!(app, "plants.wgsl");
         app.add_plugins(MaterialPlugin::<PlantMaterial>::default())
             .init_resource::<PlantBuffers>()
+            .add_observer(forget_looks)
             .add_observer(free_slots)
             .add_systems(Update, draw_plants.in_set(PlantSystems).after(super::follow::follow_commits))
             .add_systems(
@@ -221,6 +222,19 @@ fn draw_plants(
         }
     }
     upload(buffers, &mut assets, &mut materials);
+}
+
+/// Without looks nothing is drawn, and nobody follows the news.
+fn forget_looks(
+    gone: On<Remove, PlantLooks>,
+    mut terrains: Query<(&mut DrawnPlants, &mut ShownPlants), Allow<Disabled>>,
+    mut buffers: ResMut<PlantBuffers>,
+    mut commands: Commands,
+) {
+    if let Ok((mut drawn, mut shown)) = terrains.get_mut(gone.entity) {
+        drawn.clear(&mut commands, &mut buffers.slots);
+        shown.news = NewsList::default();
+    }
 }
 
 /// Frees the slots of a terrain that is despawned or loses its looks' state. Its entities go with it.

@@ -1,19 +1,47 @@
 //! Follows commits: plants go and return in the frame of their ground.
 
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 
-use super::{News, PlantRemoved, PlantReturned, ShownPlants, transform_of};
+use super::{News, NewsList, PlantRemoved, PlantReturned, ShownPlants, transform_of};
 use crate::plugin::{GroundChanged, Places, TerrainEntities};
 use crate::scatter::PlantChange;
 use crate::terrain::Terrain;
+
+/// Tells of plants that go and return.
+#[derive(SystemParam)]
+pub(super) struct PlantMessages<'w> {
+    removed: MessageWriter<'w, PlantRemoved>,
+    returned: MessageWriter<'w, PlantReturned>,
+}
+
+impl PlantMessages<'_> {
+    /// Writes a message for each change of a terrain's plants, and the news for what draws them.
+    pub fn tell(
+        &mut self,
+        terrain: Entity,
+        place: &GlobalTransform,
+        changes: Vec<PlantChange>,
+        news: &mut NewsList,
+    ) {
+        for change in changes {
+            let (plant, transform) = (change.plant, transform_of(&change.plant, place));
+            if change.stands {
+                self.returned.write(PlantReturned { terrain, plant, transform });
+            } else {
+                self.removed.write(PlantRemoved { terrain, plant, transform });
+            }
+            news.push(News::Changed(change));
+        }
+    }
+}
 
 /// Checks the plants whose ground a commit changed in this frame.
 pub(super) fn follow_commits(
     mut changed: MessageReader<GroundChanged>,
     mut terrains: Query<(&Terrain, &TerrainEntities, &mut ShownPlants)>,
     places: Places,
-    mut removed: MessageWriter<PlantRemoved>,
-    mut returned: MessageWriter<PlantReturned>,
+    mut messages: PlantMessages,
 ) {
     for GroundChanged { terrain, versions: [before, after], boxes } in changed.read() {
         let Ok((model, _, mut shown)) = terrains.get_mut(*terrain) else { continue };
@@ -36,15 +64,6 @@ pub(super) fn follow_commits(
         if changes.is_empty() {
             continue;
         }
-        let place = places.of(*terrain).unwrap_or_default();
-        for change in changes {
-            let (terrain, plant, transform) = (*terrain, change.plant, transform_of(&change.plant, &place));
-            if change.stands {
-                returned.write(PlantReturned { terrain, plant, transform });
-            } else {
-                removed.write(PlantRemoved { terrain, plant, transform });
-            }
-            news.push(News::Changed(change));
-        }
+        messages.tell(*terrain, &places.of(*terrain).unwrap_or_default(), changes, news);
     }
 }

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::Allow;
 use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
+use super::follow::PlantMessages;
 use super::{News, PlantSource, Plants, ShownPlants};
 use crate::plugin::{Places, TerrainEntities};
 use crate::scatter::{PatchPos, Plant, PlantPatches, Scatter};
@@ -36,6 +39,14 @@ pub(super) fn read_rules(mut changed: Query<(Entity, &Plants, &mut ShownPlants),
     }
 }
 
+/// Without rules there are no plants.
+pub(super) fn forget_rules(gone: On<Remove, Plants>, mut terrains: Query<&mut ShownPlants, Allow<Disabled>>) {
+    if let Ok(mut shown) = terrains.get_mut(gone.entity) {
+        shown.clear();
+        free_later(shown.patches.take());
+    }
+}
+
 impl ShownPlants {
     /// Drops all patches.
     fn clear(&mut self) {
@@ -51,6 +62,7 @@ pub(super) fn choose_patches(
     mut terrains: Query<(Entity, &Terrain, &TerrainEntities, &mut ShownPlants)>,
     viewers: Query<(Entity, Option<&PlantSource>), Or<(With<Camera3d>, With<PlantSource>)>>,
     places: Places,
+    mut messages: PlantMessages,
 ) {
     for (entity, terrain, entities, mut shown) in &mut terrains {
         let world = terrain.world();
@@ -66,9 +78,8 @@ pub(super) fn choose_patches(
         let Some(patches) = &mut shown.patches else { continue };
         if shown.version != version {
             // Follows commits that were not seen, where a game gates their systems.
-            for change in patches.update(world, None) {
-                shown.news.push(News::Changed(change));
-            }
+            let changes = patches.update(world, None);
+            messages.tell(entity, &places.of(entity).unwrap_or_default(), changes, &mut shown.news);
             shown.version = version;
         }
         if let Some(LoadTask(task)) = &mut shown.task {

@@ -53,6 +53,7 @@ impl Plugin for PlantsPlugin {
     fn build(&self, app: &mut App) {
         app.add_message::<PlantRemoved>()
             .add_message::<PlantReturned>()
+            .add_observer(load::forget_rules)
             .configure_sets(Update, PlantSystems.in_set(FollowCommits))
             .configure_sets(
                 PostUpdate,

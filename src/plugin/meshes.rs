@@ -130,7 +130,7 @@ impl MeshBuilder {
         }
     }
 
-    /// Builds the mesh of a piece that broke off. It keeps the light of the place that it leaves.
+    /// Builds the mesh of a piece that broke off, in the light that its place has once it is gone.
     pub(super) fn build_piece(&self, bounds: LatticeBox, surface: &SurfaceMesh) -> BuiltMesh {
         let columns = [bounds.min, bounds.max].map(|corner| Column::new(corner.x, corner.z));
         self.build_lit(bounds.min, surface, &mut TileLights::new(Some(self), columns.into()))

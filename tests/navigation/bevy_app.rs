@@ -308,6 +308,53 @@ fn islands_are_those_of_the_ground_after_any_edits() {
     }
 }
 
+#[test]
+fn all_islands_follow_a_game_that_digs_through_the_model_in_each_frame() {
+    let (mut app, archipelago) = empty_app(true);
+    let ground = Ground::flat(512, 512, 10.0).expect("valid");
+    let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    let terrain = app.world_mut().spawn(terrain).id();
+    let area = NavigationArea::Everywhere;
+    let navigation = app.world_mut().spawn(Navigation { terrain, archipelago, agent: AGENT, area }).id();
+    wait_for_tiles(&mut app, navigation);
+    let dig = |app: &mut App, at: Vec3| {
+        let mut model = app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
+        model.apply([Brush::dig(Shape::sphere(at, 3.0))]);
+    };
+    let polygons_at = |app: &App, at: Vec3| {
+        let mut islands = tiles(app.world(), navigation).islands();
+        islands
+            .find(|(pos, ..)| (pos.x, pos.z) == (at.x as i32 / 32, at.z as i32 / 32))
+            .map(|island| island.2.len())
+    };
+    // A pit in a corner, in the middle and in the last corner, and then others in each frame.
+    let pits = [40.0, 250.0, 490.0].map(|at| Vec3::new(at, 10.0, at));
+    assert!(pits.iter().all(|&at| polygons_at(&app, at) == Some(1)));
+    pits.iter().for_each(|&at| dig(&mut app, at));
+    let start = Instant::now();
+    let mut frame = 0;
+    while pits.iter().any(|&at| polygons_at(&app, at) == Some(1)) {
+        assert!(start.elapsed() < Duration::from_secs(300), "islands of dug ground stay");
+        frame += 1;
+        dig(&mut app, Vec3::new(100.0 + (frame % 50) as f32, 10.0, 300.0));
+        app.update();
+    }
+}
+
+#[test]
+fn a_mirrored_terrain_has_no_islands() {
+    let (mut app, [terrain, _, navigation]) = app(true, AGENT);
+    let mirrored = Transform::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    app.world_mut().entity_mut(terrain).insert(mirrored);
+    for _ in 0..10 {
+        app.update();
+    }
+    assert_eq!(island_count(&mut app), 0);
+    app.world_mut().entity_mut(terrain).insert(Transform::IDENTITY);
+    wait_for_tiles(&mut app, navigation);
+    assert_eq!(island_count(&mut app), 9);
+}
+
 /// A thousand agents cross hilly ground that is dug 20 times a second; prints how long frames take.
 ///
 /// ```text

@@ -85,4 +85,13 @@ fn plants_are_drawn_and_gone_with_their_ground() {
     app.update();
     let back = red(&capture::capture(&mut app, &film, TIMEOUT).expect("a picture"));
     assert!((back[0] - before[0]).abs() < 0.02, "{before:?}, then {back:?}");
+    // Without looks nothing is drawn; with them again, everything is.
+    let looks = app.world_mut().entity_mut(terrain).take::<PlantLooks>().expect("looks");
+    app.update();
+    let bare = red(&capture::capture(&mut app, &film, TIMEOUT).expect("a picture"));
+    assert_eq!(bare, [0.0; 2]);
+    app.world_mut().entity_mut(terrain).insert(looks);
+    app.update();
+    let again = red(&capture::capture(&mut app, &film, TIMEOUT).expect("a picture"));
+    assert!((again[0] - before[0]).abs() < 0.02, "{before:?}, then {again:?}");
 }

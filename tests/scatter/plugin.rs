@@ -215,3 +215,39 @@ fn patches_follow_their_sources() {
         assert!(high.x >= 70 && high.z >= 70, "{pos:?}");
     }
 }
+
+#[test]
+fn without_rules_there_are_no_plants() {
+    let (mut app, terrain) = app(false, ());
+    let before = standing(&app, terrain);
+    let hash = |world: &World| world.get::<Terrain>(terrain).expect("a terrain").world().hash();
+    let pristine = hash(app.world());
+    app.world_mut().entity_mut(terrain).remove::<Plants>();
+    app.update();
+    assert!(app.world().get::<ShownPlants>(terrain).expect("state").patches().is_none());
+    dig(&mut app, Vec3::new(48.0, 20.5, 48.0), 3.0);
+    wait(&mut app, |world| hash(world) != pristine);
+    app.world_mut().write_message(Undo::default()).expect("the plugin added it");
+    app.world_mut().entity_mut(terrain).insert(Plants(rules()));
+    wait(&mut app, |world| {
+        let shown = world.get::<ShownPlants>(terrain).expect("state");
+        !shown.is_loading() && shown.patches().is_some_and(|patches| !patches.is_empty())
+    });
+    wait(&mut app, |world| hash(world) == pristine);
+    app.update();
+    assert_eq!(standing(&app, terrain), before);
+}
+
+#[test]
+fn what_a_game_digs_through_the_model_is_told_too() {
+    let (mut app, terrain) = app(false, ());
+    let before = standing(&app, terrain);
+    let mut model = app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
+    model.apply([Brush::dig(Shape::sphere(Vec3::new(48.0, 20.5, 48.0), 5.0))]);
+    app.update();
+    app.update();
+    assert_up_to_date(&app, terrain, "after the dig");
+    let gone = before.len() - standing(&app, terrain).len();
+    assert!(gone > 0);
+    assert_eq!(app.world().resource::<Log>().removed.len(), gone);
+}
