@@ -341,20 +341,6 @@ fn all_islands_follow_a_game_that_digs_through_the_model_in_each_frame() {
     }
 }
 
-#[test]
-fn a_mirrored_terrain_has_no_islands() {
-    let (mut app, [terrain, _, navigation]) = app(true, AGENT);
-    let mirrored = Transform::from_scale(Vec3::new(-1.0, 1.0, 1.0));
-    app.world_mut().entity_mut(terrain).insert(mirrored);
-    for _ in 0..10 {
-        app.update();
-    }
-    assert_eq!(island_count(&mut app), 0);
-    app.world_mut().entity_mut(terrain).insert(Transform::IDENTITY);
-    wait_for_tiles(&mut app, navigation);
-    assert_eq!(island_count(&mut app), 9);
-}
-
 /// A thousand agents cross hilly ground that is dug 20 times a second; prints how long frames take.
 ///
 /// ```text
