@@ -23,7 +23,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A [`MaterialMap`](super::MaterialMap) holds materials: of splat maps, whose channels are weights, and of id maps.
+//! A [`MaterialMap`] holds materials: of splat maps, whose channels are weights, and of id maps.
 //!
 //! **Voids** are samples without a value: NaN, infinity, the value that the file or [`ImportOptions`] declares, and
 //! well-known ones such as -9999 that lie far outside of all others. **Outliers** are single samples far above or below
