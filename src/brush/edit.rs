@@ -229,7 +229,7 @@ impl Edit {
 
     /// At least the number of bricks that the edit may change, where that is known to be much less than the bricks in
     /// its [`reach`](Self::reach).
-    #[cfg_attr(not(feature = "net"), expect(dead_code))]
+    #[cfg_attr(not(feature = "net"), allow(dead_code, reason = "for the prices of servers, and for tests"))]
     pub(crate) fn most_bricks(&self) -> Option<u64> {
         // Every point of a brick that is reached lies within its diagonal.
         let volume = self.shape.volume_within(self.band() + BRICK_DIAGONAL)?;

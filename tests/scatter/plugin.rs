@@ -244,8 +244,7 @@ fn what_a_game_digs_through_the_model_is_told_too() {
     let before = standing(&app, terrain);
     let mut model = app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
     model.apply([Brush::dig(Shape::sphere(Vec3::new(48.0, 20.5, 48.0), 5.0))]);
-    app.update();
-    app.update();
+    wait(&mut app, |world| !world.resource::<Log>().removed.is_empty());
     assert_up_to_date(&app, terrain, "after the dig");
     let gone = before.len() - standing(&app, terrain).len();
     assert!(gone > 0);
