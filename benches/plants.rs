@@ -7,7 +7,7 @@
 //! thread until the frame is handed to the GPU.
 //!
 //! `small` has a tenth of everything, for software renderers. `entities` draws each plant as an entity of its own, with shared
-//! meshes and materials, as Bevy batches them by itself. `grass` and `trees` draw only these. The camera has a depth
+//! meshes and materials, which Bevy batches automatically. `grass` and `trees` draw only these. The camera has a depth
 //! prepass with `prepass`, and no MSAA with `aliased`. `dig` compares digs with plants and without: transaction and commit.
 
 #[path = "../examples/shared/offscreen.rs"]

@@ -17,7 +17,7 @@ use crate::{Options, offscreen};
 /// Time from frame to frame.
 const FRAME: Duration = Duration::from_micros(15_625);
 
-/// Frames after which it is over, whoever has arrived.
+/// The most frames of a run, even if figures are still on their way.
 const FRAMES: u32 = 64 * 90;
 
 /// Plays, and says how it went.

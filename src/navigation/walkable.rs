@@ -70,7 +70,7 @@ impl WalkableTile {
         })
     }
 
-    /// Whether the cell with this floor at its lowest corner is walkable; also of cells beside the tile.
+    /// Whether the cell with this floor at its lowest corner is walkable; also of cells next to the tile.
     pub(super) fn is_walkable(&self, floor: usize) -> bool {
         self.walkable[floor]
     }

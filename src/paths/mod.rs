@@ -1,6 +1,6 @@
 //! Navigation meshes of terrains for [`bevy_landmass`]: a path through a tunnel exists in the frame after the commit that opened it.
 //!
-//! Spawn a [`Navigation`] for each kind of agent, and add the [`NavigationPlugin`] beside
+//! Spawn a [`Navigation`] for each kind of agent, and add the [`NavigationPlugin`] as well as
 //! [`Landmass3dPlugin`](bevy_landmass::Landmass3dPlugin). It turns the [walkable](crate::navigation) ground of each tile into an
 //! island of landmass, in a task, and replaces the islands of tiles that a commit changes. Works with `MinimalPlugins`.
 //!
@@ -107,7 +107,7 @@ pub struct NavigationSource {
 
 /// Options of an archipelago for agents with these settings, in metres, on ground with voxels of this size.
 ///
-/// Agents are found on the ground within a step above and below, and within two voxels beside it: they may be pushed where the
+/// Agents are found on the ground within a step above and below, and within two voxels to its side: they may be pushed where the
 /// mesh, which keeps whole cells from walls, does not reach.
 pub fn archipelago_options(agent: &WalkSettings, voxel_size: f32) -> ArchipelagoOptions<ThreeD> {
     let vertical = agent.step + 2.0 * agent.precision + 0.5 * voxel_size;

@@ -26,7 +26,7 @@ pub struct NavigationTiles {
     /// Tiles that are not being built yet.
     pub(super) missing: Vec<NavTilePos>,
     pub(super) builds: Vec<Build>,
-    /// Number of builds so far.
+    /// The number of the latest build.
     pub(super) count: u64,
     /// The sources of the last choice.
     pub(super) sources: Vec<(Vec2, f32)>,

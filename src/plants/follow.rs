@@ -8,7 +8,7 @@ use crate::plugin::{GroundChanged, Places, TerrainEntities};
 use crate::scatter::PlantChange;
 use crate::terrain::Terrain;
 
-/// Tells of plants that go and return.
+/// Sends the messages of plants that go and return.
 #[derive(SystemParam)]
 pub(super) struct PlantMessages<'w> {
     removed: MessageWriter<'w, PlantRemoved>,

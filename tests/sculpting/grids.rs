@@ -155,7 +155,7 @@ fn a_grid_of_a_ball_is_that_ball_at_any_rotation_and_scale() {
             let [found, exact] = [&edit, &ball].map(|edit| edit.evaluator().distance(point));
             let cell = 256.0 * scale;
             if exact as f32 > 2.5 * cell {
-                // Outside the grid, what is known is how far the grid is.
+                // Outside the grid, only the distance to the grid is known.
                 assert!(found as f32 > cell && found <= exact + cell as i32 / 4, "{found}, not {exact}");
                 continue;
             }

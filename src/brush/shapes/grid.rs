@@ -245,7 +245,7 @@ impl QuantizedGrid {
         &self.samples.0
     }
 
-    /// The same place with another grid, which an image holds. An image of 2 x 2 black samples stands for one that is
+    /// Replaces the grid by that of an image and keeps the place. An image of 2 x 2 black samples stands for one that is
     /// still to come: the shape is empty.
     pub fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
         let shape = Self { samples: ImageSamples(image), ..self };

@@ -34,8 +34,8 @@ pub struct MeshGrid {
 impl ShapeGrid {
     /// The grid of a closed mesh, with this many samples along its longest side: 8 to 128.
     ///
-    /// Inside is what the mesh's winding number is not 0 for, whichever way it faces; so parts may overlap. Vertices at
-    /// the same place count as one. Distances are exact within two cells of the surface, and roughly right beyond.
+    /// Inside is what the mesh's winding number is not 0 for, whichever way it faces; so parts may overlap. Vertices with
+    /// equal positions count as one. Distances are exact within two cells of the surface, and roughly right beyond.
     ///
     /// ```
     /// use bevy_burrow::prelude::*;
