@@ -167,22 +167,10 @@ impl ShapeGeometry for Curve<Units> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::round_cone::to_balls;
     use super::*;
     use crate::brush::{Brush, Edit};
     use fastrand::Rng;
-    use glam::DVec3;
-
-    /// Distance to the hull of two balls, by the best of many balls between them.
-    fn to_balls(p: DVec3, from: (DVec3, f64), to: (DVec3, f64)) -> f64 {
-        let ball = |t: f64| p.distance(from.0.lerp(to.0, t)) - (from.1 + (to.1 - from.1) * t);
-        // The distance is convex in t.
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..100 {
-            let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
-            if ball(a) < ball(b) { high = b } else { low = a }
-        }
-        ball(low.midpoint(high))
-    }
 
     /// Random points of a path, with their radii.
     fn path(rng: &mut Rng, count: usize) -> Vec<(Vec3, f32)> {

@@ -280,6 +280,7 @@ impl ShapeGeometry for QuantizedPath {
 mod tests {
     use fastrand::Rng;
 
+    use super::super::round_cone::to_balls;
     use super::*;
     use crate::brush::shapes::CustomShape;
     use crate::brush::shapes::union::Piece;
@@ -303,18 +304,6 @@ mod tests {
             })
             .collect();
         if rng.bool() { BrushPath::spline(points) } else { BrushPath::polyline(points) }
-    }
-
-    /// Distance to the hull of two balls, by the best of many balls between them.
-    fn to_balls(p: DVec3, from: (DVec3, f64), to: (DVec3, f64)) -> f64 {
-        let ball = |t: f64| p.distance(from.0.lerp(to.0, t)) - (from.1 + (to.1 - from.1) * t);
-        // The distance is convex in t.
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..100 {
-            let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
-            if ball(a) < ball(b) { high = b } else { low = a }
-        }
-        ball(low.midpoint(high))
     }
 
     /// The ends of the pieces of a path by their definition, from the brush's own numbers, in voxels.

@@ -61,3 +61,16 @@ impl Piece for RoundCone {
         Bounds::around(self.from, self.radii[0]).union(Bounds::around(to, self.radii[1]))
     }
 }
+
+/// Distance to the hull of two balls, by the best of many balls between them.
+#[cfg(test)]
+pub(super) fn to_balls(p: glam::DVec3, from: (glam::DVec3, f64), to: (glam::DVec3, f64)) -> f64 {
+    let ball = |t: f64| p.distance(from.0.lerp(to.0, t)) - (from.1 + (to.1 - from.1) * t);
+    // The distance is convex in t.
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..100 {
+        let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+        if ball(a) < ball(b) { high = b } else { low = a }
+    }
+    ball(low.midpoint(high))
+}
