@@ -341,6 +341,20 @@ fn all_islands_follow_a_game_that_digs_through_the_model_in_each_frame() {
     }
 }
 
+#[test]
+fn a_terrain_that_a_parent_mirrors_has_no_islands() {
+    let (mut app, [terrain, _, navigation]) = app(true, AGENT);
+    let parent = app.world_mut().spawn(Transform::from_scale(Vec3::new(-1.0, 1.0, 1.0))).id();
+    app.world_mut().entity_mut(terrain).insert(ChildOf(parent));
+    for _ in 0..10 {
+        app.update();
+    }
+    assert_eq!(island_count(&mut app), 0);
+    app.world_mut().entity_mut(terrain).remove::<ChildOf>();
+    wait_for_tiles(&mut app, navigation);
+    assert_eq!(island_count(&mut app), 9);
+}
+
 /// A thousand agents cross hilly ground that is dug 20 times a second; prints how long frames take.
 ///
 /// ```text
