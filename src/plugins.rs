@@ -13,7 +13,7 @@ use crate::plugin::{HeightmapPlugin, TerrainPlugin};
 /// | plugin | what it does |
 /// | --- | --- |
 /// | [`TerrainPlugin`] | transactions, entities, messages |
-/// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
+/// | [`HeightmapPlugin`] | asset loaders for heightmap images and, with the feature `format`, whole grounds, where there is an `AssetPlugin` |
 /// | `TerrainPickingPlugin` | hits of pointers on the ground, for `bevy_picking` (feature `picking`) |
 /// | `SavePlugin` | saves worlds of terrains with a `SavedWorld` (feature `store`) |
 /// | `TerrainMaterialPlugin<StandardMaterial>` | propagates materials to tiles, chunks and pieces (feature `render`) |

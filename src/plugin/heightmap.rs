@@ -82,14 +82,15 @@ impl AssetLoader for HeightmapLoader {
 }
 
 /// Reads a file up to one byte past the limit; the decoder reports what is wrong.
-async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, std::io::Error> {
+pub(super) async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, std::io::Error> {
     use bevy::tasks::futures_lite::AsyncReadExt;
     let mut bytes = Vec::new();
     reader.take(limit.saturating_add(1)).read_to_end(&mut bytes).await?;
     Ok(bytes)
 }
 
-/// Adds the heightmap asset and its loader, where there is an asset server.
+/// Adds the assets of heightmaps, and with the feature `format` of whole [grounds](super::GroundAsset), with their loaders, where there is
+/// an asset server.
 #[derive(Default)]
 pub struct HeightmapPlugin;
 
@@ -118,5 +119,9 @@ fn register(app: &mut App) {
             app.init_asset::<HeightmapImage>();
         }
         app.insert_resource(Registered).init_asset_loader::<HeightmapLoader>();
+        #[cfg(feature = "format")]
+        app.init_asset::<super::GroundAsset>()
+            .init_asset_loader::<super::GroundLoader>()
+            .add_systems(Update, super::ground_file::follow_ground_files.before(super::BeforeLoad::Worlds));
     }
 }
