@@ -6,6 +6,7 @@ use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
 use super::blend::QuantizedBlend;
+use super::content::{Content, ContentMut};
 use super::paste::PasteSource;
 use super::quantized_operation::QuantizedOperation;
 use super::roughness::QuantizedRoughness;
@@ -13,7 +14,7 @@ use super::sculpt_kernel::SculptKernel;
 use super::shapes::QuantizedShape;
 use super::{
     BAND, Blend, Brush, BrushError, CustomShape, Evaluator, FULL_POWER, Kind, Operation, Prefab, Roughness,
-    Shape,
+    Shape, ShapeGrid,
 };
 use crate::ground::GreyImage;
 use crate::lattice::{LatticeBox, ONE};
@@ -39,8 +40,8 @@ const BRICK_DIAGONAL: i32 = 14 * ONE;
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Edit {
-    shape: QuantizedShape,
-    operation: QuantizedOperation,
+    pub(super) shape: QuantizedShape,
+    pub(super) operation: QuantizedOperation,
     /// `None` unless the operation sculpts.
     blend: Option<QuantizedBlend>,
     power: u8,
@@ -73,8 +74,8 @@ fn full_power() -> u8 {
 fn check_together(shape: &QuantizedShape, operation: &Operation) -> Result<(), BrushError> {
     match operation {
         Operation::Road if shape.road().is_none() => Err(BrushError::NoCorridor),
-        // An edit has one image that networks send by its name.
-        Operation::Stamp { .. } if shape.image().is_some() => Err(BrushError::StampInGrid),
+        // `stamp_image` names one image.
+        Operation::Stamp { .. } if shape.grid().is_some() => Err(BrushError::StampInGrid),
         _ => Ok(()),
     }
 }
@@ -180,18 +181,23 @@ impl Edit {
 
     /// The image of the stamp, if it is one; of a [`ShapeGrid`](super::ShapeGrid), the image that holds its samples.
     pub fn stamp_image(&self) -> Option<&Arc<GreyImage>> {
-        self.shape.image().or_else(|| self.operation.stamp_image())
+        self.shape.grid().map(ShapeGrid::image).or_else(|| self.operation.stamp_image())
     }
 
     /// The edit with another image, if it is a stamp or its shape is a grid; otherwise as it is.
     ///
     /// # Errors
-    /// When the image has a size that no stamp may have, or holds no grid.
-    pub fn with_stamp_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
-        if self.shape.image().is_some() {
-            return Ok(Self { shape: self.shape.with_image(image)?, ..self });
+    /// When the image has a size that no stamp may have, or holds no grid, or one that is too large at this scale.
+    pub fn with_stamp_image(mut self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        for place in self.contents_mut() {
+            match place {
+                ContentMut::Grid(grid) => *grid = ShapeGrid::in_image(Arc::clone(&image)),
+                ContentMut::Image(own) => *own = Arc::clone(&image),
+                ContentMut::Prefab(_) => {}
+            }
         }
-        Ok(Self { operation: self.operation.with_stamp_image(image)?, ..self })
+        self.check()?;
+        Ok(self)
     }
 
     /// The prefab, if it pastes one.
@@ -199,11 +205,16 @@ impl Edit {
         self.operation.prefab()
     }
 
-    /// The edit with another prefab, if it pastes one; otherwise as it is.
-    #[cfg(feature = "net")]
-    #[must_use]
-    pub(crate) fn with_prefab(self, prefab: Arc<Prefab>) -> Self {
-        Self { operation: self.operation.with_prefab(prefab), ..self }
+    /// Everything that a name can stand for, in the order in which names are written.
+    #[cfg_attr(not(feature = "format"), allow(dead_code, reason = "for messages and journals"))]
+    pub(crate) fn contents(&self) -> impl Iterator<Item = Content<'_>> {
+        self.shape.grid().map(Content::Grid).into_iter().chain(self.operation.content())
+    }
+
+    /// The places of [`contents`](Self::contents), in the same order. The edit has to be [checked](Self::check) once
+    /// they have other content.
+    pub(crate) fn contents_mut(&mut self) -> impl Iterator<Item = ContentMut<'_>> {
+        self.shape.grid_mut().map(ContentMut::Grid).into_iter().chain(self.operation.content_mut())
     }
 
     /// The samples that it pastes, if it does.

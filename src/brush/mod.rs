@@ -92,6 +92,7 @@
 //! [`REACH`]: crate::lattice::REACH
 
 mod blend;
+mod content;
 mod edit;
 mod error;
 mod evaluator;
@@ -114,6 +115,8 @@ mod stamp;
 mod voxel_count;
 
 pub use blend::Blend;
+#[cfg(feature = "format")]
+pub(crate) use content::{Content, ContentMut};
 pub use edit::Edit;
 pub use error::BrushError;
 #[doc(hidden)]

@@ -212,9 +212,8 @@ impl QuantizedPaste {
         &self.prefab
     }
 
-    #[cfg(feature = "net")]
-    pub fn with_prefab(self, prefab: Arc<Prefab>) -> Self {
-        Self { prefab, ..self }
+    pub fn prefab_mut(&mut self) -> &mut Arc<Prefab> {
+        &mut self.prefab
     }
 
     /// Ready to be evaluated.

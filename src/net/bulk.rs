@@ -2,7 +2,7 @@
 //! limits.
 
 use super::message::{MAX_TO_CLIENT, ToClient};
-use super::stamps::Stamps;
+use super::Stamps;
 use crate::format::FormatError;
 use crate::format::bytes::{Reader, put_bytes};
 use crate::ground::Ground;

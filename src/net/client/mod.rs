@@ -30,7 +30,7 @@ use super::message::{
 };
 use super::price::{UNDO, UNDO_BYTES, cost};
 use super::replica::{Replica, ShownChange};
-use super::stamps::Stamps;
+use super::Stamps;
 use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;

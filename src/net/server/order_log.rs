@@ -91,7 +91,7 @@ mod tests {
     use super::*;
     use crate::ground::Ground;
     use crate::net::message::{Entries, ToClient};
-    use crate::net::stamps::Stamps;
+    use crate::net::Stamps;
     use crate::terrain::{LooseSettings, Order};
 
     /// Every third entry is a mark, and the others are loose settings.

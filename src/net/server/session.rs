@@ -8,7 +8,7 @@ use super::sender::{BulkSender, OrderSender};
 use super::settings::ServerSettings;
 use crate::lattice::RegionPos;
 use crate::net::message::Hello;
-use crate::net::stamps::StampId;
+use crate::net::StampId;
 use crate::terrain::World;
 
 /// If a client for which a world is kept acknowledges nothing for this time, its session starts again.

@@ -1,0 +1,169 @@
+//! A table of the images, grids and prefabs that edits hold, by name. Messages and journals write names in their place.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+use xxhash_rust::xxh3::Xxh3Default;
+
+use super::error::FormatError;
+use super::ids::StampId;
+use super::prefab::packed_prefab;
+use crate::brush::{BrushError, Content, ContentMut, Edit, Prefab, ShapeGrid};
+use crate::ground::GreyImage;
+
+/// Most bytes of a prefab's file that is sent.
+const MAX_PREFAB: usize = 4 << 20;
+
+impl StampId {
+    /// The name of an image: a hash of its size and samples. It is computed once for each image.
+    pub fn of(image: &GreyImage) -> Self {
+        Self(image.hash_with(|image| {
+            let mut hash = Xxh3Default::new();
+            hash.update(&image.width().to_le_bytes());
+            hash.update(&image.height().to_le_bytes());
+            let samples = image.samples().chunks(256);
+            samples.for_each(|some| {
+                let bytes: Vec<u8> = some.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+                hash.update(&bytes);
+            });
+            hash.digest()
+        }))
+    }
+
+    /// The name of a prefab: its hash.
+    pub fn of_prefab(prefab: &Prefab) -> Self {
+        Self(prefab.hash())
+    }
+
+    /// The name of a content.
+    pub(crate) fn of_content(content: Content) -> Self {
+        match content {
+            Content::Image(image) => Self::of(image),
+            Content::Grid(grid) => Self::of(grid.image()),
+            Content::Prefab(prefab) => Self::of_prefab(prefab),
+        }
+    }
+}
+
+/// An edit whose names were looked up in a table.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Resolved {
+    /// The edit, with placeholders where content is missing or its limits are broken.
+    pub edit: Edit,
+    /// The names of content that the table lacks.
+    pub missing: Vec<StampId>,
+    /// Why the edit is beyond the limits of edits with this content.
+    pub refused: Option<BrushError>,
+}
+
+impl Resolved {
+    /// The edit, if it is whole and within every limit.
+    pub fn whole(self) -> Result<Edit, FormatError> {
+        match (self.missing.first(), self.refused) {
+            (Some(name), _) => Err(FormatError::ContentMissing(*name)),
+            (None, Some(error)) => Err(FormatError::Edit(error.to_string())),
+            (None, None) => Ok(self.edit),
+        }
+    }
+}
+
+/// The images that stamps may have, and the prefabs that may be pasted. A client sends no edits with others, and a server
+/// refuses them. Clients that lack one of the server's get it at its first use, so only players that use them need
+/// their own.
+#[derive(Clone, Debug, Default)]
+pub struct Stamps {
+    images: FxHashMap<StampId, Arc<GreyImage>>,
+    /// Images that hold a grid.
+    grids: FxHashMap<StampId, ShapeGrid>,
+    prefabs: FxHashMap<StampId, Arc<Prefab>>,
+}
+
+impl Stamps {
+    /// Adds an image.
+    pub fn add(&mut self, image: impl Into<Arc<GreyImage>>) -> StampId {
+        let image = image.into();
+        let id = StampId::of(&image);
+        if self.images.insert(id, Arc::clone(&image)).is_none() {
+            let grid = ShapeGrid::in_image(image);
+            self.grids.extend(grid.is_grid().then_some((id, grid)));
+        }
+        id
+    }
+
+    /// Adds a prefab; `None` for one that is too large to be sent: its [file](super::write_prefab) takes more than
+    /// 4 MiB.
+    pub fn add_prefab(&mut self, prefab: impl Into<Arc<Prefab>>) -> Option<StampId> {
+        let prefab = prefab.into();
+        (packed_prefab(&prefab).len() <= MAX_PREFAB).then(|| self.insert_prefab(prefab))
+    }
+
+    fn insert_prefab(&mut self, prefab: Arc<Prefab>) -> StampId {
+        let id = StampId::of_prefab(&prefab);
+        self.prefabs.insert(id, prefab);
+        id
+    }
+
+    /// Adds all images and prefabs of others.
+    pub fn add_all(&mut self, others: &Self) {
+        self.images.extend(others.images.iter().map(|(id, image)| (*id, Arc::clone(image))));
+        self.grids.extend(others.grids.iter().map(|(id, grid)| (*id, grid.clone())));
+        self.prefabs.extend(others.prefabs.iter().map(|(id, prefab)| (*id, Arc::clone(prefab))));
+    }
+
+    /// The image of this name.
+    pub fn get(&self, id: StampId) -> Option<&Arc<GreyImage>> {
+        self.images.get(&id)
+    }
+
+    /// The prefab of this name.
+    pub fn prefab(&self, id: StampId) -> Option<&Arc<Prefab>> {
+        self.prefabs.get(&id)
+    }
+
+    /// Whether the edit can be sent: every content that it has is in the list.
+    pub fn can_send(&self, edit: &Edit) -> bool {
+        edit.contents().all(|content| match content {
+            Content::Image(image) => self.images.contains_key(&StampId::of(image)),
+            Content::Grid(grid) => self.grids.contains_key(&StampId::of(grid.image())),
+            Content::Prefab(prefab) => self.prefabs.contains_key(&StampId::of_prefab(prefab)),
+        })
+    }
+
+    /// Puts the content of a name in its place. `Ok(false)` if the table lacks it.
+    fn put(&self, name: StampId, place: ContentMut) -> Result<bool, FormatError> {
+        let found = match place {
+            ContentMut::Image(own) => self.images.get(&name).map(|image| *own = Arc::clone(image)),
+            // An image that holds no grid will never hold one.
+            ContentMut::Grid(_) if self.images.contains_key(&name) && !self.grids.contains_key(&name) => {
+                return Err(FormatError::Edit(BrushError::NoGrid.to_string()));
+            }
+            ContentMut::Grid(own) => self.grids.get(&name).map(|grid| *own = grid.clone()),
+            ContentMut::Prefab(own) => self.prefabs.get(&name).map(|prefab| *own = Arc::clone(prefab)),
+        };
+        Ok(found.is_some())
+    }
+
+    /// Replaces the placeholders of an edit by the content of their names, and checks the edit again.
+    pub(crate) fn resolve(&self, named: Edit, names: &[StampId]) -> Result<Resolved, FormatError> {
+        let (mut edit, mut missing) = (named.clone(), Vec::new());
+        for (place, &name) in edit.contents_mut().zip(names) {
+            if !place.is_clear() {
+                return Err(FormatError::Invalid("edit: content next to its name"));
+            }
+            if !self.put(name, place)? {
+                missing.push(name);
+            }
+        }
+        let refused = if missing.is_empty() { edit.check().err() } else { None };
+        let edit = if refused.is_some() { named } else { edit };
+        Ok(Resolved { edit, missing, refused })
+    }
+}
+
+/// The names of an edit's content, and the edit with placeholders.
+pub(crate) fn named(edit: &Edit) -> (Vec<StampId>, Edit) {
+    let names = edit.contents().map(StampId::of_content).collect();
+    let mut edit = edit.clone();
+    edit.contents_mut().for_each(|mut place| place.clear());
+    (names, edit)
+}
