@@ -69,6 +69,13 @@ impl Batch {
         edits.flat_map(|edit| edit.contents()).map(|content| (StampId::of_content(content), content))
     }
 
+    /// A table of the content of its edits.
+    pub(crate) fn table(&self) -> Stamps {
+        let mut contents = Stamps::default();
+        self.contents().for_each(|(_, content)| contents.add_content(content));
+        contents
+    }
+
     /// The names with which the bytes of [`encode_named`](Self::encode_named) begin.
     pub(crate) fn names(bytes: &[u8]) -> Result<Vec<StampId>, FormatError> {
         read_names(&mut Reader(bytes))

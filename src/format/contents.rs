@@ -1,13 +1,20 @@
 //! A table of the images, grids and prefabs that edits hold, by name. Messages and journals write names in their place.
 
+#[cfg(feature = "store")]
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 use xxhash_rust::xxh3::Xxh3Default;
 
+use super::bytes::{Reader, put_number};
 use super::error::FormatError;
 use super::ids::StampId;
+#[cfg(feature = "store")]
+use super::ids::{Kind, WorldId};
 use super::prefab::packed_prefab;
+#[cfg(feature = "store")]
+use super::{bytes::put_bytes, frame, prefab::read_prefab};
 use crate::brush::{BrushError, Content, ContentMut, Edit, Prefab, ShapeGrid};
 use crate::ground::GreyImage;
 
@@ -44,6 +51,12 @@ impl StampId {
         }
     }
 }
+
+/// The key of every image's frame, and most bytes of one: no stamp and no grid has a larger image.
+#[cfg(feature = "store")]
+const IMAGE: &[u8] = b"image";
+#[cfg(feature = "store")]
+const MAX_IMAGE: usize = (4 << 20) + (64 << 10);
 
 /// An edit whose names were looked up in a table.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,6 +142,60 @@ impl Stamps {
         })
     }
 
+    /// Adds a content of an edit.
+    pub(crate) fn add_content(&mut self, content: Content) {
+        match content {
+            Content::Image(image) => drop(self.add(Arc::clone(image))),
+            Content::Grid(grid) => {
+                let name = self.names_grid(grid);
+                self.images.insert(name, Arc::clone(grid.image()));
+            }
+            Content::Prefab(prefab) => drop(self.insert_prefab(Arc::clone(prefab))),
+        }
+    }
+
+    fn names_grid(&mut self, grid: &ShapeGrid) -> StampId {
+        let name = StampId::of(grid.image());
+        self.grids.entry(name).or_insert_with(|| grid.clone());
+        name
+    }
+
+    /// The names in it, in order.
+    #[cfg(feature = "store")]
+    pub(crate) fn names(&self) -> BTreeSet<StampId> {
+        self.images.keys().chain(self.prefabs.keys()).copied().collect()
+    }
+
+    /// Whether it has content of this name.
+    #[cfg(feature = "store")]
+    pub(crate) fn has(&self, name: StampId) -> bool {
+        self.images.contains_key(&name) || self.prefabs.contains_key(&name)
+    }
+
+    /// Adds what [`content_file`] wrote. Returns `false` if the bytes are not what this name stands for.
+    #[cfg(feature = "store")]
+    pub(crate) fn add_file(&mut self, name: StampId, bytes: &[u8]) -> bool {
+        let mut reader = Reader(bytes);
+        let read = |reader: &mut Reader| -> Result<Self, FormatError> {
+            let mut found = Self::default();
+            while !reader.0.is_empty() {
+                let part = reader.bytes()?;
+                match frame::open(part, Kind::Image, WorldId::default(), IMAGE, MAX_IMAGE) {
+                    Ok(opened) => drop(found.add(read_image(&mut Reader(&opened.payload))?)),
+                    Err(_) => drop(found.insert_prefab(Arc::new(read_prefab(part)?))),
+                }
+            }
+            Ok(found)
+        };
+        match read(&mut reader) {
+            Ok(found) if found.names() == BTreeSet::from([name]) => {
+                self.add_all(&found);
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// Puts the content of a name in its place. `Ok(false)` if the table lacks it.
     fn put(&self, name: StampId, place: ContentMut) -> Result<bool, FormatError> {
         let found = match place {
@@ -166,4 +233,39 @@ pub(crate) fn named(edit: &Edit) -> (Vec<StampId>, Edit) {
     let mut edit = edit.clone();
     edit.contents_mut().for_each(|mut place| place.clear());
     (names, edit)
+}
+
+/// The bytes of a file with the content of a name.
+#[cfg(feature = "store")]
+pub(crate) fn content_file(contents: &Stamps, name: StampId) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if let Some(image) = contents.get(name) {
+        let mut payload = Vec::new();
+        put_image(&mut payload, image);
+        put_bytes(&mut bytes, &frame::seal(Kind::Image, WorldId::default(), IMAGE, 0, 0, &payload));
+    }
+    if let Some(prefab) = contents.prefab(name) {
+        put_bytes(&mut bytes, packed_prefab(prefab));
+    }
+    bytes
+}
+
+/// Appends an image.
+pub(crate) fn put_image(to: &mut Vec<u8>, image: &GreyImage) {
+    put_number(to, image.width().into());
+    put_number(to, image.height().into());
+    image.samples().iter().for_each(|sample| to.extend_from_slice(&sample.to_le_bytes()));
+}
+
+/// Reads what [`put_image`] appended, up to the end.
+pub(crate) fn read_image(reader: &mut Reader) -> Result<Arc<GreyImage>, FormatError> {
+    let invalid = FormatError::Invalid("image");
+    let mut side = || u32::try_from(reader.number()?).map_err(|_| FormatError::Invalid("number"));
+    let [width, height] = [side()?, side()?];
+    let (samples, rest) = std::mem::take(&mut reader.0).as_chunks();
+    if !rest.is_empty() {
+        return Err(invalid);
+    }
+    let samples = samples.iter().map(|sample| u16::from_le_bytes(*sample)).collect();
+    GreyImage::from_samples(width, height, samples).map(Arc::new).map_err(|_| invalid)
 }

@@ -12,12 +12,12 @@ use super::{StampId, Stamps};
 use crate::brush::Edit;
 use crate::format::bytes::{Reader, put_bytes, put_number};
 use crate::format::change::{put_change, read_change};
-use crate::format::contents::Resolved;
+use crate::format::contents::{Resolved, put_image, read_image};
 use crate::format::edits::EditSequence;
 use crate::format::prefab::packed_prefab;
 use crate::format::fields::{point, put_point};
 use crate::format::{FormatError, WorldId, decode_region, encode_region, plain, read_prefab};
-use crate::ground::{GreyImage, Ground};
+use crate::ground::Ground;
 use crate::lattice::RegionPos;
 use crate::terrain::Order;
 use crate::volume::DiggingRules;
@@ -261,9 +261,7 @@ impl ToClient {
             Self::Greet => to.push(GREET),
             Self::Image(image) => {
                 to.push(IMAGE);
-                put_number(&mut to, image.width().into());
-                put_number(&mut to, image.height().into());
-                image.samples().iter().for_each(|sample| to.extend_from_slice(&sample.to_le_bytes()));
+                put_image(&mut to, image);
             }
             Self::Prefab(prefab) => {
                 to.push(PREFAB);
@@ -343,17 +341,6 @@ impl ToClient {
         reader.end()?;
         Ok((message, missing))
     }
-}
-
-fn read_image(reader: &mut Reader) -> Result<Arc<GreyImage>, FormatError> {
-    let [width, height] = [small(reader)?, small(reader)?];
-    let (samples, rest) = std::mem::take(&mut reader.0).as_chunks();
-    if !rest.is_empty() {
-        return Err(FormatError::Invalid("image"));
-    }
-    let samples = samples.iter().map(|sample| u16::from_le_bytes(*sample)).collect();
-    let image = GreyImage::from_samples(width, height, samples);
-    image.map(Arc::new).map_err(|_| FormatError::Invalid("image"))
 }
 
 fn within(length: usize, limit: usize) -> Result<(), FormatError> {

@@ -137,7 +137,7 @@ pub(super) fn recover(
     let empty = || -> Result<Terrain, StoreError> { Ok(BaseLevel::first(level, ground, &settings)?) };
     if !is_same_base && base_changed == BaseChanged::Replay && is_contiguous {
         let work = replaying(progress, &whole);
-        let replayed = replay_good(empty, &GameData::new(), &whole, false, &work)?;
+        let replayed = replay_good(empty, &GameData::new(), &whole, &contents.named, false, &work)?;
         let regions = changed_regions(contents, &checkpoint, ground, level).len();
         let mut recovered = Recovered::whole(replayed, level, &checkpoint);
         recovered.findings.base_changed = Some((regions, "replayed"));
@@ -162,7 +162,7 @@ pub(super) fn recover(
     let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
     if is_same_base && !is_exact && is_log_whole {
         let work = replaying(progress, &whole);
-        let replayed = replay_good(empty, &GameData::new(), &whole, true, &work)?;
+        let replayed = replay_good(empty, &GameData::new(), &whole, &contents.named, true, &work)?;
         // Behind what can't be replayed, the checkpoint may know more.
         if replayed.frame >= checkpoint.frame {
             let mut recovered = Recovered::whole(replayed, level, &checkpoint);
@@ -183,7 +183,7 @@ pub(super) fn recover(
             None => Ok(restore(parts.clone())?),
         }
     };
-    let replayed = replay_good(begin, &game, &tail, is_checked, &work)?;
+    let replayed = replay_good(begin, &game, &tail, &contents.named, is_checked, &work)?;
     let frame = replayed.frame.max(checkpoint.frame);
     let regions = changed_regions(contents, &checkpoint, ground, level).len();
     if is_checked {
@@ -289,7 +289,6 @@ mod tests {
     use super::super::{SimulatedDisk, Store};
     use super::*;
     use crate::brush::{Brush, Shape};
-    use crate::format::Batch;
     use crate::format::frame::WorldId;
 
     /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,
@@ -299,7 +298,7 @@ mod tests {
             let found = segment::read(disk, Some(world), number).unwrap();
             disk.damage(&segment::path(number), |bytes| {
                 for frame in found.frames.iter().rev() {
-                    let mut batch = Batch::decode(&frame.payload().unwrap(), ground).unwrap();
+                    let mut batch = frame.batch(ground, &Default::default()).unwrap();
                     batch.commits.iter_mut().for_each(|record| record.hash ^= 1);
                     let revision = batch.commits.last().map_or(0, |record| record.revision);
                     let entry =
