@@ -240,6 +240,13 @@ impl Edit {
         }
     }
 
+    /// Whether it certainly changes none of these samples: of a path, whose box is mostly empty, also those far from its
+    /// pieces.
+    pub(crate) fn misses(&self, samples: LatticeBox) -> bool {
+        let Some(samples) = self.reach().intersection(samples) else { return true };
+        self.most_bricks().is_some() && self.evaluator().is_out_of_reach(samples)
+    }
+
     /// Distance outside the shape up to which samples may change.
     fn band(&self) -> i32 {
         // Two more units for the rounding of the distance.
@@ -248,7 +255,6 @@ impl Edit {
 
     /// At least the number of bricks that the edit may change, where that is known to be much less than the bricks in
     /// its [`reach`](Self::reach).
-    #[cfg_attr(not(feature = "net"), allow(dead_code, reason = "for the prices of servers, and for tests"))]
     pub(crate) fn most_bricks(&self) -> Option<u64> {
         // Every point of a brick that is reached lies within its diagonal.
         let volume = self.shape.volume_within(self.band() + BRICK_DIAGONAL)?;

@@ -453,6 +453,48 @@ impl OrderWriter {
     }
 }
 
+/// Writes edits of a client into messages that a server reads: of at most [`MAX_EDITS`] edits and [`MAX_TO_SERVER`] bytes.
+#[derive(Debug, Default)]
+pub(super) struct EditWriter {
+    first: u64,
+    count: u64,
+    bytes: Vec<u8>,
+    coder: EditSequence,
+}
+
+impl EditWriter {
+    /// Bytes before the edits: a tag and two numbers.
+    const HEAD: usize = 1 + 10 + 10;
+
+    /// Adds an edit; returns the message before it, if the edit does not fit in or does not follow on it.
+    pub fn put(&mut self, sequence: u64, edit: &Edit) -> Option<Vec<u8>> {
+        let has_room = self.count < MAX_EDITS as u64 && sequence == self.first.wrapping_add(self.count);
+        let mut before = if has_room { None } else { self.finish() };
+        let at = self.bytes.len();
+        put_edit(&mut self.bytes, &[], edit, &mut self.coder);
+        if at > 0 && self.bytes.len() > MAX_TO_SERVER - Self::HEAD {
+            self.bytes.truncate(at);
+            before = self.finish();
+            put_edit(&mut self.bytes, &[], edit, &mut self.coder);
+        }
+        if self.count == 0 {
+            self.first = sequence;
+        }
+        self.count += 1;
+        before
+    }
+
+    /// The message of what was added since the last one, if anything was.
+    pub fn finish(&mut self) -> Option<Vec<u8>> {
+        let Self { first, count, bytes, .. } = std::mem::take(self);
+        let mut message = vec![EDITS];
+        put_number(&mut message, first);
+        put_number(&mut message, count);
+        message.extend(bytes);
+        (count > 0).then_some(message)
+    }
+}
+
 /// Compresses a message to a client, if that makes it shorter.
 pub(super) fn pack(message: &[u8]) -> Vec<u8> {
     if message.len() > MAX_PACKED {
