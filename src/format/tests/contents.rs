@@ -91,3 +91,19 @@ fn content_is_within_the_limits_of_edits_wherever_it_comes_from() {
     let replaced = edit.with_stamp_image(std::sync::Arc::clone(large.image()));
     assert!(matches!(replaced, Err(BrushError::TooLarge { what: "box", .. })));
 }
+
+#[test]
+fn a_prefab_is_packed_once() {
+    use crate::format::prefab::packed_prefab;
+    use crate::format::{read_prefab, write_prefab};
+    let edits = edits();
+    let prefab = edits[1].prefab().unwrap();
+    let unpacked = prefab.bytes();
+    let packed = std::sync::Arc::clone(packed_prefab(prefab));
+    assert_eq!(prefab.bytes(), unpacked + packed.len());
+    // Wherever it is sent, listed or saved.
+    assert!(Stamps::default().add_prefab(std::sync::Arc::clone(prefab)).is_some());
+    assert_eq!(write_prefab(prefab), packed[..]);
+    assert!(std::sync::Arc::ptr_eq(packed_prefab(prefab), &packed));
+    assert_eq!(read_prefab(&packed).as_ref(), Ok(&**prefab));
+}
