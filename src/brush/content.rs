@@ -30,15 +30,6 @@ pub(crate) enum ContentMut<'a> {
 }
 
 impl ContentMut<'_> {
-    /// What is there.
-    pub fn content(&self) -> Content<'_> {
-        match self {
-            Self::Image(image) => Content::Image(image),
-            Self::Grid(grid) => Content::Grid(grid),
-            Self::Prefab(prefab) => Content::Prefab(prefab),
-        }
-    }
-
     /// Puts a placeholder there: an image of 2 x 2 black samples, a grid in such an image, or a prefab of a single sample
     /// of air.
     pub fn clear(&mut self) {

@@ -489,7 +489,7 @@ mod tests {
         let mut rng = fastrand::Rng::with_seed(4);
         let air = PrefabSample { density: 9, material: MaterialId::GROUND, is_edited: true, has_stored_material: false };
         let (mut samples, mut widest) = (0, 0);
-        for _ in 0..300 {
+        for _ in 0..150 {
             let size = IVec3::new(rng.i32(1..9), rng.i32(1..9), rng.i32(1..9));
             let anchor = IVec3::new(rng.i32(-9..20), rng.i32(-9..20), rng.i32(-9..20));
             let prefab = Prefab::new(size, anchor, 0, std::iter::repeat_n(air, size.element_product() as usize)).unwrap();
@@ -508,7 +508,7 @@ mod tests {
             }
             widest = widest.max(reach.size().max_element());
         }
-        assert!(samples > 5000 && widest < 60, "{samples} samples, {widest} voxels");
+        assert!(samples > 2000 && widest < 60, "{samples} samples, {widest} voxels");
     }
 
     #[test]

@@ -92,6 +92,7 @@
 //! [`REACH`]: crate::lattice::REACH
 
 mod blend;
+#[cfg_attr(not(feature = "format"), allow(dead_code, reason = "for messages and journals"))]
 mod content;
 mod edit;
 mod error;

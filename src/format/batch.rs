@@ -4,6 +4,7 @@
 //! head of the [edit](super::edits). Others begin with 0. Each has the hash of the world that it leads to. The game's
 //! data up to the last of them follows.
 
+#[cfg(feature = "store")]
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -12,9 +13,12 @@ use super::change::{put_change, read_change};
 use super::contents::Stamps;
 use super::edits::{EditSequence, put_edit};
 use super::error::FormatError;
+#[cfg(feature = "store")]
 use super::ids::StampId;
 use super::plain;
-use crate::brush::{Content, Edit};
+#[cfg(feature = "store")]
+use crate::brush::Content;
+use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, Order, Patch};
 use crate::volume::DiggingRules;
@@ -46,39 +50,6 @@ impl Batch {
         let mut bytes = Vec::new();
         self.put(&mut bytes, EditSequence::whole());
         bytes
-    }
-
-    /// Its bytes like those of [`encode`](Self::encode), but with names in the place of content: all names come first,
-    /// where [`names`](Self::names) finds them.
-    pub(crate) fn encode_named(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let names: Vec<StampId> = self.contents().map(|(name, _)| name).collect::<BTreeSet<_>>().into_iter().collect();
-        put_number(&mut bytes, names.len() as u64);
-        names.iter().for_each(|name| bytes.extend_from_slice(&name.0.to_le_bytes()));
-        self.put(&mut bytes, EditSequence::with_names(names));
-        bytes
-    }
-
-    /// The content of its edits, each as often as an edit has it.
-    pub(crate) fn contents(&self) -> impl Iterator<Item = (StampId, Content<'_>)> {
-        let entries = self.commits.iter().flat_map(|commit| &commit.entries);
-        let edits = entries.filter_map(|entry| match entry {
-            LogEntry::Order(Order::Edit(edit)) => Some(edit),
-            _ => None,
-        });
-        edits.flat_map(|edit| edit.contents()).map(|content| (StampId::of_content(content), content))
-    }
-
-    /// A table of the content of its edits.
-    pub(crate) fn table(&self) -> Stamps {
-        let mut contents = Stamps::default();
-        self.contents().for_each(|(_, content)| contents.add_content(content));
-        contents
-    }
-
-    /// The names with which the bytes of [`encode_named`](Self::encode_named) begin.
-    pub(crate) fn names(bytes: &[u8]) -> Result<Vec<StampId>, FormatError> {
-        read_names(&mut Reader(bytes))
     }
 
     fn put(&self, bytes: &mut Vec<u8>, mut edits: EditSequence) {
@@ -116,24 +87,6 @@ impl Batch {
         Self::read(Reader(bytes), &mut edits, ground)
     }
 
-    /// Reads what [`encode_named`](Self::encode_named) wrote, with the content of a table in place of names.
-    ///
-    /// # Errors
-    /// When anything is invalid, or [`FormatError::ContentMissing`].
-    pub(crate) fn decode_named(bytes: &[u8], ground: &Ground, contents: &Stamps) -> Result<Self, FormatError> {
-        let mut reader = Reader(bytes);
-        let sequence = EditSequence::with_names(read_names(&mut reader)?);
-        Self::read(reader, &mut EditReader { sequence, contents, is_partial: false }, ground)
-    }
-
-    /// Reads what [`encode_named`](Self::encode_named) wrote, with placeholders in place of content.
-    pub(crate) fn decode_without_content(bytes: &[u8], ground: &Ground) -> Result<Self, FormatError> {
-        let mut reader = Reader(bytes);
-        let sequence = EditSequence::with_names(read_names(&mut reader)?);
-        let mut edits = EditReader { sequence, contents: &Stamps::default(), is_partial: true };
-        Self::read(reader, &mut edits, ground)
-    }
-
     fn read(mut reader: Reader, edits: &mut EditReader, ground: &Ground) -> Result<Self, FormatError> {
         let (count, mut revision) = (reader.count()?, reader.number()?);
         let mut batch = Self::default();
@@ -166,6 +119,61 @@ impl Batch {
     }
 }
 
+/// With names in place of content, as journals have it.
+#[cfg(feature = "store")]
+impl Batch {
+    /// Its bytes like those of [`encode`](Self::encode), but with names in the place of content: all names come first,
+    /// where [`names`](Self::names) finds them.
+    pub(crate) fn encode_named(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let names: Vec<StampId> = self.contents().map(|(name, _)| name).collect::<BTreeSet<_>>().into_iter().collect();
+        put_number(&mut bytes, names.len() as u64);
+        names.iter().for_each(|name| bytes.extend_from_slice(&name.0.to_le_bytes()));
+        self.put(&mut bytes, EditSequence::with_names(names));
+        bytes
+    }
+
+    /// The content of its edits, each as often as an edit has it.
+    pub(crate) fn contents(&self) -> impl Iterator<Item = (StampId, Content<'_>)> {
+        let entries = self.commits.iter().flat_map(|commit| &commit.entries);
+        let edits = entries.filter_map(|entry| match entry {
+            LogEntry::Order(Order::Edit(edit)) => Some(edit),
+            _ => None,
+        });
+        edits.flat_map(|edit| edit.contents()).map(|content| (StampId::of_content(content), content))
+    }
+
+    /// A table of the content of its edits.
+    pub(crate) fn table(&self) -> Stamps {
+        let mut contents = Stamps::default();
+        self.contents().for_each(|(_, content)| contents.add_content(content));
+        contents
+    }
+
+    /// The names with which the bytes of [`encode_named`](Self::encode_named) begin.
+    pub(crate) fn names(bytes: &[u8]) -> Result<Vec<StampId>, FormatError> {
+        read_names(&mut Reader(bytes))
+    }
+
+    /// Reads what [`encode_named`](Self::encode_named) wrote, with the content of a table in place of names.
+    ///
+    /// # Errors
+    /// When anything is invalid, or [`FormatError::ContentMissing`].
+    pub(crate) fn decode_named(bytes: &[u8], ground: &Ground, contents: &Stamps) -> Result<Self, FormatError> {
+        let mut reader = Reader(bytes);
+        let sequence = EditSequence::with_names(read_names(&mut reader)?);
+        Self::read(reader, &mut EditReader { sequence, contents, is_partial: false }, ground)
+    }
+
+    /// Reads what [`encode_named`](Self::encode_named) wrote, with placeholders in place of content.
+    pub(crate) fn decode_without_content(bytes: &[u8], ground: &Ground) -> Result<Self, FormatError> {
+        let mut reader = Reader(bytes);
+        let sequence = EditSequence::with_names(read_names(&mut reader)?);
+        let mut edits = EditReader { sequence, contents: &Stamps::default(), is_partial: true };
+        Self::read(reader, &mut edits, ground)
+    }
+}
+
 /// Reads the edits of a batch.
 struct EditReader<'a> {
     sequence: EditSequence,
@@ -181,6 +189,7 @@ impl EditReader<'_> {
     }
 }
 
+#[cfg(feature = "store")]
 fn read_names(reader: &mut Reader) -> Result<Vec<StampId>, FormatError> {
     let count = reader.count()?;
     (0..count).map(|_| Ok(StampId(u64::from_le_bytes(reader.array()?)))).collect()

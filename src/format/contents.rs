@@ -61,7 +61,7 @@ const MAX_IMAGE: usize = (4 << 20) + (64 << 10);
 /// An edit whose names were looked up in a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Resolved {
-    /// The edit, with placeholders where content is missing or its limits are broken.
+    /// The edit; with placeholders if any content is missing, or a limit is broken.
     pub edit: Edit,
     /// The names of content that the table lacks.
     pub missing: Vec<StampId>,
@@ -145,19 +145,19 @@ impl Stamps {
     /// Adds a content of an edit.
     pub(crate) fn add_content(&mut self, content: Content) {
         match content {
-            Content::Image(image) => drop(self.add(Arc::clone(image))),
+            Content::Image(image) => {
+                self.add(Arc::clone(image));
+            }
+            // Its samples were looked at already.
             Content::Grid(grid) => {
-                let name = self.names_grid(grid);
+                let name = StampId::of(grid.image());
+                self.grids.insert(name, grid.clone());
                 self.images.insert(name, Arc::clone(grid.image()));
             }
-            Content::Prefab(prefab) => drop(self.insert_prefab(Arc::clone(prefab))),
+            Content::Prefab(prefab) => {
+                self.insert_prefab(Arc::clone(prefab));
+            }
         }
-    }
-
-    fn names_grid(&mut self, grid: &ShapeGrid) -> StampId {
-        let name = StampId::of(grid.image());
-        self.grids.entry(name).or_insert_with(|| grid.clone());
-        name
     }
 
     /// The names in it, in order.
@@ -181,9 +181,9 @@ impl Stamps {
             while !reader.0.is_empty() {
                 let part = reader.bytes()?;
                 match frame::open(part, Kind::Image, WorldId::default(), IMAGE, MAX_IMAGE) {
-                    Ok(opened) => drop(found.add(read_image(&mut Reader(&opened.payload))?)),
-                    Err(_) => drop(found.insert_prefab(Arc::new(read_prefab(part)?))),
-                }
+                    Ok(opened) => found.add(read_image(&mut Reader(&opened.payload))?),
+                    Err(_) => found.insert_prefab(Arc::new(read_prefab(part)?)),
+                };
             }
             Ok(found)
         };
@@ -222,7 +222,7 @@ impl Stamps {
             }
         }
         let refused = if missing.is_empty() { edit.check().err() } else { None };
-        let edit = if refused.is_some() { named } else { edit };
+        let edit = if refused.is_some() || !missing.is_empty() { named } else { edit };
         Ok(Resolved { edit, missing, refused })
     }
 }

@@ -83,6 +83,7 @@ impl EditSequence {
     }
 
     /// A sequence in which these names have come.
+    #[cfg(feature = "store")]
     pub fn with_names(names: Vec<StampId>) -> Self {
         Self { names, ..Self::default() }
     }

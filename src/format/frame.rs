@@ -50,6 +50,7 @@ pub struct Opened {
     /// The hash of the ground that it was sealed with, or 0.
     pub ground_hash: u64,
     /// Whether its content names [other content](super::contents), as since schema 2.
+    #[cfg_attr(not(feature = "store"), allow(dead_code, reason = "for journals"))]
     pub is_named: bool,
     /// Its content.
     pub payload: Vec<u8>,

@@ -22,6 +22,10 @@ pub(crate) mod bricks;
 pub(crate) mod bytes;
 pub(crate) mod change;
 pub(crate) mod container;
+#[cfg_attr(
+    not(all(feature = "net", feature = "store")),
+    allow(dead_code, reason = "for messages and journals")
+)]
 pub(crate) mod contents;
 pub(crate) mod edits;
 pub(crate) mod error;

@@ -79,6 +79,7 @@ pub struct GreyImage {
     height: u32,
     samples: Vec<u16>,
     /// A hash of all of it, once somebody needed it.
+    #[cfg_attr(not(feature = "format"), allow(dead_code, reason = "for names of content"))]
     hash: OnceLock<u64>,
 }
 

@@ -98,7 +98,7 @@ impl FoundContents {
     pub fn read(files: &dyn Files, names: BTreeSet<StampId>) -> Self {
         let read = names.into_iter().filter_map(|name| {
             let read = read_file(files, &path(name)).ok()?;
-            Some((name, read.bytes.into()))
+            Some((name, read.bytes.into_boxed_slice()))
         });
         Self { files: read.collect(), decoded: Mutex::default() }
     }

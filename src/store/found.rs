@@ -17,7 +17,7 @@ use super::{checkpoint_copy, unsaved};
 use crate::format::bytes::Reader;
 use crate::format::change::read_change;
 use crate::format::frame::{self, Kind, WorldId};
-use crate::format::{self, Batch, FormatError, Metadata};
+use crate::format::{self, FormatError, Metadata};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
 use crate::terrain::{Patch, TerrainSettings};

@@ -16,7 +16,6 @@ use super::replay_log::replay_all;
 use super::segment::{self, Bad};
 use super::shared::apply_game;
 use super::sources::has_world;
-use crate::format::Batch;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
