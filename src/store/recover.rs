@@ -310,6 +310,49 @@ mod tests {
     }
 
     #[test]
+    fn journals_that_hold_content_whole_are_read() {
+        use glam::UVec3;
+
+        use super::super::Files;
+        use super::super::contents::FoundContents;
+        use crate::brush::{GridShape, ShapeGrid};
+        let ground = Arc::new(Ground::flat(64, 64, 20.0).unwrap());
+        let disk = SimulatedDisk::new();
+        let mut terrain = Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).unwrap();
+        let created = Store::create_in(Arc::new(disk.clone()), &mut terrain, StoreOptions::default());
+        let mut store = created.unwrap();
+        let grid = ShapeGrid::from_fn(UVec3::splat(9), |at| at.as_vec3().distance(Vec3::splat(4.0)) - 3.0).unwrap();
+        for x in 0..4 {
+            let shape = GridShape::new(grid.clone(), Vec3::new(10.0 + 12.0 * x as f32, 20.0, 30.0));
+            terrain.apply([Brush::dig(shape)]);
+            store.follow(&mut terrain).unwrap();
+            store.flush().unwrap();
+        }
+        let (world, killed) = (store.world_id(), disk.image().lose_process());
+        for number in segment::list(&killed).unwrap() {
+            let found = segment::read(&killed, Some(world), number).unwrap();
+            assert_eq!(found.names(u64::MAX).len(), 1);
+            let contents = FoundContents::read(&killed, found.names(u64::MAX));
+            killed.damage(&segment::path(number), |bytes| {
+                for frame in found.frames.iter().rev() {
+                    let batch = frame.batch(&ground, &contents).unwrap();
+                    let revision = batch.commits.last().map_or(0, |record| record.revision);
+                    let entry = segment::entry(world, frame.base, frame.number, revision, &batch.encode());
+                    drop(bytes.splice(frame.range.clone(), entry));
+                }
+            });
+        }
+        for path in killed.paths().into_iter().filter(|path| path.ends_with(".content")) {
+            killed.remove(&path).unwrap();
+        }
+        let options = StoreOptions::default();
+        let (_, opened) = Store::open_in(Arc::new(killed), Arc::clone(&ground), options).unwrap();
+        let now = (terrain.world().revision(), terrain.world().hash());
+        assert_eq!((opened.terrain.world().revision(), opened.terrain.world().hash()), now);
+        assert_eq!((opened.replayed, opened.troubles), (4, vec![]));
+    }
+
+    #[test]
     fn commits_of_another_simulation_are_made_again() {
         let ground = Arc::new(Ground::flat(64, 64, 4.0).unwrap());
         let disk = SimulatedDisk::new();
