@@ -230,8 +230,10 @@ impl Edit {
     pub fn reach(&self) -> LatticeBox {
         let grow = self.band();
         let (low, high) = self.shape.bounds();
-        let own =
-            LatticeBox { min: (low - grow + (ONE - 1)).div_euclid(IVec3::splat(ONE)), max: (high + grow) >> 8 };
+        let own = LatticeBox {
+            min: (low - grow + (ONE - 1)).div_euclid(IVec3::splat(ONE)),
+            max: (high + grow) >> 8,
+        };
         match self.operation.paste().map(QuantizedPaste::bounds) {
             Some(pasted) => {
                 own.intersection(pasted).unwrap_or(LatticeBox::point(pasted.min.clamp(own.min, own.max)))
@@ -487,19 +489,27 @@ mod tests {
     fn a_paste_reaches_its_prefab_within_its_shape() {
         use super::super::{Paste, PrefabSample};
         let mut rng = fastrand::Rng::with_seed(4);
-        let air = PrefabSample { density: 9, material: MaterialId::GROUND, is_edited: true, has_stored_material: false };
+        let air = PrefabSample {
+            density: 9,
+            material: MaterialId::GROUND,
+            is_edited: true,
+            has_stored_material: false,
+        };
         let (mut samples, mut widest) = (0, 0);
         for _ in 0..150 {
             let size = IVec3::new(rng.i32(1..9), rng.i32(1..9), rng.i32(1..9));
             let anchor = IVec3::new(rng.i32(-9..20), rng.i32(-9..20), rng.i32(-9..20));
-            let prefab = Prefab::new(size, anchor, 0, std::iter::repeat_n(air, size.element_product() as usize)).unwrap();
+            let prefab =
+                Prefab::new(size, anchor, 0, std::iter::repeat_n(air, size.element_product() as usize))
+                    .unwrap();
             let mut place = |most: f32| Vec3::new(rng.f32(), rng.f32(), rng.f32()) * most - most / 2.0;
             let (at, turn) = (place(40.0), Quat::from_scaled_axis(place(6.0)));
             let paste = Paste { mirror: rng.bool(), scale: 0.3 + rng.f32() * 2.0, ..Paste::new(prefab, at) };
             let paste = if rng.bool() { paste.rotated(turn) } else { paste.turned_about_y(rng.i32(..)) };
             // All of the world, but for a corner.
             let shape = Shape::sphere(Vec3::ZERO, 180.0);
-            let edit = Edit::quantize(&Brush { operation: Operation::Paste { paste }, ..Brush::dig(shape) }).unwrap();
+            let edit = Edit::quantize(&Brush { operation: Operation::Paste { paste }, ..Brush::dig(shape) })
+                .unwrap();
             let (reach, source) = (edit.reach(), edit.paste_source().unwrap());
             for point in reach.grown(3).points() {
                 let is_pasted = source.sample(point).is_some();

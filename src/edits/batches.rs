@@ -25,7 +25,8 @@ pub(super) fn batches(edits: &[PreparedEdit], most: u64) -> Vec<Range<usize>> {
         bricks += own_bricks;
         let reads_changes = || {
             edit.reads().is_some_and(|around| {
-                number - first >= LONGEST || edits[first..number].iter().any(|earlier| earlier.reaches(around))
+                number - first >= LONGEST
+                    || edits[first..number].iter().any(|earlier| earlier.reaches(around))
             })
         };
         if number > first && (bricks > most || reads_changes()) {

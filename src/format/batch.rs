@@ -83,7 +83,8 @@ impl Batch {
     /// # Errors
     /// When anything is invalid. Memory is taken by the length of `bytes`.
     pub fn decode(bytes: &[u8], ground: &Ground) -> Result<Self, FormatError> {
-        let mut edits = EditReader { sequence: EditSequence::whole(), contents: &Stamps::default(), is_partial: false };
+        let mut edits =
+            EditReader { sequence: EditSequence::whole(), contents: &Stamps::default(), is_partial: false };
         Self::read(Reader(bytes), &mut edits, ground)
     }
 
@@ -126,7 +127,8 @@ impl Batch {
     /// where [`names`](Self::names) finds them.
     pub(crate) fn encode_named(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let names: Vec<StampId> = self.contents().map(|(name, _)| name).collect::<BTreeSet<_>>().into_iter().collect();
+        let names: Vec<StampId> =
+            self.contents().map(|(name, _)| name).collect::<BTreeSet<_>>().into_iter().collect();
         put_number(&mut bytes, names.len() as u64);
         names.iter().for_each(|name| bytes.extend_from_slice(&name.0.to_le_bytes()));
         self.put(&mut bytes, EditSequence::with_names(names));
@@ -159,7 +161,11 @@ impl Batch {
     ///
     /// # Errors
     /// When anything is invalid, or [`FormatError::ContentMissing`].
-    pub(crate) fn decode_named(bytes: &[u8], ground: &Ground, contents: &Stamps) -> Result<Self, FormatError> {
+    pub(crate) fn decode_named(
+        bytes: &[u8],
+        ground: &Ground,
+        contents: &Stamps,
+    ) -> Result<Self, FormatError> {
         let mut reader = Reader(bytes);
         let sequence = EditSequence::with_names(read_names(&mut reader)?);
         Self::read(reader, &mut EditReader { sequence, contents, is_partial: false }, ground)

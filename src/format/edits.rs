@@ -114,7 +114,12 @@ impl EditSequence {
     }
 
     /// Reads the next edit, whose head was read already, with the content of a table in place of names.
-    pub fn read(&mut self, head: u8, reader: &mut Reader, contents: &Stamps) -> Result<Resolved, FormatError> {
+    pub fn read(
+        &mut self,
+        head: u8,
+        reader: &mut Reader,
+        contents: &Stamps,
+    ) -> Result<Resolved, FormatError> {
         let is_named = head == NAMED;
         if is_named && self.is_whole {
             return Err(FormatError::Invalid("head of an edit"));

@@ -14,8 +14,8 @@ use crate::format::bytes::{Reader, put_bytes, put_number};
 use crate::format::change::{put_change, read_change};
 use crate::format::contents::{Resolved, put_image, read_image};
 use crate::format::edits::EditSequence;
-use crate::format::prefab::packed_prefab;
 use crate::format::fields::{point, put_point};
+use crate::format::prefab::packed_prefab;
 use crate::format::{FormatError, WorldId, decode_region, encode_region, plain, read_prefab};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
@@ -143,7 +143,10 @@ impl ToServer {
 
     /// Reads a message from a client. Edits with content that the list lacks, and those that are beyond the limits of
     /// edits, have placeholders; their positions in the message are returned too.
-    pub(super) fn read(bytes: &[u8], stamps: &Stamps) -> Result<(Self, BTreeMap<usize, Refusal>), FormatError> {
+    pub(super) fn read(
+        bytes: &[u8],
+        stamps: &Stamps,
+    ) -> Result<(Self, BTreeMap<usize, Refusal>), FormatError> {
         within(bytes.len(), MAX_TO_SERVER)?;
         let (mut reader, mut refused) = (Reader(bytes), BTreeMap::new());
         let message = match reader.byte()? {

@@ -133,7 +133,8 @@ impl Contents {
             segments.push(found);
             reading.advance(1);
         }
-        let named = FoundContents::read(files, segments.iter().flat_map(|found| found.names(u64::MAX)).collect());
+        let named =
+            FoundContents::read(files, segments.iter().flat_map(|found| found.names(u64::MAX)).collect());
         let numbers = segments.iter().flat_map(|found| {
             let own = found.frames.iter().map(|frame| frame.number);
             own.chain((found.length > 0).then_some(found.number))

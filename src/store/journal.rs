@@ -225,7 +225,8 @@ impl Journal {
             total -= segment::on_disk(oldest.bytes);
             self.segments.remove(0);
         }
-        let mut needed: BTreeSet<StampId> = self.segments.iter().flat_map(|own| &own.names).copied().collect();
+        let mut needed: BTreeSet<StampId> =
+            self.segments.iter().flat_map(|own| &own.names).copied().collect();
         needed.extend(self.waiting.iter().flat_map(|waiting| waiting.contents.names()));
         contents::retain(&*self.files, &needed, &mut self.written)
     }

@@ -321,7 +321,8 @@ mod tests {
         let mut terrain = Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).unwrap();
         let created = Store::create_in(Arc::new(disk.clone()), &mut terrain, StoreOptions::default());
         let mut store = created.unwrap();
-        let grid = ShapeGrid::from_fn(UVec3::splat(9), |at| at.as_vec3().distance(Vec3::splat(4.0)) - 3.0).unwrap();
+        let grid =
+            ShapeGrid::from_fn(UVec3::splat(9), |at| at.as_vec3().distance(Vec3::splat(4.0)) - 3.0).unwrap();
         for x in 0..4 {
             let shape = GridShape::new(grid.clone(), Vec3::new(10.0 + 12.0 * x as f32, 20.0, 30.0));
             terrain.apply([Brush::dig(shape)]);

@@ -1,5 +1,6 @@
 //! Paths of many points and roads along them, compared with brute force.
 
+use bevy_burrow::ground::FunctionSource;
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;

@@ -82,7 +82,8 @@ fn content_stays_as_long_as_the_log_names_it() {
     let first = contents(&disk);
     assert_eq!(first.len(), 2);
     let dig = |rng: &mut Rng| {
-        Brush::dig(Shape::sphere(Vec3::new(rng.f32() * 60.0, 10.0, rng.f32() * 60.0), 2.0)).with_tag(rng.u64(..))
+        Brush::dig(Shape::sphere(Vec3::new(rng.f32() * 60.0, 10.0, rng.f32() * 60.0), 2.0))
+            .with_tag(rng.u64(..))
     };
     // The log is rebuilt from as long as it is whole.
     for _ in 0..20 {
@@ -96,13 +97,13 @@ fn content_stays_as_long_as_the_log_names_it() {
     let (_, opened) = open(&rebuilt, &ground).expect("the log is whole");
     assert_eq!(state(&opened.terrain), state(&terrain));
     // Then its beginning goes, and the content with it.
-    for number in 0..3000 {
+    for number in 0..12_000 {
         terrain.apply([dig(&mut rng)]);
         save(&mut store, &mut terrain).expect("the thread runs");
         if contents(&disk).is_empty() {
             break;
         }
-        assert!(number < 2999, "it stays forever: {:?}", disk.paths());
+        assert!(number < 11_999, "it stays forever: {:?}", disk.paths());
     }
     // It comes again where it is named again.
     terrain.apply([paste(&Arc::new(block(1)), &ball(9), 5)]);

@@ -44,7 +44,9 @@ struct Samples {
 
 impl PartialEq for ShapeGrid {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0) || Arc::ptr_eq(self.image(), other.image()) || *self.0.image == *other.0.image
+        Arc::ptr_eq(&self.0, &other.0)
+            || Arc::ptr_eq(self.image(), other.image())
+            || *self.0.image == *other.0.image
     }
 }
 
@@ -320,7 +322,11 @@ impl ShapeGeometry for QuantizedGrid {
         check_turn(self.rotation)?;
         in_range("scale", voxels(self.scale), SCALE.0, SCALE.1)?;
         // A placeholder stands for a grid that is still to come: the shape is empty.
-        if self.samples.is_grid() || self.samples.image().is_placeholder() { Ok(()) } else { Err(BrushError::NoGrid) }
+        if self.samples.is_grid() || self.samples.image().is_placeholder() {
+            Ok(())
+        } else {
+            Err(BrushError::NoGrid)
+        }
     }
 
     fn bounds(&self) -> (IVec3, IVec3) {

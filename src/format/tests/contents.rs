@@ -71,7 +71,8 @@ fn next_to_a_name_stands_no_content() {
         put_edit(&mut bytes, edit, &mut EditSequence::whole());
         assert_eq!(read(&bytes, &contents), Err(FormatError::Invalid("edit: content without a name")));
     }
-    let dig = Edit::quantize(&crate::brush::Brush::dig(crate::brush::Shape::sphere(glam::Vec3::ONE, 2.0))).unwrap();
+    let dig =
+        Edit::quantize(&crate::brush::Brush::dig(crate::brush::Shape::sphere(glam::Vec3::ONE, 2.0))).unwrap();
     let named = read(&with_names(&dig, &[]), &contents);
     assert_eq!(named, Err(FormatError::Invalid("edit: a name without content")));
 }

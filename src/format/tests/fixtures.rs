@@ -147,7 +147,8 @@ mod named {
         let read = |name: &String| (name.clone(), std::fs::read(folder().join(name)).unwrap());
         let files: BTreeMap<String, Vec<u8>> = written.keys().map(read).collect();
         assert_eq!(files, written, "what is written today differs from schema 2: it needs a new number");
-        let opened = open(&files["frame.journal"], Kind::Journal, WorldId(5), &7_u64.to_be_bytes(), 1 << 20).unwrap();
+        let opened =
+            open(&files["frame.journal"], Kind::Journal, WorldId(5), &7_u64.to_be_bytes(), 1 << 20).unwrap();
         assert!(opened.is_named);
         let mut contents = Stamps::default();
         for name in Batch::names(&opened.payload).unwrap() {

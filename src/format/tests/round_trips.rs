@@ -142,7 +142,8 @@ pub fn all_edits() -> Vec<Edit> {
 
 /// Brushes with a grid, with a prefab, and with both.
 pub fn with_content() -> [Brush; 3] {
-    let grid = ShapeGrid::from_fn(UVec3::splat(6), |at| at.as_vec3().distance(Vec3::splat(2.5)) - 1.9).unwrap();
+    let grid =
+        ShapeGrid::from_fn(UVec3::splat(6), |at| at.as_vec3().distance(Vec3::splat(2.5)) - 1.9).unwrap();
     let within = GridShape::new(grid, Vec3::new(20.0, 11.0, 20.0)).with_scale(2.5);
     let ground = worlds::hills(64);
     let mut terrain = worlds::terrain(&ground);

@@ -136,7 +136,10 @@ mod tests {
             0 => Brush::dig(path),
             _ => Brush::road(Corridor::new(path, 3.0, 2.0), 1.0),
         };
-        let brush = brush.with_roughness(Roughness::new(3.7, 91.3, u32::MAX)).with_tag(number * 7).with_stroke(u64::MAX);
+        let brush = brush
+            .with_roughness(Roughness::new(3.7, 91.3, u32::MAX))
+            .with_tag(number * 7)
+            .with_stroke(u64::MAX);
         Edit::quantize(&brush).expect("a valid brush")
     }
 
@@ -145,8 +148,9 @@ mod tests {
         let dig = |x: f32| Edit::quantize(&Brush::dig(Shape::sphere(Vec3::splat(x), 2.0))).expect("valid");
         for count in [1, 20, MAX_EDITS as u64 + 50] {
             let mut outbox = Outbox::new([u64::MAX; 2].map(|most| most >> 1), u64::MAX >> 1, Duration::ZERO);
-            let edits: Vec<Edit> =
-                (0..count).map(|number| if number % 5 == 4 { dig(number as f32) } else { long(number) }).collect();
+            let edits: Vec<Edit> = (0..count)
+                .map(|number| if number % 5 == 4 { dig(number as f32) } else { long(number) })
+                .collect();
             edits.iter().zip(1..).for_each(|(edit, sequence)| outbox.edit(sequence, edit.clone(), 1));
             let (messages, mut next) = (outbox.take(Duration::ZERO), 1);
             for message in &messages {

@@ -11,9 +11,9 @@ use crate::brush::Edit;
 use crate::format::bricks::is_possible;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
+use crate::net::StampId;
 use crate::net::message::{ClientId, KickReason, MAX_REGIONS, Refusal, ToClient, ToServer};
 use crate::net::price::{UNDO, cost};
-use crate::net::StampId;
 
 /// The cost of a greeting in the count of flooding. The greetings that are [answered](super::players) in a second cost
 /// more work.
