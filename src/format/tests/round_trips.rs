@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Quat, Vec2, Vec3};
+use glam::{IVec3, Quat, UVec3, Vec2, Vec3};
 
 use super::{compare, count, worlds};
 use crate::brush::{Brush, Edit, GridShape, Paste, Roughness, Shape, ShapeGrid, Stamp};
