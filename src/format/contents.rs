@@ -175,25 +175,28 @@ impl Stamps {
     /// Adds what [`content_file`] wrote. Returns `false` if the bytes are not what this name stands for.
     #[cfg(feature = "store")]
     pub(crate) fn add_file(&mut self, name: StampId, bytes: &[u8]) -> bool {
-        let mut reader = Reader(bytes);
-        let read = |reader: &mut Reader| -> Result<Self, FormatError> {
-            let mut found = Self::default();
-            while !reader.0.is_empty() {
-                let part = reader.bytes()?;
-                match frame::open(part, Kind::Image, WorldId::default(), IMAGE, MAX_IMAGE) {
-                    Ok(opened) => found.add(read_image(&mut Reader(&opened.payload))?),
-                    Err(_) => found.insert_prefab(Arc::new(read_prefab(part)?)),
-                };
+        let (mut reader, mut found) = (Reader(bytes), Self::default());
+        // What follows the last part that can be read is nobody's.
+        while let Ok(part) = reader.bytes() {
+            match frame::open(part, Kind::Image, WorldId::default(), IMAGE, MAX_IMAGE) {
+                Ok(opened) => {
+                    let image = read_image(&mut Reader(&opened.payload));
+                    image.into_iter().for_each(|image| drop(found.images.insert(StampId::of(&image), image)));
+                }
+                Err(_) => read_prefab(part).into_iter().for_each(|prefab| {
+                    found.insert_prefab(Arc::new(prefab));
+                }),
             }
-            Ok(found)
-        };
-        match read(&mut reader) {
-            Ok(found) if found.names() == BTreeSet::from([name]) => {
-                self.add_all(&found);
-                true
-            }
-            _ => false,
         }
+        let (image, prefab) = (found.images.remove(&name), found.prefabs.remove(&name));
+        let is_there = image.is_some() || prefab.is_some();
+        image.into_iter().for_each(|image| {
+            self.add(image);
+        });
+        prefab.into_iter().for_each(|prefab| {
+            self.insert_prefab(prefab);
+        });
+        is_there
     }
 
     /// Puts the content of a name in its place. `Ok(false)` if the table lacks it.

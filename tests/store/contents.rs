@@ -38,7 +38,7 @@ fn paste(prefab: &Arc<Prefab>, grid: &ShapeGrid, number: usize) -> Brush {
 #[test]
 fn an_edit_takes_the_bytes_of_names_in_place_of_its_content() {
     let (grid, prefab) = (ball(64), Arc::new(block(1)));
-    for (in_a_frame, most) in [(1, 190.0), (100, 45.0)] {
+    for (in_a_frame, most) in [(1, 164.0), (100, 45.0)] {
         let (disk, ground) = (SimulatedDisk::new(), ground(3));
         let mut terrain = terrain(&ground);
         let mut store = create(&disk, &mut terrain, options(1000));
