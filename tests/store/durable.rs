@@ -248,7 +248,15 @@ impl Story {
             if found == past.state && turn == past.turn {
                 return;
             }
-            seen.push((past.point, opened.troubles));
+            let differs = [
+                found.hash != past.state.hash,
+                found.fields != past.state.fields,
+                found.next_field != past.state.next_field,
+                found.rules != past.state.rules,
+                found.loose != past.state.loose,
+                turn != past.turn,
+            ];
+            seen.push((past.point, differs, opened.troubles));
         }
         panic!("{story}: {first:?} is durable, but the saved world is none of the later ones: {seen:?}");
     }
