@@ -30,8 +30,8 @@ pub const MAGIC: [u8; 4] = *b"\xB5BRW";
 /// The newest schema that can be read. Older ones can be read too; newer ones are refused.
 pub const SCHEMA: u32 = 2;
 
-/// The schema of all frames but those that [name](seal_named) content.
-const PLAIN: u32 = 1;
+/// The schema of levels, and of all frames but those that name content.
+pub const PLAIN: u32 = 1;
 
 /// Content is packed by at most this factor.
 const MAX_PACKED: usize = 255;

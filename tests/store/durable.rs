@@ -195,8 +195,12 @@ impl Story {
             }
             // Records are lost.
             2 => {
+                // Rules have no revision of their own, so their loss alone shows in none.
+                let commits = self.terrain.world().revision();
                 act(&mut self.terrain, &mut self.rng);
-                drop(self.terrain.take_log());
+                if self.terrain.world().revision() > commits {
+                    drop(self.terrain.take_log());
+                }
             }
             3 => {
                 self.turn += 1;
