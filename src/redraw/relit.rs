@@ -29,6 +29,11 @@ impl Area {
     fn last(self) -> Column {
         self.stack.offset(BRICK - 1, BRICK - 1)
     }
+
+    /// The columns whose light it may change.
+    fn near(self) -> (Column, Column) {
+        (self.stack.offset(-REACH, -REACH), self.last().offset(REACH, REACH))
+    }
 }
 
 /// The areas that a commit changes, in order.
@@ -67,7 +72,7 @@ pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(MeshKey) -> bool +
     let (world, grid) = (lit.before(), lit.before().grid());
     let mut by_tile: FxHashMap<TilePos, Vec<Area>> = FxHashMap::default();
     for area in areas(lit) {
-        let (low, high) = (area.stack.offset(-REACH, -REACH), area.last().offset(REACH, REACH));
+        let (low, high) = area.near();
         let [low, high] = [low, high].map(|column| grid.chunk_of(column.at(0)));
         // A tile's last columns are the first of the next one.
         for x in low.x - 1..=high.x {
@@ -216,12 +221,13 @@ pub(crate) fn relit_nodes(
     let areas = areas(lit);
     let mut nodes: FxHashSet<Node> = FxHashSet::default();
     for area in &areas {
-        let (low, high) = (area.stack.offset(-REACH, -REACH), area.last().offset(REACH, REACH));
+        let (low, high) = area.near();
         nodes.extend(lod::nodes_near(&drawn.cut, low, high));
     }
     nodes.retain(|&node| !is_redrawn(node) && !drawn.shows_parts(node.tile()) | (node.level > 0));
     let mut nodes: Vec<Node> = nodes.into_iter().collect();
     nodes.sort_unstable();
+    let near_areas = NearAreas::of(&areas);
     // Their shapes are those before the commit.
     let updates = State::committed(lit.before()).updates(&drawn.cut, &nodes, |_| true);
     let (mut before, mut after) = (SparseSky::new(SkyView::of(lit.before())), SparseSky::new(lit.view()));
@@ -229,18 +235,39 @@ pub(crate) fn relit_nodes(
         let origin = drawn.cut.grid().columns(update.node).0.at(0) * SNAP;
         let vertices = update.mesh.iter().flat_map(|mesh| &mesh.vertices);
         let mut near =
-            vertices.map(|vertex| origin + vertex.position).filter(|place| is_near(&areas, *place));
+            vertices.map(|vertex| origin + vertex.position).filter(|place| near_areas.holds(*place));
         near.any(|place| before.light(place) != after.light(place))
     };
     updates.into_iter().filter(|update| differs(update)).collect()
 }
 
-/// Whether light at a place may change.
+/// Stacks of bricks over which light may change: a long path has thousands of areas, and a vertex is near few of them.
 #[cfg_attr(not(feature = "plugin"), allow(dead_code))]
-fn is_near(areas: &[Area], place: IVec3) -> bool {
-    let (x, z) = (place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-    areas.iter().any(|area| {
-        let (low, high) = (area.stack.offset(-REACH, -REACH), area.last().offset(REACH, REACH));
-        (low.x..=high.x).contains(&x) && (low.z..=high.z).contains(&z)
-    })
+struct NearAreas<'a>(FxHashMap<(i32, i32), Vec<&'a Area>>);
+
+#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
+impl<'a> NearAreas<'a> {
+    fn of(areas: &'a [Area]) -> Self {
+        let mut near: FxHashMap<(i32, i32), Vec<&Area>> = FxHashMap::default();
+        for area in areas {
+            let (low, high) = area.near();
+            for x in low.x >> 3..=high.x >> 3 {
+                for z in low.z >> 3..=high.z >> 3 {
+                    near.entry((x, z)).or_default().push(area);
+                }
+            }
+        }
+        Self(near)
+    }
+
+    /// Whether light at a place may change.
+    fn holds(&self, place: IVec3) -> bool {
+        let (x, z) = (place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
+        self.0.get(&(x >> 3, z >> 3)).is_some_and(|areas| {
+            areas.iter().any(|area| {
+                let (low, high) = area.near();
+                (low.x..=high.x).contains(&x) && (low.z..=high.z).contains(&z)
+            })
+        })
+    }
 }
