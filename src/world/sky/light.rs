@@ -195,13 +195,15 @@ pub(crate) trait SkyLights {
     /// Whether a ray leads to the open sky, which rises by so many 1/256 voxels with each of so many steps.
     fn is_open(&mut self, from: IVec3, (dx, dz): (i32, i32), steps: i32, rise: i32) -> bool {
         let mut y = from.y * ONE;
-        let mut is_above = false;
+        // Most rays of a tunnel end in the ground, wherever they enter it.
+        if y + steps * rise < self.top(Column::of(from).offset(dx * steps, dz * steps)) {
+            return false;
+        }
         for step in 1..=steps {
             let before = y;
             y += rise;
             let column = Column::of(from).offset(dx * step, dz * step);
-            is_above = y >= self.top(column);
-            if !is_above {
+            if y < self.top(column) {
                 // Steep rays pass several points of a column.
                 let (low, high) = (round(before) + 1, round(y));
                 if (low.min(high)..=high).any(|y| self.view().is_solid(column.at(y))) {
@@ -209,7 +211,7 @@ pub(crate) trait SkyLights {
                 }
             }
         }
-        is_above
+        true
     }
 }
 

@@ -244,7 +244,7 @@ fn a_commit_lights_all_that_it_changes() {
             // The running commit has the light of the committed one.
             for tile in world.grid().tiles() {
                 let (low, high) = world.grid().tile_cells(tile);
-                let [running, done] =
+                let [mut running, mut done] =
                     [lit.view(), SkyView::of(world)].map(|view| SkyColumns::new(view, low, high));
                 assert_eq!(running.lights(), done.lights());
             }
