@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::light::{FAR, HIGHEST_RISE, NEAR, REACH, SkyLights, Step, below, light_of, slope};
 use super::{LitWorld, SkyView};
-use crate::lattice::{Column, ONE};
+use crate::lattice::{Column, ONE, SNAP};
 
 /// Columns of a row next to each other: the first, and where they end. Empty if they end before they begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,11 +133,11 @@ impl<'a> SkyColumns<'a> {
 
     /// The last of all columns.
     fn last(&self) -> Column {
-        self.first.offset(self.width as i32 - 1, self.depth() as i32 - 1)
+        self.first.offset(self.width as i32 - 1, self.row_count() as i32 - 1)
     }
 
     /// How many rows all columns have.
-    fn depth(&self) -> usize {
+    fn row_count(&self) -> usize {
         self.tops.len() / self.width
     }
 
@@ -151,7 +151,7 @@ impl<'a> SkyColumns<'a> {
         }
         if changed != 0 && self.changed.is_empty() {
             self.changed.resize(self.tops.len(), 0);
-            self.runs.resize(self.depth(), Run::EMPTY);
+            self.runs.resize(self.row_count(), Run::EMPTY);
         }
         let start = at.x + from - first.x;
         for z in (first.z - at.z).max(0)..=(last.z - at.z).min(7) {
@@ -179,7 +179,7 @@ impl<'a> SkyColumns<'a> {
             return;
         }
         let [low, high] = [low, high].map(|at| ((at.x - first.x) as usize, (at.z - first.z) as usize));
-        if high.0 >= width || high.1 >= self.depth() {
+        if high.0 >= width || high.1 >= self.row_count() {
             return;
         }
         fn repeat<T: Copy>(all: &mut [T], width: usize, low: (usize, usize), high: (usize, usize)) {
@@ -258,6 +258,22 @@ impl<'a> SkyColumns<'a> {
     pub fn lights(&mut self) -> &[u8] {
         (0..self.size[1]).for_each(|z| self.light_row(z));
         &self.lights
+    }
+
+    /// The light over the rectangle's columns at the ground's own height, x fastest: that of a tile's vertices.
+    pub fn ground_lights(&mut self) -> Vec<u8> {
+        let mut lights = self.lights().to_vec();
+        let width = self.size[0];
+        for z in 0..self.size[1] {
+            for x in self.changed_run(z).within(width) {
+                let column = self.low.offset(x as i32, z as i32);
+                if self.is_changed(column) {
+                    let height = self.view.ground().height(column) * (SNAP / ONE);
+                    lights[z * width + x] = self.light((column.at(0) * SNAP).with_y(height));
+                }
+            }
+        }
+        lights
     }
 
     /// Lights a row of the rectangle, unless it is lit.
