@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::IVec3;
 
 use super::columns::{Run, SkyColumns};
-use super::light::{FAR, NEAR, REACH, SkyLights, Step, below, slope};
+use super::light::{FAR, NEAR, REACH, SkyLights, Step, below};
 use super::{LitWorld, SkyView};
 use crate::lattice::{Column, ONE, SNAP};
 
@@ -155,9 +155,7 @@ impl<'a> LightChange<'a> {
 
     /// Whether the top of a column of the rectangle is the ground's own height, before and after.
     fn is_ground(&self, z: usize, x: usize) -> bool {
-        let none = Step { dx: 0, dz: 0, factor: 0 };
-        let is_changed = |all: &SkyColumns| all.changed_steps(z, &(x..x + 1), &none).is_some_and(|own| own != [0]);
-        !is_changed(&self.before) && !is_changed(&self.after)
+        !self.before.is_changed_at([x, z]) && !self.after.is_changed_at([x, z])
     }
 
     /// Whether the light on top of a column differs; the top stays.
@@ -200,16 +198,18 @@ impl<'a> LightChange<'a> {
         let moved_by = |step: &Step| {
             self.moved[(z as i32 + REACH + step.dz) as usize].moved(-step.dx)
         };
-        for (far, near) in FAR.iter().zip(&NEAR) {
-            let seen = far.iter().chain(near).map(moved_by).fold(Run::EMPTY, Run::hull).within(width);
-            if seen.is_empty() {
-                continue;
-            }
-            let [before, after] =
-                [&self.before, &self.after].map(|all| horizons(all, z, &seen, (far, near)));
-            for (hidden, (before, after)) in hidden[seen].iter_mut().zip(before.into_iter().zip(after)) {
+        let near = [&self.before, &self.after].map(|all| all.near_run(z).within(width));
+        for (direction, (far, near_steps)) in FAR.iter().zip(&NEAR).enumerate() {
+            let seen = far.iter().chain(near_steps).map(moved_by).fold(Run::EMPTY, Run::hull).within(width);
+            for x in seen.clone().step_by(8) {
+                let horizons = |all: &SkyColumns, near: &Range<usize>| {
+                    all.horizons([x, z], direction, near.start < x + 8 && near.end > x)
+                };
+                let [before, after] = [horizons(&self.before, &near[0]), horizons(&self.after, &near[1])];
                 if before != after {
-                    *hidden += below(after) as i16 - below(before) as i16;
+                    for (hidden, (before, after)) in hidden[x..].iter_mut().zip(before.into_iter().zip(after)) {
+                        *hidden += below(after) as i16 - below(before) as i16;
+                    }
                 }
             }
         }
@@ -217,26 +217,4 @@ impl<'a> LightChange<'a> {
             hidden[x] = MOVED;
         }
     }
-}
-
-/// The horizons of columns of a row in a direction.
-fn horizons(all: &SkyColumns, z: usize, columns: &Range<usize>, (far, near): (&[Step], &[Step])) -> Vec<i16> {
-    let mut horizons = vec![0i16; columns.len()];
-    let own = &all.inner_row(z)[columns.clone()];
-    for step in far {
-        let tops = all.steps(z, columns, step).iter().zip(own);
-        for (horizon, (&top, &y)) in horizons.iter_mut().zip(tops) {
-            *horizon = (*horizon).max(slope(top, y, step.factor));
-        }
-    }
-    for step in near {
-        let none = Step { dx: 0, dz: 0, factor: 0 };
-        let flags = (all.changed_steps(z, columns, step), all.changed_steps(z, columns, &none));
-        let (Some(others), Some(owns)) = flags else { break };
-        let tops = all.steps(z, columns, step).iter().zip(own);
-        for ((horizon, (&top, &y)), (a, b)) in horizons.iter_mut().zip(tops).zip(others.iter().zip(owns)) {
-            *horizon = (*horizon).max(slope(top, y, step.factor) & (a | b));
-        }
-    }
-    horizons
 }

@@ -6,7 +6,9 @@ use std::ops::Range;
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
-use super::light::{FAR, HIGHEST_RISE, NEAR, REACH, SkyLights, Step, below, light_of, slope};
+use super::light::{
+    FAR, HIGHEST_RISE, NEAR, REACH, SkyLights, Step, below, hide, light_of, raise, raise_where, slope,
+};
 use super::{LitWorld, SkyView};
 use crate::lattice::{Column, ONE, SNAP};
 
@@ -58,7 +60,7 @@ pub(crate) struct SkyColumns<'a> {
     /// The first of all columns, those around included, and how many there are along x.
     first: Column,
     width: usize,
-    /// In 1/256 voxel, x fastest.
+    /// In 1/256 voxel, x fastest; eight more follow after the last row.
     tops: Vec<i32>,
     /// -1 for columns whose top is not the ground's own height, others 0. Empty if there are none.
     changed: Vec<i16>,
@@ -78,8 +80,9 @@ impl<'a> SkyColumns<'a> {
         let last = high.offset(REACH, REACH);
         let [width, depth] = [last.x - first.x + 1, last.z - first.z + 1].map(|count| count.max(1) as usize);
         let size = [high.x - low.x + 1, high.z - low.z + 1].map(|count| count.max(1) as usize);
-        let mut tops = vec![0; width * depth];
-        view.ground().fill_heights(first, width, &mut tops);
+        // Room for eight columns from any of the last row on.
+        let mut tops = vec![0; width * depth + 8];
+        view.ground().fill_heights(first, width, &mut tops[..width * depth]);
         let mut all = Self {
             view,
             low,
@@ -232,20 +235,60 @@ impl<'a> SkyColumns<'a> {
         &self.row(z + REACH as usize)[REACH as usize..][..self.size[0]]
     }
 
-    /// For columns of a row of the rectangle, the tops that lie a step away.
-    pub(super) fn steps(&self, z: usize, columns: &Range<usize>, step: &Step) -> &[i32] {
-        &self.tops[self.stepped(z, columns.start, step)..][..columns.len()]
+    /// Whether the top of a column of the rectangle is not the ground's own height.
+    pub(super) fn is_changed_at(&self, [x, z]: [usize; 2]) -> bool {
+        self.changed.get(self.inner_index([x, z])).is_some_and(|&flag| flag != 0)
     }
 
-    /// -1 for those of them that are not the ground's own height; `None` if all are.
-    pub(super) fn changed_steps(&self, z: usize, columns: &Range<usize>, step: &Step) -> Option<&[i16]> {
-        let start = self.stepped(z, columns.start, step);
-        (!self.changed.is_empty()).then(|| &self.changed[start..][..columns.len()])
+    fn inner_index(&self, [x, z]: [usize; 2]) -> usize {
+        (z + REACH as usize) * self.width + x + REACH as usize
     }
 
-    fn stepped(&self, z: usize, x: usize, step: &Step) -> usize {
-        let [z, x] = [(z, step.dz), (x, step.dx)].map(|(at, by)| (at as i32 + REACH + by) as usize);
-        z * self.width + x
+    /// The horizons of eight columns of a row of the rectangle in a direction; some of them may lie beyond it.
+    #[inline]
+    pub(super) fn horizons(&self, [x, z]: [usize; 2], direction: usize, is_near: bool) -> [i16; 8] {
+        let mut horizons = [0; 8];
+        let own = self.inner_index([x, z]);
+        let at = |step: &Step| own.wrapping_add_signed(step.dz as isize * self.width as isize + step.dx as isize);
+        let Some(ys) = eight(&self.tops, own) else { return horizons };
+        for step in &FAR[direction] {
+            if let Some(tops) = eight(&self.tops, at(step)) {
+                raise(&mut horizons, tops, ys, step);
+            }
+        }
+        if !is_near {
+            return horizons;
+        }
+        let Some(own_flags) = eight(&self.changed, own) else { return horizons };
+        let row = z as i32 + REACH;
+        let start = x as i32 + REACH;
+        let holds_any = |row: i32, start: i32| {
+            let run = self.runs[row as usize];
+            run.start < start + 8 && run.end > start
+        };
+        let is_own = holds_any(row, start);
+        for step in &NEAR[direction] {
+            if !is_own && !holds_any(row + step.dz, start + step.dx) {
+                continue;
+            }
+            let at = at(step);
+            if let (Some(tops), Some(flags)) = (eight(&self.tops, at), eight(&self.changed, at)) {
+                raise_where([flags, own_flags], &mut horizons, tops, ys, step);
+            }
+        }
+        horizons
+    }
+
+    /// Columns of a row of the rectangle, counted from its first, that may see changed tops near them, or are changed.
+    pub(super) fn near_run(&self, z: usize) -> Run {
+        let row = z + REACH as usize;
+        let by = NEAR_REACH as usize;
+        let rows = self.runs.get(row - by..=row + by).unwrap_or_default();
+        let all = rows.iter().copied().fold(Run::EMPTY, Run::hull);
+        if all.is_empty() {
+            return all;
+        }
+        Run { start: all.start - REACH - NEAR_REACH, end: all.end - REACH + NEAR_REACH }
     }
 
     /// Columns of a row of the rectangle, counted from its first, between which those lie whose top is not the ground's
@@ -281,51 +324,32 @@ impl<'a> SkyColumns<'a> {
         if self.is_lit[z] {
             return;
         }
-        let width = self.size[0];
-        let mut hidden = vec![0u16; width];
-        let mut horizons = vec![0i16; width];
-        let own = self.inner_row(z);
-        for (far, near) in FAR.iter().zip(&NEAR) {
-            let [first, second] = far.each_ref().map(|step| self.steps(z, &(0..width), step));
-            let [first_factor, second_factor] = far.map(|step| step.factor);
-            for (((horizon, &first), &second), &y) in horizons.iter_mut().zip(first).zip(second).zip(own) {
-                *horizon = slope(first, y, first_factor).max(slope(second, y, second_factor)).max(0);
-            }
-            if !self.changed.is_empty() {
-                for step in near {
-                    self.add_near(z, step, &mut horizons);
-                }
-            }
-            if horizons.iter().fold(0, |highest, &horizon| horizon.max(highest)) > LOWEST_HORIZON {
-                hidden.iter_mut().zip(&horizons).for_each(|(sum, &horizon)| *sum += below(horizon));
-            }
-        }
-        self.lights.resize(width * self.size[1], 0);
-        let lights = self.lights[z * width..][..width].iter_mut();
-        lights.zip(hidden).for_each(|(light, hidden)| *light = light_of(hidden));
         self.is_lit[z] = true;
-    }
-
-    /// Raises the horizons of a row's columns to the ground a step away, where that or theirs was dug or built.
-    fn add_near(&self, z: usize, step: &Step, horizons: &mut [i16]) {
-        let other = self.runs[(z as i32 + REACH + step.dz) as usize].moved(-step.dx - REACH);
-        let columns = self.changed_run(z).hull(other).within(horizons.len());
-        let (Some(others), Some(owns)) = (
-            self.changed_steps(z, &columns, step),
-            self.changed_steps(z, &columns, &Step { dx: 0, dz: 0, factor: 0 }),
-        ) else {
-            return;
-        };
-        let tops = self.steps(z, &columns, step).iter().zip(&self.inner_row(z)[columns.clone()]);
-        let all = horizons[columns].iter_mut().zip(tops).zip(others.iter().zip(owns));
-        for ((horizon, (&top, &y)), (a, b)) in all {
-            *horizon = (*horizon).max(slope(top, y, step.factor) & (a | b));
+        let width = self.size[0];
+        let mut row = std::mem::take(&mut self.lights);
+        row.resize(width * self.size[1], 0);
+        let near = self.near_run(z).within(width);
+        for (block, lights) in row[z * width..][..width].chunks_mut(8).enumerate() {
+            let x = block * 8;
+            let is_near = near.start < x + 8 && near.end > x;
+            let mut hidden = [0; 8];
+            for direction in 0..8 {
+                hide(&mut hidden, &self.horizons([x, z], direction, is_near));
+            }
+            lights.iter_mut().zip(hidden).for_each(|(light, hidden)| *light = light_of(hidden));
         }
+        self.lights = row;
     }
 }
 
-/// Horizons of this slope or less, in 1/32, hide nothing.
-const LOWEST_HORIZON: i16 = 2;
+/// The furthest of the steps at which only changed columns count.
+const NEAR_REACH: i32 = 11;
+
+/// Eight columns next to each other.
+#[inline(always)]
+fn eight<T>(all: &[T], at: usize) -> Option<&[T; 8]> {
+    all.get(at..)?.first_chunk()
+}
 
 impl SkyLights for SkyColumns<'_> {
     fn view(&self) -> SkyView<'_> {
@@ -349,12 +373,32 @@ impl SkyLights for SkyColumns<'_> {
         self.open_light(column, y)
     }
 
+    fn open_light(&mut self, column: Column, y: i32) -> u8 {
+        let (own, width) = (self.index(column), self.width as isize);
+        let at = |step: &Step| own.wrapping_add_signed(step.dz as isize * width + step.dx as isize);
+        let is_changed = |at: usize| self.changed.get(at).is_some_and(|&flag| flag != 0);
+        let is_own = is_changed(own);
+        let mut hidden = 0;
+        for (far, near) in FAR.iter().zip(&NEAR) {
+            let tops = far.iter().map(|step| slope(self.tops[at(step)], y, step.factor));
+            let mut horizon = tops.fold(0, i16::max);
+            if !self.changed.is_empty() {
+                for step in near.iter().filter(|step| is_own || is_changed(at(step))) {
+                    horizon = horizon.max(slope(self.tops[at(step)], y, step.factor));
+                }
+            }
+            hidden += below(horizon);
+        }
+        light_of(hidden)
+    }
+
     fn known(&mut self) -> &mut FxHashMap<IVec3, u8> {
         &mut self.known
     }
 
     fn covered_light(&mut self, air: IVec3) -> u8 {
-        let lowest = *self.lowest.get_or_init(|| self.tops.iter().copied().min().unwrap_or_default());
+        let tops = || self.tops[..self.row_count() * self.width].iter();
+        let lowest = *self.lowest.get_or_init(|| tops().copied().min().unwrap_or_default());
         if (air.y + 1) * ONE + HIGHEST_RISE < lowest {
             return 0;
         }

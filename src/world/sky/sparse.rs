@@ -33,7 +33,7 @@ impl<'a> SparseSky<'a> {
         let mut hidden = vec![0u16; own.len()];
         for direction in &FAR {
             let mut horizons = vec![0i16; own.len()];
-            for &Step { dx, dz, factor } in direction {
+            for &Step { dx, dz, factor, .. } in direction {
                 let others = ground.page_heights(low.offset(dx, dz), stride, counts);
                 for ((horizon, top), &y) in horizons.iter_mut().zip(others).zip(&own) {
                     *horizon = (*horizon).max(slope(top, y, factor));
