@@ -282,7 +282,7 @@ fn scenes(seed: u32) -> [Scene; 5] {
         26.0 - 8.0 * (1.0 - (side - 2.0) / 4.0).clamp(0.0, 1.0)
     };
     let slope = |x: i32, z: i32| 20.0 + 0.4 * f64::from(x) + 0.2 * f64::from(z);
-    let ground = |height: &dyn Fn(i32, i32) -> f64| Ground::from_fn(79, 79, height).expect("valid");
+    let ground = |height: &(dyn Fn(i32, i32) -> f64 + Sync)| Ground::from_fn(79, 79, height).expect("valid");
     [
         Scene { name: "hills", chunk_size: 16, ground: hills(seed), is_loose: false, brush: any_brush },
         Scene {
