@@ -30,7 +30,7 @@ fn counted_workload(work: &mut dyn FnMut()) {
 /// A name, and what to do.
 type Workload = (&'static str, fn());
 
-const WORKLOADS: [Workload; 15] = [
+const WORKLOADS: [Workload; 19] = [
     ("dense-caves", || dense(Field::Caves)),
     ("dense-chunk-i16", dense_chunk),
     ("dense-empty", || dense(Field::Empty)),
@@ -43,6 +43,10 @@ const WORKLOADS: [Workload; 15] = [
     ("dig-radius-4-deep", || dig(Digging::Deep)),
     ("dig-radius-4-mine", || dig(Digging::Mine)),
     ("dig-radius-4-mine-deep", || dig(Digging::DeepMine)),
+    ("dig-radius-4-tunnel", || dig(Digging::Tunnel)),
+    ("dig-radius-4-wall", || dig(Digging::Wall)),
+    ("light-radius-4-tunnel", || dig_lit(Digging::Tunnel)),
+    ("light-radius-4-wall", || dig_lit(Digging::Wall)),
     ("dig-radius-16", dig_wide),
     ("paint", paint),
     ("thousand-edits", thousand_edits),
@@ -130,10 +134,30 @@ enum Digging {
     Mine,
     /// Untouched ground with strata, 20 voxels below the surface, where the ores are.
     DeepMine,
+    /// The end of a tunnel that leads from the foot of a cliff into it.
+    Tunnel,
+    /// Places half way up a cliff, apart from each other.
+    Wall,
+}
+
+/// A cliff of 24 voxels at x = 100, over a plain.
+fn cliff() -> Terrain {
+    let height = |x: i32, _| 20.0 + 24.0 * ((f64::from(x) - 100.0) / 6.0).clamp(0.0, 1.0);
+    let ground = Ground::from_fn(256, 256, height).expect("valid heights");
+    Terrain::new(ground, &TerrainSettings::default()).expect("valid settings")
+}
+
+/// The digs of a tunnel or a wall.
+fn cliff_brushes(ground: &Digging) -> Vec<Brush> {
+    let center = |number: i32| match ground {
+        Digging::Tunnel => Vec3::new((103 + number * 3) as f32, 24.0, 128.0),
+        _ => Vec3::new(103.0, 32.0, (20 + number * 55 % 216) as f32),
+    };
+    (0..24).map(|number| Brush::dig(Shape::sphere(center(number), 4.0))).collect()
 }
 
 fn dig(ground: Digging) {
-    let mut terrain = terrain();
+    let mut terrain = if matches!(ground, Digging::Tunnel | Digging::Wall) { cliff() } else { terrain() };
     if matches!(ground, Digging::Mine | Digging::DeepMine) {
         let hills =
             Ground::from_noise(256, 256, &hills()).and_then(|ground| ground.with_strata(&Strata::mine()));
@@ -155,19 +179,26 @@ fn dig(ground: Digging) {
             one_by_one(&mut terrain, &first);
             counted_workload(&mut || one_by_one(&mut terrain, &second));
         }
+        Digging::Tunnel | Digging::Wall => {
+            let brushes = cliff_brushes(&ground);
+            counted_workload(&mut || one_by_one(&mut terrain, &brushes));
+        }
     }
 }
 
 /// The light of digs, which are not counted themselves.
 fn dig_lit(ground: Digging) {
-    let mut terrain = terrain();
+    let is_cliff = matches!(ground, Digging::Tunnel | Digging::Wall);
+    let mut terrain = if is_cliff { cliff() } else { terrain() };
     terrain.apply([Brush::dig(Shape::sphere(Vec3::new(8.0, 0.0, 8.0), 4.0))]);
     let (first, second) = (spheres(&terrain, 4.0, 0.0, 24), spheres(&terrain, 4.0, 3.0, 24));
-    let brushes = if matches!(ground, Digging::Dug) {
-        one_by_one(&mut terrain, &first);
-        second
-    } else {
-        first
+    let brushes = match ground {
+        Digging::Dug => {
+            one_by_one(&mut terrain, &first);
+            second
+        }
+        Digging::Tunnel | Digging::Wall => cliff_brushes(&ground),
+        _ => first,
     };
     for brush in &brushes {
         terrain.submit(brush);

@@ -82,6 +82,24 @@ impl Ground {
         window.unwrap_or_else(|| std::array::from_fn(|z| std::array::from_fn(|x| height(x, z))))
     }
 
+    /// Fills in the heights of rows of so many columns, from `low` on, 8x8 columns of a page at once.
+    pub(super) fn fill_heights_on_demand(&self, low: Column, width: usize, heights: &mut [i32]) {
+        let depth = heights.len() / width.max(1);
+        let blocks = |low: i32, count: usize| low >> 3..=(low + count as i32 - 1) >> 3;
+        for (z, x) in blocks(low.z, depth).flat_map(|z| blocks(low.x, width).map(move |x| (z, x))) {
+            let block = self.heights_on_demand::<8>(Column::new(x * 8, z * 8));
+            let (from, to) = ((low.x - x * 8).max(0), (low.x + width as i32 - x * 8).min(8));
+            for (z, block) in (z * 8..).zip(&block) {
+                let row =
+                    usize::try_from(z - low.z).ok().and_then(|z| heights.chunks_exact_mut(width).nth(z));
+                if let Some(row) = row {
+                    let start = (x * 8 + from - low.x) as usize;
+                    row[start..][..(to - from) as usize].copy_from_slice(&block[from as usize..to as usize]);
+                }
+            }
+        }
+    }
+
     /// Change of height around the world's column nearest to another.
     pub(super) fn rises_on_demand(&self, pages: &Pages, column: Column) -> [Rise; 2] {
         let column = self.extent().clamp(column);

@@ -256,6 +256,23 @@ impl Ground {
         std::array::from_fn(|z| row(z).unwrap_or([0; N]))
     }
 
+    /// Fills in the heights of rows of so many columns, from `low` on: what [`Self::height`] gives for each.
+    pub(crate) fn fill_heights(&self, low: Column, width: usize, heights: &mut [i32]) {
+        if self.heights.is_empty() {
+            return self.fill_heights_on_demand(low, width, heights);
+        }
+        for (z, row) in (low.z..).zip(heights.chunks_mut(width.max(1))) {
+            // Beyond the rim, columns are those on it.
+            let inside = |x: i64| x.clamp(0, row.len() as i64) as usize;
+            let start = inside(-i64::from(low.x));
+            let end = inside(i64::from(self.width()) + 1 - i64::from(low.x)).max(start);
+            let [first, last] = [low.x, self.width()].map(|x| self.extent.index(Column::new(x, z)));
+            row[..start].fill(self.heights[first]);
+            row[end..].fill(self.heights[last]);
+            row[start..end].copy_from_slice(&self.heights[first..first + end - start]);
+        }
+    }
+
     /// Pristine density of a lattice point: how far it lies above the surface of its column, in 1/256 voxel, negative
     /// below. Exact wherever it fits an `i32`, which is everywhere within the lattice's limit; saturated beyond.
     pub fn distance(&self, point: IVec3) -> i32 {

@@ -192,7 +192,10 @@ impl MeshBuilder {
         arrays.push_on_surface(columns);
         arrays.push(rings, origin);
         if let Some(lights) = lights.get() {
-            arrays.push_lights(&vertices, origin, lights);
+            // Columns lie on the undug surface, so they have no depth below it.
+            let of_columns = lights.ground_lights().into_iter().map(|light| [light, 0, 0, 0]);
+            arrays.lights.extend(of_columns.take(columns.len()));
+            arrays.push_lights(rings, origin, lights);
         }
         arrays.finish(draft.indices())
     }

@@ -8,7 +8,7 @@ use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
 use super::resolve::{FieldChange, Resolved, install, patch_of};
-use crate::lattice::{ChunkPos, LatticeBox, RegionPos, SNAP, TilePos};
+use crate::lattice::{ChunkPos, LatticeBox, RegionPos, SNAP};
 use crate::redraw::{DrawnCut, MeshUpdates, Stages, relit_parts};
 use crate::volume::UniformBricks;
 use crate::world::sky::{LitWorld, SkyColumns, SkyLights};
@@ -100,20 +100,25 @@ impl Commit {
         let chunks = self.meshes.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk));
         let redrawn: Vec<MeshKey> = tiles.chain(chunks).collect();
         let relit = relit_parts(&lit, |drawn| redrawn.contains(&drawn));
-        let mut tiles: Vec<TilePos> = redrawn.iter().chain(&relit).map(|drawn| drawn.tile()).collect();
-        tiles.sort_unstable();
-        tiles.dedup();
+        let mut parts: Vec<MeshKey> = redrawn.into_iter().chain(relit).collect();
+        parts.sort_unstable_by_key(|drawn| (drawn.tile(), *drawn));
         let mut count = 0;
-        for tile in tiles {
-            let (low, high) = lit.before().grid().tile_cells(tile);
+        for parts in parts.chunk_by(|a, b| a.tile() == b.tile()) {
+            let (low, high) = lit.before().grid().tile_cells(parts[0].tile());
             let mut lights = SkyColumns::new(lit.view(), low, high);
-            count += lights.lights().len();
-            for (chunk, surface) in self.meshes.chunks.iter().filter(|(chunk, _)| chunk.tile() == tile) {
-                let origin = lit.before().grid().origin(*chunk) * SNAP;
-                for vertex in &surface.mesh().vertices {
+            for &drawn in parts {
+                let MeshKey::Chunk(chunk) = drawn else {
+                    count += std::hint::black_box(lights.ground_lights()).len();
+                    continue;
+                };
+                let fresh = self.meshes.chunks.iter().find(|(own, _)| *own == chunk);
+                let kept = || lit.before().meshes.surfaces.get(chunk).map(|surface| surface.mesh());
+                let Some(mesh) = fresh.map(|(_, surface)| surface.mesh()).or_else(kept) else { continue };
+                let origin = lit.before().grid().origin(chunk) * SNAP;
+                for vertex in &mesh.vertices {
                     std::hint::black_box(lights.light(origin + vertex.position));
                 }
-                count += surface.mesh().vertices.len();
+                count += mesh.vertices.len();
             }
         }
         count

@@ -16,10 +16,12 @@ pub(super) struct Step {
     pub dz: i32,
     /// Multiplied by a rise in 1/128 voxel, and divided by 65,536, it gives the slope in 1/32.
     pub factor: i16,
+    /// The same for each of eight columns: from an array, compilers multiply all of them at once.
+    pub factors: [i16; 8],
 }
 
 const fn step((x, z): (i32, i32), columns: i32, factor: i16) -> Step {
-    Step { dx: x * columns, dz: z * columns, factor }
+    Step { dx: x * columns, dz: z * columns, factor, factors: [factor; 8] }
 }
 
 /// The directions in which horizons are looked for.
@@ -27,7 +29,7 @@ const DIRECTIONS: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (
 
 /// A straight direction has 16,384 / distance, a diagonal one that over the square root of 2.
 const fn steps<const N: usize>(straight: [i32; N], diagonal: [i32; N]) -> [[Step; N]; 8] {
-    let mut all = [[Step { dx: 0, dz: 0, factor: 0 }; N]; 8];
+    let mut all = [[step((0, 0), 0, 0); N]; 8];
     let mut direction = 0;
     while direction < 8 {
         let mut at = 0;
@@ -54,6 +56,40 @@ pub(super) const NEAR: [[Step; 6]; 8] = steps([1, 2, 3, 6, 8, 11], [1, 2, 3, 5, 
 pub(super) fn slope(top: i32, y: i32, factor: i16) -> i16 {
     let rise = ((top - y) >> 1).clamp(i16::MIN.into(), i16::MAX.into()) as i16;
     ((i32::from(rise) * i32::from(factor)) >> 16) as i16
+}
+
+/// Raises the horizons of eight columns, whose heights are `ys`, to the tops that lie a step away.
+#[inline(always)]
+pub(super) fn raise(horizons: &mut [i16; 8], tops: &[i32; 8], ys: &[i32; 8], step: &Step) {
+    for at in 0..8 {
+        horizons[at] = horizons[at].max(slope(tops[at], ys[at], step.factors[at]));
+    }
+}
+
+/// Raises the horizons of eight columns like [`raise`], where a bit of one of two masks is set.
+#[inline(always)]
+pub(super) fn raise_where(
+    masks: [&[i16; 8]; 2],
+    horizons: &mut [i16; 8],
+    tops: &[i32; 8],
+    ys: &[i32; 8],
+    step: &Step,
+) {
+    for at in 0..8 {
+        let slope = slope(tops[at], ys[at], step.factors[at]) & (masks[0][at] | masks[1][at]);
+        horizons[at] = horizons[at].max(slope);
+    }
+}
+
+/// Horizons of this slope or less, in 1/32, hide nothing.
+const LOWEST_HORIZON: i16 = 2;
+
+/// Adds what eight horizons hide.
+#[inline(always)]
+pub(super) fn hide(hidden: &mut [u16; 8], horizons: &[i16; 8]) {
+    if horizons.iter().fold(0, |highest, &horizon| horizon.max(highest)) > LOWEST_HORIZON {
+        hidden.iter_mut().zip(horizons).for_each(|(sum, &horizon)| *sum += below(horizon));
+    }
 }
 
 /// For each slope of a horizon, in 1/32, the share of the sky in its direction that lies below: the square of its sine.
@@ -102,10 +138,10 @@ pub(crate) trait SkyLights {
         let mut hidden = 0;
         for (far, near) in FAR.iter().zip(&NEAR) {
             let mut horizon = 0;
-            for &Step { dx, dz, factor } in far {
+            for &Step { dx, dz, factor, .. } in far {
                 horizon = horizon.max(slope(self.top(column.offset(dx, dz)), y, factor));
             }
-            for &Step { dx, dz, factor } in near {
+            for &Step { dx, dz, factor, .. } in near {
                 let other = column.offset(dx, dz);
                 if is_changed || self.is_changed(other) {
                     horizon = horizon.max(slope(self.top(other), y, factor));
@@ -195,13 +231,15 @@ pub(crate) trait SkyLights {
     /// Whether a ray leads to the open sky, which rises by so many 1/256 voxels with each of so many steps.
     fn is_open(&mut self, from: IVec3, (dx, dz): (i32, i32), steps: i32, rise: i32) -> bool {
         let mut y = from.y * ONE;
-        let mut is_above = false;
+        // Most rays of a tunnel end in the ground, wherever they enter it.
+        if y + steps * rise < self.top(Column::of(from).offset(dx * steps, dz * steps)) {
+            return false;
+        }
         for step in 1..=steps {
             let before = y;
             y += rise;
             let column = Column::of(from).offset(dx * step, dz * step);
-            is_above = y >= self.top(column);
-            if !is_above {
+            if y < self.top(column) {
                 // Steep rays pass several points of a column.
                 let (low, high) = (round(before) + 1, round(y));
                 if (low.min(high)..=high).any(|y| self.view().is_solid(column.at(y))) {
@@ -209,7 +247,7 @@ pub(crate) trait SkyLights {
                 }
             }
         }
-        is_above
+        true
     }
 }
 

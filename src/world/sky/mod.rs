@@ -15,8 +15,10 @@
 //! | `light` | the rules |
 //! | `tops` | the highest ground in the columns of a stack of bricks |
 //! | `columns` | all columns of a rectangle: for tiles and chunks |
+//! | `change` | what a commit changes: before and after, compared |
 //! | `sparse` | columns a stride apart: for coarser nodes |
 
+mod change;
 mod columns;
 mod light;
 mod sparse;
@@ -24,7 +26,7 @@ mod sparse;
 mod tests;
 mod tops;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, IVec3};
 use rustc_hash::FxHashMap;
@@ -32,19 +34,30 @@ use rustc_hash::FxHashMap;
 use super::patch::ChangedBrick;
 use super::state::World;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, Column, ONE, SNAP};
+use crate::lattice::{BRICK, BrickPos, Column, ONE, SNAP};
 use crate::volume::Brick;
 
+pub(crate) use change::LightChange;
 pub(crate) use columns::SkyColumns;
 pub(crate) use light::{REACH, SkyLights};
 pub(crate) use sparse::SparseSky;
-pub(crate) use tops::stack_tops;
+use tops::{StackTops, stack_tops};
 
-/// Bricks that a commit changes, by position, and the bricks of each stack that it changes.
+/// Bricks that a commit changes, by position, and the stacks that hold them.
 #[derive(Default)]
 struct Newer {
     bricks: FxHashMap<BrickPos, Option<Arc<Brick>>>,
-    stacks: FxHashMap<(i32, i32), Vec<i32>>,
+    stacks: FxHashMap<(i32, i32), NewerStack>,
+}
+
+/// A stack of bricks that a commit changes.
+struct NewerStack {
+    /// The heights of its bricks after the commit, ascending.
+    rows: Vec<i32>,
+    /// The height of the highest brick that the commit changes.
+    highest: i32,
+    /// Its tops before and after the commit: computed when they are first needed.
+    tops: OnceLock<[Option<StackTops>; 2]>,
 }
 
 /// A world as it is after a commit that is not installed yet, for the light of its surfaces.
@@ -59,8 +72,13 @@ impl LitWorld {
         let mut newer = Newer::default();
         for (pos, brick) in changed {
             let key = pos.stack();
-            let own = || world.stacks.get(&key).cloned().unwrap_or_default();
-            let rows = newer.stacks.entry(key).or_insert_with(own);
+            let stack = newer.stacks.entry(key).or_insert_with(|| NewerStack {
+                rows: world.stacks.get(&key).cloned().unwrap_or_default(),
+                highest: i32::MIN,
+                tops: OnceLock::new(),
+            });
+            stack.highest = stack.highest.max(pos.0.y);
+            let rows = &mut stack.rows;
             match (rows.binary_search(&pos.0.y), brick.is_some()) {
                 (Err(at), true) => rows.insert(at, pos.0.y),
                 (Ok(at), false) => drop(rows.remove(at)),
@@ -71,45 +89,36 @@ impl LitWorld {
         Self { world, newer }
     }
 
-    /// The world before the commit.
+    /// The world before the commit, with all that it keeps.
     pub fn before(&self) -> &Arc<World> {
         &self.world
     }
 
-    /// The lowest of some columns before anyone dug, and of others beside them, in 1/256 voxel.
-    pub fn lowest_ground(&self, low: Column, high: Column) -> i32 {
-        let heights = |(x, z): (i32, i32)| {
-            let heights = self.world.ground.heights::<8>(Column::new(x * 8, z * 8));
-            heights.as_flattened().iter().copied().min().unwrap_or(i32::MIN)
-        };
-        stacks_over(low, high).map(heights).min().unwrap_or(i32::MIN)
-    }
-
-    /// Whether no bricks are stored over some columns, neither before nor after the commit.
-    pub fn is_undug(&self, low: Column, high: Column) -> bool {
-        let [before, after] = [SkyView::of(&self.world), self.view()];
-        stacks_over(low, high).all(|stack| before.rows(stack).is_empty() && after.rows(stack).is_empty())
+    /// The world before the commit.
+    pub fn view_before(&self) -> SkyView<'_> {
+        SkyView { world: &self.world, newer: None, commit: Some(self) }
     }
 
     /// The world after the commit.
     pub fn view(&self) -> SkyView<'_> {
-        SkyView { world: &self.world, newer: Some(&self.newer) }
+        SkyView { world: &self.world, newer: Some(&self.newer), commit: Some(self) }
     }
 
-    /// The stacks of bricks that the commit changes, in no order.
-    pub fn changed_stacks(&self) -> impl Iterator<Item = (i32, i32)> {
-        self.newer.stacks.keys().copied()
+    /// Where the commit changes bricks: columns of stacks, and where the highest brick of each ends, in 1/256 voxel.
+    pub fn changed_stacks(&self) -> impl Iterator<Item = (Column, i32)> {
+        let stacks = self.newer.stacks.iter();
+        stacks.map(|(&(x, z), stack)| {
+            (Column::new(x * BRICK, z * BRICK), (stack.highest + 1).saturating_mul(BRICK * ONE))
+        })
     }
 
-    /// The positions of the bricks that it changes, in no order.
-    pub fn changed_bricks(&self) -> impl Iterator<Item = BrickPos> {
-        self.newer.bricks.keys().copied()
+    /// The tops of a stack that the commit changes, before and after; `None` if it does not change the stack.
+    fn changed_tops(&self, at: (i32, i32)) -> Option<&[Option<StackTops>; 2]> {
+        let stack = self.newer.stacks.get(&at)?;
+        let views =
+            [None, Some(&self.newer)].map(|newer| SkyView { world: &self.world, newer, commit: None });
+        Some(stack.tops.get_or_init(|| views.map(|view| stack_tops(view, at))))
     }
-}
-
-/// The stacks of bricks over some columns, both ends included.
-fn stacks_over(low: Column, high: Column) -> impl Iterator<Item = (i32, i32)> {
-    (low.z >> 3..=high.z >> 3).flat_map(move |z| (low.x >> 3..=high.x >> 3).map(move |x| (x, z)))
 }
 
 /// A world as far as light depends on it.
@@ -117,12 +126,14 @@ fn stacks_over(low: Column, high: Column) -> impl Iterator<Item = (i32, i32)> {
 pub(crate) struct SkyView<'a> {
     world: &'a World,
     newer: Option<&'a Newer>,
+    /// The commit before or after which this is, which knows the tops of the stacks that it changes.
+    commit: Option<&'a LitWorld>,
 }
 
 impl<'a> SkyView<'a> {
     /// A world without a running commit.
     pub fn of(world: &'a World) -> Self {
-        Self { world, newer: None }
+        Self { world, newer: None, commit: None }
     }
 
     fn ground(self) -> &'a Ground {
@@ -139,7 +150,18 @@ impl<'a> SkyView<'a> {
     /// The heights of the bricks in a stack, ascending.
     fn rows(self, stack: (i32, i32)) -> &'a [i32] {
         let newer = self.newer.and_then(|newer| newer.stacks.get(&stack));
-        newer.or_else(|| self.world.stacks.get(&stack)).map_or(&[], Vec::as_slice)
+        match newer {
+            Some(newer) => &newer.rows,
+            None => self.world.stacks.get(&stack).map_or(&[], Vec::as_slice),
+        }
+    }
+
+    /// Calls a function with the tops of a stack, unless it holds no bricks.
+    fn with_tops<R>(self, stack: (i32, i32), work: impl FnOnce(&StackTops) -> R) -> Option<R> {
+        match self.commit.and_then(|commit| commit.changed_tops(stack)) {
+            Some(tops) => tops[usize::from(self.newer.is_some())].as_ref().map(work),
+            None => stack_tops(self, stack).as_ref().map(work),
+        }
     }
 
     /// The stacks that hold bricks between two stacks, both ends included, in no order.

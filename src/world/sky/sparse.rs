@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 
 use super::SkyView;
 use super::light::{FAR, REACH, SkyLights, Step, below, light_of, slope};
-use super::tops::{StackTops, stack_tops};
+use super::tops::StackTops;
 use crate::lattice::Column;
 
 /// Columns whose tops are found when they are asked for.
@@ -33,7 +33,7 @@ impl<'a> SparseSky<'a> {
         let mut hidden = vec![0u16; own.len()];
         for direction in &FAR {
             let mut horizons = vec![0i16; own.len()];
-            for &Step { dx, dz, factor } in direction {
+            for &Step { dx, dz, factor, .. } in direction {
                 let others = ground.page_heights(low.offset(dx, dz), stride, counts);
                 for ((horizon, top), &y) in horizons.iter_mut().zip(others).zip(&own) {
                     *horizon = (*horizon).max(slope(top, y, factor));
@@ -69,7 +69,7 @@ impl<'a> SparseSky<'a> {
 
     fn stack(&mut self, column: Column) -> Option<&StackTops> {
         let (key, view) = ((column.x >> 3, column.z >> 3), self.view);
-        self.stacks.entry(key).or_insert_with(|| stack_tops(view, key).map(Box::new)).as_deref()
+        self.stacks.entry(key).or_insert_with(|| view.with_tops(key, |tops| Box::new(*tops))).as_deref()
     }
 }
 

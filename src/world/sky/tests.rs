@@ -5,10 +5,11 @@ use super::*;
 use crate::brush::{Brush, Shape};
 use crate::ground::{MaterialId, NoiseHeights, NoiseSource};
 use crate::lattice::{ChunkPos, TilePos};
-use crate::lod::Cut;
-use crate::redraw::relit_parts;
-use crate::surface::Vertex;
-use crate::terrain::{Terrain, TerrainSettings};
+use crate::lod::{Cut, Node};
+use crate::loose::LooseSettings;
+use crate::redraw::{relit_nodes, relit_parts};
+use crate::surface::{SurfaceMesh, Vertex};
+use crate::terrain::{Order, Terrain, TerrainSettings, Transaction};
 use crate::world::MeshKey;
 
 fn terrain(ground: Ground, chunk_size: u32) -> Terrain {
@@ -244,7 +245,7 @@ fn a_commit_lights_all_that_it_changes() {
             // The running commit has the light of the committed one.
             for tile in world.grid().tiles() {
                 let (low, high) = world.grid().tile_cells(tile);
-                let [running, done] =
+                let [mut running, mut done] =
                     [lit.view(), SkyView::of(world)].map(|view| SkyColumns::new(view, low, high));
                 assert_eq!(running.lights(), done.lights());
             }
@@ -259,6 +260,152 @@ fn a_commit_lights_all_that_it_changes() {
         }
     }
     assert!(relit_tiles > 20, "{relit_tiles}");
+}
+
+/// A ground, and what players do there.
+struct Scene {
+    name: &'static str,
+    chunk_size: u32,
+    ground: Ground,
+    /// Whether ground that is cut off breaks off.
+    is_loose: bool,
+    brush: fn(&mut Rng, &Ground) -> Brush,
+}
+
+fn scenes(seed: u32) -> [Scene; 5] {
+    fn at(rng: &mut Rng, low: [i32; 3], high: [i32; 3]) -> Vec3 {
+        let along =
+            |axis: usize, rng: &mut Rng| low[axis] as f32 + rng.f32() * (high[axis] - low[axis]) as f32;
+        Vec3::new(along(0, rng), along(1, rng), along(2, rng))
+    }
+    let gully = |x: i32, z: i32| {
+        let side = (f64::from(x) - 40.0 - 4.0 * (f64::from(z) / 12.0).sin()).abs();
+        26.0 - 8.0 * (1.0 - (side - 2.0) / 4.0).clamp(0.0, 1.0)
+    };
+    let slope = |x: i32, z: i32| 20.0 + 0.4 * f64::from(x) + 0.2 * f64::from(z);
+    let ground = |height: &(dyn Fn(i32, i32) -> f64 + Sync)| Ground::from_fn(79, 79, height).expect("valid");
+    [
+        Scene { name: "hills", chunk_size: 16, ground: hills(seed), is_loose: false, brush: any_brush },
+        Scene {
+            name: "tunnels and overhangs",
+            chunk_size: 32,
+            ground: cliff(),
+            is_loose: false,
+            brush: |rng, _| {
+                let from = at(rng, [36, 22, 20], [56, 30, 60]);
+                let to = from + at(rng, [-8, -3, -8], [8, 3, 8]);
+                Brush::dig(Shape::capsule(from, to, 1.5 + rng.f32() * 2.0))
+            },
+        },
+        Scene {
+            name: "roofs and loose pieces",
+            chunk_size: 16,
+            ground: ground(&|_, _| 20.0),
+            is_loose: true,
+            brush: |rng, _| {
+                let center = at(rng, [24, 20, 24], [56, 28, 56]);
+                let size = at(rng, [1, 1, 1], [9, 4, 9]);
+                match rng.u8(0..3) {
+                    0 => Brush::add(Shape::cuboid(center, size), MaterialId(2)),
+                    _ => Brush::dig(Shape::cuboid(center, size)),
+                }
+            },
+        },
+        Scene { name: "gully", chunk_size: 8, ground: ground(&gully), is_loose: false, brush: any_brush },
+        Scene {
+            name: "borders and rims",
+            chunk_size: 32,
+            ground: ground(&slope),
+            is_loose: false,
+            brush: |rng, ground| {
+                let along = |rng: &mut Rng| [0, 0, 31, 32, 33, 64, 77, 79][rng.usize(0..8)];
+                let (x, z) = (along(rng), along(rng));
+                let y = ground.height(Column::new(x, z)) / ONE - rng.i32(-1..3);
+                Brush::dig(Shape::sphere(IVec3::new(x, y, z).as_vec3(), 1.0 + rng.f32() * 3.0))
+            },
+        },
+    ]
+}
+
+/// What is drawn whose light differs between two worlds that draw the same shapes there, without what is drawn anew.
+fn otherwise_lit(before: &World, after: &World, is_drawn_anew: impl Fn(MeshKey) -> bool) -> Vec<MeshKey> {
+    let tiles = before.grid().tiles().map(MeshKey::Tile);
+    let all = tiles.chain(before.drawn_chunks().map(MeshKey::Chunk)).filter(|drawn| !is_drawn_anew(*drawn));
+    all.filter(|&drawn| lights_of(before, drawn) != lights_of(after, drawn)).collect()
+}
+
+/// Nodes of a cut whose light differs, without those that are drawn anew.
+fn otherwise_lit_nodes(before: &World, after: &World, cut: &Cut, drawn_anew: &[Node]) -> Vec<Node> {
+    let all = before.drawn_in(cut).filter(|(node, _)| node.level > 0 && !drawn_anew.contains(node));
+    let differs = |(node, mesh): &(Node, SurfaceMesh)| {
+        let (low, high) = cut.grid().columns(*node);
+        let [mut old, mut new] = [before, after]
+            .map(|world| SparseSky::new(SkyView::of(world)).with_grid(low, high, node.stride()));
+        let places = mesh.vertices.iter().map(|vertex| low.at(0) * SNAP + vertex.position);
+        { places }.any(|place| old.light(place) != new.light(place))
+    };
+    all.filter(differs).map(|(node, _)| node).collect()
+}
+
+#[test]
+fn everything_whose_light_changes_is_lit_again_wherever_players_dig() {
+    for seed in 0..2 {
+        for Scene { name, chunk_size, ground, is_loose, brush } in scenes(seed) {
+            let mut rng = Rng::with_seed(u64::from(seed) + 20);
+            let mut terrain = terrain(ground, chunk_size);
+            terrain.set_loose(is_loose.then(LooseSettings::default));
+            let cut = Cut::random(terrain.world().lod_grid(2), u64::from(seed), 12);
+            let drawn = Arc::new(terrain.world().draw_cut(cut.clone()).0);
+            terrain.set_drawn_cut(Some(Arc::clone(&drawn)));
+            // Without what is lit again, light would be wrong in so many places.
+            let (mut parts, mut nodes) = (0, 0);
+            for number in 0..24 {
+                let before = World::clone(terrain.world());
+                match number % 6 {
+                    4 => terrain.submit(Order::Undo),
+                    5 if rng.bool() => terrain.submit(Order::Redo),
+                    _ => terrain.submit(brush(&mut rng, before.ground())),
+                }
+                let Some(commit) = terrain.begin().map(Transaction::run) else { continue };
+                let lit = LitWorld::new(Arc::new(before.clone()), commit.change().bricks);
+                let tiles = commit.meshes.tiles.iter().map(|(tile, _)| MeshKey::Tile(*tile));
+                let chunks = commit.meshes.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk));
+                let redrawn: Vec<MeshKey> = tiles.chain(chunks).collect();
+                let relit = relit_parts(&lit, |drawn| redrawn.contains(&drawn));
+                let mut new_nodes: Vec<Node> = commit.meshes.nodes.iter().map(|update| update.node).collect();
+                let own_nodes = new_nodes.clone();
+                let relit_nodes = relit_nodes(&lit, &drawn, |node| own_nodes.contains(&node));
+                terrain.commit(commit).expect("it is next");
+                let world = terrain.world();
+                let needed = otherwise_lit(&before, world, |drawn| redrawn.contains(&drawn));
+                let missing: Vec<_> = needed.iter().filter(|drawn| !relit.contains(drawn)).collect();
+                assert!(missing.is_empty(), "{name}: {missing:?} after {number} of {seed}");
+                parts += needed.len();
+                let needed = otherwise_lit_nodes(&before, world, &cut, &new_nodes);
+                nodes += needed.len();
+                new_nodes.extend(relit_nodes.iter().map(|update| update.node));
+                let missing = otherwise_lit_nodes(&before, world, &cut, &new_nodes);
+                assert!(missing.is_empty(), "{name}: {missing:?} after {number} of {seed}");
+                // Columns that are brought up to date have the light of new ones, and that of each column by itself.
+                for tile in world.grid().tiles() {
+                    let (low, high) = world.grid().tile_cells(tile);
+                    let mut updated = SkyColumns::new(lit.view_before(), low, high).after(&lit);
+                    let mut lone = SparseSky::new(SkyView::of(world));
+                    assert_eq!(updated.lights(), SkyColumns::new(SkyView::of(world), low, high).lights());
+                    let columns =
+                        (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Column::new(x, z)));
+                    let ground = updated.ground_lights();
+                    for (&light, column) in ground.iter().zip(columns).step_by(7) {
+                        let height = world.ground().height(column) * (SNAP / ONE);
+                        let expected = lone.light((column.at(0) * SNAP).with_y(height));
+                        assert_eq!(light, expected, "{name}: {column:?} after {number} of {seed}");
+                    }
+                }
+            }
+            assert!(parts > 4, "{name}: {parts} parts");
+            println!("{name}: {parts} parts and {nodes} nodes are lit again");
+        }
+    }
 }
 
 #[test]
