@@ -113,7 +113,7 @@ pub fn block(seed: u64) -> Prefab {
     let ground = Ground::flat(32, 32, 10.0).expect("valid");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
     let ball = Shape::sphere(Vec3::new(16.0, 10.0, 16.0), 3.0 + seed as f32);
-    terrain.apply([if seed % 2 == 0 { Brush::dig(ball) } else { Brush::add(ball, MaterialId(2)) }]);
+    terrain.apply([if seed.is_multiple_of(2) { Brush::dig(ball) } else { Brush::add(ball, MaterialId(2)) }]);
     let min = IVec3::new(9, 3, 9);
     terrain.world().copy(LatticeBox { min, max: min + 14 }, min + 7).expect("in the world")
 }
