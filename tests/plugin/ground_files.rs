@@ -152,7 +152,6 @@ fn wrong_files_say_what_is_wrong_and_make_no_terrain() {
         ("lost.ground.json", format!(r#"{{ "heights": ["lost.png"], {SCALE} }}"#), "lost.png"),
         ("photo.ground.json", format!(r#"{{ "heights": ["photo.png"], {SCALE} }}"#), "photo.png"),
         ("tiles.ground.json", format!(r#"{{ "heights": ["good.png", "good.png"], {SCALE} }}"#), "no place"),
-        ("scale.ground.json", r#"{ "heights": ["good.png"] }"#.into(), "good.png"),
         (
             "splat.ground.json",
             format!(

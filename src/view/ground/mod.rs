@@ -117,7 +117,7 @@ fn add_materials(
     mut materials: ResMut<Assets<GroundMaterial>>,
 ) {
     let Some(textures) = &loading.ready else { return };
-    for (entity, terrain, look, place, material) in &looks {
+    for (entity, look, place, material) in &looks {
         let current = material.and_then(|material| materials.get(&material.0));
         let fits = |current: &GroundMaterial| {
             let GroundExtension { albedo, relief, without_anisotropy, .. } = &current.extension;
@@ -129,7 +129,8 @@ fn add_materials(
             continue;
         }
         let extension = GroundExtension {
-            uniform: uniform_of(terrain, look, place),
+            // The terrain's size comes with `follow`, in the same frame.
+            uniform: GroundUniform::new(look, place, IVec2::ONE),
             albedo: Some(textures.albedo.clone()),
             relief: Some(textures.relief.clone()),
             noise: Some(textures.noise.clone()),
@@ -211,7 +212,7 @@ fn note_color_maps(
 fn follow(
     looks: Query<
         (&Terrain, &GroundLook, &GlobalTransform, &MeshMaterial3d<GroundMaterial>),
-        Or<(Changed<GroundLook>, Changed<GlobalTransform>)>,
+        Or<(Changed<GroundLook>, Changed<GlobalTransform>, Changed<MeshMaterial3d<GroundMaterial>>)>,
     >,
     images: Res<Assets<Image>>,
     mut materials: ResMut<Assets<GroundMaterial>>,
