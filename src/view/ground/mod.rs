@@ -112,7 +112,10 @@ struct OwnMaterial(AssetId<GroundMaterial>);
 fn add_materials(
     mut commands: Commands,
     loading: Res<GroundLoading>,
-    looks: Query<(Entity, &Terrain, &GroundLook, &GlobalTransform, Option<&MeshMaterial3d<GroundMaterial>>)>,
+    looks: Query<
+        (Entity, &GroundLook, &GlobalTransform, Option<&MeshMaterial3d<GroundMaterial>>),
+        With<Terrain>,
+    >,
     images: Res<Assets<Image>>,
     mut materials: ResMut<Assets<GroundMaterial>>,
 ) {
