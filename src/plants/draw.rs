@@ -17,6 +17,7 @@ use bevy::render::storage::ShaderBuffer;
 
 use super::material::{PlantExtension, PlantMaterial, PlantUniform};
 use super::slots::{Record, Slots};
+use super::upload::PlantBuffers;
 use super::{News, NewsList, PlantSystems, ShownPlants};
 use crate::scatter::{PatchPos, Plant, PlantPatch, Species};
 use crate::terrain::Terrain;
@@ -92,25 +93,6 @@ impl Default for PlantLook {
 #[derive(Component, Clone, Debug, Default)]
 #[require(DrawnPlants)]
 pub struct PlantLooks(pub Vec<PlantLook>);
-
-/// The buffers with all plants that are drawn.
-#[derive(Resource)]
-pub(super) struct PlantBuffers {
-    pub slots: Slots,
-    pub records: Handle<ShaderBuffer>,
-    pub gone: Handle<ShaderBuffer>,
-    /// Slots that the buffers have room for.
-    room: usize,
-}
-
-impl FromWorld for PlantBuffers {
-    fn from_world(world: &mut World) -> Self {
-        let mut buffers = world.resource_mut::<Assets<ShaderBuffer>>();
-        let mut empty = || buffers.add(ShaderBuffer::new(&[0; 16], RenderAssetUsages::RENDER_WORLD));
-        let (records, gone) = (empty(), empty());
-        Self { slots: Slots::default(), records, gone, room: 0 }
-    }
-}
 
 /// A mesh of copies, and how far it is drawn.
 #[derive(Clone, Debug)]

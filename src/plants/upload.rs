@@ -1,14 +1,32 @@
-//! Writes what changed in the buffers of plants to the GPU: some hundred bytes for a dig, some thousand for a patch.
+//! The buffers of plants, and how what changed in them is written to the GPU: some hundred bytes for a dig, some thousand for a patch.
 
-use bevy::asset::AssetId;
+use bevy::asset::{AssetId, RenderAssetUsages};
 use bevy::prelude::*;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::renderer::RenderQueue;
 use bevy::render::storage::{GpuShaderBuffer, ShaderBuffer};
 use bevy::render::{ExtractSchedule, MainWorld, Render, RenderApp, RenderSystems};
 
-use super::draw::PlantBuffers;
-use super::slots::Bytes;
+use super::slots::{Bytes, Slots};
+
+/// The buffers with all plants that are drawn.
+#[derive(Resource)]
+pub(super) struct PlantBuffers {
+    pub slots: Slots,
+    pub records: Handle<ShaderBuffer>,
+    pub gone: Handle<ShaderBuffer>,
+    /// Slots that the buffers have room for.
+    pub room: usize,
+}
+
+impl FromWorld for PlantBuffers {
+    fn from_world(world: &mut World) -> Self {
+        let mut buffers = world.resource_mut::<Assets<ShaderBuffer>>();
+        let mut empty = || buffers.add(ShaderBuffer::new(&[0; 16], RenderAssetUsages::RENDER_WORLD));
+        let (records, gone) = (empty(), empty());
+        Self { slots: Slots::default(), records, gone, room: 0 }
+    }
+}
 
 /// Changes are written to buffers in place. Without a renderer, nothing is written.
 pub(super) fn build(app: &mut App) {

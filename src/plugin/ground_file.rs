@@ -10,6 +10,7 @@ use bevy::prelude::*;
 use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 
+use super::BeforeLoad;
 use super::heightmap::read_limited;
 use crate::ground::{
     ElevationGrid, ElevationScale, ElevationTile, Ground, GroundError, HeightFormat, IdOptions, ImportError,
@@ -246,12 +247,42 @@ impl GroundFrom {
     }
 }
 
+/// Adds the asset of grounds with its loader, and makes terrains of them, where there is an asset server.
+#[derive(Default)]
+pub struct GroundFilePlugin;
+
+impl Plugin for GroundFilePlugin {
+    // At once if possible, as games may load a ground while plugins are built; otherwise once all plugins are there.
+    fn build(&self, app: &mut App) {
+        register(app);
+    }
+
+    fn finish(&self, app: &mut App) {
+        register(app);
+    }
+}
+
+/// The asset and its loader are registered.
+#[derive(Resource)]
+struct Registered;
+
+/// Does nothing without an asset server, or if called again.
+fn register(app: &mut App) {
+    let world = app.world();
+    if world.contains_resource::<AssetServer>() && !world.contains_resource::<Registered>() {
+        app.insert_resource(Registered)
+            .init_asset::<GroundAsset>()
+            .init_asset_loader::<GroundLoader>()
+            .add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
+    }
+}
+
 /// The hash of the ground that a terrain got last from its file, or will get once what it was asked before is done.
 #[derive(Component)]
-pub(super) struct FollowedGround(u64);
+struct FollowedGround(u64);
 
 /// Makes terrains of grounds that are loaded, and gives terrains the ground that is loaded again.
-pub(super) fn follow_ground_files(
+fn follow_ground_files(
     mut commands: Commands,
     mut events: MessageReader<AssetEvent<GroundAsset>>,
     grounds: Res<Assets<GroundAsset>>,

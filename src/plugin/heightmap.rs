@@ -89,8 +89,7 @@ pub(super) async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<
     Ok(bytes)
 }
 
-/// Adds the assets of heightmaps, and with the feature `format` of whole [grounds](super::GroundAsset), with their loaders, where there is
-/// an asset server.
+/// Adds the heightmap asset and its loader, where there is an asset server.
 #[derive(Default)]
 pub struct HeightmapPlugin;
 
@@ -119,9 +118,5 @@ fn register(app: &mut App) {
             app.init_asset::<HeightmapImage>();
         }
         app.insert_resource(Registered).init_asset_loader::<HeightmapLoader>();
-        #[cfg(feature = "format")]
-        app.init_asset::<super::GroundAsset>()
-            .init_asset_loader::<super::GroundLoader>()
-            .add_systems(Update, super::ground_file::follow_ground_files.before(super::BeforeLoad::Worlds));
     }
 }

@@ -67,7 +67,8 @@ pub(crate) use entities::trigger_if_alive;
 pub use figures::BurrowFigures;
 #[cfg(feature = "format")]
 pub use ground_file::{
-    GroundAsset, GroundDescription, GroundFileError, GroundFrom, GroundLoader, MaterialFiles,
+    GroundAsset, GroundDescription, GroundFileError, GroundFilePlugin, GroundFrom, GroundLoader,
+    MaterialFiles,
 };
 #[doc(hidden)]
 pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};
