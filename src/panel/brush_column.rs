@@ -3,7 +3,7 @@
 use bevy::math::{EulerRot, Quat, Vec3};
 use bevy_egui::egui::{self, Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 
-use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, STEP, TUBE};
+use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, ROAD_HEIGHT, STEP, TUBE};
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, BAD, FAINT};
 use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
@@ -101,7 +101,7 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel
             Need::Amount => slider(ui, texts::AMOUNT, &mut tool.amount, AMOUNT.range(voxel), metres),
             Need::Level => slider(ui, texts::HEIGHT, &mut tool.level, -128.0..=256.0, metres),
             Need::Step => slider(ui, texts::STEP, &mut tool.step, STEP.range(voxel), metres),
-            Need::Height => slider(ui, texts::HEIGHT, &mut tool.length, LENGTH.range(voxel), metres),
+            Need::Height => slider(ui, texts::HEIGHT, &mut tool.length, ROAD_HEIGHT.range(voxel), metres),
         };
     }
 }
