@@ -366,7 +366,7 @@ impl BrushTool {
     /// Copies what lies in its shape, around a position, to be pasted.
     ///
     /// # Errors
-    /// As [`World::copy`](crate::world::World::copy): when it is too large, or not in the world.
+    /// As [`World::copy`](crate::terrain::World::copy): when it is too large, or not in the world.
     pub fn copy(
         &mut self,
         terrain: &Terrain,
