@@ -487,7 +487,7 @@ impl EditWriter {
         before
     }
 
-    /// The message of what was added since the last one, if anything was.
+    /// The message with the edits added since the last one, if there are any.
     pub fn finish(&mut self) -> Option<Vec<u8>> {
         let Self { first, count, bytes, .. } = std::mem::take(self);
         let mut message = vec![EDITS];

@@ -29,7 +29,7 @@ pub const ALIGN: [&str; 2] = ["Upright", "Along the surface"];
 texts! {
     ROUGH = "Rough", BUMPS = "Bumps", WIDTH = "Width", PATTERN = "Pattern",
     FITS_NOT = "This operation can't have this shape", HUT = "Hut", COPIED = "Copy", PREFAB = "Copy",
-    COPY_HELP = "What was copied of a world, or a prefab file that was dropped on the window", MIRRORED = "Mirrored",
+    COPY_HELP = "The last copy, or a prefab file dropped on the window", MIRRORED = "Mirrored",
     EDITS_ONLY = "Edits only", SMOOTH_PATH = "Curved", PATH_POINTS = "Points",
     PATH_HELP = "Each click sets a point. The path is one edit and one undo step.",
 }

@@ -72,7 +72,7 @@ pub struct BrushTool {
     /// What is pasted.
     #[reflect(ignore)]
     pub prefab: ToolPrefab,
-    /// Whether what is pasted is mirrored.
+    /// Whether pastes are mirrored.
     pub is_mirrored: bool,
     /// The points of a path that are set already, in world space; a brush adds its own place as the last one. At most
     /// [`PATH_POINTS`].
@@ -164,7 +164,7 @@ pub struct ToolPrefab {
     pub prefab: Option<Arc<Prefab>>,
     /// Metres of a voxel where it was copied: 1/8 to 8.
     pub voxel_size: f32,
-    /// Whether only what was edited there is pasted, and not the ground around it.
+    /// Whether only samples that were edited are pasted, and not the ground around them.
     pub is_edits_only: bool,
     /// Its name in the panel.
     pub name: Option<Name>,
@@ -571,7 +571,7 @@ mod tests {
             tool.add_point(&at(10.0));
             let shown = tool.brush_at(&at(20.0));
             tool.add_point(&at(20.0));
-            assert_eq!(tool.finish_path().as_ref(), Some(&shown), "what is shown is what is done");
+            assert_eq!(tool.finish_path().as_ref(), Some(&shown), "the preview is the edit");
             assert!(tool.points.is_empty() && Edit::quantize(&shown).is_ok());
             let straight = BrushTool { is_smooth: false, ..tool.clone() };
             assert_ne!(straight.brush_at(&at(20.0)), tool.brush_at(&at(20.0)));

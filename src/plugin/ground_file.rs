@@ -157,7 +157,7 @@ impl AssetLoader for GroundLoader {
     }
 }
 
-/// The bytes of a file beside the description.
+/// The bytes of a file, whose path is relative to the description.
 async fn read(name: &str, context: &mut LoadContext<'_>) -> Result<Vec<u8>, GroundFileError> {
     let path = context.path().resolve_embed_str(name);
     let path = path.map_err(|error| GroundFileError::Path(name.into(), error))?;

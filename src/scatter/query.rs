@@ -55,7 +55,7 @@ impl Scatter {
         }
         let size = [world.ground().width(), world.ground().depth()];
         let middle = DVec2::new(place.x, place.z).clamp(DVec2::ZERO, IVec2::from_array(size).as_dvec2());
-        // What is `far` from the middle is as far from the place, and farther if that lies outside.
+        // A plant `far` from the middle is at least as far from the place, as that may lie outside.
         let aside = middle.distance_squared(DVec2::new(place.x, place.z));
         let cell = middle.floor().as_ivec2();
         let mut best: Option<(f64, Plant)> = None;

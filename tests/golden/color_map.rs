@@ -1,4 +1,4 @@
-//! A colour map tints distant ground as the picture has it, and neither what is near nor what was dug.
+//! A colour map tints distant ground as the picture has it, but neither near ground nor dug faces.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;

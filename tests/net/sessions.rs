@@ -528,7 +528,7 @@ fn a_grid_that_is_too_large_where_it_is_named_is_refused() {
     let shape = GridShape::new(small, Vec3::splat(40.0)).with_scale(64.0);
     let edit = Edit::quantize(&Brush::dig(shape)).expect("valid");
     let mut message = ToServer::Edits { first: 1, edits: vec![edit] }.to_bytes();
-    // The same edit, but with the name of the other grid: 8,128 voxels a side.
+    // That edit with the name of the other grid: 8,128 voxels a side.
     let name = known[0].0.to_le_bytes();
     let at = message.windows(8).position(|window| window == name).expect("its name is in it");
     message[at..at + 8].copy_from_slice(&known[1].0.to_le_bytes());

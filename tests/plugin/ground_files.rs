@@ -87,11 +87,11 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     stage.frames_until("the ground is another one", |stage| height(stage, terrain, 0, 0) == 26);
     stage.settle();
     assert_eq!(material(&stage), MaterialId(5));
-    assert!(is_open(&stage), "what was dug stays dug");
+    assert!(is_open(&stage), "the hole stays");
     let pristine = DVec3::new(8.0, 27.0, 60.0);
     assert!(stage.terrain(terrain).world().is_solid(pristine));
 
-    // The same file again changes nothing.
+    // An unchanged file changes nothing.
     let hash = stage.hash(terrain);
     server.reload("island.ground.json");
     stage.frames(20);

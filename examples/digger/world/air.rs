@@ -27,7 +27,7 @@ impl Plugin for AirPlugin {
     }
 }
 
-/// Bevy 0.19 goes on to draw the sky of a camera that has lost its [`AtmosphereSettings`], with a pipeline for HDR.
+/// Bevy 0.19 continues to draw the sky of a camera that has lost its [`AtmosphereSettings`], with a pipeline for HDR.
 fn forget_air(
     mut commands: Commands,
     stale: Query<Entity, (With<ExtractedAtmosphere>, Without<GpuAtmosphereSettings>)>,
