@@ -11,7 +11,7 @@ use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 
 use super::BeforeLoad;
-use super::heightmap::read_limited;
+use super::heightmap::{read_limited, register_loader};
 use crate::ground::{
     ElevationGrid, ElevationScale, ElevationTile, Ground, GroundError, HeightFormat, IdOptions, ImportError,
     ImportOptions, MaterialControl, MaterialMap, SplatOptions, TileEdges, tile_place,
@@ -262,18 +262,9 @@ impl Plugin for GroundFilePlugin {
     }
 }
 
-/// The asset and its loader are registered.
-#[derive(Resource)]
-struct Registered;
-
-/// Does nothing without an asset server, or if called again.
 fn register(app: &mut App) {
-    let world = app.world();
-    if world.contains_resource::<AssetServer>() && !world.contains_resource::<Registered>() {
-        app.insert_resource(Registered)
-            .init_asset::<GroundAsset>()
-            .init_asset_loader::<GroundLoader>()
-            .add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
+    if register_loader::<GroundLoader>(app) {
+        app.add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
     }
 }
 
