@@ -15,7 +15,8 @@
 //! | `W` `A` `S` `D`, `Q`, `E`, left `Shift` | flies, down, up, faster |
 //! | `F` | flies to what is under the mouse |
 //! | wheel, `[`, `]` | size of the brush |
-//! | `1` to `9`, `0`, `-`, `=`, `P`, `R`, or `Tab` | operations |
+//! | `1` to `9`, `0`, `-`, `=`, `P`, `R`, `X`, or `Tab` | operations |
+//! | `G`, `B`, `Enter`, `Backspace` | puts the brush down, with handles to move, turn (`G` again) and size it; onto the ground; makes the edit; takes it back |
 //! | click, `Enter`, `Backspace` with the shape *Path* | sets a point, makes one edit of all points, takes the last one back |
 //! | `Ctrl+C`, `Ctrl+Shift+C` | copies what lies in the brush, to paste it; writes it to a `.prefab` file too |
 //! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
@@ -25,6 +26,7 @@
 //! | `F12` | saves a picture |
 //! | a PNG dropped on the window | becomes the stamp, as with `--stamp`: plain grey, white is high |
 //! | a `.prefab` dropped on the window | is pasted |
+//! | a `.glb` or `.gltf` with closed meshes dropped on the window | becomes the brush's shape, as with `--model` |
 //! | `Esc` | quits, and asks before changes are lost |
 //!
 //! With `--headless`, or without a display, a script sculpts instead and saves pictures, panel included, in `--out`.
@@ -33,18 +35,23 @@
 //! | file | subject |
 //! | --- | --- |
 //! | `scene.rs` | landscape, sun, camera |
-//! | `stroke.rs` | aim, preview, strokes, keys |
-//! | `stamps.rs` | stamps from files |
+//! | `stroke.rs` | aim, preview, strokes |
+//! | `placing.rs` | handles for the brush |
+//! | `keys.rs` | keys and the wheel |
+//! | `stamps.rs`, `models.rs` | stamps, prefabs and models from files |
 //! | `journal.rs` | a line for each receipt |
 //! | `script.rs` | the script for `--headless` |
 
 #[path = "../shared/display.rs"]
 mod display;
 mod journal;
+mod keys;
+mod models;
 #[path = "../shared/offscreen.rs"]
 mod offscreen;
 #[path = "../shared/photo.rs"]
 mod photo;
+mod placing;
 mod scene;
 mod script;
 mod stamps;
@@ -80,6 +87,9 @@ struct Options {
     /// Image to stamp: a PNG of plain grey with 8 or 16 bits, 2 to 256 samples a side; white is high.
     #[arg(long, value_name = "FILE")]
     stamp: Option<PathBuf>,
+    /// Model to dig and build with: a .glb or .gltf file with closed meshes.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
     /// Write each frame, and where the panel's widgets are, to standard output: for scripts that click on them.
     #[arg(long)]
     tell: bool,
@@ -109,7 +119,16 @@ fn main() -> ExitCode {
         ..default()
     }));
     editor(&mut app, &options);
-    app.add_plugins((stroke::MousePlugin, stamps::DropPlugin));
+    app.add_plugins((
+        stroke::MousePlugin,
+        keys::KeysPlugin,
+        placing::PlacingPlugin,
+        stamps::DropPlugin,
+        models::ModelsPlugin,
+    ));
+    if let Some(file) = options.model {
+        app.world_mut().resource_mut::<models::Reading>().start(file);
+    }
     if let Some(file) = &options.stamp {
         let taken = stamps::take(file, &mut app.world_mut().resource_mut::<BrushTool>());
         app.world_mut().resource_mut::<BurrowPanel>().report(taken);

@@ -12,6 +12,8 @@ use bevy_burrow::ground::ImageError;
 use bevy_burrow::panel::{BrushTool, BurrowPanel, StampImage, ToolOperation, ToolPrefab};
 use bevy_burrow::prelude::*;
 
+use crate::models::{self, Reading};
+
 /// The script's default stamp.
 const CRATER: &[u8] = include_bytes!("../../assets/stamps/crater.png");
 
@@ -23,7 +25,7 @@ const LIMITS: ImageLimits =
 const PREFAB: &str = "prefab";
 const MOST_PREFAB: u64 = 128 << 20;
 
-/// Uses files that are dropped on the window: prefabs are pasted, images are stamps.
+/// Uses files that are dropped on the window: prefabs are pasted, images are stamps, models are shapes.
 pub struct DropPlugin;
 
 impl Plugin for DropPlugin {
@@ -71,9 +73,14 @@ fn take_dropped(
     mut drops: MessageReader<FileDragAndDrop>,
     mut tool: ResMut<BrushTool>,
     mut panel: ResMut<BurrowPanel>,
+    mut models: Option<ResMut<Reading>>,
 ) {
     for message in drops.read() {
         if let FileDragAndDrop::DroppedFile { path_buf, .. } = message {
+            if let (true, Some(models)) = (models::is_model(path_buf), &mut models) {
+                models.start(path_buf.clone());
+                continue;
+            }
             let is_prefab = path_buf.extension().is_some_and(|extension| extension == PREFAB);
             panel.report(if is_prefab {
                 take_prefab(path_buf, &mut tool)

@@ -1,27 +1,23 @@
-//! Strokes: aiming, the preview of the brush, and mouse and key bindings.
+//! Strokes by the mouse: aiming, modifiers, the preview of the brush.
 
 #[path = "../shared/gizmos.rs"]
 mod gizmos;
 
 use std::time::Duration;
 
-use bevy::camera_controller::free_camera::{FreeCamera, FreeCameraState};
-use bevy::input::keyboard::{Key, KeyboardInput};
-use bevy::input::mouse::{AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::prelude::*;
-use bevy::window::{PrimaryWindow, WindowCloseRequested};
+use bevy::window::PrimaryWindow;
 use bevy_burrow::brush::Blend;
 use bevy_burrow::debug::draw_shape;
 use bevy_burrow::panel::{
-    BrushTool, BurrowPanel, PanelAction, PanelInput, ToolAlign, ToolOperation, ToolShape, keyboard_is_free,
-    pointer_is_free,
+    BrushTool, BurrowPanel, PanelInput, ToolAlign, ToolOperation, ToolShape, pointer_is_free,
 };
 use bevy_burrow::prelude::*;
 
-use crate::stamps;
+use crate::placing::Placing;
 
 /// The reach of the brush in metres.
-const REACH: f32 = 400.0;
+pub const REACH: f32 = 400.0;
 
 /// Parts of a ring, and lines along a side of the preview of a stamp.
 const RING: u32 = 48;
@@ -48,7 +44,7 @@ enum Modifier {
 
 /// The strokes that were made.
 #[derive(Resource, Default)]
-struct Strokes {
+pub struct Strokes {
     /// Brushes that were sent.
     count: u64,
     /// The stroke that is drawn: one press of the button, and one step of undo.
@@ -70,69 +66,37 @@ impl Plugin for StrokePlugin {
     }
 }
 
-/// Strokes by mouse and keys.
+/// Strokes by the mouse.
 pub struct MousePlugin;
 
 impl Plugin for MousePlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Strokes>()
-            .add_systems(Startup, name_keys)
-            .add_systems(PreUpdate, hold_camera.after(bevy::input::InputSystems))
-            .add_systems(
-                Update,
-                (
-                    (aim, read_modifier, stroke.run_if(pointer_is_free))
-                        .chain()
-                        .before(BurrowSystems::Collect)
-                        .before(preview),
-                    turn_wheel.run_if(pointer_is_free),
-                    keys.run_if(keyboard_is_free),
-                    path_keys.run_if(keyboard_is_free).before(BurrowSystems::Collect),
-                    command,
-                    copy.after(aim),
-                    ask_to_close,
-                ),
-            );
+        app.init_resource::<Strokes>().add_systems(
+            Update,
+            (aim, read_modifier, stroke.run_if(pointer_is_free.and_then(not(any_with_component::<Placing>))))
+                .chain()
+                .before(BurrowSystems::Collect)
+                .before(preview),
+        );
     }
 }
 
-/// The keys of the operations, in the panel's order.
-const OPERATION_KEYS: [(KeyCode, &str); 14] = [
-    (KeyCode::Digit1, "1"),
-    (KeyCode::Digit2, "2"),
-    (KeyCode::Digit3, "3"),
-    (KeyCode::Digit4, "4"),
-    (KeyCode::Digit5, "5"),
-    (KeyCode::Digit6, "6"),
-    (KeyCode::Digit7, "7"),
-    (KeyCode::Digit8, "8"),
-    (KeyCode::Digit9, "9"),
-    (KeyCode::Digit0, "0"),
-    (KeyCode::Minus, "-"),
-    (KeyCode::Equal, "="),
-    (KeyCode::KeyP, "P"),
-    (KeyCode::KeyR, "R"),
-];
+impl Strokes {
+    /// A brush that is a stroke of its own.
+    pub fn only(&mut self, brush: Brush) -> Brush {
+        self.number += 1;
+        self.next(brush)
+    }
 
-/// Keys of the panel's buttons.
-const BUTTON_KEYS: [(&str, &str); 7] = [
-    ("New", "Ctrl+N"),
-    ("Open", "Ctrl+O"),
-    ("Save", "Ctrl+S"),
-    ("Save as", "Ctrl+Shift+S"),
-    ("Undo", "Ctrl+Z"),
-    ("Redo", "Ctrl+Y"),
-    ("Save picture", "F12"),
-];
-
-/// Tells the panel the keys that it shows.
-fn name_keys(mut panel: ResMut<BurrowPanel>) {
-    let operations =
-        ToolOperation::all().zip(OPERATION_KEYS).map(|(operation, (_, key))| (operation.name(), key));
-    panel.keys = operations.chain(BUTTON_KEYS).map(|(name, key)| (name.into(), key.into())).collect();
+    /// The next brush of a stroke.
+    fn next(&mut self, brush: Brush) -> Brush {
+        self.count += 1;
+        brush.with_tag(self.count).with_stroke(self.number)
+    }
 }
 
-fn aim(
+/// Finds what is under the pointer.
+pub fn aim(
     window: Single<&Window, With<PrimaryWindow>>,
     camera: Single<(&Camera, &GlobalTransform), With<Camera3d>>,
     terrains: Terrains,
@@ -229,33 +193,10 @@ fn stroke(
         let above = Ray3d::new(place + Vec3::Y * REACH, Dir3::NEG_Y);
         let on_line = if place == hit.position { Some(*hit) } else { terrains.raycast(above, 2.0 * REACH) };
         let Some(hit) = on_line else { continue };
-        strokes.count += 1;
-        brushes.write(tool.brush_at(&hit).with_tag(strokes.count).with_stroke(strokes.number));
+        brushes.write(strokes.next(tool.brush_at(&hit)));
     }
     strokes.last = Some(hit.position);
     strokes.rest = Timer::new(Duration::from_secs_f32(1.0 / tool.rate.max(0.1)), TimerMode::Once);
-}
-
-/// Enter makes an edit of the path's points, Backspace takes the last one back.
-fn path_keys(
-    keys: Res<ButtonInput<KeyCode>>,
-    mut tool: ResMut<BrushTool>,
-    mut strokes: ResMut<Strokes>,
-    mut brushes: MessageWriter<Brush>,
-) {
-    if tool.points.is_empty() || tool.fitting_shape() != ToolShape::Path {
-        return;
-    }
-    if keys.just_pressed(KeyCode::Backspace) {
-        tool.points.pop();
-    }
-    if keys.any_just_pressed([KeyCode::Enter, KeyCode::NumpadEnter])
-        && let Some(brush) = tool.finish_path()
-    {
-        strokes.count += 1;
-        strokes.number += 1;
-        brushes.write(brush.with_tag(strokes.count).with_stroke(strokes.number));
-    }
 }
 
 /// Positions along a straight line, at most `apart` from each other, up to its end. Without a start, only the end.
@@ -265,171 +206,21 @@ fn line(from: Option<Vec3>, to: Vec3, apart: f32) -> impl Iterator<Item = Vec3> 
     (1..steps).map(move |step| start.lerp(to, step as f32 / steps as f32)).chain([to])
 }
 
-/// The wheel changes the size of the brush, or, while the right button is held, how fast the camera flies.
-fn turn_wheel(
-    wheel: Res<AccumulatedMouseScroll>,
-    mouse: Res<ButtonInput<MouseButton>>,
-    mut tool: ResMut<BrushTool>,
-    terrain: Option<Single<&Terrain>>,
-    mut cameras: Query<&mut FreeCamera>,
-) {
-    let lines = match wheel.unit {
-        MouseScrollUnit::Line => wheel.delta.y,
-        MouseScrollUnit::Pixel => wheel.delta.y / MouseScrollUnit::SCROLL_UNIT_CONVERSION_FACTOR,
-    };
-    if lines == 0.0 {
-        return;
-    }
-    if mouse.pressed(MouseButton::Right) {
-        for mut camera in &mut cameras {
-            let factor = 1.2f32.powf(lines);
-            camera.walk_speed = (camera.walk_speed * factor).clamp(2.0, 200.0);
-            camera.run_speed = (camera.run_speed * factor).clamp(6.0, 600.0);
-        }
-    } else if let Some(terrain) = terrain {
-        tool.grow(1.1f32.powf(lines), terrain.voxel_size());
-    }
-}
-
-fn keys(
-    keys: Res<ButtonInput<KeyCode>>,
-    aim: Res<Aim>,
-    terrain: Option<Single<&Terrain>>,
-    mut camera: Single<&mut Transform, With<FreeCamera>>,
-    mut tool: ResMut<BrushTool>,
-    mut panel: ResMut<BurrowPanel>,
-    mut actions: MessageWriter<PanelAction>,
-) {
-    for (key, factor) in [(KeyCode::BracketRight, 1.25), (KeyCode::BracketLeft, 0.8)] {
-        if let (true, Some(terrain)) = (keys.just_pressed(key), &terrain) {
-            tool.grow(factor, terrain.voxel_size());
-        }
-    }
-    for (operation, (key, _)) in ToolOperation::all().zip(OPERATION_KEYS) {
-        if keys.just_pressed(key) {
-            tool.operation = operation;
-        }
-    }
-    if keys.just_pressed(KeyCode::Tab) {
-        let all: Vec<ToolOperation> = ToolOperation::all().collect();
-        let next = all.iter().position(|&operation| operation == tool.operation).map_or(0, |at| at + 1);
-        tool.operation = all.get(next).copied().unwrap_or_default();
-    }
-    if let (true, Some(hit)) = (keys.just_pressed(KeyCode::KeyH), &aim.0) {
-        tool.level = hit.position.y;
-    }
-    if let (true, Some(hit)) = (keys.just_pressed(KeyCode::KeyF), &aim.0) {
-        camera.translation = hit.position - camera.forward() * (15.0 + 3.0 * tool.width());
-    }
-    if keys.just_pressed(KeyCode::F1) {
-        panel.is_open = !panel.is_open;
-    }
-    if keys.just_pressed(KeyCode::F12) {
-        actions.write(PanelAction::SavePicture);
-    }
-    if keys.just_pressed(KeyCode::Escape) {
-        actions.write(PanelAction::Quit);
-    }
-}
-
-/// The window's close button asks as Escape does.
-fn ask_to_close(mut requests: MessageReader<WindowCloseRequested>, mut actions: MessageWriter<PanelAction>) {
-    if requests.read().next().is_some() {
-        actions.write(PanelAction::Quit);
-    }
-}
-
-/// Undo, redo and files. Reads keyboard messages, because `ButtonInput<Key>` never releases a `Z` that comes up as `z`
-/// after Shift was released.
-fn command(
-    mut presses: MessageReader<KeyboardInput>,
-    keys: Res<ButtonInput<KeyCode>>,
-    panel: Option<Res<PanelInput>>,
-    mut actions: MessageWriter<PanelAction>,
-) {
-    let is_shift = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
-    let is_due = keyboard_is_free(panel) && keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
-    for press in presses.read().filter(|press| is_due && press.state.is_pressed() && !press.repeat) {
-        let action = match letter(press) {
-            Some('z') if !is_shift => PanelAction::Undo,
-            Some('z' | 'y') => PanelAction::Redo,
-            Some('s') if is_shift => PanelAction::SaveLevelAs,
-            Some('s') => PanelAction::SaveLevel,
-            Some('o') => PanelAction::LoadLevel,
-            Some('n') => PanelAction::NewLevel,
-            _ => continue,
-        };
-        actions.write(action);
-    }
-}
-
-/// `Ctrl+C` copies what lies in the brush; with Shift, into a file too.
-fn copy(
-    mut presses: MessageReader<KeyboardInput>,
-    keys: Res<ButtonInput<KeyCode>>,
-    input: Option<Res<PanelInput>>,
-    aim: Res<Aim>,
-    terrains: Query<(&Terrain, &GlobalTransform)>,
-    mut tool: ResMut<BrushTool>,
-    mut panel: ResMut<BurrowPanel>,
-) {
-    let is_due = keyboard_is_free(input) && keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
-    let is_pressed =
-        |press: &KeyboardInput| press.state.is_pressed() && !press.repeat && letter(press) == Some('c');
-    if !presses.read().any(is_pressed) || !is_due {
-        return;
-    }
-    let Some(hit) = aim.0 else { return };
-    let Ok((terrain, place)) = terrains.get(hit.terrain) else { return };
-    let copied = tool.copy(terrain, place, &hit).map_err(|why| why.to_string());
-    let is_kept = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
-    panel
-        .report(copied.and_then(|()| if is_kept { stamps::keep(&tool.prefab) } else { Ok("Copied".into()) }));
-}
-
-/// The letter on a key, by the keyboard layout: QWERTZ and AZERTY have Z elsewhere than QWERTY. For layouts without
-/// Latin letters, the key's position on QWERTY counts.
-fn letter(press: &KeyboardInput) -> Option<char> {
-    match (&press.logical_key, press.key_code) {
-        (Key::Character(text), _) if text.bytes().all(|byte| byte.is_ascii_graphic()) => {
-            text.chars().next().map(|letter| letter.to_ascii_lowercase())
-        }
-        (_, KeyCode::KeyZ) => Some('z'),
-        (_, KeyCode::KeyY) => Some('y'),
-        (_, KeyCode::KeyS) => Some('s'),
-        (_, KeyCode::KeyO) => Some('o'),
-        (_, KeyCode::KeyN) => Some('n'),
-        (_, KeyCode::KeyC) => Some('c'),
-        _ => None,
-    }
-}
-
-/// The camera stands still while the panel uses pointer or keyboard, and while Control turns its keys into commands.
-fn hold_camera(
-    input: Res<PanelInput>,
-    keys: Res<ButtonInput<KeyCode>>,
-    mouse: Res<ButtonInput<MouseButton>>,
-    mut cameras: Query<&mut FreeCameraState>,
-) {
-    for mut camera in &mut cameras {
-        // A look around that began outside the panel continues over it.
-        let goes_on =
-            camera.enabled && mouse.pressed(MouseButton::Right) && !mouse.just_pressed(MouseButton::Right);
-        let is_command = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
-        camera.enabled = goes_on || !input.has_pointer && !input.has_keyboard && !is_command;
-    }
-}
-
 /// Shows the shape, and on the ground its outline and where the falloff ends; of a stamp, its image.
 fn preview(
     aim: Res<Aim>,
     tool: Res<BrushTool>,
     modifier: Res<Modifier>,
     terrains: Terrains,
+    placing: Option<Single<&Transform, With<Placing>>>,
+    terrain: Option<Single<&Terrain>>,
     mut gizmos: Gizmos,
 ) {
-    let Some(hit) = &aim.0 else { return };
     let tool = modified(&tool, *modifier);
+    let voxel = terrain.map_or(1.0, |terrain| terrain.voxel_size());
+    let placed = placing.map(|place| tool.placed(&place, voxel));
+    let Some((tool, hit)) = placed.or_else(|| Some((tool, aim.0?))) else { return };
+    let hit = &hit;
     let color = match *modifier {
         Modifier::Invert => Color::srgb(1.0, 0.45, 0.35),
         Modifier::Smooth => Color::srgb(0.45, 0.75, 1.0),
@@ -478,8 +269,6 @@ fn preview(
 
 #[cfg(test)]
 mod tests {
-    use bevy::input::ButtonState;
-
     use super::*;
 
     #[test]
@@ -550,38 +339,4 @@ mod tests {
 
     #[derive(Resource, Default)]
     struct Sent(Vec<Option<u64>>);
-
-    #[test]
-    fn undo_and_redo_follow_the_keyboard_layout() {
-        let on = |key_code, text: &str| {
-            let (logical_key, state, window) =
-                (Key::Character(text.into()), ButtonState::Pressed, Entity::PLACEHOLDER);
-            letter(&KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window })
-        };
-        assert_eq!((on(KeyCode::KeyZ, "z"), on(KeyCode::KeyZ, "Z")), (Some('z'), Some('z')));
-        // QWERTZ and AZERTY.
-        assert_eq!((on(KeyCode::KeyY, "z"), on(KeyCode::KeyZ, "y")), (Some('z'), Some('y')));
-        assert_eq!((on(KeyCode::KeyW, "z"), on(KeyCode::KeyZ, "w")), (Some('z'), Some('w')));
-        // Cyrillic letters.
-        assert_eq!((on(KeyCode::KeyZ, "я"), on(KeyCode::KeyY, "н")), (Some('z'), Some('y')));
-    }
-
-    #[test]
-    fn ctrl_shift_z_works_again_after_shift_was_released_first() {
-        let mut app = App::new();
-        app.add_message::<KeyboardInput>().add_message::<PanelAction>().add_systems(Update, command);
-        let mut keys = ButtonInput::<KeyCode>::default();
-        keys.press(KeyCode::ControlLeft);
-        keys.press(KeyCode::ShiftLeft);
-        app.insert_resource(keys);
-        for (text, state) in [("Z", ButtonState::Pressed), ("z", ButtonState::Released)].repeat(2) {
-            let (key_code, logical_key) = (KeyCode::KeyZ, Key::Character(text.into()));
-            let window = Entity::PLACEHOLDER;
-            let press = KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window };
-            app.world_mut().write_message(press);
-        }
-        app.update();
-        let actions = app.world().resource::<Messages<PanelAction>>();
-        assert_eq!(actions.len(), 2);
-    }
 }

@@ -154,7 +154,13 @@ fn draw(
         // Rounded, so that small moves of the camera draw nothing again.
         let step = (debug.near / scale / 4.0).max(1.0);
         let steps = (focus / step).round();
-        let place = Place { focus: steps * step, radius: debug.radius / scale, near: debug.near / scale };
+        let place = Place {
+            focus: steps * step,
+            radius: debug.radius / scale,
+            near: debug.near / scale,
+            #[cfg(feature = "navigation")]
+            agent: debug.agent.scaled(1.0 / scale),
+        };
         for view in DebugView::ALL.into_iter().filter(|&view| debug.shows(view)) {
             let fading = if view == DebugView::Dirty { *frames } else { 0 };
             let key = Key {

@@ -22,11 +22,17 @@ pub struct BurrowDebug {
     pub wires: bool,
     /// Edges of triangles, coloured by level of detail.
     pub levels: bool,
+    /// Where an agent can walk, as polygons, and the free air above floors.
+    #[cfg(feature = "navigation")]
+    pub walkable: bool,
+    /// The agent of that view, in metres.
+    #[cfg(feature = "navigation")]
+    pub agent: crate::navigation::WalkSettings,
     /// The place around which is drawn, in world space; `None` for where the camera looks at the ground.
     pub focus: Option<Vec3>,
-    /// How far views reach, in metres; normals and wires reach [`near`](Self::near).
+    /// How far views reach, in metres; normals, wires and walkable ground reach [`near`](Self::near).
     pub radius: f32,
-    /// How far normals and wires reach, in metres.
+    /// How far normals, wires and walkable ground reach, in metres.
     pub near: f32,
     /// Most lines of a view of one terrain.
     pub most_lines: usize,
@@ -46,6 +52,10 @@ impl Default for BurrowDebug {
             normals: false,
             wires: false,
             levels: false,
+            #[cfg(feature = "navigation")]
+            walkable: false,
+            #[cfg(feature = "navigation")]
+            agent: crate::navigation::WalkSettings { height: 1.8, ..Default::default() },
             focus: None,
             radius: 96.0,
             near: 20.0,
@@ -68,11 +78,13 @@ pub enum DebugView {
     Normals,
     Wires,
     Levels,
+    #[cfg(feature = "navigation")]
+    Walkable,
 }
 
 impl DebugView {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; if cfg!(feature = "navigation") { 9 } else { 8 }] = [
         Self::Chunks,
         Self::Fields,
         Self::Mask,
@@ -81,6 +93,8 @@ impl DebugView {
         Self::Normals,
         Self::Wires,
         Self::Levels,
+        #[cfg(feature = "navigation")]
+        Self::Walkable,
     ];
 
     /// In plain words.
@@ -94,6 +108,8 @@ impl DebugView {
             Self::Normals => "Normals",
             Self::Wires => "Seam wires",
             Self::Levels => "Levels of detail",
+            #[cfg(feature = "navigation")]
+            Self::Walkable => "Walkable ground",
         }
     }
 }
@@ -110,6 +126,8 @@ impl BurrowDebug {
             DebugView::Normals => self.normals,
             DebugView::Wires => self.wires,
             DebugView::Levels => self.levels,
+            #[cfg(feature = "navigation")]
+            DebugView::Walkable => self.walkable,
         }
     }
 
@@ -124,6 +142,8 @@ impl BurrowDebug {
             DebugView::Normals => &mut self.normals,
             DebugView::Wires => &mut self.wires,
             DebugView::Levels => &mut self.levels,
+            #[cfg(feature = "navigation")]
+            DebugView::Walkable => &mut self.walkable,
         }
     }
 }

@@ -32,8 +32,11 @@ pub struct Place {
     pub focus: Vec3,
     /// How far most views reach, in voxels.
     pub radius: f32,
-    /// How far normals and wires reach, in voxels.
+    /// How far normals, wires and walkable ground reach, in voxels.
     pub near: f32,
+    /// Who walks, in voxels.
+    #[cfg(feature = "navigation")]
+    pub agent: crate::navigation::WalkSettings,
 }
 
 /// Draws a view.
@@ -52,6 +55,8 @@ pub fn draw(view: DebugView, terrain: &Terrain, place: Place, dirty: &[Dirty], o
             Some(drawn) => levels(world, drawn.cut(), place, out),
             None => levels(world, &Cut::coarsest(world.lod_grid(0)), place, out),
         },
+        #[cfg(feature = "navigation")]
+        DebugView::Walkable => super::walkable::draw(world, place, out),
     }
 }
 
@@ -227,7 +232,17 @@ mod tests {
         let mut terrain = hills(side);
         let focus = Vec3::new(32.0, terrain.world().height(32.0, 32.0).unwrap_or_default() as f32, 32.0);
         terrain.apply([Brush::dig(Shape::sphere(focus, 6.0))]);
-        (terrain, Place { focus, radius: 40.0, near: 12.0 })
+        (terrain, place_at(focus, 40.0, 12.0))
+    }
+
+    fn place_at(focus: Vec3, radius: f32, near: f32) -> Place {
+        Place {
+            focus,
+            radius,
+            near,
+            #[cfg(feature = "navigation")]
+            agent: crate::navigation::WalkSettings { slope: 2.0, ..Default::default() },
+        }
     }
 
     fn count(view: DebugView, terrain: &Terrain, place: Place, most: usize) -> usize {
@@ -259,7 +274,7 @@ mod tests {
 
     #[test]
     fn where_nobody_dug_only_the_ground_is_drawn() {
-        let place = Place { focus: Vec3::new(32.0, 0.0, 32.0), radius: 40.0, near: 40.0 };
+        let place = place_at(Vec3::new(32.0, 0.0, 32.0), 40.0, 40.0);
         let counts = DebugView::ALL.map(|view| count(view, &hills(64), place, 100_000));
         assert!(counts[0] > 0 && counts[5] > 0 && counts[6] > 0, "{counts:?}");
         assert_eq!(counts[1..5], [0; 4]);

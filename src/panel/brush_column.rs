@@ -3,7 +3,7 @@
 use bevy::math::{EulerRot, Quat, Vec3};
 use bevy_egui::egui::{self, Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 
-use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, ROAD_HEIGHT, STEP, TUBE};
+use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, ROAD_HEIGHT, STEP, TUBE};
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, BAD, FAINT};
 use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
@@ -120,7 +120,7 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
         tool.shape = shape;
     }
     let now = tool.fitting_shape();
-    let radii = RADIUS.range(voxel);
+    let radii = tool.radii(voxel);
     let turn = |ui: &mut Ui, turn: &mut f32| {
         slider(ui, texts::TURN, turn, -180.0..=180.0, |slider| {
             slider.step_by(15.0).max_decimals(0).suffix("°")
@@ -128,6 +128,7 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     };
     if tool.operation == ToolOperation::Paste {
         turn(ui, &mut tool.turn);
+        align(ui, tool);
         return;
     }
     if now == ToolShape::Box {
@@ -137,6 +138,11 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
         turn(ui, &mut tool.turn);
     } else {
         slider(ui, texts::RADIUS, &mut tool.radius, radii, length);
+    }
+    if now == ToolShape::Model {
+        turn(ui, &mut tool.turn);
+        figure(ui, texts::MODEL, tool.model.label());
+        ui.label(egui::RichText::new(texts::MODEL_HELP).color(FAINT).size(11.0));
     }
     if now == ToolShape::Torus {
         slider(ui, texts::TUBE, &mut tool.tube, TUBE.range(voxel), length);
@@ -150,11 +156,15 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
         slider(ui, texts::LENGTH, &mut tool.length, LENGTH.range(voxel), length);
     }
     slider(ui, texts::SINK, &mut tool.sink, -1.0..=1.0, percent).on_hover_text(texts::SINK_HELP);
+    if now != ToolShape::Sphere || tool.operation == ToolOperation::Stamp {
+        align(ui, tool);
+    }
+}
+
+fn align(ui: &mut Ui, tool: &mut BrushTool) {
     let aligns = [ToolAlign::Upright, ToolAlign::Surface];
     let chosen = usize::from(tool.align == ToolAlign::Surface);
-    if (now != ToolShape::Sphere || tool.operation == ToolOperation::Stamp)
-        && let Some(&align) = choice(ui, &texts::ALIGN, chosen).and_then(|at| aligns.get(at))
-    {
+    if let Some(&align) = choice(ui, &texts::ALIGN, chosen).and_then(|at| aligns.get(at)) {
         tool.align = align;
     }
 }
@@ -202,6 +212,15 @@ fn draw_shape(ui: &Ui, shape: ToolShape, rect: Rect, stroke: Stroke) {
     let outline = |from, to| {
         ui.painter().line_segment([at(from), at(to)], stroke);
     };
+    if shape == ToolShape::Model {
+        // A star with seven points.
+        let corner = |step: i32| {
+            let (sin, cos) = (step as f32 * std::f32::consts::TAU / 14.0).sin_cos();
+            Vec3::new(sin, cos, 0.0) * if step % 2 == 0 { 1.0 } else { 0.6 }
+        };
+        (0..14).for_each(|step| outline(corner(step), corner(step + 1)));
+        return;
+    }
     if shape == ToolShape::Path {
         let at = |step: i32| {
             let along = step as f32 / 8.0;

@@ -41,13 +41,14 @@ mod terrain_controls;
 mod texts;
 mod theme;
 pub mod tool;
+mod tool_content;
 mod tool_operation;
 mod widgets;
 mod world_column;
 
 pub use state::{BurrowPanel, PanelAction, PanelInput, PanelPlaces, keyboard_is_free, pointer_is_free};
 #[doc(hidden)]
-pub use tool::{BrushTool, PATH_POINTS, StampImage, ToolAlign, ToolPrefab, ToolShape};
+pub use tool::{BrushTool, PATH_POINTS, StampImage, ToolAlign, ToolModel, ToolPrefab, ToolShape};
 pub use tool_operation::ToolOperation;
 
 use bevy::camera::RenderTarget;

@@ -4,6 +4,7 @@ use bevy::prelude::*;
 
 use super::{BrushTool, ToolOperation, ToolShape, texts};
 use crate::brush::{Operation, Stamp};
+use crate::ground::MaterialId;
 use crate::plugin::TerrainHit;
 
 /// A setting that only some operations use.
@@ -82,6 +83,8 @@ pub(super) const OPERATIONS: &[Row] = &[
         make: paste },
     Row { tool: ToolOperation::Reset, needs: &[],
         profile: |x| (0.6 - 0.4 * bowl(x), 0.6), make: |_, _| Operation::Reset },
+    Row { tool: ToolOperation::Clear, needs: &[],
+        profile: |x| (0.45 + 0.25 * triangle_wave(x * 5.0), 0.2), make: |_, _| Operation::Paint { material: MaterialId::GROUND } },
 ];
 
 /// A half ellipse in the middle.
@@ -130,11 +133,11 @@ impl ToolOperation {
         self.row().name()
     }
 
-    /// Whether a brush of this operation may have a shape. A stamp covers a whole area, so it can't be a ring or a path; a
+    /// Whether a brush of this operation may have a shape. A stamp covers a whole area, so it can't be a ring, a path or a model; a
     /// road is a path; what is pasted has a shape of its own.
     pub fn fits(self, shape: ToolShape) -> bool {
         match self {
-            Self::Stamp => !matches!(shape, ToolShape::Torus | ToolShape::Path),
+            Self::Stamp => !matches!(shape, ToolShape::Torus | ToolShape::Path | ToolShape::Model),
             Self::Road => shape == ToolShape::Path,
             Self::Paste => shape == ToolShape::Box,
             _ => true,

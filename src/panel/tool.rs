@@ -1,17 +1,17 @@
 //! The current brush: the panel's left column sets it, and games read it.
 
-use std::sync::{Arc, LazyLock};
+use std::ops::RangeInclusive;
 
 use bevy::prelude::*;
 
 use super::lengths::RADIUS;
 use super::texts;
+pub use super::tool_content::{StampImage, ToolModel, ToolPrefab};
 use super::tool_operation::ToolOperation;
 use crate::brush::{
-    Brush, BrushPath, Corridor, FULL_POWER, Operation, Paste, Prefab, PrefabError, PrefabSample, Roughness,
-    Shape,
+    Brush, BrushPath, Corridor, FULL_POWER, GridShape, Operation, Paste, PrefabError, Roughness, Shape,
 };
-use crate::ground::{GreyImage, MaterialId};
+use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
 use crate::plugin::TerrainHit;
 use crate::terrain::Terrain;
@@ -47,7 +47,7 @@ pub struct BrushTool {
     pub length: f32,
     /// The direction of its axis.
     pub align: ToolAlign,
-    /// Rotation about its axis in degrees. Only affects boxes, stamps and what is pasted.
+    /// Rotation about its axis in degrees. Only affects boxes, models, stamps and what is pasted.
     pub turn: f32,
     /// How deep it is placed: at -1 it rests on the ground, at 0 its centre is on the surface, at 1 it is just
     /// below the surface.
@@ -69,6 +69,9 @@ pub struct BrushTool {
     /// The image for stamping.
     #[reflect(ignore)]
     pub stamp: StampImage,
+    /// The shape of [`ToolShape::Model`].
+    #[reflect(ignore)]
+    pub model: ToolModel,
     /// What is pasted.
     #[reflect(ignore)]
     pub prefab: ToolPrefab,
@@ -113,6 +116,7 @@ impl Default for BrushTool {
             level: 0.0,
             step: 4.0,
             stamp: StampImage::default(),
+            model: ToolModel::default(),
             prefab: ToolPrefab::default(),
             is_mirrored: false,
             points: Vec::new(),
@@ -126,118 +130,6 @@ impl Default for BrushTool {
         }
     }
 }
-
-/// The image of a [`BrushTool`]'s stamp; white is high. The default is a mountain with ridges.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct StampImage {
-    /// Heights with 2 to 256 samples per side. Brushes with other images are rejected.
-    pub image: Option<Arc<GreyImage>>,
-    /// The name of the image in the panel.
-    pub name: Option<Name>,
-}
-
-impl StampImage {
-    /// An image with a name.
-    pub fn new(name: impl Into<Name>, image: impl Into<Arc<GreyImage>>) -> Self {
-        Self { image: Some(image.into()), name: Some(name.into()) }
-    }
-
-    /// The label in the panel: the image's name, or its size without one.
-    pub(super) fn label(&self) -> String {
-        match (&self.image, &self.name) {
-            (None, _) => texts::RIDGE.into(),
-            (Some(_), Some(name)) => name.to_string(),
-            (Some(image), None) => format!("{} x {} samples", image.width(), image.height()),
-        }
-    }
-
-    /// The image, or the default one.
-    pub(super) fn image(&self) -> Option<Arc<GreyImage>> {
-        self.image.clone().or_else(|| RIDGE.clone())
-    }
-}
-
-/// What a [`BrushTool`] pastes. The default is a hut.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ToolPrefab {
-    /// A piece of a world.
-    pub prefab: Option<Arc<Prefab>>,
-    /// Metres of a voxel where it was copied: 1/8 to 8.
-    pub voxel_size: f32,
-    /// Whether only samples that were edited are pasted, and not the ground around them.
-    pub is_edits_only: bool,
-    /// Its name in the panel.
-    pub name: Option<Name>,
-}
-
-impl Default for ToolPrefab {
-    fn default() -> Self {
-        Self { prefab: None, voxel_size: 1.0, is_edits_only: true, name: None }
-    }
-}
-
-impl ToolPrefab {
-    /// A prefab that was copied from voxels of this size in metres.
-    pub fn new(prefab: impl Into<Arc<Prefab>>, voxel_size: f32) -> Self {
-        Self { prefab: Some(prefab.into()), voxel_size, ..Self::default() }
-    }
-
-    /// The label in the panel.
-    pub(super) fn label(&self) -> String {
-        match (&self.prefab, &self.name) {
-            (None, _) => texts::HUT.into(),
-            (Some(_), Some(name)) => name.to_string(),
-            (Some(prefab), None) => {
-                let [x, y, z] = prefab.size().to_array();
-                format!("{x} x {y} x {z}")
-            }
-        }
-    }
-
-    /// The prefab, or the default one.
-    fn prefab(&self) -> Option<Arc<Prefab>> {
-        self.prefab.clone().or_else(|| HUT.clone())
-    }
-}
-
-/// A hut of concrete with a door, 9 x 6 x 9 voxels, on its anchor.
-static HUT: LazyLock<Option<Arc<Prefab>>> = LazyLock::new(|| {
-    const SIZE: IVec3 = IVec3::new(11, 8, 11);
-    let sample = |at: IVec3| {
-        // Voxels inside a box around the middle of the floor.
-        let within = |at: IVec3, half: i32, height: i32| {
-            let side = (at.x - 5).abs().max((at.z - 5).abs());
-            (side as f32 - (half as f32 + 0.5))
-                .max(at.y as f32 - (height as f32 + 0.5))
-                .max(-0.5 - at.y as f32)
-        };
-        let door = ((at.x - 5).abs() as f32 - 1.5).max(at.y as f32 - 4.5).max(at.z as f32 - 4.5);
-        let room = within(at, 3, 5).min(door);
-        let depth = within(at, 4, 6).max(-room);
-        PrefabSample {
-            density: (depth * 256.0) as i16,
-            material: if depth < 0.0 { MaterialId(5) } else { MaterialId::GROUND },
-            is_edited: within(at, 5, 7) < 0.0,
-            has_stored_material: depth < 0.0,
-        }
-    };
-    let places = (0..SIZE.y)
-        .flat_map(|y| (0..SIZE.z).flat_map(move |z| (0..SIZE.x).map(move |x| IVec3::new(x, y, z))));
-    Prefab::new(SIZE, IVec3::new(5, 0, 5), 0, places.map(sample)).ok().map(Arc::new)
-});
-
-/// A mountain with three ridges.
-static RIDGE: LazyLock<Option<Arc<GreyImage>>> = LazyLock::new(|| {
-    const SIDE: u32 = 65;
-    let height = |x: u32, z: u32| {
-        let at = (Vec2::new(x as f32, z as f32) * 2.0 / (SIDE - 1) as f32) - 1.0;
-        let ridge = 0.5 + 0.5 * (3.0 * at.y.atan2(at.x)).cos();
-        let fall = (1.0 - at.length()).clamp(0.0, 1.0);
-        (fall.powf(1.6 - 0.8 * ridge) * f32::from(u16::MAX)) as u16
-    };
-    let samples = (0..SIDE).flat_map(|z| (0..SIDE).map(move |x| height(x, z))).collect();
-    GreyImage::from_samples(SIDE, SIDE, samples).ok().map(Arc::new)
-});
 
 /// Most points that a path of a [`BrushTool`] has before its last one.
 pub const PATH_POINTS: usize = 255;
@@ -261,6 +153,8 @@ pub enum ToolShape {
     Torus,
     /// A tube through [points](BrushTool::points).
     Path,
+    /// Any form: [`BrushTool::model`], as wide as its longest side is.
+    Model,
 }
 
 /// The direction of a [`BrushTool`]'s axis.
@@ -276,8 +170,16 @@ pub enum ToolAlign {
 
 impl ToolShape {
     /// All shapes, in the panel's order.
-    pub const ALL: [Self; 7] =
-        [Self::Sphere, Self::Box, Self::Cylinder, Self::Capsule, Self::Cone, Self::Torus, Self::Path];
+    pub const ALL: [Self; 8] = [
+        Self::Sphere,
+        Self::Box,
+        Self::Cylinder,
+        Self::Capsule,
+        Self::Cone,
+        Self::Torus,
+        Self::Path,
+        Self::Model,
+    ];
 
     /// Whether `length` applies.
     pub fn is_long(self) -> bool {
@@ -297,6 +199,10 @@ impl BrushTool {
             }
             (Operation::Paste { paste }, _) => Brush::paste(paste.clone()),
             (_, ToolShape::Path) => Brush::dig(self.path_to(self.middle(hit))),
+            (_, ToolShape::Model) => match self.model_at(hit) {
+                Some(model) => Brush::dig(model),
+                None => Brush::dig(self.shape_at(hit)),
+            },
             _ => Brush::dig(self.shape_at(hit)),
         };
         brush.operation = operation;
@@ -309,17 +215,14 @@ impl BrushTool {
         if self.is_of_material { brush.with_material(self.material_id()) } else { brush }
     }
 
+    /// Its model at a position.
+    fn model_at(&self, hit: &TerrainHit) -> Option<GridShape> {
+        self.model.shape(self.middle(hit), self.rotation(self.axis(hit)), self.radius)
+    }
+
     /// The brush along the points of its path, which are forgotten. `None` without points.
     pub fn finish_path(&mut self) -> Option<Brush> {
-        let position = self.points.pop()?;
-        let hit = TerrainHit {
-            terrain: Entity::PLACEHOLDER,
-            distance: 0.0,
-            position,
-            normal: Vec3::Y,
-            material: MaterialId::default(),
-            from_inside: false,
-        };
+        let hit = hit_at(self.points.pop()?, Vec3::Y);
         // Points are where the middle of the brush is.
         let brush = Self { sink: 0.0, ..self.clone() }.brush_at(&hit);
         self.points.clear();
@@ -349,17 +252,16 @@ impl BrushTool {
         if self.is_smooth { BrushPath::spline(points) } else { BrushPath::polyline(points) }
     }
 
-    /// What is pasted at a position, with its anchor there: exactly, if it was copied from voxels of the same size and is turned
-    /// by quarter turns.
+    /// What is pasted at a position, with its anchor there: exactly, if it was copied from voxels of the same size, and is upright
+    /// and turned by quarter turns.
     pub(super) fn paste_at(&self, hit: &TerrainHit) -> Option<Paste> {
         let (prefab, voxel) = (self.prefab.prefab()?, self.prefab.voxel_size);
         let place = (hit.position / voxel).round() * voxel;
-        let turned = Quat::from_rotation_y(self.turn.to_radians());
         Some(Paste {
             scale: voxel,
             mirror: self.is_mirrored,
             edited_only: self.prefab.is_edits_only,
-            ..Paste::new(prefab, place).rotated(turned)
+            ..Paste::new(prefab, place).rotated(self.rotation(self.axis(hit)))
         })
     }
 
@@ -391,7 +293,7 @@ impl BrushTool {
 
     /// The shape of [`brush_at`](Self::brush_at), for a preview.
     ///
-    /// For a path, a ball at its end.
+    /// For a path, a ball at its end; for a model, the box around it.
     pub fn shape_at(&self, hit: &TerrainHit) -> Shape {
         let paste = self.paste_at(hit).filter(|_| self.operation == ToolOperation::Paste);
         paste.map_or_else(|| self.shape_around(self.middle(hit), self.axis(hit)), |paste| paste.shape())
@@ -420,15 +322,20 @@ impl BrushTool {
         let end = middle - axis * self.length / 2.0;
         match self.fitting_shape() {
             ToolShape::Sphere | ToolShape::Path => Shape::sphere(middle, self.radius),
-            ToolShape::Box => {
-                let turn = Quat::from_rotation_y(self.turn.to_radians());
-                Shape::turned_cuboid(middle, self.half, Quat::from_rotation_arc(Vec3::Y, axis) * turn)
+            ToolShape::Box => Shape::turned_cuboid(middle, self.half, self.rotation(axis)),
+            ToolShape::Model => {
+                Shape::turned_cuboid(middle, self.model.half(self.radius), self.rotation(axis))
             }
             ToolShape::Cylinder => Shape::cylinder(end, axis * self.length, self.radius),
             ToolShape::Capsule => Shape::capsule(end, end + axis * self.length, self.radius),
             ToolShape::Cone => Shape::cone(end, axis * self.length, self.radius),
             ToolShape::Torus => Shape::torus(middle, axis, self.radius, self.tube.min(self.radius)),
         }
+    }
+
+    /// From upright to this axis, turned about it.
+    fn rotation(&self, axis: Vec3) -> Quat {
+        Quat::from_rotation_arc(Vec3::Y, axis) * Quat::from_rotation_y(self.turn.to_radians())
     }
 
     /// The direction of its axis at this position.
@@ -459,16 +366,47 @@ impl BrushTool {
         match self.fitting_shape() {
             ToolShape::Sphere | ToolShape::Path => self.radius,
             ToolShape::Box => self.half.y,
+            ToolShape::Model => self.model.half(self.radius).y,
             ToolShape::Cylinder | ToolShape::Cone => self.length / 2.0,
             ToolShape::Capsule => self.length / 2.0 + self.radius,
             ToolShape::Torus => self.tube.min(self.radius),
         }
     }
 
+    /// The radii that its shape may have.
+    pub(super) fn radii(&self, voxel_size: f32) -> RangeInclusive<f32> {
+        let range = RADIUS.range(voxel_size);
+        let is_model = self.fitting_shape() == ToolShape::Model;
+        let least = if is_model { self.model.least_radius() * voxel_size } else { 0.0 };
+        range.start().max(least)..=range.end().max(least)
+    }
+
+    /// This tool at a place instead of on the ground: turned as the place is, and larger by its scale. Returns the hit for
+    /// [`brush_at`](Self::brush_at) and [`shape_at`](Self::shape_at). Not for paths.
+    pub fn placed(&self, place: &Transform, voxel_size: f32) -> (Self, TerrainHit) {
+        let normal = place.rotation * Vec3::Y;
+        // What is left when the axis is upright is a rotation about it.
+        let (axis, angle) =
+            (Quat::from_rotation_arc(Vec3::Y, normal).inverse() * place.rotation).to_axis_angle();
+        let mut tool = Self {
+            align: ToolAlign::Surface,
+            sink: 0.0,
+            turn: self.turn + (angle * axis.y.signum()).to_degrees(),
+            ..self.clone()
+        };
+        let scale = place.scale.max_element();
+        if tool.operation == ToolOperation::Paste {
+            tool.prefab.voxel_size = (tool.prefab.voxel_size * scale).clamp(1.0 / 8.0, 8.0);
+        } else {
+            tool.grow(scale, voxel_size);
+        }
+        (tool, hit_at(place.translation, normal))
+    }
+
     /// Scales its radius, or the size of a box, within the range of the panel's sliders for this voxel size. Useful
     /// for a mouse wheel.
     pub fn grow(&mut self, factor: f32, voxel_size: f32) {
-        let range = RADIUS.range(voxel_size);
+        let range = self.radii(voxel_size);
         let grow = |size: f32| (size * factor).clamp(*range.start(), *range.end());
         match self.fitting_shape() {
             ToolShape::Box => self.half = self.half.map(grow),
@@ -477,11 +415,24 @@ impl BrushTool {
     }
 }
 
+/// A hit of no terrain.
+fn hit_at(position: Vec3, normal: Vec3) -> TerrainHit {
+    TerrainHit {
+        terrain: Entity::PLACEHOLDER,
+        distance: 0.0,
+        position,
+        normal,
+        material: MaterialId::default(),
+        from_inside: false,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brush::shapes::Cylinder;
-    use crate::brush::{Edit, Operation};
+    use crate::brush::shapes::{Cuboid, Cylinder};
+    use crate::brush::{Edit, Operation, ShapeGrid};
+    use crate::ground::GreyImage;
 
     fn hit() -> TerrainHit {
         TerrainHit {
@@ -658,6 +609,51 @@ mod tests {
             (0..200).for_each(|_| tool.grow(0.5, voxel));
             let least = if shape == ToolShape::Box { tool.half.x } else { tool.radius };
             assert_eq!(least..=most, RADIUS.range(voxel));
+        }
+    }
+
+    #[test]
+    fn a_placed_brush_is_turned_and_sized_as_its_place() {
+        let tool =
+            BrushTool { shape: ToolShape::Box, half: Vec3::new(2.0, 3.0, 4.0), sink: 0.7, ..default() };
+        let turns = [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (1.0, -2.0, 0.5), (3.1, 1.5, -1.5), (0.0, 3.0, 0.0)];
+        for (x, y, z) in turns {
+            let rotation = Quat::from_euler(EulerRot::YXZ, x, y, z);
+            let place =
+                Transform { translation: Vec3::new(5.0, 6.0, 7.0), rotation, scale: Vec3::splat(2.0) };
+            let (placed, hit) = tool.placed(&place, 1.0);
+            let Shape::Cuboid(Cuboid { center, half, rotation: found }) = placed.shape_at(&hit) else {
+                panic!("a box")
+            };
+            assert_eq!((center, half), (place.translation, 2.0 * tool.half));
+            assert!(found.dot(rotation).abs() > 0.999_9, "{found} instead of {rotation}");
+            let model = BrushTool { shape: ToolShape::Model, ..tool.clone() };
+            let (placed, hit) = model.placed(&place, 1.0);
+            let found = placed.model_at(&hit).expect("a boulder");
+            assert!(found.rotation.dot(rotation).abs() > 0.999_9, "{}", found.rotation);
+            let paste = BrushTool { operation: ToolOperation::Paste, ..tool.clone() };
+            let (placed, hit) = paste.placed(&place, 1.0);
+            let found = placed.paste_at(&hit).expect("a hut");
+            assert!(found.rotation.dot(rotation).abs() > 0.999_9 && found.scale == 2.0, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_model_of_any_size_that_is_offered_is_a_valid_brush() {
+        let long = ShapeGrid::from_fn(UVec3::new(5, 9, 128), |at| (at.x - 2).abs() as f32 - 1.0);
+        let models = [ToolModel::default(), ToolModel::new("long", long.expect("a grid"))];
+        for (model, voxel) in models.iter().flat_map(|model| [0.125, 1.0, 8.0].map(|voxel| (model, voxel))) {
+            let mut tool = BrushTool { shape: ToolShape::Model, model: model.clone(), ..default() };
+            for factor in [0.0, 1e9] {
+                tool.grow(factor, voxel);
+                let brush = tool.brush_at(&hit());
+                let shape = tool.model_at(&hit()).expect("a grid");
+                let in_voxels = GridShape { scale: shape.scale / voxel, center: Vec3::ZERO, ..shape };
+                assert!(
+                    Edit::quantize(&Brush::dig(in_voxels)).is_ok(),
+                    "{factor} with voxels of {voxel}: {brush:?}"
+                );
+            }
         }
     }
 }

@@ -37,4 +37,6 @@ pub enum ToolOperation {
     Paste,
     /// Returns ground to what it was before any edit.
     Reset,
+    /// Removes plants, and returns painted ground to its own material.
+    Clear,
 }
