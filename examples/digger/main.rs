@@ -70,6 +70,7 @@ use std::process::ExitCode;
 use bevy::prelude::*;
 use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
+use bevy_burrow::view::GroundTextureCache;
 use clap::Parser;
 
 use crate::party::connection::{Address, Party};
@@ -245,6 +246,7 @@ fn open_window(options: &Options) -> App {
         Window { title: "Digger".into(), resolution: (options.width, options.height).into(), ..default() };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
+    app.insert_resource(GroundTextureCache(saves::folder_of_textures()));
     let new_world = || saves::create(&saves::new_name()?, 0).ok();
     let world = options.saved_world().or_else(PlayedWorld::latest);
     let world = world.or_else(|| options.host.and_then(|_| new_world()));

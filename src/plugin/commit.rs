@@ -14,11 +14,12 @@ use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive
 use super::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
 use super::load::Loading;
 use super::lod_state::{LodState, ShownLevels, WantedTiles, Watchers};
-use super::meshes::{BuiltMesh, VertexExtras, VertexKind};
+use super::meshes::{VertexExtras, VertexKind};
+use super::new_mesh::NewMesh;
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface};
 use super::reports::{Report, Reports};
 use super::same_frame::SameFrame;
-use super::task::{Change, InFlight, TaskCounter, TaskOutput};
+use super::task::{Change, InFlight, TaskCounter, TaskOutput, UPLOADS_PER_FRAME};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Held,
     LoosePieceFound, MaterialColors, SkyLight, SlimVertices,
@@ -157,10 +158,7 @@ impl Commits<'_, '_> {
         start_measuring(&mut display.commands);
         for (_, entity) in done {
             let Ok((_, terrain, entities, mut task, levels)) = terrains.get_mut(entity) else { continue };
-            let swaps = match &task.done {
-                Some(Ok(output)) => output.swaps(),
-                _ => 0,
-            };
+            let swaps = task.swaps();
             if *swapped > 0 && *swapped + swaps > settings.swaps_per_frame {
                 continue;
             }
@@ -175,12 +173,20 @@ impl Commits<'_, '_> {
     }
 }
 
-/// Commits what is done.
+/// Commits what is done. The meshes of large results are passed to the renderer over several frames before.
 pub(super) fn commit_transactions(mut commits: Commits, mut same_frame: ResMut<SameFrame>) {
     same_frame.begin();
     let mut done: Vec<(u64, Entity)> = Vec::new();
+    let mut budget = UPLOADS_PER_FRAME;
     for (entity, _, _, mut task, _) in &mut commits.terrains {
-        if task.is_done() {
+        if !task.is_done() {
+            continue;
+        }
+        let is_uploaded = match &mut commits.display.assets {
+            Some(assets) if task.swaps() > UPLOADS_PER_FRAME => task.upload(assets, &mut budget),
+            _ => true,
+        };
+        if is_uploaded {
             done.push((task.number, entity));
         }
     }
@@ -471,31 +477,23 @@ fn refresh_material(mut child: EntityWorldMut) {
     }
 }
 
-/// Replaces an entity's mesh under the same handle.
+/// Replaces an entity's mesh: under the same handle, unless the new one was uploaded already.
 fn swap(
     commands: &mut Commands,
     assets: &mut Assets<Mesh>,
     child: Entity,
     shown: Option<&Mesh3d>,
-    mesh: BuiltMesh,
+    mesh: Option<NewMesh>,
 ) {
     let Ok(mut child) = commands.get_entity(child) else { return };
-    match (mesh, shown) {
-        (None, _) => {
-            child.try_remove::<Drawing>();
-        }
-        (Some((mesh, facts)), shown) => {
-            let mut new = Some(mesh);
-            if let Some(Mesh3d(handle)) = shown
-                && let Some(mesh) = new.take()
-                && let Err(error) = assets.insert(handle, mesh)
-            {
-                warn!("a mesh could not be swapped: {error}");
-            }
-            if let Some(mesh) = new {
-                child.try_insert(Mesh3d(assets.add(mesh))).queue_silenced(refresh_material);
-            }
-            child.try_insert(facts);
-        }
+    let Some(mesh) = mesh else {
+        child.try_remove::<Drawing>();
+        return;
+    };
+    let (facts, former) = (mesh.facts.clone(), shown.map(|shown| &shown.0));
+    let handle = mesh.show(assets, former);
+    if former != Some(&handle) {
+        child.try_insert(Mesh3d(handle)).queue_silenced(refresh_material);
     }
+    child.try_insert(facts);
 }

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
 use super::lod_state::{LevelsOfDetail, LodState, ShownLevels};
-use super::meshes::{BuiltMesh, MeshFacts, VertexExtras, VertexKind};
+use super::meshes::{VertexExtras, VertexKind};
+use super::new_mesh::NewMesh;
 use super::places::{LocalPlaces, TerrainPlace, place_terrain};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::reports::{Report, Reports};
@@ -31,7 +32,7 @@ pub(super) struct Loading {
     has_lod: bool,
     task: Option<ThreadTask<BuiltWorld>>,
     waiting: Vec<BuiltSurface>,
-    ready: HashMap<MeshKey, Loaded>,
+    ready: HashMap<MeshKey, BuiltSurface>,
     levels: Option<BuiltNodes>,
 }
 
@@ -50,12 +51,6 @@ impl Loading {
     fn is_of(&self, terrain: &Terrain) -> bool {
         self.world.version().is_same_world(terrain.world().version())
     }
-}
-
-/// A surface whose mesh, if it has one, was passed to the renderer.
-struct Loaded {
-    mesh: Option<(Handle<Mesh>, MeshFacts)>,
-    built: BuiltSurface,
 }
 
 /// Terrains without a task that are not held.
@@ -334,10 +329,10 @@ pub(super) fn finish_loading(
         let rest = loading.waiting.len().saturating_sub(budget);
         budget -= loading.waiting.len() - rest;
         for mut built in loading.waiting.split_off(rest) {
-            let mesh = assets
-                .as_mut()
-                .and_then(|assets| built.mesh.take().map(|(mesh, facts)| (assets.add(mesh), facts)));
-            loading.ready.insert(built.drawn, Loaded { mesh, built });
+            if let (Some(assets), Some(mesh)) = (&mut assets, &mut built.mesh) {
+                mesh.upload(assets);
+            }
+            loading.ready.insert(built.drawn, built);
         }
         if !loading.waiting.is_empty() {
             continue;
@@ -346,7 +341,8 @@ pub(super) fn finish_loading(
             old.despawn(&mut commands, children);
         }
         let levels = loading.levels.take();
-        let mut entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
+        let place = (entity, terrain.voxel_size());
+        let mut entities = show(&mut commands, place, assets.as_deref_mut(), &mut loading);
         let model = terrain.bypass_change_detection();
         match levels {
             Some(BuiltNodes { drawn, nodes, known }) => {
@@ -378,6 +374,7 @@ pub(super) fn finish_loading(
 fn show(
     commands: &mut Commands,
     (terrain, voxel_size): (Entity, f32),
+    mut assets: Option<&mut Assets<Mesh>>,
     loading: &mut Loading,
 ) -> TerrainEntities {
     let world = Arc::clone(&loading.world);
@@ -389,9 +386,9 @@ fn show(
     let tiles = (!has_lod).then(|| world.grid().tiles().map(MeshKey::Tile)).into_iter().flatten();
     for drawn in tiles.chain(chunks.into_iter().map(MeshKey::Chunk)) {
         let child = entities.spawn(commands, terrain, &world, drawn);
-        if let Some(Loaded { mesh, built }) = loading.ready.remove(&drawn) {
-            if let Some((handle, facts)) = mesh {
-                commands.entity(child).try_insert((Mesh3d(handle), facts));
+        if let Some(built) = loading.ready.remove(&drawn) {
+            if let (Some(mesh), Some(assets)) = (built.mesh, &mut assets) {
+                insert_mesh(commands, assets, child, mesh);
             }
             apply_actions(commands, child, built.shown, built.actions);
         }
@@ -415,26 +412,29 @@ fn show_nodes(
     mut assets: Option<&mut Assets<Mesh>>,
     nodes: Vec<BuiltNode>,
 ) {
-    let mut add = |mesh: BuiltMesh| {
-        let (mesh, facts) = mesh?;
-        Some((Mesh3d(assets.as_mut()?.add(mesh)), facts))
+    let mut insert = |commands: &mut Commands, child: Entity, mesh: Option<NewMesh>| {
+        if let (Some(mesh), Some(assets)) = (mesh, &mut assets) {
+            insert_mesh(commands, assets, child, mesh);
+        }
     };
     for BuiltNode { node, mesh, shown, .. } in nodes {
         if let Some(mesh) = mesh {
             let child = entities.node(commands, terrain, world, node);
-            if let Some(mesh) = add(mesh) {
-                commands.entity(child).try_insert(mesh);
-            }
+            insert(commands, child, mesh);
         }
         for BuiltSurface { drawn, mesh, shown, actions, .. } in shown {
             let child = entities.get(commands, drawn);
             let child = child.unwrap_or_else(|| entities.spawn(commands, terrain, world, drawn));
-            if let Some(mesh) = add(mesh) {
-                commands.entity(child).try_insert(mesh);
-            }
+            insert(commands, child, mesh);
             apply_actions(commands, child, shown, actions);
         }
     }
+}
+
+/// Gives an entity its first mesh.
+fn insert_mesh(commands: &mut Commands, assets: &mut Assets<Mesh>, child: Entity, mesh: NewMesh) {
+    let facts = mesh.facts.clone();
+    commands.entity(child).try_insert((Mesh3d(mesh.show(assets, None)), facts));
 }
 
 #[cfg(test)]

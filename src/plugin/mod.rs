@@ -39,6 +39,7 @@ mod lod_state;
 mod materials;
 mod meshes;
 pub mod messages;
+mod new_mesh;
 mod palettes;
 #[cfg(feature = "picking")]
 mod picking;

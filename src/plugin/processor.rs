@@ -10,7 +10,8 @@ use bevy::ecs::system::SystemParam;
 use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
-use super::meshes::{BuiltMesh, MeshBuilder, TileLights, VertexExtras};
+use super::meshes::{MeshBuilder, TileLights, VertexExtras};
+use super::new_mesh::NewMesh;
 use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::lod::{LodGrid, Node};
@@ -136,7 +137,7 @@ impl fmt::Debug for SurfaceProcessors {
 /// The new surface of a tile or chunk, ready to be swapped in.
 pub(super) struct BuiltSurface {
     pub drawn: MeshKey,
-    pub mesh: BuiltMesh,
+    pub mesh: Option<NewMesh>,
     pub shown: ShownSurface,
     pub actions: Vec<CommitAction>,
     /// Whether it is drawn. Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
@@ -147,7 +148,7 @@ pub(super) struct BuiltSurface {
 pub(super) struct BuiltNode {
     pub node: Node,
     /// Its own mesh; `None` if it is drawn by its tile and chunks, or not at all.
-    pub mesh: Option<BuiltMesh>,
+    pub mesh: Option<Option<NewMesh>>,
     /// Tile and chunks that are drawn from now on.
     pub shown: Vec<BuiltSurface>,
     /// Tile and chunks that are drawn no more.
@@ -159,13 +160,18 @@ impl BuiltNode {
     pub fn swaps(&self) -> usize {
         usize::from(self.mesh.is_some()) + self.shown.len()
     }
+
+    /// The meshes that it shows.
+    pub fn meshes(&mut self) -> impl Iterator<Item = &mut NewMesh> {
+        let own = self.mesh.iter_mut().flatten();
+        own.chain(self.shown.iter_mut().filter_map(|shown| shown.mesh.as_mut()))
+    }
 }
 
 impl BuiltSurface {
     /// Triangles in the mesh.
     pub fn triangles(&self) -> usize {
-        let indices = self.mesh.as_ref().and_then(|(mesh, _)| mesh.indices());
-        indices.map_or(0, |indices| indices.len() / 3)
+        self.mesh.as_ref().map_or(0, |mesh| mesh.triangles)
     }
 }
 
@@ -283,7 +289,8 @@ impl SurfaceBuilder {
             let columns = LodGrid::new(self.grid, u8::MAX).columns(node);
             let build = |mesh: Arc<SurfaceMesh>| {
                 let builder = self.mesh_builder.as_ref();
-                builder.and_then(|builder| builder.build_node(columns, node.stride(), &mesh))
+                let mesh = builder.and_then(|builder| builder.build_node(columns, node.stride(), &mesh));
+                mesh.map(NewMesh::new)
             };
             let shown = shown.into_iter();
             let shown = shown.map(|(drawn, draft)| self.build((drawn, true), draft.is_empty(), || draft));
@@ -329,8 +336,9 @@ impl SurfaceBuilder {
         let draft = draft();
         built.shown.is_empty = draft.is_empty();
         let surface = (!processors.is_empty()).then(|| draft.surface());
-        built.mesh =
+        let mesh =
             mesh_builder.and_then(|builder| builder.build(part.origin, &draft, surface.as_deref(), lights));
+        built.mesh = mesh.map(NewMesh::new);
         if let Some(surface) = &surface {
             let build = |processor: &Arc<dyn SurfaceProcessor>| {
                 guarded.guarded(part.terrain, || processor.build(part, surface))

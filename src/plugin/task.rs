@@ -22,6 +22,10 @@ use crate::terrain::{
 use crate::threads::{ThreadTask, Threads};
 use crate::world::sky::{LitWorld, REACH};
 
+/// Meshes of large results that are passed to the renderer in a frame, before all of them are shown in one. A result with no more
+/// meshes is shown at once.
+pub(super) const UPLOADS_PER_FRAME: usize = 64;
+
 /// The running task of a terrain.
 #[derive(Component)]
 pub(super) struct InFlight {
@@ -45,13 +49,6 @@ pub(super) struct TaskOutput {
     pub nodes: Vec<BuiltNode>,
     pub pieces: Vec<LoosePieceFound>,
     pub times: TaskTimes,
-}
-
-impl TaskOutput {
-    /// Meshes that are swapped for it.
-    pub fn swaps(&self) -> usize {
-        self.surfaces.len() + self.nodes.iter().map(BuiltNode::swaps).sum::<usize>()
-    }
 }
 
 /// The source of a change of the ground.
@@ -146,6 +143,25 @@ impl InFlight {
             self.done = self.task.check_within(time).map(|done| done.map_err(|_| TaskPanicked));
         }
         self.done.is_some()
+    }
+
+    /// Meshes that are swapped for its result.
+    pub fn swaps(&self) -> usize {
+        let Some(Ok(output)) = &self.done else { return 0 };
+        output.surfaces.len() + output.nodes.iter().map(BuiltNode::swaps).sum::<usize>()
+    }
+
+    /// Passes meshes of its result to the renderer, as many as are left of a frame's budget. Returns whether it has all.
+    pub fn upload(&mut self, assets: &mut Assets<Mesh>, budget: &mut usize) -> bool {
+        let Some(Ok(output)) = &mut self.done else { return true };
+        let surfaces = output.surfaces.iter_mut().filter_map(|built| built.mesh.as_mut());
+        for mesh in surfaces.chain(output.nodes.iter_mut().flat_map(BuiltNode::meshes)) {
+            if *budget == 0 {
+                return false;
+            }
+            *budget -= usize::from(mesh.upload(assets));
+        }
+        true
     }
 
     /// Whether its result is a transaction with edits or a step through history, and no piece of ground breaks off or

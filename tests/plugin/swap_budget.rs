@@ -55,6 +55,44 @@ fn commits_within_the_budget_are_shown_in_one_frame() {
 }
 
 #[test]
+fn meshes_of_a_large_commit_go_to_the_renderer_over_several_frames_and_are_shown_in_one() {
+    let mut stage = Stage::drawing();
+    let settings = TerrainSettings { chunk_size: 8, voxel_size: 1.0 };
+    let ground = Ground::flat(128, 128, 8.0).expect("a valid ground");
+    let terrain = stage.show(Terrain::new(ground, &settings).expect("valid settings"));
+    for round in 0..3 {
+        let (commits, before) = (stage.figures().commits, stage.meshes());
+        let size = Vec3::new(60.0, 2.0 + round as f32, 60.0);
+        stage.send(Brush::dig(Shape::cuboid(Vec3::new(64.0, 8.0, 64.0), size)));
+        let (mut meshes, mut uploads) = (before, Vec::new());
+        stage.frames_until("it is dug", |stage| {
+            let new = stage.meshes().saturating_sub(meshes);
+            meshes = stage.meshes();
+            stage.assert_whole(terrain, "a large commit");
+            let is_dug = stage.figures().commits > commits;
+            if !is_dug && new > 0 {
+                uploads.push(new);
+            }
+            is_dug
+        });
+        assert!(uploads.len() > 2 && uploads.iter().all(|&new| new <= 64), "{uploads:?}");
+        stage.settle_shown();
+        // Nothing is left of former meshes.
+        stage.frames(3);
+        assert_eq!(stage.meshes(), stage.count::<Mesh3d>());
+    }
+    // Undo and a world that is replaced while meshes are on their way leave none behind either.
+    stage.write(bevy_burrow::plugin::Undo { terrain: Some(terrain) });
+    stage.frames(2);
+    stage.rest();
+    stage.frame();
+    let world = stage.app.world_mut();
+    assert!(world.despawn(terrain));
+    stage.frames(5);
+    assert_eq!((stage.meshes(), stage.count::<Mesh3d>()), (0, 0));
+}
+
+#[test]
 fn constantly_dug_terrains_do_not_starve_another_one() {
     for waiting in 0..3 {
         let mut stage = Stage::drawing()

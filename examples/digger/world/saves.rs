@@ -213,6 +213,11 @@ pub fn worlds() -> Vec<FoundWorld> {
     worlds
 }
 
+/// Where painted textures are kept from one start to the next.
+pub fn folder_of_textures() -> Option<PathBuf> {
+    Some(folder_of_worlds()?.with_file_name("textures"))
+}
+
 fn folder_of_worlds() -> Option<PathBuf> {
     let folder = |name: &str| std::env::var_os(name).filter(|folder| !folder.is_empty()).map(PathBuf::from);
     let data = if cfg!(windows) {
