@@ -33,6 +33,7 @@ use std::process::{ExitCode, Termination};
 
 use bevy::camera_controller::free_camera::FreeCameraPlugin;
 use bevy::prelude::*;
+use bevy_burrow::debug::{BurrowDebug, BurrowDebugPlugin};
 use bevy_burrow::paths::NavigationPlugin;
 use bevy_burrow::paths::bevy_landmass::debug::{EnableLandmassDebug, Landmass3dDebugPlugin};
 use bevy_burrow::paths::bevy_landmass::prelude::*;
@@ -76,8 +77,15 @@ fn game(app: &mut App, options: &Options) {
     app.add_plugins((BurrowPlugins, Landmass3dPlugin::default(), NavigationPlugin::default()))
         .add_plugins(Landmass3dDebugPlugin::default())
         .insert_resource(EnableLandmassDebug(options.meshes))
+        .add_plugins(BurrowDebugPlugin)
+        .insert_resource(BurrowDebug {
+            walkable: options.meshes,
+            agent: scene::AGENT,
+            near: 64.0,
+            ..default()
+        })
         .init_resource::<story::Story>()
         .add_systems(Startup, (scene::set_up, figures::spawn).chain())
         .add_systems(FixedUpdate, figures::walk)
-        .add_systems(Update, (story::tell.before(BurrowSystems::Collect), scene::draw_spans));
+        .add_systems(Update, story::tell.before(BurrowSystems::Collect));
 }

@@ -4,12 +4,12 @@
 mod flight;
 
 use bevy::prelude::*;
-use bevy_burrow::navigation::{NavTilePos, WalkSettings, WalkableTile, Walker};
+use bevy_burrow::debug::BurrowDebug;
+use bevy_burrow::navigation::WalkSettings;
 use bevy_burrow::paths::bevy_landmass::debug::EnableLandmassDebug;
 use bevy_burrow::paths::bevy_landmass::prelude::*;
 use bevy_burrow::paths::{Navigation, NavigationArea, archipelago_options};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::Version;
 
 use crate::figures::Figure;
 
@@ -90,14 +90,16 @@ pub fn use_mouse(
     }
 }
 
-/// Shows meshes, and sends the figures back.
+/// `G` shows or hides where figures can walk, `R` swaps the start and the goal of each.
 pub fn press_keys(
     keys: Res<ButtonInput<KeyCode>>,
     mut shows: ResMut<EnableLandmassDebug>,
+    mut debug: ResMut<BurrowDebug>,
     mut figures: Query<(&mut Figure, &mut AgentTarget3d)>,
 ) {
     if keys.just_pressed(KeyCode::KeyG) {
         shows.0 = !shows.0;
+        debug.walkable = shows.0;
     }
     if keys.just_pressed(KeyCode::KeyR) {
         for (mut figure, mut target) in &mut figures {
@@ -106,37 +108,4 @@ pub fn press_keys(
             *target = AgentTarget3d::Point(home);
         }
     }
-}
-
-/// Draws the stretches of air above floors, up to the height of a figure; green where it can stand.
-pub fn draw_spans(
-    terrain: Single<&Terrain>,
-    shows: Res<EnableLandmassDebug>,
-    mut gizmos: Gizmos,
-    mut drawn: Local<(Option<Version>, Vec<(Vec3, Vec3, bool)>)>,
-) -> Result {
-    if !shows.0 {
-        return Ok(());
-    }
-    let world = terrain.world();
-    if drawn.0 != Some(world.version()) {
-        let (walker, mut lines) = (Walker::new(&AGENT)?, Vec::new());
-        for pos in NavTilePos::all(world) {
-            let tile = WalkableTile::new(world, pos, &walker);
-            for (column, floor, ceiling) in tile.spans() {
-                let is_own = |cell: &bevy_burrow::navigation::WalkableCell| cell.heights[0] == floor;
-                let can_stand = tile.cells_of(column).any(|cell| is_own(&cell));
-                let [low, high] = [floor, ceiling.unwrap_or(i32::MAX)].map(|height| height as f32 / 256.0);
-                let foot = Vec3::new(column.x as f32, low, column.z as f32);
-                lines.push((foot, foot.with_y(high.min(low + AGENT.height)), can_stand));
-            }
-        }
-        *drawn = (Some(world.version()), lines);
-    }
-    for &(from, to, can_stand) in &drawn.1 {
-        let color =
-            if can_stand { Color::srgba(0.1, 0.9, 0.3, 0.35) } else { Color::srgba(0.9, 0.2, 0.1, 0.35) };
-        gizmos.line(from, to, color);
-    }
-    Ok(())
 }

@@ -11,6 +11,7 @@ use bevy_burrow::panel::{
 };
 use bevy_burrow::prelude::*;
 
+use crate::placing::Placing;
 use crate::stamps;
 use crate::stroke::{Aim, Strokes, aim};
 
@@ -190,13 +191,14 @@ fn command(
     }
 }
 
-/// `Ctrl+C` copies what lies in the brush; with Shift, into a file too.
+/// `Ctrl+C` copies what lies in the brush under the pointer; with Shift, into a file too.
 fn copy(
     mut presses: MessageReader<KeyboardInput>,
     keys: Res<ButtonInput<KeyCode>>,
     input: Option<Res<PanelInput>>,
     aim: Res<Aim>,
     terrains: Query<(&Terrain, &GlobalTransform)>,
+    placing: Query<(), With<Placing>>,
     mut tool: ResMut<BrushTool>,
     mut panel: ResMut<BurrowPanel>,
 ) {
@@ -206,7 +208,7 @@ fn copy(
     if !presses.read().any(is_pressed) || !is_due {
         return;
     }
-    let Some(hit) = aim.0 else { return };
+    let Some(hit) = aim.0.filter(|_| placing.is_empty()) else { return };
     let Ok((terrain, place)) = terrains.get(hit.terrain) else { return };
     let copied = tool.copy(terrain, place, &hit).map_err(|why| why.to_string());
     let is_kept = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);

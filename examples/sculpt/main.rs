@@ -120,7 +120,7 @@ fn main() -> ExitCode {
     }));
     editor(&mut app, &options);
     app.add_plugins((
-        stroke::MousePlugin,
+        stroke::StrokePlugin,
         keys::KeysPlugin,
         placing::PlacingPlugin,
         stamps::DropPlugin,
@@ -143,7 +143,7 @@ fn editor(app: &mut App, options: &Options) {
         BurrowPanelPlugin,
         BurrowDebugPlugin,
         scene::ScenePlugin(options.cells),
-        stroke::StrokePlugin,
+        stroke::PreviewPlugin,
         journal::JournalPlugin,
     ));
     let mut panel = app.world_mut().resource_mut::<BurrowPanel>();

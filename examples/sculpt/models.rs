@@ -53,6 +53,12 @@ pub enum ModelError {
     /// Its data is written as text.
     #[error("its data is embedded as text: export it as .glb")]
     Embedded,
+    /// A part is made of lines, points, strips or fans.
+    #[error("a part is no list of triangles: export all meshes as triangles")]
+    NoTriangles,
+    /// A node is below itself, or below two others.
+    #[error("its nodes are no tree")]
+    Cycle,
     /// The mesh is not closed, for example.
     #[error(transparent)]
     Brush(#[from] BrushError),
@@ -86,18 +92,27 @@ fn read(file: &Path) -> Result<ToolModel, ModelError> {
         buffers.push(match buffer.source() {
             Source::Bin => gltf.blob.clone().unwrap_or_default(),
             Source::Uri(uri) if uri.starts_with("data:") => return Err(ModelError::Embedded),
-            Source::Uri(uri) => bytes(&file.with_file_name(uri))?,
+            Source::Uri(uri) => bytes(&file.with_file_name(uri.replace("%20", " ")))?,
         });
     }
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    let mut count = 0;
     let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
     let mut nodes: Vec<(gltf::Node, Mat4)> =
         scene.iter().flat_map(gltf::Scene::nodes).map(|node| (node, Mat4::IDENTITY)).collect();
     while let Some((node, parent)) = nodes.pop() {
         let place = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+        let is_mirrored = place.determinant() < 0.0;
+        count += 1;
+        if count > gltf.nodes().len() {
+            return Err(ModelError::Cycle);
+        }
         nodes.extend(node.children().map(|child| (child, place)));
         let parts = node.mesh().into_iter().flat_map(|mesh| mesh.primitives().collect::<Vec<_>>());
-        for part in parts.filter(|part| part.mode() == Mode::Triangles) {
+        for part in parts {
+            if part.mode() != Mode::Triangles {
+                return Err(ModelError::NoTriangles);
+            }
             let reader = part.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
             let first = positions.len() as u32;
             let own = reader.read_positions().into_iter().flatten();
@@ -106,7 +121,9 @@ fn read(file: &Path) -> Result<ToolModel, ModelError> {
                 Some(indices) => indices.into_u32().map(|index| first.saturating_add(index)).collect(),
                 None => (first..positions.len() as u32).collect(),
             };
-            triangles.extend(corners.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]));
+            // Mirrored, a mesh would be inside out.
+            let (second, third) = if is_mirrored { (2, 1) } else { (1, 2) };
+            triangles.extend(corners.chunks_exact(3).map(|own| [own[0], own[second], own[third]]));
         }
     }
     let grid = ShapeGrid::from_mesh(&positions, &triangles, SAMPLES)?.grid;

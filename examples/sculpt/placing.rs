@@ -4,7 +4,7 @@ use bevy::gizmos::transform_gizmo::{
     TransformGizmoFocus, TransformGizmoMode, TransformGizmoPlugin, TransformGizmoSettings,
 };
 use bevy::prelude::*;
-use bevy_burrow::panel::{BrushTool, ToolAlign, ToolShape, keyboard_is_free};
+use bevy_burrow::panel::{BrushTool, ToolShape, keyboard_is_free};
 use bevy_burrow::prelude::*;
 
 use crate::stroke::{Aim, REACH, Strokes, aim};
@@ -41,9 +41,10 @@ fn place(
     let is_path = tool.fitting_shape() == ToolShape::Path;
     let Some(placing) = placing else {
         if let (true, false, Some(hit)) = (keys.just_pressed(KeyCode::KeyG), is_path, &aim.0) {
-            let axis = if tool.align == ToolAlign::Surface { hit.normal } else { Vec3::Y };
-            let turn = Quat::from_rotation_arc(Vec3::Y, axis.normalize_or(Vec3::Y));
-            commands.spawn((Placing, Transform::from_translation(hit.position).with_rotation(turn)));
+            // How the tool itself is turned about its axis comes on top.
+            let upright = BrushTool { turn: 0.0, ..tool.clone() };
+            let place = Transform::from_translation(hit.position).with_rotation(upright.rotation(hit));
+            commands.spawn((Placing, place));
             handles.mode = TransformGizmoMode::Translate;
         }
         return;
@@ -57,8 +58,10 @@ fn place(
         };
     }
     if keys.just_pressed(KeyCode::KeyB) {
-        let above = Ray3d::new(place.translation + Vec3::Y * REACH, Dir3::NEG_Y);
-        if let Some(hit) = terrains.raycast(above, 2.0 * REACH) {
+        // In a cave, onto its floor; from within the ground, onto the surface.
+        let from = |height: f32| Ray3d::new(place.translation + Vec3::Y * height, Dir3::NEG_Y);
+        let below = terrains.raycast(from(0.0), REACH).filter(|hit| !hit.from_inside);
+        if let Some(hit) = below.or_else(|| terrains.raycast(from(REACH), 2.0 * REACH)) {
             place.translation = hit.position;
         }
     }

@@ -9,9 +9,7 @@ use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_burrow::brush::Blend;
 use bevy_burrow::debug::draw_shape;
-use bevy_burrow::panel::{
-    BrushTool, BurrowPanel, PanelInput, ToolAlign, ToolOperation, ToolShape, pointer_is_free,
-};
+use bevy_burrow::panel::{BrushTool, BurrowPanel, PanelInput, ToolOperation, ToolShape, pointer_is_free};
 use bevy_burrow::prelude::*;
 
 use crate::placing::Placing;
@@ -55,9 +53,9 @@ pub struct Strokes {
 }
 
 /// The brush's preview.
-pub struct StrokePlugin;
+pub struct PreviewPlugin;
 
-impl Plugin for StrokePlugin {
+impl Plugin for PreviewPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Aim>()
             .init_resource::<Modifier>()
@@ -67,9 +65,9 @@ impl Plugin for StrokePlugin {
 }
 
 /// Strokes by the mouse.
-pub struct MousePlugin;
+pub struct StrokePlugin;
 
-impl Plugin for MousePlugin {
+impl Plugin for StrokePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Strokes>().add_systems(
             Update,
@@ -178,7 +176,7 @@ fn stroke(
     if *modifier == Modifier::Line && !is_first {
         return;
     }
-    if tool.fitting_shape() == ToolShape::Path && *modifier == Modifier::None {
+    if tool.fitting_shape() == ToolShape::Path {
         if is_first {
             tool.add_point(hit);
         }
@@ -233,8 +231,8 @@ fn preview(
             draw_shape(&mut gizmos, &Shape::sphere(*point, tool.radius), color.with_alpha(0.3));
         }
     }
-    let axis = if tool.align == ToolAlign::Surface { hit.normal } else { Vec3::Y };
-    let turn = Quat::from_rotation_arc(Vec3::Y, axis.normalize_or(Vec3::Y));
+    let turn = tool.rotation(hit);
+    let axis = turn * Vec3::Y;
     let width = tool.width();
     let ring = |radius: f32| {
         (0..=RING).map(move |step| {
@@ -293,7 +291,6 @@ mod tests {
         assert_eq!(line(None, to, 2.0).collect::<Vec<_>>(), [to]);
     }
 
-    /// Sends mouse input to the strokes, and returns the stroke of each brush.
     #[test]
     fn a_held_button_is_one_stroke() {
         let mut app = App::new();

@@ -17,6 +17,7 @@
 //! | [`rings`](BurrowDebug::rings) | triangles of tiles that are fanned over the border of the mask or of steep cells, or are bands of these |
 //! | [`dirty`](BurrowDebug::dirty) | bricks in the boxes of the latest edits, fading |
 //! | [`normals`](BurrowDebug::normals) | normals of vertices: golden of tiles, blue of chunks |
+//! | [`levels`](BurrowDebug::levels) | edges of triangles, coloured by level of detail |
 //! | `walkable` | with the feature `navigation`: polygons that an agent walks on (green), and the air above floors (blue) |
 //! | [`wires`](BurrowDebug::wires) | edges of triangles: golden of tiles, blue of chunks, white what both share |
 //!

@@ -4,9 +4,9 @@ use bevy::prelude::*;
 
 use super::lines::LineBuffer;
 use super::views::Place;
-use super::wires::around;
+use super::wires::{around, voxels};
 use crate::lattice::{Column, ONE};
-use crate::navigation::{NavTilePos, WalkableTile, Walker};
+use crate::navigation::{NAV_TILE, NavTilePos, WalkableTile, Walker};
 use crate::terrain::World;
 
 const GROUND: LinearRgba = LinearRgba::rgb(0.10, 0.80, 0.25);
@@ -25,8 +25,15 @@ pub fn draw(world: &World, place: Place, out: &mut LineBuffer) {
         return;
     };
     let (low, high) = (Column::of(bounds.min), Column::of(bounds.max));
+    out.width(2.0);
     let is_near = |at: Vec3| at.with_y(0.0).distance(place.focus.with_y(0.0)) <= place.near;
-    for pos in NavTilePos::covering(world, low, high) {
+    // The nearest first, should there not be room for all.
+    let mut tiles: Vec<NavTilePos> = NavTilePos::covering(world, low, high).collect();
+    tiles.sort_by_cached_key(|tile| {
+        let middle = tile.origin().at(0) + NAV_TILE / 2;
+        (middle - place.focus.as_ivec3()).with_y(0).length_squared()
+    });
+    for pos in tiles {
         if out.is_full() {
             return;
         }
@@ -35,7 +42,7 @@ pub fn draw(world: &World, place: Place, out: &mut LineBuffer) {
         let origin = pos.origin().at(0).as_vec3();
         let corner = |index: u32| {
             let at = polygons.vertices().get(index as usize).copied().unwrap_or_default();
-            origin + at.as_vec3() / 4096.0 + Vec3::Y * LIFT
+            origin + voxels(at) + Vec3::Y * LIFT
         };
         for polygon in polygons.iter() {
             let next = polygon.iter().cycle().skip(1);

@@ -9,28 +9,17 @@ use super::theme::{self, ACCENT, BRIGHT, FAINT};
 use super::widgets::{button, note, share};
 use super::{level, survey, texts};
 use crate::terrain::Terrain;
-use crate::volume::DiggingRules;
 
-/// Compares the terrain with what was saved.
-pub(super) fn watch(panel: Res<BurrowPanel>, terrains: Query<(Entity, &Terrain)>, mut files: ResMut<Files>) {
-    let Some((entity, terrain)) =
-        survey::chosen(&panel, &terrains).and_then(|entity| terrains.get(entity).ok())
-    else {
-        return;
-    };
-    match &files.saved {
-        Some((of, hash, rules)) if *of == entity => {
-            let same_rules = terrain.rules().map_or(*rules == DiggingRules::default(), |now| now == rules);
-            let is_unsaved = *hash != terrain.world().hash() || !same_rules;
-            if files.is_unsaved != is_unsaved {
-                files.is_unsaved = is_unsaved;
-            }
-        }
-        _ => files.take_as_saved(entity, terrain),
-    }
+/// Notes which terrains have changes that are not saved.
+pub(super) fn track_changes(
+    panel: Res<BurrowPanel>,
+    terrains: Query<(Entity, &Terrain)>,
+    mut files: ResMut<Files>,
+) {
+    files.bypass_change_detection().track(survey::chosen(&panel, &terrains), terrains.iter());
 }
 
-/// Does what was answered.
+/// Carries out the answer to a question.
 pub(super) fn answer(
     mut commands: Commands,
     mut panel: ResMut<BurrowPanel>,
@@ -45,9 +34,7 @@ pub(super) fn answer(
     let chosen = survey::chosen(&panel, &terrains).and_then(|entity| terrains.get(entity).ok());
     match (question, answer) {
         (Some(Question::Unsaved(action)), Some(Answer::Discard)) => {
-            // With this, the terrain counts as saved.
-            files.saved = None;
-            files.is_unsaved = false;
+            files.may_lose = Some(action);
             actions.write(action);
         }
         (Some(Question::Unsaved(action)), Some(Answer::Yes)) => {
@@ -56,7 +43,7 @@ pub(super) fn answer(
         }
         (Some(Question::Replace(target)), Some(Answer::Yes)) => {
             if let Some(terrain) = chosen {
-                level::save(&mut commands, &mut panel, terrain, target);
+                level::save(&mut commands, (&mut *panel, &mut *files), terrain, target);
             }
         }
         _ => files.then = None,
@@ -71,7 +58,7 @@ pub(super) fn bar(
     actions: &mut Vec<PanelAction>,
     has_terrain: bool,
 ) {
-    let is_free = has_terrain && !matches!(panel.note, Some(Note::Busy(_)));
+    let is_free = has_terrain && !files.is_busy && !matches!(panel.note, Some(Note::Busy(_)));
     let mut folder = panel.level.display().to_string();
     let edit =
         ui.add(TextEdit::singleline(&mut folder).desired_width(f32::INFINITY).hint_text(texts::FOLDER));
@@ -93,16 +80,16 @@ pub(super) fn bar(
             }
         }
     });
-    let opened = files.opened.as_ref().map_or_else(|| texts::NEW.into(), |path| path.display().to_string());
+    let opened = files.opened().map_or_else(|| texts::NEW.into(), |path| path.display().to_string());
     let (mark, color) =
-        if files.is_unsaved { (format!("{opened}: {}", texts::UNSAVED), ACCENT) } else { (opened, FAINT) };
+        if files.is_unsaved() { (format!("{opened}: {}", texts::UNSAVED), ACCENT) } else { (opened, FAINT) };
     let line = ui.add(egui::Label::new(RichText::new(mark).color(color).size(11.0)).truncate());
-    if files.is_unsaved {
+    if files.is_unsaved() {
         note(ui, texts::UNSAVED, line.rect);
     }
 }
 
-/// Asks, over everything else.
+/// Shows the question that waits, over everything else.
 pub(super) fn ask(context: &egui::Context, files: &mut Files) {
     let Some(question) = files.question.clone() else { return };
     let (text, answers) = (question.text(), question.answers());

@@ -101,7 +101,7 @@ impl Plugin for BurrowPanelPlugin {
                     picture::give_up,
                     files::answer,
                     perform_actions,
-                    files::watch,
+                    files::track_changes,
                     note_rejection,
                     forget_note,
                 )
@@ -149,15 +149,19 @@ fn perform_actions(
                     PanelAction::SaveLevel => files.target(&panel),
                     _ => panel.level.clone(),
                 };
-                terrain
-                    .into_iter()
-                    .for_each(|own| level::save(&mut commands, &mut panel, own, target.clone()));
+                terrain.into_iter().for_each(|own| {
+                    level::save(&mut commands, (&mut *panel, &mut *files), own, target.clone())
+                });
             }
             Some(PanelAction::LoadLevel) => {
-                terrain.into_iter().for_each(|own| level::load(&mut commands, &mut panel, own));
+                terrain
+                    .into_iter()
+                    .for_each(|own| level::load(&mut commands, (&mut *panel, &mut *files), own));
             }
             Some(PanelAction::NewLevel) => {
-                terrain.into_iter().for_each(|own| level::renew(&mut commands, &mut panel, own));
+                terrain
+                    .into_iter()
+                    .for_each(|own| level::renew(&mut commands, (&mut *panel, &mut *files), own));
             }
             Some(PanelAction::Quit) => drop(exit.write(AppExit::Success)),
         }

@@ -2,27 +2,63 @@
 
 use std::path::PathBuf;
 
+use bevy::ecs::entity::EntityHashMap;
 use bevy::prelude::*;
 
 use super::state::{BurrowPanel, PanelAction};
 use super::texts;
-use crate::terrain::Terrain;
+use crate::terrain::{LooseSettings, Terrain};
 use crate::volume::DiggingRules;
 
-/// The state of the level that is edited.
+/// The levels that are edited, one for each terrain.
 #[derive(Resource, Default)]
 pub struct Files {
-    /// Where it was opened from, or saved last.
-    pub(super) opened: Option<PathBuf>,
-    /// The terrain as it was then.
-    pub(super) saved: Option<(Entity, u64, DiggingRules)>,
-    /// Whether the terrain has changed since.
-    pub is_unsaved: bool,
+    levels: EntityHashMap<OpenLevel>,
+    /// The terrain whose level the file bar shows.
+    chosen: Option<Entity>,
+    /// Whether a level is being saved or opened.
+    pub(super) is_busy: bool,
     /// What is asked now.
     pub(super) question: Option<Question>,
     pub(super) answer: Option<Answer>,
     /// The action that follows once the level is saved.
     pub(super) then: Option<PanelAction>,
+    /// The action that may lose changes: its question was answered.
+    pub(super) may_lose: Option<PanelAction>,
+}
+
+/// The level of a terrain.
+#[derive(Default)]
+struct OpenLevel {
+    /// Where it was opened from, or saved last.
+    from: Option<PathBuf>,
+    /// The terrain as it was then; `None` until a terrain that was opened is there.
+    saved: Option<LevelState>,
+    /// Whether the terrain has changed since.
+    is_unsaved: bool,
+}
+
+/// All of a terrain that a level saves.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct LevelState {
+    hash: u64,
+    rules: DiggingRules,
+    loose: Option<LooseSettings>,
+}
+
+impl LevelState {
+    /// The state of a terrain.
+    pub fn of(terrain: &Terrain) -> Self {
+        let (rules, loose) = (terrain.rules().cloned().unwrap_or_default(), terrain.loose().cloned());
+        Self { hash: terrain.world().hash(), rules, loose }
+    }
+
+    /// Whether a terrain is as it was then.
+    fn is_still(&self, terrain: &Terrain) -> bool {
+        self.hash == terrain.world().hash()
+            && self.loose.as_ref() == terrain.loose()
+            && terrain.rules().map_or(self.rules == DiggingRules::default(), |rules| *rules == self.rules)
+    }
 }
 
 /// A question, and the action that waits for its answer.
@@ -63,20 +99,44 @@ pub(super) enum Answer {
 }
 
 impl Files {
-    /// Takes the terrain, as it is, for saved.
-    pub fn take_as_saved(&mut self, entity: Entity, terrain: &Terrain) {
-        self.saved = Some((entity, terrain.world().hash(), terrain.rules().cloned().unwrap_or_default()));
-        self.is_unsaved = false;
+    /// Compares all terrains with what was saved of them. A terrain that is new counts as saved.
+    pub fn track<'a>(
+        &mut self,
+        chosen: Option<Entity>,
+        terrains: impl Iterator<Item = (Entity, &'a Terrain)>,
+    ) {
+        let mut there = EntityHashMap::default();
+        for (entity, terrain) in terrains {
+            let mut level = self.levels.remove(&entity).unwrap_or_default();
+            let saved = level.saved.get_or_insert_with(|| LevelState::of(terrain));
+            level.is_unsaved = !saved.is_still(terrain);
+            there.insert(entity, level);
+        }
+        (self.levels, self.chosen) = (there, chosen);
     }
 
-    /// Notes that the level is open, from where or as a new one. The file bar takes the terrain that comes for saved.
-    pub fn note_opened(&mut self, from: Option<PathBuf>) {
-        (self.opened, self.saved) = (from, None);
+    /// Whether the level that the file bar shows has unsaved changes.
+    pub fn is_unsaved(&self) -> bool {
+        self.shown().is_some_and(|level| level.is_unsaved)
     }
 
-    /// Notes where a state of the terrain was saved.
-    pub fn note_saved(&mut self, to: PathBuf, entity: Entity, hash: u64, rules: DiggingRules) {
-        (self.opened, self.saved) = (Some(to), Some((entity, hash, rules)));
+    /// Where the level that the file bar shows was opened from, or saved last.
+    pub fn opened(&self) -> Option<&PathBuf> {
+        self.shown()?.from.as_ref()
+    }
+
+    fn shown(&self) -> Option<&OpenLevel> {
+        self.levels.get(&self.chosen?)
+    }
+
+    /// Notes that a terrain's level was opened, from where or as a new one. The terrain that comes counts as saved.
+    pub fn note_opened(&mut self, terrain: Entity, from: Option<PathBuf>) {
+        self.levels.insert(terrain, OpenLevel { from, ..OpenLevel::default() });
+    }
+
+    /// Notes where a state of a terrain was saved. Whether it has changed since is found out once more.
+    pub fn note_saved(&mut self, to: PathBuf, terrain: Entity, state: LevelState) {
+        self.levels.insert(terrain, OpenLevel { from: Some(to), saved: Some(state), is_unsaved: false });
     }
 
     /// Takes the action that waited until the level was saved.
@@ -102,13 +162,18 @@ impl Files {
 
     /// The action to perform now, if it may be: one that loses something is asked about first.
     pub fn admit(&mut self, action: PanelAction, panel: &BurrowPanel) -> Option<PanelAction> {
-        let loses = matches!(action, PanelAction::NewLevel | PanelAction::LoadLevel | PanelAction::Quit);
+        let loses = match action {
+            PanelAction::NewLevel | PanelAction::LoadLevel => self.is_unsaved(),
+            PanelAction::Quit => self.levels.values().any(|level| level.is_unsaved),
+            _ => false,
+        };
+        let may_lose = self.may_lose.take_if(|own| *own == action).is_some();
         if action == PanelAction::Quit && self.question.is_some() {
             // The key that asks also takes the question back.
             self.question = None;
             return None;
         }
-        if loses && self.is_unsaved {
+        if loses && !may_lose {
             self.question = Some(Question::Unsaved(action));
             return None;
         }
@@ -117,7 +182,7 @@ impl Files {
             PanelAction::SaveLevelAs => panel.level.clone(),
             _ => return Some(action),
         };
-        if self.opened.as_ref() != Some(&target) && target.exists() {
+        if self.opened() != Some(&target) && target.exists() {
             self.question = Some(Question::Replace(target));
             return None;
         }
@@ -126,6 +191,6 @@ impl Files {
 
     /// Where the level is saved: where it is from, or where it is named.
     pub fn target(&self, panel: &BurrowPanel) -> PathBuf {
-        self.opened.clone().unwrap_or_else(|| panel.level.clone())
+        self.opened().cloned().unwrap_or_else(|| panel.level.clone())
     }
 }

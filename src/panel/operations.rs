@@ -104,11 +104,10 @@ fn triangle_wave(x: f32) -> f32 {
 
 /// A stamp of the tool's image, as large as the tool and oriented like it.
 fn stamp(tool: &BrushTool, hit: &TerrainHit) -> Operation {
-    let (size, turn) = (Vec2::splat(2.0 * tool.width()), Quat::from_rotation_y(tool.turn.to_radians()));
-    let tilt = Quat::from_rotation_arc(Vec3::Y, tool.axis(hit));
+    let size = Vec2::splat(2.0 * tool.width());
     match tool.stamp.image() {
         Some(image) => Operation::Stamp {
-            stamp: Stamp::new(image, hit.position, size, tool.amount).with_rotation(tilt * turn),
+            stamp: Stamp::new(image, hit.position, size, tool.amount).with_rotation(tool.rotation(hit)),
         },
         None => Operation::Raise { amount: tool.amount },
     }

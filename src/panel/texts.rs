@@ -71,6 +71,7 @@ texts! {
     UNSAVED_QUESTION = "There are unsaved changes. They will be lost unless you save them.",
     SAVE_CHANGES = "Save changes", DISCARD = "Discard changes", CANCEL = "Cancel", REPLACE = "Replace",
     SAVING = "Saving the level ...", OPENING = "Opening the level ...", STARTED_ANEW = "Started a new level",
+    STILL_BUSY = "A level is still being saved or opened. Try again in a moment.",
 }
 
 // The right column.
@@ -104,7 +105,7 @@ texts! {
     SWAPS_HELP = "Meshes that are replaced per frame, at most, after edits. Fewer make frames smoother.",
     LOADS = "Loads",
     LOADS_HELP = "Meshes that are uploaded per frame, at most, while a terrain loads. Fewer make loading slower.",
-    DEBUG = "Debug views", REACH = "Reach", NEAR = "Near", NEAR_HELP = "How far normals and wires reach",
+    DEBUG = "Debug views", REACH = "Reach", NEAR = "Near", NEAR_HELP = "How far normals, wires and walkable ground reach",
 }
 
 // Diagnostics.

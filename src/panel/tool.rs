@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use bevy::prelude::*;
 
-use super::lengths::RADIUS;
+use super::lengths::{AMOUNT, LENGTH, Length, RADIUS, TUBE};
 use super::texts;
 pub use super::tool_content::{StampImage, ToolModel, ToolPrefab};
 use super::tool_operation::ToolOperation;
@@ -217,7 +217,7 @@ impl BrushTool {
 
     /// Its model at a position.
     fn model_at(&self, hit: &TerrainHit) -> Option<GridShape> {
-        self.model.shape(self.middle(hit), self.rotation(self.axis(hit)), self.radius)
+        self.model.shape(self.middle(hit), self.rotation(hit), self.radius)
     }
 
     /// The brush along the points of its path, which are forgotten. `None` without points.
@@ -252,16 +252,16 @@ impl BrushTool {
         if self.is_smooth { BrushPath::spline(points) } else { BrushPath::polyline(points) }
     }
 
-    /// What is pasted at a position, with its anchor there: exactly, if it was copied from voxels of the same size, and is upright
-    /// and turned by quarter turns.
+    /// What is pasted at a position, with its anchor there: exactly, if it is upright, turned by quarter turns, and pasted on a terrain
+    /// with voxels of the same size at whole multiples of it.
     pub(super) fn paste_at(&self, hit: &TerrainHit) -> Option<Paste> {
         let (prefab, voxel) = (self.prefab.prefab()?, self.prefab.voxel_size);
         let place = (hit.position / voxel).round() * voxel;
         Some(Paste {
-            scale: voxel,
+            scale: voxel * self.prefab.scale,
             mirror: self.is_mirrored,
             edited_only: self.prefab.is_edits_only,
-            ..Paste::new(prefab, place).rotated(self.rotation(self.axis(hit)))
+            ..Paste::new(prefab, place).rotated(self.rotation(hit) * self.prefab.rotation)
         })
     }
 
@@ -285,8 +285,12 @@ impl BrushTool {
         let samples = LatticeBox { min: low.floor().as_ivec3(), max: high.ceil().as_ivec3() };
         let anchor = to_voxels.transform_point3(hit.position).round().as_ivec3();
         let prefab = terrain.world().copy(samples, anchor)?;
-        self.prefab =
-            ToolPrefab { name: Some(texts::COPIED.into()), ..ToolPrefab::new(prefab, terrain.voxel_size()) };
+        self.prefab = ToolPrefab {
+            name: Some(texts::COPIED.into()),
+            rotation: place.rotation(),
+            is_edits_only: self.prefab.is_edits_only,
+            ..ToolPrefab::new(prefab, place.scale().x.abs())
+        };
         self.operation = ToolOperation::Paste;
         Ok(())
     }
@@ -322,10 +326,8 @@ impl BrushTool {
         let end = middle - axis * self.length / 2.0;
         match self.fitting_shape() {
             ToolShape::Sphere | ToolShape::Path => Shape::sphere(middle, self.radius),
-            ToolShape::Box => Shape::turned_cuboid(middle, self.half, self.rotation(axis)),
-            ToolShape::Model => {
-                Shape::turned_cuboid(middle, self.model.half(self.radius), self.rotation(axis))
-            }
+            ToolShape::Box => Shape::turned_cuboid(middle, self.half, self.turned(axis)),
+            ToolShape::Model => Shape::turned_cuboid(middle, self.model.half(self.radius), self.turned(axis)),
             ToolShape::Cylinder => Shape::cylinder(end, axis * self.length, self.radius),
             ToolShape::Capsule => Shape::capsule(end, end + axis * self.length, self.radius),
             ToolShape::Cone => Shape::cone(end, axis * self.length, self.radius),
@@ -333,8 +335,12 @@ impl BrushTool {
         }
     }
 
-    /// From upright to this axis, turned about it.
-    fn rotation(&self, axis: Vec3) -> Quat {
+    /// How the brush is turned at a position: from upright to its axis, and about it.
+    pub fn rotation(&self, hit: &TerrainHit) -> Quat {
+        self.turned(self.axis(hit))
+    }
+
+    fn turned(&self, axis: Vec3) -> Quat {
         Quat::from_rotation_arc(Vec3::Y, axis) * Quat::from_rotation_y(self.turn.to_radians())
     }
 
@@ -348,7 +354,14 @@ impl BrushTool {
 
     /// Half of its largest horizontal extent.
     pub fn width(&self) -> f32 {
-        if self.fitting_shape() == ToolShape::Box { self.half.x.max(self.half.z) } else { self.radius }
+        let half = match self.fitting_shape() {
+            _ if self.operation == ToolOperation::Paste => self.prefab.half(),
+            ToolShape::Box => self.half,
+            ToolShape::Model => self.model.half(self.radius),
+            ToolShape::Torus => Vec3::splat(self.radius + self.tube.min(self.radius)),
+            _ => Vec3::splat(self.radius),
+        };
+        half.x.max(half.z)
     }
 
     /// The material to add or paint.
@@ -381,24 +394,34 @@ impl BrushTool {
         range.start().max(least)..=range.end().max(least)
     }
 
-    /// This tool at a place instead of on the ground: turned as the place is, and larger by its scale. Returns the hit for
-    /// [`brush_at`](Self::brush_at) and [`shape_at`](Self::shape_at). Not for paths.
+    /// This tool at a place instead of on the ground: turned as the place is, and all its lengths times the place's scale, of a box
+    /// along each of its sides. Returns the hit for [`brush_at`](Self::brush_at) and [`shape_at`](Self::shape_at). Not for paths.
     pub fn placed(&self, place: &Transform, voxel_size: f32) -> (Self, TerrainHit) {
         let normal = place.rotation * Vec3::Y;
         // What is left when the axis is upright is a rotation about it.
         let (axis, angle) =
             (Quat::from_rotation_arc(Vec3::Y, normal).inverse() * place.rotation).to_axis_angle();
+        let scale = place.scale.abs();
+        let by = scale.element_product().cbrt();
+        let within = |length: f32, range: &Length| {
+            let range = range.range(voxel_size);
+            (length * by).clamp(*range.start(), *range.end())
+        };
         let mut tool = Self {
             align: ToolAlign::Surface,
             sink: 0.0,
             turn: self.turn + (angle * axis.y.signum()).to_degrees(),
+            length: within(self.length, &LENGTH),
+            tube: within(self.tube, &TUBE),
+            amount: within(self.amount, &AMOUNT),
             ..self.clone()
         };
-        let scale = place.scale.max_element();
-        if tool.operation == ToolOperation::Paste {
-            tool.prefab.voxel_size = (tool.prefab.voxel_size * scale).clamp(1.0 / 8.0, 8.0);
+        tool.prefab.scale *= by.clamp(1.0 / 16.0, 16.0);
+        if tool.fitting_shape() == ToolShape::Box {
+            let range = tool.radii(voxel_size);
+            tool.half = (tool.half * scale).clamp(Vec3::splat(*range.start()), Vec3::splat(*range.end()));
         } else {
-            tool.grow(scale, voxel_size);
+            tool.grow(by, voxel_size);
         }
         (tool, hit_at(place.translation, normal))
     }
@@ -619,13 +642,16 @@ mod tests {
         let turns = [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (1.0, -2.0, 0.5), (3.1, 1.5, -1.5), (0.0, 3.0, 0.0)];
         for (x, y, z) in turns {
             let rotation = Quat::from_euler(EulerRot::YXZ, x, y, z);
-            let place =
-                Transform { translation: Vec3::new(5.0, 6.0, 7.0), rotation, scale: Vec3::splat(2.0) };
+            let place = Transform {
+                translation: Vec3::new(5.0, 6.0, 7.0),
+                rotation,
+                scale: Vec3::new(2.0, 1.0, 4.0),
+            };
             let (placed, hit) = tool.placed(&place, 1.0);
             let Shape::Cuboid(Cuboid { center, half, rotation: found }) = placed.shape_at(&hit) else {
                 panic!("a box")
             };
-            assert_eq!((center, half), (place.translation, 2.0 * tool.half));
+            assert_eq!((center, half), (place.translation, place.scale * tool.half));
             assert!(found.dot(rotation).abs() > 0.999_9, "{found} instead of {rotation}");
             let model = BrushTool { shape: ToolShape::Model, ..tool.clone() };
             let (placed, hit) = model.placed(&place, 1.0);
@@ -635,6 +661,10 @@ mod tests {
             let (placed, hit) = paste.placed(&place, 1.0);
             let found = placed.paste_at(&hit).expect("a hut");
             assert!(found.rotation.dot(rotation).abs() > 0.999_9 && found.scale == 2.0, "{found:?}");
+            let small = Transform::from_scale(Vec3::splat(0.5));
+            let torus = BrushTool { shape: ToolShape::Torus, ..default() };
+            let placed = torus.placed(&small, 1.0).0;
+            assert_eq!((placed.radius, placed.tube), (0.5 * torus.radius, 0.5 * torus.tube));
         }
     }
 

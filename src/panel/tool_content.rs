@@ -109,6 +109,10 @@ pub struct ToolPrefab {
     pub prefab: Option<Arc<Prefab>>,
     /// Metres of a voxel where it was copied: 1/8 to 8.
     pub voxel_size: f32,
+    /// How many times as large it is pasted.
+    pub scale: f32,
+    /// How the terrain was turned from which it was copied.
+    pub rotation: Quat,
     /// Whether only samples that were edited are pasted, and not the ground around them.
     pub is_edits_only: bool,
     /// Its name in the panel.
@@ -117,7 +121,8 @@ pub struct ToolPrefab {
 
 impl Default for ToolPrefab {
     fn default() -> Self {
-        Self { prefab: None, voxel_size: 1.0, is_edits_only: true, name: None }
+        let rotation = Quat::IDENTITY;
+        Self { prefab: None, voxel_size: 1.0, scale: 1.0, rotation, is_edits_only: true, name: None }
     }
 }
 
@@ -137,6 +142,12 @@ impl ToolPrefab {
                 format!("{x} x {y} x {z}")
             }
         }
+    }
+
+    /// Half its sides in metres, before it is turned.
+    pub(super) fn half(&self) -> Vec3 {
+        let size = self.prefab().map_or(Vec3::ONE, |prefab| prefab.size().as_vec3());
+        size * self.voxel_size * self.scale / 2.0
     }
 
     /// The prefab, or the default one.

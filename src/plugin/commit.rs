@@ -15,7 +15,7 @@ use super::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
 use super::load::Loading;
 use super::lod_state::{LodState, ShownLevels, WantedTiles, Watchers};
 use super::meshes::{VertexExtras, VertexKind};
-use super::new_mesh::NewMesh;
+use super::new_mesh::PendingMesh;
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface};
 use super::reports::{Report, Reports};
 use super::same_frame::SameFrame;
@@ -177,17 +177,22 @@ impl Commits<'_, '_> {
 pub(super) fn commit_transactions(mut commits: Commits, mut same_frame: ResMut<SameFrame>) {
     same_frame.begin();
     let mut done: Vec<(u64, Entity)> = Vec::new();
-    let mut budget = UPLOADS_PER_FRAME;
-    for (entity, _, _, mut task, _) in &mut commits.terrains {
+    let mut large: Vec<(u64, Entity)> = Vec::new();
+    for (entity, terrain, _, mut task, _) in &mut commits.terrains {
         if !task.is_done() {
             continue;
         }
-        let is_uploaded = match &mut commits.display.assets {
-            Some(assets) if task.swaps() > UPLOADS_PER_FRAME => task.upload(assets, &mut budget),
-            _ => true,
-        };
-        if is_uploaded {
-            done.push((task.number, entity));
+        let is_awaited = task.ticket.is_none_or(|ticket| terrain.waits_for(ticket));
+        let is_large = is_awaited && task.swaps() > UPLOADS_PER_FRAME;
+        if is_large { &mut large } else { &mut done }.push((task.number, entity));
+    }
+    // The oldest first, here too.
+    large.sort_unstable();
+    let mut budget = UPLOADS_PER_FRAME;
+    for (number, entity) in large {
+        let Ok((_, _, _, mut task, _)) = commits.terrains.get_mut(entity) else { continue };
+        if commits.display.assets.as_mut().is_none_or(|assets| task.upload(assets, &mut budget)) {
+            done.push((number, entity));
         }
     }
     commits.commit(done, &mut same_frame.swapped);
@@ -483,7 +488,7 @@ fn swap(
     assets: &mut Assets<Mesh>,
     child: Entity,
     shown: Option<&Mesh3d>,
-    mesh: Option<NewMesh>,
+    mesh: Option<PendingMesh>,
 ) {
     let Ok(mut child) = commands.get_entity(child) else { return };
     let Some(mesh) = mesh else {

@@ -4,19 +4,20 @@ use std::sync::Arc;
 
 use bevy::asset::io::Reader;
 use bevy::asset::{AssetLoader, LoadContext, ParseAssetPathError, ReadAssetBytesError};
+use bevy::ecs::entity::EntityHashMap;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::Allow;
 use bevy::prelude::*;
 use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 
-use super::BeforeLoad;
 use super::heightmap::{read_limited, register_loader};
+use super::{BeforeLoad, EditOutbox};
 use crate::ground::{
     ElevationGrid, ElevationScale, ElevationTile, Ground, GroundError, HeightFormat, IdOptions, ImportError,
     ImportOptions, MaterialControl, MaterialMap, SplatOptions, TileEdges, tile_place,
 };
-use crate::terrain::{Order, Terrain, TerrainSettings};
+use crate::terrain::{Order, Request, Terrain, TerrainSettings};
 
 /// The largest file of a [`GroundDescription`], in bytes.
 const MAX_DESCRIPTION: u64 = 1 << 20;
@@ -218,8 +219,9 @@ async fn materials(
     Ok(map)
 }
 
-/// This entity is a terrain whose ground is a file. It gets its [`Terrain`] once the file is loaded, unless it has one already. When
-/// the file or one that it names changes, edits stay and the ground below them becomes the new one, as with [`Order::Ground`].
+/// This entity is a terrain whose ground is a file. It gets its [`Terrain`] once the file is loaded; a terrain that is there already
+/// gets the file's ground. When the file or one that it names changes, edits stay and the ground below them becomes the new one, as
+/// with [`Order::Ground`], which clears the history of undo. A [`SharedTerrain`] of a client follows its server, and not the file.
 ///
 /// Hot reloading takes Bevy's feature `file_watcher`. A ground of another size takes a new terrain: the change is logged and not shown.
 ///
@@ -264,50 +266,54 @@ impl Plugin for GroundFilePlugin {
 
 fn register(app: &mut App) {
     if register_loader::<GroundLoader>(app) {
-        app.add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
+        app.add_observer(forget_followed).add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
     }
 }
 
-/// The hash of the ground that a terrain got last from its file, or will get once what it was asked before is done.
+/// The hash of the ground that a terrain has from its file, or will have once what it was asked before is done.
 #[derive(Component)]
 struct FollowedGround(u64);
+
+/// Another terrain in the place of a former one is compared with the file again.
+fn forget_followed(inserted: On<Insert, Terrain>, mut commands: Commands) {
+    commands.entity(inserted.entity).try_remove::<FollowedGround>();
+}
 
 /// Makes terrains of grounds that are loaded, and gives terrains the ground that is loaded again.
 fn follow_ground_files(
     mut commands: Commands,
-    mut events: MessageReader<AssetEvent<GroundAsset>>,
     grounds: Res<Assets<GroundAsset>>,
     mut terrains: Query<
-        (Entity, Ref<GroundFrom>, Option<&mut Terrain>, Option<&FollowedGround>),
+        (Entity, &GroundFrom, Option<&mut Terrain>, Option<&FollowedGround>, Has<EditOutbox>),
         Allow<Disabled>,
     >,
+    mut failed: Local<EntityHashMap<u64>>,
 ) {
-    let changed: Vec<AssetId<GroundAsset>> = events
-        .read()
-        .filter_map(|event| match event {
-            AssetEvent::Added { id } | AssetEvent::Modified { id } => Some(*id),
-            _ => None,
-        })
-        .collect();
-    for (entity, from, terrain, followed) in &mut terrains {
-        if !from.is_changed() && !changed.contains(&from.ground.id()) {
-            continue;
-        }
+    for (entity, from, terrain, followed, is_shared) in &mut terrains {
         let Some(GroundAsset { ground, report }) = grounds.get(&from.ground) else { continue };
+        let hash = ground.hash();
         let Some(mut terrain) = terrain else {
+            if failed.get(&entity) == Some(&hash) {
+                continue;
+            }
             match Terrain::new(Arc::clone(ground), &from.settings) {
                 Ok(terrain) => {
                     info!("{report}");
-                    commands.entity(entity).try_insert((terrain, FollowedGround(ground.hash())));
+                    commands.entity(entity).try_insert(terrain);
                 }
-                Err(error) => error!("no terrain is made of the ground of {entity}: {error}"),
+                Err(error) => {
+                    error!("no terrain is made of the ground of {entity}: {error}");
+                    failed.insert(entity, hash);
+                }
             }
             continue;
         };
-        let before = terrain.bypass_change_detection().world().ground();
-        if followed.map_or(before.hash(), |followed| followed.0) == ground.hash() {
+        // The ground of a client is its server's.
+        if is_shared || followed.is_some_and(|followed| followed.0 == hash) {
             continue;
         }
+        let model = terrain.bypass_change_detection();
+        let before = model.world().ground();
         let size = |ground: &Ground| (ground.width(), ground.depth());
         if size(before) != size(ground) {
             let ((width, depth), (new_width, new_depth)) = (size(before), size(ground));
@@ -315,10 +321,15 @@ fn follow_ground_files(
                 "the file of the ground of {entity} has {new_width} x {new_depth} cells now, and the terrain {width} x {depth}: \
                  despawn it and spawn another one to show the file"
             );
-            continue;
+        } else if followed.is_some() || before.hash() != hash {
+            let order = Request::from(Order::Ground(Arc::clone(ground)));
+            // In a later frame, if too much waits.
+            if model.admit(&order).is_err() {
+                continue;
+            }
+            info!("{report}");
+            terrain.submit(order);
         }
-        info!("{report}");
-        terrain.submit(Order::Ground(Arc::clone(ground)));
-        commands.entity(entity).try_insert(FollowedGround(ground.hash()));
+        commands.entity(entity).try_insert(FollowedGround(hash));
     }
 }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
 use super::lod_state::{LevelsOfDetail, LodState, ShownLevels};
 use super::meshes::{VertexExtras, VertexKind};
-use super::new_mesh::NewMesh;
+use super::new_mesh::PendingMesh;
 use super::places::{LocalPlaces, TerrainPlace, place_terrain};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::reports::{Report, Reports};
@@ -330,7 +330,8 @@ pub(super) fn finish_loading(
         budget -= loading.waiting.len() - rest;
         for mut built in loading.waiting.split_off(rest) {
             if let (Some(assets), Some(mesh)) = (&mut assets, &mut built.mesh) {
-                mesh.upload(assets);
+                // The budget was spent on it above.
+                mesh.upload(assets, &mut 1);
             }
             loading.ready.insert(built.drawn, built);
         }
@@ -412,7 +413,7 @@ fn show_nodes(
     mut assets: Option<&mut Assets<Mesh>>,
     nodes: Vec<BuiltNode>,
 ) {
-    let mut insert = |commands: &mut Commands, child: Entity, mesh: Option<NewMesh>| {
+    let mut insert = |commands: &mut Commands, child: Entity, mesh: Option<PendingMesh>| {
         if let (Some(mesh), Some(assets)) = (mesh, &mut assets) {
             insert_mesh(commands, assets, child, mesh);
         }
@@ -432,7 +433,7 @@ fn show_nodes(
 }
 
 /// Gives an entity its first mesh.
-fn insert_mesh(commands: &mut Commands, assets: &mut Assets<Mesh>, child: Entity, mesh: NewMesh) {
+fn insert_mesh(commands: &mut Commands, assets: &mut Assets<Mesh>, child: Entity, mesh: PendingMesh) {
     let facts = mesh.facts.clone();
     commands.entity(child).try_insert((Mesh3d(mesh.show(assets, None)), facts));
 }

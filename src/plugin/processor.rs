@@ -11,7 +11,7 @@ use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
 use super::meshes::{MeshBuilder, TileLights, VertexExtras};
-use super::new_mesh::NewMesh;
+use super::new_mesh::PendingMesh;
 use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::lod::{LodGrid, Node};
@@ -137,7 +137,7 @@ impl fmt::Debug for SurfaceProcessors {
 /// The new surface of a tile or chunk, ready to be swapped in.
 pub(super) struct BuiltSurface {
     pub drawn: MeshKey,
-    pub mesh: Option<NewMesh>,
+    pub mesh: Option<PendingMesh>,
     pub shown: ShownSurface,
     pub actions: Vec<CommitAction>,
     /// Whether it is drawn. Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
@@ -148,7 +148,7 @@ pub(super) struct BuiltSurface {
 pub(super) struct BuiltNode {
     pub node: Node,
     /// Its own mesh; `None` if it is drawn by its tile and chunks, or not at all.
-    pub mesh: Option<Option<NewMesh>>,
+    pub mesh: Option<Option<PendingMesh>>,
     /// Tile and chunks that are drawn from now on.
     pub shown: Vec<BuiltSurface>,
     /// Tile and chunks that are drawn no more.
@@ -162,7 +162,7 @@ impl BuiltNode {
     }
 
     /// The meshes that it shows.
-    pub fn meshes(&mut self) -> impl Iterator<Item = &mut NewMesh> {
+    pub fn meshes(&mut self) -> impl Iterator<Item = &mut PendingMesh> {
         let own = self.mesh.iter_mut().flatten();
         own.chain(self.shown.iter_mut().filter_map(|shown| shown.mesh.as_mut()))
     }
@@ -290,7 +290,7 @@ impl SurfaceBuilder {
             let build = |mesh: Arc<SurfaceMesh>| {
                 let builder = self.mesh_builder.as_ref();
                 let mesh = builder.and_then(|builder| builder.build_node(columns, node.stride(), &mesh));
-                mesh.map(NewMesh::new)
+                mesh.map(PendingMesh::new)
             };
             let shown = shown.into_iter();
             let shown = shown.map(|(drawn, draft)| self.build((drawn, true), draft.is_empty(), || draft));
@@ -338,7 +338,7 @@ impl SurfaceBuilder {
         let surface = (!processors.is_empty()).then(|| draft.surface());
         let mesh =
             mesh_builder.and_then(|builder| builder.build(part.origin, &draft, surface.as_deref(), lights));
-        built.mesh = mesh.map(NewMesh::new);
+        built.mesh = mesh.map(PendingMesh::new);
         if let Some(surface) = &surface {
             let build = |processor: &Arc<dyn SurfaceProcessor>| {
                 guarded.guarded(part.terrain, || processor.build(part, surface))

@@ -31,7 +31,8 @@ impl Default for BurrowEngine {
 #[reflect(Resource, Default)]
 pub struct BurrowSettings {
     /// Meshes swapped per frame. A commit is never split: a larger one is shown whole, and others wait for the next
-    /// frame.
+    /// frame. A commit with more than 64 meshes is uploaded at 64 a frame and then shown at once; later edits of that
+    /// terrain wait meanwhile.
     pub swaps_per_frame: usize,
     /// Meshes of tiles and chunks passed to the renderer per frame while a terrain loads. They are shown once all are
     /// there.

@@ -155,13 +155,8 @@ impl InFlight {
     pub fn upload(&mut self, assets: &mut Assets<Mesh>, budget: &mut usize) -> bool {
         let Some(Ok(output)) = &mut self.done else { return true };
         let surfaces = output.surfaces.iter_mut().filter_map(|built| built.mesh.as_mut());
-        for mesh in surfaces.chain(output.nodes.iter_mut().flat_map(BuiltNode::meshes)) {
-            if *budget == 0 {
-                return false;
-            }
-            *budget -= usize::from(mesh.upload(assets));
-        }
-        true
+        let nodes = output.nodes.iter_mut().flat_map(BuiltNode::meshes);
+        surfaces.chain(nodes).all(|mesh| mesh.upload(assets, budget))
     }
 
     /// Whether its result is a transaction with edits or a step through history, and no piece of ground breaks off or

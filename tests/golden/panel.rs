@@ -40,8 +40,10 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let closed = ["Terrain", "Diagnostics"].map(|name| (name, false));
     let open = ["Fill", "Digging rules", "Loose pieces", "Look", "Settings"].map(|name| (name, true));
     unfold(studio, &[&closed[..], &open[..]].concat());
-    // Sections take a moment to open and to close.
+    // Sections take a moment to open and to close. The ground need not be drawn meanwhile.
+    studio.app.world_mut().entity_mut(terrain).insert(Visibility::Hidden);
     (0..60).for_each(|_| studio.app.update());
+    studio.app.world_mut().entity_mut(terrain).insert(Visibility::Inherited);
     photograph(studio, album, "panel_settings", &SETTINGS);
 }
 

@@ -6,12 +6,14 @@ use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
 use crate::album::{Album, flip};
-use crate::studio::{Studio, TIMEOUT};
+use crate::studio::{SIZE, Studio, TIMEOUT};
 
 /// Height of the level ground: the middle of a chunk, so that the whole surface is in one layer of chunks.
 const HEIGHT: f64 = 16.0;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
+    // Pictures are compared only with each other, so small ones will do.
+    studio.resize((SIZE.0 / 2, SIZE.1 / 2));
     let level = || Ground::flat(96, 96, HEIGHT).expect("valid ground");
     // In the middle of the tile and chunk at 32 to 64; the larger one removes the whole tile.
     let middle = Vec3::new(48.0, HEIGHT as f32, 48.0);
@@ -37,6 +39,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
             album.check(apart < 1e-4, || format!("{what} dug again {round}: FLIP {apart:.5} from the first"));
         }
     }
+    studio.resize(SIZE);
 }
 
 /// Sends a brush or a history step, and waits for its commit. The camera draws all the while, as anything that newly

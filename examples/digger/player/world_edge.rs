@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use avian3d::prelude::*;
+use bevy::ecs::entity::EntityHashMap;
 use bevy::prelude::*;
 use bevy::time::common_conditions::on_timer;
 use bevy_burrow::physics::{Character, CharacterMotion};
@@ -35,16 +36,21 @@ fn bring_back(
     places: Option<Res<Places>>,
     players: Query<(Entity, &Character, &Transform), (With<Player>, Without<Scripted>)>,
     mut hints: MessageWriter<Hint>,
-    mut checks: Local<u32>,
+    mut checks: Local<EntityHashMap<u32>>,
 ) {
     let Some(places) = places else { return };
     for (player, character, place) in &players {
         let feet = character.feet(place.translation);
-        *checks = if is_lost(feet, &terrains.spans(feet.x, feet.z)) { *checks + 1 } else { 0 };
-        if *checks < CHECKS {
+        if !is_lost(feet, &terrains.spans(feet.x, feet.z)) {
+            checks.remove(&player);
             continue;
         }
-        *checks = 0;
+        let lost = checks.entry(player).or_default();
+        *lost += 1;
+        if *lost < CHECKS {
+            continue;
+        }
+        checks.remove(&player);
         let start = player::start(&places, |place| terrains.height(place.x, place.y));
         let place = character.standing_at(start + Vec3::Y * 0.1);
         commands.entity(player).insert((place, Position(place.translation), CharacterMotion::default()));

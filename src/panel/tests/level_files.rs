@@ -18,7 +18,7 @@ fn editor(name: &str) -> (App, Entity, std::path::PathBuf) {
         .add_message::<Redo>()
         .add_message::<AppExit>()
         .init_resource::<Exits>()
-        .add_systems(Update, (level::finish, files::answer, perform_actions, files::watch).chain())
+        .add_systems(Update, (level::finish, files::answer, perform_actions, files::track_changes).chain())
         .add_systems(Last, |mut exits: MessageReader<AppExit>, mut count: ResMut<Exits>| {
             count.0 += exits.read().count();
         });
@@ -37,7 +37,7 @@ fn act(app: &mut App, action: PanelAction, answer: Option<&str>) -> bool {
     }
     for _ in 0..10_000 {
         app.update();
-        let is_busy = matches!(app.world().resource::<BurrowPanel>().note, Some(Note::Busy(_)));
+        let is_busy = app.world().resource::<Files>().is_busy;
         if !is_busy && app.world().resource::<Messages<PanelAction>>().is_empty() {
             break;
         }
@@ -63,11 +63,11 @@ fn hash(app: &App, terrain: Entity) -> u64 {
 fn unsaved_changes_are_marked_and_asked_about_before_they_are_lost() {
     let (mut app, terrain, folder) = editor("unsaved");
     let pristine = hash(&app, terrain);
-    assert!(!app.world().resource::<Files>().is_unsaved);
+    assert!(!app.world().resource::<Files>().is_unsaved());
     let saved = dig_at(&mut app, terrain, 20.0);
-    assert!(app.world().resource::<Files>().is_unsaved);
+    assert!(app.world().resource::<Files>().is_unsaved());
     assert!(!act(&mut app, PanelAction::SaveLevel, None), "nothing is there to be replaced");
-    assert!(folder.exists() && !app.world().resource::<Files>().is_unsaved);
+    assert!(folder.exists() && !app.world().resource::<Files>().is_unsaved());
     assert!(!act(&mut app, PanelAction::SaveLevel, None), "the level that is open");
     let changed = dig_at(&mut app, terrain, 40.0);
     for action in [PanelAction::LoadLevel, PanelAction::NewLevel, PanelAction::Quit] {
@@ -79,7 +79,7 @@ fn unsaved_changes_are_marked_and_asked_about_before_they_are_lost() {
     assert_eq!(hash(&app, terrain), saved);
     assert!(!act(&mut app, PanelAction::NewLevel, None), "all is saved");
     assert_eq!(hash(&app, terrain), pristine);
-    assert!(!app.world().resource::<Files>().is_unsaved);
+    assert!(!app.world().resource::<Files>().is_unsaved());
     std::fs::remove_dir_all(folder).expect("removed");
 }
 
@@ -101,7 +101,57 @@ fn another_level_is_replaced_only_after_a_question() {
     dig_at(&mut app, terrain, 20.0);
     for (answer, is_unsaved) in [(texts::CANCEL, true), (texts::REPLACE, false)] {
         assert!(act(&mut app, PanelAction::SaveLevel, Some(answer)));
-        assert_eq!(app.world().resource::<Files>().is_unsaved, is_unsaved, "{answer}");
+        assert_eq!(app.world().resource::<Files>().is_unsaved(), is_unsaved, "{answer}");
     }
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn changes_that_were_discarded_are_unsaved_still_where_nothing_came_in_their_place() {
+    let (mut app, terrain, folder) = editor("failed");
+    let changed = dig_at(&mut app, terrain, 20.0);
+    // There is no such level.
+    assert!(act(&mut app, PanelAction::LoadLevel, Some(texts::DISCARD)));
+    assert_eq!(hash(&app, terrain), changed);
+    assert!(app.world().resource::<Files>().is_unsaved());
+    assert!(act(&mut app, PanelAction::Quit, Some(texts::CANCEL)));
+    assert!(!folder.exists());
+}
+
+#[test]
+fn each_terrain_has_a_level_of_its_own() {
+    let (mut app, first, folder) = editor("two");
+    dig_at(&mut app, first, 20.0);
+    let second = app.world_mut().spawn(flat(1.0)).id();
+    let choose = |app: &mut App, terrain: Entity| {
+        app.world_mut().resource_mut::<BurrowPanel>().terrain = Some(terrain);
+        app.update();
+        app.world().resource::<Files>().is_unsaved()
+    };
+    assert!(choose(&mut app, first) && !choose(&mut app, second) && choose(&mut app, first));
+    assert!(!choose(&mut app, second));
+    assert!(act(&mut app, PanelAction::Quit, Some(texts::CANCEL)), "the other terrain has changes");
+    choose(&mut app, first);
+    assert!(!act(&mut app, PanelAction::SaveLevel, None));
+    choose(&mut app, second);
+    // The folder holds the level of another terrain.
+    assert!(act(&mut app, PanelAction::SaveLevel, Some(texts::CANCEL)));
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn a_second_action_waits_for_the_first_and_loses_nothing_of_it() {
+    let (mut app, terrain, folder) = editor("twice");
+    let saved = dig_at(&mut app, terrain, 20.0);
+    app.world_mut().write_message(PanelAction::SaveLevel);
+    app.update();
+    app.world_mut().resource_mut::<BurrowPanel>().report(Ok("Copied".into()));
+    for action in [PanelAction::SaveLevelAs, PanelAction::NewLevel] {
+        act(&mut app, action, None);
+    }
+    assert!(!app.world().resource::<Files>().is_busy && folder.exists());
+    app.world_mut().write_message(PanelAction::LoadLevel);
+    act(&mut app, PanelAction::SaveLevel, None);
+    assert_eq!(hash(&app, terrain), saved);
     std::fs::remove_dir_all(folder).expect("removed");
 }

@@ -37,6 +37,8 @@ pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
 
 use bevy::asset::{AssetEventSystems, embedded_asset};
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::Allow;
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
@@ -180,7 +182,7 @@ fn loaded_color_map(look: &GroundLook, images: &Assets<Image>) -> Option<Handle<
 /// A colour map that is loaded, or loaded again, changes the looks that have it.
 fn note_color_maps(
     mut events: MessageReader<AssetEvent<Image>>,
-    mut looks: Query<&mut GroundLook, With<Terrain>>,
+    mut looks: Query<&mut GroundLook, (With<Terrain>, Allow<Disabled>)>,
     mut materials: ResMut<Assets<GroundMaterial>>,
 ) {
     let changed: Vec<AssetId<Image>> = events
@@ -215,7 +217,10 @@ fn note_color_maps(
 fn follow(
     looks: Query<
         (&Terrain, &GroundLook, &GlobalTransform, &MeshMaterial3d<GroundMaterial>),
-        Or<(Changed<GroundLook>, Changed<GlobalTransform>, Changed<MeshMaterial3d<GroundMaterial>>)>,
+        (
+            Or<(Changed<GroundLook>, Changed<GlobalTransform>, Changed<MeshMaterial3d<GroundMaterial>>)>,
+            Allow<Disabled>,
+        ),
     >,
     images: Res<Assets<Image>>,
     mut materials: ResMut<Assets<GroundMaterial>>,
