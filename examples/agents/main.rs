@@ -87,5 +87,5 @@ fn game(app: &mut App, options: &Options) {
         .init_resource::<story::Story>()
         .add_systems(Startup, (scene::set_up, figures::spawn).chain())
         .add_systems(FixedUpdate, figures::walk)
-        .add_systems(Update, story::tell.before(BurrowSystems::Collect));
+        .add_systems(Update, story::advance_story.before(BurrowSystems::Collect));
 }

@@ -36,7 +36,7 @@ pub struct Story {
 /// The middle of the tunnel along x.
 const TUNNEL: f32 = 64.0;
 
-pub fn tell(
+pub fn advance_story(
     mut story: ResMut<Story>,
     figures: Query<(&Figure, &Transform, &AgentState)>,
     time: Res<Time>,

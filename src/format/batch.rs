@@ -32,7 +32,7 @@ const GROUND: u8 = 4;
 /// A sequence of commits, and the game's data up to the last of them.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// Commits in order. Their changes count where they have an entry [`LogEntry::Change`]; edits lead to theirs again.
+    /// Commits in order. A change is stored only with an entry [`LogEntry::Change`]; changes of edits are computed again.
     pub commits: Vec<CommitRecord>,
     /// Changes of the game's data, in order; `None` if it removed a key.
     pub game: Vec<(String, Option<Vec<u8>>)>,
@@ -44,8 +44,8 @@ impl Batch {
         self.commits.is_empty() && self.game.is_empty()
     }
 
-    /// Its bytes, with the content of edits in each of them. Those of a commit that sets another
-    /// [ground](Order::Ground) can't be read again: a log ends there.
+    /// Its bytes, with the content of edits in each of them. A batch with a commit that sets
+    /// another [ground](Order::Ground) is refused when it is read: a log ends there.
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.put(&mut bytes, EditSequence::whole());

@@ -16,7 +16,7 @@ pub fn put_signed(to: &mut Vec<u8>, number: i64) {
     put_number(to, (number << 1 ^ number >> 63).cast_unsigned());
 }
 
-/// Appends bytes after their number.
+/// Appends the number of bytes, then the bytes.
 pub fn put_bytes(to: &mut Vec<u8>, bytes: &[u8]) {
     put_number(to, bytes.len() as u64);
     to.extend_from_slice(bytes);
@@ -45,7 +45,7 @@ impl<'a> Reader<'a> {
         self.array().map(|[byte]| byte)
     }
 
-    /// What [`put_number`] appended.
+    /// Reads an integer that [`put_number`] wrote.
     pub fn number(&mut self) -> Result<u64, FormatError> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {

@@ -1,4 +1,4 @@
-//! The right column: files and buttons, terrain, settings, and diagnostics.
+//! The right column: files and buttons, terrain, rules, look, plants, settings, and diagnostics.
 
 use bevy::prelude::Entity;
 use bevy_egui::egui::{Color32, RichText, Ui, Vec2};
@@ -66,7 +66,7 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     section(ui, texts::DIAGNOSTICS, false, |ui| {
         live(ui, content.figures, content.survey);
         if let Some(line) = chosen {
-            levels(ui, line);
+            lod_nodes(ui, line);
         }
         if let Some(counts) = &content.survey.counts {
             memory(ui, counts, content.survey.mesh_bytes);
@@ -144,7 +144,7 @@ fn terrain(ui: &mut Ui, panel: &mut BurrowPanel, terrains: &[TerrainLine], chose
     figure(ui, texts::REVISION, count(line.terrain.world().revision() as usize));
 }
 
-fn levels(ui: &mut Ui, line: &TerrainLine) {
+fn lod_nodes(ui: &mut Ui, line: &TerrainLine) {
     if let Some(drawn) = line.terrain.drawn_cut() {
         let nodes = ShownLevels::of(drawn.cut(), 0).nodes;
         figure(ui, texts::LEVELS, nodes.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));

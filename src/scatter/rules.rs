@@ -26,12 +26,12 @@ pub struct ScatterRules {
 
 /// A kind of plant or stone.
 ///
-/// Spots lie in squares with sides of [`spacing`](Self::spacing), one at a random point of each. A plant stands on a spot that
+/// Lengths are in voxels. Spots lie in squares with sides of [`spacing`](Self::spacing), one at a random point of each. A plant stands on a spot that
 /// passes all rules.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Species {
-    /// Its name. Where its plants stand depends on it, and not on its place in the list.
+    /// Its name, which seeds where its plants stand. Its place in the list matters only for [`room`](Self::room).
     pub name: String,
     /// Sides of the squares that have one spot each, 1/16 to 1024.
     pub spacing: f32,
@@ -61,7 +61,7 @@ pub struct Species {
 }
 
 impl Species {
-    /// A species with this name, one on every square voxel.
+    /// A species with this name, with one plant per square voxel.
     pub fn named(name: impl Into<String>) -> Self {
         Self { name: name.into(), ..Self::default() }
     }
@@ -117,7 +117,7 @@ pub struct Stem {
     pub height: f32,
 }
 
-/// How far a species is drawn. Where plants stand does not depend on it.
+/// How far a species is drawn, in voxels. Where plants stand does not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ViewDistances {

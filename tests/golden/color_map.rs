@@ -51,9 +51,11 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         studio.picture()
     };
     let far = show(studio, (0.0, 1.0));
-    let (right, left) = (shares(&far, 0.1, 0.45), shares(&far, 0.55, 0.9));
-    println!("colour map: red and blue on the right {left:?}, on the left {right:?}");
-    album.check(left[0] > 0.95 && right[1] > 0.95, || format!("the map lies elsewhere: {left:?}, {right:?}"));
+    let (high_x, low_x) = (shares(&far, 0.1, 0.45), shares(&far, 0.55, 0.9));
+    println!("colour map: red and blue at low x {low_x:?}, at high x {high_x:?}");
+    album.check(low_x[0] > 0.95 && high_x[1] > 0.95, || {
+        format!("the map lies elsewhere: {low_x:?}, {high_x:?}")
+    });
     let near = show(studio, (500.0, 600.0));
     let (apart, _) = flip(&before, &near);
     album.check(apart < 0.002, || format!("near ground has the colours of the map: FLIP {apart:.5}"));

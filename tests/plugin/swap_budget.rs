@@ -81,15 +81,23 @@ fn meshes_of_a_large_commit_go_to_the_renderer_over_several_frames_and_are_shown
         stage.frames(3);
         assert_eq!(stage.meshes(), stage.count::<Mesh3d>());
     }
-    // Undo and a world that is replaced while meshes are on their way leave none behind either.
-    stage.write(bevy_burrow::plugin::Undo { terrain: Some(terrain) });
-    stage.frames(2);
-    stage.rest();
-    stage.frame();
-    let world = stage.app.world_mut();
-    assert!(world.despawn(terrain));
-    stage.frames(5);
-    assert_eq!((stage.meshes(), stage.count::<Mesh3d>()), (0, 0));
+    // Terrains that are replaced or despawned while meshes are on their way leave none behind either.
+    for is_despawned in [false, true] {
+        let before = stage.meshes();
+        stage.send(Brush::dig(Shape::cuboid(Vec3::new(64.0, 8.0, 64.0), Vec3::new(50.0, 6.0, 50.0))));
+        stage.frames_until("meshes are on their way", |stage| stage.meshes() > before);
+        let world = stage.app.world_mut();
+        if is_despawned {
+            assert!(world.despawn(terrain));
+            stage.frames(5);
+        } else {
+            let another = Terrain::new(Ground::flat(64, 64, 8.0).expect("a valid ground"), &settings);
+            world.entity_mut(terrain).insert(another.expect("valid settings"));
+            stage.settle_shown();
+            stage.frames(3);
+        }
+        assert_eq!(stage.meshes(), stage.count::<Mesh3d>());
+    }
 }
 
 #[test]

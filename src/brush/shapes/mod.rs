@@ -1,8 +1,7 @@
 //! The shapes that a brush can have: a file for each, and here what they have in common.
 //!
-//! A shape is a struct over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). To
-//! add one, write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
-//! `kernels/shapes.cuh`, unless `ShapeSdf::is_for_cpu` keeps it from GPUs.
+//! Most shapes are structs over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). Paths, corridors
+//! and grids hold more than numbers, and are two structs each. How to add one: see *Add a shape* in `CONTRIBUTING.md`.
 
 /// Converts a shape field by field, as in `convert!(Sphere { center: point, radius: length })`.
 macro_rules! convert {

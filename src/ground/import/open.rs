@@ -151,7 +151,7 @@ fn decode_hgt(bytes: &[u8], options: &ImportOptions) -> Result<Decoded, ImportEr
     let (width, height) = (width as u32, height as u32);
     options.limits.check_image(width, height, 4)?;
     let sample = SampleKind::Signed(16);
-    let (samples, _) = raw::read(bytes, count, raw::Reading { sample, is_big_endian: true })?;
+    let (samples, _) = raw::read(bytes, count, raw::SampleEncoding { sample, is_big_endian: true })?;
     let decoded = Decoded::new(HeightFormat::Hgt, sample, (width, height), samples);
     Ok(Decoded { no_data: Some(-32_768.0), ..decoded })
 }

@@ -16,12 +16,12 @@ const PROBES: usize = 1 << 16;
 
 /// How the bytes of a sample are read.
 #[derive(Clone, Copy)]
-pub(super) struct Reading {
+pub(super) struct SampleEncoding {
     pub sample: SampleKind,
     pub is_big_endian: bool,
 }
 
-impl Reading {
+impl SampleEncoding {
     /// Bytes of a sample; `None` for types that RAW files do not have.
     fn bytes(self) -> Option<usize> {
         match self.sample {
@@ -63,7 +63,11 @@ impl Reading {
 }
 
 /// Reads samples one after the other, top row first; says whether any was rounded.
-pub(super) fn read(bytes: &[u8], count: u64, reading: Reading) -> Result<(Vec<f32>, bool), ImportError> {
+pub(super) fn read(
+    bytes: &[u8],
+    count: u64,
+    reading: SampleEncoding,
+) -> Result<(Vec<f32>, bool), ImportError> {
     let mut samples = reserve(count)?;
     let mut is_rounded = false;
     for sample in bytes.chunks_exact(reading.bytes().unwrap_or(1)).take(count as usize) {
@@ -83,7 +87,7 @@ pub(super) fn decode(bytes: &[u8], layout: &RawLayout, limits: &ImageLimits) -> 
         return Err(ImportError::Empty);
     }
     let mut notes = Vec::new();
-    let given = layout.sample.map(|sample| Reading { sample, is_big_endian: false }.bytes());
+    let given = layout.sample.map(|sample| SampleEncoding { sample, is_big_endian: false }.bytes());
     let per_sample = match (given, layout.size) {
         (Some(None), _) => {
             let allowed = "16 or 32 bits, or floats of 32";
@@ -145,7 +149,7 @@ pub(super) fn decode(bytes: &[u8], layout: &RawLayout, limits: &ImageLimits) -> 
     Ok(decoded)
 }
 
-/// Exchanges the order of rows.
+/// Reverses the order of rows.
 fn flip(samples: &mut [f32], width: usize) {
     let mut rest = samples;
     while rest.len() >= 2 * width {
@@ -177,7 +181,7 @@ fn widths(count: u64, limits: &ImageLimits) -> Vec<u64> {
 }
 
 /// The sample type and byte order under which the samples vary least, of those that the layout leaves open.
-fn guess_reading(bytes: &[u8], per_sample: usize, layout: &RawLayout) -> Reading {
+fn guess_reading(bytes: &[u8], per_sample: usize, layout: &RawLayout) -> SampleEncoding {
     let kinds = match (layout.sample, per_sample) {
         (Some(sample), _) => vec![sample],
         (None, 4) => vec![SampleKind::Float(32), SampleKind::Unsigned(32), SampleKind::Signed(32)],
@@ -189,11 +193,11 @@ fn guess_reading(bytes: &[u8], per_sample: usize, layout: &RawLayout) -> Reading
     };
     let readings = orders
         .iter()
-        .flat_map(|&is_big_endian| kinds.iter().map(move |&sample| Reading { sample, is_big_endian }));
+        .flat_map(|&is_big_endian| kinds.iter().map(move |&sample| SampleEncoding { sample, is_big_endian }));
     let count = bytes.len() / per_sample;
     // Runs of neighbours, spread over the file.
     let runs = count.div_ceil(64).clamp(1, PROBES / 64);
-    let probe = |reading: Reading| {
+    let probe = |reading: SampleEncoding| {
         let run = |number: usize| {
             let start = count * number / runs * per_sample;
             let end = (start + 64 * per_sample).min(bytes.len());
@@ -204,5 +208,5 @@ fn guess_reading(bytes: &[u8], per_sample: usize, layout: &RawLayout) -> Reading
     let rated = readings.map(|reading| (probe(reading), reading));
     // Of equals the first: low byte first, floats, unsigned.
     let best = rated.reduce(|best, next| if next.0 < best.0 { next } else { best });
-    best.map_or(Reading { sample: kinds[0], is_big_endian: orders[0] }, |(_, reading)| reading)
+    best.map_or(SampleEncoding { sample: kinds[0], is_big_endian: orders[0] }, |(_, reading)| reading)
 }

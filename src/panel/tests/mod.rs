@@ -236,7 +236,7 @@ fn rules_and_loose_pieces_are_set_where_they_are_shown() {
 }
 
 #[test]
-fn looks_are_set_where_there_is_one() {
+fn the_look_section_needs_a_look() {
     let mut screen = Screen::new(1280.0, 1600.0, 1);
     assert!(!screen.places.0.contains_key("Look"));
     screen.controls.look = Some(GroundLook::default());
@@ -311,7 +311,7 @@ fn numbers_are_typed_where_one_clicks_on_them() {
 }
 
 #[test]
-fn what_sliders_offer_the_terrain_takes() {
+fn every_slider_value_makes_a_valid_brush() {
     let hit = TerrainHit {
         terrain: Entity::PLACEHOLDER,
         distance: 9.0,
@@ -573,7 +573,7 @@ fn a_game_that_saves_its_worlds_itself_hides_the_files() {
 }
 
 #[test]
-fn good_news_is_not_shown_for_ever() {
+fn messages_of_success_expire() {
     let mut app = App::new();
     app.insert_resource(Time::<Real>::default())
         .init_resource::<BurrowPanel>()
