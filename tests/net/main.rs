@@ -9,6 +9,7 @@ mod limits;
 mod link;
 mod load;
 mod one_hash;
+mod restarts;
 mod server;
 mod sessions;
 mod siege;
