@@ -63,6 +63,13 @@ impl Scene {
         self.play(&mut [follower], 4);
     }
 
+    fn join_all(&mut self) -> [Follower; 3] {
+        let mut all = [1, 2, 3].map(|id| Follower::new(id, &self.ground));
+        let [a, b, c] = &mut all;
+        self.connect_all(&mut [a, b, c]);
+        all
+    }
+
     fn play(&mut self, followers: &mut [&mut Follower], frames: u32) {
         for _ in 0..frames {
             play(&mut self.server, followers, &mut self.now, 1);
@@ -70,12 +77,21 @@ impl Scene {
         }
     }
 
-    /// Digs somewhere with each of these numbers.
-    fn dig(&mut self, follower: &mut Follower, numbers: std::ops::Range<u32>) {
+    /// The first of these, which are all that are connected, digs somewhere with each of these numbers.
+    fn dig(&mut self, followers: &mut [&mut Follower], numbers: std::ops::Range<u32>) {
         for number in numbers {
-            follower.edit([dig(6.0 + (number * 37 % 116) as f32, 6.0 + (number * 53 % 116) as f32)]);
-            self.play(&mut [follower], 1);
+            let at = [number * 37 % 116, number * 53 % 116].map(|at| 6.0 + at as f32);
+            followers[0].edit([dig(at[0], at[1])]);
+            self.play(followers, 1);
         }
+    }
+
+    /// Connects all of these at once.
+    fn connect_all(&mut self, followers: &mut [&mut Follower]) {
+        for follower in followers.iter_mut() {
+            follower.connect(&mut self.server, self.now);
+        }
+        self.play(followers, 4);
     }
 
     fn store(&mut self) -> &mut Store {
@@ -109,13 +125,13 @@ fn killed(disk: SimulatedDisk) -> SimulatedDisk {
 fn after_a_restart_clients_get_what_they_miss_as_entries() {
     for kill in [false, true] {
         let mut scene = Scene::new();
-        let (mut a, mut b, mut away) = (scene.join(1), scene.join(2), scene.join(3));
+        let [mut a, mut b, mut away] = scene.join_all();
         scene.server.set_rules(DiggingRules::default().with_unbreakable(MaterialId(9))).expect("valid");
-        scene.dig(&mut a, 0..5);
+        scene.dig(&mut [&mut a, &mut b, &mut away], 0..5);
         scene.play(&mut [&mut a, &mut b, &mut away], 40);
         // This one misses digs, an undo, and settings.
         scene.server.disconnect(away.id);
-        scene.dig(&mut a, 5..60);
+        scene.dig(&mut [&mut a, &mut b], 5..60);
         a.undo(1);
         scene.server.set_loose(Some(LooseSettings::default()));
         scene.play(&mut [&mut a, &mut b], 40);
@@ -127,17 +143,16 @@ fn after_a_restart_clients_get_what_they_miss_as_entries() {
             (epoch.world, epoch.number, epoch.run == before.run),
             (before.world, before.number, false)
         );
-        for follower in [&mut a, &mut b, &mut away] {
-            scene.connect(follower);
-        }
+        scene.connect_all(&mut [&mut a, &mut b, &mut away]);
         agreed(&scene.server, &[&a, &b, &away]);
-        scene.dig(&mut b, 60..64);
+        scene.dig(&mut [&mut b, &mut a, &mut away], 60..64);
         scene.play(&mut [&mut a, &mut b, &mut away], 60);
         agreed(&scene.server, &[&a, &b, &away]);
         for follower in [&a, &b, &away] {
             assert_eq!((&follower.joins[..], follower.repairs), (&["log", "log"][..], 0), "{kill}");
         }
-        // A new one begins with the pristine world, from which the order leads here.
+        // A new one, after the others have gone, begins with the pristine world, from which the order leads here.
+        [&a, &b, &away].iter().for_each(|follower| scene.server.disconnect(follower.id));
         let new = scene.join(4);
         assert_eq!(
             (agreed(&scene.server, &[&new]), &new.joins[..]),
@@ -147,7 +162,7 @@ fn after_a_restart_clients_get_what_they_miss_as_entries() {
         for _ in 0..3 {
             scene.restart(|disk| disk);
             scene.connect(&mut a);
-            scene.dig(&mut a, 64..67);
+            scene.dig(&mut [&mut a], 64..67);
         }
         scene.connect(&mut away);
         agreed(&scene.server, &[&a, &away]);
@@ -158,19 +173,19 @@ fn after_a_restart_clients_get_what_they_miss_as_entries() {
 #[test]
 fn clients_that_know_more_than_was_saved_compare_however_many_servers_follow() {
     let mut scene = Scene::new();
-    let (mut ahead, mut b) = (scene.join(1), scene.join(2));
-    scene.dig(&mut b, 0..10);
-    scene.play(&mut [&mut ahead, &mut b], 2);
+    let [mut ahead, mut b, mut c] = scene.join_all();
+    scene.dig(&mut [&mut b, &mut ahead, &mut c], 0..10);
+    scene.play(&mut [&mut ahead, &mut b, &mut c], 2);
     scene.store().flush().expect("the disk works");
     let image = killed(scene.disk.clone());
     // This is lost.
-    scene.dig(&mut b, 10..14);
-    scene.play(&mut [&mut ahead, &mut b], 2);
+    scene.dig(&mut [&mut b, &mut ahead, &mut c], 10..14);
+    scene.play(&mut [&mut ahead, &mut b, &mut c], 2);
     scene.restart(|_| image);
     assert!(scene.server.epoch().number < ahead.number);
     // Others get the numbers of what was lost.
-    let mut c = scene.join(3);
-    scene.dig(&mut c, 20..40);
+    scene.connect(&mut c);
+    scene.dig(&mut [&mut c], 20..40);
     assert!(scene.server.epoch().number > ahead.number);
     scene.restart(|disk| disk);
     scene.connect(&mut ahead);
@@ -196,7 +211,7 @@ fn clients_compare_where_something_else_changed_the_saved_world() {
     for (what, change) in changes {
         let mut scene = Scene::new();
         let mut a = scene.join(1);
-        scene.dig(&mut a, 0..10);
+        scene.dig(&mut [&mut a], 0..10);
         // A game without a server.
         scene.store = None;
         let (mut store, mut alone) = scene.open();
@@ -208,7 +223,7 @@ fn clients_compare_where_something_else_changed_the_saved_world() {
         agreed(&scene.server, &[&a]);
         assert_eq!((&a.joins[..], a.repairs), (&["log", "compare"][..], 0), "{what}");
         // From there on, the order is saved again.
-        scene.dig(&mut a, 10..20);
+        scene.dig(&mut [&mut a], 10..20);
         scene.restart(|disk| disk);
         scene.connect(&mut a);
         agreed(&scene.server, &[&a]);
@@ -219,15 +234,14 @@ fn clients_compare_where_something_else_changed_the_saved_world() {
 #[test]
 fn clients_compare_where_the_saved_order_does_not_reach_back() {
     let mut scene = Scene::of(ServerSettings { log_bytes: 1500, ..settings() }, |_| {});
-    let (mut a, mut away) = (scene.join(1), scene.join(2));
+    let mut away = scene.join(2);
     scene.server.disconnect(away.id);
-    scene.dig(&mut a, 0..200);
+    let mut a = scene.join(1);
+    scene.dig(&mut [&mut a], 0..200);
     scene.play(&mut [&mut a], 60);
     scene.restart(|disk| disk);
-    for follower in [&mut a, &mut away] {
-        scene.connect(follower);
-        scene.play(&mut [follower], 100);
-    }
+    scene.connect_all(&mut [&mut a, &mut away]);
+    scene.play(&mut [&mut a, &mut away], 100);
     agreed(&scene.server, &[&a, &away]);
     assert_eq!((a.joins.last(), away.joins.last()), (Some(&"log"), Some(&"compare")));
     assert_eq!((a.repairs, away.repairs), (0, 0));
@@ -237,10 +251,10 @@ fn clients_compare_where_the_saved_order_does_not_reach_back() {
 fn worlds_that_were_dug_before_their_server_send_new_clients_regions() {
     let mut scene = Scene::of(settings(), |terrain| drop(terrain.apply([dig(40.0, 40.0)])));
     let mut a = scene.join(1);
-    scene.dig(&mut a, 0..10);
+    scene.dig(&mut [&mut a], 0..10);
     scene.restart(|disk| disk);
-    let new = scene.join(2);
-    scene.connect(&mut a);
+    let mut new = Follower::new(2, &scene.ground);
+    scene.connect_all(&mut [&mut a, &mut new]);
     agreed(&scene.server, &[&a, &new]);
     assert_eq!((&a.joins[..], &new.joins[..]), (&["regions", "log"][..], &["regions"][..]));
 }
@@ -277,19 +291,19 @@ fn damaged_and_cut_journals_never_give_another_world() {
     for seed in 0..count("BURROW_RESTARTS", 12) {
         let mut rng = Rng::with_seed(seed);
         let mut scene = Scene::new();
-        let mut all = [scene.join(1), scene.join(2), scene.join(3)];
+        let mut all = scene.join_all();
         for _ in 0..6 {
-            for follower in &mut all {
-                if rng.bool() {
-                    scene.connect(follower);
-                }
-            }
+            rng.shuffle(&mut all);
+            let mut here: Vec<&mut Follower> = all.iter_mut().take(rng.usize(1..=3)).collect();
+            scene.connect_all(&mut here);
             for _ in 0..rng.u32(1..12) {
-                let who = rng.usize(0..3);
+                let who = rng.usize(0..here.len());
+                here.swap(0, who);
                 let number = rng.u32(0..1000);
-                scene.dig(&mut all[who], number..number + 1);
+                scene.dig(&mut here, number..number + 1);
                 if rng.u32(0..8) == 0 {
-                    all[who].undo(all[who].id.0);
+                    let id = here[0].id.0;
+                    here[0].undo(id);
                 }
                 if rng.u32(0..8) == 0 {
                     scene.server.set_loose(rng.bool().then(LooseSettings::default));
@@ -298,7 +312,7 @@ fn damaged_and_cut_journals_never_give_another_world() {
                     scene.store().checkpoint().expect("the disk works");
                 }
             }
-            all.iter().for_each(|follower| scene.server.disconnect(follower.id));
+            here.iter().for_each(|follower| scene.server.disconnect(follower.id));
             let how = rng.u32(0..4);
             let mut chance = Rng::with_seed(rng.u64(..));
             let image = scene.disk.image();
@@ -323,12 +337,9 @@ fn damaged_and_cut_journals_never_give_another_world() {
                 }
             });
         }
-        for follower in &mut all {
-            scene.connect(follower);
-            scene.play(&mut [follower], 100);
-        }
         let [a, b, c] = &mut all;
-        scene.play(&mut [a, b, c], 60);
+        scene.connect_all(&mut [a, b, c]);
+        scene.play(&mut [a, b, c], 100);
         agreed(&scene.server, &[a, b, c]);
         assert_eq!([a.repairs, b.repairs, c.repairs], [0; 3], "seed {seed}: {:?}", a.joins);
     }
