@@ -2,6 +2,9 @@
 
 mod bots;
 mod follower;
+#[allow(dead_code, reason = "the tests of the store use all of it")]
+#[path = "../store/gated.rs"]
+mod gated;
 mod hostile;
 mod joins;
 mod laws;

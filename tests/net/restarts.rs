@@ -12,6 +12,7 @@ use fastrand::Rng;
 use glam::{Vec2, Vec3};
 
 use crate::follower::{Follower, agreed, count, hills, play, terrain};
+use crate::gated::{Gate, GatedDisk, Gatekeeper};
 
 fn settings() -> ServerSettings {
     let cost = Rate { per_second: 1 << 40, burst: 1 << 40 };
@@ -283,6 +284,38 @@ fn a_server_that_lacks_content_of_saved_entries_sends_regions() {
         let how = if knows { "log" } else { "compare" };
         assert_eq!((&away.joins[..], away.repairs), (&["log", how][..], 0));
     }
+}
+
+#[test]
+fn what_was_not_taken_while_the_disk_hung_is_saved_although_nobody_digs_any_more() {
+    let (ground, disk, gate) = (hills(128), SimulatedDisk::new(), Gatekeeper::default());
+    let mut saved = terrain(&ground);
+    let options = || StoreOptions { waiting_bytes: 0, ..options() };
+    let files = Arc::new(GatedDisk::new(&disk, &gate));
+    let mut store = Store::create_in(files, &mut saved, options()).expect("a new world");
+    let mut server = Server::open(saved, &store, settings());
+    let (mut a, mut now) = (Follower::new(1, &ground), Duration::from_secs(1));
+    a.connect(&mut server, now);
+    play(&mut server, &mut [&mut a], &mut now, 4);
+    gate.set(Gate::Shut);
+    for number in 0..4 {
+        // More than may wait, with each dig.
+        store.put("filler", vec![number; 2 << 20]);
+        a.edit([dig(20.0 + 10.0 * f32::from(number), 40.0)]);
+        play(&mut server, &mut [&mut a], &mut now, 1);
+        server.save(&mut store).expect("the thread runs");
+    }
+    let taken = store.revision();
+    gate.set(Gate::Open);
+    store.flush().expect("the disk answers");
+    assert!(taken < server.terrain().world().revision(), "all was taken");
+    server.save(&mut store).expect("the thread runs");
+    store.flush().expect("the disk works");
+    server.save(&mut store).expect("the thread runs");
+    assert_eq!(server.durable(), server.applied());
+    let disk = killed(disk);
+    let (_, opened) = Store::open_in(Arc::new(disk), ground, options()).expect("a saved world");
+    assert_eq!(opened.terrain.world().hash(), server.terrain().world().hash());
 }
 
 /// Servers are killed at any moment, with journals that are cut or damaged: clients always end with the server's world.

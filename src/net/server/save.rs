@@ -68,17 +68,21 @@ impl Server {
     /// # Errors
     /// When the store's thread has ended.
     pub fn save(&mut self, store: &mut Store) -> Result<(), StoreError> {
-        if self.saving.number != self.applied {
+        let has_new = self.saving.number != self.applied;
+        if has_new {
             match &mut self.saved_order {
                 Some(saved) => saved.save(store, self.applied, &self.terrain),
                 None => store.put(format!("{RESERVED}{NUMBER}"), self.applied.to_le_bytes()),
             }
             self.sequences.save(store);
-            store.follow(&mut self.terrain)?;
             self.saving.number = self.applied;
+        }
+        // Also without new entries: while too much waited for the disk, nothing was taken.
+        store.follow(&mut self.terrain)?;
+        let revision = store.revision();
+        let is_later = revision > self.saving.revision;
+        if has_new || is_later {
             // Without a commit among the records, they are certainly saved once the next commit is.
-            let revision = store.revision();
-            let is_later = revision > self.saving.revision;
             self.saving.waiting.push_back((revision.saturating_add((!is_later).into()), self.applied));
             self.saving.revision = revision;
         }

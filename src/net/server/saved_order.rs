@@ -30,8 +30,8 @@ const STATE: &str = "state";
 /// Most bytes of entries that are saved; a checkpoint holds all of them.
 const MAX_BYTES: usize = 256 << 10;
 
-/// Bytes after which a piece is complete. Until then, each save writes it again.
-const PIECE_BYTES: usize = 1 << 10;
+/// Bytes after which a piece is complete. Until then, each frame of the journal has it again.
+const PIECE_BYTES: usize = 256;
 
 /// Bytes that a piece takes in addition to its message.
 const PIECE_HEAD: usize = 64;
