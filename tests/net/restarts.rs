@@ -298,7 +298,7 @@ fn what_was_not_taken_while_the_disk_hung_is_saved_although_nobody_digs_any_more
     a.connect(&mut server, now);
     play(&mut server, &mut [&mut a], &mut now, 4);
     gate.set(Gate::Shut);
-    for number in 0..4 {
+    for number in 0..4_u8 {
         // More than may wait, with each dig.
         store.put("filler", vec![number; 2 << 20]);
         a.edit([dig(20.0 + 10.0 * f32::from(number), 40.0)]);
