@@ -357,15 +357,16 @@ fn damaged_and_cut_journals_never_give_another_world() {
                     let image = image.lose_process();
                     let logs: Vec<String> =
                         image.paths().into_iter().filter(|path| path.ends_with(".log")).collect();
-                    let log = &logs[chance.usize(0..logs.len())];
-                    image.damage(log, |bytes| {
-                        if chance.bool() {
-                            bytes.truncate(chance.usize(0..=bytes.len()));
-                        } else if !bytes.is_empty() {
-                            let at = chance.usize(0..bytes.len());
-                            bytes[at] ^= 1 << chance.u32(0..8);
-                        }
-                    });
+                    if let Some(log) = chance.choice(&logs) {
+                        let (is_cut, part, bit) = (chance.bool(), chance.f32(), chance.u32(0..8));
+                        image.damage(log, |bytes| {
+                            let at = (part * bytes.len() as f32) as usize;
+                            match bytes.get_mut(at) {
+                                Some(byte) if !is_cut => *byte ^= 1 << bit,
+                                _ => bytes.truncate(at),
+                            }
+                        });
+                    }
                     image
                 }
             });
