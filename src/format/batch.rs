@@ -98,7 +98,7 @@ impl Batch {
                 odd if odd & 1 == 1 => {
                     let entries = vec![LogEntry::Order(Order::Edit(edits.read(head >> 1, &mut reader)?))];
                     let (revision, change) = (revision.wrapping_add(1), Patch::default());
-                    CommitRecord { revision, hash: 0, entries, change }
+                    CommitRecord { number: 0, revision, hash: 0, entries, change }
                 }
                 _ => return Err(FormatError::Invalid("commit")),
             };
@@ -262,7 +262,7 @@ fn read_commit(
             _ => return Err(FormatError::Invalid("entry of a commit")),
         });
     }
-    let mut commit = CommitRecord { revision, hash: 0, entries, change: Patch::default() };
+    let mut commit = CommitRecord { number: 0, revision, hash: 0, entries, change: Patch::default() };
     if commit.has_change() {
         commit.change = read_change(reader, ground)?;
     }

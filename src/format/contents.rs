@@ -167,7 +167,7 @@ impl Stamps {
     }
 
     /// Whether it has content of this name.
-    #[cfg(feature = "store")]
+    #[cfg(any(feature = "net", feature = "store"))]
     pub(crate) fn has(&self, name: StampId) -> bool {
         self.images.contains_key(&name) || self.prefabs.contains_key(&name)
     }

@@ -5,7 +5,8 @@ use super::error::GroundError;
 use super::grey_image::{GreyImage, LinePosition};
 use super::material::ColumnMaterial;
 use super::rules::apply;
-use super::world::{Ground, Materials};
+use super::stored_materials::Materials;
+use super::world::Ground;
 use crate::lattice::{Column, ONE};
 
 impl MaterialControl {

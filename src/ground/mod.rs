@@ -36,9 +36,11 @@ mod page;
 mod pages;
 mod png;
 mod region_hash;
+mod rise;
 mod rules;
 pub mod source;
 mod sources;
+mod stored_materials;
 pub mod strata;
 mod world;
 

@@ -7,9 +7,11 @@ use super::error::GroundError;
 use super::extent::Extent;
 use super::material::{ColumnMaterial, MaterialId};
 use super::pages::{Page, Pages};
+use super::rise::Rise;
 use super::source::HeightSource;
+use super::stored_materials::Materials;
 use super::strata::steep_word;
-use super::world::{Ground, Materials, Rise};
+use super::world::Ground;
 use crate::lattice::Column;
 use crate::lattice::hash::hash_words;
 

@@ -6,7 +6,9 @@ use glam::Vec3;
 
 use super::material::ColumnMaterial;
 use super::pages::Pages;
-use super::world::{Ground, Materials, Rise};
+use super::rise::{Rise, normal_of, slope_of, squared_slope_of};
+use super::stored_materials::Materials;
+use super::world::Ground;
 use crate::lattice::Column;
 
 /// The coarsest stride at which a ground with a source computes pages, to keep them. Coarser, points are fewer.
@@ -95,7 +97,7 @@ impl Ground {
                 .map(move |((before, after), column)| Rise { rise: after - before, run: run(column) })
         };
         let rises: Vec<[Rise; 2]> = zip(around(0), around(1)).map(|(x, z)| [x, z]).collect();
-        let normals = rises.iter().map(|&rises| Self::normal_of(rises)).collect();
+        let normals = rises.iter().map(|&rises| normal_of(rises)).collect();
 
         let Coordinates([xs, zs]) = columns;
         let places = || zip(columns.columns(), zip(&heights, &rises));
@@ -103,7 +105,7 @@ impl Ground {
             Materials::OnDemand(None) => pages.point_materials([xs, zs], stride),
             Materials::OnDemand(Some(control)) => places()
                 .map(|(column, (&height, &rises))| {
-                    control.of_column(self, column, || (height, Self::slope_of(rises)))
+                    control.of_column(self, column, || (height, slope_of(rises)))
                 })
                 .collect(),
             Materials::Uniform(material) => vec![*material; heights.len()],
@@ -111,7 +113,7 @@ impl Ground {
         };
         if self.has_own_materials() {
             for (material, (column, (&height, &rises))) in zip(&mut materials, places()) {
-                let squared_slope = Self::squared_slope_of(rises);
+                let squared_slope = squared_slope_of(rises);
                 *material = ColumnMaterial::solid(self.lone_top((column, height, squared_slope), *material));
             }
         }

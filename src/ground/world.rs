@@ -1,16 +1,16 @@
 //! The ground itself: heights and materials of every column of the pristine world.
 
 use std::fmt;
-use std::ops::Range;
 
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
-use super::control::MaterialControl;
 use super::extent::Extent;
 use super::material::{ColumnMaterial, MaterialId};
 use super::pages::Pages;
+use super::rise::{Rise, normal_of, slope_of, squared_slope_of};
 use super::source::HeightSource;
+use super::stored_materials::Materials;
 use super::strata::Below;
 use crate::lattice::hash::hash_words;
 use crate::lattice::{Column, ONE};
@@ -43,49 +43,6 @@ impl PartialEq for Ground {
     }
 }
 
-/// The materials of all columns: one for all, or one for each where they differ.
-#[derive(PartialEq)]
-pub(super) enum Materials {
-    Uniform(ColumnMaterial),
-    Columns(Vec<ColumnMaterial>),
-    /// Of a ground with a source: computed when it is asked for. Without a control they are the source's.
-    OnDemand(Option<Box<MaterialControl>>),
-}
-
-impl Materials {
-    /// The materials of each column, row-major; as one where all are alike, so that equal worlds are stored alike.
-    pub(super) fn from_columns(columns: Vec<ColumnMaterial>) -> Self {
-        match columns.first() {
-            Some(&first) if columns.iter().all(|&material| material == first) => Self::Uniform(first),
-            _ => Self::Columns(columns),
-        }
-    }
-
-    fn get(&self, index: usize) -> ColumnMaterial {
-        match self {
-            Self::Uniform(material) => *material,
-            Self::Columns(materials) => materials[index],
-            Self::OnDemand(_) => ColumnMaterial::default(),
-        }
-    }
-
-    /// Those of some columns, one after the other; where they are computed on demand, these here.
-    fn of<'a>(
-        &'a self,
-        indices: Range<usize>,
-        on_demand: &'a [ColumnMaterial],
-    ) -> impl Iterator<Item = ColumnMaterial> {
-        let none = std::iter::repeat_n(ColumnMaterial::default(), 0);
-        let (all, columns): (_, &[ColumnMaterial]) = match self {
-            _ if !on_demand.is_empty() => (none, on_demand),
-            Self::Uniform(material) => (std::iter::repeat_n(*material, indices.len()), &[]),
-            Self::Columns(columns) => (none, &columns[indices]),
-            Self::OnDemand(_) => (none, &[]),
-        };
-        all.chain(columns.iter().copied())
-    }
-}
-
 /// The buffer of [`Ground::row`], kept by the caller so that it is allocated once for many rows.
 #[derive(Default)]
 pub(crate) struct RowBuffer {
@@ -94,15 +51,6 @@ pub(crate) struct RowBuffer {
     pub(super) heights: Vec<i32>,
     /// Of grounds with a source, unless all columns are alike.
     pub(super) materials: Vec<ColumnMaterial>,
-}
-
-/// Change of height along one axis around a column.
-#[derive(Clone, Copy)]
-pub(super) struct Rise {
-    /// Height gained, in 1/256 voxel.
-    pub rise: i32,
-    /// Number of voxels over which it is gained: 2, at the rim 1.
-    pub run: i32,
 }
 
 impl Ground {
@@ -284,7 +232,7 @@ impl Ground {
     /// Unit normal of the surface over a column: central differences of the height, one-sided at the rim; beyond the
     /// rim, that of the nearest rim column. Same bits on every machine.
     pub fn normal(&self, column: Column) -> Vec3 {
-        Self::normal_of(self.rises(column))
+        normal_of(self.rises(column))
     }
 
     /// Like [`Self::normal`], from the heights of the columns before and after along x and z; `None` at the
@@ -292,14 +240,7 @@ impl Ground {
     pub(crate) fn inner_normal(&self, column: Column, x: [i32; 2], z: [i32; 2]) -> Option<Vec3> {
         let is_inner = (1..self.width()).contains(&column.x) && (1..self.depth()).contains(&column.z);
         let rise = |[before, after]: [i32; 2]| Rise { rise: after - before, run: 2 };
-        is_inner.then(|| Self::normal_of([rise(x), rise(z)]))
-    }
-
-    pub(super) fn normal_of(rises: [Rise; 2]) -> Vec3 {
-        let slope = |along: Rise| along.rise as f32 / (along.run * ONE) as f32;
-        let [x, z] = rises.map(slope);
-        let length = (x * x + z * z + 1.0).sqrt();
-        Vec3::new(-x / length, 1.0 / length, -z / length)
+        is_inner.then(|| normal_of([rise(x), rise(z)]))
     }
 
     /// Columns of a row that all lie in the world, from one on: their heights, normals and materials, equal
@@ -340,7 +281,7 @@ impl Ground {
                 let along_z = before[inner.clone()].iter().zip(&after[inner.clone()]);
                 let along_z =
                     along_z.map(|(before, after)| Rise { rise: after - before, run: south - north });
-                normals.extend(along_x.zip(along_z).map(|(x, z)| Self::normal_of([x, z])));
+                normals.extend(along_x.zip(along_z).map(|(x, z)| normal_of([x, z])));
             }
             normals.extend((normals.len()..count).map(rim));
             own
@@ -357,13 +298,7 @@ impl Ground {
     /// Steepness of the surface over a column as rise over run, from the same differences as [`Self::normal`]: 0 is
     /// level, 1 is 45 degrees.
     pub fn slope(&self, column: Column) -> f64 {
-        Self::slope_of(self.rises(column))
-    }
-
-    pub(super) fn slope_of(rises: [Rise; 2]) -> f64 {
-        let slope = |along: Rise| f64::from(along.rise) / f64::from(along.run * ONE);
-        let [x, z] = rises.map(slope);
-        (x * x + z * z).sqrt()
+        slope_of(self.rises(column))
     }
 
     /// Change of height around a column along x and along z.
@@ -425,17 +360,7 @@ impl Ground {
     /// Square of the surface's steepness over a column of the world, in 1/256 voxel of rise over two voxels of run.
     #[inline]
     pub(crate) fn squared_slope(&self, column: Column) -> u64 {
-        Self::squared_slope_of(self.rises(column))
-    }
-
-    #[inline]
-    pub(super) fn squared_slope_of(rises: [Rise; 2]) -> u64 {
-        let steps = |along: Rise| match along.run {
-            2 => u64::from(along.rise.unsigned_abs()),
-            run => u64::from((along.rise * 2 / run).unsigned_abs()),
-        };
-        let [x, z] = rises.map(steps);
-        x * x + z * z
+        squared_slope_of(self.rises(column))
     }
 
     /// Lowest and highest height of the world, in 1/256 voxel; with a source, the bounds that it promised.

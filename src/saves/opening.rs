@@ -121,6 +121,8 @@ pub(super) fn start_opening(
         // now on follows.
         let terrain = terrain.bypass_change_detection();
         terrain.abandon();
+        // A new log says the rules of edits that wait.
+        terrain.keep_log(None);
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
         let opening = OpeningWorld::new(WorldReader::new(saved, terrain, level), terrain.world().version());
@@ -195,7 +197,7 @@ pub(super) fn finish_opening(
                 // The terrain and its history stay as they are.
                 Found::New(ReadWorld { mut store, terrain: copy, .. }) => {
                     free_later(copy);
-                    store.adopt(&terrain);
+                    store.adopt(&terrain, opening.reader.next_record);
                     store
                 }
                 Found::Old(ReadWorld { store, terrain: mut read, troubles }) => {

@@ -122,6 +122,8 @@ pub(crate) struct WorldReader {
     pub(super) id: LevelId,
     /// The content of a world that does not exist yet.
     parts: WorldParts,
+    /// The number of the next record in the log of the terrain that this content is of.
+    pub(super) next_record: u64,
     pub progress: Progress,
 }
 
@@ -130,8 +132,9 @@ impl WorldReader {
     /// given. The terrain's rules and loose settings also hold in a world that exists.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
         let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
+        let next_record = terrain.log_numbers().map_or(0, |numbers| numbers.end);
         let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));
-        Self { saved, folder, level, ground, id, parts, progress: Progress::default() }
+        Self { saved, folder, level, ground, id, parts, next_record, progress: Progress::default() }
     }
 
     /// Reads the world, or creates it. Waits while another process has it open.
@@ -147,7 +150,7 @@ impl WorldReader {
 
     /// Reads the world, or makes one, unless somebody has it open.
     fn try_read(&self) -> Result<Found, StoreError> {
-        let Self { saved, folder, level, ground, id, parts, progress } = self;
+        let Self { saved, folder, level, ground, id, parts, progress, .. } = self;
         // An unreadable level was reported when the terrain was built from it.
         let level = level.as_ref();
         let level =

@@ -110,7 +110,7 @@ pub enum StoreError {
     #[error("the log can't be replayed: {0}")]
     LogRefused(String),
     /// Records do not follow those that were taken before.
-    #[error("a record leads to revision {found}, but the store is at {at}")]
+    #[error("records are missing: the next one leads to revision {found}, and the store is at {at}")]
     Gap {
         /// The store's revision.
         at: u64,

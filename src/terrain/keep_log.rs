@@ -1,15 +1,20 @@
 //! The log of a terrain: what it keeps, and who takes it.
 
+#[cfg(feature = "store")]
+use std::ops::Range;
+
 use super::log::CommitLog;
 use super::model::Terrain;
 use super::record::CommitRecord;
+#[cfg(feature = "store")]
+use super::record::WorldParts;
 
 impl Terrain {
     /// Keeps a record of each commit until it is [taken](Self::take_log); `None` keeps none and
     /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps and prefabs, the
-    /// oldest are dropped. A reader that finds a gap between [revisions](CommitRecord::revision), or whose
-    /// last record does not have the [world's revision](super::World::revision), has to read [all of the
-    /// world](Self::parts).
+    /// oldest are dropped. A reader that finds a gap between [numbers](CommitRecord::number) or
+    /// [revisions](CommitRecord::revision), or whose last record does not have the [world's
+    /// revision](super::World::revision), has to read [all of the world](Self::parts).
     ///
     /// Rules and settings of loose pieces are logged with the first edit that obeys them, or once nothing
     /// waits.
@@ -42,6 +47,24 @@ impl Terrain {
     #[cfg(feature = "store")]
     pub(crate) fn log_sets_ground_after(&self, revision: u64) -> bool {
         self.log.as_ref().is_some_and(|log| log.sets_ground_after(revision))
+    }
+
+    /// The numbers of the records that wait, which begin with that of the next record if none waits; `None` without a
+    /// log.
+    #[cfg(feature = "store")]
+    pub(crate) fn log_numbers(&self) -> Option<Range<u64>> {
+        self.log.as_ref().map(CommitLog::numbers)
+    }
+
+    /// All of the world but its ground, with the rules and loose settings from which later records of the log
+    /// continue: edits that wait may obey others than later edits.
+    #[cfg(feature = "store")]
+    pub(crate) fn logged_parts(&self) -> WorldParts {
+        let parts = self.parts();
+        match self.log.as_ref().and_then(CommitLog::rules) {
+            Some((rules, loose)) => WorldParts { rules: rules.as_deref().cloned(), loose: *loose, ..parts },
+            None => parts,
+        }
     }
 
     /// Records the rules and loose settings of later edits in the log, unless waiting edits obey others.

@@ -1,6 +1,8 @@
 //! The commit log: records of commits that wait to be taken, within a bound of bytes.
 
 use std::collections::VecDeque;
+#[cfg(feature = "store")]
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::order::Order;
@@ -94,6 +96,8 @@ pub(super) struct CommitLog {
     /// Bytes of all of them.
     bytes: usize,
     limit: usize,
+    /// The number of the next record.
+    next: u64,
     /// The rules that hold after the last record; `None` if nothing is known of them.
     rules: Option<Rules>,
     /// Whether a commit was dropped after the last record that was taken. The first waiting record is a
@@ -104,7 +108,7 @@ pub(super) struct CommitLog {
 impl CommitLog {
     pub fn new(limit: usize) -> Self {
         let (records, sizes) = Default::default();
-        Self { records, sizes, bytes: 0, limit, rules: None, has_gap: false }
+        Self { records, sizes, bytes: 0, limit, next: 0, rules: None, has_gap: false }
     }
 
     /// Records the commit that led to this world. Records that no longer fit are moved to `dropped`.
@@ -116,8 +120,7 @@ impl CommitLog {
             drop(entries.splice(0..0, changes.inspect(|entry| bytes += rule_bytes(entry))));
             self.rules = Some(last);
         }
-        let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
-        self.push(record, bytes, dropped);
+        self.push(world, entries, change, bytes, dropped);
     }
 
     /// Records new rules, if they differ from the previous ones.
@@ -131,8 +134,7 @@ impl CommitLog {
             self.rules = Some(rules);
             let change = Patch { next_field: world.next_field, ..Patch::default() };
             let bytes = bytes_of(&entries, &change);
-            let record = CommitRecord { revision: world.revision(), hash: world.hash(), entries, change };
-            self.push(record, bytes, &mut Vec::new());
+            self.push(world, entries, change, bytes, &mut Vec::new());
         }
     }
 
@@ -148,6 +150,18 @@ impl CommitLog {
         self.sizes.clear();
         self.bytes = 0;
         std::mem::take(&mut self.records).into()
+    }
+
+    /// The numbers of the records that wait.
+    #[cfg(feature = "store")]
+    pub fn numbers(&self) -> Range<u64> {
+        self.next - self.records.len() as u64..self.next
+    }
+
+    /// The rules and loose settings that hold after the last record; `None` if the next record says them.
+    #[cfg(feature = "store")]
+    pub fn rules(&self) -> Option<&Rules> {
+        self.rules.as_ref()
     }
 
     /// Whether no record waits.
@@ -166,8 +180,17 @@ impl CommitLog {
             && self.records.iter().any(sets_ground)
     }
 
-    fn push(&mut self, record: CommitRecord, bytes: usize, dropped: &mut Vec<CommitRecord>) {
-        self.records.push_back(record);
+    fn push(
+        &mut self,
+        world: &World,
+        entries: Vec<LogEntry>,
+        change: Patch,
+        bytes: usize,
+        dropped: &mut Vec<CommitRecord>,
+    ) {
+        let (number, revision, hash) = (self.next, world.revision(), world.hash());
+        self.next += 1;
+        self.records.push_back(CommitRecord { number, revision, hash, entries, change });
         self.sizes.push_back(bytes);
         self.bytes += bytes;
         self.trim(dropped);

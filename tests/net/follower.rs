@@ -44,6 +44,8 @@ pub struct Follower {
     pub epoch: Option<Epoch>,
     /// The number of the last applied entry.
     pub number: u64,
+    /// The number that the last welcome led to. Marks up to it were compared with others.
+    joined_at: u64,
     pub last_sequence: u64,
     pub place: IVec3,
     /// Messages to send.
@@ -86,6 +88,7 @@ impl Follower {
             terrain: terrain(ground),
             epoch: None,
             number: 0,
+            joined_at: 0,
             last_sequence: 0,
             place: IVec3::ZERO,
             out: Vec::new(),
@@ -188,6 +191,7 @@ impl Follower {
         assert_eq!(welcome.client, self.id);
         self.last_sequence = self.last_sequence.max(welcome.sequence);
         self.epoch = Some(welcome.epoch);
+        self.joined_at = welcome.epoch.number;
         self.waiting.clear();
         self.marks.clear();
         self.hashes.clear();
@@ -293,6 +297,9 @@ impl Follower {
             let grid = self.terrain.world().grid();
             self.touched.append(&mut touched_regions(grid, &commit.change()));
             self.terrain.commit(commit).expect("its own commit");
+        }
+        if self.number <= self.joined_at {
+            self.touched.clear();
         }
     }
 

@@ -2,6 +2,9 @@
 
 mod bots;
 mod follower;
+#[allow(dead_code, reason = "the tests of the store use all of it")]
+#[path = "../store/gated.rs"]
+mod gated;
 mod hostile;
 mod joins;
 mod laws;
@@ -9,6 +12,7 @@ mod limits;
 mod link;
 mod load;
 mod one_hash;
+mod restarts;
 mod server;
 mod sessions;
 mod siege;

@@ -204,11 +204,31 @@ impl Play {
         }
     }
 
+    /// The disk after the power or the process was lost, and perhaps a part of the journal.
+    fn lost(rng: &mut Rng, disk: &SimulatedDisk) -> SimulatedDisk {
+        if rng.u32(0..3) == 0 {
+            return disk.image().lose_power(|| rng.bool());
+        }
+        let disk = disk.image().lose_process();
+        let logs: Vec<String> = disk.paths().into_iter().filter(|path| path.ends_with(".log")).collect();
+        if let (true, Some(log)) = (rng.u32(0..3) == 0, rng.choice(&logs)) {
+            let (is_cut, part, bit) = (rng.bool(), rng.f32(), rng.u32(0..8));
+            disk.damage(log, |bytes| {
+                let at = (part * bytes.len() as f32) as usize;
+                match bytes.get_mut(at) {
+                    Some(byte) if !is_cut => *byte ^= 1 << bit,
+                    _ => bytes.truncate(at),
+                }
+            });
+        }
+        disk
+    }
+
     fn restart(&mut self) {
         let disk = match self.store.take() {
             // It is killed: waiting commits are not saved.
             Some((store, disk)) => {
-                let disk = disk.image().lose_process();
+                let disk = Self::lost(&mut self.rng, &disk);
                 drop(store);
                 disk
             }

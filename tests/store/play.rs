@@ -10,9 +10,9 @@ use bevy_burrow::store::{Opened, SimulatedDisk, Store, StoreError, StoreOptions}
 use bevy_burrow::terrain::Meshing;
 use bevy_burrow::volume::{Brick, Field};
 use fastrand::Rng;
-use glam::{IVec3, UVec3, Vec3};
+use glam::{IVec3, UVec3, Vec2, Vec3};
 
-use crate::worlds::{any_random_brush, random_ground_of_size};
+use crate::worlds::{any_random_brush, random_ground_of_size, random_rules};
 
 /// A count from the environment, or the default.
 pub fn count(name: &str, default: u64) -> u64 {
@@ -73,8 +73,11 @@ pub fn act(terrain: &mut Terrain, rng: &mut Rng) {
         0 => drop(terrain.undo()),
         1 => drop(terrain.redo()),
         2 => {
-            let rules = DiggingRules::default().with_unbreakable(MaterialId(rng.u8(0..4)));
-            let rules = if rng.bool() { rules } else { DiggingRules::default() };
+            let rules = match rng.u32(0..3) {
+                0 => DiggingRules::default().with_unbreakable(MaterialId(rng.u8(0..4))),
+                1 => random_rules(rng, terrain.world().ground()),
+                _ => DiggingRules::default(),
+            };
             terrain.set_rules(rules).expect("valid rules");
         }
         3 => {
@@ -89,14 +92,20 @@ pub fn act(terrain: &mut Terrain, rng: &mut Rng) {
     }
 }
 
-/// A brush with a grid, with a prefab, or with both: one of a few, so that they come again.
+/// A brush with a grid, with a prefab, with both, or with an image: one of a few, so that they come again.
 pub fn brush_with_content(rng: &mut Rng) -> Brush {
     let place = |rng: &mut Rng, low: f32| Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 40.0 + low;
     let within = GridShape::new(ball(rng.i32(5..8)), place(rng, 8.0)).with_scale(1.5);
     let paste = Paste::new(block(rng.u64(0..3)), place(rng, 0.0)).turned_about_y(rng.i32(0..4));
-    match rng.u8(0..3) {
+    match rng.u8(0..6) {
         0 => Brush::add(within, MaterialId(rng.u8(0..4))),
         1 => Brush::paste(paste),
+        2 => Brush::reset(within),
+        3 => Brush::reset(Shape::sphere(place(rng, 8.0), 9.0)),
+        4 => {
+            let at = place(rng, 0.0);
+            Brush::stamp(within, Stamp::new(ramp(rng.u16(1..4)), at, Vec2::splat(12.0), 3.0))
+        }
         _ => Brush { operation: Operation::Paste { paste }, ..Brush::dig(within) },
     }
 }
@@ -106,6 +115,12 @@ pub fn ball(side: i32) -> ShapeGrid {
     let middle = (side - 1) as f32 / 2.0;
     let distance = |at: IVec3| (at.as_vec3() - middle).length() - middle + 1.2;
     ShapeGrid::from_fn(UVec3::splat(side as u32), distance).expect("valid")
+}
+
+/// An image that becomes brighter along one side.
+fn ramp(steepness: u16) -> GreyImage {
+    let samples = (0..64).map(|at| at % 8 * 2000 * steepness).collect();
+    GreyImage::from_samples(8, 8, samples).expect("valid")
 }
 
 /// A copy of some ground with a ball of ground or of air in it.

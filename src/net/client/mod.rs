@@ -2,7 +2,8 @@
 //!
 //! | file | what it does |
 //! | --- | --- |
-//! | `client` | the interface for games, and received messages |
+//! | `client` | the interface for games |
+//! | `receive`, `follow` | received messages, and entries of the order |
 //! | `join` | catching up with the server: old entries, regions, a comparison |
 //! | `outbox` | sends the player's edits and undos as fast as the server's limits allow |
 //! | `repair` | marks, and regions that differ |
@@ -10,11 +11,13 @@
 //! | `replica` | the world of the order, and the shown world |
 
 mod events;
+mod follow;
 mod give_up;
 mod images;
 mod join;
 mod outbox;
 mod pieces;
+mod receive;
 mod repair;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -25,26 +28,20 @@ use glam::IVec3;
 
 use super::Stamps;
 use super::bulk::BulkReader;
-use super::encoding::{PIECE, entry_bytes};
-use super::message::{
-    ClientId, Entries, Entry, Epoch, Hello, KickReason, Lane, PROTOCOL, Refusal, ToClient, ToServer,
-};
-use super::price::{UNDO, UNDO_BYTES, cost};
+use super::message::{ClientId, Entry, Epoch, Hello, Lane, PROTOCOL, Refusal, ToServer};
+use super::price::cost;
 use super::replica::{Replica, ShownChange};
 use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;
-use crate::lattice::{LatticeBox, RegionPos};
-use crate::terrain::{Order, Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
+use crate::lattice::RegionPos;
+use crate::terrain::{Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
 use outbox::Outbox;
 use pieces::Pieces;
 use repair::{Marks, Reaches, Repair};
-
-/// Most entries that one [`advance`](Client::advance) applies.
-const BATCH: usize = 2048;
 
 /// The time between acknowledgements, and the bytes of the bulk lane after which one is sent sooner.
 const ACK: Duration = Duration::from_millis(100);
@@ -408,229 +405,6 @@ impl Client {
         }
     }
 
-    /// Looks at a message. Entries with stamps whose images are missing wait for these.
-    fn read(&mut self, lane: Lane, bytes: Vec<u8>) {
-        let ground = self.replica.world().shared_ground();
-        match ToClient::read(&bytes, &ground, &self.stamps) {
-            Ok((message, missing)) if missing.is_empty() => self.take(lane, message),
-            Ok((ToClient::Entries(entries), missing)) => {
-                if self.has_begun[lane as usize] {
-                    self.note_received(lane, &entries);
-                    self.outgoing.extend(self.images.park(lane, bytes, missing));
-                }
-            }
-            _ => self.figures.malformed += 1,
-        }
-    }
-
-    fn take(&mut self, lane: Lane, message: ToClient) {
-        if !self.has_begun[lane as usize]
-            && !matches!(message, ToClient::Stream { .. } | ToClient::Kicked(_) | ToClient::Greet)
-        {
-            return;
-        }
-        match message {
-            // Two servers have answered the greeting, one in the place of the other.
-            ToClient::Stream { stream } if stream == self.stream && self.has_begun[lane as usize] => {
-                self.greet()
-            }
-            ToClient::Stream { stream } => self.has_begun[lane as usize] = stream == self.stream,
-            ToClient::Greet => {
-                // One that has greeted waits for the answer.
-                if self.is_welcome() {
-                    self.greet();
-                }
-            }
-            ToClient::Welcome(welcome) => self.begin(welcome),
-            ToClient::Kicked(why) => self.leave(why),
-            ToClient::Entries(entries) => self.take_entries(lane, entries),
-            ToClient::Failed { number } => self.take_failed(number),
-            ToClient::Refused { sequence, why } => self.take_refusal(sequence, why),
-            ToClient::Hashes { number, regions } => self.marks.take_theirs(number, regions),
-            ToClient::Table { number, regions } => self.take_table(number, &regions),
-            ToClient::Region(content) => self.take_region(content),
-            ToClient::Durable { number } => self.events.push(ClientEvent::Durable(number)),
-            ToClient::Piece(piece) => self.bulk.add(&piece),
-            ToClient::Image(image) => self.take_image(image),
-            ToClient::Prefab(prefab) => self.take_prefab(prefab),
-        }
-    }
-
-    fn take_refusal(&mut self, sequence: u64, why: Refusal) {
-        self.outbox.answer(sequence, None, self.now);
-        if self.undos.remove(&sequence) {
-            self.events.push(ClientEvent::UndoRefused(Some(why)));
-        } else if why == Refusal::NotJoined {
-            // The server has forgotten the session: the edit is sent again.
-            if self.is_welcome() {
-                self.greet();
-            }
-        } else if let Some(edit) = self.replica.take_back(sequence) {
-            self.refuse_pieces(sequence);
-            self.events.push(ClientEvent::Refused { tag: edit.tag(), why: Some(why) });
-        }
-    }
-
-    fn leave(&mut self, why: KickReason) {
-        self.stage = Stage::Disconnected;
-        self.events.push(ClientEvent::Kicked(why));
-    }
-
-    /// Reads the bulk lane. Messages that arrive there before the welcome wait for it: there is no order between lanes.
-    fn read_bulk(&mut self) {
-        while self.is_welcome() {
-            match self.bulk.next_bytes() {
-                Ok(Some(message)) if !matches!(message.first(), Some(&PIECE)) => {
-                    self.read(Lane::Bulk, message)
-                }
-                Ok(None) => return,
-                _ => {
-                    // Nothing more can be read of this stream.
-                    self.figures.malformed += 1;
-                    return self.greet();
-                }
-            }
-        }
-    }
-
-    /// Records received entries; greets again if others before them are missing.
-    fn note_received(&mut self, lane: Lane, Entries { first, entries }: &Entries) {
-        let last = first.saturating_add(entries.len() as u64).saturating_sub(1);
-        if lane == Lane::Order && self.is_welcome() {
-            if *first > self.received.saturating_add(1) {
-                // Something is missing: what follows waits until it has come.
-                self.figures.gaps += 1;
-                self.greet();
-            }
-            self.received = self.received.max(last);
-        }
-    }
-
-    fn take_entries(&mut self, lane: Lane, entries: Entries) {
-        self.note_received(lane, &entries);
-        let from = self.number();
-        let Entries { first, entries } = entries;
-        let numbered =
-            entries.into_iter().enumerate().map(|(at, entry)| (first.saturating_add(at as u64), entry));
-        self.waiting.extend(numbered.filter(|(number, _)| *number > from));
-    }
-
-    /// Applies entries that have come, as many as one call may; returns whether more could be.
-    fn follow(&mut self) -> bool {
-        let mut left = BATCH;
-        loop {
-            self.finish_repair();
-            self.begin_repair();
-            let Some(end) = self.applicable() else { return false };
-            let batch = self.next_batch(end, left);
-            if batch.is_empty() {
-                return left == 0;
-            }
-            left -= batch.len();
-            self.apply(batch);
-        }
-    }
-
-    /// The number up to which entries may be applied now; `None` if none may.
-    fn applicable(&self) -> Option<u64> {
-        match self.stage {
-            Stage::ByLog { to, .. } => Some(to),
-            Stage::Following => self.repair.as_ref().map_or(Some(u64::MAX), Repair::number),
-            _ => None,
-        }
-    }
-
-    /// The next entries up to a number, at most `most`. A mark ends them, and parts are returned alone, because pieces
-    /// that they turn into ground have to be found.
-    fn next_batch(&mut self, end: u64, most: usize) -> Vec<Entry> {
-        let (mut batch, mut number) = (Vec::new(), self.number());
-        let is_parts = |entry: Option<&Entry>| entry.is_some_and(|entry| entry.parts().is_some());
-        while number < end
-            && batch.len() < most
-            && (batch.is_empty() || !is_parts(self.waiting.get(&(number + 1))))
-            && let Some(entry) = self.waiting.remove(&(number + 1))
-        {
-            number += 1;
-            let entry = self.valid(number, entry);
-            let is_compared = matches!((&entry, &self.stage), (Entry::HashCheck, Stage::Following));
-            let is_checked = is_compared || entry.parts().is_some();
-            batch.push(entry);
-            if is_checked {
-                break;
-            }
-        }
-        batch
-    }
-
-    fn apply(&mut self, batch: Vec<Entry>) {
-        let Some(mut epoch) = self.epoch else { return };
-        let id = self.id;
-        let sequence_of = |entry: &Entry| entry.edit().and_then(|_| entry.number_of(id));
-        let is_reported = !self.is_history();
-        let tag = |sequence| Some((sequence, self.replica.pending_edit(sequence)?.tag()));
-        let tags: BTreeMap<u64, u64> = batch.iter().filter_map(sequence_of).filter_map(tag).collect();
-        for entry in &batch {
-            if let Some(sequence) = entry.number_of(id) {
-                let cost = entry.parts().map(|_| UNDO + entry_bytes(entry) as u64 / UNDO_BYTES);
-                self.outbox.answer(sequence, cost, self.now);
-            }
-        }
-        let reach_of_parts = batch.first().and_then(|first| reach(first.parts()?));
-        let ground = reach_of_parts.map(|reach| self.ground_pieces(Some(reach))).unwrap_or_default();
-        let applied = self.replica.apply(&batch, sequence_of);
-        let mut receipts = applied.receipts.into_iter();
-        for entry in &batch {
-            epoch.number += 1;
-            let Entry::Order { by, order } = entry else { continue };
-            match order {
-                Order::Edit(edit) => {
-                    self.reaches.note(epoch.number, edit.reach());
-                    let Some(receipt) = receipts.next() else { continue };
-                    // Its player may have been here before, in another client.
-                    match sequence_of(entry).and_then(|sequence| tags.get(&sequence).copied()) {
-                        Some(tag) => {
-                            let receipt = Receipt { tag, ..receipt };
-                            self.confirm_pieces(sequence_of(entry), &receipt);
-                            self.events.push(ClientEvent::Confirmed { tag, receipt: Some(receipt) });
-                        }
-                        None if is_reported => {
-                            self.confirm_pieces(None, &receipt);
-                            let author = by.map_or(ClientId::SERVER, |(author, _)| author);
-                            self.events.push(ClientEvent::RemoteEdit { author, receipt });
-                        }
-                        None => {}
-                    }
-                }
-                Order::Parts { change, .. } => {
-                    let mut restored = receipts.next().and_then(|receipt| receipt.outcome.ok());
-                    let is_missing = restored.is_none();
-                    let reach = reach(change);
-                    let returned =
-                        reach.map(|reach| self.check_pieces(Some(reach), &ground)).unwrap_or_default();
-                    restored.iter_mut().for_each(|restored| restored.returned.clone_from(&returned));
-                    if entry.number_of(id).is_some_and(|sequence| self.undos.remove(&sequence)) {
-                        self.events.push(ClientEvent::Undone(restored));
-                    }
-                    reach.into_iter().for_each(|reach| self.reaches.note(epoch.number, reach));
-                    if applied.failed_locally && is_missing {
-                        let regions = change.bricks.iter().map(|(pos, _)| RegionPos::of(*pos));
-                        self.doubtful.extend(regions);
-                    }
-                }
-                _ => {}
-            }
-        }
-        self.figures.applied += batch.len() as u64;
-        self.epoch = Some(epoch);
-        if matches!(self.stage, Stage::Following) {
-            self.marks.touch(applied.regions);
-            if matches!(batch.last(), Some(Entry::HashCheck)) {
-                self.marks.mark(epoch.number, &mut self.replica);
-            }
-        }
-        self.finish_log();
-    }
-
     fn acknowledge(&mut self, now: Duration) {
         let (bulk, number, last) = self.acknowledged;
         let new = (self.bulk.received(), self.number());
@@ -640,9 +414,4 @@ impl Client {
             self.outgoing.push(ToServer::Ack { bulk: new.0, number: new.1 }.to_bytes());
         }
     }
-}
-
-/// A box around all bricks of a change.
-fn reach(change: &Patch) -> Option<LatticeBox> {
-    change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union)
 }

@@ -147,6 +147,8 @@ impl Server {
     pub(super) fn fail(&mut self, number: u64) {
         self.figures.failed += 1;
         self.failed.insert(number);
+        #[cfg(feature = "store")]
+        self.saved_order.iter_mut().for_each(|saved| saved.fail(number));
         self.report(ServerEvent::EntryFailed(number));
         self.send_to_all(&ToClient::Failed { number });
     }

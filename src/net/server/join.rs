@@ -90,12 +90,7 @@ impl Server {
 
     fn welcome(&mut self, client: ClientId, hello: &Hello) {
         let log = match hello.epoch {
-            Some(epoch)
-                if (epoch.world, epoch.run) == (self.epoch.world, self.epoch.run)
-                    && epoch.number <= self.epoch.number =>
-            {
-                self.entries_after(epoch.number)
-            }
+            Some(epoch) if self.has_passed(epoch) => self.entries_after(epoch.number),
             Some(_) => None,
             // It has the pristine world.
             None => self.entries_after(0).filter(|_| self.is_whole),
@@ -132,15 +127,33 @@ impl Server {
         self.report(ServerEvent::Joined(client));
     }
 
+    /// Whether the order leads from this position to the present one: a position of this run, or of an earlier run of
+    /// which everything up to it was saved.
+    fn has_passed(&self, epoch: Epoch) -> bool {
+        let of_this_run = (epoch.run == self.epoch.run).then_some(self.epoch.number);
+        #[cfg(feature = "store")]
+        let last = of_this_run.or_else(|| self.saved_order.as_ref()?.shared_with(epoch.run));
+        #[cfg(not(feature = "store"))]
+        let last = of_this_run;
+        epoch.world == self.epoch.world && last.is_some_and(|last| epoch.number <= last)
+    }
+
     /// The messages with all entries after a number, if the log has them and they take fewer bytes than the regions
     /// that changed since.
     fn entries_after(&mut self, number: u64) -> Option<(Join, Bulk)> {
         let messages = self.log.after(number)?;
+        if !self.log.names_after(number).all(|name| self.stamps.has(name)) {
+            return None;
+        }
         let bytes: usize = messages.iter().map(|message| message.len()).sum();
         // A few entries are sent in any case.
         if bytes > super::FULL_MESSAGE {
             let changed = self.changed.iter().filter(|(_, at)| **at > number);
-            let changed: Vec<RegionPos> = changed.map(|(region, _)| *region).collect();
+            let changed: Vec<RegionPos> = match number < self.began {
+                // Nothing is known of what earlier runs changed.
+                true => regions_of(self.terrain.world()).into_iter().collect(),
+                false => changed.map(|(region, _)| *region).collect(),
+            };
             if bytes > self.encodings.estimate(&(0, self.terrain.snapshot()), &changed) {
                 return None;
             }

@@ -12,7 +12,7 @@
 //! | `strokes` | strokes that can be undone |
 //! | `join`, `sender`, `pace` | clients that join, reconnect, or differ; the bulk lane; how fast it is |
 //! | `kept` | older states of the world that are kept for joining clients |
-//! | `save` | a server that survives a restart |
+//! | `save`, `saved_order` | a server that survives a restart; the entries that it saves |
 
 mod apply;
 mod events;
@@ -26,6 +26,8 @@ mod players;
 mod receive;
 #[cfg(feature = "store")]
 mod save;
+#[cfg(feature = "store")]
+mod saved_order;
 mod sender;
 mod sequences;
 mod session;
@@ -128,6 +130,8 @@ pub struct Server {
     now: Duration,
     /// The world, this run, and the number of the last entry.
     epoch: Epoch,
+    /// The number that this run began with.
+    began: u64,
     /// The number of the last entry that is applied.
     applied: u64,
     waiting: VecDeque<Ordered>,
@@ -162,6 +166,9 @@ pub struct Server {
     durable: u64,
     #[cfg(feature = "store")]
     saving: save::Saving,
+    /// The order in the store; `None` without one.
+    #[cfg(feature = "store")]
+    saved_order: Option<saved_order::SavedOrder>,
     outgoing: Vec<Outgoing>,
     events: VecDeque<ServerEvent>,
     figures: ServerFigures,
@@ -202,6 +209,7 @@ impl Server {
             admission: Box::new(|_| Ok(())),
             now: Duration::ZERO,
             epoch: Epoch { world: id, run, number },
+            began: number,
             applied: number,
             waiting: VecDeque::new(),
             waiting_cost: 0,
@@ -226,6 +234,8 @@ impl Server {
             durable: number,
             #[cfg(feature = "store")]
             saving: save::Saving::at(0, number),
+            #[cfg(feature = "store")]
+            saved_order: None,
             outgoing: Vec::new(),
             events: VecDeque::new(),
             figures: ServerFigures::default(),
@@ -422,6 +432,10 @@ impl Server {
         self.figures.ordered += 1;
         self.writer.put(&ordered.entry);
         self.log.push(&ordered.entry);
+        #[cfg(feature = "store")]
+        if let Some(saved) = &mut self.saved_order {
+            saved.push(self.epoch.number, &ordered.entry);
+        }
         self.waiting.push_back(ordered);
         if self.writer.len() >= FULL_MESSAGE {
             self.flush();

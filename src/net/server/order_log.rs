@@ -1,9 +1,10 @@
 //! The latest entries in long messages, for clients that join or reconnect.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use super::FULL_MESSAGE;
+use crate::net::StampId;
 use crate::net::encoding::{OrderWriter, pack};
 use crate::net::message::Entry;
 
@@ -11,6 +12,8 @@ use crate::net::message::Entry;
 struct Block {
     last: u64,
     message: Arc<[u8]>,
+    /// The content that its edits name, where a store had the message: the present server may lack it.
+    names: BTreeSet<StampId>,
 }
 
 /// The latest entries, within a limit of bytes.
@@ -32,6 +35,20 @@ impl OrderLog {
         Self { first: number + 1, blocks, bytes: 0, limit, writer, last: number }
     }
 
+    /// Adds a message before all entries: those from a number up to the first that is kept.
+    #[cfg(feature = "store")]
+    pub fn push_front(&mut self, first: u64, message: Vec<u8>, names: BTreeSet<StampId>) {
+        self.bytes += message.len();
+        self.blocks.push_front(Block { last: self.first - 1, message: message.into(), names });
+        self.first = first;
+    }
+
+    /// The names of content in messages [after](Self::after) a number that a store had.
+    pub fn names_after(&self, number: u64) -> impl Iterator<Item = StampId> {
+        let from = self.blocks.partition_point(|block| block.last <= number);
+        self.blocks.iter().skip(from).flat_map(|block| block.names.iter().copied())
+    }
+
     /// Adds the next entry.
     pub fn push(&mut self, entry: &Entry) {
         self.writer.put(entry);
@@ -42,7 +59,7 @@ impl OrderLog {
         if let Some(message) = self.writer.message(self.last) {
             let message: Arc<[u8]> = pack(&message).into();
             self.bytes += message.len();
-            self.blocks.push_back(Block { last: self.last, message });
+            self.blocks.push_back(Block { last: self.last, message, names: BTreeSet::new() });
         }
         self.writer = OrderWriter::default();
     }

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::keys::{NUMBER, RESERVED, prefix};
+use super::saved_order::{FoundOrder, SavedOrder};
 use super::sequences::{Applied, MAX_SEQUENCE, Sequences};
 use super::{Server, ServerSettings};
 use crate::net::message::ClientId;
@@ -33,7 +34,8 @@ impl Saving {
 impl Server {
     /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or
     /// one that a store was created of. What its clients send again that the world holds already is not done twice: the
-    /// last numbers of the 1024 players who dug last are saved with it.
+    /// last numbers of the 1024 players who dug last are saved with it, and the latest entries, so that clients that
+    /// return after a restart get what they miss of these. Of older changes they get the regions that differ.
     pub fn open(terrain: Terrain, store: &Store, settings: ServerSettings) -> Self {
         let number = store
             .get(&format!("{}{NUMBER}", prefix(store)))
@@ -44,6 +46,18 @@ impl Server {
         let mut server = Self::at(terrain, store.world_id(), number, settings);
         server.sequences = Sequences::open(store);
         server.saving = Saving::at(store.revision(), number);
+        let (run, log_bytes) = (server.epoch.run, server.settings.log_bytes);
+        let FoundOrder { pieces, is_whole, mut saved } =
+            SavedOrder::open(store, &server.terrain, run, number, log_bytes);
+        let has_order = !pieces.is_empty();
+        for piece in pieces.into_iter().rev() {
+            server.log.push_front(piece.first, piece.message, piece.names);
+        }
+        server.is_whole |= is_whole && has_order;
+        saved.set_whole(server.is_whole);
+        // Those that say what holds at first.
+        (number + 1..).zip(&server.waiting).for_each(|(number, ordered)| saved.push(number, &ordered.entry));
+        server.saved_order = Some(saved);
         server
     }
 
@@ -54,14 +68,21 @@ impl Server {
     /// # Errors
     /// When the store's thread has ended.
     pub fn save(&mut self, store: &mut Store) -> Result<(), StoreError> {
-        if self.saving.number != self.applied {
-            store.put(format!("{RESERVED}{NUMBER}"), self.applied.to_le_bytes());
+        let has_new = self.saving.number != self.applied;
+        if has_new {
+            match &mut self.saved_order {
+                Some(saved) => saved.save(store, self.applied, &self.terrain),
+                None => store.put(format!("{RESERVED}{NUMBER}"), self.applied.to_le_bytes()),
+            }
             self.sequences.save(store);
-            store.follow(&mut self.terrain)?;
             self.saving.number = self.applied;
+        }
+        // Also without new entries: while too much waited for the disk, nothing was taken.
+        store.follow(&mut self.terrain)?;
+        let revision = store.revision();
+        let is_later = revision > self.saving.revision;
+        if has_new || is_later {
             // Without a commit among the records, they are certainly saved once the next commit is.
-            let revision = store.revision();
-            let is_later = revision > self.saving.revision;
             self.saving.waiting.push_back((revision.saturating_add((!is_later).into()), self.applied));
             self.saving.revision = revision;
         }

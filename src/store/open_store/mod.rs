@@ -32,7 +32,7 @@ use super::settle::settle;
 use super::shared::{GameData, SavePoint, Shared};
 use super::sources::has_world;
 use super::unsaved;
-use super::writer::{Message, Writer};
+use super::writer::{Content, Message, Writer};
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, Order, Patch, Terrain, TerrainSettings, Version};
@@ -60,6 +60,8 @@ pub struct Store {
     /// The version of the last given terrain.
     version: Version,
     size: WorldSize,
+    /// The number of the next record of its log.
+    next_record: u64,
     /// The hash of its ground.
     ground: u64,
     /// Whether commits were skipped because too much waited; the whole world is saved next.
@@ -147,7 +149,7 @@ impl Store {
         unsaved::clear(&*files).map_err(StoreError::files("creating the world"))?;
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
-        let (parts, hash) = (terrain.parts(), terrain.world().hash());
+        let (parts, hash) = (terrain.logged_parts(), terrain.world().hash());
         let revision = parts.revision;
         let world = WorldId::random();
         let ground = terrain.world().shared_ground();
@@ -181,8 +183,8 @@ impl Store {
         writer.save_all()?;
         let mut store = Self::start(writer, shared, world, terrain)?;
         if !entries.is_empty() {
-            let change = Patch::default();
-            store.append(vec![CommitRecord { revision, hash, entries, change }])?;
+            let record = CommitRecord { number: 0, revision, hash, entries, change: Patch::default() };
+            store.give(store.point, Content::Commits(vec![record]))?;
             store.flush()?;
         }
         Work::until(progress.as_ref(), 1.0, 1).finish();
@@ -296,6 +298,7 @@ impl Store {
             open: Some((messages, thread)),
             point,
             version: terrain.world().version(),
+            next_record: terrain.log_numbers().map_or(0, |numbers| numbers.end),
             size: WorldSize::of(terrain),
             ground: terrain.world().ground().hash(),
             has_gap: false,

@@ -21,7 +21,9 @@ impl Store {
     /// [`StoreError::OtherSize`] if the terrain has another size than the saved world; then nothing is taken;
     /// [`StoreError::Ended`] when the store's thread has panicked.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
-        let is_next = self.follows(terrain) && !self.has_gap;
+        let is_next = self.follows(terrain)
+            && !self.has_gap
+            && terrain.log_numbers().is_some_and(|numbers| numbers.start == self.next_record);
         let revision = terrain.world().revision();
         if is_next && !terrain.has_log() && self.unsent.is_empty() && revision == self.point.revision {
             return Ok(());
@@ -49,10 +51,11 @@ impl Store {
             || terrain.log_sets_ground_after(self.point.revision)
     }
 
-    /// Replaces the last given terrain by one that was made from the same parts.
+    /// Replaces the last given terrain by the one that it was made from, when the next record of that one's log had
+    /// this number.
     #[cfg(feature = "plugin")]
-    pub(crate) fn adopt(&mut self, terrain: &Terrain) {
-        self.version = terrain.world().version();
+    pub(crate) fn adopt(&mut self, terrain: &Terrain, next_record: u64) {
+        (self.version, self.next_record) = (terrain.world().version(), next_record);
     }
 
     /// Whether this terrain is another state of the saved world: it has the same ground and size.
@@ -80,10 +83,10 @@ impl Store {
     /// Whether every record follows the previous one.
     fn continues(&self, records: &[CommitRecord]) -> bool {
         let mut at = self.point.revision;
-        records.iter().all(|record| {
-            let follows = record.revision == at.saturating_add(record.is_commit().into());
+        (self.next_record..).zip(records).all(|(number, record)| {
+            let is_next = record.revision == at.saturating_add(record.is_commit().into());
             at = record.revision;
-            follows
+            is_next && record.number == number
         })
     }
 
@@ -100,7 +103,10 @@ impl Store {
             return Err(StoreError::Gap { at: self.point.revision, found });
         }
         let revision = records.last().map_or(self.point.revision, |record| record.revision);
-        self.give(SavePoint { revision, ..self.point }, Content::Commits(records))
+        let next_record = self.next_record + records.len() as u64;
+        self.give(SavePoint { revision, ..self.point }, Content::Commits(records))?;
+        self.next_record = next_record;
+        Ok(())
     }
 
     /// Takes the whole terrain, if records are missing or another terrain replaces the last one. It is durable with the
@@ -113,7 +119,7 @@ impl Store {
     pub fn append_whole(&mut self, terrain: &Terrain) -> Result<(), StoreError> {
         self.check_size(terrain)?;
         let world = terrain.world();
-        let (parts, hash) = (Box::new(terrain.parts()), world.hash());
+        let (parts, hash) = (Box::new(terrain.logged_parts()), world.hash());
         let is_other = !self.follows(terrain);
         let point = SavePoint {
             revision: parts.revision,
@@ -121,12 +127,13 @@ impl Store {
             ..self.point
         };
         self.give(point, Content::Whole(parts, world.shared_ground(), hash))?;
+        self.next_record = terrain.log_numbers().map_or(0, |numbers| numbers.end);
         (self.version, self.has_gap) = (world.version(), false);
         Ok(())
     }
 
     /// Sends content that leads to a point, with the game's data since the last time.
-    fn give(&mut self, point: SavePoint, content: Content) -> Result<(), StoreError> {
+    pub(super) fn give(&mut self, point: SavePoint, content: Content) -> Result<(), StoreError> {
         if self.is_full() {
             return Err(StoreError::Full);
         }
