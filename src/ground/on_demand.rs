@@ -90,7 +90,8 @@ impl Ground {
             let block = self.heights_on_demand::<8>(Column::new(x * 8, z * 8));
             let (from, to) = ((low.x - x * 8).max(0), (low.x + width as i32 - x * 8).min(8));
             for (z, block) in (z * 8..).zip(&block) {
-                let row = usize::try_from(z - low.z).ok().and_then(|z| heights.chunks_exact_mut(width).nth(z));
+                let row =
+                    usize::try_from(z - low.z).ok().and_then(|z| heights.chunks_exact_mut(width).nth(z));
                 if let Some(row) = row {
                     let start = (x * 8 + from - low.x) as usize;
                     row[start..][..(to - from) as usize].copy_from_slice(&block[from as usize..to as usize]);

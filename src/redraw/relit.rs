@@ -54,8 +54,7 @@ impl Area {
     fn change(self, lit: &LitWorld, (low, high): (Column, Column)) -> Option<LightChange<'_>> {
         let (grid, own) = (lit.before().grid(), self.lit());
         let low = Column::new(low.x.max(own.0.x).max(0), low.z.max(own.0.z).max(0));
-        let high =
-            Column::new(high.x.min(own.1.x).min(grid.width()), high.z.min(own.1.z).min(grid.depth()));
+        let high = Column::new(high.x.min(own.1.x).min(grid.width()), high.z.min(own.1.z).min(grid.depth()));
         let is_any = low.x <= high.x && low.z <= high.z;
         is_any.then(|| LightChange::new(lit, (low, high), (self.low, self.high), self.highest))
     }

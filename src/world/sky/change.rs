@@ -191,13 +191,12 @@ impl<'a> LightChange<'a> {
         let rows = [self.before.inner_row(z), self.after.inner_row(z)];
         let own = self.moved[z + REACH as usize].within(width);
         // Only higher ground hides anything.
-        if rows[0].iter().fold(i32::MAX, |lowest, &top| lowest.min(top)) >= self.highest_top && own.is_empty() {
+        if rows[0].iter().fold(i32::MAX, |lowest, &top| lowest.min(top)) >= self.highest_top && own.is_empty()
+        {
             return;
         }
         let hidden = &mut self.hidden[z * width..][..width];
-        let moved_by = |step: &Step| {
-            self.moved[(z as i32 + REACH + step.dz) as usize].moved(-step.dx)
-        };
+        let moved_by = |step: &Step| self.moved[(z as i32 + REACH + step.dz) as usize].moved(-step.dx);
         let near = [&self.before, &self.after].map(|all| all.near_run(z).within(width));
         for (direction, (far, near_steps)) in FAR.iter().zip(&NEAR).enumerate() {
             let seen = far.iter().chain(near_steps).map(moved_by).fold(Run::EMPTY, Run::hull).within(width);
@@ -207,7 +206,8 @@ impl<'a> LightChange<'a> {
                 };
                 let [before, after] = [horizons(&self.before, &near[0]), horizons(&self.after, &near[1])];
                 if before != after {
-                    for (hidden, (before, after)) in hidden[x..].iter_mut().zip(before.into_iter().zip(after)) {
+                    for (hidden, (before, after)) in hidden[x..].iter_mut().zip(before.into_iter().zip(after))
+                    {
                         *hidden += below(after) as i16 - below(before) as i16;
                     }
                 }

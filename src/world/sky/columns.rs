@@ -249,7 +249,8 @@ impl<'a> SkyColumns<'a> {
     pub(super) fn horizons(&self, [x, z]: [usize; 2], direction: usize, is_near: bool) -> [i16; 8] {
         let mut horizons = [0; 8];
         let own = self.inner_index([x, z]);
-        let at = |step: &Step| own.wrapping_add_signed(step.dz as isize * self.width as isize + step.dx as isize);
+        let at =
+            |step: &Step| own.wrapping_add_signed(step.dz as isize * self.width as isize + step.dx as isize);
         let Some(ys) = eight(&self.tops, own) else { return horizons };
         for step in &FAR[direction] {
             if let Some(tops) = eight(&self.tops, at(step)) {

@@ -115,7 +115,8 @@ impl LitWorld {
     /// The tops of a stack that the commit changes, before and after; `None` if it does not change the stack.
     fn changed_tops(&self, at: (i32, i32)) -> Option<&[Option<StackTops>; 2]> {
         let stack = self.newer.stacks.get(&at)?;
-        let views = [None, Some(&self.newer)].map(|newer| SkyView { world: &self.world, newer, commit: None });
+        let views =
+            [None, Some(&self.newer)].map(|newer| SkyView { world: &self.world, newer, commit: None });
         Some(stack.tops.get_or_init(|| views.map(|view| stack_tops(view, at))))
     }
 }

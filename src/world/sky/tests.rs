@@ -274,7 +274,8 @@ struct Scene {
 
 fn scenes(seed: u32) -> [Scene; 5] {
     fn at(rng: &mut Rng, low: [i32; 3], high: [i32; 3]) -> Vec3 {
-        let along = |axis: usize, rng: &mut Rng| low[axis] as f32 + rng.f32() * (high[axis] - low[axis]) as f32;
+        let along =
+            |axis: usize, rng: &mut Rng| low[axis] as f32 + rng.f32() * (high[axis] - low[axis]) as f32;
         Vec3::new(along(0, rng), along(1, rng), along(2, rng))
     }
     let gully = |x: i32, z: i32| {
@@ -391,7 +392,8 @@ fn everything_whose_light_changes_is_lit_again_wherever_players_dig() {
                     let mut updated = SkyColumns::new(lit.view_before(), low, high).after(&lit);
                     let mut lone = SparseSky::new(SkyView::of(world));
                     assert_eq!(updated.lights(), SkyColumns::new(SkyView::of(world), low, high).lights());
-                    let columns = (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Column::new(x, z)));
+                    let columns =
+                        (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Column::new(x, z)));
                     let ground = updated.ground_lights();
                     for (&light, column) in ground.iter().zip(columns).step_by(7) {
                         let height = world.ground().height(column) * (SNAP / ONE);
