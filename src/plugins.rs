@@ -14,6 +14,7 @@ use crate::plugin::{HeightmapPlugin, TerrainPlugin};
 /// | --- | --- |
 /// | [`TerrainPlugin`] | transactions, entities, messages |
 /// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
+/// | `GroundFilePlugin` | grounds of files, where there is an `AssetPlugin` (feature `format`) |
 /// | `TerrainPickingPlugin` | hits of pointers on the ground, for `bevy_picking` (feature `picking`) |
 /// | `SavePlugin` | saves worlds of terrains with a `SavedWorld` (feature `store`) |
 /// | `TerrainMaterialPlugin<StandardMaterial>` | propagates materials to tiles, chunks and pieces (feature `render`) |
@@ -24,6 +25,8 @@ pub struct BurrowPlugins;
 impl PluginGroup for BurrowPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>().add(TerrainPlugin).add(HeightmapPlugin);
+        #[cfg(feature = "format")]
+        let group = group.add(crate::plugin::GroundFilePlugin);
         #[cfg(feature = "picking")]
         let group = group.add(crate::plugin::TerrainPickingPlugin);
         #[cfg(feature = "store")]

@@ -609,6 +609,36 @@ def sculpt(stage):
     if any(line.startswith("tool ") for line in stage.lines()[since:]):
         raise Failed("a stamp takes a torus")
     stage.say("each shape works, and a torus can't be a stamp")
+
+    # A road is a path: clicks are points, Enter makes one edit of them.
+    press_key("equal", r"^tool operation=Road ")
+    for right in (-60, 0, 60):
+        since = stage.mark()
+        stage.click(middle[0] + right, middle[1])
+        stage.wait(r"^tool operation=Road ", since)
+        stage.rest()
+    since, before = stage.mark(), hash_now()
+    stage.xdo("key", "--delay", 0, "Return")
+    stage.wait(strokes, since)
+    if hash_now() == before:
+        raise Failed("a road changes nothing")
+    since = stage.mark()
+    stage.chord("ctrl", "z")
+    if stage.wait(r"^undo .*hash=(\w+)", since).group(1) != before:
+        raise Failed("a road is more than one step of undo")
+    stage.rest()
+    since = stage.mark()
+    stage.chord("ctrl", "c")
+    stage.wait(r"^tool operation=Paste ", since)
+    stage.rest()
+    dig(middle[0] - 50, middle[1])
+    before = hash_now()
+    press_key("r", r"^tool operation=Reset ")
+    dig(*middle)
+    if hash_now() == before:
+        raise Failed("a reset changes nothing")
+    stage.say("a path is one edit, what is copied is pasted, and ground is reset")
+    picture(stage, "paste")
     press_key("1", r"^tool operation=Dig ")
     stage.rest()
 

@@ -15,13 +15,16 @@
 //! | `W` `A` `S` `D`, `Q`, `E`, left `Shift` | flies, down, up, faster |
 //! | `F` | flies to what is under the mouse |
 //! | wheel, `[`, `]` | size of the brush |
-//! | `1` to `9`, `0`, `-`, or `Tab` | operations |
+//! | `1` to `9`, `0`, `-`, `=`, `P`, `R`, or `Tab` | operations |
+//! | click, `Enter`, `Backspace` with the shape *Path* | sets a point, makes one edit of all points, takes the last one back |
+//! | `Ctrl+C`, `Ctrl+Shift+C` | copies what lies in the brush, to paste it; writes it to a `.prefab` file too |
 //! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
 //! | `Ctrl+N`, `Ctrl+O`, `Ctrl+S`, `Ctrl+Shift+S` | new, open, save, save as |
 //! | `H` | takes the height under the mouse for levelling |
 //! | `F1` | shows and hides the panel |
 //! | `F12` | saves a picture |
 //! | a PNG dropped on the window | becomes the stamp, as with `--stamp`: plain grey, white is high |
+//! | a `.prefab` dropped on the window | is pasted |
 //! | `Esc` | quits, and asks before changes are lost |
 //!
 //! With `--headless`, or without a display, a script sculpts instead and saves pictures, panel included, in `--out`.

@@ -1,4 +1,4 @@
-//! Stamps from files: named by `--stamp`, or dropped on the window.
+//! Stamps and prefabs from files: named by `--stamp`, or dropped on the window.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -7,8 +7,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use bevy::prelude::*;
+use bevy_burrow::format::{read_prefab, write_prefab};
 use bevy_burrow::ground::ImageError;
-use bevy_burrow::panel::{BrushTool, BurrowPanel, StampImage, ToolOperation};
+use bevy_burrow::panel::{BrushTool, BurrowPanel, StampImage, ToolOperation, ToolPrefab};
 use bevy_burrow::prelude::*;
 
 /// The script's default stamp.
@@ -18,7 +19,11 @@ const CRATER: &[u8] = include_bytes!("../../assets/stamps/crater.png");
 const LIMITS: ImageLimits =
     ImageLimits { max_file_bytes: 4 << 20, max_width: 256, max_height: 256, max_alloc_bytes: 16 << 20 };
 
-/// Uses files that are dropped on the window as stamps.
+/// The extension of prefab files, and the most bytes of one.
+const PREFAB: &str = "prefab";
+const MOST_PREFAB: u64 = 128 << 20;
+
+/// Uses files that are dropped on the window: prefabs are pasted, images are stamps.
 pub struct DropPlugin;
 
 impl Plugin for DropPlugin {
@@ -69,9 +74,37 @@ fn take_dropped(
 ) {
     for message in drops.read() {
         if let FileDragAndDrop::DroppedFile { path_buf, .. } = message {
-            panel.report(take(path_buf, &mut tool));
+            let is_prefab = path_buf.extension().is_some_and(|extension| extension == PREFAB);
+            panel.report(if is_prefab {
+                take_prefab(path_buf, &mut tool)
+            } else {
+                take(path_buf, &mut tool)
+            });
         }
     }
+}
+
+/// Pastes a file's prefab from now on. On an error, the tool stays as it is.
+fn take_prefab(file: &Path, tool: &mut BrushTool) -> Result<String, String> {
+    let failed = |why: String| format!("{} can't be pasted: {why}", file.display());
+    let mut bytes = Vec::new();
+    let opened = File::open(file).map_err(|why| failed(why.to_string()))?;
+    opened.take(MOST_PREFAB).read_to_end(&mut bytes).map_err(|why| failed(why.to_string()))?;
+    let prefab = read_prefab(&bytes).map_err(|why| failed(why.to_string()))?;
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    tool.prefab = ToolPrefab { name: Some(name.into()), ..ToolPrefab::new(prefab, 1.0) };
+    tool.operation = ToolOperation::Paste;
+    Ok(format!("{} is pasted now", file.display()))
+}
+
+/// Writes what was copied to the first free file of the working folder.
+pub fn keep(copy: &ToolPrefab) -> Result<String, String> {
+    let Some(prefab) = &copy.prefab else { return Err("Nothing was copied".into()) };
+    let free = |number: &u32| !Path::new(&format!("copy_{number}.{PREFAB}")).exists();
+    let name = format!("copy_{}.{PREFAB}", (1..10_000).find(free).unwrap_or_default());
+    std::fs::write(&name, write_prefab(prefab))
+        .map_err(|why| format!("The copy could not be saved in {name}: {why}"))?;
+    Ok(format!("Copied, and saved to {name}"))
 }
 
 fn read(file: &Path) -> Result<StampImage, StampError> {

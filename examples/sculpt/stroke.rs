@@ -13,10 +13,12 @@ use bevy::window::{PrimaryWindow, WindowCloseRequested};
 use bevy_burrow::brush::Blend;
 use bevy_burrow::debug::draw_shape;
 use bevy_burrow::panel::{
-    BrushTool, BurrowPanel, PanelAction, PanelInput, ToolAlign, ToolOperation, keyboard_is_free,
+    BrushTool, BurrowPanel, PanelAction, PanelInput, ToolAlign, ToolOperation, ToolShape, keyboard_is_free,
     pointer_is_free,
 };
 use bevy_burrow::prelude::*;
+
+use crate::stamps;
 
 /// The reach of the brush in metres.
 const REACH: f32 = 400.0;
@@ -85,7 +87,9 @@ impl Plugin for MousePlugin {
                         .before(preview),
                     turn_wheel.run_if(pointer_is_free),
                     keys.run_if(keyboard_is_free),
+                    path_keys.run_if(keyboard_is_free).before(BurrowSystems::Collect),
                     command,
+                    copy.after(aim),
                     ask_to_close,
                 ),
             );
@@ -93,7 +97,7 @@ impl Plugin for MousePlugin {
 }
 
 /// The keys of the operations, in the panel's order.
-const OPERATION_KEYS: [(KeyCode, &str); 11] = [
+const OPERATION_KEYS: [(KeyCode, &str); 14] = [
     (KeyCode::Digit1, "1"),
     (KeyCode::Digit2, "2"),
     (KeyCode::Digit3, "3"),
@@ -105,6 +109,9 @@ const OPERATION_KEYS: [(KeyCode, &str); 11] = [
     (KeyCode::Digit9, "9"),
     (KeyCode::Digit0, "0"),
     (KeyCode::Minus, "-"),
+    (KeyCode::Equal, "="),
+    (KeyCode::KeyP, "P"),
+    (KeyCode::KeyR, "R"),
 ];
 
 /// Keys of the panel's buttons.
@@ -207,6 +214,12 @@ fn stroke(
     if *modifier == Modifier::Line && !is_first {
         return;
     }
+    if tool.fitting_shape() == ToolShape::Path && *modifier == Modifier::None {
+        if is_first {
+            tool.add_point(hit);
+        }
+        return;
+    }
     if is_first {
         strokes.number += 1;
     }
@@ -221,6 +234,28 @@ fn stroke(
     }
     strokes.last = Some(hit.position);
     strokes.rest = Timer::new(Duration::from_secs_f32(1.0 / tool.rate.max(0.1)), TimerMode::Once);
+}
+
+/// Enter makes an edit of the path's points, Backspace takes the last one back.
+fn path_keys(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut tool: ResMut<BrushTool>,
+    mut strokes: ResMut<Strokes>,
+    mut brushes: MessageWriter<Brush>,
+) {
+    if tool.points.is_empty() || tool.fitting_shape() != ToolShape::Path {
+        return;
+    }
+    if keys.just_pressed(KeyCode::Backspace) {
+        tool.points.pop();
+    }
+    if keys.any_just_pressed([KeyCode::Enter, KeyCode::NumpadEnter])
+        && let Some(brush) = tool.finish_path()
+    {
+        strokes.count += 1;
+        strokes.number += 1;
+        brushes.write(brush.with_tag(strokes.count).with_stroke(strokes.number));
+    }
 }
 
 /// Positions along a straight line, at most `apart` from each other, up to its end. Without a start, only the end.
@@ -328,6 +363,30 @@ fn command(
     }
 }
 
+/// `Ctrl+C` copies what lies in the brush; with Shift, into a file too.
+fn copy(
+    mut presses: MessageReader<KeyboardInput>,
+    keys: Res<ButtonInput<KeyCode>>,
+    input: Option<Res<PanelInput>>,
+    aim: Res<Aim>,
+    terrains: Query<(&Terrain, &GlobalTransform)>,
+    mut tool: ResMut<BrushTool>,
+    mut panel: ResMut<BurrowPanel>,
+) {
+    let is_due = keyboard_is_free(input) && keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
+    let is_pressed =
+        |press: &KeyboardInput| press.state.is_pressed() && !press.repeat && letter(press) == Some('c');
+    if !presses.read().any(is_pressed) || !is_due {
+        return;
+    }
+    let Some(hit) = aim.0 else { return };
+    let Ok((terrain, place)) = terrains.get(hit.terrain) else { return };
+    let copied = tool.copy(terrain, place, &hit).map_err(|why| why.to_string());
+    let is_kept = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
+    panel
+        .report(copied.and_then(|()| if is_kept { stamps::keep(&tool.prefab) } else { Ok("Copied".into()) }));
+}
+
 /// The letter on a key, by the keyboard layout: QWERTZ and AZERTY have Z elsewhere than QWERTY. For layouts without
 /// Latin letters, the key's position on QWERTY counts.
 fn letter(press: &KeyboardInput) -> Option<char> {
@@ -340,6 +399,7 @@ fn letter(press: &KeyboardInput) -> Option<char> {
         (_, KeyCode::KeyS) => Some('s'),
         (_, KeyCode::KeyO) => Some('o'),
         (_, KeyCode::KeyN) => Some('n'),
+        (_, KeyCode::KeyC) => Some('c'),
         _ => None,
     }
 }
@@ -376,6 +436,12 @@ fn preview(
         _ => Color::srgb(1.0, 0.80, 0.30),
     };
     draw_shape(&mut gizmos, &tool.shape_at(hit), color.with_alpha(0.5));
+    if tool.fitting_shape() == ToolShape::Path {
+        gizmos.linestrip(tool.points.iter().copied().chain([hit.position]), color);
+        for point in &tool.points {
+            draw_shape(&mut gizmos, &Shape::sphere(*point, tool.radius), color.with_alpha(0.3));
+        }
+    }
     let axis = if tool.align == ToolAlign::Surface { hit.normal } else { Vec3::Y };
     let turn = Quat::from_rotation_arc(Vec3::Y, axis.normalize_or(Vec3::Y));
     let width = tool.width();

@@ -6,14 +6,15 @@ use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
 use super::blend::QuantizedBlend;
-use super::paste::PasteSource;
+use super::content::{Content, ContentMut};
+use super::paste::{PasteSource, QuantizedPaste};
 use super::quantized_operation::QuantizedOperation;
 use super::roughness::QuantizedRoughness;
 use super::sculpt_kernel::SculptKernel;
 use super::shapes::QuantizedShape;
 use super::{
     BAND, Blend, Brush, BrushError, CustomShape, Evaluator, FULL_POWER, Kind, Operation, Prefab, Roughness,
-    Shape,
+    Shape, ShapeGrid,
 };
 use crate::ground::GreyImage;
 use crate::lattice::{LatticeBox, ONE};
@@ -39,8 +40,8 @@ const BRICK_DIAGONAL: i32 = 14 * ONE;
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Edit {
-    shape: QuantizedShape,
-    operation: QuantizedOperation,
+    pub(super) shape: QuantizedShape,
+    pub(super) operation: QuantizedOperation,
     /// `None` unless the operation sculpts.
     blend: Option<QuantizedBlend>,
     power: u8,
@@ -73,8 +74,8 @@ fn full_power() -> u8 {
 fn check_together(shape: &QuantizedShape, operation: &Operation) -> Result<(), BrushError> {
     match operation {
         Operation::Road if shape.road().is_none() => Err(BrushError::NoCorridor),
-        // An edit has one image that networks send by its name.
-        Operation::Stamp { .. } if shape.image().is_some() => Err(BrushError::StampInGrid),
+        // `stamp_image` names one image.
+        Operation::Stamp { .. } if shape.grid().is_some() => Err(BrushError::StampInGrid),
         _ => Ok(()),
     }
 }
@@ -180,18 +181,23 @@ impl Edit {
 
     /// The image of the stamp, if it is one; of a [`ShapeGrid`](super::ShapeGrid), the image that holds its samples.
     pub fn stamp_image(&self) -> Option<&Arc<GreyImage>> {
-        self.shape.image().or_else(|| self.operation.stamp_image())
+        self.shape.grid().map(ShapeGrid::image).or_else(|| self.operation.stamp_image())
     }
 
     /// The edit with another image, if it is a stamp or its shape is a grid; otherwise as it is.
     ///
     /// # Errors
-    /// When the image has a size that no stamp may have, or holds no grid.
-    pub fn with_stamp_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
-        if self.shape.image().is_some() {
-            return Ok(Self { shape: self.shape.with_image(image)?, ..self });
+    /// When the image has a size that no stamp may have, or holds no grid, or one that is too large at this scale.
+    pub fn with_stamp_image(mut self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+        for place in self.contents_mut() {
+            match place {
+                ContentMut::Grid(grid) => *grid = ShapeGrid::in_image(Arc::clone(&image)),
+                ContentMut::Image(own) => *own = Arc::clone(&image),
+                ContentMut::Prefab(_) => {}
+            }
         }
-        Ok(Self { operation: self.operation.with_stamp_image(image)?, ..self })
+        self.check()?;
+        Ok(self)
     }
 
     /// The prefab, if it pastes one.
@@ -199,11 +205,16 @@ impl Edit {
         self.operation.prefab()
     }
 
-    /// The edit with another prefab, if it pastes one; otherwise as it is.
-    #[cfg(feature = "net")]
-    #[must_use]
-    pub(crate) fn with_prefab(self, prefab: Arc<Prefab>) -> Self {
-        Self { operation: self.operation.with_prefab(prefab), ..self }
+    /// Everything that a name can stand for, in the order in which names are written.
+    #[cfg_attr(not(feature = "format"), allow(dead_code, reason = "for messages and journals"))]
+    pub(crate) fn contents(&self) -> impl Iterator<Item = Content<'_>> {
+        self.shape.grid().map(Content::Grid).into_iter().chain(self.operation.content())
+    }
+
+    /// The places of [`contents`](Self::contents), in the same order. The edit has to be [checked](Self::check) once
+    /// they have other content.
+    pub(crate) fn contents_mut(&mut self) -> impl Iterator<Item = ContentMut<'_>> {
+        self.shape.grid_mut().map(ContentMut::Grid).into_iter().chain(self.operation.content_mut())
     }
 
     /// The samples that it pastes, if it does.
@@ -211,14 +222,31 @@ impl Edit {
         self.operation.paste().map(|paste| paste.source())
     }
 
-    /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6).
+    /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6). A paste
+    /// changes none beyond its prefab: where that lies outside the shape, it is a single point.
     ///
     /// At the rim of the lattice the box reaches beyond its [limits](super#limits) by at most some thousand
     /// voxels; the world cuts it.
     pub fn reach(&self) -> LatticeBox {
         let grow = self.band();
         let (low, high) = self.shape.bounds();
-        LatticeBox { min: (low - grow + (ONE - 1)).div_euclid(IVec3::splat(ONE)), max: (high + grow) >> 8 }
+        let own = LatticeBox {
+            min: (low - grow + (ONE - 1)).div_euclid(IVec3::splat(ONE)),
+            max: (high + grow) >> 8,
+        };
+        match self.operation.paste().map(QuantizedPaste::bounds) {
+            Some(pasted) => {
+                own.intersection(pasted).unwrap_or(LatticeBox::point(pasted.min.clamp(own.min, own.max)))
+            }
+            None => own,
+        }
+    }
+
+    /// Whether it certainly changes none of these samples: of a path, whose box is mostly empty, also those far from its
+    /// pieces.
+    pub(crate) fn misses(&self, samples: LatticeBox) -> bool {
+        let Some(samples) = self.reach().intersection(samples) else { return true };
+        self.most_bricks().is_some() && self.evaluator().is_out_of_reach(samples)
     }
 
     /// Distance outside the shape up to which samples may change.
@@ -229,7 +257,6 @@ impl Edit {
 
     /// At least the number of bricks that the edit may change, where that is known to be much less than the bricks in
     /// its [`reach`](Self::reach).
-    #[cfg_attr(not(feature = "net"), allow(dead_code, reason = "for the prices of servers, and for tests"))]
     pub(crate) fn most_bricks(&self) -> Option<u64> {
         // Every point of a brick that is reached lies within its diagonal.
         let volume = self.shape.volume_within(self.band() + BRICK_DIAGONAL)?;
@@ -456,6 +483,42 @@ mod tests {
         };
         assert_eq!(read(r#"{"amplitude":0,"scale":1024,"seed":7}"#).unwrap(), edit);
         assert!(read(r#"{"amplitude":0,"scale":0,"seed":7}"#).is_err());
+    }
+
+    #[test]
+    fn a_paste_reaches_its_prefab_within_its_shape() {
+        use super::super::{Paste, PrefabSample};
+        let mut rng = fastrand::Rng::with_seed(4);
+        let air = PrefabSample {
+            density: 9,
+            material: MaterialId::GROUND,
+            is_edited: true,
+            has_stored_material: false,
+        };
+        let (mut samples, mut widest) = (0, 0);
+        for _ in 0..150 {
+            let size = IVec3::new(rng.i32(1..9), rng.i32(1..9), rng.i32(1..9));
+            let anchor = IVec3::new(rng.i32(-9..20), rng.i32(-9..20), rng.i32(-9..20));
+            let prefab =
+                Prefab::new(size, anchor, 0, std::iter::repeat_n(air, size.element_product() as usize))
+                    .unwrap();
+            let mut place = |most: f32| Vec3::new(rng.f32(), rng.f32(), rng.f32()) * most - most / 2.0;
+            let (at, turn) = (place(40.0), Quat::from_scaled_axis(place(6.0)));
+            let paste = Paste { mirror: rng.bool(), scale: 0.3 + rng.f32() * 2.0, ..Paste::new(prefab, at) };
+            let paste = if rng.bool() { paste.rotated(turn) } else { paste.turned_about_y(rng.i32(..)) };
+            // All of the world, but for a corner.
+            let shape = Shape::sphere(Vec3::ZERO, 180.0);
+            let edit = Edit::quantize(&Brush { operation: Operation::Paste { paste }, ..Brush::dig(shape) })
+                .unwrap();
+            let (reach, source) = (edit.reach(), edit.paste_source().unwrap());
+            for point in reach.grown(3).points() {
+                let is_pasted = source.sample(point).is_some();
+                assert!(!is_pasted || reach.contains(point), "{point} is beyond {reach:?}");
+                samples += u64::from(is_pasted);
+            }
+            widest = widest.max(reach.size().max_element());
+        }
+        assert!(samples > 2000 && widest < 60, "{samples} samples, {widest} voxels");
     }
 
     #[test]

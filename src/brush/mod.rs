@@ -92,6 +92,8 @@
 //! [`REACH`]: crate::lattice::REACH
 
 mod blend;
+#[cfg_attr(not(feature = "format"), allow(dead_code, reason = "for messages and journals"))]
+mod content;
 mod edit;
 mod error;
 mod evaluator;
@@ -114,6 +116,8 @@ mod stamp;
 mod voxel_count;
 
 pub use blend::Blend;
+#[cfg(feature = "format")]
+pub(crate) use content::{Content, ContentMut};
 pub use edit::Edit;
 pub use error::BrushError;
 #[doc(hidden)]

@@ -11,7 +11,7 @@ use super::quantize::{
 };
 use super::{BrushError, Prefab, Shape, is_default};
 use crate::ground::{Ground, MaterialId};
-use crate::lattice::{Column, ONE};
+use crate::lattice::{Column, LatticeBox, ONE};
 
 /// Least and most scale.
 const SCALE: (f32, f32) = (0.125, 8.0);
@@ -212,9 +212,30 @@ impl QuantizedPaste {
         &self.prefab
     }
 
-    #[cfg(feature = "net")]
-    pub fn with_prefab(self, prefab: Arc<Prefab>) -> Self {
-        Self { prefab, ..self }
+    /// A box around every lattice point that it gives a sample, at most two voxels too wide on each side.
+    pub fn bounds(&self) -> LatticeBox {
+        let (rows, squared) = matrix(self.rotation);
+        let (anchor, size) = (self.prefab.anchor().as_i64vec3(), self.prefab.size().as_i64vec3());
+        let (mut low, mut high) = (-anchor, size - 1 - anchor);
+        if self.mirror {
+            (low.x, high.x) = (-high.x, -low.x);
+        }
+        let (low, high) = (low.to_array(), high.to_array());
+        let ends = |axis: usize, toward_high: bool| {
+            let part = |i: usize| if (rows[axis][i] > 0) == toward_high { high[i] } else { low[i] };
+            let along: i64 = (0..3).map(|i| rows[axis][i] * part(i)).sum();
+            i64::from(self.at[axis]) + along * i64::from(self.scale) / squared
+        };
+        // A voxel more for the rounding of places.
+        let voxel = |end: i64, more: i64| (end.div_euclid(i64::from(ONE)) + more) as i32;
+        LatticeBox {
+            min: IVec3::from_array([0, 1, 2].map(|axis| voxel(ends(axis, false), -1))),
+            max: IVec3::from_array([0, 1, 2].map(|axis| voxel(ends(axis, true), 2))),
+        }
+    }
+
+    pub fn prefab_mut(&mut self) -> &mut Arc<Prefab> {
+        &mut self.prefab
     }
 
     /// Ready to be evaluated.

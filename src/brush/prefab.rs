@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::hash::{Hash, Hasher};
+use std::sync::{Arc, OnceLock};
 
 use glam::IVec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -113,6 +114,8 @@ pub struct Prefab {
     materials: Vec<MaterialId>,
     marks: Vec<u8>,
     hash: u64,
+    /// Its file, once somebody needed it.
+    packed: OnceLock<Arc<[u8]>>,
 }
 
 impl Prefab {
@@ -133,6 +136,7 @@ impl Prefab {
             materials: Vec::with_capacity(count),
             marks: Vec::with_capacity(count),
             hash: 0,
+            packed: OnceLock::new(),
         };
         for sample in samples {
             own.densities.push(sample.density);
@@ -167,6 +171,11 @@ impl Prefab {
         if !(0..count).all(|index| self.at_index(index).is_valid() && self.marks[index] <= EDITED | STORED) {
             return Err(PrefabError::Invalid { what: "sample" });
         }
+        self.hash = self.hash_of_content();
+        Ok(self)
+    }
+
+    fn hash_of_content(&self) -> u64 {
         let word = |index: usize| {
             let sample = self.at_index(index);
             u64::from(sample.density.cast_unsigned())
@@ -176,8 +185,7 @@ impl Prefab {
         let words = |v: IVec3| v.to_array().map(|part| u64::from(part.cast_unsigned()));
         let head = words(self.size).into_iter().chain(words(self.anchor));
         let head = head.chain([u64::from(self.above_ground.cast_unsigned())]);
-        self.hash = hash_words(head.chain((0..count).map(word)));
-        Ok(self)
+        hash_words(head.chain((0..self.densities.len()).map(word)))
     }
 
     /// Samples along each axis: one more than voxels between the first and the last.
@@ -205,9 +213,10 @@ impl Prefab {
         self.hash
     }
 
-    /// Bytes of memory that it takes.
+    /// Bytes of memory that it takes. They grow by those of its file when it is first sent or saved.
     pub fn bytes(&self) -> usize {
-        size_of::<Self>() + self.densities.len() * (size_of::<i16>() + 2)
+        let packed = self.packed.get().map_or(0, |packed| packed.len());
+        size_of::<Self>() + self.densities.len() * (size_of::<i16>() + 2) + packed
     }
 
     fn at_index(&self, index: usize) -> PrefabSample {
@@ -226,11 +235,16 @@ impl Prefab {
         self.at_index((at.y * size.z + at.z) * size.x + at.x)
     }
 
+    /// The bytes of its file, which `pack` makes where nobody has needed them yet: a large prefab takes a while.
+    #[cfg(feature = "format")]
+    pub(crate) fn packed(&self, pack: impl FnOnce(&Self) -> Vec<u8>) -> &Arc<[u8]> {
+        self.packed.get_or_init(|| pack(self).into())
+    }
+
     /// A prefab of a single sample of air, which stands for one that is named.
-    #[cfg(feature = "net")]
     pub(crate) fn placeholder() -> Self {
         let (size, anchor) = (IVec3::ONE, IVec3::ZERO);
-        Self {
+        let own = Self {
             size,
             anchor,
             above_ground: 0,
@@ -238,7 +252,14 @@ impl Prefab {
             materials: vec![MaterialId::GROUND],
             marks: vec![0],
             hash: 0,
-        }
+            packed: OnceLock::new(),
+        };
+        Self { hash: own.hash_of_content(), ..own }
+    }
+
+    /// Whether it equals the [placeholder](Self::placeholder).
+    pub(crate) fn is_placeholder(&self) -> bool {
+        self.size == IVec3::ONE && *self == Self::placeholder()
     }
 }
 
@@ -353,6 +374,7 @@ impl TryFrom<Stored> for Prefab {
             materials: vec![MaterialId::GROUND; count],
             marks: vec![0; count],
             hash: 0,
+            packed: OnceLock::new(),
         };
         let mut density = 0_i16;
         for (from, to) in by_columns(size).enumerate() {

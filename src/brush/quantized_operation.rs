@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
+use super::content::{Content, ContentMut};
 use super::paste::QuantizedPaste;
 use super::quantize::{
     check_direction, check_point, direction, in_range, measure, point, restored_direction, restored_point,
@@ -116,11 +117,21 @@ impl QuantizedOperation {
         }
     }
 
-    /// With another image, if it is a stamp.
-    pub fn with_stamp_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
+    /// Its image or its prefab.
+    pub fn content(&self) -> Option<Content<'_>> {
         match self {
-            Self::Stamp { stamp } => Ok(Self::Stamp { stamp: stamp.with_image(image)? }),
-            other => Ok(other),
+            Self::Stamp { stamp } => Some(Content::Image(stamp.image())),
+            Self::Paste { paste } => Some(Content::Prefab(paste.prefab())),
+            _ => None,
+        }
+    }
+
+    /// The place of its image or its prefab. The operation has to be [checked](Self::check) then.
+    pub fn content_mut(&mut self) -> Option<ContentMut<'_>> {
+        match self {
+            Self::Stamp { stamp } => Some(ContentMut::Image(stamp.image_mut())),
+            Self::Paste { paste } => Some(ContentMut::Prefab(paste.prefab_mut())),
+            _ => None,
         }
     }
 
@@ -132,15 +143,6 @@ impl QuantizedOperation {
     /// The prefab that is pasted.
     pub fn prefab(&self) -> Option<&Arc<Prefab>> {
         self.paste().map(QuantizedPaste::prefab)
-    }
-
-    /// With another prefab, if it pastes one.
-    #[cfg(feature = "net")]
-    pub fn with_prefab(self, prefab: Arc<Prefab>) -> Self {
-        match self {
-            Self::Paste { paste } => Self::Paste { paste: paste.with_prefab(prefab) },
-            other => other,
-        }
     }
 
     /// The kind of its operation.

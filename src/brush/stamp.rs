@@ -168,9 +168,8 @@ impl QuantizedStamp {
         &self.relief.0
     }
 
-    pub fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
-        check_sides(image.width(), image.height())?;
-        Ok(Self { relief: ImageSamples(image), ..self })
+    pub fn image_mut(&mut self) -> &mut Arc<GreyImage> {
+        &mut self.relief.0
     }
 
     pub fn check(&self) -> Result<(), BrushError> {

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use super::prepared_edit::PreparedEdit;
-use crate::lattice::BrickPos;
 
 /// Most edits of a batch in which some edit reads its surroundings, so that comparing each with all others stays cheap.
 const LONGEST: usize = 1 << 12;
@@ -19,13 +18,15 @@ pub(super) fn batches(edits: &[PreparedEdit], most: u64) -> Vec<Range<usize>> {
     let mut batches = Vec::new();
     let (mut first, mut bricks) = (0, 0);
     for (number, edit) in edits.iter().enumerate() {
-        let Some(reach) = edit.reach else { continue };
-        let own_bricks = BrickPos::range(reach).volume();
+        if edit.reach.is_none() {
+            continue;
+        }
+        let own_bricks = edit.most_bricks;
         bricks += own_bricks;
         let reads_changes = || {
-            let mut earlier = edits[first..number].iter().filter_map(|edit| edit.reach);
             edit.reads().is_some_and(|around| {
-                number - first >= LONGEST || earlier.any(|earlier| earlier.intersection(around).is_some())
+                number - first >= LONGEST
+                    || edits[first..number].iter().any(|earlier| earlier.reaches(around))
             })
         };
         if number > first && (bricks > most || reads_changes()) {

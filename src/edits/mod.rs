@@ -35,7 +35,7 @@ pub(crate) use effect::{DraftedBrick, EditEffect, MergedBricks, Overlay};
 #[cfg(feature = "cuda")]
 pub(crate) use jobs::Job;
 pub(crate) use prepared::PreparedEdits;
-pub(crate) use prepared_edit::reach;
+pub(crate) use prepared_edit::{most_bricks, reach};
 pub(crate) use removal::take_out;
 pub(crate) use reset::{ResetBrick, edited_within, reset};
 pub(crate) use restore::count_replaced;

@@ -3,7 +3,7 @@
 use glam::IVec3;
 
 use crate::brush::{Edit, Evaluator, Kind, SculptKernel};
-use crate::lattice::{ChunkGrid, LatticeBox};
+use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
 use crate::volume::DiggingRules;
 
 /// Distance in voxels, down and up, within which new ground searches for its material.
@@ -13,6 +13,8 @@ pub(super) const LOOK: i32 = 64;
 pub(crate) struct PreparedEdit {
     /// The part of the edit's reach that lies in the world.
     pub reach: Option<LatticeBox>,
+    /// At least the number of bricks that it may change.
+    pub most_bricks: u64,
     pub operation: Kind,
     pub evaluator: Evaluator,
     pub sculptor: Option<SculptKernel>,
@@ -25,6 +27,7 @@ impl PreparedEdit {
     pub fn new(grid: ChunkGrid, edit: &Edit, rules: Option<&DiggingRules>) -> Self {
         let mut own = Self {
             reach: reach(grid, edit),
+            most_bricks: most_bricks(grid, edit).unwrap_or(0),
             operation: edit.kind(),
             evaluator: edit.evaluator(),
             sculptor: edit.sculptor(),
@@ -64,6 +67,13 @@ impl PreparedEdit {
 /// The part of an edit's reach that lies in the world; `None` when it lies outside.
 pub(crate) fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
     edit.reach().intersection(grid.edit_bounds())
+}
+
+/// At least the number of bricks of a world that an edit may change: along paths far fewer than the bricks in its reach.
+/// `None` when it lies outside.
+pub(crate) fn most_bricks(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
+    let around = BrickPos::range(reach(grid, edit)?).volume();
+    Some(edit.most_bricks().map_or(around, |most| most.min(around)))
 }
 
 /// Returns `true` if some rule may restrict an edit of this power that changes these samples.

@@ -4,13 +4,21 @@
 //! head of the [edit](super::edits). Others begin with 0. Each has the hash of the world that it leads to. The game's
 //! data up to the last of them follows.
 
+#[cfg(feature = "store")]
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::bytes::{Reader, put_bytes, put_number, put_signed};
 use super::change::{put_change, read_change};
-use super::edits::{EditSequence, put_edit, read_edit};
+use super::contents::Stamps;
+use super::edits::{EditSequence, put_edit};
 use super::error::FormatError;
+#[cfg(feature = "store")]
+use super::ids::StampId;
 use super::plain;
+#[cfg(feature = "store")]
+use crate::brush::Content;
+use crate::brush::Edit;
 use crate::ground::Ground;
 use crate::terrain::{CommitRecord, LogEntry, Order, Patch};
 use crate::volume::DiggingRules;
@@ -36,33 +44,38 @@ impl Batch {
         self.commits.is_empty() && self.game.is_empty()
     }
 
-    /// Its bytes. Those of a commit that sets another [ground](Order::Ground) can't be read again: a log ends there.
+    /// Its bytes, with the content of edits in each of them. Those of a commit that sets another
+    /// [ground](Order::Ground) can't be read again: a log ends there.
     pub fn encode(&self) -> Vec<u8> {
-        let (mut bytes, mut edits) = (Vec::new(), EditSequence::default());
-        put_number(&mut bytes, self.commits.len() as u64);
+        let mut bytes = Vec::new();
+        self.put(&mut bytes, EditSequence::whole());
+        bytes
+    }
+
+    fn put(&self, bytes: &mut Vec<u8>, mut edits: EditSequence) {
+        put_number(bytes, self.commits.len() as u64);
         let mut revision = self.commits.first().map_or(0, |first| first.revision.wrapping_sub(1));
-        put_number(&mut bytes, revision);
+        put_number(bytes, revision);
         for commit in &self.commits {
             match &*commit.entries {
                 [LogEntry::Order(Order::Edit(edit))] if commit.revision == revision.wrapping_add(1) => {
                     let at = bytes.len();
-                    put_edit(&mut bytes, edit, &mut edits);
+                    put_edit(bytes, edit, &mut edits);
                     if let Some(head) = bytes.get_mut(at) {
                         *head = *head << 1 | 1;
                     }
                 }
-                _ => put_commit(&mut bytes, commit, revision, &mut edits),
+                _ => put_commit(bytes, commit, revision, &mut edits),
             }
             bytes.extend_from_slice(&commit.hash.to_le_bytes());
             revision = commit.revision;
         }
-        put_number(&mut bytes, self.game.len() as u64);
+        put_number(bytes, self.game.len() as u64);
         for (key, value) in &self.game {
-            put_bytes(&mut bytes, key.as_bytes());
+            put_bytes(bytes, key.as_bytes());
             bytes.push(value.is_some().into());
-            value.iter().for_each(|value| put_bytes(&mut bytes, value));
+            value.iter().for_each(|value| put_bytes(bytes, value));
         }
-        bytes
     }
 
     /// Reads what [`encode`](Self::encode) wrote, over the ground of the world.
@@ -70,13 +83,18 @@ impl Batch {
     /// # Errors
     /// When anything is invalid. Memory is taken by the length of `bytes`.
     pub fn decode(bytes: &[u8], ground: &Ground) -> Result<Self, FormatError> {
-        let (mut reader, mut edits) = (Reader(bytes), EditSequence::default());
+        let mut edits =
+            EditReader { sequence: EditSequence::whole(), contents: &Stamps::default(), is_partial: false };
+        Self::read(Reader(bytes), &mut edits, ground)
+    }
+
+    fn read(mut reader: Reader, edits: &mut EditReader, ground: &Ground) -> Result<Self, FormatError> {
         let (count, mut revision) = (reader.count()?, reader.number()?);
         let mut batch = Self::default();
         for _ in 0..count {
             let head = reader.byte()?;
             let mut commit = match head {
-                0 => read_commit(&mut reader, revision, &mut edits, ground)?,
+                0 => read_commit(&mut reader, revision, edits, ground)?,
                 odd if odd & 1 == 1 => {
                     let entries = vec![LogEntry::Order(Order::Edit(edits.read(head >> 1, &mut reader)?))];
                     let (revision, change) = (revision.wrapping_add(1), Patch::default());
@@ -100,6 +118,87 @@ impl Batch {
         reader.end()?;
         Ok(batch)
     }
+}
+
+/// With names in place of content, as journals have it.
+#[cfg(feature = "store")]
+impl Batch {
+    /// Its bytes like those of [`encode`](Self::encode), but with names in the place of content: all names come first,
+    /// where [`names`](Self::names) finds them.
+    pub(crate) fn encode_named(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let names: Vec<StampId> =
+            self.contents().map(|(name, _)| name).collect::<BTreeSet<_>>().into_iter().collect();
+        put_number(&mut bytes, names.len() as u64);
+        names.iter().for_each(|name| bytes.extend_from_slice(&name.0.to_le_bytes()));
+        self.put(&mut bytes, EditSequence::with_names(names));
+        bytes
+    }
+
+    /// The content of its edits, each as often as an edit has it.
+    pub(crate) fn contents(&self) -> impl Iterator<Item = (StampId, Content<'_>)> {
+        let entries = self.commits.iter().flat_map(|commit| &commit.entries);
+        let edits = entries.filter_map(|entry| match entry {
+            LogEntry::Order(Order::Edit(edit)) => Some(edit),
+            _ => None,
+        });
+        edits.flat_map(|edit| edit.contents()).map(|content| (StampId::of_content(content), content))
+    }
+
+    /// A table of the content of its edits.
+    pub(crate) fn table(&self) -> Stamps {
+        let mut contents = Stamps::default();
+        self.contents().for_each(|(_, content)| contents.add_content(content));
+        contents
+    }
+
+    /// The names with which the bytes of [`encode_named`](Self::encode_named) begin.
+    pub(crate) fn names(bytes: &[u8]) -> Result<Vec<StampId>, FormatError> {
+        read_names(&mut Reader(bytes))
+    }
+
+    /// Reads what [`encode_named`](Self::encode_named) wrote, with the content of a table in place of names.
+    ///
+    /// # Errors
+    /// When anything is invalid, or [`FormatError::ContentMissing`].
+    pub(crate) fn decode_named(
+        bytes: &[u8],
+        ground: &Ground,
+        contents: &Stamps,
+    ) -> Result<Self, FormatError> {
+        let mut reader = Reader(bytes);
+        let sequence = EditSequence::with_names(read_names(&mut reader)?);
+        Self::read(reader, &mut EditReader { sequence, contents, is_partial: false }, ground)
+    }
+
+    /// Reads what [`encode_named`](Self::encode_named) wrote, with placeholders in place of content.
+    pub(crate) fn decode_without_content(bytes: &[u8], ground: &Ground) -> Result<Self, FormatError> {
+        let mut reader = Reader(bytes);
+        let sequence = EditSequence::with_names(read_names(&mut reader)?);
+        let mut edits = EditReader { sequence, contents: &Stamps::default(), is_partial: true };
+        Self::read(reader, &mut edits, ground)
+    }
+}
+
+/// Reads the edits of a batch.
+struct EditReader<'a> {
+    sequence: EditSequence,
+    contents: &'a Stamps,
+    /// Whether edits without their content are accepted.
+    is_partial: bool,
+}
+
+impl EditReader<'_> {
+    fn read(&mut self, head: u8, reader: &mut Reader) -> Result<Edit, FormatError> {
+        let resolved = self.sequence.read(head, reader, self.contents)?;
+        if self.is_partial { Ok(resolved.edit) } else { resolved.whole() }
+    }
+}
+
+#[cfg(feature = "store")]
+fn read_names(reader: &mut Reader) -> Result<Vec<StampId>, FormatError> {
+    let count = reader.count()?;
+    (0..count).map(|_| Ok(StampId(u64::from_le_bytes(reader.array()?)))).collect()
 }
 
 /// Appends a commit of any kind but for its hash.
@@ -139,7 +238,7 @@ fn put_commit(to: &mut Vec<u8>, commit: &CommitRecord, before: u64, edits: &mut 
 fn read_commit(
     reader: &mut Reader,
     before: u64,
-    edits: &mut EditSequence,
+    edits: &mut EditReader,
     ground: &Ground,
 ) -> Result<CommitRecord, FormatError> {
     let revision = before.wrapping_add(reader.signed()?.cast_unsigned());
@@ -154,7 +253,10 @@ fn read_commit(
                 let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
                 LogEntry::Order(Order::Loose(loose))
             }
-            EDIT => LogEntry::Order(Order::Edit(read_edit(reader, edits)?)),
+            EDIT => {
+                let head = reader.byte()?;
+                LogEntry::Order(Order::Edit(edits.read(head, reader)?))
+            }
             CHANGE => LogEntry::Change,
             GROUND => return Err(FormatError::Invalid("commit: it sets another ground, which no log holds")),
             _ => return Err(FormatError::Invalid("entry of a commit")),

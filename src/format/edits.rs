@@ -2,9 +2,14 @@
 //!
 //! The serialised form of an [`Edit`] is cut into shape, middle, what lies between, tag and stroke. Bits of a head say
 //! which of them are as before; it is below 128. Reading joins them again and deserialises the result, which checks it.
+//!
+//! An edit with content, such as a stamp, is [`NAMED`]: it has placeholders, and the names of its content follow. Earlier
+//! journals and portable worlds hold content whole.
 
-use super::bytes::{Reader, put_bytes, put_signed};
+use super::bytes::{Reader, put_bytes, put_number, put_signed};
+use super::contents::{Resolved, Stamps, named};
 use super::error::FormatError;
+use super::ids::StampId;
 use super::plain;
 use crate::brush::Edit;
 
@@ -22,6 +27,10 @@ const OTHER_STROKE: u8 = 16;
 const NO_STROKE: u8 = 32;
 /// Not a difference: the serialised edit follows.
 const SERIALIZED: u8 = 64;
+
+/// Names follow the head and the rest of an edit with placeholders. Each is 0 and 8 bytes where it comes for the first
+/// time in its sequence, and else a number from 1 among those that have come.
+const NAMED: u8 = 65;
 
 /// Longer parts are never repeated by a bit, so that few bytes can't take much memory.
 const LONGEST_REST: usize = 64;
@@ -61,11 +70,87 @@ impl Parts {
 #[derive(Clone, Debug, Default)]
 pub struct EditSequence {
     last: Parts,
+    /// Names that have come.
+    names: Vec<StampId>,
+    /// Whether content is written whole, in place of its name.
+    is_whole: bool,
 }
 
 impl EditSequence {
+    /// A sequence of edits that hold their content whole.
+    pub fn whole() -> Self {
+        Self { is_whole: true, ..Self::default() }
+    }
+
+    /// A sequence in which these names have come.
+    #[cfg(feature = "store")]
+    pub fn with_names(names: Vec<StampId>) -> Self {
+        Self { names, ..Self::default() }
+    }
+
     /// Appends the next edit to `to`, and returns its head.
     pub fn put(&mut self, to: &mut Vec<u8>, edit: &Edit) -> u8 {
+        if self.is_whole || edit.contents().next().is_none() {
+            return self.put_whole(to, edit);
+        }
+        let (names, edit) = named(edit);
+        let at = to.len();
+        to.push(0);
+        let head = self.put_whole(to, &edit);
+        if let Some(place) = to.get_mut(at) {
+            *place = head;
+        }
+        for name in names {
+            match self.names.iter().position(|known| *known == name) {
+                Some(place) => put_number(to, place as u64 + 1),
+                None => {
+                    put_number(to, 0);
+                    to.extend_from_slice(&name.0.to_le_bytes());
+                    self.names.push(name);
+                }
+            }
+        }
+        NAMED
+    }
+
+    /// Reads the next edit, whose head was read already, with the content of a table in place of names.
+    pub fn read(
+        &mut self,
+        head: u8,
+        reader: &mut Reader,
+        contents: &Stamps,
+    ) -> Result<Resolved, FormatError> {
+        let is_named = head == NAMED;
+        if is_named && self.is_whole {
+            return Err(FormatError::Invalid("head of an edit"));
+        }
+        let head = if is_named { reader.byte()? } else { head };
+        let edit = self.read_whole(head, reader)?;
+        let count = edit.contents().count();
+        if !is_named {
+            return match count == 0 || self.is_whole {
+                true => Ok(Resolved { edit, missing: Vec::new(), refused: None }),
+                false => Err(FormatError::Invalid("edit: content without a name")),
+            };
+        }
+        if count == 0 {
+            return Err(FormatError::Invalid("edit: a name without content"));
+        }
+        let names = (0..count).map(|_| self.read_name(reader)).collect::<Result<Vec<_>, _>>()?;
+        contents.resolve(edit, &names)
+    }
+
+    fn read_name(&mut self, reader: &mut Reader) -> Result<StampId, FormatError> {
+        let Some(place) = reader.number()?.checked_sub(1) else {
+            let name = StampId(u64::from_le_bytes(reader.array()?));
+            self.names.push(name);
+            return Ok(name);
+        };
+        let name = usize::try_from(place).ok().and_then(|place| self.names.get(place));
+        name.copied().ok_or(FormatError::Invalid("name of content"))
+    }
+
+    fn put_whole(&mut self, to: &mut Vec<u8>, edit: &Edit) -> u8 {
         let serialized = plain::to_bytes(edit);
         let Some(new) = Parts::of(edit, &serialized) else {
             put_bytes(to, &serialized);
@@ -103,8 +188,7 @@ impl EditSequence {
         head
     }
 
-    /// Reads the next edit, whose head was read already.
-    pub fn read(&mut self, head: u8, reader: &mut Reader) -> Result<Edit, FormatError> {
+    fn read_whole(&mut self, head: u8, reader: &mut Reader) -> Result<Edit, FormatError> {
         if head == SERIALIZED {
             return edit(reader.bytes()?);
         }
@@ -159,10 +243,4 @@ pub fn put_edit(to: &mut Vec<u8>, edit: &Edit, sequence: &mut EditSequence) {
     if let Some(place) = to.get_mut(at) {
         *place = head;
     }
-}
-
-/// Reads what [`put_edit`] appended.
-pub fn read_edit(reader: &mut Reader, sequence: &mut EditSequence) -> Result<Edit, FormatError> {
-    let head = reader.byte()?;
-    sequence.read(head, reader)
 }

@@ -27,8 +27,11 @@ pub use super::ids::{Kind, WorldId};
 /// How every frame begins.
 pub const MAGIC: [u8; 4] = *b"\xB5BRW";
 
-/// The schema that is written. Older ones can be read; newer ones are refused.
-pub const SCHEMA: u32 = 1;
+/// The newest schema that can be read. Older ones can be read too; newer ones are refused.
+pub const SCHEMA: u32 = 2;
+
+/// The schema of levels, and of all frames but those that name content.
+pub const PLAIN: u32 = 1;
 
 /// Content is packed by at most this factor.
 const MAX_PACKED: usize = 255;
@@ -46,6 +49,9 @@ pub struct Opened {
     pub revision: u64,
     /// The hash of the ground that it was sealed with, or 0.
     pub ground_hash: u64,
+    /// Whether its content names [other content](super::contents), as since schema 2.
+    #[cfg_attr(not(feature = "store"), allow(dead_code, reason = "for journals"))]
+    pub is_named: bool,
     /// Its content.
     pub payload: Vec<u8>,
 }
@@ -70,18 +76,37 @@ pub fn seal(
     ground_hash: u64,
     payload: &[u8],
 ) -> Vec<u8> {
+    let packed = packed(payload);
+    sealed(PLAIN, kind, world, key, revision, ground_hash, payload, packed.as_deref())
+}
+
+/// Like [`seal`], for a payload that names content: versions that can't read names refuse it as newer.
+#[cfg(feature = "store")]
+pub fn seal_named(
+    kind: Kind,
+    world: WorldId,
+    key: &[u8],
+    revision: u64,
+    ground_hash: u64,
+    payload: &[u8],
+) -> Vec<u8> {
+    let packed = packed(payload);
+    sealed(SCHEMA, kind, world, key, revision, ground_hash, payload, packed.as_deref())
+}
+
+/// The payload compressed, if that makes it smaller.
+fn packed(payload: &[u8]) -> Option<Vec<u8>> {
     let packed = lz4_flex::block::compress(payload);
-    let is_smaller = packed.len() + 4 < payload.len();
-    let packed = is_smaller.then_some(&*packed);
-    sealed(kind, world, key, revision, ground_hash, payload, packed)
+    (packed.len() + 4 < payload.len()).then_some(packed)
 }
 
 /// Seals a payload without compression, for payloads that are compressed or compared elsewhere.
 pub fn seal_unpacked(kind: Kind, world: WorldId, key: &[u8], ground_hash: u64, payload: &[u8]) -> Vec<u8> {
-    sealed(kind, world, key, 0, ground_hash, payload, None)
+    sealed(PLAIN, kind, world, key, 0, ground_hash, payload, None)
 }
 
 fn sealed(
+    schema: u32,
     kind: Kind,
     world: WorldId,
     key: &[u8],
@@ -95,7 +120,7 @@ fn sealed(
     frame.extend_from_slice(&MAGIC);
     let packed_flag = if packed.is_some() { PACKED } else { 0 };
     let flags = packed_flag | if ground_hash != 0 { GROUND } else { 0 };
-    frame.extend_from_slice(&[SCHEMA as u8, kind as u8, flags]);
+    frame.extend_from_slice(&[schema as u8, kind as u8, flags]);
     frame.extend_from_slice(&world.0.to_le_bytes());
     put_bytes(&mut frame, key);
     put_number(&mut frame, revision);
@@ -150,7 +175,7 @@ fn split_schema(bytes: &[u8]) -> Result<(u8, &[u8]), FormatError> {
 /// The unchecked header of a frame at the front of `bytes`; `None` if no frame that this version can read begins there.
 pub fn peek(bytes: &[u8]) -> Option<Peeked<'_>> {
     let (schema, rest) = split_schema(bytes).ok()?;
-    let (parts, after) = (u32::from(schema) == SCHEMA).then(|| parts(rest))?.ok()?;
+    let (parts, after) = (PLAIN..=SCHEMA).contains(&u32::from(schema)).then(|| parts(rest))?.ok()?;
     let length = bytes.len() - after.len() + CHECKSUM;
     (length <= bytes.len()).then_some(Peeked { world: parts.world, key: parts.key, length })
 }
@@ -191,7 +216,7 @@ pub fn open_any_world(
     if schema > SCHEMA {
         return Err(FormatError::Newer { found: schema, known: SCHEMA });
     }
-    if schema < SCHEMA {
+    if schema < PLAIN {
         return Err(FormatError::Invalid("schema"));
     }
     let (parts, after) = parts(rest)?;
@@ -206,7 +231,7 @@ pub fn open_any_world(
     }
     let payload = unpacked(&parts, limit)?;
     let Parts { world, revision, ground_hash, .. } = parts;
-    Ok((world, Opened { revision, ground_hash, payload }))
+    Ok((world, Opened { revision, ground_hash, is_named: schema > PLAIN, payload }))
 }
 
 /// The content.

@@ -1,4 +1,4 @@
-//! What a frame contains, and of which world.
+//! What a frame contains, and of which world; names of content.
 
 use std::fmt;
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -26,6 +26,8 @@ pub enum Kind {
     RegionChange,
     /// A prefab.
     Prefab,
+    /// An image of a stamp or of a grid.
+    Image,
 }
 
 /// Identifies a world uniquely.
@@ -46,3 +48,7 @@ impl fmt::Display for WorldId {
         write!(f, "{:032x}", self.0)
     }
 }
+
+/// Identifies an image or a prefab by its content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct StampId(pub u64);

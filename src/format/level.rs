@@ -106,7 +106,7 @@ pub fn write_level(level: &Level) -> Result<LevelFiles, FormatError> {
 
 pub(super) fn write_within(level: &Level, limits: &Limits) -> Result<LevelFiles, FormatError> {
     let description = Description {
-        burrow_level: frame::SCHEMA,
+        burrow_level: frame::PLAIN,
         simulation: SIMULATION,
         settings: level.settings,
         ground: format!("{:016x}", level.ground),
@@ -182,8 +182,8 @@ fn read_description(json: &[u8]) -> Result<Description, FormatError> {
     }
     let invalid = |error| file_error(LEVEL_JSON, error);
     let Schema { burrow_level: found } = serde_json::from_slice(json).map_err(invalid)?;
-    if found > frame::SCHEMA {
-        return Err(FormatError::Newer { found, known: frame::SCHEMA });
+    if found > frame::PLAIN {
+        return Err(FormatError::Newer { found, known: frame::PLAIN });
     }
     serde_json::from_slice(json).map_err(invalid)
 }

@@ -7,6 +7,7 @@
 //! | `region`, `bricks`, `fields` | a region's record |
 //! | `predict`, `residuals` | densities of bricks |
 //! | `batch`, `edits`, `change` | commits, for journals |
+//! | `contents` | images and prefabs that edits name |
 //! | `metadata` | a world without its regions |
 //! | `portable` | a whole world as one file |
 //! | `prefab` | a prefab as a file |
@@ -21,6 +22,11 @@ pub(crate) mod bricks;
 pub(crate) mod bytes;
 pub(crate) mod change;
 pub(crate) mod container;
+#[cfg_attr(
+    not(all(feature = "net", feature = "store")),
+    allow(dead_code, reason = "for messages and journals")
+)]
+pub(crate) mod contents;
 pub(crate) mod edits;
 pub(crate) mod error;
 pub(crate) mod fields;

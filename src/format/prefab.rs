@@ -1,5 +1,7 @@
 //! Prefabs as files, `.prefab`.
 
+use std::sync::Arc;
+
 use super::error::FormatError;
 use super::frame::{self, Kind, WorldId};
 use super::plain;
@@ -14,7 +16,14 @@ const LIMIT: usize = 12 * MAX_PREFAB_SAMPLES as usize + 64;
 
 /// The bytes of a prefab's file: packed, with a checksum and the number of the format. Equal prefabs give equal bytes.
 pub fn write_prefab(prefab: &Prefab) -> Vec<u8> {
-    frame::seal(Kind::Prefab, WorldId::default(), KEY, 0, 0, &plain::to_bytes(prefab))
+    packed_prefab(prefab).to_vec()
+}
+
+/// The bytes of a prefab's file, which are made once for each prefab.
+pub(crate) fn packed_prefab(prefab: &Prefab) -> &Arc<[u8]> {
+    let pack =
+        |prefab: &Prefab| frame::seal(Kind::Prefab, WorldId::default(), KEY, 0, 0, &plain::to_bytes(prefab));
+    prefab.packed(pack)
 }
 
 /// Reads what [`write_prefab`] wrote.

@@ -1,6 +1,7 @@
 //! Grey images, the form in which artists and surveys deliver heights and masks.
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use super::MAX_SIZE;
 use super::error::ImageError;
@@ -72,12 +73,23 @@ impl ImageLimits {
 /// A grey image: at least one sample, row by row from the top, each 0 (black) to 65535 (white).
 ///
 /// Samples of 8 bits are widened by 257, so v becomes exactly v/255 of full scale.
-#[derive(Clone, PartialEq, Eq)]
+#[derive(Clone)]
 pub struct GreyImage {
     width: u32,
     height: u32,
     samples: Vec<u16>,
+    /// A hash of all of it, once somebody needed it.
+    #[cfg_attr(not(feature = "format"), allow(dead_code, reason = "for names of content"))]
+    hash: OnceLock<u64>,
 }
+
+impl PartialEq for GreyImage {
+    fn eq(&self, other: &Self) -> bool {
+        (self.width, self.height) == (other.width, other.height) && self.samples == other.samples
+    }
+}
+
+impl Eq for GreyImage {}
 
 impl GreyImage {
     /// An image of `width` x `height` samples, row by row, each 0 to 65535.
@@ -91,7 +103,7 @@ impl GreyImage {
         if actual != expected {
             return Err(ImageError::Length { width, height, unit: "samples", expected, actual });
         }
-        Ok(Self { width, height, samples })
+        Ok(Self { width, height, samples, hash: OnceLock::new() })
     }
 
     /// Reads headerless 16-bit samples, row by row from the top.
@@ -118,6 +130,22 @@ impl GreyImage {
             RawFormat::BigEndian => u16::from_be_bytes,
         };
         Self::from_samples(width, height, pairs.iter().map(|&pair| sample(pair)).collect())
+    }
+
+    /// An image of 2 x 2 black samples, which stands for one that is named.
+    pub(crate) fn placeholder() -> Self {
+        Self { width: 2, height: 2, samples: vec![0; 4], hash: OnceLock::new() }
+    }
+
+    /// Whether it equals the [placeholder](Self::placeholder).
+    pub(crate) fn is_placeholder(&self) -> bool {
+        (self.width, self.height) == (2, 2) && self.samples == [0; 4]
+    }
+
+    /// A hash of its content, which `hash` computes where nobody has needed it yet.
+    #[cfg(feature = "format")]
+    pub(crate) fn hash_with(&self, hash: impl FnOnce(&Self) -> u64) -> u64 {
+        *self.hash.get_or_init(|| hash(self))
     }
 
     /// Samples in a row, at least 1.

@@ -82,7 +82,7 @@ impl Ground {
         window.unwrap_or_else(|| std::array::from_fn(|z| std::array::from_fn(|x| height(x, z))))
     }
 
-    /// Fills in the heights of rows of so many columns, from `low` on, 8x8 columns of a page at once.
+    /// Fills in the heights of rows of `width` columns, from `low` on, 8x8 columns of a page at once.
     pub(super) fn fill_heights_on_demand(&self, low: Column, width: usize, heights: &mut [i32]) {
         let depth = heights.len() / width.max(1);
         let blocks = |low: i32, count: usize| low >> 3..=(low + count as i32 - 1) >> 3;

@@ -256,7 +256,7 @@ impl Ground {
         std::array::from_fn(|z| row(z).unwrap_or([0; N]))
     }
 
-    /// Fills in the heights of rows of so many columns, from `low` on: what [`Self::height`] gives for each.
+    /// Fills in the heights of rows of `width` columns, from `low` on: what [`Self::height`] gives for each.
     pub(crate) fn fill_heights(&self, low: Column, width: usize, heights: &mut [i32]) {
         if self.heights.is_empty() {
             return self.fill_heights_on_demand(low, width, heights);

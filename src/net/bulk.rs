@@ -1,8 +1,8 @@
 //! The bulk lane: a sequence of messages as one stream of bytes, which the server cuts into pieces according to its
 //! limits.
 
+use super::Stamps;
 use super::message::{MAX_TO_CLIENT, ToClient};
-use super::stamps::Stamps;
 use crate::format::FormatError;
 use crate::format::bytes::{Reader, put_bytes};
 use crate::ground::Ground;

@@ -4,18 +4,20 @@
 //! Reading any bytes gives a message or a [`FormatError`]: nothing panics, and memory is bounded by the length of
 //! the input, which has its own limits.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::message::*;
-use super::stamps::{StampId, Stamps};
-use crate::brush::{Edit, Prefab};
+use super::{StampId, Stamps};
+use crate::brush::Edit;
 use crate::format::bytes::{Reader, put_bytes, put_number};
 use crate::format::change::{put_change, read_change};
+use crate::format::contents::{Resolved, put_image, read_image};
 use crate::format::edits::EditSequence;
 use crate::format::fields::{point, put_point};
-use crate::format::{FormatError, WorldId, decode_region, encode_region, plain, read_prefab, write_prefab};
-use crate::ground::{GreyImage, Ground};
+use crate::format::prefab::packed_prefab;
+use crate::format::{FormatError, WorldId, decode_region, encode_region, plain, read_prefab};
+use crate::ground::Ground;
 use crate::lattice::RegionPos;
 use crate::terrain::Order;
 use crate::volume::DiggingRules;
@@ -52,7 +54,6 @@ const RULES: u8 = 128;
 const LOOSE: u8 = 129;
 const PARTS: u8 = 130;
 const MARK: u8 = 131;
-const STAMP: u8 = 132;
 
 const LOG: u8 = 0;
 const REGIONS: u8 = 1;
@@ -135,16 +136,19 @@ impl ToServer {
     /// When anything is invalid, longer than it may be, or a stamp has an image that the list lacks.
     pub fn from_bytes(bytes: &[u8], stamps: &Stamps) -> Result<Self, FormatError> {
         match Self::read(bytes, stamps)? {
-            (message, unknown) if unknown.is_empty() => Ok(message),
+            (message, refused) if refused.is_empty() => Ok(message),
             _ => Err(FormatError::Invalid("image of a stamp")),
         }
     }
 
-    /// Reads a message from a client. Edits whose stamps have images that the list lacks get another image; their
-    /// positions in the message are returned too.
-    pub(super) fn read(bytes: &[u8], stamps: &Stamps) -> Result<(Self, Vec<usize>), FormatError> {
+    /// Reads a message from a client. Edits with content that the list lacks, and those that are beyond the limits of
+    /// edits, have placeholders; their positions in the message are returned too.
+    pub(super) fn read(
+        bytes: &[u8],
+        stamps: &Stamps,
+    ) -> Result<(Self, BTreeMap<usize, Refusal>), FormatError> {
         within(bytes.len(), MAX_TO_SERVER)?;
-        let (mut reader, mut unknown) = (Reader(bytes), Vec::new());
+        let (mut reader, mut refused) = (Reader(bytes), BTreeMap::new());
         let message = match reader.byte()? {
             HELLO => Self::Hello(read_hello(&mut reader)?),
             GREETING => Self::Greeting { stream: reader.number()?, hello: read_hello(&mut reader)? },
@@ -154,8 +158,12 @@ impl ToServer {
                 let (mut edits, mut coder) = (Vec::with_capacity(count), EditSequence::default());
                 for place in 0..count {
                     let head = reader.byte()?;
-                    let read = read_edit(&mut reader, head, stamps, &mut coder, |_| Ok(()))?;
-                    unknown.extend(read.missing.map(|_| place));
+                    let read = coder.read(head, &mut reader, stamps)?;
+                    let why = match read.refused {
+                        Some(_) => Some(Refusal::TooLarge),
+                        None => read.missing.first().map(|_| Refusal::UnknownStamp),
+                    };
+                    refused.extend(why.map(|why| (place, why)));
                     edits.push(read.edit);
                 }
                 Self::Edits { first, edits }
@@ -176,7 +184,7 @@ impl ToServer {
             _ => return Err(FormatError::Invalid("tag of a message")),
         };
         reader.end()?;
-        Ok((message, unknown))
+        Ok((message, refused))
     }
 }
 
@@ -256,13 +264,11 @@ impl ToClient {
             Self::Greet => to.push(GREET),
             Self::Image(image) => {
                 to.push(IMAGE);
-                put_number(&mut to, image.width().into());
-                put_number(&mut to, image.height().into());
-                image.samples().iter().for_each(|sample| to.extend_from_slice(&sample.to_le_bytes()));
+                put_image(&mut to, image);
             }
             Self::Prefab(prefab) => {
                 to.push(PREFAB);
-                to.extend_from_slice(&write_prefab(prefab));
+                to.extend_from_slice(packed_prefab(prefab));
             }
         }
         to
@@ -340,17 +346,6 @@ impl ToClient {
     }
 }
 
-fn read_image(reader: &mut Reader) -> Result<Arc<GreyImage>, FormatError> {
-    let [width, height] = [small(reader)?, small(reader)?];
-    let (samples, rest) = std::mem::take(&mut reader.0).as_chunks();
-    if !rest.is_empty() {
-        return Err(FormatError::Invalid("image"));
-    }
-    let samples = samples.iter().map(|sample| u16::from_le_bytes(*sample)).collect();
-    let image = GreyImage::from_samples(width, height, samples);
-    image.map(Arc::new).map_err(|_| FormatError::Invalid("image"))
-}
-
 fn within(length: usize, limit: usize) -> Result<(), FormatError> {
     if length <= limit {
         Ok(())
@@ -382,65 +377,13 @@ fn at_place<T: Copy>(all: &[T], place: u8) -> Result<T, FormatError> {
 
 /// Appends an edit; `before` stands between its head and the rest.
 fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, coder: &mut EditSequence) {
-    let image = edit.stamp_image().map(|image| StampId::of(image));
-    let name = image.or_else(|| edit.prefab().map(|prefab| StampId::of_prefab(prefab)));
-    let unnamed = name.and_then(|name| {
-        to.push(STAMP);
-        to.extend_from_slice(&name.0.to_le_bytes());
-        let edit = edit.clone().with_prefab(Arc::new(Prefab::placeholder()));
-        edit.with_stamp_image(no_image()?).ok()
-    });
     let at = to.len();
     to.push(0);
     before.iter().for_each(|&number| put_number(to, number));
-    let head = coder.put(to, unnamed.as_ref().unwrap_or(edit));
+    let head = coder.put(to, edit);
     if let Some(place) = to.get_mut(at) {
         *place = head;
     }
-}
-
-/// An edit as it was read.
-struct ReadEdit<T> {
-    /// The data in between.
-    before: T,
-    edit: Edit,
-    /// The image of its stamp or its prefab, if it is missing: the edit has another one then.
-    missing: Option<StampId>,
-}
-
-/// Reads what [`put_edit`] appended after the first byte; `before` reads what stands between.
-fn read_edit<T>(
-    reader: &mut Reader,
-    head: u8,
-    stamps: &Stamps,
-    coder: &mut EditSequence,
-    before: impl FnOnce(&mut Reader) -> Result<T, FormatError>,
-) -> Result<ReadEdit<T>, FormatError> {
-    let stamp = (head == STAMP).then(|| reader.array().map(u64::from_le_bytes)).transpose()?;
-    let head = if stamp.is_some() { reader.byte()? } else { head };
-    let before = before(reader)?;
-    let edit = coder.read(head, reader)?;
-    let (edit, missing) = match (stamp.map(StampId), edit.stamp_image()) {
-        (None, None) if edit.prefab().is_none() => (edit, None),
-        (Some(id), None) if edit.prefab().is_some() => match stamps.prefab(id) {
-            Some(prefab) => (edit.with_prefab(Arc::clone(prefab)), None),
-            None => (edit, Some(id)),
-        },
-        (Some(id), Some(_)) => match stamps.get(id) {
-            Some(image) => {
-                let error = |error| FormatError::Edit(format!("{error}"));
-                (edit.with_stamp_image(Arc::clone(image)).map_err(error)?, None)
-            }
-            None => (edit, Some(id)),
-        },
-        _ => return Err(FormatError::Invalid("image of a stamp")),
-    };
-    Ok(ReadEdit { before, edit, missing })
-}
-
-/// The placeholder of a named image.
-fn no_image() -> Option<Arc<GreyImage>> {
-    GreyImage::from_samples(2, 2, vec![0; 4]).ok().map(Arc::new)
 }
 
 fn put_entry(to: &mut Vec<u8>, entry: &Entry, coder: &mut EditSequence) {
@@ -513,6 +456,48 @@ impl OrderWriter {
     }
 }
 
+/// Writes edits of a client into messages that a server reads: of at most [`MAX_EDITS`] edits and [`MAX_TO_SERVER`] bytes.
+#[derive(Debug, Default)]
+pub(super) struct EditWriter {
+    first: u64,
+    count: u64,
+    bytes: Vec<u8>,
+    coder: EditSequence,
+}
+
+impl EditWriter {
+    /// Bytes before the edits: a tag and two numbers.
+    const HEAD: usize = 1 + 10 + 10;
+
+    /// Adds an edit; returns the message before it, if the edit does not fit in or does not follow on it.
+    pub fn put(&mut self, sequence: u64, edit: &Edit) -> Option<Vec<u8>> {
+        let has_room = self.count < MAX_EDITS as u64 && sequence == self.first.wrapping_add(self.count);
+        let mut before = if has_room { None } else { self.finish() };
+        let at = self.bytes.len();
+        put_edit(&mut self.bytes, &[], edit, &mut self.coder);
+        if at > 0 && self.bytes.len() > MAX_TO_SERVER - Self::HEAD {
+            self.bytes.truncate(at);
+            before = self.finish();
+            put_edit(&mut self.bytes, &[], edit, &mut self.coder);
+        }
+        if self.count == 0 {
+            self.first = sequence;
+        }
+        self.count += 1;
+        before
+    }
+
+    /// The message with the edits added since the last one, if there are any.
+    pub fn finish(&mut self) -> Option<Vec<u8>> {
+        let Self { first, count, bytes, .. } = std::mem::take(self);
+        let mut message = vec![EDITS];
+        put_number(&mut message, first);
+        put_number(&mut message, count);
+        message.extend(bytes);
+        (count > 0).then_some(message)
+    }
+}
+
 /// Compresses a message to a client, if that makes it shorter.
 pub(super) fn pack(message: &[u8]) -> Vec<u8> {
     if message.len() > MAX_PACKED {
@@ -543,7 +528,7 @@ fn read_entry(
     ground: &Ground,
     stamps: &Stamps,
     coder: &mut EditSequence,
-) -> Result<(Entry, Option<StampId>), FormatError> {
+) -> Result<(Entry, Vec<StampId>), FormatError> {
     let entry = match reader.byte()? {
         RULES => Entry::of_server(Order::Rules(read_rules(reader.bytes()?)?.map(Arc::new))),
         LOOSE => {
@@ -559,13 +544,15 @@ fn read_entry(
         }
         MARK => Entry::HashCheck,
         head => {
-            let from = |reader: &mut Reader| Ok((ClientId(reader.number()?), reader.number()?));
-            let ReadEdit { before: (author, sequence), edit, missing } =
-                read_edit(reader, head, stamps, coder, from)?;
+            let (author, sequence) = (ClientId(reader.number()?), reader.number()?);
+            let Resolved { edit, missing, refused } = coder.read(head, reader, stamps)?;
+            if let Some(error) = refused {
+                return Err(FormatError::Edit(error.to_string()));
+            }
             return Ok((Entry::of(author, sequence, Order::Edit(edit)), missing));
         }
     };
-    Ok((entry, None))
+    Ok((entry, Vec::new()))
 }
 
 fn read_rules(bytes: &[u8]) -> Result<Option<DiggingRules>, FormatError> {

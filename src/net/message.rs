@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use glam::IVec3;
 
-use super::stamps::StampId;
+use super::StampId;
 use crate::brush::{Edit, Prefab};
 use crate::format::WorldId;
 use crate::ground::GreyImage;
@@ -38,7 +38,7 @@ use crate::terrain::{LooseSettings, Order, Patch};
 use crate::volume::{Brick, DiggingRules, Fields};
 
 /// The version of the protocol. It changes whenever the encoding of messages does.
-pub const PROTOCOL: u32 = 4;
+pub const PROTOCOL: u32 = 5;
 
 /// Most bytes of a message to a server.
 pub const MAX_TO_SERVER: usize = 64 << 10;
@@ -373,7 +373,7 @@ pub enum Refusal {
     /// Other players have changed the same parts since.
     #[error("others have dug there since")]
     Touched,
-    /// The parts that it would restore are too large for a message.
+    /// It is larger than edits may be, or than a message may be.
     #[error("too large")]
     TooLarge,
     /// The edit arrived before the client had joined.

@@ -8,7 +8,6 @@
 //! | --- | --- |
 //! | [`message`] | messages between client and server |
 //! | `encoding` | the binary encoding of messages |
-//! | `stamps` | images of stamps, which are named, and sent to clients that lack them |
 //! | `bulk` | the bulk lane: regions and old entries, as one stream that is cut into pieces |
 //! | `regions` | regions as they are compared and sent |
 //! | `price`, `bucket` | the costs of edits, and their budget |
@@ -65,8 +64,11 @@ mod price;
 mod regions;
 mod replica;
 pub mod server;
-mod stamps;
 
+#[doc(inline)]
+pub use crate::format::contents::Stamps;
+#[doc(inline)]
+pub use crate::format::ids::StampId;
 use crate::terrain::{Meshing, Terrain, WorkLimits};
 pub use bucket::Rate;
 #[doc(hidden)]
@@ -88,7 +90,6 @@ pub use server::{
     Admission, Outgoing, Permission, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
     UnknownStamp,
 };
-pub use stamps::{StampId, Stamps};
 
 /// Prepares a terrain that is never shown: it builds no meshes, keeps no history, and accepts all work.
 fn never_shown(terrain: &mut Terrain) {

@@ -2,8 +2,8 @@
 //! them.
 
 use crate::brush::Edit;
-use crate::edits::reach;
-use crate::lattice::{BrickPos, ChunkGrid};
+use crate::edits::most_bricks;
+use crate::lattice::ChunkGrid;
 
 /// The fixed cost of every edit.
 const EDIT: u64 = 20;
@@ -21,7 +21,5 @@ pub const MAX_UNDO_BYTES: usize = 1 << 20;
 /// of the world.
 pub fn cost(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     let weight = if edit.blend().is_some() { SCULPTED } else { 1 };
-    let around = BrickPos::range(reach(grid, edit)?).volume();
-    let bricks = edit.most_bricks().map_or(around, |most| most.min(around));
-    Some(EDIT + weight * bricks)
+    Some(EDIT + weight * most_bricks(grid, edit)?)
 }

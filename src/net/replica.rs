@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::message::{Entry, RuleState};
 use super::never_shown;
 use super::regions::{RegionSums, Steps, chunks_of, touched_regions};
-use crate::brush::Edit;
+use crate::brush::{Edit, Evaluator};
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{
@@ -23,6 +23,25 @@ type Stored = Option<Arc<Brick>>;
 
 /// An edit reads at most this many voxels beyond the samples that it may change.
 const MARGIN: i32 = 8;
+
+/// The samples that a pending edit may read.
+struct Reads {
+    around: LatticeBox,
+    /// Of an edit whose box is mostly empty, such as a long path.
+    evaluator: Option<Evaluator>,
+}
+
+impl Reads {
+    fn of(edit: &Edit) -> Self {
+        let evaluator = edit.most_bricks().map(|_| edit.evaluator());
+        Self { around: edit.reach().grown(MARGIN), evaluator }
+    }
+
+    fn meets(&self, samples: LatticeBox) -> bool {
+        let Some(samples) = self.around.intersection(samples) else { return false };
+        self.evaluator.as_ref().is_none_or(|evaluator| !evaluator.is_out_of_reach(samples.grown(MARGIN)))
+    }
+}
 
 /// With at least this many pending edits, the shown world is kept as a separate terrain. A further edit is then
 /// predicted alone, and not together with all previous ones.
@@ -333,16 +352,19 @@ impl Replica {
         {
             return false;
         }
-        let reads = |edit: &Edit| edit.reach().grown(MARGIN).intersection(world.grid().edit_bounds());
-        let reads: Vec<LatticeBox> = self.pending.iter().filter_map(|pending| reads(&pending.edit)).collect();
-        let chunks: BTreeSet<ChunkPos> =
-            reads.iter().flat_map(|samples| world.grid().chunks_of(*samples)).collect();
-        let is_read = |pos: &BrickPos| reads.iter().any(|read| read.intersection(pos.samples()).is_some());
+        let reads: Vec<Reads> = self.pending.iter().map(|pending| Reads::of(&pending.edit)).collect();
+        let grid = world.grid();
+        let is_read = |samples: LatticeBox| reads.iter().any(|read| read.meets(samples));
+        let is_read_chunk = |chunk: ChunkPos| is_read(grid.chunk_samples(chunk));
         self.before
             .fields
             .keys()
-            .all(|chunk| !chunks.contains(chunk) && !self.predicted.fields.contains_key(chunk))
-            && self.before.bricks.keys().all(|pos| !is_read(pos) && !self.predicted.bricks.contains_key(pos))
+            .all(|chunk| !self.predicted.fields.contains_key(chunk) && !is_read_chunk(*chunk))
+            && self
+                .before
+                .bricks
+                .keys()
+                .all(|pos| !self.predicted.bricks.contains_key(pos) && !is_read(pos.samples()))
     }
 
     /// Updates the shown world. Returns its change, if there is one, and the receipts of the pending edits that were

@@ -3,7 +3,7 @@
 use bevy::math::{EulerRot, Quat, Vec3};
 use bevy_egui::egui::{self, Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 
-use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, STEP, TUBE};
+use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, ROAD_HEIGHT, STEP, TUBE};
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, BAD, FAINT};
 use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
@@ -55,7 +55,7 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel
     let chosen = OPERATIONS.iter().position(|row| row.tool == tool.operation).unwrap_or_default();
     let clicked = tiles(
         ui,
-        4,
+        5,
         &names,
         chosen,
         |_| true,
@@ -86,6 +86,12 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel
     if tool.operation == ToolOperation::Stamp {
         figure(ui, texts::IMAGE, tool.stamp.label());
     }
+    if tool.operation == ToolOperation::Paste {
+        ui.label(egui::RichText::new(texts::COPY_HELP).color(FAINT).size(11.0));
+        figure(ui, texts::PREFAB, tool.prefab.label());
+        switch(ui, texts::MIRRORED, &mut tool.is_mirrored);
+        switch(ui, texts::EDITS_ONLY, &mut tool.prefab.is_edits_only);
+    }
     for need in row.needs {
         match need {
             Need::Material => continue,
@@ -95,6 +101,7 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel
             Need::Amount => slider(ui, texts::AMOUNT, &mut tool.amount, AMOUNT.range(voxel), metres),
             Need::Level => slider(ui, texts::HEIGHT, &mut tool.level, -128.0..=256.0, metres),
             Need::Step => slider(ui, texts::STEP, &mut tool.step, STEP.range(voxel), metres),
+            Need::Height => slider(ui, texts::HEIGHT, &mut tool.length, ROAD_HEIGHT.range(voxel), metres),
         };
     }
 }
@@ -103,7 +110,7 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     let now = tool.fitting_shape();
     let chosen = ToolShape::ALL.iter().position(|&shape| shape == now).unwrap_or_default();
     let fits = |at: usize| ToolShape::ALL.get(at).is_some_and(|&shape| tool.operation.fits(shape));
-    let clicked = tiles(ui, 3, &texts::SHAPES, chosen, fits, |ui, at, rect, color| {
+    let clicked = tiles(ui, 4, &texts::SHAPES, chosen, fits, |ui, at, rect, color| {
         let color = if at == chosen { ACCENT } else { color };
         if let Some(&shape) = ToolShape::ALL.get(at) {
             draw_shape(ui, shape, rect, Stroke::new(1.5, color));
@@ -114,16 +121,30 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     }
     let now = tool.fitting_shape();
     let radii = RADIUS.range(voxel);
+    let turn = |ui: &mut Ui, turn: &mut f32| {
+        slider(ui, texts::TURN, turn, -180.0..=180.0, |slider| {
+            slider.step_by(15.0).max_decimals(0).suffix("°")
+        });
+    };
+    if tool.operation == ToolOperation::Paste {
+        turn(ui, &mut tool.turn);
+        return;
+    }
     if now == ToolShape::Box {
         slider(ui, texts::HALF_SIZES[0], &mut tool.half.x, radii.clone(), length);
         slider(ui, texts::HALF_SIZES[1], &mut tool.half.y, radii.clone(), length);
         slider(ui, texts::HALF_SIZES[2], &mut tool.half.z, radii, length);
-        slider(ui, texts::TURN, &mut tool.turn, -180.0..=180.0, |slider| slider.max_decimals(0).suffix("°"));
+        turn(ui, &mut tool.turn);
     } else {
         slider(ui, texts::RADIUS, &mut tool.radius, radii, length);
     }
     if now == ToolShape::Torus {
         slider(ui, texts::TUBE, &mut tool.tube, TUBE.range(voxel), length);
+    }
+    if now == ToolShape::Path {
+        switch(ui, texts::SMOOTH_PATH, &mut tool.is_smooth);
+        figure(ui, texts::PATH_POINTS, tool.points.len().to_string());
+        ui.label(egui::RichText::new(texts::PATH_HELP).color(FAINT).size(11.0));
     }
     if now.is_long() {
         slider(ui, texts::LENGTH, &mut tool.length, LENGTH.range(voxel), length);
@@ -181,5 +202,13 @@ fn draw_shape(ui: &Ui, shape: ToolShape, rect: Rect, stroke: Stroke) {
     let outline = |from, to| {
         ui.painter().line_segment([at(from), at(to)], stroke);
     };
+    if shape == ToolShape::Path {
+        let at = |step: i32| {
+            let along = step as f32 / 8.0;
+            Vec3::new(2.4 * along - 1.2, 0.6 * (4.0 * along).sin() - 0.1, 0.0)
+        };
+        (0..8).for_each(|step| outline(at(step), at(step + 1)));
+        return;
+    }
     tool.shape_around(Vec3::ZERO, Vec3::Y).outline(outline);
 }

@@ -47,7 +47,7 @@ mod world_column;
 
 pub use state::{BurrowPanel, PanelAction, PanelInput, PanelPlaces, keyboard_is_free, pointer_is_free};
 #[doc(hidden)]
-pub use tool::{BrushTool, StampImage, ToolAlign, ToolShape};
+pub use tool::{BrushTool, PATH_POINTS, StampImage, ToolAlign, ToolPrefab, ToolShape};
 pub use tool_operation::ToolOperation;
 
 use bevy::camera::RenderTarget;

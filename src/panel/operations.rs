@@ -15,8 +15,9 @@ pub(super) enum Need {
     Amount,
     Level,
     Step,
+    Height,
 }
-use Need::{Amount, Falloff, Level, Material, Step, Strength};
+use Need::{Amount, Falloff, Height, Level, Material, Step, Strength};
 
 /// A row of the table: an operation.
 pub(super) struct Row {
@@ -73,6 +74,14 @@ pub(super) const OPERATIONS: &[Row] = &[
     Row { tool: ToolOperation::Terrace, needs: &[Step, Strength, Falloff],
         profile: |x| (0.1 + 0.8 * x, 0.1 + 0.8 * (x * 3.0).round() / 3.0),
         make: |tool, _| Operation::Terrace { step: tool.step, base: 0.0 } },
+    Row { tool: ToolOperation::Road, needs: &[Height, Falloff],
+        profile: |x| (0.3 + 0.4 * x + 0.12 * (x * 14.0).sin(), 0.3 + 0.4 * (3.0 * x - 1.0).clamp(0.0, 1.0)),
+        make: |_, _| Operation::Road },
+    Row { tool: ToolOperation::Paste, needs: &[],
+        profile: |x| (0.2, if (x - 0.5).abs() < 0.25 { 0.75 } else { 0.2 }),
+        make: paste },
+    Row { tool: ToolOperation::Reset, needs: &[],
+        profile: |x| (0.6 - 0.4 * bowl(x), 0.6), make: |_, _| Operation::Reset },
 ];
 
 /// A half ellipse in the middle.
@@ -102,6 +111,14 @@ fn stamp(tool: &BrushTool, hit: &TerrainHit) -> Operation {
     }
 }
 
+/// The tool's prefab.
+fn paste(tool: &BrushTool, hit: &TerrainHit) -> Operation {
+    match tool.paste_at(hit) {
+        Some(paste) => Operation::Paste { paste },
+        None => Operation::Paint { material: tool.material_id() },
+    }
+}
+
 impl ToolOperation {
     /// All operations, in the panel's order.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -113,9 +130,15 @@ impl ToolOperation {
         self.row().name()
     }
 
-    /// Whether a brush of this operation may have a shape. A stamp covers a whole area, so it can't be a ring.
+    /// Whether a brush of this operation may have a shape. A stamp covers a whole area, so it can't be a ring or a path; a
+    /// road is a path; what is pasted has a shape of its own.
     pub fn fits(self, shape: ToolShape) -> bool {
-        self != Self::Stamp || shape != ToolShape::Torus
+        match self {
+            Self::Stamp => !matches!(shape, ToolShape::Torus | ToolShape::Path),
+            Self::Road => shape == ToolShape::Path,
+            Self::Paste => shape == ToolShape::Box,
+            _ => true,
+        }
     }
 
     pub(super) fn row(self) -> &'static Row {

@@ -28,10 +28,13 @@ texts! {
 pub const ALIGN: [&str; 2] = ["Upright", "Along the surface"];
 texts! {
     ROUGH = "Rough", BUMPS = "Bumps", WIDTH = "Width", PATTERN = "Pattern",
-    TORUS_STAMP = "A stamp can't have this shape",
+    FITS_NOT = "This operation can't have this shape", HUT = "Hut", COPIED = "Copy", PREFAB = "Copy",
+    COPY_HELP = "The last copy, or a prefab file dropped on the window", MIRRORED = "Mirrored",
+    EDITS_ONLY = "Edits only", SMOOTH_PATH = "Curved", PATH_POINTS = "Points",
+    PATH_HELP = "Each click sets a point. The path is one edit and one undo step.",
 }
 /// The operations and what they do, in the order of `ToolOperation`.
-pub const OPERATIONS: [(&str, &str); 11] = [
+pub const OPERATIONS: [(&str, &str); 14] = [
     ("Dig", "Removes ground"),
     ("Build", "Fills the shape with ground"),
     ("Paint", "Changes the material of the ground"),
@@ -43,9 +46,12 @@ pub const OPERATIONS: [(&str, &str); 11] = [
     ("Lower", "Lowers the surface"),
     ("Stamp", "Presses an image onto the ground"),
     ("Terrace", "Cuts slopes into steps"),
+    ("Road", "Levels the ground along a path, with shoulders as wide as the falloff"),
+    ("Paste", "Puts down what was copied"),
+    ("Reset", "Returns the ground to what it was at first"),
 ];
 /// The shapes, in the order of `ToolShape`.
-pub const SHAPES: [&str; 6] = ["Sphere", "Box", "Cylinder", "Capsule", "Cone", "Torus"];
+pub const SHAPES: [&str; 7] = ["Sphere", "Box", "Cylinder", "Capsule", "Cone", "Torus", "Path"];
 
 // The plants of a terrain.
 texts! {

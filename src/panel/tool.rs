@@ -7,9 +7,14 @@ use bevy::prelude::*;
 use super::lengths::RADIUS;
 use super::texts;
 use super::tool_operation::ToolOperation;
-use crate::brush::{Brush, FULL_POWER, Roughness, Shape};
+use crate::brush::{
+    Brush, BrushPath, Corridor, FULL_POWER, Operation, Paste, Prefab, PrefabError, PrefabSample, Roughness,
+    Shape,
+};
 use crate::ground::{GreyImage, MaterialId};
+use crate::lattice::LatticeBox;
 use crate::plugin::TerrainHit;
+use crate::terrain::Terrain;
 
 /// The current brush, in metres of world space. The panel and the game may change it. The game turns it into
 /// brushes:
@@ -42,7 +47,7 @@ pub struct BrushTool {
     pub length: f32,
     /// The direction of its axis.
     pub align: ToolAlign,
-    /// Rotation about its axis in degrees. Only affects boxes.
+    /// Rotation about its axis in degrees. Only affects boxes, stamps and what is pasted.
     pub turn: f32,
     /// How deep it is placed: at -1 it rests on the ground, at 0 its centre is on the surface, at 1 it is just
     /// below the surface.
@@ -64,6 +69,16 @@ pub struct BrushTool {
     /// The image for stamping.
     #[reflect(ignore)]
     pub stamp: StampImage,
+    /// What is pasted.
+    #[reflect(ignore)]
+    pub prefab: ToolPrefab,
+    /// Whether pastes are mirrored.
+    pub is_mirrored: bool,
+    /// The points of a path that are set already, in world space; a brush adds its own place as the last one. At most
+    /// [`PATH_POINTS`].
+    pub points: Vec<Vec3>,
+    /// Whether a path is a curve without kinks.
+    pub is_smooth: bool,
     /// Power against the hardness of materials, see [`Brush::power`]; 255 digs everything.
     pub power: u8,
     /// Whether its surface is rough.
@@ -98,6 +113,10 @@ impl Default for BrushTool {
             level: 0.0,
             step: 4.0,
             stamp: StampImage::default(),
+            prefab: ToolPrefab::default(),
+            is_mirrored: false,
+            points: Vec::new(),
+            is_smooth: true,
             power: FULL_POWER,
             is_rough: false,
             bump: 0.5,
@@ -138,6 +157,75 @@ impl StampImage {
     }
 }
 
+/// What a [`BrushTool`] pastes. The default is a hut.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToolPrefab {
+    /// A piece of a world.
+    pub prefab: Option<Arc<Prefab>>,
+    /// Metres of a voxel where it was copied: 1/8 to 8.
+    pub voxel_size: f32,
+    /// Whether only samples that were edited are pasted, and not the ground around them.
+    pub is_edits_only: bool,
+    /// Its name in the panel.
+    pub name: Option<Name>,
+}
+
+impl Default for ToolPrefab {
+    fn default() -> Self {
+        Self { prefab: None, voxel_size: 1.0, is_edits_only: true, name: None }
+    }
+}
+
+impl ToolPrefab {
+    /// A prefab that was copied from voxels of this size in metres.
+    pub fn new(prefab: impl Into<Arc<Prefab>>, voxel_size: f32) -> Self {
+        Self { prefab: Some(prefab.into()), voxel_size, ..Self::default() }
+    }
+
+    /// The label in the panel.
+    pub(super) fn label(&self) -> String {
+        match (&self.prefab, &self.name) {
+            (None, _) => texts::HUT.into(),
+            (Some(_), Some(name)) => name.to_string(),
+            (Some(prefab), None) => {
+                let [x, y, z] = prefab.size().to_array();
+                format!("{x} x {y} x {z}")
+            }
+        }
+    }
+
+    /// The prefab, or the default one.
+    fn prefab(&self) -> Option<Arc<Prefab>> {
+        self.prefab.clone().or_else(|| HUT.clone())
+    }
+}
+
+/// A hut of concrete with a door, 9 x 6 x 9 voxels, on its anchor.
+static HUT: LazyLock<Option<Arc<Prefab>>> = LazyLock::new(|| {
+    const SIZE: IVec3 = IVec3::new(11, 8, 11);
+    let sample = |at: IVec3| {
+        // Voxels inside a box around the middle of the floor.
+        let within = |at: IVec3, half: i32, height: i32| {
+            let side = (at.x - 5).abs().max((at.z - 5).abs());
+            (side as f32 - (half as f32 + 0.5))
+                .max(at.y as f32 - (height as f32 + 0.5))
+                .max(-0.5 - at.y as f32)
+        };
+        let door = ((at.x - 5).abs() as f32 - 1.5).max(at.y as f32 - 4.5).max(at.z as f32 - 4.5);
+        let room = within(at, 3, 5).min(door);
+        let depth = within(at, 4, 6).max(-room);
+        PrefabSample {
+            density: (depth * 256.0) as i16,
+            material: if depth < 0.0 { MaterialId(5) } else { MaterialId::GROUND },
+            is_edited: within(at, 5, 7) < 0.0,
+            has_stored_material: depth < 0.0,
+        }
+    };
+    let places = (0..SIZE.y)
+        .flat_map(|y| (0..SIZE.z).flat_map(move |z| (0..SIZE.x).map(move |x| IVec3::new(x, y, z))));
+    Prefab::new(SIZE, IVec3::new(5, 0, 5), 0, places.map(sample)).ok().map(Arc::new)
+});
+
 /// A mountain with three ridges.
 static RIDGE: LazyLock<Option<Arc<GreyImage>>> = LazyLock::new(|| {
     const SIDE: u32 = 65;
@@ -150,6 +238,9 @@ static RIDGE: LazyLock<Option<Arc<GreyImage>>> = LazyLock::new(|| {
     let samples = (0..SIDE).flat_map(|z| (0..SIDE).map(move |x| height(x, z))).collect();
     GreyImage::from_samples(SIDE, SIDE, samples).ok().map(Arc::new)
 });
+
+/// Most points that a path of a [`BrushTool`] has before its last one.
+pub const PATH_POINTS: usize = 255;
 
 /// The shape of a [`BrushTool`].
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -168,6 +259,8 @@ pub enum ToolShape {
     Cone,
     /// A ring.
     Torus,
+    /// A tube through [points](BrushTool::points).
+    Path,
 }
 
 /// The direction of a [`BrushTool`]'s axis.
@@ -183,8 +276,8 @@ pub enum ToolAlign {
 
 impl ToolShape {
     /// All shapes, in the panel's order.
-    pub const ALL: [Self; 6] =
-        [Self::Sphere, Self::Box, Self::Cylinder, Self::Capsule, Self::Cone, Self::Torus];
+    pub const ALL: [Self; 7] =
+        [Self::Sphere, Self::Box, Self::Cylinder, Self::Capsule, Self::Cone, Self::Torus, Self::Path];
 
     /// Whether `length` applies.
     pub fn is_long(self) -> bool {
@@ -196,8 +289,17 @@ impl BrushTool {
     /// The brush for a position on the ground, in world space.
     pub fn brush_at(&self, hit: &TerrainHit) -> Brush {
         let row = self.operation.row();
-        let mut brush = Brush::dig(self.shape_at(hit));
-        brush.operation = row.operation(self, hit);
+        let operation = row.operation(self, hit);
+        let mut brush = match (&operation, self.fitting_shape()) {
+            (Operation::Road, _) => {
+                let along = Corridor::new(self.path_to(self.middle(hit)), self.length, self.length);
+                Brush::road(along, self.falloff)
+            }
+            (Operation::Paste { paste }, _) => Brush::paste(paste.clone()),
+            (_, ToolShape::Path) => Brush::dig(self.path_to(self.middle(hit))),
+            _ => Brush::dig(self.shape_at(hit)),
+        };
+        brush.operation = operation;
         brush.roughness = self.roughness();
         brush.power = self.power;
         if !row.sculpts() {
@@ -207,15 +309,99 @@ impl BrushTool {
         if self.is_of_material { brush.with_material(self.material_id()) } else { brush }
     }
 
-    /// The shape of [`brush_at`](Self::brush_at), for a preview.
-    pub fn shape_at(&self, hit: &TerrainHit) -> Shape {
-        let axis = self.axis(hit);
-        self.shape_around(hit.position - axis * self.sink * self.reach(), axis)
+    /// The brush along the points of its path, which are forgotten. `None` without points.
+    pub fn finish_path(&mut self) -> Option<Brush> {
+        let position = self.points.pop()?;
+        let hit = TerrainHit {
+            terrain: Entity::PLACEHOLDER,
+            distance: 0.0,
+            position,
+            normal: Vec3::Y,
+            material: MaterialId::default(),
+            from_inside: false,
+        };
+        // Points are where the middle of the brush is.
+        let brush = Self { sink: 0.0, ..self.clone() }.brush_at(&hit);
+        self.points.clear();
+        Some(brush)
     }
 
-    /// The shape that its operation has: the chosen one if it [fits](ToolOperation::fits), else a sphere.
+    /// Adds a point to its path, where the middle of a brush would be.
+    pub fn add_point(&mut self, hit: &TerrainHit) {
+        if self.points.len() < PATH_POINTS {
+            self.points.push(self.middle(hit));
+        }
+    }
+
+    /// The middle of the brush at a position.
+    fn middle(&self, hit: &TerrainHit) -> Vec3 {
+        hit.position - self.axis(hit) * self.sink * self.reach()
+    }
+
+    /// The path through its points to a last one. A single point makes a short one.
+    fn path_to(&self, end: Vec3) -> BrushPath {
+        let mut points: Vec<Vec3> = self.points.iter().copied().take(PATH_POINTS).collect();
+        if points.is_empty() {
+            points.push(end - Vec3::X * 0.1 * self.radius);
+        }
+        points.push(end);
+        let points = points.into_iter().map(|point| (point, self.radius));
+        if self.is_smooth { BrushPath::spline(points) } else { BrushPath::polyline(points) }
+    }
+
+    /// What is pasted at a position, with its anchor there: exactly, if it was copied from voxels of the same size and is turned
+    /// by quarter turns.
+    pub(super) fn paste_at(&self, hit: &TerrainHit) -> Option<Paste> {
+        let (prefab, voxel) = (self.prefab.prefab()?, self.prefab.voxel_size);
+        let place = (hit.position / voxel).round() * voxel;
+        let turned = Quat::from_rotation_y(self.turn.to_radians());
+        Some(Paste {
+            scale: voxel,
+            mirror: self.is_mirrored,
+            edited_only: self.prefab.is_edits_only,
+            ..Paste::new(prefab, place).rotated(turned)
+        })
+    }
+
+    /// Copies what lies in its shape, around a position, to be pasted.
+    ///
+    /// # Errors
+    /// As [`World::copy`](crate::terrain::World::copy): when it is too large, or not in the world.
+    pub fn copy(
+        &mut self,
+        terrain: &Terrain,
+        place: &GlobalTransform,
+        hit: &TerrainHit,
+    ) -> Result<(), PrefabError> {
+        let to_voxels = place.affine().inverse();
+        let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
+        self.shape_at(hit).outline(|from, to| {
+            for at in [from, to].map(|at| to_voxels.transform_point3(at)) {
+                (low, high) = (low.min(at), high.max(at));
+            }
+        });
+        let samples = LatticeBox { min: low.floor().as_ivec3(), max: high.ceil().as_ivec3() };
+        let anchor = to_voxels.transform_point3(hit.position).round().as_ivec3();
+        let prefab = terrain.world().copy(samples, anchor)?;
+        self.prefab =
+            ToolPrefab { name: Some(texts::COPIED.into()), ..ToolPrefab::new(prefab, terrain.voxel_size()) };
+        self.operation = ToolOperation::Paste;
+        Ok(())
+    }
+
+    /// The shape of [`brush_at`](Self::brush_at), for a preview.
+    ///
+    /// For a path, a ball at its end.
+    pub fn shape_at(&self, hit: &TerrainHit) -> Shape {
+        let paste = self.paste_at(hit).filter(|_| self.operation == ToolOperation::Paste);
+        paste.map_or_else(|| self.shape_around(self.middle(hit), self.axis(hit)), |paste| paste.shape())
+    }
+
+    /// The shape that its operation has: the chosen one if it [fits](ToolOperation::fits), else the first that does.
     pub fn fitting_shape(&self) -> ToolShape {
-        if self.operation.fits(self.shape) { self.shape } else { ToolShape::Sphere }
+        let fits = |shape: &ToolShape| self.operation.fits(*shape);
+        let first = ToolShape::ALL.into_iter().find(fits).unwrap_or_default();
+        if fits(&self.shape) { self.shape } else { first }
     }
 
     /// The height of a stamp above the ground at a place in its square, for a preview: `u` and `v` go from -1 to 1.
@@ -233,7 +419,7 @@ impl BrushTool {
     pub(super) fn shape_around(&self, middle: Vec3, axis: Vec3) -> Shape {
         let end = middle - axis * self.length / 2.0;
         match self.fitting_shape() {
-            ToolShape::Sphere => Shape::sphere(middle, self.radius),
+            ToolShape::Sphere | ToolShape::Path => Shape::sphere(middle, self.radius),
             ToolShape::Box => {
                 let turn = Quat::from_rotation_y(self.turn.to_radians());
                 Shape::turned_cuboid(middle, self.half, Quat::from_rotation_arc(Vec3::Y, axis) * turn)
@@ -255,7 +441,7 @@ impl BrushTool {
 
     /// Half of its largest horizontal extent.
     pub fn width(&self) -> f32 {
-        if self.shape == ToolShape::Box { self.half.x.max(self.half.z) } else { self.radius }
+        if self.fitting_shape() == ToolShape::Box { self.half.x.max(self.half.z) } else { self.radius }
     }
 
     /// The material to add or paint.
@@ -271,7 +457,7 @@ impl BrushTool {
     /// Half extent along its axis.
     fn reach(&self) -> f32 {
         match self.fitting_shape() {
-            ToolShape::Sphere => self.radius,
+            ToolShape::Sphere | ToolShape::Path => self.radius,
             ToolShape::Box => self.half.y,
             ToolShape::Cylinder | ToolShape::Cone => self.length / 2.0,
             ToolShape::Capsule => self.length / 2.0 + self.radius,
@@ -284,7 +470,7 @@ impl BrushTool {
     pub fn grow(&mut self, factor: f32, voxel_size: f32) {
         let range = RADIUS.range(voxel_size);
         let grow = |size: f32| (size * factor).clamp(*range.start(), *range.end());
-        match self.shape {
+        match self.fitting_shape() {
             ToolShape::Box => self.half = self.half.map(grow),
             _ => self.radius = grow(self.radius),
         }
@@ -372,6 +558,62 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_path_is_one_brush_through_its_points() {
+        let at = |x: f32| TerrainHit { position: Vec3::new(x, 20.0, 30.0), normal: Vec3::Y, ..hit() };
+        for (operation, sink) in [(ToolOperation::Dig, 0.5), (ToolOperation::Road, 0.0)] {
+            let mut tool =
+                BrushTool { operation, shape: ToolShape::Path, sink, radius: 2.0, ..BrushTool::default() };
+            assert_eq!(tool.finish_path(), None);
+            tool.add_point(&at(0.0));
+            tool.add_point(&at(10.0));
+            let shown = tool.brush_at(&at(20.0));
+            tool.add_point(&at(20.0));
+            assert_eq!(tool.finish_path().as_ref(), Some(&shown), "the preview is the edit");
+            assert!(tool.points.is_empty() && Edit::quantize(&shown).is_ok());
+            let straight = BrushTool { is_smooth: false, ..tool.clone() };
+            assert_ne!(straight.brush_at(&at(20.0)), tool.brush_at(&at(20.0)));
+        }
+        let mut tool = BrushTool { shape: ToolShape::Path, ..BrushTool::default() };
+        (0..400).for_each(|x| tool.add_point(&at(x as f32)));
+        assert!(Edit::quantize(&tool.brush_at(&at(400.0))).is_ok());
+        assert!(tool.finish_path().is_some_and(|brush| Edit::quantize(&brush).is_ok()));
+    }
+
+    #[test]
+    fn what_is_copied_is_pasted_as_it_was() {
+        let ground = crate::ground::Ground::flat(64, 64, 20.0).expect("valid");
+        let mut terrain = Terrain::new(ground, &crate::terrain::TerrainSettings::default()).expect("valid");
+        terrain.apply([Brush::add(
+            Shape::cuboid(Vec3::new(16.0, 22.0, 16.0), Vec3::new(2.0, 3.0, 2.0)),
+            MaterialId(5),
+        )]);
+        let at = |x: f32| TerrainHit { position: Vec3::new(x, 20.0, 16.0), ..hit() };
+        let mut tool = BrushTool { shape: ToolShape::Box, half: Vec3::splat(8.0), ..BrushTool::default() };
+        tool.copy(&terrain, &GlobalTransform::IDENTITY, &at(16.0)).expect("it is in the world");
+        assert_eq!(tool.operation, ToolOperation::Paste);
+        let receipts = terrain.apply([tool.brush_at(&at(40.2))]);
+        assert!(receipts.iter().all(|receipt| receipt.outcome.is_ok()), "{receipts:?}");
+        let solid = |x: f64| terrain.world().is_solid(bevy::math::DVec3::new(x, 23.0, 16.0));
+        assert!(solid(16.0) && solid(40.0) && !solid(28.0));
+        let kept = tool.prefab.clone();
+        assert!(tool.copy(&terrain, &GlobalTransform::IDENTITY, &at(-900.0)).is_err());
+        assert_eq!(tool.prefab, kept, "an error changes nothing");
+    }
+
+    #[test]
+    fn a_hut_can_be_entered() {
+        let ground = crate::ground::Ground::flat(64, 64, 20.0).expect("valid");
+        let mut terrain = Terrain::new(ground, &crate::terrain::TerrainSettings::default()).expect("valid");
+        let tool = BrushTool { operation: ToolOperation::Paste, ..BrushTool::default() };
+        let hit = TerrainHit { position: Vec3::new(32.0, 20.0, 32.0), normal: Vec3::Y, ..hit() };
+        let receipts = terrain.apply([tool.brush_at(&hit)]);
+        assert!(receipts.iter().all(|receipt| receipt.outcome.is_ok()), "{receipts:?}");
+        let solid = |x: f64, y: f64, z: f64| terrain.world().is_solid(bevy::math::DVec3::new(x, y, z));
+        assert!(solid(28.0, 23.0, 32.0) && solid(32.0, 26.0, 32.0), "walls and a roof");
+        assert!(!solid(32.0, 22.0, 32.0) && !solid(32.0, 22.0, 28.0), "a room and a door");
     }
 
     #[test]

@@ -84,7 +84,7 @@ pub fn tiles(
                 note(ui, name, rect);
                 let color = frame_tile(ui, rect, &response, at == chosen);
                 let color = if is_enabled { color } else { FAINT.gamma_multiply(0.4) };
-                let response = if is_enabled { response } else { response.on_hover_text(texts::TORUS_STAMP) };
+                let response = if is_enabled { response } else { response.on_hover_text(texts::FITS_NOT) };
                 let area = Rect::from_min_max(
                     rect.min + Vec2::new(10.0, 6.0),
                     Pos2::new(rect.right() - 10.0, rect.bottom() - 19.0),

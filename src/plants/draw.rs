@@ -17,6 +17,7 @@ use bevy::render::storage::ShaderBuffer;
 
 use super::material::{PlantExtension, PlantMaterial, PlantUniform};
 use super::slots::{Record, Slots};
+use super::upload::PlantBuffers;
 use super::{News, NewsList, PlantSystems, ShownPlants};
 use crate::scatter::{PatchPos, Plant, PlantPatch, Species};
 use crate::terrain::Terrain;
@@ -48,6 +49,7 @@ impl Plugin for PlantDrawingPlugin {
                     limit_shadows.after(TransformSystems::Propagate),
                 ),
             );
+        super::upload::build(app);
     }
 }
 
@@ -91,25 +93,6 @@ impl Default for PlantLook {
 #[derive(Component, Clone, Debug, Default)]
 #[require(DrawnPlants)]
 pub struct PlantLooks(pub Vec<PlantLook>);
-
-/// The buffers with all plants that are drawn.
-#[derive(Resource)]
-struct PlantBuffers {
-    slots: Slots,
-    records: Handle<ShaderBuffer>,
-    gone: Handle<ShaderBuffer>,
-    /// Slots that the buffers have room for.
-    room: usize,
-}
-
-impl FromWorld for PlantBuffers {
-    fn from_world(world: &mut World) -> Self {
-        let mut buffers = world.resource_mut::<Assets<ShaderBuffer>>();
-        let mut empty = || buffers.add(ShaderBuffer::new(&[0; 16], RenderAssetUsages::default()));
-        let (records, gone) = (empty(), empty());
-        Self { slots: Slots::default(), records, gone, room: 0 }
-    }
-}
 
 /// A mesh of copies, and how far it is drawn.
 #[derive(Clone, Debug)]
@@ -221,7 +204,7 @@ fn draw_plants(
             drawn.patches.insert(pos, placed);
         }
     }
-    upload(buffers, &mut assets, &mut materials);
+    grow(buffers, &mut assets, &mut materials);
 }
 
 /// Without looks nothing is drawn, and nobody follows the news.
@@ -413,34 +396,28 @@ fn copies_of(one: &Mesh, copies: u32) -> Option<Mesh> {
     })
 }
 
-/// Writes buffers that changed.
-fn upload(
+/// Makes larger buffers with all plants once there are more than they hold. Other changes are [written in place](super::upload).
+fn grow(
     buffers: &mut PlantBuffers,
     assets: &mut Assets<ShaderBuffer>,
     materials: &mut Assets<PlantMaterial>,
 ) {
     let slots = &mut buffers.slots;
-    let has_grown = slots.len() > buffers.room;
-    let mut write = |handle: &Handle<ShaderBuffer>, bytes: &[u8]| {
+    if slots.len() == buffers.room {
+        return;
+    }
+    buffers.room = slots.len();
+    slots.take_changes();
+    for (handle, bytes) in [(&buffers.records, slots.record_bytes()), (&buffers.gone, slots.gone_bytes())] {
         if let Some(mut buffer) = assets.get_mut(handle) {
             buffer.data = Some(bytes.to_vec());
         }
-    };
-    if std::mem::take(&mut slots.records_changed) || has_grown {
-        write(&buffers.records, slots.record_bytes());
     }
-    if std::mem::take(&mut slots.gone_changed) || has_grown {
-        write(&buffers.gone, slots.gone_bytes());
-    }
-    if has_grown {
-        buffers.room = slots.len();
-        // Larger buffers are others: materials have to be bound to them.
-        let all: Vec<_> = materials.ids().collect();
-        for id in all {
-            if let Some(mut material) = materials.get_mut(id) {
-                // Writing to it is what binds it again.
-                let _: &mut PlantMaterial = &mut material;
-            }
+    // Larger buffers are others: materials have to be bound to them, which writing to them does.
+    let all: Vec<_> = materials.ids().collect();
+    for id in all {
+        if let Some(mut material) = materials.get_mut(id) {
+            let _: &mut PlantMaterial = &mut material;
         }
     }
 }

@@ -24,6 +24,8 @@ mod load;
 mod material;
 #[cfg(feature = "render")]
 mod slots;
+#[cfg(feature = "render")]
+mod upload;
 
 #[cfg(feature = "avian")]
 pub use colliders::PlantCollidersPlugin;

@@ -300,7 +300,7 @@ fn commit(
     let is_whole = commit.is_whole();
     let fields = commit.field_news().to_vec();
     #[cfg(any(feature = "scatter", feature = "landmass"))]
-    let (boxes, before) = (commit.changed_boxes().collect(), terrain.world().version());
+    let (boxes, before) = (commit.changed_boxes(), terrain.world().version());
     let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return false };
     if !waste.is_empty() {
         free_later(waste);

@@ -1,5 +1,7 @@
 //! Heightmaps as assets: grey PNG and headerless 16-bit RAW, decoded within limits.
 
+use std::marker::PhantomData;
+
 use bevy::asset::io::Reader;
 use bevy::asset::{AssetLoader, LoadContext};
 use bevy::prelude::*;
@@ -82,7 +84,7 @@ impl AssetLoader for HeightmapLoader {
 }
 
 /// Reads a file up to one byte past the limit; the decoder reports what is wrong.
-async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, std::io::Error> {
+pub(super) async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, std::io::Error> {
     use bevy::tasks::futures_lite::AsyncReadExt;
     let mut bytes = Vec::new();
     reader.take(limit.saturating_add(1)).read_to_end(&mut bytes).await?;
@@ -105,18 +107,24 @@ impl Plugin for HeightmapPlugin {
     }
 }
 
-/// The asset and its loader are registered.
+/// The loader and its asset are registered.
 #[derive(Resource)]
-struct Registered;
+struct Registered<L: Send + Sync + 'static>(PhantomData<L>);
 
-/// Does nothing without an asset server, or if called again.
 fn register(app: &mut App) {
+    register_loader::<HeightmapLoader>(app);
+}
+
+/// Registers a loader and its asset. Does nothing and returns `false` without an asset server, or if called again.
+pub(super) fn register_loader<L: AssetLoader + FromWorld>(app: &mut App) -> bool {
     let world = app.world();
-    if world.contains_resource::<AssetServer>() && !world.contains_resource::<Registered>() {
-        // The game may have registered the asset itself.
-        if !world.contains_resource::<Assets<HeightmapImage>>() {
-            app.init_asset::<HeightmapImage>();
-        }
-        app.insert_resource(Registered).init_asset_loader::<HeightmapLoader>();
+    if !world.contains_resource::<AssetServer>() || world.contains_resource::<Registered<L>>() {
+        return false;
     }
+    // The game may have registered the asset itself.
+    if !world.contains_resource::<Assets<L::Asset>>() {
+        app.init_asset::<L::Asset>();
+    }
+    app.insert_resource(Registered::<L>(PhantomData)).init_asset_loader::<L>();
+    true
 }

@@ -28,6 +28,8 @@ pub mod diagnostics;
 mod engine;
 mod entities;
 mod figures;
+#[cfg(feature = "format")]
+mod ground_file;
 pub mod heightmap;
 mod inbox;
 mod load;
@@ -63,6 +65,11 @@ pub(crate) use entities::TerrainEntities;
 #[cfg(feature = "avian")]
 pub(crate) use entities::trigger_if_alive;
 pub use figures::BurrowFigures;
+#[cfg(feature = "format")]
+pub use ground_file::{
+    GroundAsset, GroundDescription, GroundFileError, GroundFilePlugin, GroundFrom, GroundLoader,
+    MaterialFiles,
+};
 #[doc(hidden)]
 pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};
 #[doc(hidden)]

@@ -164,6 +164,7 @@ pub(crate) fn relit_nodes(
     }
     let mut nodes: Vec<Node> = nodes.into_iter().collect();
     nodes.sort_unstable();
+    let near_areas = NearAreas::of(&areas);
     // Their shapes are those before the commit.
     let updates = State::committed(lit.before()).updates(&drawn.cut, &nodes, |_| true);
     let (mut before, mut after) = (SparseSky::new(lit.view_before()), SparseSky::new(lit.view()));
@@ -171,18 +172,39 @@ pub(crate) fn relit_nodes(
         let origin = drawn.cut.grid().columns(update.node).0.at(0) * SNAP;
         let vertices = update.mesh.iter().flat_map(|mesh| &mesh.vertices);
         let mut near =
-            vertices.map(|vertex| origin + vertex.position).filter(|place| is_near(&areas, *place));
+            vertices.map(|vertex| origin + vertex.position).filter(|place| near_areas.holds(*place));
         near.any(|place| before.light(place) != after.light(place))
     };
     updates.into_iter().filter(|update| differs(update)).collect()
 }
 
-/// Whether light at a place may change.
+/// Stacks of bricks over which light may change: a long path has thousands of areas, and a vertex is near few of them.
 #[cfg_attr(not(feature = "plugin"), allow(dead_code))]
-fn is_near(areas: &[Area], place: IVec3) -> bool {
-    let (x, z) = (place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-    areas.iter().any(|area| {
-        let (low, high) = area.lit();
-        (low.x..=high.x).contains(&x) && (low.z..=high.z).contains(&z)
-    })
+struct NearAreas<'a>(FxHashMap<(i32, i32), Vec<&'a Area>>);
+
+#[cfg_attr(not(feature = "plugin"), allow(dead_code))]
+impl<'a> NearAreas<'a> {
+    fn of(areas: &'a [Area]) -> Self {
+        let mut near: FxHashMap<(i32, i32), Vec<&Area>> = FxHashMap::default();
+        for area in areas {
+            let (low, high) = area.lit();
+            for x in low.x >> 3..=high.x >> 3 {
+                for z in low.z >> 3..=high.z >> 3 {
+                    near.entry((x, z)).or_default().push(area);
+                }
+            }
+        }
+        Self(near)
+    }
+
+    /// Whether light at a place may change.
+    fn holds(&self, place: IVec3) -> bool {
+        let (x, z) = (place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
+        self.0.get(&(x >> 3, z >> 3)).is_some_and(|areas| {
+            areas.iter().any(|area| {
+                let (low, high) = area.lit();
+                (low.x..=high.x).contains(&x) && (low.z..=high.z).contains(&z)
+            })
+        })
+    }
 }

@@ -1,6 +1,6 @@
 //! Questions about plants that stand: the nearest one, those in a box, the first along a ray. Lengths are in voxels.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, IVec2, Vec3Swizzles};
 
 use super::plants::{Plant, Scatter};
 use crate::lattice::{Column, ONE};
@@ -8,6 +8,9 @@ use crate::terrain::World;
 
 /// Cells along a side of the squares that are searched one after the other.
 const STEP: i32 = 16;
+
+/// Cells from a place up to which the nearest plant is searched for.
+const SEARCHED: i32 = 1024;
 
 /// The plant that a ray meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +40,9 @@ impl Scatter {
     }
 
     /// The plant whose foot is nearest to a place, at most `most` away, of the species that `is_wanted` accepts.
+    ///
+    /// Ground is searched outwards, each cell once, up to 1,024 voxels from the column of the world that is nearest to the
+    /// place: where nothing stands within that distance, there is none.
     pub fn nearest(
         &self,
         world: &World,
@@ -44,24 +50,46 @@ impl Scatter {
         most: f64,
         is_wanted: impl Fn(usize) -> bool,
     ) -> Option<Plant> {
-        if !place.is_finite() {
+        if !place.is_finite() || most.is_nan() || most < 0.0 {
             return None;
         }
-        let mut radius = f64::from(STEP).min(most);
-        loop {
-            let around = DVec3::splat(radius);
-            let plants = self.standing(world, place - around, place + around, &is_wanted).into_iter();
-            let near = plants.map(|plant| (plant.position().distance(place), plant));
-            let near = near.filter(|(apart, _)| *apart <= radius);
-            let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.id.cmp(&b.1.id)));
-            // Nothing outside the world.
-            let far =
-                f64::from(world.ground().width().max(world.ground().depth())) + place.abs().max_element();
-            if nearest.is_some() || !(radius < most && radius < 2.0 * far) {
-                return nearest.map(|(_, plant)| plant);
+        let size = [world.ground().width(), world.ground().depth()];
+        let middle = DVec2::new(place.x, place.z).clamp(DVec2::ZERO, IVec2::from_array(size).as_dvec2());
+        // A plant `far` from the middle is at least as far from the place, as that may lie outside.
+        let aside = middle.distance_squared(DVec2::new(place.x, place.z));
+        let cell = middle.floor().as_ivec2();
+        let mut best: Option<(f64, Plant)> = None;
+        for inner in (0..SEARCHED).step_by(STEP as usize) {
+            let outer = inner + STEP;
+            let ring = match inner {
+                0 => vec![(IVec2::splat(-outer), IVec2::splat(outer))],
+                _ => {
+                    let long = |low: i32, high: i32| (IVec2::new(low, -outer), IVec2::new(high, outer));
+                    let short = |low: i32, high: i32| (IVec2::new(-inner, low), IVec2::new(inner, high));
+                    let (before, after) = ((-outer, -inner - 1), (inner + 1, outer));
+                    vec![
+                        long(before.0, before.1),
+                        long(after.0, after.1),
+                        short(before.0, before.1),
+                        short(after.0, after.1),
+                    ]
+                }
+            };
+            for (low, high) in ring {
+                let at = |corner: IVec2| (cell + corner).as_dvec2().extend(0.0).xzy();
+                let plants = self.standing(world, at(low), at(high), &is_wanted).into_iter();
+                let near = plants.map(|plant| (plant.position().distance(place), plant));
+                let near = near.filter(|(apart, _)| *apart <= most).chain(best);
+                best = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.id.cmp(&b.1.id)));
             }
-            radius = (2.0 * radius).min(most);
+            let far = f64::from(outer).powi(2) + aside;
+            let has_all = cell.cmple(IVec2::splat(outer)).all()
+                && (IVec2::from_array(size) - cell).cmple(IVec2::splat(outer)).all();
+            if has_all || far > most * most || best.is_some_and(|(apart, _)| apart * apart < far) {
+                break;
+            }
         }
+        best.map(|(_, plant)| plant)
     }
 
     /// The first plant whose [stem](super::Stem) a ray meets within `most` voxels. The ground is not asked: compare the distance

@@ -16,7 +16,6 @@ use super::replay_log::replay_all;
 use super::segment::{self, Bad};
 use super::shared::apply_game;
 use super::sources::has_world;
-use crate::format::Batch;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
@@ -90,7 +89,7 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
     let any_ground = Ground::flat(1, 1, 0.0).map_err(|why| StoreError::Unreadable(why.to_string()))?;
     let mut frame_before = checkpoint.frame;
     for frame in contents.frames_from(checkpoint.frame + 1) {
-        let batch = frame.payload().and_then(|payload| Batch::decode(&payload, &any_ground));
+        let batch = frame.batch(&any_ground, &contents.named);
         let Ok(batch) = batch else {
             damage.push(format!("the frame {} of the journal can't be read", frame.number));
             break;

@@ -1,13 +1,16 @@
 //! Writes the journal: frames in segments, of which the oldest are removed beyond a limit of bytes.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::io;
 use std::sync::Arc;
 
 use super::files::{Files, OpenFile, Opening};
 use super::segment::{self, FOLDER};
-use super::unsaved;
+use super::{contents, unsaved};
+use crate::format::Batch;
+use crate::format::contents::Stamps;
 use crate::format::frame::WorldId;
+use crate::format::ids::StampId;
 
 /// The most bytes of a segment. Whole segments are removed, so the log is cut in steps of this.
 const SEGMENT_BYTES: u64 = 1 << 20;
@@ -20,6 +23,8 @@ const LEAST_SEGMENTS: u64 = 16;
 struct Waiting {
     frame: u64,
     entry: Vec<u8>,
+    /// The content that it names.
+    contents: Stamps,
 }
 
 /// The segment that is written.
@@ -33,12 +38,14 @@ struct Current {
 }
 
 /// A segment on the disk.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Segment {
     pub number: u64,
     /// The greatest number of its frames, 0 if it has none.
     pub last_frame: u64,
     pub bytes: u64,
+    /// The names of content in its frames.
+    pub names: BTreeSet<StampId>,
 }
 
 /// The journal as it is written.
@@ -52,6 +59,8 @@ pub(super) struct Journal {
     waiting: VecDeque<Waiting>,
     waiting_bytes: usize,
     segments: Vec<Segment>,
+    /// The content that this process has made durable.
+    written: BTreeSet<StampId>,
     next_frame: u64,
     next_segment: u64,
     /// The head of the next segment: a revision and its checkpoint.
@@ -80,6 +89,7 @@ impl Journal {
             waiting,
             waiting_bytes: 0,
             segments,
+            written: BTreeSet::new(),
             next_frame,
             next_segment,
             head,
@@ -103,12 +113,16 @@ impl Journal {
     }
 
     /// Adds a frame; it is durable after the next successful [`write`](Self::write).
-    pub fn push(&mut self, revision: u64, payload: &[u8]) {
+    pub fn push(&mut self, revision: u64, batch: &Batch, payload: &[u8]) {
         let frame = self.next_frame;
         self.next_frame += 1;
-        let entry = segment::entry(self.world, self.base, frame, revision, payload);
+        let contents = batch.table();
+        let entry = match contents.names().is_empty() {
+            true => segment::entry(self.world, self.base, frame, revision, payload),
+            false => segment::named_entry(self.world, self.base, frame, revision, payload),
+        };
         self.waiting_bytes += entry.len();
-        self.waiting.push_back(Waiting { frame, entry });
+        self.waiting.push_back(Waiting { frame, entry, contents });
     }
 
     /// Drops the frames that are not durable yet, and leaves a gap in their numbers.
@@ -153,6 +167,9 @@ impl Journal {
         {
             return Err(io::Error::new(io::ErrorKind::NotFound, "the journal's file has been removed"));
         }
+        for waiting in &self.waiting {
+            contents::write(&*self.files, &waiting.contents, &mut self.written)?;
+        }
         let current = match &mut self.current {
             Some(current) => current,
             none => none.insert(begin(&*self.files, self.world, &mut self.next_segment, &self.head)?),
@@ -172,10 +189,15 @@ impl Journal {
             self.is_entered = true;
         }
         current.end = start + bytes.len() as u64;
-        let segment = Segment { number, last_frame, bytes: current.end };
+        let names = self.waiting.iter().flat_map(|waiting| waiting.contents.names());
         match self.segments.last_mut().filter(|last| last.number == number) {
-            Some(last) => *last = segment,
-            None => self.segments.push(segment),
+            Some(last) => {
+                (last.last_frame, last.bytes) = (last_frame, current.end);
+                last.names.extend(names);
+            }
+            None => {
+                self.segments.push(Segment { number, last_frame, bytes: current.end, names: names.collect() })
+            }
         }
         Ok(())
     }
@@ -192,7 +214,7 @@ impl Journal {
         let mut total: u64 = self.segments.iter().map(|segment| segment::on_disk(segment.bytes)).sum();
         let own = self.current.as_ref().map(|current| current.number);
         // One stays, so that a journal that somebody removed is missed.
-        while let [oldest, _, ..] = self.segments[..] {
+        while let [oldest, _, ..] = &self.segments[..] {
             if total <= bytes || oldest.last_frame > needed || own == Some(oldest.number) {
                 break;
             }
@@ -203,7 +225,10 @@ impl Journal {
             total -= segment::on_disk(oldest.bytes);
             self.segments.remove(0);
         }
-        Ok(())
+        let mut needed: BTreeSet<StampId> =
+            self.segments.iter().flat_map(|own| &own.names).copied().collect();
+        needed.extend(self.waiting.iter().flat_map(|waiting| waiting.contents.names()));
+        contents::retain(&*self.files, &needed, &mut self.written)
     }
 }
 

@@ -5,6 +5,7 @@ mod checkpoint;
 mod checkpoint_copy;
 mod checkpointing;
 mod closing;
+mod contents;
 mod database;
 #[cfg(any(test, feature = "tools"))]
 mod disk;

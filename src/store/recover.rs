@@ -137,7 +137,7 @@ pub(super) fn recover(
     let empty = || -> Result<Terrain, StoreError> { Ok(BaseLevel::first(level, ground, &settings)?) };
     if !is_same_base && base_changed == BaseChanged::Replay && is_contiguous {
         let work = replaying(progress, &whole);
-        let replayed = replay_good(empty, &GameData::new(), &whole, false, &work)?;
+        let replayed = replay_good(empty, &GameData::new(), &whole, &contents.named, false, &work)?;
         let regions = changed_regions(contents, &checkpoint, ground, level).len();
         let mut recovered = Recovered::whole(replayed, level, &checkpoint);
         recovered.findings.base_changed = Some((regions, "replayed"));
@@ -162,7 +162,7 @@ pub(super) fn recover(
     let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
     if is_same_base && !is_exact && is_log_whole {
         let work = replaying(progress, &whole);
-        let replayed = replay_good(empty, &GameData::new(), &whole, true, &work)?;
+        let replayed = replay_good(empty, &GameData::new(), &whole, &contents.named, true, &work)?;
         // Behind what can't be replayed, the checkpoint may know more.
         if replayed.frame >= checkpoint.frame {
             let mut recovered = Recovered::whole(replayed, level, &checkpoint);
@@ -183,7 +183,7 @@ pub(super) fn recover(
             None => Ok(restore(parts.clone())?),
         }
     };
-    let replayed = replay_good(begin, &game, &tail, is_checked, &work)?;
+    let replayed = replay_good(begin, &game, &tail, &contents.named, is_checked, &work)?;
     let frame = replayed.frame.max(checkpoint.frame);
     let regions = changed_regions(contents, &checkpoint, ground, level).len();
     if is_checked {
@@ -289,7 +289,6 @@ mod tests {
     use super::super::{SimulatedDisk, Store};
     use super::*;
     use crate::brush::{Brush, Shape};
-    use crate::format::Batch;
     use crate::format::frame::WorldId;
 
     /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,
@@ -299,7 +298,7 @@ mod tests {
             let found = segment::read(disk, Some(world), number).unwrap();
             disk.damage(&segment::path(number), |bytes| {
                 for frame in found.frames.iter().rev() {
-                    let mut batch = Batch::decode(&frame.payload().unwrap(), ground).unwrap();
+                    let mut batch = frame.batch(ground, &Default::default()).unwrap();
                     batch.commits.iter_mut().for_each(|record| record.hash ^= 1);
                     let revision = batch.commits.last().map_or(0, |record| record.revision);
                     let entry =
@@ -308,6 +307,50 @@ mod tests {
                 }
             });
         }
+    }
+
+    #[test]
+    fn journals_that_hold_content_whole_are_read() {
+        use glam::UVec3;
+
+        use super::super::Files;
+        use super::super::contents::FoundContents;
+        use crate::brush::{GridShape, ShapeGrid};
+        let ground = Arc::new(Ground::flat(64, 64, 20.0).unwrap());
+        let disk = SimulatedDisk::new();
+        let mut terrain = Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).unwrap();
+        let created = Store::create_in(Arc::new(disk.clone()), &mut terrain, StoreOptions::default());
+        let mut store = created.unwrap();
+        let grid =
+            ShapeGrid::from_fn(UVec3::splat(9), |at| at.as_vec3().distance(Vec3::splat(4.0)) - 3.0).unwrap();
+        for x in 0..4 {
+            let shape = GridShape::new(grid.clone(), Vec3::new(10.0 + 12.0 * x as f32, 20.0, 30.0));
+            terrain.apply([Brush::dig(shape)]);
+            store.follow(&mut terrain).unwrap();
+            store.flush().unwrap();
+        }
+        let (world, killed) = (store.world_id(), disk.image().lose_process());
+        for number in segment::list(&killed).unwrap() {
+            let found = segment::read(&killed, Some(world), number).unwrap();
+            assert_eq!(found.names(u64::MAX).len(), 1);
+            let contents = FoundContents::read(&killed, found.names(u64::MAX));
+            killed.damage(&segment::path(number), |bytes| {
+                for frame in found.frames.iter().rev() {
+                    let batch = frame.batch(&ground, &contents).unwrap();
+                    let revision = batch.commits.last().map_or(0, |record| record.revision);
+                    let entry = segment::entry(world, frame.base, frame.number, revision, &batch.encode());
+                    drop(bytes.splice(frame.range.clone(), entry));
+                }
+            });
+        }
+        for path in killed.paths().into_iter().filter(|path| path.ends_with(".content")) {
+            killed.remove(&path).unwrap();
+        }
+        let options = StoreOptions::default();
+        let (_, opened) = Store::open_in(Arc::new(killed), Arc::clone(&ground), options).unwrap();
+        let now = (terrain.world().revision(), terrain.world().hash());
+        assert_eq!((opened.terrain.world().revision(), opened.terrain.world().hash()), now);
+        assert_eq!((opened.replayed, opened.troubles), (4, vec![]));
     }
 
     #[test]

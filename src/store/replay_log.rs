@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::base_level::BaseLevel;
+use super::contents::FoundContents;
 use super::error::StoreError;
 use super::found::Contents;
 use super::progress::{Progress, Work};
 use super::segment::Frame;
 use super::shared::{GameData, apply_game};
-use crate::format::Batch;
 use crate::ground::Ground;
 use crate::terrain::{
     Asked, CommitRecord, Meshing, Order, Patch, ReplayError, Terrain, TerrainSettings, WorkLimits, WorldParts,
@@ -43,7 +43,7 @@ pub(super) fn replay_all(
         return Err(StoreError::LogNotWhole);
     }
     let empty = BaseLevel::first(level, ground, &settings)?;
-    let replayed = replay(empty, GameData::new(), &whole, true, &Work::until(None, 1.0, 0))?;
+    let replayed = replay(empty, GameData::new(), &whole, &contents.named, true, &Work::until(None, 1.0, 0))?;
     match replayed.refused {
         Some(why) => Err(StoreError::LogRefused(why)),
         None => Ok(replayed.terrain),
@@ -66,15 +66,17 @@ pub(super) fn replay_good(
     mut begin: impl FnMut() -> Result<Terrain, StoreError>,
     game: &GameData,
     frames: &[&Frame],
+    contents: &FoundContents,
     is_checked: bool,
     work: &Work,
 ) -> Result<Replayed, StoreError> {
-    let replayed = replay(begin()?, game.clone(), frames, is_checked, work)?;
+    let replayed = replay(begin()?, game.clone(), frames, contents, is_checked, work)?;
     if replayed.refused.is_none() {
         return Ok(replayed);
     }
     let good: Vec<&Frame> = frames.iter().copied().filter(|frame| frame.number <= replayed.frame).collect();
-    Ok(Replayed { refused: replayed.refused, ..replay(begin()?, game.clone(), &good, is_checked, work)? })
+    let again = replay(begin()?, game.clone(), &good, contents, is_checked, work)?;
+    Ok(Replayed { refused: replayed.refused, ..again })
 }
 
 /// Replays frames, and compares the world with each commit if `is_checked`. Stops before the first frame that does not
@@ -83,6 +85,7 @@ fn replay(
     mut terrain: Terrain,
     mut game: GameData,
     frames: &[&Frame],
+    contents: &FoundContents,
     is_checked: bool,
     work: &Work,
 ) -> Result<Replayed, StoreError> {
@@ -93,7 +96,7 @@ fn replay(
     let limits = terrain.work_limits();
     terrain.set_work_limits(WorkLimits::UNBOUNDED);
     for frame in frames {
-        let batch = frame.payload().and_then(|payload| Batch::decode(&payload, terrain.world().ground()));
+        let batch = frame.batch(terrain.world().ground(), contents);
         let batch = match batch {
             Ok(batch) => batch,
             Err(why) => {

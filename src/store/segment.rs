@@ -6,19 +6,22 @@
 //! | 8 | number of the frame, little-endian; 0 is the segment's head |
 //! | length | the frame, which is sealed with its number as its key |
 
+use std::collections::BTreeSet;
 use std::io;
 use std::ops::Range;
 
 use super::base_level::BaseLevel;
+use super::contents::FoundContents;
 use super::files::Files;
 use super::reading::{is_refused, read_file};
-use crate::format::FormatError;
 use crate::format::frame::{self, Kind, WorldId};
+use crate::format::ids::StampId;
+use crate::format::{Batch, FormatError};
 use crate::ground::Ground;
 use crate::terrain::SIMULATION;
 
-/// The folder of segments.
-pub(super) const FOLDER: &str = "journal";
+/// The folder of segments, and of the content that they name.
+pub(super) use super::contents::FOLDER;
 
 /// Bytes before each frame.
 const PREFIX: usize = 12;
@@ -74,6 +77,11 @@ pub(super) fn entry(world: WorldId, base: u64, frame: u64, revision: u64, payloa
     sealed_entry(frame, &frame::seal(Kind::Journal, world, &key(frame), revision, base, payload))
 }
 
+/// An entry of a segment whose commits name content.
+pub(super) fn named_entry(world: WorldId, base: u64, frame: u64, revision: u64, payload: &[u8]) -> Vec<u8> {
+    sealed_entry(frame, &frame::seal_named(Kind::Journal, world, &key(frame), revision, base, payload))
+}
+
 /// The first entry of a segment: a checkpoint, from whose state on its frames lead.
 pub(super) fn head(world: WorldId, segment: u64, revision: u64, checkpoint: &[u8]) -> Vec<u8> {
     sealed_entry(0, &frame::seal(Kind::Checkpoint, world, &key(segment), revision, 0, checkpoint))
@@ -95,6 +103,8 @@ pub(super) struct Frame {
     /// The [base] that it was written on.
     pub base: u64,
     world: WorldId,
+    /// The names of the content of its edits; `None` if these hold it whole.
+    pub names: Option<Vec<StampId>>,
     /// Its bytes, which hold the commits. Unpacked they may be far more.
     sealed: Box<[u8]>,
     /// Where its entry is in its segment.
@@ -102,8 +112,28 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The commits in it.
-    pub fn payload(&self) -> Result<Vec<u8>, FormatError> {
+    /// The commits in it, over the ground of the world.
+    ///
+    /// # Errors
+    /// When anything is invalid, or [`FormatError::ContentMissing`].
+    pub fn batch(&self, ground: &Ground, contents: &FoundContents) -> Result<Batch, FormatError> {
+        let payload = self.payload()?;
+        match &self.names {
+            Some(names) => Batch::decode_named(&payload, ground, &contents.table(names)),
+            None => Batch::decode(&payload, ground),
+        }
+    }
+
+    /// The commits in it without the content of their edits. Revisions and hashes depend on no ground.
+    pub fn batch_without_content(&self, any_ground: &Ground) -> Result<Batch, FormatError> {
+        let payload = self.payload()?;
+        match &self.names {
+            Some(_) => Batch::decode_without_content(&payload, any_ground),
+            None => Batch::decode(&payload, any_ground),
+        }
+    }
+
+    fn payload(&self) -> Result<Vec<u8>, FormatError> {
         let opened = frame::open(&self.sealed, Kind::Journal, self.world, &key(self.number), FRAME_LIMIT);
         opened.map(|opened| opened.payload)
     }
@@ -141,6 +171,12 @@ pub(super) struct Found {
 }
 
 impl Found {
+    /// The names of content in its frames up to a number.
+    pub fn names(&self, last_frame: u64) -> BTreeSet<StampId> {
+        let frames = self.frames.iter().filter(|frame| frame.number <= last_frame);
+        frames.flat_map(|frame| frame.names.iter().flatten()).copied().collect()
+    }
+
     /// The checkpoint of its head.
     pub fn checkpoint(&self) -> Option<Vec<u8>> {
         let (head, key) = (self.head.as_ref()?, key(self.number));
@@ -220,7 +256,8 @@ fn read_entry(bytes: &[u8], at: usize, found: &mut Found, budget: &mut usize) ->
                 found.head = Some(sealed);
             } else {
                 let base = opened.ground_hash;
-                found.frames.push(Frame { number: frame_number, base, world, sealed, range: at..end });
+                let names = opened.is_named.then(|| Batch::names(&opened.payload).unwrap_or_default());
+                found.frames.push(Frame { number: frame_number, base, world, names, sealed, range: at..end });
             }
             Some(end)
         }

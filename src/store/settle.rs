@@ -88,12 +88,12 @@ fn cut_journal(
         let (last_frame, end) = kept.fold((0, 0), |(last, end): (u64, usize), frame| {
             (last.max(frame.number), end.max(frame.range.end))
         });
-        let all = found.length as u64;
+        let (all, names) = (found.length as u64, found.names(recovered.frame));
         if found.number < last_kept {
             // What is bad there did not matter, since later frames follow.
-            segments.push(Segment { number: found.number, last_frame, bytes: all });
+            segments.push(Segment { number: found.number, last_frame, bytes: all, names });
         } else if found.number == last_kept {
-            segments.push(Segment { number: found.number, last_frame, bytes: end as u64 });
+            segments.push(Segment { number: found.number, last_frame, bytes: end as u64, names });
             if end < found.length {
                 let path = segment::path(found.number);
                 let rest = read_file(files, &path)?.bytes.split_off(end);
@@ -110,7 +110,7 @@ fn cut_journal(
         } else if found.length == 0 && found.error.is_none() {
             // It is nobody's, whatever its name says.
         } else if found.frames.is_empty() && found.bad.is_empty() {
-            segments.push(Segment { number: found.number, last_frame: 0, bytes: all });
+            segments.push(Segment { number: found.number, last_frame: 0, bytes: all, names });
         } else {
             moved.push(found);
         }

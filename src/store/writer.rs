@@ -412,12 +412,16 @@ impl Writer {
     pub(super) fn flush(&mut self) -> Result<(), StoreError> {
         let pending = std::mem::take(&mut self.state.pending);
         if !pending.batch.is_empty() {
-            let payload = pending.batch.encode();
+            // Equal bytes where there is nothing to name, so that earlier versions read them.
+            let payload = match pending.batch.contents().next() {
+                Some(_) => pending.batch.encode_named(),
+                None => pending.batch.encode(),
+            };
             if payload.len() > self.options.frame_bytes.min(FRAME_LIMIT) {
                 self.leave_gap();
                 return Ok(());
             }
-            self.journal.push(self.mirror.revision, &payload);
+            self.journal.push(self.mirror.revision, &pending.batch, &payload);
         }
         self.shared.begin_waiting(FRAME_TIME);
         let written = self.journal.write();

@@ -1,5 +1,6 @@
 //! The result of a transaction, and its installation into the world.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -7,9 +8,7 @@ use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
 use super::resolve::{FieldChange, Resolved, install, patch_of};
-#[cfg(all(feature = "plugin", any(feature = "scatter", feature = "landmass")))]
-use crate::lattice::LatticeBox;
-use crate::lattice::{ChunkPos, SNAP};
+use crate::lattice::{ChunkPos, LatticeBox, RegionPos, SNAP};
 use crate::redraw::{DrawnCut, MeshUpdates, Stages, relit_parts};
 use crate::volume::UniformBricks;
 use crate::world::sky::{LitWorld, SkyColumns, SkyLights};
@@ -150,10 +149,16 @@ impl Commit {
         self.whole.is_some()
     }
 
-    /// Boxes around the bricks that it changes.
-    #[cfg(all(feature = "plugin", any(feature = "scatter", feature = "landmass")))]
-    pub(crate) fn changed_boxes(&self) -> impl Iterator<Item = LatticeBox> {
-        self.changes.iter().filter_map(|delta| delta.bounds)
+    /// Boxes around the bricks that it changes, one for each region of the lattice: what a long path passes by lies in
+    /// none.
+    #[doc(hidden)]
+    pub fn changed_boxes(&self) -> Vec<LatticeBox> {
+        let mut boxes = BTreeMap::<RegionPos, LatticeBox>::new();
+        for (pos, _) in self.changes.iter().flat_map(|delta| &delta.change.patch.bricks) {
+            let own = pos.samples();
+            boxes.entry(RegionPos::of(*pos)).and_modify(|all| *all = all.union(own)).or_insert(own);
+        }
+        boxes.into_values().collect()
     }
 
     /// The receipts of its orders.

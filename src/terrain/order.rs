@@ -6,9 +6,9 @@ use super::receipt::{Asked, Rejection};
 #[cfg(feature = "plugin")]
 use crate::brush::BrushError;
 use crate::brush::{Brush, Edit, Kind};
-use crate::edits::reach;
+use crate::edits::most_bricks;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
+use crate::lattice::{ChunkGrid, LatticeBox};
 use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
 use crate::world::Patch;
@@ -91,7 +91,7 @@ impl Order {
     pub(super) fn work(&self, grid: ChunkGrid) -> u64 {
         let Some(edit) = self.edit() else { return STEP };
         let weight = if edit.kind() == Kind::Sculpt { LOOKS_AROUND } else { 1 };
-        EDIT + weight * reach(grid, edit).map_or(0, |reach| BrickPos::range(reach).volume())
+        EDIT + weight * most_bricks(grid, edit).unwrap_or(0)
     }
 
     /// Whether it replaces parts of the world that steps of history refer to.
@@ -106,7 +106,7 @@ impl Order {
     /// Whether it certainly changes none of these samples, where `step` says whether a step through history may.
     pub(super) fn misses(&self, samples: LatticeBox, step: impl FnOnce() -> bool) -> bool {
         match self {
-            Self::Edit(edit) => edit.reach().intersection(samples).is_none(),
+            Self::Edit(edit) => edit.misses(samples),
             Self::Parts { change, .. } => {
                 change.bricks.iter().all(|(pos, _)| pos.samples().intersection(samples).is_none())
             }

@@ -43,8 +43,9 @@ mod vertex;
 
 #[doc(hidden)]
 pub use ground::{
-    GroundArrays, GroundArraysError, GroundBase, GroundLayer, GroundLayerImages, GroundLoading, GroundLook,
-    GroundMaterial, GroundPlugin, GroundQuality, GroundTextureCache, GroundTextures, GroundTexturesError,
+    ColorMap, GroundArrays, GroundArraysError, GroundBase, GroundLayer, GroundLayerImages, GroundLoading,
+    GroundLook, GroundMaterial, GroundPlugin, GroundQuality, GroundTextureCache, GroundTextures,
+    GroundTexturesError,
 };
 pub use material::TerrainMaterialPlugin;
 #[doc(hidden)]

@@ -11,7 +11,7 @@ use crate::lattice::LatticeBox;
 use crate::surface::{MaterialMix, SurfaceMesh};
 
 /// Why there is no GLB file of a region.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GlbError {
     /// Nothing is drawn there.
@@ -23,9 +23,15 @@ pub enum GlbError {
         /// Bytes of its buffer.
         bytes: u64,
     },
-    /// The voxel size is not a positive number.
-    #[error("the voxel size is {0}, but it must be a positive number")]
+    /// The voxel size is not a positive number, or so large that positions in metres are no finite numbers.
+    #[error("the voxel size is {0}, but it must be a positive number with which all positions are finite")]
     VoxelSize(f32),
+    /// A vertex has no finite position or normal, so that other programs would refuse the file.
+    #[error("the mesh of the {part} has a vertex that is not finite: export a region without it")]
+    NotFinite {
+        /// The tile or chunk.
+        part: String,
+    },
 }
 
 /// The parts of the buffer, one for each attribute, and the indices.
@@ -68,7 +74,7 @@ impl Glb {
         at: Vec3,
         voxel_size: f32,
         colour: &dyn Fn(MaterialId) -> Vec3,
-    ) {
+    ) -> Result<(), GlbError> {
         let starts: [usize; VIEWS] = std::array::from_fn(|view| self.parts[view].len());
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let [positions, normals, colours, materials, weights, indices] = &mut self.parts;
@@ -76,7 +82,14 @@ impl Glb {
             v.to_array().into_iter().for_each(|part| to.extend_from_slice(&part.to_le_bytes()));
         };
         for vertex in &mesh.vertices {
-            let position = Vec3::from_array(vertex.position_f32()) * voxel_size;
+            let in_voxels = Vec3::from_array(vertex.position_f32());
+            let position = in_voxels * voxel_size;
+            if !in_voxels.is_finite() || !vertex.normal.is_finite() {
+                return Err(GlbError::NotFinite { part: name.into() });
+            }
+            if !(position + at).is_finite() {
+                return Err(GlbError::VoxelSize(voxel_size));
+            }
             (low, high) = (low.min(position), high.max(position));
             put(positions, position);
             put(normals, vertex.normal);
@@ -117,6 +130,7 @@ impl Glb {
         );
         let at = at.to_array().map(exact);
         item(&mut self.nodes, format_args!(r#"{{"name":"{name}","mesh":{number},"translation":{at:?}}}"#));
+        Ok(())
     }
 
     fn finish(self) -> Result<Vec<u8>, GlbError> {
@@ -198,17 +212,19 @@ impl World {
                 MeshKey::Tile(tile) => format!("tile {} {}", tile.x, tile.z),
                 MeshKey::Chunk(chunk) => format!("chunk {} {} {}", chunk.x, chunk.y, chunk.z),
             };
-            if !mesh.is_empty() {
-                let at = self.origin(drawn).as_vec3() * voxel_size;
-                glb.add(&name, mesh, at, voxel_size, colours);
+            // A mesh without a vertex or a triangle has no bounds.
+            if mesh.is_empty() || mesh.vertices.is_empty() {
+                return Ok(());
             }
+            let at = self.origin(drawn).as_vec3() * voxel_size;
+            glb.add(&name, mesh, at, voxel_size, colours)
         };
         match region {
-            None => self.drawn().for_each(|(drawn, mesh)| add(drawn, &mesh)),
-            Some(samples) => self.drawn_near(samples).into_iter().for_each(|drawn| match drawn {
+            None => self.drawn().try_for_each(|(drawn, mesh)| add(drawn, &mesh))?,
+            Some(samples) => self.drawn_near(samples).into_iter().try_for_each(|drawn| match drawn {
                 MeshKey::Tile(tile) => add(drawn, &self.tile_mesh(tile)),
                 MeshKey::Chunk(chunk) => add(drawn, &self.chunk_mesh(chunk)),
-            }),
+            })?,
         }
         glb.finish()
     }

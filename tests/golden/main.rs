@@ -22,6 +22,7 @@ mod album;
 mod borders;
 #[path = "../../examples/shared/capture.rs"]
 mod capture;
+mod color_map;
 mod debug_views;
 mod far;
 #[path = "../../examples/shared/holes.rs"]
@@ -63,6 +64,7 @@ fn ground_looks_as_approved() {
     ways::shoot(&mut studio, &mut album);
     ways::count_bindings(&mut studio, &mut album);
     own_textures::shoot(&mut studio, &mut album);
+    color_map::shoot(&mut studio, &mut album);
     return_of_ground::shoot(&mut studio, &mut album);
     pieces::shoot(&mut studio, &mut album);
     truth::shoot(&mut studio, &mut album);

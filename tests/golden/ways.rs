@@ -13,8 +13,8 @@ use crate::studio::Studio;
 /// Largest mean FLIP between forward and deferred, whose G-buffer has eight bits per colour channel. Measured: 0.009.
 const CLOSE: f32 = 0.015;
 
-/// Textures and samplers of the ground: many GPUs have 16 of either for a whole pass, of which Bevy's views take up to 13.
-const BINDINGS: (usize, usize) = (3, 2);
+/// Textures and samplers of the ground: many GPUs have 16 of either for a whole pass, of which Bevy's views take up to 12.
+const BINDINGS: (usize, usize) = (4, 2);
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
     set_up(studio);

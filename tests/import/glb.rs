@@ -120,7 +120,7 @@ fn what_cannot_be_written_is_refused() {
     let outside = LatticeBox { min: IVec3::splat(5000), max: IVec3::splat(5001) };
     let glb = |region, size| terrain.world().to_glb(region, size, &|_| Vec3::ONE);
     assert_eq!(glb(Some(outside), 1.0), Err(GlbError::Empty));
-    for size in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+    for size in [0.0, -1.0, f32::NAN, f32::INFINITY, f32::MAX, 1e37] {
         assert!(matches!(glb(None, size), Err(GlbError::VoxelSize(_))));
     }
 }

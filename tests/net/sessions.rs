@@ -6,7 +6,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::net::{Client, ClientEvent, ClientId, Lane, Rate, Server, ServerSettings, UndoPolicy};
+use bevy_burrow::lattice::LatticeBox;
+use bevy_burrow::net::{
+    Client, ClientEvent, ClientId, Lane, Rate, Refusal, Server, ServerSettings, ToClient, ToServer,
+    UndoPolicy,
+};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
 use fastrand::Rng;
@@ -462,6 +466,80 @@ fn paths_roads_and_grids_reach_everybody() {
     assert_eq!((server.figures().malformed, server.figures().refused), (0, 0));
     // One that joins later gets the same world.
     assert!(joins_again(&mut server, &ground, &mut now).is_some());
+}
+
+/// A server and a client that has joined.
+fn joined() -> (Server, Client, Arc<Ground>, Duration) {
+    let ((mut server, ground), mut now) = (quick(128, 20), Duration::from_secs(1));
+    server.connect(ID, now);
+    let mut client = new_client(&ground, now);
+    while !client.has_joined() {
+        pump(&mut server, &mut client, &mut now);
+    }
+    (server, client, ground, now)
+}
+
+/// A ball of some samples along its side.
+fn ball(side: i32) -> ShapeGrid {
+    let middle = (side - 1) as f32 / 2.0;
+    let distance = |at: IVec3| (at.as_vec3() - middle).length() - middle + 1.5;
+    ShapeGrid::from_fn(UVec3::splat(side as u32), distance).expect("valid")
+}
+
+#[test]
+fn a_paste_within_a_grid_reaches_everybody() {
+    let (mut server, mut client, ground, mut now) = joined();
+    let prefab = {
+        let mut other = terrain(&ground);
+        other.apply([Brush::add(Shape::sphere(Vec3::new(30.0, 20.0, 30.0), 9.0), MaterialId(3))]);
+        let min = IVec3::new(18, 8, 18);
+        Arc::new(other.world().copy(LatticeBox { min, max: min + 24 }, min).expect("in the world"))
+    };
+    let grid = ball(20);
+    let paste = |at: Vec3| {
+        let within = GridShape::new(grid.clone(), at + 12.0);
+        let operation = Operation::Paste { paste: Paste::new(Arc::clone(&prefab), at) };
+        Edit::quantize(&Brush { operation, ..Brush::dig(within) }).expect("valid")
+    };
+    let at = Vec3::new(60.0, 8.0, 60.0);
+    assert!(server.edit(paste(at)).is_err(), "nobody can get it");
+    server.stamps_mut().add(Arc::clone(grid.image()));
+    assert!(server.edit(paste(at)).is_err(), "nobody can get the prefab");
+    assert!(server.stamps_mut().add_prefab(Arc::clone(&prefab)).is_some());
+    let before = server.terrain().world().hash();
+    server.edit(paste(at)).expect("both are in the list");
+    (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
+    assert_ne!(server.terrain().world().hash(), before);
+    assert_eq!(client.world().hash(), server.terrain().world().hash());
+    // The client has both now.
+    client.submit(paste(at + 20.0).with_labels(9, None));
+    (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
+    assert_eq!(client.world().hash(), server.terrain().world().hash());
+    assert_eq!((server.figures().malformed, server.figures().refused), (0, 0));
+    assert_eq!(client.figures().malformed, 0);
+    assert!(joins_again(&mut server, &ground, &mut now).is_some());
+}
+
+#[test]
+fn a_grid_that_is_too_large_where_it_is_named_is_refused() {
+    let (mut server, mut client, _, mut now) = joined();
+    let (small, large) = (ball(5), ball(128));
+    let known = [&small, &large].map(|grid| server.stamps_mut().add(Arc::clone(grid.image())));
+    let shape = GridShape::new(small, Vec3::splat(40.0)).with_scale(64.0);
+    let edit = Edit::quantize(&Brush::dig(shape)).expect("valid");
+    let mut message = ToServer::Edits { first: 1, edits: vec![edit] }.to_bytes();
+    // That edit with the name of the other grid: 8,128 voxels a side.
+    let name = known[0].0.to_le_bytes();
+    let at = message.windows(8).position(|window| window == name).expect("its name is in it");
+    message[at..at + 8].copy_from_slice(&known[1].0.to_le_bytes());
+    let before = server.terrain().world().hash();
+    server.receive(ID, &message, now);
+    let answers: Vec<Vec<u8>> = server.take_outgoing().into_iter().map(|(_, _, bytes)| bytes).collect();
+    let refused = ToClient::Refused { sequence: 1, why: Refusal::TooLarge }.to_bytes();
+    assert_eq!(answers, [refused]);
+    (0..20).for_each(|_| pump(&mut server, &mut client, &mut now));
+    assert_eq!(server.terrain().world().hash(), before);
+    assert_eq!((server.figures().malformed, server.figures().refused), (0, 1));
 }
 
 /// A player digs without a connection on one machine, and meanwhile plays on another one.

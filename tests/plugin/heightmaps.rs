@@ -28,16 +28,20 @@ fn stage_in(folder: &Path) -> Stage {
 }
 
 /// A temporary folder that is removed when dropped.
-struct Folder(PathBuf);
+pub struct Folder(PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("bevy_burrow_{name}_{}", std::process::id()));
         std::fs::create_dir_all(&path).expect("a temporary folder");
         Self(path)
     }
 
-    fn put(&self, name: &str, bytes: &[u8]) {
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    pub fn put(&self, name: &str, bytes: &[u8]) {
         std::fs::write(self.0.join(name), bytes).expect("a temporary file");
     }
 }
@@ -48,7 +52,7 @@ impl Drop for Folder {
     }
 }
 
-fn png(image: image::DynamicImage) -> Vec<u8> {
+pub fn png(image: image::DynamicImage) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write_to(&mut bytes, image::ImageFormat::Png).expect("a PNG");
     bytes.into_inner()

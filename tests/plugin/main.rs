@@ -10,6 +10,7 @@ mod despawning;
 mod diagnostics;
 mod entities;
 mod gates;
+mod ground_files;
 mod heightmaps;
 mod history;
 mod holes;

@@ -1,7 +1,11 @@
 //! Queries equal a search through all plants.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bevy_burrow::ground::{ColumnGrid, HeightSource};
 use bevy_burrow::prelude::*;
-use bevy_burrow::scatter::{Plant, Scatter, ScatterRules};
+use bevy_burrow::scatter::{Plant, Scatter, ScatterRules, Species};
 use fastrand::Rng;
 use glam::{DVec2, DVec3};
 
@@ -54,6 +58,40 @@ fn the_nearest_plant_and_those_in_a_box() {
         let any = scatter.nearest(terrain.world(), far, f64::INFINITY, |_| true);
         assert_eq!(any.is_some(), !plants.is_empty());
     }
+}
+
+/// Ground that counts how many heights are asked for.
+struct Counted(Arc<AtomicU64>);
+
+impl HeightSource for Counted {
+    fn id(&self) -> u64 {
+        5
+    }
+
+    fn bounds(&self) -> (i32, i32) {
+        (0, 0)
+    }
+
+    fn fill_heights(&self, _: ColumnGrid, heights: &mut [i32]) {
+        self.0.fetch_add(heights.len() as u64, Ordering::Relaxed);
+        heights.fill(0);
+    }
+}
+
+#[test]
+fn the_search_for_a_plant_is_bounded_where_there_is_none() {
+    let count = Arc::new(AtomicU64::new(0));
+    let ground = Ground::from_source(200_000, 200_000, Counted(Arc::clone(&count))).expect("a size");
+    let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    // They grow on hills only.
+    let (_, rules, _, _) = world(1);
+    let species = rules.species.iter().map(|own| Species { height: (50.0, 90.0), ..own.clone() }).collect();
+    let scatter = Scatter::new(&ScatterRules { species, ..rules }).expect("valid");
+    let before = count.load(Ordering::Relaxed);
+    let place = DVec3::new(1e5, 0.0, 1e5);
+    assert_eq!(scatter.nearest(terrain.world(), place, f64::INFINITY, |_| true), None);
+    let asked = count.load(Ordering::Relaxed) - before;
+    assert!(asked < 1 << 25, "{asked} heights");
 }
 
 #[test]

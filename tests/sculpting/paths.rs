@@ -1,5 +1,6 @@
 //! Paths of many points and roads along them, compared with brute force.
 
+use bevy_burrow::ground::FunctionSource;
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
@@ -230,4 +231,40 @@ fn roads_are_refused_in_other_shapes() {
     let brush = Brush { operation: Operation::Road, ..Brush::smooth(Shape::sphere(Vec3::ONE, 4.0), 1.0) };
     let error = bevy_burrow::brush::Edit::quantize(&brush).expect_err("no corridor");
     assert!(error.to_string().contains("`Brush::road`"), "{error}");
+}
+
+#[test]
+fn a_long_path_counts_as_its_pieces_and_not_as_the_box_around_them() {
+    let side = 4096;
+    let source = FunctionSource::new(1, 19.0, 21.0, |_, _| 20.0);
+    let ground = Ground::from_source(side, side, source).expect("a size");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    // From corner to corner, in and out of the ground: 3 million bricks in its box.
+    let path = |aside: f32| {
+        BrushPath::polyline([0.0, 1.0, 2.0, 3.0].map(|part: f32| {
+            let along = 100.0 + part * 1250.0;
+            (Vec3::new(along, 20.0 + (part % 2.0) * 200.0, along + aside), 2.0)
+        }))
+    };
+    (0..30).for_each(|number| terrain.submit(Brush::dig(path(number as f32 * 9.0)).with_tag(number)));
+    assert!(terrain.take_receipts().is_empty(), "there is room for all of them");
+    let each = terrain.waiting_work() / 30;
+    assert!((1_000..60_000).contains(&each), "{each} bricks");
+    // What lies in the box, but not along the path, does not wait.
+    let around = |at: IVec3| LatticeBox::point(at).grown(20);
+    assert!(terrain.is_ready(around(IVec3::new(3000, 20, 600))));
+    assert!(!terrain.is_ready(around(IVec3::new(100, 20, 110))));
+    // Nor is it said to have changed.
+    let (mut changed, mut count) = (0, 0);
+    while let Some(transaction) = terrain.begin() {
+        let commit = transaction.run();
+        for own in commit.changed_boxes() {
+            assert!(own.size().max_element() <= 64, "{own:?}");
+            changed += own.volume();
+            count += 1;
+        }
+        assert!(terrain.commit(commit).expect("in order").iter().all(|receipt| receipt.outcome.is_ok()));
+    }
+    assert!(count > 5 && changed < 1 << 24, "{count} boxes of {changed} samples");
+    assert!(terrain.is_ready(around(IVec3::new(100, 20, 110))));
 }

@@ -1,5 +1,6 @@
 //! Worlds on disk: nothing that was acknowledged is ever lost, whatever happens to the process, the power or the files.
 
+mod contents;
 mod crafted;
 mod damage;
 mod durable;

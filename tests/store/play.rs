@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use bevy_burrow::lattice::{BrickPos, ChunkPos};
+use bevy_burrow::lattice::{BrickPos, ChunkPos, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{Opened, SimulatedDisk, Store, StoreError, StoreOptions};
 use bevy_burrow::terrain::Meshing;
 use bevy_burrow::volume::{Brick, Field};
 use fastrand::Rng;
+use glam::{IVec3, UVec3, Vec3};
 
 use crate::worlds::{any_random_brush, random_ground_of_size};
 
@@ -80,11 +81,41 @@ pub fn act(terrain: &mut Terrain, rng: &mut Rng) {
             let loose = LooseSettings { largest: 4096, crumbs: rng.u32(0..40), debris: rng.u32(0..400) };
             terrain.set_loose(rng.bool().then_some(loose));
         }
+        4 => drop(terrain.apply([brush_with_content(rng)])),
         _ => {
             let brush = any_random_brush(rng, terrain.world().ground());
             drop(terrain.apply([brush]));
         }
     }
+}
+
+/// A brush with a grid, with a prefab, or with both: one of a few, so that they come again.
+pub fn brush_with_content(rng: &mut Rng) -> Brush {
+    let place = |rng: &mut Rng, low: f32| Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 40.0 + low;
+    let within = GridShape::new(ball(rng.i32(5..8)), place(rng, 8.0)).with_scale(1.5);
+    let paste = Paste::new(block(rng.u64(0..3)), place(rng, 0.0)).turned_about_y(rng.i32(0..4));
+    match rng.u8(0..3) {
+        0 => Brush::add(within, MaterialId(rng.u8(0..4))),
+        1 => Brush::paste(paste),
+        _ => Brush { operation: Operation::Paste { paste }, ..Brush::dig(within) },
+    }
+}
+
+/// A ball of some samples along its side.
+pub fn ball(side: i32) -> ShapeGrid {
+    let middle = (side - 1) as f32 / 2.0;
+    let distance = |at: IVec3| (at.as_vec3() - middle).length() - middle + 1.2;
+    ShapeGrid::from_fn(UVec3::splat(side as u32), distance).expect("valid")
+}
+
+/// A copy of some ground with a ball of ground or of air in it.
+pub fn block(seed: u64) -> Prefab {
+    let ground = Ground::flat(32, 32, 10.0).expect("valid");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    let ball = Shape::sphere(Vec3::new(16.0, 10.0, 16.0), 3.0 + seed as f32);
+    terrain.apply([if seed.is_multiple_of(2) { Brush::dig(ball) } else { Brush::add(ball, MaterialId(2)) }]);
+    let min = IVec3::new(9, 3, 9);
+    terrain.world().copy(LatticeBox { min, max: min + 14 }, min + 7).expect("in the world")
 }
 
 /// The key of the revision in the game data, so that game data and ground can be compared.

@@ -78,7 +78,7 @@ fn spawn_camera(mut commands: Commands) {
     ));
 }
 
-/// Without a GPU, the game starts with low quality.
+/// Without a GPU, the game starts with low quality, and scripts are played in it.
 fn prefer_low_quality_in_software(
     adapter: Option<Res<RenderAdapterInfo>>,
     file: Res<SettingsFile>,
@@ -89,7 +89,7 @@ fn prefer_low_quality_in_software(
         return;
     }
     defaults.0.quality = Quality::Low;
-    if file.0.as_ref().is_some_and(|file| !file.exists()) {
+    if file.0.as_ref().is_none_or(|file| !file.exists()) {
         settings.quality = Quality::Low;
     }
 }
@@ -191,8 +191,10 @@ fn apply_settings(
     } else {
         camera.remove::<Bloom>();
     }
-    let has_air =
-        settings.quality != Quality::Low && air::is_possible(device.0.as_deref(), device.1.as_deref());
+    // Mesa's software renderer fails in Bevy's atmosphere.
+    let has_air = settings.quality != Quality::Low
+        && !draws_in_software(adapter.as_deref())
+        && air::is_possible(device.0.as_deref(), device.1.as_deref());
     if has_air {
         let reach = FAR * settings.view_distance;
         let air = AtmosphereSettings { aerial_view_lut_max_distance: reach, ..default() };

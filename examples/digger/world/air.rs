@@ -2,10 +2,12 @@
 //! and in low quality, there is fog, and the sky's own colours are those of `day.rs`.
 
 use bevy::light::{Atmosphere, SunDisk, atmosphere::ScatteringMedium};
-use bevy::pbr::AtmosphereSettings;
+use bevy::pbr::{AtmosphereSettings, ExtractedAtmosphere, GpuAtmosphereSettings};
 use bevy::prelude::*;
+use bevy::render::extract_component::DynamicUniformIndex;
 use bevy::render::render_resource::{DownlevelFlags, TextureFormat, TextureUsages};
 use bevy::render::renderer::{RenderAdapter, RenderDevice};
+use bevy::render::{ExtractSchedule, RenderApp};
 
 use crate::player::camera::PlayerCamera;
 use crate::world::light::Sun;
@@ -19,6 +21,19 @@ impl Plugin for AirPlugin {
             .add_systems(Startup, spawn_air)
             .add_systems(PostStartup, hide_sun_disk)
             .add_systems(PreUpdate, notice_air);
+        if let Some(render) = app.get_sub_app_mut(RenderApp) {
+            render.add_systems(ExtractSchedule, forget_air);
+        }
+    }
+}
+
+/// Bevy 0.19 continues to draw the sky of a camera that has lost its [`AtmosphereSettings`], with a pipeline for HDR.
+fn forget_air(
+    mut commands: Commands,
+    stale: Query<Entity, (With<ExtractedAtmosphere>, Without<GpuAtmosphereSettings>)>,
+) {
+    for camera in &stale {
+        commands.entity(camera).remove::<(ExtractedAtmosphere, DynamicUniformIndex<GpuAtmosphereSettings>)>();
     }
 }
 

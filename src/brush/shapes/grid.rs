@@ -1,5 +1,6 @@
 //! Shapes of any form: signed distances on a grid, which a brush places with any rotation and scale.
 
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use glam::{IVec3, Quat, UVec3, Vec3};
@@ -27,9 +28,47 @@ const ZERO: i32 = 1 << 15;
 /// A grid is made once, of a function or of a [closed mesh](Self::from_mesh), and shared by all brushes that use it. Its
 /// samples are kept as a [`GreyImage`], so that everything that names the images of stamps by their content, such as
 /// [`Stamps`](crate::net::Stamps) of networks, names grids too.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct ShapeGrid(ImageSamples);
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(from = "ImageSamples", into = "ImageSamples")]
+pub struct ShapeGrid(Arc<Samples>);
+
+/// The image of a grid, and what a look at all of its samples found out. Edits share it, so nobody looks twice.
+#[derive(Debug)]
+struct Samples {
+    image: Arc<GreyImage>,
+    /// Zero unless the image holds a grid.
+    size: UVec3,
+    /// The least sample.
+    least: u16,
+}
+
+impl PartialEq for ShapeGrid {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+            || Arc::ptr_eq(self.image(), other.image())
+            || *self.0.image == *other.0.image
+    }
+}
+
+impl Eq for ShapeGrid {}
+
+impl Hash for ShapeGrid {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.0.size, self.0.least).hash(state);
+    }
+}
+
+impl From<ImageSamples> for ShapeGrid {
+    fn from(samples: ImageSamples) -> Self {
+        Self::in_image(samples.0)
+    }
+}
+
+impl From<ShapeGrid> for ImageSamples {
+    fn from(grid: ShapeGrid) -> Self {
+        Self(Arc::clone(grid.image()))
+    }
+}
 
 impl ShapeGrid {
     /// A grid of as many samples as `size` says, 3 to 128 along each side. `distance` gets the position of a sample,
@@ -83,34 +122,49 @@ impl ShapeGrid {
             (distance.clamp(1 - ZERO, ZERO - 1) + ZERO) as u16
         }));
         let image = GreyImage::from_samples(size.x, size.y * size.z + 1, samples);
-        image.map(|image| Self(ImageSamples(Arc::new(image)))).map_err(|_| wrong_size(size))
+        image.map(|image| Self::in_image(Arc::new(image))).map_err(|_| wrong_size(size))
     }
 
-    /// The grid in an image; `None` unless it holds one.
-    fn in_image(image: Arc<GreyImage>) -> Option<Self> {
-        let grid = Self(ImageSamples(image));
-        let (size, image) = (grid.size(), grid.image());
-        if check_size(size).is_err() || (image.width(), image.height()) != (size.x, size.y * size.z + 1) {
-            return None;
-        }
-        let is_rim = |at: IVec3| at.cmpeq(IVec3::ZERO).any() || at.cmpeq(size.as_ivec3() - 1).any();
-        points(size).all(|at| !is_rim(at) || grid.distance(at) > 0).then_some(grid)
-    }
-
-    /// Samples along each side.
-    pub fn size(&self) -> UVec3 {
-        let image = self.image();
-        match image.samples() {
+    /// The grid in an image, which may hold [none](Self::is_grid).
+    pub(crate) fn in_image(image: Arc<GreyImage>) -> Self {
+        let size = match image.samples() {
             [layer, layers, ..] if image.width() > 1 => {
                 UVec3::new(image.width(), (*layer).into(), (*layers).into())
             }
             _ => UVec3::ZERO,
+        };
+        let fits = check_size(size).is_ok() && image.height() == size.y * size.z + 1;
+        if !fits {
+            return Self(Arc::new(Samples { image, size: UVec3::ZERO, least: 0 }));
         }
+        let is_rim = |at: IVec3| at.cmpeq(IVec3::ZERO).any() || at.cmpeq(size.as_ivec3() - 1).any();
+        let (mut least, mut has_rim_outside) = (u16::MAX, true);
+        for (at, &sample) in points(size).zip(image.samples().iter().skip(size.x as usize)) {
+            least = least.min(sample);
+            has_rim_outside &= i32::from(sample) > ZERO || !is_rim(at);
+        }
+        let size = if has_rim_outside { size } else { UVec3::ZERO };
+        Self(Arc::new(Samples { image, size, least }))
     }
 
-    /// The image that holds its samples: the name under which networks send it.
+    /// Whether its image holds a grid.
+    pub(crate) fn is_grid(&self) -> bool {
+        self.0.size != UVec3::ZERO
+    }
+
+    /// Samples along each side.
+    pub fn size(&self) -> UVec3 {
+        self.0.size
+    }
+
+    /// The image that holds its samples: the name under which networks and journals keep it.
     pub fn image(&self) -> &Arc<GreyImage> {
-        &self.0.0
+        &self.0.image
+    }
+
+    /// Depth of the sample that lies deepest inside, in 1/256 cell.
+    fn deepest(&self) -> i64 {
+        if self.is_grid() { (i64::from(ZERO) - i64::from(self.0.least)).max(0) } else { 0 }
     }
 
     /// Distance outside the shape at a sample, in 1/256 cell. Samples beyond the grid are those at its rim.
@@ -216,7 +270,7 @@ pub(in crate::brush) struct QuantizedGrid {
     rotation: [i16; 4],
     /// 1/256 voxel between two samples.
     scale: i32,
-    samples: ImageSamples,
+    samples: ShapeGrid,
 }
 
 impl QuantizedGrid {
@@ -226,48 +280,33 @@ impl QuantizedGrid {
             center: quantize::point("center", shape.center)?,
             rotation: quantize::turn(shape.rotation)?,
             scale: in_range("scale", shape.scale, SCALE.0, SCALE.1)?,
-            samples: shape.grid.0.clone(),
+            samples: shape.grid.clone(),
         })
     }
 
     /// As a brush has it.
     pub fn restored(&self) -> GridShape {
         GridShape {
-            grid: ShapeGrid(self.samples.clone()),
+            grid: self.samples.clone(),
             center: quantize::restored_point(self.center),
             rotation: quantize::restored_turn(self.rotation),
             scale: voxels(self.scale),
         }
     }
 
-    /// The image that holds the samples.
-    pub fn image(&self) -> &Arc<GreyImage> {
-        &self.samples.0
+    /// The samples.
+    pub fn samples(&self) -> &ShapeGrid {
+        &self.samples
     }
 
-    /// Replaces the grid by that of an image and keeps the place. An image of 2 x 2 black samples stands for one that is
-    /// still to come: the shape is empty.
-    pub fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
-        let shape = Self { samples: ImageSamples(image), ..self };
-        shape.grid()?;
-        Ok(shape)
-    }
-
-    /// The grid; `None` while it is still to come.
-    fn grid(&self) -> Result<Option<ShapeGrid>, BrushError> {
-        let image = self.image();
-        let is_to_come = (image.width(), image.height()) == (2, 2) && image.samples() == [0; 4];
-        match ShapeGrid::in_image(Arc::clone(image)) {
-            None if is_to_come => Ok(None),
-            None => Err(BrushError::NoGrid),
-            grid => Ok(grid),
-        }
+    /// The samples, to be replaced. The shape has to be checked then.
+    pub fn samples_mut(&mut self) -> &mut ShapeGrid {
+        &mut self.samples
     }
 
     /// Half the sides of the grid.
     fn half(&self) -> [i32; 3] {
-        let size = ShapeGrid(self.samples.clone()).size();
-        size.to_array().map(|side| side.saturating_sub(1) as i32 * self.scale / 2)
+        self.samples.size().to_array().map(|side| side.saturating_sub(1) as i32 * self.scale / 2)
     }
 }
 
@@ -282,7 +321,12 @@ impl ShapeGeometry for QuantizedGrid {
         check_point("center", self.center)?;
         check_turn(self.rotation)?;
         in_range("scale", voxels(self.scale), SCALE.0, SCALE.1)?;
-        self.grid().map(drop)
+        // A placeholder stands for a grid that is still to come: the shape is empty.
+        if self.samples.is_grid() || self.samples.image().is_placeholder() {
+            Ok(())
+        } else {
+            Err(BrushError::NoGrid)
+        }
     }
 
     fn bounds(&self) -> (IVec3, IVec3) {
@@ -297,9 +341,7 @@ impl ShapeGeometry for QuantizedGrid {
     }
 
     fn deepest(&self) -> i32 {
-        let least = self.image().samples().iter().skip(self.image().width() as usize).min();
-        let inside = least.map_or(0, |&least| i64::from(ZERO) - i64::from(least));
-        (inside.max(0) * i64::from(self.scale) / i64::from(ONE)) as i32
+        (self.samples.deepest() * i64::from(self.scale) / i64::from(ONE)) as i32
     }
 
     fn volume(&self) -> f64 {
@@ -308,7 +350,7 @@ impl ShapeGeometry for QuantizedGrid {
 
     fn distance(&self) -> GridDistance {
         let (rows, squared) = matrix(self.rotation);
-        let grid = ShapeGrid(self.samples.clone());
+        let grid = self.samples.clone();
         GridDistance {
             rows,
             squared,

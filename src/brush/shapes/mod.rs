@@ -67,7 +67,6 @@ use path::QuantizedPath;
 
 use super::BrushError;
 use super::quantize::{self, check_extent};
-use crate::ground::GreyImage;
 use crate::lattice::ONE;
 
 /// The integer geometry of a shape. All methods except `check` may rely on checked numbers.
@@ -469,20 +468,14 @@ impl QuantizedShape {
         }
     }
 
-    /// The image that holds the shape's samples, if it is a grid.
-    pub(super) fn image(&self) -> Option<&Arc<GreyImage>> {
-        match self {
-            Self::Grid(grid) => Some(grid.image()),
-            _ => None,
-        }
+    /// The shape's samples, if it is a grid.
+    pub(super) fn grid(&self) -> Option<&ShapeGrid> {
+        if let Self::Grid(grid) = self { Some(grid.samples()) } else { None }
     }
 
-    /// The shape with another image that holds its samples, if it is a grid.
-    pub(super) fn with_image(self, image: Arc<GreyImage>) -> Result<Self, BrushError> {
-        match self {
-            Self::Grid(grid) => Ok(Self::Grid(grid.with_image(image)?)),
-            other => Ok(other),
-        }
+    /// The shape's samples, if it is a grid, to be replaced. The shape has to be [checked](Self::check) then.
+    pub(super) fn grid_mut(&mut self) -> Option<&mut ShapeGrid> {
+        if let Self::Grid(grid) = self { Some(grid.samples_mut()) } else { None }
     }
 
     /// The road along the shape, and half its width where it is widest; only a corridor has one.

@@ -95,3 +95,66 @@ fn levels_of_schema_1_can_be_read() {
     assert_eq!(files, written, "what is written today differs from schema 1: it needs a new number");
     read_level(&files, &ground).unwrap();
 }
+
+/// A frame of a journal that names content, and the file of each content: schema 2.
+#[cfg(feature = "store")]
+mod named {
+    use std::collections::BTreeMap;
+
+    use super::super::{compare, round_trips, worlds};
+    use super::{PathBuf, ground};
+    use crate::format::Batch;
+    use crate::format::contents::{Stamps, content_file};
+    use crate::format::frame::{Kind, WorldId, open, seal_named};
+    use crate::format::ids::StampId;
+    use crate::terrain::CommitRecord;
+
+    fn folder() -> PathBuf {
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/store/schema_2")
+    }
+
+    fn file_name(StampId(name): StampId) -> String {
+        format!("{name:016x}.content")
+    }
+
+    fn batch() -> Batch {
+        let mut terrain = worlds::terrain(&ground());
+        worlds::apply(&mut terrain, round_trips::with_content());
+        let commits: Vec<CommitRecord> = terrain.take_log();
+        Batch { commits, game: vec![("turn".into(), Some(vec![3]))] }
+    }
+
+    fn written() -> BTreeMap<String, Vec<u8>> {
+        let (batch, key) = (batch(), 7_u64.to_be_bytes());
+        let contents = batch.table();
+        let file = |name| (file_name(name), content_file(&contents, name));
+        let mut files: BTreeMap<String, Vec<u8>> = contents.names().into_iter().map(file).collect();
+        let frame = seal_named(Kind::Journal, WorldId(5), &key, 3, 9, &batch.encode_named());
+        files.insert("frame.journal".into(), frame);
+        files
+    }
+
+    #[test]
+    #[ignore = "writes the fixtures"]
+    fn write_fixtures() {
+        std::fs::create_dir_all(folder()).unwrap();
+        written().iter().for_each(|(name, bytes)| std::fs::write(folder().join(name), bytes).unwrap());
+    }
+
+    #[test]
+    fn frames_of_schema_2_can_be_read() {
+        let written = written();
+        let read = |name: &String| (name.clone(), std::fs::read(folder().join(name)).unwrap());
+        let files: BTreeMap<String, Vec<u8>> = written.keys().map(read).collect();
+        assert_eq!(files, written, "what is written today differs from schema 2: it needs a new number");
+        let opened =
+            open(&files["frame.journal"], Kind::Journal, WorldId(5), &7_u64.to_be_bytes(), 1 << 20).unwrap();
+        assert!(opened.is_named);
+        let mut contents = Stamps::default();
+        for name in Batch::names(&opened.payload).unwrap() {
+            assert!(contents.add_file(name, &files[&file_name(name)]));
+        }
+        let batch = Batch::decode_named(&opened.payload, &ground(), &contents).unwrap();
+        assert!(compare::batches(&batch, &self::batch()));
+    }
+}

@@ -6,8 +6,10 @@ use fastrand::Rng;
 
 use super::damage::damage;
 use super::{compare, count, round_trips, worlds};
+use crate::brush::Edit;
 use crate::format::bytes::Reader;
-use crate::format::edits::{EditSequence, put_edit, read_edit};
+use crate::format::contents::Stamps;
+use crate::format::edits::{EditSequence, put_edit};
 use crate::format::frame::{self, Kind, WorldId};
 use crate::format::level::{Level, read_level, unpack_level, write_level};
 use crate::format::limits::Limits;
@@ -82,23 +84,31 @@ fn journals() {
 #[test]
 fn edits() {
     let edits = round_trips::all_edits();
-    let encode = |edits: &[_]| {
-        let (mut bytes, mut sequence) = (Vec::new(), EditSequence::default());
-        edits.iter().for_each(|edit| put_edit(&mut bytes, edit, &mut sequence));
-        bytes
-    };
-    let valid: Vec<_> = edits.chunks(5).map(encode).collect();
-    fuzz("edit", &valid, 200, |bytes| {
-        let (mut reader, mut sequence, mut read) = (Reader(bytes), EditSequence::default(), Vec::new());
-        while !reader.0.is_empty() {
-            let Ok(edit) = read_edit(&mut reader, &mut sequence) else { return false };
-            assert_eq!(edit.check(), Ok(()));
-            read.push(edit);
-        }
-        let (again, mut sequence) = (encode(&read), EditSequence::default());
-        let mut reader = Reader(&again);
-        read.iter().all(|edit| read_edit(&mut reader, &mut sequence).as_ref() == Ok(edit))
-    });
+    let mut contents = Stamps::default();
+    edits.iter().flat_map(|edit| edit.contents()).for_each(|content| contents.add_content(content));
+    for of in [EditSequence::default, EditSequence::whole] {
+        let encode = |edits: &[Edit]| {
+            let (mut bytes, mut sequence) = (Vec::new(), of());
+            edits.iter().for_each(|edit| put_edit(&mut bytes, edit, &mut sequence));
+            bytes
+        };
+        let read = |reader: &mut Reader, sequence: &mut EditSequence| {
+            let head = reader.byte()?;
+            sequence.read(head, reader, &contents)?.whole()
+        };
+        let valid: Vec<_> = edits.chunks(5).map(encode).collect();
+        fuzz("edit", &valid, 200, |bytes| {
+            let (mut reader, mut sequence, mut all) = (Reader(bytes), of(), Vec::new());
+            while !reader.0.is_empty() {
+                let Ok(edit) = read(&mut reader, &mut sequence) else { return false };
+                assert_eq!(edit.check(), Ok(()));
+                all.push(edit);
+            }
+            let (again, mut sequence) = (encode(&all), of());
+            let mut reader = Reader(&again);
+            all.iter().all(|edit| read(&mut reader, &mut sequence).as_ref() == Ok(edit))
+        });
+    }
 }
 
 #[test]

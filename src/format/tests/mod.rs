@@ -1,6 +1,7 @@
 //! Laws of the formats: written data can be read again, bit for bit; damage is detected; nothing panics.
 
 mod compare;
+mod contents;
 mod damage;
 mod fixtures;
 mod fuzz;

@@ -2,19 +2,20 @@
 
 use std::sync::Arc;
 
-use glam::{Quat, Vec2, Vec3};
+use glam::{IVec3, Quat, UVec3, Vec2, Vec3};
 
 use super::{compare, count, worlds};
-use crate::brush::{Brush, Edit, Roughness, Shape, Stamp};
+use crate::brush::{Brush, Edit, GridShape, Paste, Roughness, Shape, ShapeGrid, Stamp};
 use crate::format::bytes::Reader;
-use crate::format::edits::{EditSequence, put_edit, read_edit};
+use crate::format::contents::Stamps;
+use crate::format::edits::{EditSequence, put_edit};
 use crate::format::level::{
     Level, pack_level, read_level, region_name, region_of_name, unpack_level, write_level,
 };
 use crate::format::portable::{read_portable, read_portable_head, write_portable};
 use crate::format::{Batch, Metadata, decode_region, encode_region};
 use crate::ground::{GreyImage, MaterialId};
-use crate::lattice::RegionPos;
+use crate::lattice::{LatticeBox, RegionPos};
 use crate::terrain::{Terrain, TerrainSettings};
 use crate::volume::layers;
 
@@ -136,7 +137,22 @@ pub fn all_edits() -> Vec<Edit> {
             Brush::terrace(shape, 3.0),
         ]
     });
-    brushes.map(|brush| Edit::quantize(&brush).unwrap()).collect()
+    brushes.chain(with_content()).map(|brush| Edit::quantize(&brush).unwrap()).collect()
+}
+
+/// Brushes with a grid, with a prefab, and with both.
+pub fn with_content() -> [Brush; 3] {
+    let grid =
+        ShapeGrid::from_fn(UVec3::splat(6), |at| at.as_vec3().distance(Vec3::splat(2.5)) - 1.9).unwrap();
+    let within = GridShape::new(grid, Vec3::new(20.0, 11.0, 20.0)).with_scale(2.5);
+    let ground = worlds::hills(64);
+    let mut terrain = worlds::terrain(&ground);
+    terrain.apply([Brush::dig(Shape::sphere(Vec3::new(9.0, 12.0, 9.0), 5.0))]);
+    let min = IVec3::new(4, 6, 4);
+    let prefab = terrain.world().copy(LatticeBox { min, max: min + 10 }, min).unwrap();
+    let paste = Brush::paste(Paste::new(prefab, Vec3::new(15.0, 6.0, 15.0)));
+    let pasted_within = Brush { operation: paste.operation.clone(), ..Brush::dig(within.clone()) };
+    [Brush::add(within, MaterialId(2)), paste, pasted_within]
 }
 
 #[test]
@@ -145,13 +161,19 @@ fn edits_come_back_in_whatever_order() {
     let mut rng = fastrand::Rng::with_seed(3);
     for _ in 0..50 {
         let order: Vec<&Edit> = (0..40).filter_map(|_| rng.choice(&edits)).collect();
-        let (mut bytes, mut sequence) = (Vec::new(), EditSequence::default());
-        order.iter().for_each(|edit| put_edit(&mut bytes, edit, &mut sequence));
-        let (mut reader, mut sequence) = (Reader(&bytes), EditSequence::default());
-        for edit in order {
-            assert_eq!(read_edit(&mut reader, &mut sequence).as_ref(), Ok(edit));
+        let mut contents = Stamps::default();
+        order.iter().flat_map(|edit| edit.contents()).for_each(|content| contents.add_content(content));
+        for of in [EditSequence::default, EditSequence::whole] {
+            let (mut bytes, mut sequence) = (Vec::new(), of());
+            order.iter().for_each(|edit| put_edit(&mut bytes, edit, &mut sequence));
+            let (mut reader, mut sequence) = (Reader(&bytes), of());
+            for edit in &order {
+                let head = reader.byte().unwrap();
+                let read = sequence.read(head, &mut reader, &contents).unwrap();
+                assert_eq!(read.whole().as_ref(), Ok(*edit));
+            }
+            reader.end().unwrap();
         }
-        reader.end().unwrap();
     }
 }
 

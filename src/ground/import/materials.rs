@@ -16,7 +16,8 @@ use crate::ground::{ColumnMaterial, ImageLimits, MaterialId, MaterialMap};
 pub const MAX_LAYERS: usize = 16;
 
 /// The layers of splat maps.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct SplatOptions {
     /// The material of each channel of all files, one after the other: red, green, blue and alpha, or the grey of a file
     /// with one channel. `None` ignores a channel. At most [`MAX_LAYERS`] have a material.
@@ -36,7 +37,8 @@ impl SplatOptions {
 }
 
 /// The meaning of the samples of an id map.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct IdOptions {
     /// The material of each id. An id is the grey of a sample, or the entry of a palette, as the file has it. Without any,
     /// the id is the material itself.

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use super::super::StampId;
 use super::super::message::{Lane, MAX_IMAGES, ToServer};
-use super::super::stamps::StampId;
 use super::Client;
 use crate::brush::Prefab;
 use crate::ground::GreyImage;

@@ -23,6 +23,7 @@ use std::time::Duration;
 
 use glam::IVec3;
 
+use super::Stamps;
 use super::bulk::BulkReader;
 use super::encoding::{PIECE, entry_bytes};
 use super::message::{
@@ -30,7 +31,6 @@ use super::message::{
 };
 use super::price::{UNDO, UNDO_BYTES, cost};
 use super::replica::{Replica, ShownChange};
-use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use super::super::bucket::{Bucket, Rate};
-use super::super::message::{ClientId, MAX_EDITS, ToServer};
+use super::super::encoding::EditWriter;
+use super::super::message::{ClientId, ToServer};
 use super::super::price::{MAX_UNDO_BYTES, UNDO, UNDO_BYTES};
 use crate::brush::Edit;
 
@@ -84,7 +85,7 @@ impl Outbox {
 
     /// Messages that may be sent now.
     pub fn take(&mut self, now: Duration) -> Vec<Vec<u8>> {
-        let (mut messages, mut first, mut edits) = (Vec::new(), 0, Vec::new());
+        let (mut messages, mut edits) = (Vec::new(), EditWriter::default());
         while self.waiting.front().map(|(_, cost, _)| *cost).is_some_and(|cost| self.may_send(cost, now))
             && let Some((sequence, cost, what)) = self.waiting.pop_front()
         {
@@ -92,22 +93,15 @@ impl Outbox {
             self.on_the_way.insert(sequence, cost);
             self.sent = self.sent.max(sequence);
             self.cost += cost.known;
-            if edits.len() == MAX_EDITS
-                || sequence != first + edits.len() as u64
-                || matches!(what, Item::Undo(_))
-            {
-                messages.extend(edits_message(first, &mut edits));
-                first = sequence;
-            }
             match what {
-                Item::Edit(edit) => edits.push(edit),
+                Item::Edit(edit) => messages.extend(edits.put(sequence, &edit)),
                 Item::Undo(of) => {
+                    messages.extend(edits.finish());
                     messages.push(ToServer::Undo { sequence, of }.to_bytes());
-                    first = sequence + 1;
                 }
             }
         }
-        messages.extend(edits_message(first, &mut edits));
+        messages.extend(edits.finish());
         messages
     }
 
@@ -121,7 +115,56 @@ impl Outbox {
     }
 }
 
-fn edits_message(first: u64, edits: &mut Vec<Edit>) -> Option<Vec<u8>> {
-    let edits = std::mem::take(edits);
-    (!edits.is_empty()).then(|| ToServer::Edits { first, edits }.to_bytes())
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::super::super::Stamps;
+    use super::super::super::message::{MAX_EDITS, MAX_TO_SERVER};
+    use super::*;
+    use crate::brush::{Brush, BrushPath, Corridor, Roughness, Shape};
+
+    /// The longest edits: paths and roads of 256 points that go to and fro, each with other numbers.
+    fn long(number: u64) -> Edit {
+        let place = |point: u64| {
+            let far = ((point + number) * 7919 % 1000) as f32 - 500.0;
+            Vec3::new(2.0e5 + far, far * 3.0, 2.0e5 - far)
+        };
+        let points = (0..256).map(|point| (place(point / 8), 0.25 + (point % 9) as f32));
+        let path = BrushPath::polyline(points);
+        let brush = match number % 2 {
+            0 => Brush::dig(path),
+            _ => Brush::road(Corridor::new(path, 3.0, 2.0), 1.0),
+        };
+        let brush = brush
+            .with_roughness(Roughness::new(3.7, 91.3, u32::MAX))
+            .with_tag(number * 7)
+            .with_stroke(u64::MAX);
+        Edit::quantize(&brush).expect("a valid brush")
+    }
+
+    #[test]
+    fn no_message_of_edits_is_larger_than_a_server_reads() {
+        let dig = |x: f32| Edit::quantize(&Brush::dig(Shape::sphere(Vec3::splat(x), 2.0))).expect("valid");
+        for count in [1, 20, MAX_EDITS as u64 + 50] {
+            let mut outbox = Outbox::new([u64::MAX; 2].map(|most| most >> 1), u64::MAX >> 1, Duration::ZERO);
+            let edits: Vec<Edit> = (0..count)
+                .map(|number| if number % 5 == 4 { dig(number as f32) } else { long(number) })
+                .collect();
+            edits.iter().zip(1..).for_each(|(edit, sequence)| outbox.edit(sequence, edit.clone(), 1));
+            let (messages, mut next) = (outbox.take(Duration::ZERO), 1);
+            for message in &messages {
+                assert!(message.len() <= MAX_TO_SERVER, "{} bytes", message.len());
+                let read = ToServer::from_bytes(message, &Stamps::default()).expect("a server reads it");
+                let ToServer::Edits { first, edits: part } = read else { panic!("edits") };
+                assert_eq!(first, next);
+                assert_eq!(part, edits[next as usize - 1..][..part.len()]);
+                next += part.len() as u64;
+            }
+            assert_eq!(next, count + 1, "all of them, in order");
+            // As few messages as there may be.
+            let bytes: usize = messages.iter().map(Vec::len).sum();
+            assert!(messages.len() <= 1 + bytes / (MAX_TO_SERVER / 2) + count as usize / MAX_EDITS);
+        }
+    }
 }

@@ -40,11 +40,11 @@ use std::time::Duration;
 
 use glam::IVec3;
 
+use super::Stamps;
 use super::encoding::{OrderWriter, entry_bytes};
 use super::message::{ClientId, Entry, Epoch, KickReason, Lane, MAX_TO_CLIENT, ToClient};
 use super::never_shown;
 use super::regions::RegionSums;
-use super::stamps::Stamps;
 use crate::brush::Edit;
 use crate::format::{FormatError, WorldId};
 use crate::lattice::RegionPos;

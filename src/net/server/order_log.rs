@@ -90,8 +90,8 @@ impl OrderLog {
 mod tests {
     use super::*;
     use crate::ground::Ground;
+    use crate::net::Stamps;
     use crate::net::message::{Entries, ToClient};
-    use crate::net::stamps::Stamps;
     use crate::terrain::{LooseSettings, Order};
 
     /// Every third entry is a mark, and the others are loose settings.

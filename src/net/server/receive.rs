@@ -1,5 +1,6 @@
 //! Handles messages from clients.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,9 +11,9 @@ use crate::brush::Edit;
 use crate::format::bricks::is_possible;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
+use crate::net::StampId;
 use crate::net::message::{ClientId, KickReason, MAX_REGIONS, Refusal, ToClient, ToServer};
 use crate::net::price::{UNDO, cost};
-use crate::net::stamps::StampId;
 
 /// The cost of a greeting in the count of flooding. The greetings that are [answered](super::players) in a second cost
 /// more work.
@@ -49,8 +50,8 @@ impl Server {
                 true
             }
             Ok((ToServer::Hello(_) | ToServer::Greeting { .. }, _)) => true,
-            Ok((ToServer::Edits { first, edits }, unknown)) => {
-                self.receive_edits(client, first, edits, &unknown, now)
+            Ok((ToServer::Edits { first, edits }, refused)) => {
+                self.receive_edits(client, first, edits, &refused, now)
             }
             Ok((ToServer::Undo { sequence, of }, _)) => self.receive_undo(client, sequence, of, now),
             Ok((message, _)) => {
@@ -87,13 +88,13 @@ impl Server {
         may
     }
 
-    /// `unknown` are the positions of edits whose stamps have images that the server lacks.
+    /// `refused` are the positions of edits with content that the server lacks, or that are beyond the limits of edits.
     fn receive_edits(
         &mut self,
         client: ClientId,
         first: u64,
         edits: Vec<Edit>,
-        unknown: &[usize],
+        refused: &BTreeMap<usize, Refusal>,
         now: Duration,
     ) -> bool {
         if first == 0 || first.checked_add(edits.len() as u64).is_none() {
@@ -118,8 +119,8 @@ impl Server {
             if !self.may_go_on(client, counted, now) {
                 return true;
             }
-            if unknown.contains(&place) {
-                self.refuse(client, sequence, Refusal::UnknownStamp);
+            if let Some(why) = refused.get(&place) {
+                self.refuse(client, sequence, *why);
                 continue;
             }
             match self.validate(client, &edit, now) {

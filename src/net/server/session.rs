@@ -7,8 +7,8 @@ use std::time::Duration;
 use super::sender::{BulkSender, OrderSender};
 use super::settings::ServerSettings;
 use crate::lattice::RegionPos;
+use crate::net::StampId;
 use crate::net::message::Hello;
-use crate::net::stamps::StampId;
 use crate::terrain::World;
 
 /// If a client for which a world is kept acknowledges nothing for this time, its session starts again.

@@ -56,6 +56,12 @@ struct Ground {
     tints: array<Tint, 16>,
     // The strength of the large relief of each layer.
     broad: array<vec4<f32>, 4>,
+    // How much the colour map tints each layer.
+    map_tints: array<vec4<f32>, 4>,
+    // Metres from the camera at which the colour map begins to show, and from which on it shows fully.
+    map_distance: vec2<f32>,
+    // What turns metres into the width and height of the colour map.
+    per_side: vec2<f32>,
     near: f32,
     far: f32,
     variety: f32,
@@ -77,6 +83,9 @@ struct Base {
 @group(#{MATERIAL_BIND_GROUP}) @binding(101) var albedo_texture: texture_2d_array<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(102) var layer_sampler: sampler;
 @group(#{MATERIAL_BIND_GROUP}) @binding(103) var relief_texture: texture_2d_array<f32>;
+#ifdef GROUND_COLOR_MAP
+@group(#{MATERIAL_BIND_GROUP}) @binding(104) var color_map: texture_2d<f32>;
+#endif
 @group(#{MATERIAL_BIND_GROUP}) @binding(105) var noise_texture: texture_3d<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(106) var noise_sampler: sampler;
 
@@ -442,6 +451,26 @@ fn layer_at(layer: u32, site: Site) -> Texels {
     return texels;
 }
 
+#ifdef GROUND_COLOR_MAP
+// A layer in the colours of the map: its texture's own differences from its mean stay.
+fn mapped(color: vec3<f32>, layer: u32, side: u32, site: Site, distance: f32) -> vec3<f32> {
+    let share = ground.map_tints[layer >> 2u][layer & 3u] * smoothstep(ground.map_distance.x, ground.map_distance.y, distance);
+    if share <= 0.0 {
+        return color;
+    }
+    // The sampler repeats; the map does not.
+    let half = 0.5 / vec2<f32>(textureDimensions(color_map));
+    let at = clamp(site.place.xz * ground.per_side, half, 1.0 - half);
+    let dx = site.dx.xz * ground.per_side;
+    let dy = site.dy.xz * ground.per_side;
+    let map = textureSampleGrad(color_map, noise_sampler, at, dx, dy).rgb;
+    // The coarsest level of a texture is its mean.
+    let mean = textureSampleLevel(albedo_texture, noise_sampler, vec2(0.5), texture_of(layer, side), 16.0).rgb;
+    let tinted = max(mean * ground.tints[layer].color, vec3(0.004));
+    return mix(color, clamp(color / tinted, vec3(0.0), vec3(4.0)) * map, share);
+}
+#endif
+
 // The two strongest layers of a place, the share of the second one, 0 to 0.5, and how wide the border between them is.
 struct Choice {
     layers: vec2<u32>,
@@ -624,8 +653,16 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     let next = choice.layers.y;
     var texels = layer_at(best, site);
     var metallic = ground.layers[best].metallic;
+#ifdef GROUND_COLOR_MAP
+    // Dug faces show what is there.
+    let map_distance = select(distance, 0.0, cut_of(in, texels.color.a).x > 0.5);
+    texels.color = vec4(mapped(texels.color.rgb, best, site.side, site, map_distance), texels.color.a);
+#endif
     if choice.share > 0.5 - 2.0 * choice.width {
-        let other = layer_at(next, site);
+        var other = layer_at(next, site);
+#ifdef GROUND_COLOR_MAP
+        other.color = vec4(mapped(other.color.rgb, next, site.side, site, map_distance), other.color.a);
+#endif
         // What stands high covers what lies low.
         let rise = clamp(HEIGHT_SHIFT * (other.color.a - texels.color.a), -choice.width, choice.width);
         // Half on the border itself, from either side.

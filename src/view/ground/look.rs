@@ -33,6 +33,30 @@ pub struct GroundLook {
     pub variety: f32,
     /// The texture fetches per pixel.
     pub quality: GroundQuality,
+    /// A picture of the whole ground that tints distant views.
+    pub color_map: Option<ColorMap>,
+}
+
+/// A picture of the whole ground from above, such as a satellite image or the colour map of a terrain tool. Far from the camera,
+/// layers keep their texture and take the picture's colours, except for faces that were dug.
+///
+/// It is stretched over the terrain: its first row lies at z = 0, and the first pixel of each row at x = 0. When its file changes and
+/// Bevy's asset server watches files, the ground changes too.
+#[derive(Reflect, Clone, Debug, PartialEq)]
+pub struct ColorMap {
+    /// The picture. Until it is loaded, the ground has the colours of its layers.
+    pub image: Handle<Image>,
+    /// Metres from the camera at which its colours begin to show, and from which on they show fully.
+    pub distance: (f32, f32),
+    /// How much they show there, 0 to 1; multiplied by each layer's [`map_tint`](GroundLayer::map_tint).
+    pub strength: f32,
+}
+
+impl ColorMap {
+    /// The colours of a picture, from 60 to 300 metres on.
+    pub fn new(image: Handle<Image>) -> Self {
+        Self { image, distance: (60.0, 300.0), strength: 1.0 }
+    }
 }
 
 /// A layer of the ground.
@@ -50,6 +74,8 @@ pub struct GroundLayer {
     pub metallic: f32,
     /// Its colours are multiplied by this.
     pub tint: LinearRgba,
+    /// How much a [`ColorMap`] tints it: 1 for natural ground, 0 for works such as bricks and snow that somebody put down.
+    pub map_tint: f32,
     /// Whether its texture is cut into pieces near the camera, so that its repetition does not show: up to three times the
     /// fetches. Not for textures with a pattern, such as bricks.
     pub has_pieces: bool,
@@ -65,6 +91,7 @@ impl Default for GroundLayer {
             broad_relief: 0.5,
             metallic: 0.0,
             tint: LinearRgba::WHITE,
+            map_tint: 1.0,
             has_pieces: true,
             top: None,
         }
@@ -96,7 +123,7 @@ impl Default for GroundLook {
                 layer(4.0, 0.35),
                 layer(6.0, 0.4),
                 layer(4.0, 0.5),
-                GroundLayer { has_pieces: false, ..layer(4.0, 0.0) },
+                GroundLayer { has_pieces: false, map_tint: 0.0, ..layer(4.0, 0.0) },
                 layer(2.5, 0.8),
                 ore(2.5, 0.35),
                 layer(3.0, 0.5),
@@ -109,6 +136,7 @@ impl Default for GroundLook {
             distance: (48.0, 64.0),
             variety: 0.5,
             quality: GroundQuality::High,
+            color_map: None,
         }
     }
 }

@@ -104,6 +104,9 @@ pub struct GroundExtension {
     /// x and y of the layers' normals, occlusion, roughness.
     #[texture(103, dimension = "2d_array")]
     pub relief: Option<Handle<Image>>,
+    /// The look's colour map, once it is loaded.
+    #[texture(104)]
+    pub color_map: Option<Handle<Image>>,
     /// Four kinds of noise in space.
     #[texture(105, dimension = "3d", visibility(vertex, fragment))]
     #[sampler(106, visibility(vertex, fragment))]
@@ -118,6 +121,7 @@ pub struct GroundExtension {
 pub struct GroundKey {
     without_anisotropy: bool,
     is_fine: bool,
+    has_color_map: bool,
 }
 
 impl From<&GroundExtension> for GroundKey {
@@ -125,6 +129,7 @@ impl From<&GroundExtension> for GroundKey {
         Self {
             without_anisotropy: extension.without_anisotropy,
             is_fine: extension.quality == GroundQuality::High,
+            has_color_map: extension.color_map.is_some(),
         }
     }
 }
@@ -156,6 +161,12 @@ pub(super) struct GroundUniform {
     tints: [TintUniform; MAX_LAYERS],
     /// The strength of the large relief of each layer.
     broad: [Vec4; MAX_LAYERS / 4],
+    /// How much the colour map tints each layer.
+    map_tints: [Vec4; MAX_LAYERS / 4],
+    /// Where the colour map begins to show, and where it shows fully.
+    map_distance: Vec2,
+    /// What turns metres along x and z into the width and height of the colour map.
+    per_side: Vec2,
     near: f32,
     far: f32,
     variety: f32,
@@ -167,10 +178,17 @@ pub(super) struct GroundUniform {
 }
 
 impl GroundUniform {
-    pub(super) fn new(look: &GroundLook, place: &GlobalTransform) -> Self {
+    /// `size` is the number of cells along x and z.
+    pub(super) fn new(look: &GroundLook, place: &GlobalTransform, size: IVec2) -> Self {
         let count = look.layers.len().clamp(1, MAX_LAYERS);
         let (scale, rotation, translation) = place.to_scale_rotation_translation();
         let layer = |at: usize| look.layers.get(at).cloned().unwrap_or_default();
+        let by_four = |of: &dyn Fn(GroundLayer) -> f32| {
+            std::array::from_fn(|four| Vec4::from_array(std::array::from_fn(|at| of(layer(4 * four + at)))))
+        };
+        let map = look.color_map.as_ref();
+        let (from, to) = map.map_or((0.0, 0.0), |map| map.distance);
+        let strength = map.map_or(0.0, |map| map.strength);
         Self {
             place: Mat4::from_rotation_translation(rotation, translation).inverse(),
             layers: std::array::from_fn(|at| {
@@ -182,9 +200,10 @@ impl GroundUniform {
                 let GroundLayer { tint, top, .. } = layer(at);
                 TintUniform { color: tint.to_vec3(), top: top.map_or(-1.0, f32::from) }
             }),
-            broad: std::array::from_fn(|four| {
-                Vec4::from_array(std::array::from_fn(|at| layer(4 * four + at).broad_relief))
-            }),
+            broad: by_four(&|layer| layer.broad_relief),
+            map_tints: by_four(&|layer| (layer.map_tint * strength).clamp(0.0, 1.0)),
+            map_distance: Vec2::new(from, to.max(from + 0.1)),
+            per_side: 1.0 / (size.max(IVec2::ONE).as_vec2() * scale.xz().abs().max(Vec2::splat(1e-6))),
             near: look.distance.0,
             far: look.distance.1.max(look.distance.0 + 0.1),
             variety: look.variety,
@@ -274,8 +293,12 @@ impl MaterialExtension for GroundExtension {
             }
         }
         if let Some(fragment) = &mut descriptor.fragment {
-            let GroundKey { without_anisotropy, is_fine } = key.bind_group_data;
-            let definitions = [(without_anisotropy, "WITHOUT_ANISOTROPY"), (is_fine, "GROUND_FINE")];
+            let GroundKey { without_anisotropy, is_fine, has_color_map } = key.bind_group_data;
+            let definitions = [
+                (without_anisotropy, "WITHOUT_ANISOTROPY"),
+                (is_fine, "GROUND_FINE"),
+                (has_color_map, "GROUND_COLOR_MAP"),
+            ];
             fragment.shader_defs.extend(definitions.iter().filter(|own| own.0).map(|own| own.1.into()));
         }
         descriptor.vertex.buffers = vec![layout.0.get_layout(&attributes)?];

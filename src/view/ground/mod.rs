@@ -31,7 +31,7 @@ mod textures;
 
 pub use cache::GroundTextureCache;
 pub use fit::GroundTexturesError;
-pub use look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
+pub use look::{ColorMap, GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
 pub use material::{GroundBase, GroundExtension, GroundMaterial};
 pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
@@ -97,7 +97,10 @@ fn keep_materials(app: &mut App) {
     // Transforms are final by then; a material that changes later shows only in the next frame.
     .add_systems(
         PostUpdate,
-        (follow, pieces::follow).chain().after(TransformSystems::Propagate).before(AssetEventSystems),
+        (note_color_maps, follow, pieces::follow)
+            .chain()
+            .after(TransformSystems::Propagate)
+            .before(AssetEventSystems),
     );
 }
 
@@ -113,6 +116,7 @@ fn add_materials(
         (Entity, &GroundLook, &GlobalTransform, Option<&MeshMaterial3d<GroundMaterial>>),
         With<Terrain>,
     >,
+    images: Res<Assets<Image>>,
     mut materials: ResMut<Assets<GroundMaterial>>,
 ) {
     let Some(textures) = &loading.ready else { return };
@@ -128,10 +132,12 @@ fn add_materials(
             continue;
         }
         let extension = GroundExtension {
-            uniform: GroundUniform::new(look, place),
+            // The terrain's size comes with `follow`, in the same frame.
+            uniform: GroundUniform::new(look, place, IVec2::ONE),
             albedo: Some(textures.albedo.clone()),
             relief: Some(textures.relief.clone()),
             noise: Some(textures.noise.clone()),
+            color_map: loaded_color_map(look, &images),
             without_anisotropy: textures.without_anisotropy,
             quality: look.quality,
         };
@@ -160,20 +166,68 @@ fn remove_materials(
     }
 }
 
+fn uniform_of(terrain: &Terrain, look: &GroundLook, place: &GlobalTransform) -> GroundUniform {
+    let ground = terrain.world().ground();
+    GroundUniform::new(look, place, IVec2::new(ground.width(), ground.depth()))
+}
+
+/// A look's colour map, if it is loaded: a material with one that is not would not be drawn.
+fn loaded_color_map(look: &GroundLook, images: &Assets<Image>) -> Option<Handle<Image>> {
+    let image = &look.color_map.as_ref()?.image;
+    images.contains(image).then(|| image.clone())
+}
+
+/// A colour map that is loaded, or loaded again, changes the looks that have it.
+fn note_color_maps(
+    mut events: MessageReader<AssetEvent<Image>>,
+    mut looks: Query<&mut GroundLook, With<Terrain>>,
+    mut materials: ResMut<Assets<GroundMaterial>>,
+) {
+    let changed: Vec<AssetId<Image>> = events
+        .read()
+        .filter_map(|event| match event {
+            AssetEvent::Added { id } | AssetEvent::Modified { id } => Some(*id),
+            _ => None,
+        })
+        .collect();
+    for mut look in &mut looks {
+        let Some(map) = &look.color_map else { continue };
+        let id = map.image.id();
+        if !changed.contains(&id) {
+            continue;
+        }
+        look.set_changed();
+        // Materials that show it already are bound to what it was before.
+        let is_bound = |(own, material): (_, &GroundMaterial)| {
+            let map = material.extension.color_map.as_ref();
+            map.is_some_and(|map| map.id() == id).then_some(own)
+        };
+        let bound: Vec<_> = materials.iter().filter_map(is_bound).collect();
+        for own in bound {
+            if let Some(mut material) = materials.get_mut(own) {
+                let _: &mut GroundMaterial = &mut material;
+            }
+        }
+    }
+}
+
 /// Textures move with the terrain, in the frame that draws it elsewhere, and follow its look.
 fn follow(
     looks: Query<
-        (&GroundLook, &GlobalTransform, &MeshMaterial3d<GroundMaterial>),
-        (With<Terrain>, Or<(Changed<GroundLook>, Changed<GlobalTransform>)>),
+        (&Terrain, &GroundLook, &GlobalTransform, &MeshMaterial3d<GroundMaterial>),
+        Or<(Changed<GroundLook>, Changed<GlobalTransform>, Changed<MeshMaterial3d<GroundMaterial>>)>,
     >,
+    images: Res<Assets<Image>>,
     mut materials: ResMut<Assets<GroundMaterial>>,
 ) {
-    for (look, place, material) in &looks {
+    for (terrain, look, place, material) in &looks {
         // Bevy prepares the material and all tiles again once it is touched, and a terrain's transform counts as
         // changed whenever anything below it moves.
-        let (uniform, quality) = (GroundUniform::new(look, place), look.quality);
+        let (uniform, quality) = (uniform_of(terrain, look, place), look.quality);
+        let color_map = loaded_color_map(look, &images);
         let is_other = |material: &GroundMaterial| {
-            material.extension.uniform != uniform || material.extension.quality != quality
+            let own = &material.extension;
+            own.uniform != uniform || own.quality != quality || own.color_map != color_map
         };
         if !materials.get(&material.0).is_some_and(is_other) {
             continue;
@@ -181,6 +235,7 @@ fn follow(
         if let Some(mut material) = materials.get_mut(&material.0) {
             material.extension.uniform = uniform;
             material.extension.quality = quality;
+            material.extension.color_map = color_map;
         }
     }
 }
@@ -233,11 +288,44 @@ mod tests {
         app.world_mut().entity_mut(terrain).remove::<GroundLook>().insert(other.clone());
         app.update();
         assert_eq!(material_of(&app, terrain), before);
-        let uniform = GroundUniform::new(&other, &GlobalTransform::IDENTITY);
+        let uniform = GroundUniform::new(&other, &GlobalTransform::IDENTITY, stage::SIZE);
         assert_eq!(stage::extension(&app, terrain).uniform, uniform);
         app.world_mut().entity_mut(terrain).remove::<GroundLook>();
         app.update();
         assert_eq!(material_of(&app, terrain), None);
+    }
+
+    #[test]
+    fn a_color_map_shows_once_it_is_loaded_and_again_when_it_changes() {
+        let mut app = stage::app();
+        let terrain = stage::spawn_terrain(&mut app);
+        let handle = app.world().resource::<Assets<Image>>().reserve_handle();
+        let look = GroundLook { color_map: Some(ColorMap::new(handle.clone())), ..default() };
+        app.world_mut().entity_mut(terrain).insert(look);
+        let piece = app.world_mut().spawn(GroundPiece { terrain, origin: IVec3::ONE }).id();
+        (0..3).for_each(|_| app.update());
+        assert_eq!(stage::extension(&app, terrain).color_map, None, "ground is drawn without it");
+        let load = |app: &mut App| {
+            let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+            images.insert(&handle, Image::default()).expect("a handle of these assets");
+            app.update();
+            app.update();
+        };
+        load(&mut app);
+        for entity in [terrain, piece] {
+            assert_eq!(stage::extension(&app, entity).color_map, Some(handle.clone()));
+        }
+        // Materials are bound again to what is loaded again.
+        app.world_mut().resource_mut::<Messages<AssetEvent<GroundMaterial>>>().clear();
+        load(&mut app);
+        let mut events = app.world_mut().resource_mut::<Messages<AssetEvent<GroundMaterial>>>();
+        let changes = events.drain().filter(|event| matches!(event, AssetEvent::Modified { .. })).count();
+        assert_eq!(changes, 2, "the terrain and its piece");
+        app.world_mut().get_mut::<GroundLook>(terrain).expect("a look").color_map = None;
+        app.update();
+        for entity in [terrain, piece] {
+            assert_eq!(stage::extension(&app, entity).color_map, None);
+        }
     }
 
     #[test]

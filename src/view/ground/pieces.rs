@@ -61,7 +61,7 @@ pub(super) fn follow(
 mod tests {
     use super::super::look::GroundQuality;
     use super::super::material::GroundUniform;
-    use super::super::stage::{app, extension, spawn_terrain, textures};
+    use super::super::stage::{SIZE, app, extension, spawn_terrain, textures};
     use super::super::textures::GroundLoading;
     use super::*;
 
@@ -157,7 +157,7 @@ mod tests {
         app.world_mut().entity_mut(terrain).insert(place);
         app.update();
         let ground = extension(&app, terrain);
-        assert_eq!(ground.uniform, GroundUniform::new(&GroundLook::default(), &place.into()));
+        assert_eq!(ground.uniform, GroundUniform::new(&GroundLook::default(), &place.into(), SIZE));
         assert_eq!(extension(&app, debris), of_piece(&ground, &piece));
         assert_eq!(count_changes(&mut app), 2, "the renderer sees the change in the same frame");
     }

@@ -28,8 +28,12 @@ pub(super) fn app() -> App {
     app
 }
 
+/// Cells of the terrains along x and z.
+pub(super) const SIZE: IVec2 = IVec2::splat(64);
+
 pub(super) fn spawn_terrain(app: &mut App) -> Entity {
-    let ground = Ground::flat(64, 64, 8.0).expect("valid");
+    let [width, depth] = SIZE.as_uvec2().to_array();
+    let ground = Ground::flat(width, depth, 8.0).expect("valid");
     let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
     app.world_mut().spawn((terrain, GroundLook::default(), GlobalTransform::IDENTITY)).id()
 }

@@ -96,7 +96,7 @@ impl<'a> LightChange<'a> {
                     return true;
                 }
             }
-            // Ground under roofs, or that was under one. What was dug is not drawn by a tile.
+            // Ground under roofs, or that was under one. Tiles draw no dug ground.
             let changed = self.before.changed_run(z).hull(self.after.changed_run(z)).within(width);
             for x in changed.start.max(columns.start)..changed.end.min(columns.end) {
                 if self.is_ground(z, x) {

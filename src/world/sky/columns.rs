@@ -213,7 +213,7 @@ impl<'a> SkyColumns<'a> {
         (column.z - self.first.z) as usize * self.width + (column.x - self.first.x) as usize
     }
 
-    /// Where a column lies in the rectangle; `None` beside it.
+    /// Where a column lies in the rectangle; `None` outside.
     pub(super) fn place(&self, column: Column) -> Option<[usize; 2]> {
         let [x, z] = [column.x - self.low.x, column.z - self.low.z].map(|at| usize::try_from(at).ok());
         let place = [x?, z?];

@@ -16,7 +16,7 @@ pub(super) struct Step {
     pub dz: i32,
     /// Multiplied by a rise in 1/128 voxel, and divided by 65,536, it gives the slope in 1/32.
     pub factor: i16,
-    /// The same for each of eight columns: from an array, compilers multiply all of them at once.
+    /// That factor eight times, one for each of eight columns: from an array, compilers multiply all of them at once.
     pub factors: [i16; 8],
 }
 

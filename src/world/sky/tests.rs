@@ -327,14 +327,14 @@ fn scenes(seed: u32) -> [Scene; 5] {
     ]
 }
 
-/// What is drawn whose light differs between two worlds that draw the same shapes there, without what is drawn anew.
+/// What is drawn whose light differs between two worlds that draw the same shapes there, without parts that are drawn again.
 fn otherwise_lit(before: &World, after: &World, is_drawn_anew: impl Fn(MeshKey) -> bool) -> Vec<MeshKey> {
     let tiles = before.grid().tiles().map(MeshKey::Tile);
     let all = tiles.chain(before.drawn_chunks().map(MeshKey::Chunk)).filter(|drawn| !is_drawn_anew(*drawn));
     all.filter(|&drawn| lights_of(before, drawn) != lights_of(after, drawn)).collect()
 }
 
-/// Nodes of a cut whose light differs, without those that are drawn anew.
+/// Nodes of a cut whose light differs, without those that are drawn again.
 fn otherwise_lit_nodes(before: &World, after: &World, cut: &Cut, drawn_anew: &[Node]) -> Vec<Node> {
     let all = before.drawn_in(cut).filter(|(node, _)| node.level > 0 && !drawn_anew.contains(node));
     let differs = |(node, mesh): &(Node, SurfaceMesh)| {
@@ -357,7 +357,7 @@ fn everything_whose_light_changes_is_lit_again_wherever_players_dig() {
             let cut = Cut::random(terrain.world().lod_grid(2), u64::from(seed), 12);
             let drawn = Arc::new(terrain.world().draw_cut(cut.clone()).0);
             terrain.set_drawn_cut(Some(Arc::clone(&drawn)));
-            // Without what is lit again, light would be wrong in so many places.
+            // Without what is lit again, light would be wrong in this many places.
             let (mut parts, mut nodes) = (0, 0);
             for number in 0..24 {
                 let before = World::clone(terrain.world());
@@ -386,7 +386,7 @@ fn everything_whose_light_changes_is_lit_again_wherever_players_dig() {
                 new_nodes.extend(relit_nodes.iter().map(|update| update.node));
                 let missing = otherwise_lit_nodes(&before, world, &cut, &new_nodes);
                 assert!(missing.is_empty(), "{name}: {missing:?} after {number} of {seed}");
-                // Columns that are brought up to date have the light of new ones, and that of each column by itself.
+                // Columns that are brought up to date have the light of new ones, and that of each column alone.
                 for tile in world.grid().tiles() {
                     let (low, high) = world.grid().tile_cells(tile);
                     let mut updated = SkyColumns::new(lit.view_before(), low, high).after(&lit);

@@ -1,0 +1,324 @@
+//! Grounds as assets: a file that says which heights and which maps of materials a world has.
+
+use std::sync::Arc;
+
+use bevy::asset::io::Reader;
+use bevy::asset::{AssetLoader, LoadContext, ParseAssetPathError, ReadAssetBytesError};
+use bevy::ecs::entity_disabling::Disabled;
+use bevy::ecs::query::Allow;
+use bevy::prelude::*;
+use bevy::reflect::TypePath;
+use serde::{Deserialize, Serialize};
+
+use super::BeforeLoad;
+use super::heightmap::{read_limited, register_loader};
+use crate::ground::{
+    ElevationGrid, ElevationScale, ElevationTile, Ground, GroundError, HeightFormat, IdOptions, ImportError,
+    ImportOptions, MaterialControl, MaterialMap, SplatOptions, TileEdges, tile_place,
+};
+use crate::terrain::{Order, Terrain, TerrainSettings};
+
+/// The largest file of a [`GroundDescription`], in bytes.
+const MAX_DESCRIPTION: u64 = 1 << 20;
+
+/// What a ground is made of, as a JSON file with the extension `ground.json` says it. Paths are relative to that file.
+///
+/// ```
+/// # use bevy_burrow::plugin::GroundDescription;
+/// let description: GroundDescription = serde_json::from_str(
+///     r#"{
+///         "heights": ["alps.tif"],
+///         "scale": { "voxels_per_sample": 4, "heights": { "units": { "voxels_per_unit": 1, "base": 0 } } },
+///         "materials": { "splats": { "files": ["alps_splat.png"], "options": { "layers": [1, 2, 3, null] } } }
+///     }"#,
+/// )?;
+/// # assert_eq!(description.heights, ["alps.tif"]);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GroundDescription {
+    /// One file of heights, or several whose names contain the place of a tile, as in `island_x3_y5.png`.
+    pub heights: Vec<String>,
+    /// How they are read.
+    pub import: ImportOptions,
+    /// How tiles meet.
+    pub tiles: TileEdges,
+    /// The scale. `None`: voxels of one metre, and samples as far apart as the first file says, or a voxel if it says nothing.
+    pub scale: Option<ElevationScale>,
+    /// The materials. `None`: material 0 everywhere.
+    pub materials: Option<MaterialFiles>,
+}
+
+/// The files with the materials of a ground.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum MaterialFiles {
+    /// Splat maps or masks.
+    Splats {
+        /// The files, in the order of their channels.
+        files: Vec<String>,
+        /// What the channels mean.
+        options: SplatOptions,
+    },
+    /// An id map.
+    Ids {
+        /// The file.
+        file: String,
+        /// What the samples mean.
+        #[serde(default)]
+        options: IdOptions,
+    },
+}
+
+/// A ground that was made of files.
+#[derive(Asset, TypePath, Clone, Debug)]
+pub struct GroundAsset {
+    /// The ground.
+    pub ground: Arc<Ground>,
+    /// What was read, guessed and doubted, a line for each file and each note.
+    pub report: String,
+}
+
+/// The reason why a ground can't be made of its files.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GroundFileError {
+    /// The description can't be read.
+    #[error("reading a ground's description: {0}")]
+    Read(#[from] std::io::Error),
+    /// The description is too large to be one.
+    #[error(
+        "the description of a ground has at most {MAX_DESCRIPTION} bytes: name the files in it, and put nothing else there"
+    )]
+    TooLarge,
+    /// The description is not what it should be.
+    #[error("the description of a ground is wrong: {0}")]
+    Description(#[from] serde_json::Error),
+    /// It names no heights.
+    #[error("the description of a ground names no file of heights: add \"heights\": [\"island.png\"]")]
+    NoHeights,
+    /// One of several files of heights has no place in its name.
+    #[error(
+        "`{0}` is one of several files of heights, and no place is in its name: name it like island_x3_y5.png"
+    )]
+    NoPlace(String),
+    /// A file's path is no path.
+    #[error("`{0}` is no path of a file: {1}")]
+    Path(String, ParseAssetPathError),
+    /// A file can't be read.
+    #[error("reading `{0}`: {1}")]
+    File(String, ReadAssetBytesError),
+    /// A file's content can't be used.
+    #[error("`{0}`: {1}")]
+    Import(String, ImportError),
+    /// The heights and materials make no ground.
+    #[error(transparent)]
+    Ground(#[from] GroundError),
+}
+
+/// Loads files with the extension `ground.json`, and the files that they name, as [`GroundAsset`]. Where Bevy's asset server watches
+/// files, a change of any of them loads the ground again.
+#[derive(Default, TypePath)]
+pub struct GroundLoader;
+
+impl AssetLoader for GroundLoader {
+    type Asset = GroundAsset;
+    type Settings = ();
+    type Error = GroundFileError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        (): &(),
+        context: &mut LoadContext<'_>,
+    ) -> Result<GroundAsset, GroundFileError> {
+        let bytes = read_limited(reader, MAX_DESCRIPTION).await?;
+        if bytes.len() as u64 > MAX_DESCRIPTION {
+            return Err(GroundFileError::TooLarge);
+        }
+        let description: GroundDescription = serde_json::from_slice(&bytes)?;
+        let mut report = Vec::new();
+        let (grid, scale) = heights(&description, context, &mut report).await?;
+        let ground = grid.into_ground(&scale)?;
+        let ground = match &description.materials {
+            Some(files) => {
+                let map = materials(files, context, &mut report).await?;
+                ground.with_materials(&MaterialControl::Map(Arc::new(map)))?
+            }
+            None => ground,
+        };
+        Ok(GroundAsset { ground: Arc::new(ground), report: report.join("\n") })
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["ground.json"]
+    }
+}
+
+/// The bytes of a file, whose path is relative to the description.
+async fn read(name: &str, context: &mut LoadContext<'_>) -> Result<Vec<u8>, GroundFileError> {
+    let path = context.path().resolve_embed_str(name);
+    let path = path.map_err(|error| GroundFileError::Path(name.into(), error))?;
+    let bytes = context.read_asset_bytes(path).await;
+    bytes.map_err(|error| GroundFileError::File(name.into(), error))
+}
+
+async fn heights(
+    description: &GroundDescription,
+    context: &mut LoadContext<'_>,
+    report: &mut Vec<String>,
+) -> Result<(ElevationGrid, ElevationScale), GroundFileError> {
+    let GroundDescription { heights, import, tiles: edges, .. } = description;
+    let (mut tiles, mut scale) = (Vec::new(), description.scale);
+    for name in heights {
+        let failed = |error| GroundFileError::Import(name.clone(), error);
+        // Without a header, its name is all that says what it is.
+        let is_hgt = name.to_ascii_lowercase().ends_with(".hgt");
+        let format = import.format.or(is_hgt.then_some(HeightFormat::Hgt));
+        let bytes = read(name, context).await?;
+        let (grid, found) =
+            ElevationGrid::decode(&bytes, &ImportOptions { format, ..import.clone() }).map_err(failed)?;
+        report.push(format!("{name}: {found}"));
+        if scale.is_none() {
+            scale = Some(found.scale(1.0).map_err(failed)?);
+        }
+        let place = if heights.len() == 1 { Some((0, 0)) } else { tile_place(name) };
+        let (column, row) = place.ok_or_else(|| GroundFileError::NoPlace(name.clone()))?;
+        tiles.push(ElevationTile { column, row, grid });
+    }
+    let (Some(first), Some(scale)) = (heights.first(), scale) else { return Err(GroundFileError::NoHeights) };
+    let joined = ElevationGrid::join(tiles, *edges);
+    let (grid, notes) = joined.map_err(|error| GroundFileError::Import(first.clone(), error))?;
+    report.extend(notes.iter().map(ToString::to_string));
+    Ok((grid, scale))
+}
+
+async fn materials(
+    files: &MaterialFiles,
+    context: &mut LoadContext<'_>,
+    report: &mut Vec<String>,
+) -> Result<MaterialMap, GroundFileError> {
+    let (name, read) = match files {
+        MaterialFiles::Splats { files, options } => {
+            let mut all = Vec::new();
+            for file in files {
+                all.push(read(file, context).await?);
+            }
+            (files.first(), MaterialMap::decode_splats(&all, options))
+        }
+        MaterialFiles::Ids { file, options } => {
+            (Some(file), MaterialMap::decode_ids(&read(file, context).await?, options))
+        }
+    };
+    let name = name.cloned().unwrap_or_default();
+    let (map, found) = read.map_err(|error| GroundFileError::Import(name.clone(), error))?;
+    report.push(format!("{name}: {found}"));
+    Ok(map)
+}
+
+/// This entity is a terrain whose ground is a file. It gets its [`Terrain`] once the file is loaded, unless it has one already. When
+/// the file or one that it names changes, edits stay and the ground below them becomes the new one, as with [`Order::Ground`].
+///
+/// Hot reloading takes Bevy's feature `file_watcher`. A ground of another size takes a new terrain: the change is logged and not shown.
+///
+/// ```no_run
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::prelude::*;
+/// use bevy_burrow::plugin::GroundFrom;
+///
+/// fn spawn(mut commands: Commands, assets: Res<AssetServer>) {
+///     commands.spawn((GroundFrom::new(assets.load("alps.ground.json")), GroundLook::default()));
+/// }
+/// ```
+#[derive(Component, Clone, Debug)]
+pub struct GroundFrom {
+    /// The file.
+    pub ground: Handle<GroundAsset>,
+    /// The settings of the terrain that it becomes.
+    pub settings: TerrainSettings,
+}
+
+impl GroundFrom {
+    /// A file, with a terrain's usual settings.
+    pub fn new(ground: Handle<GroundAsset>) -> Self {
+        Self { ground, settings: TerrainSettings::default() }
+    }
+}
+
+/// Adds the asset of grounds with its loader, and makes terrains of them, where there is an asset server.
+#[derive(Default)]
+pub struct GroundFilePlugin;
+
+impl Plugin for GroundFilePlugin {
+    // At once if possible, as games may load a ground while plugins are built; otherwise once all plugins are there.
+    fn build(&self, app: &mut App) {
+        register(app);
+    }
+
+    fn finish(&self, app: &mut App) {
+        register(app);
+    }
+}
+
+fn register(app: &mut App) {
+    if register_loader::<GroundLoader>(app) {
+        app.add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
+    }
+}
+
+/// The hash of the ground that a terrain got last from its file, or will get once what it was asked before is done.
+#[derive(Component)]
+struct FollowedGround(u64);
+
+/// Makes terrains of grounds that are loaded, and gives terrains the ground that is loaded again.
+fn follow_ground_files(
+    mut commands: Commands,
+    mut events: MessageReader<AssetEvent<GroundAsset>>,
+    grounds: Res<Assets<GroundAsset>>,
+    mut terrains: Query<
+        (Entity, Ref<GroundFrom>, Option<&mut Terrain>, Option<&FollowedGround>),
+        Allow<Disabled>,
+    >,
+) {
+    let changed: Vec<AssetId<GroundAsset>> = events
+        .read()
+        .filter_map(|event| match event {
+            AssetEvent::Added { id } | AssetEvent::Modified { id } => Some(*id),
+            _ => None,
+        })
+        .collect();
+    for (entity, from, terrain, followed) in &mut terrains {
+        if !from.is_changed() && !changed.contains(&from.ground.id()) {
+            continue;
+        }
+        let Some(GroundAsset { ground, report }) = grounds.get(&from.ground) else { continue };
+        let Some(mut terrain) = terrain else {
+            match Terrain::new(Arc::clone(ground), &from.settings) {
+                Ok(terrain) => {
+                    info!("{report}");
+                    commands.entity(entity).try_insert((terrain, FollowedGround(ground.hash())));
+                }
+                Err(error) => error!("no terrain is made of the ground of {entity}: {error}"),
+            }
+            continue;
+        };
+        let before = terrain.bypass_change_detection().world().ground();
+        if followed.map_or(before.hash(), |followed| followed.0) == ground.hash() {
+            continue;
+        }
+        let size = |ground: &Ground| (ground.width(), ground.depth());
+        if size(before) != size(ground) {
+            let ((width, depth), (new_width, new_depth)) = (size(before), size(ground));
+            error!(
+                "the file of the ground of {entity} has {new_width} x {new_depth} cells now, and the terrain {width} x {depth}: \
+                 despawn it and spawn another one to show the file"
+            );
+            continue;
+        }
+        info!("{report}");
+        terrain.submit(Order::Ground(Arc::clone(ground)));
+        commands.entity(entity).try_insert(FollowedGround(ground.hash()));
+    }
+}

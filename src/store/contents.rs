@@ -1,0 +1,119 @@
+//! The images and prefabs that frames of the journal name, each in a file next to the segments. It is written and made
+//! durable before the first frame that names it, and removed when no segment names it any more.
+
+use std::collections::BTreeSet;
+use std::io;
+use std::sync::{Mutex, PoisonError};
+
+use super::files::{Files, Opening};
+use super::reading::read_file;
+use crate::format::contents::{Stamps, content_file};
+use crate::format::ids::StampId;
+
+/// The folder of the journal.
+pub(super) const FOLDER: &str = "journal";
+
+/// How the names of such files end.
+const ENDING: &str = ".content";
+
+fn path(name: StampId) -> String {
+    format!("{FOLDER}/{:016x}{ENDING}", name.0)
+}
+
+/// The content whose file has this name.
+fn name_of(file: &str) -> Option<StampId> {
+    let name = StampId(u64::from_str_radix(file.strip_suffix(ENDING)?, 16).ok()?);
+    path(name).ends_with(&format!("/{file}")).then_some(name)
+}
+
+/// Whether a file holds the content of its name.
+fn is_valid(files: &dyn Files, name: StampId) -> bool {
+    let bytes = read_file(files, &path(name));
+    bytes.is_ok_and(|read| Stamps::default().add_file(name, &read.bytes))
+}
+
+/// Makes the content of these names durable, unless it is in `written` and still there.
+pub(super) fn write(files: &dyn Files, contents: &Stamps, written: &mut BTreeSet<StampId>) -> io::Result<()> {
+    let mut is_new = false;
+    for name in contents.names() {
+        let path = path(name);
+        if written.contains(&name) && files.exists(&path)? {
+            continue;
+        }
+        files.create_folder(FOLDER)?;
+        if !files.exists(&path)? || !is_valid(files, name) {
+            write_file(files, &path, &content_file(contents, name))?;
+        } else {
+            // A killed process may not have synced it.
+            files.open(&path, Opening::Existing)?.sync()?;
+        }
+        written.insert(name);
+        is_new = true;
+    }
+    if is_new { files.sync_folder(FOLDER) } else { Ok(()) }
+}
+
+/// Writes a file, in place of what an interrupted process left there or what was damaged.
+fn write_file(files: &dyn Files, path: &str, bytes: &[u8]) -> io::Result<()> {
+    if files.exists(path)? {
+        files.remove(path)?;
+    }
+    let written = files.open(path, Opening::New).and_then(|file| {
+        file.write_at(0, bytes)?;
+        file.sync()
+    });
+    if written.is_err() {
+        drop(files.remove(path));
+    }
+    written
+}
+
+/// Removes the files of all other content.
+pub(super) fn retain(
+    files: &dyn Files,
+    needed: &BTreeSet<StampId>,
+    written: &mut BTreeSet<StampId>,
+) -> io::Result<()> {
+    for name in files.list(FOLDER)?.iter().filter_map(|file| name_of(file)) {
+        if !needed.contains(&name) {
+            written.remove(&name);
+            match files.remove(&path(name)) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The content that was found of a world's journal. It is decoded where a frame is.
+#[derive(Debug, Default)]
+pub(super) struct FoundContents {
+    files: Vec<(StampId, Box<[u8]>)>,
+    decoded: Mutex<Stamps>,
+}
+
+impl FoundContents {
+    /// Reads the files of these names. Those that are missing or damaged are found out where a frame needs them.
+    pub fn read(files: &dyn Files, names: BTreeSet<StampId>) -> Self {
+        let read = names.into_iter().filter_map(|name| {
+            let read = read_file(files, &path(name)).ok()?;
+            Some((name, read.bytes.into_boxed_slice()))
+        });
+        Self { files: read.collect(), decoded: Mutex::default() }
+    }
+
+    /// A table with the content of these names, as far as it is there and not damaged.
+    pub fn table(&self, names: &[StampId]) -> Stamps {
+        let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
+        for name in names {
+            let file = self.files.binary_search_by_key(name, |(name, _)| *name).ok();
+            if let Some((_, bytes)) = file.and_then(|at| self.files.get(at))
+                && !decoded.has(*name)
+            {
+                decoded.add_file(*name, bytes);
+            }
+        }
+        decoded.clone()
+    }
+}
