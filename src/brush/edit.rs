@@ -45,6 +45,7 @@ pub struct Edit {
     /// `None` unless the operation sculpts.
     blend: Option<QuantizedBlend>,
     power: u8,
+    #[serde(with = "super::roughness::optional")]
     roughness: Option<QuantizedRoughness>,
     tag: u64,
     stroke: Option<u64>,
@@ -60,6 +61,7 @@ struct Unchecked {
     blend: Option<QuantizedBlend>,
     #[serde(default = "full_power")]
     power: u8,
+    #[serde(default, with = "super::roughness::optional")]
     roughness: Option<QuantizedRoughness>,
     tag: u64,
     #[serde(default)]

@@ -144,8 +144,8 @@ pub(crate) struct Constants {
     pub kind: u32,
     /// The result of [`ShapeSdf::constants`].
     pub shape: [f32; 12],
-    /// Amplitude, scale and seed of roughness.
-    pub roughness: Option<(i32, i32, u32)>,
+    /// Amplitude, scale, seed and origin of roughness.
+    pub roughness: Option<(i32, i32, u32, [i32; 3])>,
 }
 
 #[cfg(feature = "cuda")]

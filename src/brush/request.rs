@@ -219,8 +219,8 @@ impl Brush {
     }
 
     /// The brush after every point p moved to `rotation * (p * scale) + translation`: for example from world
-    /// space to terrain space. Sizes and roughness grow with `scale`, which should be positive; the roughness
-    /// pattern itself stays tied to the lattice.
+    /// space to terrain space. Sizes and roughness grow with `scale`, which should be positive; the axes of the
+    /// roughness pattern stay those of the lattice.
     ///
     /// `rotation` should have length 1. Other numbers give a brush that [`Edit::quantize`](super::Edit::quantize)
     /// refuses or that is deformed.
@@ -238,6 +238,7 @@ impl Brush {
             roughness: self.roughness.map(|roughness| Roughness {
                 amplitude: roughness.amplitude * scale,
                 scale: roughness.scale * scale,
+                origin: rotation * (roughness.origin * scale) + translation,
                 ..roughness
             }),
             tag: self.tag,
@@ -268,6 +269,9 @@ impl Brush {
             None => brush.shape.stretched(|arrow| rest * arrow),
         };
         brush.operation.stretch(rest);
+        if let Some(roughness) = &mut brush.roughness {
+            roughness.origin = rest * roughness.origin;
+        }
         brush
     }
 }
@@ -288,6 +292,6 @@ mod tests {
         assert!(base.abs_diff_eq(Vec3::new(10.0, 12.0, 10.0), 1e-5), "{base}");
         assert!(axis.abs_diff_eq(Vec3::new(0.0, 2.0, 0.0), 1e-5), "{axis}");
         assert_eq!((radius, moved.tag), (6.0, 7));
-        assert_eq!(moved.roughness, Some(Roughness::new(2.0, 8.0, 9)));
+        assert_eq!(moved.roughness, Some(Roughness::new(2.0, 8.0, 9).with_origin(Vec3::splat(10.0))));
     }
 }

@@ -205,12 +205,19 @@ pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
         (_, false) => Brush::add(shape, material),
     };
     match rng.u32(0..6) {
-        0 => brush.with_roughness(Roughness {
-            amplitude: rng.f32() * 2.0,
-            scale: 1.0 + rng.f32() * 6.0,
-            seed: rng.u32(..),
-        }),
+        0 => brush.with_roughness(random_roughness(rng, 2.0)),
         _ => brush,
+    }
+}
+
+/// Bumps up to this high; half of them tied to a point that is not the origin.
+fn random_roughness(rng: &mut Rng, most: f32) -> Roughness {
+    let roughness = Roughness::new(rng.f32() * most, 1.0 + rng.f32() * 6.0, rng.u32(..));
+    let away = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5) * 4000.0;
+    match rng.u32(0..4) {
+        0 | 1 => roughness,
+        2 => roughness.with_origin(away.round()),
+        _ => roughness.with_origin(away),
     }
 }
 
@@ -259,7 +266,7 @@ pub fn sculpting_brush(rng: &mut Rng, shape: Shape, place: Vec3) -> Brush {
     match rng.u32(0..4) {
         0 => brush.with_material(MaterialId(rng.u8(0..6))),
         1 => brush.with_strength(rng.f32()),
-        2 => brush.with_roughness(Roughness::new(rng.f32(), 1.0 + rng.f32() * 6.0, rng.u32(..))),
+        2 => brush.with_roughness(random_roughness(rng, 1.0)),
         _ => brush,
     }
 }
