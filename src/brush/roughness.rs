@@ -252,6 +252,52 @@ mod tests {
     }
 
     #[test]
+    fn noise_moves_with_its_origin() {
+        let own = QuantizedRoughness::quantize(&Roughness::new(1.0, 4.7, 1)).unwrap();
+        let by = IVec3::new(9000, -31, 77_777);
+        let moved = Roughness::new(1.0, 4.7, 1).with_origin(by.as_vec3());
+        let moved = QuantizedRoughness::quantize(&moved).unwrap();
+        for i in 0..3000 {
+            let p = IVec3::new(i % 41 - 20, i / 41 % 37 - 15, i / 1517 - 7);
+            assert_eq!(noise(&own, p), noise(&moved, p + by));
+        }
+        let far = |origin| QuantizedRoughness::quantize(&Roughness::new(1.0, 4.0, 1).with_origin(origin));
+        assert_eq!(far(Vec3::splat(1e30)), far(Vec3::splat(4_194_304.0)));
+        for end in [f32::MAX, f32::MIN] {
+            let farthest = far(Vec3::splat(end)).unwrap();
+            assert_eq!(farthest.check(), Ok(()));
+            assert!(
+                noise(&farthest, IVec3::MAX).abs() <= 256.0 && noise(&farthest, IVec3::MIN).abs() <= 256.0
+            );
+        }
+        assert!(matches!(far(Vec3::NAN), Err(BrushError::NotFinite { what: "origin", .. })));
+        let beyond = QuantizedRoughness { origin: [0, i32::MIN, 0], ..own };
+        assert!(matches!(beyond.check(), Err(BrushError::Roughness { what: "origin", .. })));
+    }
+
+    #[test]
+    fn the_form_without_an_origin_is_the_one_from_before_there_was_one() {
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct Own(#[serde(with = "optional")] Option<QuantizedRoughness>);
+        let own = |origin| {
+            QuantizedRoughness::quantize(&Roughness::new(1.0, 4.0, 700).with_origin(origin)).unwrap()
+        };
+        let bytes = |own: Option<_>| postcard::to_stdvec(&Own(own)).unwrap();
+        let before = |own: Option<(i32, i32, u32)>| postcard::to_stdvec(&own).unwrap();
+        assert_eq!(bytes(None), before(None));
+        assert_eq!(bytes(Some(own(Vec3::ZERO))), before(Some((256, 1024, 700))));
+        for own in [None, Some(own(Vec3::ZERO)), Some(own(Vec3::new(-1.5, 900.0, 0.0)))] {
+            assert_eq!(postcard::from_bytes::<Own>(&bytes(own)).unwrap(), Own(own));
+            let json = serde_json::to_string(&own).unwrap();
+            assert_eq!(serde_json::from_str::<Own>(&json).unwrap(), Own(own));
+        }
+        assert_eq!(
+            serde_json::to_string(&Own(Some(own(Vec3::ZERO)))).unwrap(),
+            r#"{"amplitude":256,"scale":1024,"seed":700}"#
+        );
+    }
+
+    #[test]
     fn amplitude_and_scale_have_ends() {
         for (amplitude, scale, what) in [
             (-0.01, 4.0, "amplitude"),

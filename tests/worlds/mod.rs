@@ -211,7 +211,7 @@ pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
 }
 
 /// Bumps up to this high; half of them tied to a point that is not the origin.
-fn random_roughness(rng: &mut Rng, most: f32) -> Roughness {
+pub fn random_roughness(rng: &mut Rng, most: f32) -> Roughness {
     let roughness = Roughness::new(rng.f32() * most, 1.0 + rng.f32() * 6.0, rng.u32(..));
     let away = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5) * 4000.0;
     match rng.u32(0..4) {
