@@ -274,3 +274,59 @@ fn grids_with_materials_are_written_and_read_and_wrong_ones_refused() {
         assert_eq!(edit.clone().with_stamp_image(other), Err(BrushError::NoGrid));
     }
 }
+
+#[test]
+fn a_mesh_with_materials_has_them_on_its_faces() {
+    // A box whose faces have materials 1 to 6, of quads in the order -x, x, -y, y, -z, z.
+    let corner =
+        |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * Vec3::new(12.0, 9.0, 10.0);
+    let positions: Vec<Vec3> = (0..8).map(corner).collect();
+    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles: Vec<[u32; 3]> = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let materials: Vec<MaterialId> = (0..12).map(|i| MaterialId(1 + i / 2)).collect();
+    let mesh = ShapeGrid::from_painted_mesh(&positions, &triangles, &materials, 30).expect("closed");
+    assert!(ShapeGrid::from_painted_mesh(&positions, &triangles, &materials[1..], 30).is_err());
+    let plain = ShapeGrid::from_mesh(&positions, &triangles, 30).expect("closed");
+    assert_eq!((mesh.middle, mesh.cell, mesh.grid.size()), (plain.middle, plain.cell, plain.grid.size()));
+    let place = Vec3::new(40.0, 40.0, 40.0);
+    let mut ground = flat(10.0);
+    ground.apply([Brush::fill(GridShape::new(mesh.grid, place + mesh.middle).with_scale(mesh.cell), 0.0)]);
+    let near = |at: Vec3| ground.world().samples().material((place + at).round().as_ivec3());
+    let middle = Vec3::new(6.0, 4.5, 5.0);
+    for (axis, half) in [(Vec3::X, 5.0), (Vec3::Y, 3.5), (Vec3::Z, 4.0)] {
+        for (side, step) in [(-1.0, 0), (1.0, 1)] {
+            let number = 1 + 2 * axis.dot(Vec3::new(0.0, 1.0, 2.0)) as u8 + step;
+            assert_eq!(near(middle + axis * half * side), MaterialId(number), "{axis} {side}");
+        }
+    }
+}
+
+#[test]
+fn a_piece_of_a_world_is_built_again_elsewhere() {
+    let mut ground = flat(20.0);
+    ground.apply([
+        Brush::add(Shape::sphere(Vec3::new(24.0, 30.0, 24.0), 6.0), MaterialId(3)),
+        Brush::add(Shape::cuboid(Vec3::new(24.0, 34.0, 24.0), Vec3::new(2.5, 6.0, 2.5)), MaterialId(5)),
+    ]);
+    let piece = LatticeBox { min: IVec3::new(14, 23, 14), max: IVec3::new(34, 42, 34) };
+    let grid = ground.world().shape_grid(piece).expect("a valid size");
+    let by = IVec3::new(40, 2, 37);
+    let middle = (piece.min + piece.max).as_vec3() / 2.0 + by.as_vec3();
+    ground.apply([Brush::fill(GridShape::new(grid.clone(), middle), 0.0)]);
+    let samples = ground.world().samples();
+    let mut solid = 0;
+    for point in piece.grown(-1).points() {
+        assert_eq!(samples.is_solid(point), samples.is_solid(point + by), "{point}");
+        if samples.is_solid(point) {
+            assert_eq!(samples.material(point), samples.material(point + by), "{point}");
+            solid += 1;
+        }
+    }
+    assert!(solid > 800);
+    for side in [1, 128] {
+        let wrong = LatticeBox { min: IVec3::ZERO, max: IVec3::new(side, 20, 20) };
+        assert!(matches!(ground.world().shape_grid(wrong), Err(BrushError::GridSize { .. })));
+    }
+    let everything = LatticeBox { min: IVec3::MIN, max: IVec3::MAX };
+    assert!(ground.world().shape_grid(everything).is_err());
+}

@@ -363,7 +363,7 @@ fn random_direction(rng: &mut Rng) -> Vec3 {
 }
 
 /// A path near a place.
-fn random_path(rng: &mut Rng, at: Vec3) -> BrushPath {
+pub fn random_path(rng: &mut Rng, at: Vec3) -> BrushPath {
     let points: Vec<(Vec3, f32)> = (0..rng.u32(2..6))
         .map(|_| (at + random_direction(rng) * Vec3::new(24.0, 6.0, 24.0), 1.0 + rng.f32() * 3.0))
         .collect();
@@ -371,7 +371,7 @@ fn random_path(rng: &mut Rng, at: Vec3) -> BrushPath {
 }
 
 /// One of a few grids near a place, turned and scaled; half of them have materials.
-fn random_grid(rng: &mut Rng, at: Vec3) -> GridShape {
+pub fn random_grid(rng: &mut Rng, at: Vec3) -> GridShape {
     let (side, kind) = (rng.i32(7..10), rng.u32(0..4));
     let distance = |at: IVec3| {
         let from = (at - side / 2).as_vec3();
