@@ -239,10 +239,10 @@ impl SculptKernel {
     }
 
     /// The density of a sample after a rounded union or subtraction, from its distances to the shape and to the surface
-    /// of the ground.
-    pub fn rounded(&self, rounding: Rounding, before: i32, outside: i32, surface: i32) -> i32 {
-        let after = rounding.density(before, outside, surface);
-        before + part(i64::from(after) - i64::from(before), self.blend.strength)
+    /// of the ground; `None` for operations that do not round.
+    pub fn rounded(&self, before: i32, outside: i32, surface: i32) -> Option<i32> {
+        let after = self.rounding?.density(before, outside, surface);
+        Some(before + part(i64::from(after) - i64::from(before), self.blend.strength))
     }
 
     /// Whether only the CPU computes its densities.

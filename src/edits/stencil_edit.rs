@@ -8,7 +8,6 @@ use super::delta::Counts;
 use super::padded_brick::PaddedBrick;
 use super::prepared_edit::{LOOK, PreparedEdit};
 use super::rule_scope::BrickRules;
-use super::surface_distance::SurfaceDistance;
 use crate::brush::{BAND, Kind, Stencil};
 use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
@@ -28,10 +27,6 @@ impl BrickEditor<'_> {
         let low = self.pos.origin();
         let (from, to) = ((samples.min - low).as_usizevec3(), (samples.max - low).as_usizevec3());
         let (mut layers, mut nearest) = ([0; 8], NearestGround::default());
-        let rounding = edit.sculptor.as_ref().and_then(|own| Some((own, own.rounding()?)));
-        let rounding = rounding.map(|(own, rounding)| {
-            (own, rounding, SurfaceDistance::new(&self.view, self.pos, rounding.horizon()))
-        });
         for y in from.y..=to.y {
             let mut changed = Changed::default();
             for (z, x) in (from.z..=to.z).flat_map(|z| (from.x..=to.x).map(move |x| (z, x))) {
@@ -47,12 +42,10 @@ impl BrickEditor<'_> {
                     continue;
                 }
                 let before = around.density(local);
-                let proposed = match (&edit.sculptor, &rounding) {
-                    (_, Some((sculptor, rounding, surface))) => {
-                        Some(sculptor.rounded(*rounding, before, outside, surface.at(index)))
-                    }
+                let proposed = match (&edit.sculptor, &around.surface) {
+                    (Some(sculptor), Some(surface)) => sculptor.rounded(before, outside, surface.at(index)),
                     (Some(sculptor), None) => sculptor.density(point, outside, || around.around(local)),
-                    (None, None) => (outside <= BAND).then(|| edit.operation.apply(before, outside)),
+                    (None, _) => (outside <= BAND).then(|| edit.operation.apply(before, outside)),
                 };
                 let Some(proposed) =
                     proposed.filter(|&after| Sample::edited(after) != Sample::edited(before))

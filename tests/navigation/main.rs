@@ -42,6 +42,7 @@ fn random_settings(rng: &mut Rng) -> WalkSettings {
         step: [0.0, 0.3, 0.6, 1.5][rng.usize(0..4)],
         slope: [0.2, 0.7, 1.0, 2.0][rng.usize(0..4)],
         precision: [0.05, 0.25, 0.5, 2.0][rng.usize(0..4)],
+        ..WalkSettings::default()
     }
 }
 

@@ -78,7 +78,7 @@ impl ShapeGrid {
         let (MeshGrid { grid, middle, cell }, nearest) = Self::of_mesh(positions, triangles, samples)?;
         let mut nearest = nearest.into_iter();
         // In the order of the samples.
-        let material = |_| nearest.next().and_then(|triangle| materials.get(triangle as usize).copied());
+        let mut material = |_| nearest.next().and_then(|triangle| materials.get(triangle as usize).copied());
         let grid = grid.with_materials(|at| material(at).unwrap_or(MaterialId::GROUND));
         Ok(MeshGrid { grid, middle, cell })
     }
