@@ -7,8 +7,9 @@
 //! 2. the landing is lower by more than a step, by no more than the agent jumps or climbs, and not farther than it leaps;
 //! 3. no walkable cell as high as the upper one lies between them;
 //! 4. the air is free for a box as wide as the cells that the agent touches: from its feet on the ledge to its head all the
-//!    way over, and from the landing up to there above the cells that it touches there. Ground up to the height that it
-//!    climbs in one step does not count as in the way.
+//!    way over, and from the landing up to there above the cells that it touches there, but for those towards the wall.
+//!    Ground up to the height that it climbs from one column to the next does not count as in the way, and air lower than the
+//!    agent counts as none.
 //!
 //! So the agent leaps as high as it stands and then falls straight down. Links side by side become one, as far as both their
 //! edges are straight within the [precision](super::WalkSettings::precision).
@@ -29,6 +30,8 @@ pub struct LedgeLink {
     pub top: [IVec3; 2],
     /// The edge on the lower ground, in the same order.
     pub bottom: [IVec3; 2],
+    /// The way of a jump: a unit along x or z.
+    pub way: IVec3,
     /// Whether an agent can jump down.
     pub is_jump: bool,
     /// Whether an agent can climb up.
@@ -97,7 +100,6 @@ impl WalkableTile {
                 leaps.extend(floors.filter_map(|floor| self.leap(rules, cell, floor, way)));
             }
         }
-        // Above each other, links of one storey follow each other.
         leaps
     }
 
@@ -245,6 +247,7 @@ impl WalkableTile {
         LedgeLink {
             top: edge(first.upper, last.upper, sign > 0),
             bottom: edge(first.lower, last.lower, sign < 0),
+            way: if axis == Axis::X { IVec3::X * sign } else { IVec3::Z * sign },
             is_jump: first.is_jump,
             is_climb: first.is_climb,
         }

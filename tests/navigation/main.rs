@@ -3,6 +3,7 @@
 #[cfg(feature = "landmass")]
 mod bevy_app;
 mod laws;
+mod ledges;
 mod polygons;
 mod recast;
 mod reference;
