@@ -148,6 +148,12 @@ fn wild_operation() -> impl Strategy<Value = Operation> {
         wild().prop_map(|amount| Operation::Lower { amount }),
         (wild(), wild()).prop_map(|(step, base)| Operation::Terrace { step, base }),
         stamp,
+        prop_oneof![
+            Just(Operation::Reset),
+            Just(Operation::Road),
+            Just(Operation::Fill),
+            Just(Operation::Carve)
+        ],
     ]
 }
 
