@@ -1,7 +1,7 @@
 //! Random worlds and edits for the tests: steep, flat, at integer heights, and cut from real elevation data.
 #![allow(dead_code)] // each test file uses its own part of this
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use bevy_burrow::brush::CustomShape;
 use bevy_burrow::brush::shapes::Cuboid;
@@ -370,36 +370,60 @@ pub fn random_path(rng: &mut Rng, at: Vec3) -> BrushPath {
     if rng.bool() { BrushPath::spline(points) } else { BrushPath::polyline(points) }
 }
 
-/// One of a few grids near a place, turned and scaled; half of them have materials.
-pub fn random_grid(rng: &mut Rng, at: Vec3) -> GridShape {
-    let (side, kind) = (rng.i32(7..10), rng.u32(0..4));
+/// The grids and prefabs that random brushes have.
+pub fn contents() -> &'static (Vec<ShapeGrid>, Vec<Arc<Prefab>>) {
+    static CONTENTS: OnceLock<(Vec<ShapeGrid>, Vec<Arc<Prefab>>)> = OnceLock::new();
+    CONTENTS.get_or_init(|| ((0..6).map(grid).collect(), (0..6).map(prefab).collect()))
+}
+
+/// A ball or a box; half of them have materials.
+fn grid(number: i32) -> ShapeGrid {
+    let side = 7 + number % 3;
     let distance = |at: IVec3| {
         let from = (at - side / 2).as_vec3();
         let depth = side as f32 / 2.0 - 1.2;
-        if kind % 2 == 0 { from.length() - depth } else { from.abs().max_element() - depth }
+        if number % 2 == 0 { from.length() - depth } else { from.abs().max_element() - depth }
     };
     let grid = ShapeGrid::from_fn(glam::UVec3::splat(side as u32), distance).expect("a valid grid");
-    let grid = match kind {
-        0 | 1 => grid,
+    match number {
+        0..3 => grid,
         _ => grid.with_materials(|at| MaterialId([0, 3, 255][at.element_sum() as usize / 5 % 3])),
-    };
+    }
+}
+
+/// A copy of some ground with a pit or a heap.
+fn prefab(number: i32) -> Arc<Prefab> {
+    let mut terrain = Terrain::new(Ground::flat(32, 32, 10.0).expect("valid"), &TerrainSettings::default())
+        .expect("valid settings");
+    let ball = Shape::sphere(Vec3::new(16.0, 10.0, 16.0), (3 + number / 2) as f32);
+    terrain.apply([if number % 2 == 0 { Brush::dig(ball) } else { Brush::add(ball, MaterialId(2)) }]);
+    let min = IVec3::new(10, 4, 10);
+    let samples = LatticeBox { min, max: min + 8 + number };
+    Arc::new(terrain.world().copy(samples, min + 6).expect("in the world"))
+}
+
+/// A grid near a place, turned and scaled.
+pub fn random_grid(rng: &mut Rng, at: Vec3) -> GridShape {
+    let grids = &contents().0;
+    let grid = grids[rng.usize(0..grids.len())].clone();
     GridShape::new(grid, at).with_rotation(random_rotation(rng)).with_scale(0.5 + rng.f32())
 }
 
-/// One of a few prefabs near a place, turned in any way.
+/// A prefab near a place, turned in any way.
 fn random_paste(rng: &mut Rng, at: Vec3) -> Paste {
-    let mut terrain = Terrain::new(Ground::flat(32, 32, 10.0).expect("valid"), &TerrainSettings::default())
-        .expect("valid settings");
-    let ball = Shape::sphere(Vec3::new(16.0, 10.0, 16.0), rng.u8(3..6).into());
-    terrain.apply([if rng.bool() { Brush::dig(ball) } else { Brush::add(ball, MaterialId(2)) }]);
-    let (min, size) = (IVec3::new(10, 4, 10), rng.i32(8..13));
-    let prefab = terrain.world().copy(LatticeBox { min, max: min + size }, min + 6).expect("in the world");
+    let prefabs = &contents().1;
+    let prefab = Arc::clone(&prefabs[rng.usize(0..prefabs.len())]);
     let paste = Paste { edited_only: rng.bool(), mirror: rng.bool(), ..Paste::new(prefab, at.round()) };
     match rng.u32(0..3) {
         0 => Paste { scale: 0.5 + rng.f32(), at, ..paste.rotated(random_rotation(rng)) },
         1 => paste.turned_about_y(rng.i32(0..4)),
         _ => paste,
     }
+}
+
+/// Whether a brush has an image, a grid or a prefab, which messages name.
+pub fn has_content(brush: &Brush) -> bool {
+    Edit::quantize(brush).is_ok_and(|edit| edit.stamp_image().is_some() || edit.prefab().is_some())
 }
 
 /// A random brush of those that GPUs apply.
