@@ -2,12 +2,11 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use bevy_burrow::brush::CustomShape;
 use bevy_burrow::brush::shapes::{Capsule, Cone, Cuboid, Cylinder, Sphere};
 use bevy_burrow::brush::{BAND, Evaluator};
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
-use glam::{DVec3, IVec2, IVec3, Quat, Vec3};
+use glam::{IVec2, IVec3, Quat, Vec3};
 
 use crate::checked_terrain::{CheckedTerrain, Effect};
 use crate::worlds::reference_density;
@@ -101,34 +100,6 @@ fn rounded(brush: &Brush, before: i32, outside: i32, surface: i32) -> i32 {
     }
     let whole = i64::from(if is_dig { -after } else { after }) - i64::from(before);
     before + (whole.signum() * ((whole.abs() * i64::from(units(brush.blend.strength)) + 255) / 256)) as i32
-}
-
-/// The material that the brush's own grid has at a point: that of the nearest sample inside, of the eight around it, else
-/// of the nearest.
-fn own_material(brush: &Brush, point: IVec3) -> Option<MaterialId> {
-    let (Some(CustomShape::Grid(_)), Operation::Fill) = (brush.custom.as_deref(), &brush.operation) else {
-        return None;
-    };
-    // With the numbers that the edit rounds to.
-    let rounded = Brush::from(&Edit::quantize(brush).ok()?);
-    let Some(CustomShape::Grid(shape)) = rounded.custom.as_deref() else { return None };
-    if !shape.grid.has_materials() {
-        return None;
-    }
-    let size = shape.grid.size().as_dvec3();
-    let local = shape.rotation.as_dquat().inverse() * (point.as_dvec3() - shape.center.as_dvec3());
-    let place = (local / f64::from(shape.scale) + (size - 1.0) / 2.0).clamp(DVec3::ZERO, size - 1.0);
-    let low = place.floor().min(size - 2.0);
-    let corners = (0..8).map(|i| IVec3::new(i & 1, i >> 1 & 1, i >> 2).as_dvec3());
-    let weight = |corner: DVec3| (1.0 - (place - low - corner).abs()).element_product();
-    let is_inside = |corner: DVec3| shape.grid.distance((low + corner).as_ivec3()) < 0;
-    let nearest = corners
-        .max_by(|a, b| {
-            let rank = |corner: DVec3| (is_inside(corner) && weight(corner) > 0.0, weight(corner));
-            rank(*a).partial_cmp(&rank(*b)).expect("numbers")
-        })
-        .expect("eight");
-    Some(shape.grid.material((low + nearest).as_ivec3())).filter(|own| *own != MaterialId::GROUND)
 }
 
 impl CheckedTerrain {
@@ -308,9 +279,6 @@ impl CheckedTerrain {
     fn new_material(&self, brush: &Brush, point: IVec3) -> MaterialId {
         if let Some(material) = brush.blend.material {
             return material;
-        }
-        if let Some(own) = own_material(brush, point) {
-            return own;
         }
         let column = (1..=64).map(|by| -by).chain(1..=64).map(|by| point + IVec3::Y * by);
         let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].map(|step| point + step);

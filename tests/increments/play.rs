@@ -66,7 +66,9 @@ pub fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
                 0 => Brush::dig(shape),
                 1 => Brush::add(shape, material),
                 2 => Brush::paint(shape, material),
-                3 | 4 => Brush::fill(shape, rounding),
+                // The materials of grids have tests of their own.
+                3 => Brush::fill(shape, rounding).with_material(material),
+                4 if !matches!(shape, AnyShape::Grid(_)) => Brush::fill(shape, rounding),
                 5 => Brush::carve(shape, rounding),
                 _ => Brush::reset(shape),
             }
