@@ -76,7 +76,7 @@ impl WalkableTile {
             let leaps = self.leaps(&rules, way);
             let mut rest = &leaps[..];
             while let Some(first) = rest.first() {
-                let run = self.run(first, rest, way.0);
+                let run = self.run(rest, way.0);
                 links.push(self.link(first, &rest[run - 1], way));
                 rest = &rest[run..];
             }
@@ -202,8 +202,8 @@ impl WalkableTile {
         self.links.corners(floor)?.into_iter().map(|corner| self.floors.floor[corner]).max()
     }
 
-    /// How many leaps from the first on belong to one link.
-    fn run(&self, first: &Leap, rest: &[Leap], axis: Axis) -> usize {
+    /// How many leaps from the first on belong to one link; at least 1.
+    fn run(&self, rest: &[Leap], axis: Axis) -> usize {
         let along = if axis == Axis::X { Axis::Z } else { Axis::X };
         let follows = |pair: &[Leap]| {
             let (a, b) = (&pair[0], &pair[1]);
@@ -228,7 +228,6 @@ impl WalkableTile {
                 })
             })
         };
-        debug_assert_eq!(first.upper, rest[0].upper);
         (1..=most).take_while(|count| is_straight(*count)).last().unwrap_or(1)
     }
 
