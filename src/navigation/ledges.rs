@@ -76,7 +76,7 @@ impl WalkableTile {
             let leaps = self.leaps(&rules, way);
             let mut rest = &leaps[..];
             while let Some(first) = rest.first() {
-                let run = self.run(rest, way.0);
+                let run = self.run(rest, way);
                 links.push(self.link(first, &rest[run - 1], way));
                 rest = &rest[run..];
             }
@@ -203,7 +203,7 @@ impl WalkableTile {
     }
 
     /// How many leaps from the first on belong to one link; at least 1.
-    fn run(&self, rest: &[Leap], axis: Axis) -> usize {
+    fn run(&self, rest: &[Leap], (axis, sign): (Axis, i32)) -> usize {
         let along = if axis == Axis::X { Axis::Z } else { Axis::X };
         let follows = |pair: &[Leap]| {
             let (a, b) = (&pair[0], &pair[1]);
@@ -212,21 +212,26 @@ impl WalkableTile {
                 && self.links.next(a.lower, along) == Some(b.lower)
         };
         let most = 1 + rest.windows(2).take_while(|pair| follows(pair)).count();
-        let heights = |floor: fn(&Leap) -> usize, count: usize| -> Vec<i64> {
-            let own = rest[..count].iter().map(|leap| i64::from(self.floors.floor[floor(leap)]));
-            let end =
-                self.links.next(floor(&rest[count - 1]), along).map(|end| self.floors.floor[end].into());
-            own.chain(end).collect()
+        // Along the edge of the cells.
+        let heights = |cells: Vec<usize>, is_far: bool| -> Vec<i64> {
+            let end = cells.last().and_then(|&last| self.links.next(last, along));
+            let on_edge = |floor: usize| if is_far { self.links.next(floor, axis) } else { Some(floor) };
+            let corners = cells.into_iter().chain(end).filter_map(on_edge);
+            corners.map(|corner| self.floors.floor[corner].into()).collect()
         };
         let is_straight = |count: usize| {
-            [(|leap| leap.upper) as fn(&Leap) -> usize, |leap| leap.lower].into_iter().all(|floor| {
-                let heights = heights(floor, count);
-                let (first, last, span) = (heights[0], heights[heights.len() - 1], heights.len() as i64 - 1);
-                (0..).zip(&heights).all(|(place, height)| {
-                    let line = (first * (span - place) + last * place) / span.max(1);
-                    (height - line).abs() <= i64::from(self.precision)
-                })
-            })
+            let cells = |floor: fn(&Leap) -> usize| rest[..count].iter().map(floor).collect::<Vec<_>>();
+            [(cells(|leap| leap.upper), sign > 0), (cells(|leap| leap.lower), sign < 0)].into_iter().all(
+                |(cells, is_far)| {
+                    let heights = heights(cells, is_far);
+                    let (first, last, span) =
+                        (heights[0], heights[heights.len() - 1], heights.len() as i64 - 1);
+                    (0..).zip(&heights).all(|(place, height)| {
+                        let line = (first * (span - place) + last * place) / span.max(1);
+                        (height - line).abs() <= i64::from(self.precision)
+                    })
+                },
+            )
         };
         (1..=most).take_while(|count| is_straight(*count)).last().unwrap_or(1)
     }
