@@ -21,8 +21,16 @@ pub const PASS: Vec2 = Vec2::new(30.0, 48.0);
 pub const PLAIN: f32 = 10.0;
 
 /// A figure's size, in metres, and what it climbs.
-pub const AGENT: WalkSettings =
-    WalkSettings { radius: 0.4, height: 1.8, step: 0.4, slope: 1.0, precision: 0.3 };
+pub const AGENT: WalkSettings = WalkSettings {
+    radius: 0.4,
+    height: 1.8,
+    step: 0.4,
+    slope: 1.0,
+    precision: 0.3,
+    jump_down: 0.0,
+    climb_up: 0.0,
+    leap: 1.0,
+};
 
 const EYE: Vec3 = Vec3::new(62.0, 52.0, -6.0);
 const MIDDLE: Vec3 = Vec3::new(50.0, 8.0, 46.0);

@@ -224,7 +224,7 @@ impl Compute for Shared {
     fn edit(&self, work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta])) {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Edit, work.jobs().len()));
         #[cfg(feature = "cuda")]
-        let is_for_cpu = work.edits.iter().any(|edit| edit.evaluator.is_for_cpu());
+        let is_for_cpu = work.edits.iter().any(|edit| edit.is_for_cpu());
         #[cfg(feature = "cuda")]
         if let Some(cuda) = self.cuda_for(work.base.ground()).filter(|_| !is_for_cpu) {
             let mut attempt = cuda.edit(work, &mut choice);

@@ -7,7 +7,7 @@ use super::quantize::{in_range, voxels};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
-/// How an operation that sculpts blends in. Dig, add and paint ignore it.
+/// How an operation that sculpts blends in. Dig, add, paint, reset and paste ignore it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blend {
@@ -15,8 +15,9 @@ pub struct Blend {
     pub strength: f32,
     /// Width in voxels, from the shape's surface inwards, over which the change fades in: 0 to 64. A falloff wider than
     /// the shape's depth ends in its middle. With 0 the change ends in a step at the shape's surface.
+    /// For fills and carves it is the radius by which their edge with the ground is rounded, at most 16.
     pub falloff: f32,
-    /// The material of new ground. `None`: that of the first ground straight below it, else straight above,
+    /// The material of new ground. `None`: for a fill with a grid that has materials, those; else that of the first ground straight below it, else straight above,
     /// within 64 voxels, else next to it.
     pub material: Option<MaterialId>,
 }

@@ -8,13 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::blend::QuantizedBlend;
 use super::content::{Content, ContentMut};
 use super::paste::{PasteSource, QuantizedPaste};
+use super::quantize::voxels;
 use super::quantized_operation::QuantizedOperation;
 use super::roughness::QuantizedRoughness;
 use super::sculpt_kernel::SculptKernel;
 use super::shapes::QuantizedShape;
 use super::{
     BAND, Blend, Brush, BrushError, CustomShape, Evaluator, FULL_POWER, Kind, Operation, Prefab, Roughness,
-    Shape, ShapeGrid,
+    Shape, ShapeGrid, rounding,
 };
 use crate::ground::GreyImage;
 use crate::lattice::{LatticeBox, ONE};
@@ -45,6 +46,7 @@ pub struct Edit {
     /// `None` unless the operation sculpts.
     blend: Option<QuantizedBlend>,
     power: u8,
+    #[serde(with = "super::roughness::optional")]
     roughness: Option<QuantizedRoughness>,
     tag: u64,
     stroke: Option<u64>,
@@ -60,6 +62,7 @@ struct Unchecked {
     blend: Option<QuantizedBlend>,
     #[serde(default = "full_power")]
     power: u8,
+    #[serde(default, with = "super::roughness::optional")]
     roughness: Option<QuantizedRoughness>,
     tag: u64,
     #[serde(default)]
@@ -70,10 +73,21 @@ fn full_power() -> u8 {
     FULL_POWER
 }
 
-/// Checks what concerns a shape and an operation together.
-fn check_together(shape: &QuantizedShape, operation: &Operation) -> Result<(), BrushError> {
+/// Checks what concerns shape, operation and blend together.
+fn check_together(
+    shape: &QuantizedShape,
+    operation: &Operation,
+    blend: Option<QuantizedBlend>,
+) -> Result<(), BrushError> {
     match operation {
         Operation::Road if shape.road().is_none() => Err(BrushError::NoCorridor),
+        Operation::Fill | Operation::Carve
+            if blend.is_some_and(|blend| blend.falloff > rounding::MOST * ONE) =>
+        {
+            let most = rounding::MOST as f32;
+            let value = blend.map_or(0.0, |blend| voxels(blend.falloff));
+            Err(BrushError::OutOfBounds { what: "falloff", value, least: 0.0, most })
+        }
         // `stamp_image` names one image.
         Operation::Stamp { .. } if shape.grid().is_some() => Err(BrushError::StampInGrid),
         _ => Ok(()),
@@ -95,11 +109,12 @@ impl Edit {
             Some(custom) => QuantizedShape::quantize_custom(custom)?,
             None => QuantizedShape::quantize(&brush.shape)?,
         };
-        check_together(&shape, &brush.operation)?;
+        let blend = sculpts.then(|| QuantizedBlend::quantize(&brush.blend)).transpose()?;
+        check_together(&shape, &brush.operation, blend)?;
         Ok(Self {
             shape,
             operation: QuantizedOperation::quantize(&brush.operation)?,
-            blend: sculpts.then(|| QuantizedBlend::quantize(&brush.blend)).transpose()?,
+            blend,
             power: brush.power,
             roughness: roughness.filter(|roughness| roughness.amplitude != 0),
             tag: brush.tag,
@@ -115,7 +130,7 @@ impl Edit {
     pub fn check(&self) -> Result<(), BrushError> {
         self.shape.check()?;
         self.operation.check()?;
-        check_together(&self.shape, &self.operation.operation())?;
+        check_together(&self.shape, &self.operation.operation(), self.blend)?;
         if self.blend.is_some() != (self.kind() == Kind::Sculpt) {
             return Err(BrushError::Blend);
         }
@@ -222,7 +237,8 @@ impl Edit {
         self.operation.paste().map(|paste| paste.source())
     }
 
-    /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6). A paste
+    /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6), or the radius
+    /// of a fill or a carve if that is greater. A paste
     /// changes none beyond its prefab: where that lies outside the shape, it is a single point.
     ///
     /// At the rim of the lattice the box reaches beyond its [limits](super#limits) by at most some thousand
@@ -252,7 +268,13 @@ impl Edit {
     /// Distance outside the shape up to which samples may change.
     fn band(&self) -> i32 {
         // Two more units for the rounding of the distance.
-        BAND + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2
+        self.own_band() + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2
+    }
+
+    /// Distance outside the rough shape up to which samples may change.
+    fn own_band(&self) -> i32 {
+        let rounding = self.blend.and_then(|blend| self.operation.rounding(blend.falloff));
+        rounding.map_or(BAND, |rounding| rounding.radius.max(BAND))
     }
 
     /// At least the number of bricks that the edit may change, where that is known to be much less than the bricks in
@@ -265,7 +287,7 @@ impl Edit {
 
     /// The edit's signed distance function, ready to evaluate.
     pub fn evaluator(&self) -> Evaluator {
-        Evaluator::new(&self.shape, self.roughness)
+        Evaluator::new(&self.shape, self.roughness, self.own_band())
     }
 }
 

@@ -5,7 +5,6 @@ use std::ops::Range;
 use glam::{I64Vec3, IVec3};
 use wide::{i16x8, i32x8};
 
-use super::BAND;
 use super::roughness::QuantizedRoughness;
 use super::shapes::{QuantizedShape, ShapeSdf, larger, smaller};
 use crate::lattice::{LatticeBox, ONE};
@@ -30,13 +29,16 @@ pub struct Evaluator {
     origin_fraction: IVec3,
     form: ShapeSdf,
     roughness: Option<QuantizedRoughness>,
+    /// Distance outside within which the edit changes samples.
+    band: i32,
 }
 
 impl Evaluator {
-    /// The evaluator of a checked edit.
-    pub(super) fn new(shape: &QuantizedShape, roughness: Option<QuantizedRoughness>) -> Self {
+    /// The evaluator of a checked edit that changes samples within `band` outside its rough shape.
+    pub(super) fn new(shape: &QuantizedShape, roughness: Option<QuantizedRoughness>, band: i32) -> Self {
         let origin = shape.origin();
-        Self { origin_voxel: origin >> 8, origin_fraction: origin & 0xff, form: shape.form(), roughness }
+        let (origin_voxel, origin_fraction) = (origin >> 8, origin & 0xff);
+        Self { origin_voxel, origin_fraction, form: shape.form(), roughness, band }
     }
 
     /// Signed distance from a lattice point to the edit's shape in 1/256 voxel: negative inside, roughness included,
@@ -89,7 +91,7 @@ impl Evaluator {
         });
     }
 
-    /// Returns `true` if every sample of the box lies farther than [`BAND`] outside, so that the edit changes
+    /// Returns `true` if every sample of the box lies farther outside than the edit changes samples, so that it changes
     /// none of them (rule 6).
     ///
     /// Cheap and conservative: `false` may also mean "not sure". It takes one distance, at the middle of the box, of
@@ -107,7 +109,7 @@ impl Evaluator {
         // A generous bound on the rounding to f32 at this distance.
         let rounding = 16 + (distance >> 14);
         let amplitude = self.roughness.map_or(0, |roughness| roughness.amplitude);
-        f64::from(distance - rounding) > f64::from(BAND + amplitude) + diagonal
+        f64::from(distance - rounding) > f64::from(self.band + amplitude) + diagonal
     }
 
     /// Distances without roughness, not rounded, for a run of at most [`RUN`] from (`x`, `start.y`, `start.z`) along
@@ -144,8 +146,8 @@ pub(crate) struct Constants {
     pub kind: u32,
     /// The result of [`ShapeSdf::constants`].
     pub shape: [f32; 12],
-    /// Amplitude, scale and seed of roughness.
-    pub roughness: Option<(i32, i32, u32)>,
+    /// Amplitude, scale, seed and origin of roughness.
+    pub roughness: Option<(i32, i32, u32, [i32; 3])>,
 }
 
 #[cfg(feature = "cuda")]
@@ -185,8 +187,8 @@ fn round(distance: f32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brush::Roughness;
     use crate::brush::shapes::{Cone, Cuboid, Sphere};
+    use crate::brush::{BAND, Roughness};
 
     fn sphere(center: [i32; 3], radius: i32) -> QuantizedShape {
         QuantizedShape::Sphere(Sphere { center, radius })
@@ -232,7 +234,7 @@ mod tests {
         ] {
             let roughness =
                 seed.map(|seed| QuantizedRoughness::quantize(&Roughness::new(1.5, 3.0, seed)).unwrap());
-            let evaluator = Evaluator::new(&shape, roughness);
+            let evaluator = Evaluator::new(&shape, roughness, BAND);
             for origin in [IVec3::new(-3, -4, 0), IVec3::new(8, 0, -8), IVec3::new(1 << 14, 0, 0)] {
                 let mut rows = [i16x8::splat(i16::MIN); 64];
                 evaluator.rows(origin, 1..7, 2..8, &mut rows);
@@ -253,7 +255,7 @@ mod tests {
     #[test]
     fn beyond_the_horizon_all_distances_are_one() {
         for shape in [sphere([-5, 300, 7], 600), cone([1 << 23, 9, -7], [-99, 55_000, 999], 9_000)] {
-            let evaluator = Evaluator::new(&shape, None);
+            let evaluator = Evaluator::new(&shape, None, BAND);
             let far = FARTHEST as i32;
             for x in [far - 40, far, -far - 40, -2 * far, i32::MIN, i32::MAX - 80] {
                 for start in [IVec3::new(x, 3, 0), IVec3::new(x, i32::MAX, i32::MIN)] {
@@ -267,7 +269,7 @@ mod tests {
 
     #[test]
     fn up_to_the_horizon_distances_are_exact() {
-        let evaluator = Evaluator::new(&sphere([0; 3], 256), None);
+        let evaluator = Evaluator::new(&sphere([0; 3], 256), None, BAND);
         let mut row = [0; 33_000];
         evaluator.row(IVec3::new(-16_500, 0, 0), &mut row);
         for (x, distance) in (-16_500i32..).zip(row) {

@@ -67,7 +67,8 @@ fn any_shape(far: f32, size: f32) -> impl Strategy<Value = AnyShape> {
 
 fn roughness() -> impl Strategy<Value = Option<Roughness>> {
     prop::option::of(
-        (0.0f32..8.0, 1.0f32..20.0, any::<u32>()).prop_map(|(a, s, seed)| Roughness::new(a, s, seed)),
+        (0.0f32..8.0, 1.0f32..20.0, any::<u32>(), prop_oneof![Just(Vec3::ZERO), vector(9000.0)])
+            .prop_map(|(a, s, seed, origin)| Roughness::new(a, s, seed).with_origin(origin)),
     )
 }
 
@@ -101,7 +102,9 @@ fn wild_brush() -> impl Strategy<Value = Brush> {
         5 => Shape::torus(a, b, radius, turn.x),
         _ => Shape::curve([a, b, b, a + b], [radius, turn.x]),
     });
-    let roughness = (wild(), wild(), any::<u32>()).prop_map(|(a, s, seed)| Roughness::new(a, s, seed));
+    let origin = prop_oneof![Just(Vec3::ZERO), vector()];
+    let roughness = (wild(), wild(), any::<u32>(), origin)
+        .prop_map(|(a, s, seed, origin)| Roughness::new(a, s, seed).with_origin(origin));
     let blend = (wild(), wild(), prop::option::of(any::<u8>().prop_map(MaterialId)))
         .prop_map(|(strength, falloff, material)| Blend { strength, falloff, material });
     let blend = prop_oneof![Just(Blend::default()), blend];
@@ -145,6 +148,12 @@ fn wild_operation() -> impl Strategy<Value = Operation> {
         wild().prop_map(|amount| Operation::Lower { amount }),
         (wild(), wild()).prop_map(|(step, base)| Operation::Terrace { step, base }),
         stamp,
+        prop_oneof![
+            Just(Operation::Reset),
+            Just(Operation::Road),
+            Just(Operation::Fill),
+            Just(Operation::Carve)
+        ],
     ]
 }
 

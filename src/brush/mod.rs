@@ -43,6 +43,7 @@
 //! | falloff of sculpting | 0 | 64 voxels |
 //! | amount of a raise or lower | 0 | 64 voxels |
 //! | step of a terrace | 1 voxel | 256 voxels |
+//! | rounding: falloff of a fill or a carve | 0 | 16 voxels |
 //! | samples along a side of a stamp | 2 | 256 |
 //! | side of a stamp | 1/2 voxel | 2048 voxels |
 //! | height of a stamp | -256 voxels | 256 voxels |
@@ -58,8 +59,12 @@
 //! on a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls and
 //! ceilings too. A sample whose density stays as it is is not edited.
 //!
-//! New solid samples get the blend's material; without one, of the first solid voxel straight below within 64
-//! voxels, else straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
+//! [`Operation::Fill`] and [`Operation::Carve`] are an add and a dig with the edge between shape and ground rounded, by a
+//! radius that is the blend's falloff. They reach that far beyond the shape.
+//!
+//! New solid samples get the blend's material; without one, that of the [`ShapeGrid`] at this place, if the shape is one
+//! with [materials](ShapeGrid::with_materials); else of the first solid voxel straight below within 64 voxels, else
+//! straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
 //!
 //! ```
 //! use bevy_burrow::prelude::*;
@@ -109,6 +114,7 @@ mod quantized_operation;
 mod reach;
 mod request;
 mod roughness;
+mod rounding;
 mod sculpt_kernel;
 #[doc(hidden)]
 pub mod shapes;
@@ -134,6 +140,7 @@ pub use prefab::{Prefab, PrefabError};
 pub(crate) use reach::reaches;
 pub use request::Brush;
 pub use roughness::Roughness;
+pub(crate) use rounding::Rounding;
 #[cfg(feature = "cuda")]
 pub(crate) use sculpt_kernel::SculptOp;
 pub(crate) use sculpt_kernel::{FARTHEST, SculptKernel, Stencil, is_moved};

@@ -5,14 +5,15 @@ use glam::Mat3A;
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
+use super::quantize::Shift;
 use super::{DEPTH, Paste, Stamp, is_default};
 use crate::ground::MaterialId;
 
 /// The operation inside the shape.
 ///
 /// Dig, add, paint, reset and paste look at one sample at a time, all but the last as far as [`BAND`](super::BAND) beyond
-/// their shape. All others *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change
-/// nothing outside. Beyond the world's rim they assume that everything continues as at the rim.
+/// their shape. All others *sculpt*: they read what lies around and have the brush's [`Blend`](super::Blend), by which most
+/// fade; but for fill and carve, they change nothing outside. Beyond the world's rim they assume that everything continues as at the rim.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -96,6 +97,15 @@ pub enum Operation {
     /// ground below it, as far as the corridor goes up and down. It fades into the ground at its sides over the falloff,
     /// its shoulders. Ground higher than the corridor stays as the roof of a tunnel, and air below it as a culvert.
     Road,
+    /// Fills with ground like an [`Add`](Self::Add), and rounds the edge between the shape and the ground: a smooth union.
+    /// The radius of the rounding is the blend's falloff, at most 16 voxels; with 0 it is a plain union. It changes ground
+    /// that far beyond the shape, at least [`BAND`](super::BAND). New ground has the blend's material, the shape's own
+    /// where that has [some](super::ShapeGrid::with_materials), or that of the ground below it. Each application rounds
+    /// again, by at most 0.42 of the radius.
+    Fill,
+    /// Takes ground away like a [`Dig`](Self::Dig), and rounds the rim of the hole. The radius is the blend's falloff, as of
+    /// a [`Fill`](Self::Fill).
+    Carve,
     /// Puts a copy of another place here, as far as it lies inside the shape. It changes nothing outside, not even
     /// within [`BAND`](super::BAND). The terrain's rules hold: a sample is pasted entirely, or refused.
     Paste {
@@ -122,7 +132,7 @@ impl Operation {
     pub(super) fn fields(&self) -> &'static [&'static str] {
         match self {
             Self::Dig | Self::Add { .. } | Self::Paint { .. } => &[],
-            Self::Smooth | Self::Sharpen | Self::Reset | Self::Road => &[],
+            Self::Smooth | Self::Sharpen | Self::Reset | Self::Road | Self::Fill | Self::Carve => &[],
             Self::Flatten { .. } => &["point", "normal"],
             Self::Level { .. } => &["height"],
             Self::Raise { .. } | Self::Lower { .. } => &["amount"],
@@ -133,9 +143,9 @@ impl Operation {
     }
 
     /// The operation after every point p moved to `turn * (p * scale) + shift`. Heights follow along y.
-    pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
-        let point = |p: Vec3| turn * (p * scale) + shift;
-        let height = |y: f32| y * scale + shift.y;
+    pub(super) fn transformed(&self, turn: Quat, shift: Shift, scale: f32) -> Self {
+        let point = |p: Vec3| shift.point(turn * (p * scale));
+        let height = |y: f32| shift.height(y * scale);
         match self {
             Self::Flatten { point: at, normal } => {
                 Self::Flatten { point: point(*at), normal: turn * *normal }
@@ -187,7 +197,9 @@ impl Operation {
             | Self::Raise { .. }
             | Self::Lower { .. }
             | Self::Reset
-            | Self::Road => {}
+            | Self::Road
+            | Self::Fill
+            | Self::Carve => {}
         }
     }
 }

@@ -92,6 +92,51 @@ pub(super) fn point(what: &'static str, at: Vec3) -> Result<[i32; 3], BrushError
     Ok(at.to_array().map(round))
 }
 
+/// A move of points.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shift {
+    by: Vec3,
+    rounds: bool,
+}
+
+impl Shift {
+    /// Moves by a vector.
+    pub fn by(by: Vec3) -> Self {
+        Self { by, rounds: false }
+    }
+
+    /// Moves by a vector, into the voxels of a terrain. Points are rounded to the fraction of a voxel that edits have, and
+    /// moved by whole voxels only then: so they have the same fraction in all terrains that lie whole voxels apart, however
+    /// far that is.
+    #[cfg_attr(not(any(test, feature = "plugin")), expect(dead_code))]
+    pub fn into_voxels(by: Vec3) -> Self {
+        Self { by, rounds: true }
+    }
+
+    /// A point after the move.
+    pub fn point(self, at: Vec3) -> Vec3 {
+        Vec3::from_array([0, 1, 2].map(|axis| self.along(at[axis], axis)))
+    }
+
+    /// A height after the move.
+    pub fn height(self, y: f32) -> f32 {
+        self.along(y, 1)
+    }
+
+    fn along(self, at: f32, axis: usize) -> f32 {
+        let by = self.by[axis];
+        if !self.rounds {
+            return at + by;
+        }
+        let whole = by.round();
+        let near = at + (by - whole);
+        let units = near * ONE as f32;
+        // Numbers so large are refused, as they are.
+        let rounded = if units.is_finite() { units.round_ties_even() / ONE as f32 } else { near };
+        rounded + whole
+    }
+}
+
 pub(super) fn restored_point(at: [i32; 3]) -> Vec3 {
     Vec3::from_array(at.map(voxels))
 }

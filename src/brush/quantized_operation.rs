@@ -12,7 +12,7 @@ use super::quantize::{
     voxels,
 };
 use super::stamp::QuantizedStamp;
-use super::{BrushError, Kind, Operation, Prefab};
+use super::{BrushError, Kind, Operation, Prefab, Rounding};
 use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::{LIMIT, ONE};
 
@@ -40,6 +40,8 @@ pub(super) enum QuantizedOperation {
     Reset,
     Road,
     Paste { paste: QuantizedPaste },
+    Fill,
+    Carve,
 }
 
 impl QuantizedOperation {
@@ -64,6 +66,8 @@ impl QuantizedOperation {
             }
             Operation::Reset => Self::Reset,
             Operation::Road => Self::Road,
+            Operation::Fill => Self::Fill,
+            Operation::Carve => Self::Carve,
             Operation::Paste { paste } => Self::Paste { paste: QuantizedPaste::quantize(paste)? },
         })
     }
@@ -105,6 +109,8 @@ impl QuantizedOperation {
             Self::Terrace { step, base } => Operation::Terrace { step: voxels(*step), base: voxels(*base) },
             Self::Reset => Operation::Reset,
             Self::Road => Operation::Road,
+            Self::Fill => Operation::Fill,
+            Self::Carve => Operation::Carve,
             Self::Paste { paste } => Operation::Paste { paste: paste.paste() },
         }
     }
@@ -143,6 +149,15 @@ impl QuantizedOperation {
     /// The prefab that is pasted.
     pub fn prefab(&self) -> Option<&Arc<Prefab>> {
         self.paste().map(QuantizedPaste::prefab)
+    }
+
+    /// How it rounds edges with this falloff, if it does.
+    pub fn rounding(&self, falloff: i32) -> Option<Rounding> {
+        match self {
+            Self::Fill => Some(Rounding { radius: falloff, is_dig: false }),
+            Self::Carve => Some(Rounding { radius: falloff, is_dig: true }),
+            _ => None,
+        }
     }
 
     /// The kind of its operation.

@@ -8,6 +8,7 @@ use bevy::reflect::{ReflectDeserialize, ReflectSerialize};
 use glam::Mat3A;
 use glam::{Quat, Vec3};
 
+use super::quantize::Shift;
 use super::{AnyShape, Blend, Corridor, CustomShape, FULL_POWER, Operation, Paste, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
@@ -144,6 +145,31 @@ impl Brush {
         Self::new(shape, Operation::Terrace { step, base: 0.0 })
     }
 
+    /// A brush that fills its shape with ground, whose edge with the ground around is rounded by a radius of 0 to 16 voxels:
+    /// see [`Operation::Fill`]. Without [a material](Self::with_material) it has those of the shape, or of the ground below.
+    ///
+    /// ```
+    /// use bevy_burrow::prelude::*;
+    /// use glam::Vec3;
+    ///
+    /// let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
+    /// // A pillar with a wide foot, and a hole with a rounded rim.
+    /// let pillar = Shape::cylinder(Vec3::new(20.0, 6.0, 20.0), Vec3::Y * 20.0, 3.0);
+    /// let hole = Shape::sphere(Vec3::new(44.0, 9.0, 44.0), 6.0);
+    /// terrain.apply([Brush::fill(pillar, 4.0), Brush::carve(hole, 2.0)]);
+    /// assert!(terrain.world().is_solid(Vec3::new(24.0, 10.5, 20.0).as_dvec3()));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn fill(shape: impl Into<AnyShape>, rounding: f32) -> Self {
+        Self::new(shape, Operation::Fill).with_falloff(rounding)
+    }
+
+    /// A brush that takes ground away and rounds the rim of the hole, by a radius of 0 to 16 voxels: see
+    /// [`Operation::Carve`].
+    pub fn carve(shape: impl Into<AnyShape>, rounding: f32) -> Self {
+        Self::new(shape, Operation::Carve).with_falloff(rounding)
+    }
+
     /// A brush that returns the ground in its shape to what it was before any edit.
     pub fn reset(shape: impl Into<AnyShape>) -> Self {
         Self::new(shape, Operation::Reset)
@@ -219,25 +245,29 @@ impl Brush {
     }
 
     /// The brush after every point p moved to `rotation * (p * scale) + translation`: for example from world
-    /// space to terrain space. Sizes and roughness grow with `scale`, which should be positive; the roughness
-    /// pattern itself stays tied to the lattice.
+    /// space to terrain space. Sizes and roughness grow with `scale`, which should be positive; the axes of the
+    /// roughness pattern stay those of the lattice.
     ///
     /// `rotation` should have length 1. Other numbers give a brush that [`Edit::quantize`](super::Edit::quantize)
     /// refuses or that is deformed.
     #[must_use]
     pub fn transformed(&self, rotation: Quat, translation: Vec3, scale: f32) -> Self {
-        let custom =
-            self.custom.as_ref().map(|custom| Arc::new(custom.transformed(rotation, translation, scale)));
+        self.moved(rotation, Shift::by(translation), scale)
+    }
+
+    fn moved(&self, rotation: Quat, shift: Shift, scale: f32) -> Self {
+        let custom = self.custom.as_ref().map(|custom| Arc::new(custom.transformed(rotation, shift, scale)));
         Self {
             shape: match &custom {
                 Some(custom) => custom.around(),
-                None => self.shape.transformed(rotation, translation, scale),
+                None => self.shape.transformed(rotation, shift, scale),
             },
             custom,
-            operation: self.operation.transformed(rotation, translation, scale),
+            operation: self.operation.transformed(rotation, shift, scale),
             roughness: self.roughness.map(|roughness| Roughness {
                 amplitude: roughness.amplitude * scale,
                 scale: roughness.scale * scale,
+                origin: shift.point(rotation * (roughness.origin * scale)),
                 ..roughness
             }),
             tag: self.tag,
@@ -247,11 +277,12 @@ impl Brush {
         }
     }
 
-    /// The brush in the space of a terrain that is scaled evenly and then rotated and moved.
-    #[cfg(feature = "plugin")]
+    /// The brush in the space of a terrain that is scaled evenly and then rotated and moved. Terrains of equal scale and
+    /// rotation that lie whole voxels apart get brushes that differ by exactly that.
+    #[cfg(any(test, feature = "plugin"))]
     pub(crate) fn placed_in(&self, scale: f32, rotation: Quat, translation: Vec3) -> Self {
         let (rotation, scale) = (rotation.inverse(), scale.recip());
-        self.transformed(rotation, rotation * -translation * scale, scale)
+        self.moved(rotation, Shift::into_voxels(rotation * -translation * scale), scale)
     }
 
     /// The brush in the space of a terrain that a parent stretches: points are transformed exactly, and sizes, which
@@ -268,6 +299,9 @@ impl Brush {
             None => brush.shape.stretched(|arrow| rest * arrow),
         };
         brush.operation.stretch(rest);
+        if let Some(roughness) = &mut brush.roughness {
+            roughness.origin = rest * roughness.origin;
+        }
         brush
     }
 }
@@ -288,6 +322,29 @@ mod tests {
         assert!(base.abs_diff_eq(Vec3::new(10.0, 12.0, 10.0), 1e-5), "{base}");
         assert!(axis.abs_diff_eq(Vec3::new(0.0, 2.0, 0.0), 1e-5), "{axis}");
         assert_eq!((radius, moved.tag), (6.0, 7));
-        assert_eq!(moved.roughness, Some(Roughness::new(2.0, 8.0, 9)));
+        assert_eq!(moved.roughness, Some(Roughness::new(2.0, 8.0, 9).with_origin(Vec3::splat(10.0))));
+    }
+
+    #[test]
+    fn neighbouring_terrains_get_the_same_brush() {
+        let mut rng = fastrand::Rng::with_seed(8);
+        let mut place = |most: f32| Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5) * most;
+        for voxel in [0.125, 0.5, 1.0, 4.0] {
+            for _ in 0..400 {
+                let (at, first) = (place(300.0), place(9000.0));
+                let apart = (place(4000.0) / voxel).round() * voxel;
+                // As far as floats allow, the terrains lie whole voxels apart.
+                if first + apart - first != apart {
+                    continue;
+                }
+                let brush = Brush::level(Shape::capsule(at, at + place(9.0), 2.0), at.y)
+                    .with_roughness(Roughness::new(1.0, 4.0, 3));
+                let [own, other] = [first, first + apart]
+                    .map(|corner| brush.placed_in(voxel, Quat::IDENTITY, corner - 300.0))
+                    .map(|brush| super::super::Edit::quantize(&brush).unwrap());
+                let back = Brush::from(&other).transformed(Quat::IDENTITY, apart / voxel, 1.0);
+                assert_eq!(super::super::Edit::quantize(&back).unwrap(), own, "{at} in {first} and {apart}");
+            }
+        }
     }
 }

@@ -23,10 +23,10 @@ use std::sync::Arc;
 
 use glam::IVec3;
 
-use super::DEPTH;
 use super::blend::QuantizedBlend;
 use super::quantized_operation::{QuantizedOperation, above_plane};
-use super::shapes::{QuantizedShape, Road};
+use super::shapes::{GridMaterials, QuantizedShape, Road};
+use super::{DEPTH, Rounding};
 #[cfg(feature = "cuda")]
 use super::{quantize::measure, stamp::StampParams};
 use crate::ground::MaterialId;
@@ -196,6 +196,10 @@ pub(crate) struct SculptKernel {
     deep: i32,
     /// The road, if that is built.
     road: Option<Arc<Road>>,
+    /// How edges are rounded, if they are.
+    rounding: Option<Rounding>,
+    /// The shape's own materials, if new ground has them.
+    materials: Option<GridMaterials>,
 }
 
 impl SculptKernel {
@@ -207,12 +211,44 @@ impl SculptKernel {
             (_, Some((_, half_width))) => *half_width,
             _ => shape.deepest(),
         };
-        Self { operation: operation.clone(), blend, deep, road: road.map(|(road, _)| Arc::new(road)) }
+        let rounding = operation.rounding(blend.falloff);
+        let builds = *operation == QuantizedOperation::Fill && blend.material.is_none();
+        Self {
+            operation: operation.clone(),
+            blend,
+            deep,
+            road: road.map(|(road, _)| Arc::new(road)),
+            rounding,
+            materials: if builds { shape.materials() } else { None },
+        }
     }
 
-    /// The material of new ground, if the operation has one.
+    /// The material of new ground, if the operation has one that is the same everywhere.
     pub fn material(&self) -> Option<MaterialId> {
         self.blend.material
+    }
+
+    /// The material of new ground at a lattice point; `None` for that of the ground near it.
+    pub fn material_at(&self, at: IVec3) -> Option<MaterialId> {
+        self.blend.material.or_else(|| self.materials.as_ref()?.at(at))
+    }
+
+    /// How it rounds edges, if it does. [`density`](Self::density) is for all others.
+    pub fn rounding(&self) -> Option<Rounding> {
+        self.rounding
+    }
+
+    /// The density of a sample after a rounded union or subtraction, from its distances to the shape and to the surface
+    /// of the ground; `None` for operations that do not round.
+    pub fn rounded(&self, before: i32, outside: i32, surface: i32) -> Option<i32> {
+        let after = self.rounding?.density(before, outside, surface);
+        Some(before + part(i64::from(after) - i64::from(before), self.blend.strength))
+    }
+
+    /// Whether only the CPU computes its densities.
+    #[cfg(feature = "cuda")]
+    pub fn is_for_cpu(&self) -> bool {
+        self.rounding.is_some() || self.road.is_some()
     }
 
     /// The density at a lattice point after the operation, from its distance to the shape and from what is around;
@@ -322,6 +358,8 @@ impl SculptKernel {
             | QuantizedOperation::Paint { .. }
             | QuantizedOperation::Reset
             | QuantizedOperation::Road
+            | QuantizedOperation::Fill
+            | QuantizedOperation::Carve
             | QuantizedOperation::Paste { .. } => {
                 return None;
             }

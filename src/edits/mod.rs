@@ -26,6 +26,7 @@ mod reset;
 mod restore;
 mod rule_scope;
 mod stencil_edit;
+mod surface_distance;
 
 pub(crate) use delta::EditDelta;
 #[cfg(feature = "cuda")]

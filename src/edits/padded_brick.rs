@@ -4,7 +4,9 @@ use std::ops::RangeInclusive;
 
 use glam::{IVec3, USizeVec3};
 
-use crate::brush::{DEPTH, FARTHEST, Stencil, is_moved};
+use super::prepared_edit::PreparedEdit;
+use super::surface_distance::SurfaceDistance;
+use crate::brush::{DEPTH, FARTHEST, SculptKernel, Stencil, is_moved};
 use crate::lattice::{BRICK, BrickPos, Column, ONE};
 use crate::volume::{Brick, SampleView, row};
 
@@ -18,6 +20,8 @@ pub(super) struct PaddedBrick {
     cut: [[u16; SIDE]; SIDE],
     /// Which densities are farther from zero than the pristine ones, likewise.
     moved: [[u16; SIDE]; SIDE],
+    /// How far its samples are from the surface, for edits that round edges.
+    pub surface: Option<SurfaceDistance>,
 }
 
 impl PaddedBrick {
@@ -28,8 +32,12 @@ impl PaddedBrick {
     pub fn new(view: &SampleView, pos: BrickPos) -> Self {
         let low = pos.origin() - 1;
         let heights = view.ground().heights::<SIDE>(Column::of(low));
-        let mut own =
-            Self { densities: [[[0; SIDE]; SIDE]; SIDE], cut: [[0; SIDE]; SIDE], moved: [[0; SIDE]; SIDE] };
+        let mut own = Self {
+            densities: [[[0; SIDE]; SIDE]; SIDE],
+            cut: [[0; SIDE]; SIDE],
+            moved: [[0; SIDE]; SIDE],
+            surface: None,
+        };
         for (y, layer) in (low.y..).zip(&mut own.densities) {
             for (row, heights) in layer.iter_mut().zip(&heights) {
                 row.iter_mut().zip(heights).for_each(|(density, height)| *density = y * ONE - height);
@@ -43,6 +51,13 @@ impl PaddedBrick {
         let (width, depth) = (view.ground().width(), view.ground().depth());
         own.repeat_rim(inside(low.x, width), inside(low.z, depth));
         own
+    }
+
+    /// The samples of a brick and those around it, with what an edit that rounds edges needs in addition.
+    pub fn for_edit(view: &SampleView, pos: BrickPos, edit: &PreparedEdit) -> Self {
+        let rounding = edit.sculptor.as_ref().and_then(SculptKernel::rounding);
+        let surface = rounding.map(|rounding| SurfaceDistance::new(view, pos, rounding.horizon()));
+        Self { surface, ..Self::new(view, pos) }
     }
 
     /// Beyond the world's rim, where nothing can be edited, samples repeat those at the rim.

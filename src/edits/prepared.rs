@@ -131,7 +131,7 @@ fn apply_jobs(work: &PreparedEdits, jobs: &[Job], delta: &mut EditDelta) {
         edit.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
         if edit.looks_around() {
             let rules = rules.as_ref().filter(|_| edit.is_ruled);
-            let around = PaddedBrick::new(&editor.view, pos);
+            let around = PaddedBrick::for_edit(&editor.view, pos, edit);
             editor.change(work.grid, reached, number, delta, |editor, samples, counts| {
                 editor.apply_stencil(edit, rules, samples, &distances, &around, counts)
             });

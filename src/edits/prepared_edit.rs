@@ -2,6 +2,7 @@
 
 use glam::IVec3;
 
+use super::surface_distance::margin;
 use crate::brush::{Edit, Evaluator, Kind, SculptKernel};
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
 use crate::volume::DiggingRules;
@@ -49,9 +50,17 @@ impl PreparedEdit {
         self.sculptor.is_some() || self.is_ruled
     }
 
+    /// Whether only the CPU computes it.
+    #[cfg(feature = "cuda")]
+    pub fn is_for_cpu(&self) -> bool {
+        self.evaluator.is_for_cpu() || self.sculptor.as_ref().is_some_and(SculptKernel::is_for_cpu)
+    }
+
     /// The samples that the edit reads, if it reads others than those that it changes.
     pub(super) fn reads(&self) -> Option<LatticeBox> {
-        let all = self.reach.filter(|_| self.looks_around())?.grown(1);
+        let rounding = self.sculptor.as_ref().and_then(SculptKernel::rounding);
+        let around = rounding.map_or(1, |rounding| margin(rounding.horizon()));
+        let all = self.reach.filter(|_| self.looks_around())?.grown(around);
         let has_to_look = self.sculptor.as_ref().is_some_and(|own| own.material().is_none());
         let look = IVec3::Y * if has_to_look { LOOK } else { 0 };
         Some(LatticeBox { min: all.min - look, max: all.max + look })

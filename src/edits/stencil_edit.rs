@@ -42,9 +42,10 @@ impl BrickEditor<'_> {
                     continue;
                 }
                 let before = around.density(local);
-                let proposed = match &edit.sculptor {
-                    Some(sculptor) => sculptor.density(point, outside, || around.around(local)),
-                    None => (outside <= BAND).then(|| edit.operation.apply(before, outside)),
+                let proposed = match (&edit.sculptor, &around.surface) {
+                    (Some(sculptor), Some(surface)) => sculptor.rounded(before, outside, surface.at(index)),
+                    (Some(sculptor), None) => sculptor.density(point, outside, || around.around(local)),
+                    (None, _) => (outside <= BAND).then(|| edit.operation.apply(before, outside)),
                 };
                 let Some(proposed) =
                     proposed.filter(|&after| Sample::edited(after) != Sample::edited(before))
@@ -53,7 +54,7 @@ impl BrickEditor<'_> {
                 };
                 let mut new = || match &edit.sculptor {
                     Some(sculptor) => sculptor
-                        .material()
+                        .material_at(point)
                         .unwrap_or_else(|| nearest.material(&self.view, point, &around.around(local))),
                     None => edit.operation.material().unwrap_or(MaterialId::GROUND),
                 };

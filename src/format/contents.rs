@@ -56,7 +56,7 @@ impl StampId {
 #[cfg(feature = "store")]
 const IMAGE: &[u8] = b"image";
 #[cfg(feature = "store")]
-const MAX_IMAGE: usize = (4 << 20) + (64 << 10);
+const MAX_IMAGE: usize = (6 << 20) + (64 << 10);
 
 /// An edit whose names were looked up in a table.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,6 +10,9 @@
 //! 4. A cell is **walkable** if all cells that the agent touches while it stands anywhere on it are passable, and belong to the
 //!    world.
 //!
+//! With [`WalkSettings::jump_down`] or [`climb_up`](WalkSettings::climb_up), its [`ledges`](WalkableTile::ledges) lead from walkable
+//! cells to lower ones beyond a ledge, and back.
+//!
 //! Its [`polygons`](WalkableTile::polygons) are convex, share their edges, and meet those of the next tile in the same line.
 //!
 //! ```
@@ -30,6 +33,7 @@
 //! | `settings` | the size of an agent and what it can climb, also as integers |
 //! | `tiles` | squares of 32 x 32 cells, and those that an edit changes |
 //! | `floors` | floors and ceilings of columns, from the bits of bricks |
+//! | `ledges` | links where agents jump down or climb up |
 //! | `links` | which floors are linked, which cells passable |
 //! | `walkable` | which cells are walkable |
 //! | `border` | the edges that two tiles share |
@@ -37,12 +41,14 @@
 
 mod border;
 mod floors;
+mod ledges;
 mod links;
 mod polygons;
 mod settings;
 mod tiles;
 mod walkable;
 
+pub use ledges::LedgeLink;
 pub use polygons::NavPolygons;
 pub use settings::{WalkError, WalkSettings, Walker};
 pub use tiles::{NAV_TILE, NavTilePos};

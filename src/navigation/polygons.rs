@@ -113,7 +113,7 @@ impl WalkableTile {
     }
 
     /// Where the column of a floor is, from the tile's lowest one, in 1/4096 voxel, at y = 0.
-    fn position(&self, floor: usize) -> IVec3 {
+    pub(super) fn position(&self, floor: usize) -> IVec3 {
         let column = self.floors.starts.partition_point(|&start| start as usize <= floor) - 1;
         let (x, z) = (column % self.floors.side, column / self.floors.side);
         let (origin, low) = (self.pos().origin(), self.floors.low);

@@ -1,5 +1,6 @@
 //! The size of an agent and what it can climb.
 
+use super::ledges::LedgeRules;
 use crate::lattice::ONE;
 
 /// The size of an agent and what it can climb, in voxels.
@@ -18,11 +19,27 @@ pub struct WalkSettings {
     pub slope: f32,
     /// How far polygons may be above or below the ground; 1/64 to 64. Less makes more polygons.
     pub precision: f32,
+    /// The highest ledge that it jumps down; 0 to 256. With 0 it jumps down none.
+    pub jump_down: f32,
+    /// The highest ledge that it climbs up, where it does not walk; 0 to 256. With 0 it climbs none.
+    pub climb_up: f32,
+    /// How far from the ledge it lands, or climbs up from, at most; 0 to 16. It is kept in whole cells, and the distance that the
+    /// agent keeps from walls and edges is not counted.
+    pub leap: f32,
 }
 
 impl Default for WalkSettings {
     fn default() -> Self {
-        Self { radius: 0.5, height: 2.0, step: 0.5, slope: 1.0, precision: 0.5 }
+        Self {
+            radius: 0.5,
+            height: 2.0,
+            step: 0.5,
+            slope: 1.0,
+            precision: 0.5,
+            jump_down: 0.0,
+            climb_up: 0.0,
+            leap: 1.0,
+        }
     }
 }
 
@@ -34,6 +51,9 @@ impl WalkSettings {
             height: self.height * by,
             step: self.step * by,
             precision: self.precision * by,
+            jump_down: self.jump_down * by,
+            climb_up: self.climb_up * by,
+            leap: self.leap * by,
             ..self
         }
     }
@@ -72,6 +92,8 @@ pub struct Walker {
     pub(super) precision: i32,
     /// For each row of cells from 0 on along z: as many cells along x as must be passable to both sides.
     pub(super) reach: Vec<i32>,
+    /// How it passes ledges, if it does.
+    pub(super) ledges: Option<LedgeRules>,
 }
 
 impl Walker {
@@ -86,19 +108,35 @@ impl Walker {
         let step = check("step", settings.step, 0.0, 64.0)?.floor() as i32;
         let slope = check("slope", settings.slope, 0.0, 64.0)?.floor() as i32;
         let precision = check("precision", settings.precision, 1.0 / 64.0, 64.0)?.floor() as i32;
+        let jump = check("jump_down", settings.jump_down, 0.0, 256.0)?.floor() as i32;
+        let ledge = check("climb_up", settings.climb_up, 0.0, 256.0)?.floor() as i32;
+        let leap = check("leap", settings.leap, 0.0, 16.0)?.floor() as i32;
+        let (reach, climb) = (reach(radius), step.max(slope));
+        let wide = reach[0].max(reach.len() as i32 - 1);
+        let ledges = LedgeRules {
+            jump,
+            climb: ledge,
+            // The cells of the ledge and of the wall, and those that it keeps from both.
+            cells: leap / ONE + 2 * wide + 2,
+            wide,
+            step: climb,
+            height,
+        };
         Ok(Self {
             height,
             step,
-            climb: step.max(slope),
+            climb,
             squared_slope: i64::from(slope).pow(2),
             precision,
-            reach: reach(radius),
+            reach,
+            ledges: (jump.max(ledge) > 0).then_some(ledges),
         })
     }
 
-    /// How far, in columns along x and z, the ground may lie that decides whether a cell is walkable.
+    /// How far, in columns along x and z, the ground may lie that decides whether a cell is walkable, and where its links over
+    /// ledges lead.
     pub fn reach(&self) -> i32 {
-        self.reach.len() as i32
+        self.reach.len() as i32 + self.ledges.map_or(0, |ledges| ledges.cells + ledges.wide + 1)
     }
 }
 
@@ -153,6 +191,9 @@ mod tests {
             ("step", WalkSettings { step: f32::NAN, ..good }),
             ("slope", WalkSettings { slope: 65.0, ..good }),
             ("precision", WalkSettings { precision: 0.0, ..good }),
+            ("jump_down", WalkSettings { jump_down: -1.0, ..good }),
+            ("climb_up", WalkSettings { climb_up: 257.0, ..good }),
+            ("leap", WalkSettings { leap: f32::NAN, ..good }),
         ] {
             let error = Walker::new(&bad).expect_err(name);
             assert!(error.to_string().starts_with(&format!("the {name} of an agent is ")), "{error}");

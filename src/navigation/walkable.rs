@@ -1,6 +1,7 @@
 //! Which cells of a tile are walkable.
 
 use super::floors::Floors;
+use super::ledges::LedgeRules;
 use super::links::{Axis, Links};
 use super::settings::Walker;
 use super::tiles::{NAV_TILE, NavTilePos};
@@ -16,6 +17,7 @@ pub struct WalkableTile {
     /// Whether the cell with this floor at its lowest corner is walkable.
     walkable: Vec<bool>,
     pub(super) precision: i32,
+    pub(super) ledges: Option<LedgeRules>,
 }
 
 /// A cell on which an agent can stand.
@@ -31,14 +33,14 @@ impl WalkableTile {
     /// The walkable cells of a tile. Reads the columns of the tile and as far around it as the agent
     /// [reaches](Walker::reach).
     pub fn new(world: &World, pos: NavTilePos, walker: &Walker) -> Self {
-        // The cells of a tile, those around it, and those that these depend on.
+        // The cells of a tile, those around it, and those that these and their ledges depend on.
         let around = walker.reach();
         let low = pos.origin().offset(-around, -around);
         let side = (NAV_TILE + 2 * around + 1) as usize;
         let floors = Floors::new(world, low, side, walker.height);
         let links = Links::new(&floors, walker);
         let walkable = erode(&floors, &links, walker);
-        Self { pos, floors, links, walkable, precision: walker.precision }
+        Self { pos, floors, links, walkable, precision: walker.precision, ledges: walker.ledges }
     }
 
     /// The tile's position.

@@ -38,7 +38,7 @@ use crate::terrain::{LooseSettings, Order, Patch};
 use crate::volume::{Brick, DiggingRules, Fields};
 
 /// The version of the protocol. It changes whenever the encoding of messages does.
-pub const PROTOCOL: u32 = 5;
+pub const PROTOCOL: u32 = 6;
 
 /// Most bytes of a message to a server.
 pub const MAX_TO_SERVER: usize = 64 << 10;

@@ -9,9 +9,11 @@ use bevy_landmass::prelude::*;
 use bevy_landmass::{NavMeshHandle, NavigationMesh};
 
 use super::Navigation;
-use super::tiles::{Build, LoadedTile, NavigationTiles, despawn};
+use super::ledges::spawn_links;
+use super::tiles::{Build, BuiltMesh, LoadedTile, NavigationTiles, despawn};
 use crate::lattice::SNAP;
 use crate::navigation::{NavPolygons, NavTilePos, WalkableTile};
+use crate::plugin::Places;
 use crate::terrain::World as Ground;
 use crate::threads::{ThreadTask, Threads};
 
@@ -32,8 +34,10 @@ impl NavigationTiles {
             let (world, walker, own) = (Arc::clone(world), Arc::clone(&walker), tiles.to_vec());
             let task = ThreadTask::start(threads, move || {
                 let built = own.into_iter().map(|pos| {
-                    let polygons = WalkableTile::new(&world, pos, &walker).polygons();
-                    (pos, mesh(&polygons, scale).map(|mesh| (polygons, mesh)))
+                    let tile = WalkableTile::new(&world, pos, &walker);
+                    let polygons = tile.polygons();
+                    let mesh = mesh(&polygons, scale);
+                    (pos, mesh.map(|mesh| BuiltMesh { polygons, ledges: tile.ledges(), mesh }))
                 });
                 built.collect()
             });
@@ -70,6 +74,7 @@ fn mesh(polygons: &NavPolygons, scale: f32) -> Option<Arc<ValidNavigationMesh3d>
 /// Makes islands of tiles that are done. Waits for those that the commit of the last frame changed.
 pub(super) fn replace_islands(
     mut navigations: Query<(&Navigation, &mut NavigationTiles)>,
+    places: Places,
     meshes: Option<ResMut<Assets<NavMesh3d>>>,
     handles: Query<&NavMeshHandle3d>,
     wait: Res<Wait>,
@@ -97,7 +102,12 @@ pub(super) fn replace_islands(
                     continue;
                 };
                 tile.build = number;
+                let ledges = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.ledges.clone());
                 show(navigation, pos, tile, mesh, (&mut meshes, &handles), &mut commands);
+                tile.links.drain(..).for_each(|link| despawn(Some(link), &mut commands));
+                if let (Some(island), Some(place)) = (tile.island, places.of(navigation.terrain)) {
+                    tile.links = spawn_links(navigation, island, pos, &ledges, &place, &mut commands);
+                }
             }
         }
     }
@@ -108,11 +118,11 @@ fn show(
     navigation: &Navigation,
     pos: NavTilePos,
     tile: &mut LoadedTile,
-    built: Option<(NavPolygons, Arc<ValidNavigationMesh3d>)>,
+    built: Option<BuiltMesh>,
     (meshes, handles): (&mut Assets<NavMesh3d>, &Query<&NavMeshHandle3d>),
     commands: &mut Commands,
 ) {
-    let Some((polygons, nav_mesh)) = built else {
+    let Some(BuiltMesh { polygons, mesh: nav_mesh, .. }) = built else {
         despawn(tile.island.take(), commands);
         tile.polygons = None;
         return;

@@ -10,13 +10,16 @@
 //! | [`NavigationSource`] | a place around which there are islands |
 //! | [`NavigationTiles`] | the tiles that there are |
 //! | [`archipelago_options`] | options for landmass that fit an agent |
+//! | [`JUMP_DOWN`], [`CLIMB_UP`] | kinds of landmass' animation links over ledges |
 
 mod build;
 mod choose;
 mod follow;
+mod ledges;
 mod tiles;
 
 pub use bevy_landmass;
+pub use ledges::{CLIMB_UP, JUMP_DOWN};
 pub use tiles::NavigationTiles;
 
 use std::time::Duration;
@@ -56,7 +59,10 @@ impl Plugin for NavigationPlugin {
             .configure_sets(PostUpdate, NavigationSystems.after(CommitSameFrame))
             // Before landmass moves agents, in whichever schedule it does.
             .configure_sets(PreUpdate, NavigationSystems.before(LandmassSystems::SyncExistence))
-            .add_systems(PreUpdate, build::replace_islands.in_set(NavigationSystems))
+            .add_systems(
+                PreUpdate,
+                (build::replace_islands, ledges::move_links).chain().in_set(NavigationSystems),
+            )
             .add_systems(
                 Update,
                 (

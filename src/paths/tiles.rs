@@ -9,7 +9,7 @@ use bevy::prelude::*;
 use bevy_landmass::prelude::*;
 
 use super::Navigation;
-use crate::navigation::{NavPolygons, NavTilePos, Walker};
+use crate::navigation::{LedgeLink, NavPolygons, NavTilePos, Walker};
 use crate::terrain::Version;
 use crate::threads::ThreadTask;
 
@@ -40,10 +40,19 @@ pub(super) struct LoadedTile {
     pub build: u64,
     pub polygons: Option<Arc<NavPolygons>>,
     pub island: Option<Entity>,
+    /// Its links over ledges, children of the island.
+    pub links: Vec<Entity>,
 }
 
-/// A tile that was built, and its mesh; `None` where nothing is walkable.
-pub(super) type BuiltTile = (NavTilePos, Option<(NavPolygons, Arc<ValidNavigationMesh3d>)>);
+/// A tile that was built; `None` where nothing is walkable.
+pub(super) type BuiltTile = (NavTilePos, Option<BuiltMesh>);
+
+/// The mesh of a tile.
+pub(super) struct BuiltMesh {
+    pub polygons: NavPolygons,
+    pub ledges: Vec<LedgeLink>,
+    pub mesh: Arc<ValidNavigationMesh3d>,
+}
 
 /// A task that builds tiles.
 pub(super) struct Build {

@@ -1,12 +1,12 @@
 //! Copies a box of the world, to be pasted elsewhere.
 
-use glam::IVec3;
+use glam::{I64Vec3, IVec3};
 use rayon::prelude::*;
 
 use super::state::World;
-use crate::brush::{Prefab, PrefabError, PrefabSample, ground_level};
+use crate::brush::{BrushError, Prefab, PrefabError, PrefabSample, ShapeGrid, ground_level};
 use crate::ground::MaterialId;
-use crate::lattice::{Column, LIMIT, LatticeBox};
+use crate::lattice::{Column, LIMIT, LatticeBox, ONE};
 use crate::volume::{Sample, resolve};
 
 impl World {
@@ -70,5 +70,37 @@ impl World {
         let layers: Vec<Vec<PrefabSample>> = (min.y..=max.y).into_par_iter().map(layer).collect();
         let above_ground = anchor.y.saturating_sub(ground_level(ground, Column::of(anchor)));
         Prefab::new(size, from_min, above_ground, layers.into_iter().flatten())
+    }
+
+    /// A piece of the world as a shape with its materials: a [fill](crate::brush::Brush::fill) builds it again, at any
+    /// rotation and scale, with its edge rounded if wanted, and a dig takes its form out of the ground. A box has 3 to 128
+    /// samples along each side; the outermost count as air. Beyond the world's rim everything continues as at the rim.
+    ///
+    /// Where a piece has to be the same to the bit, air included, [copy](Self::copy) it.
+    ///
+    /// ```
+    /// use bevy_burrow::lattice::LatticeBox;
+    /// use bevy_burrow::prelude::*;
+    /// use glam::{IVec3, Vec3};
+    ///
+    /// let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
+    /// terrain.apply([Brush::add(Shape::sphere(Vec3::new(16.0, 16.0, 16.0), 4.0), MaterialId(3))]);
+    /// let rock = LatticeBox { min: IVec3::splat(11), max: IVec3::splat(21) };
+    /// let rock = terrain.world().shape_grid(rock)?;
+    /// let place = Vec3::new(44.0, 13.0, 40.0);
+    /// terrain.apply([Brush::fill(GridShape::new(rock, place).with_scale(1.5), 2.0)]);
+    /// assert_eq!(terrain.world().samples().material(place.as_ivec3()), MaterialId(3));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`BrushError::GridSize`].
+    pub fn shape_grid(&self, samples: LatticeBox) -> Result<ShapeGrid, BrushError> {
+        let size = (samples.max.as_i64vec3() - samples.min.as_i64vec3() + 1)
+            .clamp(I64Vec3::ZERO, I64Vec3::splat(1 << 20));
+        let (view, rim) = (self.samples(), IVec3::new(self.ground().width(), LIMIT, self.ground().depth()));
+        let point = |at: IVec3| (samples.min + at).clamp(IVec3::new(0, -LIMIT, 0), rim);
+        let distance = |at: IVec3| view.distance(point(at)) as f32 / ONE as f32;
+        Ok(ShapeGrid::from_fn(size.as_uvec3(), distance)?.with_materials(|at| view.material(point(at))))
     }
 }

@@ -1,5 +1,7 @@
 //! A reference implementation of edits, sample by sample, written from the documentation.
 
+use std::collections::{BTreeSet, HashMap};
+
 use bevy_burrow::brush::shapes::{Capsule, Cone, Cuboid, Cylinder, Sphere};
 use bevy_burrow::brush::{BAND, Evaluator};
 use bevy_burrow::lattice::LatticeBox;
@@ -68,6 +70,36 @@ fn from_relief(point: IVec3, stamp: &Stamp) -> (i32, i32) {
     let white = 65_535 * 256 * 256;
     let relief = (2 * grey * i64::from(units(stamp.height)) + white).div_euclid(2 * white);
     (beside, from.y - relief as i32)
+}
+
+/// The new density of a sample under a fill or a carve, from its distances to the shape and to the surface.
+fn rounded(brush: &Brush, before: i32, outside: i32, surface: i32) -> i32 {
+    let (is_dig, depth) = (brush.operation == Operation::Carve, bevy_burrow::brush::DEPTH);
+    let (radius, shape) = (units(brush.blend.falloff), outside.max(-depth));
+    // A carve is a fill of air.
+    let (own, is_in) = if is_dig { (-before, before >= 0) } else { (before, before < 0) };
+    let mut after = if outside <= BAND { own.min(shape) } else { own };
+    if shape < radius && if is_in { own > -depth } else { surface < radius } {
+        let near = if is_in { -surface.min(radius.max(depth)) } else { surface };
+        let corner = i64::from(radius - near).pow(2) + i64::from(radius - shape).pow(2);
+        // The integer root.
+        let mut root = (corner as f64).sqrt() as i64;
+        while root * root > corner {
+            root -= 1;
+        }
+        while (root + 1) * (root + 1) <= corner {
+            root += 1;
+        }
+        let arc = radius - root as i32;
+        let filled = match (is_in, arc > 0 && near < shape) {
+            (true, _) => own.min(shape) + arc - near.min(shape),
+            (false, true) => (i64::from(own) * i64::from(arc) / i64::from(near)) as i32,
+            (false, false) => arc,
+        };
+        after = after.min(filled.max(-depth));
+    }
+    let whole = i64::from(if is_dig { -after } else { after }) - i64::from(before);
+    before + (whole.signum() * ((whole.abs() * i64::from(units(brush.blend.strength)) + 255) / 256)) as i32
 }
 
 impl CheckedTerrain {
@@ -203,6 +235,46 @@ impl CheckedTerrain {
         IVec3::new(at.x.clamp(0, ground.width()), at.y, at.z.clamp(0, ground.depth()))
     }
 
+    /// The distance to the surface, as a fill and a carve define it, of all samples of a box that are nearer to it than the
+    /// radius: the shortest way through samples of their own side.
+    fn surface_distances(&self, brush: &Brush, samples: LatticeBox) -> HashMap<IVec3, i32> {
+        let horizon = units(brush.blend.falloff).max(1024);
+        let around = samples.grown(horizon / 256 + 2);
+        let distance = |at: IVec3| self.distance(self.at_rim(at));
+        let (mut known, mut open) = (HashMap::new(), BTreeSet::new());
+        for point in around.points() {
+            let own = distance(point);
+            // Where the surface crosses the edges to neighbours, in voxels; squares of a plane's normal add up.
+            let along = [IVec3::X, IVec3::Y, IVec3::Z].map(|axis| {
+                let others = [axis, -axis].map(|step| distance(point + step));
+                let crossed = others.into_iter().filter(|other| (*other < 0) != (own < 0));
+                let part =
+                    |other: i32| f64::from(own.abs()) * 256.0 / f64::from((own.abs() + other.abs()).max(1));
+                crossed.map(part).fold(f64::INFINITY, f64::min)
+            });
+            let squares: f64 = along.iter().map(|length| 1.0 / (length * length)).sum();
+            if squares > 0.0 {
+                let first = (1.0 / squares.sqrt()).round_ties_even() as i32;
+                open.insert((first, point.to_array()));
+            }
+        }
+        while let Some((length, at)) = open.pop_first() {
+            let point = IVec3::from_array(at);
+            if length >= horizon || !around.contains(point) || known.contains_key(&point) {
+                continue;
+            }
+            known.insert(point, length);
+            let is_solid = distance(point) < 0;
+            for step in LatticeBox::point(IVec3::ZERO).grown(1).points().filter(|step| *step != IVec3::ZERO) {
+                if (distance(point + step) < 0) == is_solid {
+                    let way = [256, 362, 443][step.abs().element_sum() as usize - 1];
+                    open.insert((length + way, (point + step).to_array()));
+                }
+            }
+        }
+        known
+    }
+
     /// The material of a sample that becomes solid.
     fn new_material(&self, brush: &Brush, point: IVec3) -> MaterialId {
         if let Some(material) = brush.blend.material {
@@ -222,6 +294,8 @@ impl CheckedTerrain {
         let mut changes = Vec::new();
         let Some(reach) = edit.reach().intersection(grid.edit_bounds()) else { return effect };
         let evaluator: Evaluator = edit.evaluator();
+        let rounds = matches!(brush.operation, Operation::Fill | Operation::Carve);
+        let surface = if rounds { self.surface_distances(brush, reach) } else { HashMap::new() };
         let mut row = vec![0; reach.size().x as usize];
         for (y, z) in
             (reach.min.y..=reach.max.y).flat_map(|y| (reach.min.z..=reach.max.z).map(move |z| (y, z)))
@@ -236,8 +310,12 @@ impl CheckedTerrain {
                 let number = after.clamp(-32767, 32767);
                 match edit.operation() {
                     operation if operation.is_sculpting() => {
-                        let after =
-                            self.sculpted(brush, point, outside).map(|after| after.clamp(-32767, 32767));
+                        let after = match surface.get(&point) {
+                            Some(surface) if rounds => Some(rounded(brush, before, outside, *surface)),
+                            _ if rounds => Some(rounded(brush, before, outside, i32::MAX)),
+                            _ => self.sculpted(brush, point, outside),
+                        };
+                        let after = after.map(|after| after.clamp(-32767, 32767));
                         let Some(after) = after.filter(|&after| after != before.clamp(-32767, 32767)) else {
                             continue;
                         };
@@ -246,11 +324,16 @@ impl CheckedTerrain {
                             (false, true) => self.new_material(brush, point),
                             _ => own,
                         };
-                        changes.push((point, before, (after, material)));
+                        changes.push((point, before, Some((after, material))));
+                    }
+                    Operation::Reset => {
+                        if outside <= BAND && stored.is_some() {
+                            changes.push((point, before, None));
+                        }
                     }
                     Operation::Paint { material } => {
                         if outside <= 0 && before < 0 && (stored.is_none() || own != material) {
-                            changes.push((point, before, (number, material)));
+                            changes.push((point, before, Some((number, material))));
                         }
                     }
                     operation => {
@@ -260,15 +343,19 @@ impl CheckedTerrain {
                                 (false, true) => operation.material().unwrap_or(own),
                                 _ => own,
                             };
-                            changes.push((point, before, (number, material)));
+                            changes.push((point, before, Some((number, material))));
                         }
                     }
                 }
             }
         }
-        for (point, before, (after, material)) in changes {
+        for (point, before, change) in changes {
             let old = self.material(point);
-            self.samples.insert(point, (after, material));
+            let after = change.map_or_else(|| ground.distance(point), |(after, _)| after);
+            match change {
+                Some(sample) => drop(self.samples.insert(point, sample)),
+                None => drop(self.samples.remove(&point)),
+            }
             let new = self.material(point);
             effect.chunks.insert(grid.chunk_of(point));
             LatticeBox::include(&mut effect.bounds, LatticeBox::point(point));

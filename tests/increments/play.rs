@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use bevy_burrow::brush::AnyShape;
 use bevy_burrow::lattice::{Column, ONE};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
@@ -9,6 +10,7 @@ use fastrand::Rng;
 use glam::{Quat, Vec2, Vec3};
 
 use crate::checked_terrain::CheckedTerrain;
+use crate::worlds;
 
 /// A brush of any shape and operation, rough or smooth, with about this radius and position.
 pub fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
@@ -47,7 +49,35 @@ pub fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
         16 => Brush::stamp(shape, any_stamp(rng, center, radius)),
         _ => Brush::terrace(shape, by.max(1.0)),
     };
+    let brush = match rng.u32(0..8) {
+        0 => {
+            // Shapes and operations that no others are combined with here.
+            let (path, grid) = (worlds::random_path(rng, center), worlds::random_grid(rng, center));
+            let shape: AnyShape = match rng.u32(0..5) {
+                0 => path.into(),
+                1 => Corridor::new(path, radius, 2.0).into(),
+                2 => grid.into(),
+                3 => Shape::curve([center, center + axis, center + jitter, center - axis], [radius, 1.0])
+                    .into(),
+                _ => shape.into(),
+            };
+            let rounding = [0.0, 0.6, 1.5, 3.0][rng.usize(0..4)];
+            match rng.u32(0..7) {
+                0 => Brush::dig(shape),
+                1 => Brush::add(shape, material),
+                2 => Brush::paint(shape, material),
+                // The materials of grids have tests of their own.
+                3 => Brush::fill(shape, rounding).with_material(material),
+                4 if !matches!(shape, AnyShape::Grid(_)) => Brush::fill(shape, rounding),
+                5 => Brush::carve(shape, rounding),
+                _ => Brush::reset(shape),
+            }
+        }
+        _ => brush,
+    };
+    let rounds = matches!(brush.operation, Operation::Fill | Operation::Carve);
     let brush = match rng.u32(0..3) {
+        0 if rounds => brush.with_material(material),
         0 if brush.operation.is_sculpting() => brush.with_falloff(rng.f32() * 3.0).with_material(material),
         1 => brush.with_strength(rng.f32()),
         _ => brush,

@@ -16,7 +16,16 @@ use fastrand::Rng;
 
 use crate::random_works;
 
-const AGENT: WalkSettings = WalkSettings { radius: 0.4, height: 1.8, step: 0.4, slope: 1.0, precision: 0.3 };
+const AGENT: WalkSettings = WalkSettings {
+    radius: 0.4,
+    height: 1.8,
+    step: 0.4,
+    slope: 1.0,
+    precision: 0.3,
+    jump_down: 0.0,
+    climb_up: 0.0,
+    leap: 1.0,
+};
 
 const SOUTH: Vec3 = Vec3::new(48.0, 10.0, 12.0);
 const NORTH: Vec3 = Vec3::new(48.0, 10.0, 84.0);

@@ -3,6 +3,7 @@
 #[cfg(feature = "landmass")]
 mod bevy_app;
 mod laws;
+mod ledges;
 mod polygons;
 mod recast;
 mod reference;
@@ -42,6 +43,7 @@ fn random_settings(rng: &mut Rng) -> WalkSettings {
         step: [0.0, 0.3, 0.6, 1.5][rng.usize(0..4)],
         slope: [0.2, 0.7, 1.0, 2.0][rng.usize(0..4)],
         precision: [0.05, 0.25, 0.5, 2.0][rng.usize(0..4)],
+        ..WalkSettings::default()
     }
 }
 

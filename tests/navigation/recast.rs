@@ -95,7 +95,14 @@ fn nearly_all_that_recast_finds_is_walkable() {
     for index in 0..world_count(8) {
         let mut rng = Rng::with_seed(5000 + index);
         let terrain = random_hills(&mut rng);
-        let settings = WalkSettings { radius: 0.6, height: 2.0, step: 0.5, slope: 1.0, precision: 0.5 };
+        let settings = WalkSettings {
+            radius: 0.6,
+            height: 2.0,
+            step: 0.5,
+            slope: 1.0,
+            precision: 0.5,
+            ..WalkSettings::default()
+        };
         let mut cells: HashMap<Column, Vec<WalkableCell>> = HashMap::new();
         for cell in all_cells(terrain.world(), &walker(&settings)) {
             cells.entry(cell.cell).or_default().push(cell);

@@ -138,6 +138,71 @@ fn touched_cells(radius: f64) -> HashSet<(i32, i32)> {
     around.filter(|place| *place == (0, 0) || is_touched(place)).collect()
 }
 
+/// A place where an agent jumps down or climbs up: its upper cell, the way, how many cells it leads, and whether it is for
+/// jumps and for climbs.
+pub type Leap = (Column, (i32, i32), i32, bool, bool);
+
+/// All leaps of a world, in order.
+pub fn leaps(world: &World, settings: &WalkSettings) -> Vec<Leap> {
+    let reference = Reference::new(world, settings);
+    let touched = touched_cells(f64::from((settings.radius * 256.0).ceil()) / 256.0);
+    let wide = touched.iter().map(|&(x, z)| x.max(z)).max().expect("its own cell");
+    let most = settings.leap as i32 + 2 * wide + 2;
+    let climb = whole(settings.step.max(settings.slope), f32::floor);
+    let mut tops: HashMap<Column, Vec<i64>> = HashMap::new();
+    let mut uppers: Vec<(Floor, i64)> = Vec::new();
+    for cell in walkable_cells(world, settings) {
+        let top = i64::from(*cell.heights.iter().max().expect("four"));
+        tops.entry(cell.cell).or_default().push(top);
+        uppers.push(((cell.cell, cell.heights[0].into()), top));
+    }
+    let is_walkable = |floor: Floor| reference.is_walkable(floor, &touched);
+    let has_air = |at: Column, from: i64, to: i64| {
+        reference.floors.get(&at).is_some_and(|floors| {
+            floors.iter().any(|&(floor, roof)| floor <= from && roof.is_none_or(|roof| roof >= to))
+        })
+    };
+    let mut leaps = Vec::new();
+    for (floor, top) in uppers {
+        for (dx, dz) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+            if reference.step(floor, floor.0.offset(dx, dz)).is_some_and(is_walkable) {
+                continue;
+            }
+            let at = |cells: i32| floor.0.offset(dx * cells, dz * cells);
+            // The first cell with ground that is walkable, as high or lower.
+            let others = |cells: i32| tops.get(&at(cells)).into_iter().flatten().copied();
+            let Some(cells) = (1..=most).find(|&cells| others(cells).any(|other| other <= top + climb))
+            else {
+                continue;
+            };
+            if others(cells).any(|other| (other - top).abs() <= climb) {
+                continue;
+            }
+            let bottom = others(cells).filter(|&other| other < top).max().expect("a lower one");
+            let [jump, ledge] =
+                [settings.jump_down, settings.climb_up].map(|most| top - bottom <= whole(most, f32::floor));
+            let head = top + whole(settings.height, f32::ceil);
+            let air = |from: i64| (from + climb).min(head - 1);
+            // In cells ahead of the upper one and to its side.
+            let column = |ahead: i32, aside: i32| {
+                let along = if dx + dz > 0 { ahead } else { 1 - ahead };
+                if dx != 0 { floor.0.offset(along, aside) } else { floor.0.offset(aside, along) }
+            };
+            let is_free = (0..=cells + wide + 1).all(|ahead| {
+                (-wide..=wide + 1).all(|aside| {
+                    let at = column(ahead, aside);
+                    if ahead >= cells { has_air(at, air(bottom), head) } else { has_air(at, air(top), head) }
+                })
+            });
+            if (jump || ledge) && is_free {
+                leaps.push((floor.0, (dx, dz), cells, jump, ledge));
+            }
+        }
+    }
+    leaps.sort_unstable();
+    leaps
+}
+
 /// All walkable cells of a world, in order.
 pub fn walkable_cells(world: &World, settings: &WalkSettings) -> Vec<WalkableCell> {
     let reference = Reference::new(world, settings);

@@ -36,8 +36,14 @@ fn speed_of_tiles() {
             terrain.apply([brush]);
         }
         let world = terrain.world();
-        let walker =
-            walker(&WalkSettings { radius: 0.4, height: 1.8, step: 0.5, slope: 1.0, precision: 0.5 });
+        let walker = walker(&WalkSettings {
+            radius: 0.4,
+            height: 1.8,
+            step: 0.5,
+            slope: 1.0,
+            precision: 0.5,
+            ..WalkSettings::default()
+        });
         let tiles: Vec<NavTilePos> = NavTilePos::all(world).collect();
         let mut times = [Vec::new(), Vec::new()];
         let (mut cells, mut polygons, mut bytes) = (0, 0, 0);

@@ -18,7 +18,7 @@ use glam::{IVec3, Vec2, Vec3};
 
 use crate::follower::terrain;
 use crate::link::{Line, Way};
-use crate::worlds::{any_random_brush, random_rules};
+use crate::worlds::{any_random_brush, contents, random_rules};
 
 /// A frame of a player; every other one is one of the server.
 pub const FRAME: Duration = Duration::from_micros(16_667);
@@ -171,6 +171,10 @@ impl Bot {
         let mut client =
             Client::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
         client.stamps_mut().add(Arc::clone(image));
+        // Others get what they lack from the server.
+        if id.is_multiple_of(2) {
+            add_contents(client.stamps_mut());
+        }
         client.set_place(IVec3::new(20, 20, 20));
         client.connect(now);
         let (up, order, bulk, free, dug, arrived, events) = Default::default();
@@ -310,14 +314,26 @@ pub struct Play {
     pub up_lag: Duration,
 }
 
+/// Adds the grids and prefabs of random brushes.
+fn add_contents(stamps: &mut Stamps) {
+    let (grids, prefabs) = contents();
+    for grid in grids {
+        stamps.add(Arc::clone(grid.image()));
+    }
+    for prefab in prefabs {
+        stamps.add_prefab(Arc::clone(prefab)).expect("it is small");
+    }
+}
+
 impl Play {
     pub fn new(ground: &Arc<Ground>, bots: u64, settings: ServerSettings) -> Self {
         let samples = (0..64).map(|at: u16| at * 900).collect();
         let image = Arc::new(GreyImage::from_samples(8, 8, samples).expect("an image"));
         let mut server = Server::new(terrain(ground), settings);
-        server.stamps_mut().add(Arc::clone(&image));
         let mut stamps = Stamps::default();
         stamps.add(Arc::clone(&image));
+        add_contents(&mut stamps);
+        server.stamps_mut().add_all(&stamps);
         let reference = Reference::new(ground, stamps);
         let mut play = Self {
             server,

@@ -16,7 +16,7 @@ use fastrand::Rng;
 use glam::{IVec3, Vec2, Vec3};
 
 use crate::follower::{FRAME, Follower, count, hills, play, terrain};
-use crate::worlds::any_random_brush;
+use crate::worlds::{any_random_brush, has_content};
 
 /// Bytes that a decoder may take regardless of the size of its input.
 const ANYWAY: u64 = 1 << 20;
@@ -92,7 +92,7 @@ impl Messages {
             } else {
                 for bot in &mut bots {
                     let brushes = (0..rng.u32(0..3)).map(|_| any_random_brush(&mut rng, &ground));
-                    let kept = brushes.filter(|brush| !matches!(brush.operation, Operation::Stamp { .. }));
+                    let kept = brushes.filter(|brush| !has_content(brush));
                     let place = Vec3::new(64.0, 20.0, 64.0);
                     let stamp = Stamp::new(Arc::clone(&image), place, Vec2::splat(9.0), 3.0);
                     bot.edit(

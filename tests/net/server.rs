@@ -14,7 +14,7 @@ use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
 use glam::{IVec3, Vec3};
 
 use crate::follower::{Follower, agreed, count, hills, play, terrain};
-use crate::worlds::{any_random_brush, random_rules};
+use crate::worlds::{any_random_brush, has_content, random_rules};
 
 fn dig(x: f32, z: f32) -> Brush {
     Brush::dig(Shape::sphere(Vec3::new(x, 20.0, z), 3.0))
@@ -58,8 +58,7 @@ fn all_have_the_world_of_the_order() {
     for round in 0..count("BURROW_ROUNDS", 60) {
         for follower in [&mut a, &mut b, &mut c] {
             let brushes = (0..rng.u32(0..4)).map(|_| any_random_brush(&mut rng, &scene.ground));
-            let brushes: Vec<Brush> =
-                brushes.filter(|brush| !matches!(brush.operation, Operation::Stamp { .. })).collect();
+            let brushes: Vec<Brush> = brushes.filter(|brush| !has_content(brush)).collect();
             follower.edit(brushes);
             if rng.u32(0..9) == 0 {
                 follower.undo(follower.id.0);

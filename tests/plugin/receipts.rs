@@ -85,7 +85,7 @@ fn refused() -> Vec<Brush> {
         Shape::sphere(Vec3::new(-500.0, 8.0, 30.0), 3.0),
     ];
     let mut brushes: Vec<Brush> = shapes.map(Brush::dig).to_vec();
-    brushes.push(dig(30.0, 8.0, 30.0, 3.0).with_roughness(Roughness { amplitude: nan, scale: 4.0, seed: 1 }));
+    brushes.push(dig(30.0, 8.0, 30.0, 3.0).with_roughness(Roughness::new(nan, 4.0, 1)));
     brushes.into_iter().enumerate().map(|(tag, brush)| brush.with_tag(tag as u64)).collect()
 }
 

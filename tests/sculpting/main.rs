@@ -9,6 +9,7 @@ mod neighbours;
 mod paths;
 mod planes;
 mod rim;
+mod rounded;
 mod smoothed;
 #[path = "../worlds/mod.rs"]
 mod worlds;

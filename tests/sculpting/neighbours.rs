@@ -7,6 +7,7 @@ use fastrand::Rng;
 use glam::{IVec3, Quat, UVec3, Vec2, Vec3};
 
 use crate::measured::terrain;
+use crate::worlds;
 
 const SIDE: i32 = 48;
 
@@ -45,9 +46,13 @@ fn brush(rng: &mut Rng, grid: &ShapeGrid) -> Brush {
         5 => Brush::stamp(shape, Stamp::new(image, at, Vec2::new(6.0, 8.0), 3.0)).with_material(material),
         _ => Brush::reset(shape),
     };
-    match custom.filter(|_| rng.bool()) {
+    let brush = match custom.filter(|_| rng.bool()) {
         Some(custom) => Brush { custom: custom.custom, ..brush },
         None => brush,
+    };
+    match rng.u8(..3) {
+        0 => brush.with_roughness(worlds::random_roughness(rng, 2.0)),
+        _ => brush,
     }
 }
 

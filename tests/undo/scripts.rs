@@ -2,16 +2,20 @@
 
 use std::collections::BTreeMap;
 
+use bevy_burrow::brush::CustomShape;
 use bevy_burrow::prelude::*;
 use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
 
 use crate::worlds::{any_random_brush, random_brush_at_a_face, random_rules};
 
-const OPERATIONS: [&str; 11] =
-    ["dig", "add", "paint", "smooth", "sharpen", "flatten", "level", "raise", "lower", "stamp", "terrace"];
+const OPERATIONS: [&str; 16] = [
+    "dig", "add", "paint", "smooth", "sharpen", "flatten", "level", "raise", "lower", "stamp", "terrace",
+    "reset", "road", "paste", "fill", "carve",
+];
 
-const SHAPES: [&str; 6] = ["sphere", "box", "cylinder", "capsule", "cone", "torus"];
+const SHAPES: [&str; 10] =
+    ["sphere", "box", "cylinder", "capsule", "cone", "torus", "curve", "path", "corridor", "grid"];
 
 const EFFECTS: [&str; 6] =
     ["protected", "unbreakable", "too hard", "slowed", "crumbs removed", "debris broken off"];
@@ -95,11 +99,23 @@ fn operation(brush: &Brush) -> &'static str {
         Operation::Lower { .. } => "lower",
         Operation::Stamp { .. } => "stamp",
         Operation::Terrace { .. } => "terrace",
+        Operation::Reset => "reset",
+        Operation::Road => "road",
+        Operation::Paste { .. } => "paste",
+        Operation::Fill => "fill",
+        Operation::Carve => "carve",
         _ => panic!("{brush:?}"),
     }
 }
 
 fn shape(brush: &Brush) -> &'static str {
+    match brush.custom.as_deref() {
+        None => {}
+        Some(CustomShape::Path(_)) => return "path",
+        Some(CustomShape::Corridor(_)) => return "corridor",
+        Some(CustomShape::Grid(_)) => return "grid",
+        Some(_) => panic!("{brush:?}"),
+    }
     match brush.shape {
         Shape::Sphere(_) => "sphere",
         Shape::Cuboid(_) => "box",
@@ -107,6 +123,7 @@ fn shape(brush: &Brush) -> &'static str {
         Shape::Capsule(_) => "capsule",
         Shape::Cone(_) => "cone",
         Shape::Torus(_) => "torus",
+        Shape::Curve(_) => "curve",
         _ => panic!("{brush:?}"),
     }
 }

@@ -1,9 +1,10 @@
 //! Random worlds and edits for the tests: steep, flat, at integer heights, and cut from real elevation data.
 #![allow(dead_code)] // each test file uses its own part of this
 
-use bevy_burrow::brush::shapes::Cuboid;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
+use bevy_burrow::brush::CustomShape;
+use bevy_burrow::brush::shapes::Cuboid;
 use bevy_burrow::ground::{
     Bedding, GreyImage, Ground, ImageLimits, ImageScale, Interval, MaterialControl, MaterialRule, Strata,
     Stratum, StratumBounds,
@@ -205,12 +206,19 @@ pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
         (_, false) => Brush::add(shape, material),
     };
     match rng.u32(0..6) {
-        0 => brush.with_roughness(Roughness {
-            amplitude: rng.f32() * 2.0,
-            scale: 1.0 + rng.f32() * 6.0,
-            seed: rng.u32(..),
-        }),
+        0 => brush.with_roughness(random_roughness(rng, 2.0)),
         _ => brush,
+    }
+}
+
+/// Bumps up to this high; half of them tied to a point that is not the origin.
+pub fn random_roughness(rng: &mut Rng, most: f32) -> Roughness {
+    let roughness = Roughness::new(rng.f32() * most, 1.0 + rng.f32() * 6.0, rng.u32(..));
+    let away = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5) * 4000.0;
+    match rng.u32(0..4) {
+        0 | 1 => roughness,
+        2 => roughness.with_origin(away.round()),
+        _ => roughness.with_origin(away),
     }
 }
 
@@ -259,7 +267,7 @@ pub fn sculpting_brush(rng: &mut Rng, shape: Shape, place: Vec3) -> Brush {
     match rng.u32(0..4) {
         0 => brush.with_material(MaterialId(rng.u8(0..6))),
         1 => brush.with_strength(rng.f32()),
-        2 => brush.with_roughness(Roughness::new(rng.f32(), 1.0 + rng.f32() * 6.0, rng.u32(..))),
+        2 => brush.with_roughness(random_roughness(rng, 1.0)),
         _ => brush,
     }
 }
@@ -295,8 +303,131 @@ pub fn random_lower_and_raise(rng: &mut Rng, ground: &Ground) -> (Brush, Brush) 
     (lower, raise)
 }
 
-/// A random brush of any kind.
+/// A random brush of any kind: every shape, every operation. New ones belong here, and all tests of laws get them.
 pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
+    let like = random_gpu_brush(rng, ground);
+    let dig = rng.bool();
+    let (at, radius) = (random_center(rng, ground, dig, 2.0), 1.5 + rng.f32() * 4.0);
+    let material = MaterialId(rng.u8(0..8));
+    let shape: Option<CustomShape> = match rng.u32(0..12) {
+        0 => Some(CustomShape::Path(random_path(rng, at))),
+        1 => {
+            Some(CustomShape::Corridor(Corridor::new(random_path(rng, at), rng.f32() * 6.0, rng.f32() * 6.0)))
+        }
+        2 => Some(CustomShape::Grid(random_grid(rng, at))),
+        _ => None,
+    };
+    // Stamps within grids are refused, and other operations take any shape.
+    let is_stamp = matches!(like.operation, Operation::Stamp { .. });
+    let brush = match shape {
+        Some(shape) if !(is_stamp && matches!(shape, CustomShape::Grid(_))) => {
+            let own = Brush::dig(shape);
+            Brush { shape: own.shape, custom: own.custom, ..like }
+        }
+        _ if rng.u32(0..12) == 0 => {
+            let ends = [at, at, at, at].map(|at| at + random_direction(rng) * 9.0);
+            Brush { shape: Shape::curve(ends, [radius, radius * 0.5]), ..like }
+        }
+        _ => like,
+    };
+    match rng.u32(0..16) {
+        0 => Brush { operation: Operation::Reset, ..brush },
+        1 | 2 => {
+            let rounding = [0.0, 0.7, 2.0, 4.5, 9.0][rng.usize(0..5)];
+            let operation = if dig { Operation::Carve } else { Operation::Fill };
+            let brush = Brush { operation, ..brush }.with_falloff(rounding);
+            match rng.u32(0..3) {
+                0 => brush,
+                1 => brush.with_material(material),
+                _ => brush.with_strength(rng.f32()),
+            }
+        }
+        3 => {
+            let road = Corridor::new(random_path(rng, at), 1.0 + rng.f32() * 6.0, rng.f32() * 6.0);
+            Brush { power: brush.power, ..Brush::road(road, rng.f32() * 3.0) }
+        }
+        4 => {
+            let paste = random_paste(rng, at);
+            match rng.bool() {
+                true => Brush { power: brush.power, ..Brush::paste(paste) },
+                // A part of it, perhaps none.
+                false => Brush { operation: Operation::Paste { paste }, ..brush },
+            }
+        }
+        _ => brush,
+    }
+}
+
+fn random_direction(rng: &mut Rng) -> Vec3 {
+    Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5)
+}
+
+/// A path near a place.
+pub fn random_path(rng: &mut Rng, at: Vec3) -> BrushPath {
+    let points: Vec<(Vec3, f32)> = (0..rng.u32(2..6))
+        .map(|_| (at + random_direction(rng) * Vec3::new(24.0, 6.0, 24.0), 1.0 + rng.f32() * 3.0))
+        .collect();
+    if rng.bool() { BrushPath::spline(points) } else { BrushPath::polyline(points) }
+}
+
+/// The grids and prefabs that random brushes have.
+pub fn contents() -> &'static (Vec<ShapeGrid>, Vec<Arc<Prefab>>) {
+    static CONTENTS: OnceLock<(Vec<ShapeGrid>, Vec<Arc<Prefab>>)> = OnceLock::new();
+    CONTENTS.get_or_init(|| ((0..6).map(grid).collect(), (0..6).map(prefab).collect()))
+}
+
+/// A ball or a box; half of them have materials.
+fn grid(number: i32) -> ShapeGrid {
+    let side = 7 + number % 3;
+    let distance = |at: IVec3| {
+        let from = (at - side / 2).as_vec3();
+        let depth = side as f32 / 2.0 - 1.2;
+        if number % 2 == 0 { from.length() - depth } else { from.abs().max_element() - depth }
+    };
+    let grid = ShapeGrid::from_fn(glam::UVec3::splat(side as u32), distance).expect("a valid grid");
+    match number {
+        0..3 => grid,
+        _ => grid.with_materials(|at| MaterialId([0, 3, 255][at.element_sum() as usize / 5 % 3])),
+    }
+}
+
+/// A copy of some ground with a pit or a heap.
+fn prefab(number: i32) -> Arc<Prefab> {
+    let mut terrain = Terrain::new(Ground::flat(32, 32, 10.0).expect("valid"), &TerrainSettings::default())
+        .expect("valid settings");
+    let ball = Shape::sphere(Vec3::new(16.0, 10.0, 16.0), (3 + number / 2) as f32);
+    terrain.apply([if number % 2 == 0 { Brush::dig(ball) } else { Brush::add(ball, MaterialId(2)) }]);
+    let min = IVec3::new(10, 4, 10);
+    let samples = LatticeBox { min, max: min + 8 + number };
+    Arc::new(terrain.world().copy(samples, min + 6).expect("in the world"))
+}
+
+/// A grid near a place, turned and scaled.
+pub fn random_grid(rng: &mut Rng, at: Vec3) -> GridShape {
+    let grids = &contents().0;
+    let grid = grids[rng.usize(0..grids.len())].clone();
+    GridShape::new(grid, at).with_rotation(random_rotation(rng)).with_scale(0.5 + rng.f32())
+}
+
+/// A prefab near a place, turned in any way.
+fn random_paste(rng: &mut Rng, at: Vec3) -> Paste {
+    let prefabs = &contents().1;
+    let prefab = Arc::clone(&prefabs[rng.usize(0..prefabs.len())]);
+    let paste = Paste { edited_only: rng.bool(), mirror: rng.bool(), ..Paste::new(prefab, at.round()) };
+    match rng.u32(0..3) {
+        0 => Paste { scale: 0.5 + rng.f32(), at, ..paste.rotated(random_rotation(rng)) },
+        1 => paste.turned_about_y(rng.i32(0..4)),
+        _ => paste,
+    }
+}
+
+/// Whether a brush has an image, a grid or a prefab, which messages name.
+pub fn has_content(brush: &Brush) -> bool {
+    Edit::quantize(brush).is_ok_and(|edit| edit.stamp_image().is_some() || edit.prefab().is_some())
+}
+
+/// A random brush of those that GPUs apply.
+pub fn random_gpu_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let brush = if rng.bool() { random_brush(rng, ground) } else { random_sculpting_brush(rng, ground) };
     if rng.u32(0..8) > 0 {
         return brush;

@@ -9,7 +9,7 @@ use super::round_cone::RoundCone;
 use super::union::{Bounds, Piece, Union};
 use super::{Outline, ShapeGeometry};
 use crate::brush::BrushError;
-use crate::brush::quantize::{difference, in_range, measure, voxels};
+use crate::brush::quantize::{Shift, difference, in_range, measure, voxels};
 use crate::lattice::ONE;
 
 /// Most voxels above and below a path.
@@ -37,7 +37,7 @@ impl Corridor {
         Self { path, above, below }
     }
 
-    pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
+    pub(super) fn transformed(&self, turn: Quat, shift: Shift, scale: f32) -> Self {
         let path = self.path.transformed(turn, shift, scale);
         Self { path, above: self.above * scale, below: self.below * scale }
     }

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::distance::Distance;
 use super::{Outline, Shape, ShapeGeometry};
-use crate::brush::quantize::{self, check_point, check_turn, in_range, matrix, voxels};
+use crate::brush::quantize::{self, Shift, check_point, check_turn, in_range, matrix, voxels};
 use crate::brush::stamp::ImageSamples;
 use crate::brush::{BrushError, is_default};
-use crate::ground::GreyImage;
+use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::ONE;
 
 /// Least and most samples along a side of a grid.
@@ -23,7 +23,8 @@ const SCALE: (f32, f32) = (1.0 / 16.0, 64.0);
 /// What a distance of 0 is stored as.
 const ZERO: i32 = 1 << 15;
 
-/// Signed distances on a grid, in 1/256 of its cells: negative inside. The outermost samples are outside.
+/// Signed distances on a grid, in 1/256 of its cells: negative inside. The outermost samples are outside. It may have
+/// [materials](Self::with_materials), which a [fill](crate::brush::Operation::Fill) builds with.
 ///
 /// A grid is made once, of a function or of a [closed mesh](Self::from_mesh), and shared by all brushes that use it. Its
 /// samples are kept as a [`GreyImage`], so that everything that names the images of stamps by their content, such as
@@ -40,6 +41,8 @@ struct Samples {
     size: UVec3,
     /// The least sample.
     least: u16,
+    /// Whether materials follow the distances.
+    has_materials: bool,
 }
 
 impl PartialEq for ShapeGrid {
@@ -113,7 +116,8 @@ impl ShapeGrid {
     /// The grid of distances in 1/256 cell: x fastest, then y, then z.
     pub(super) fn of(size: UVec3, distances: &[i32]) -> Result<Self, BrushError> {
         check_size(size)?;
-        // A first row says how many rows a layer has, and how many layers there are.
+        // A first row says how many rows a layer has, and how many layers there are. Layers follow, and after them
+        // perhaps materials: two in a sample, in the order of distances.
         let mut samples = vec![0; size.x as usize];
         (samples[0], samples[1]) = (size.y as u16, size.z as u16);
         samples.extend(points(size).zip(distances).map(|(at, &distance)| {
@@ -133,9 +137,10 @@ impl ShapeGrid {
             }
             _ => UVec3::ZERO,
         };
-        let fits = check_size(size).is_ok() && image.height() == size.y * size.z + 1;
+        let has_materials = check_size(size).is_ok() && image.height() == rows(size) + material_rows(size);
+        let fits = check_size(size).is_ok() && (image.height() == rows(size) || has_materials);
         if !fits {
-            return Self(Arc::new(Samples { image, size: UVec3::ZERO, least: 0 }));
+            return Self(Arc::new(Samples { image, size: UVec3::ZERO, least: 0, has_materials: false }));
         }
         let is_rim = |at: IVec3| at.cmpeq(IVec3::ZERO).any() || at.cmpeq(size.as_ivec3() - 1).any();
         let (mut least, mut has_rim_outside) = (u16::MAX, true);
@@ -144,7 +149,60 @@ impl ShapeGrid {
             has_rim_outside &= i32::from(sample) > ZERO || !is_rim(at);
         }
         let size = if has_rim_outside { size } else { UVec3::ZERO };
-        Self(Arc::new(Samples { image, size, least }))
+        Self(Arc::new(Samples { image, size, least, has_materials }))
+    }
+
+    /// The grid with materials, which a [fill](crate::brush::Brush::fill) builds with that has none of its own.
+    /// `material` gets the position of a sample, as in [`from_fn`](Self::from_fn). Where it returns
+    /// [`MaterialId::GROUND`], new ground has the material of the ground near it. New ground takes the material of the
+    /// nearest sample inside the shape; those of others do not matter.
+    ///
+    /// ```
+    /// use bevy_burrow::prelude::*;
+    /// use glam::{IVec3, UVec3, Vec3};
+    ///
+    /// let ball = ShapeGrid::from_fn(UVec3::splat(17), |at| (at - 8).as_vec3().length() - 6.0)?
+    ///     .with_materials(|at| MaterialId(if at.y > 8 { 1 } else { 2 }));
+    /// let mut terrain = Terrain::new(Ground::flat(64, 64, 20.0)?, &TerrainSettings::default())?;
+    /// let receipt = terrain.apply_one(Brush::fill(GridShape::new(ball, Vec3::new(30.0, 26.0, 30.0)), 0.0));
+    /// assert!(receipt.outcome.is_ok_and(|applied| applied.added.total() > 800));
+    /// assert_eq!(terrain.world().samples().material(IVec3::new(30, 30, 30)), MaterialId(1));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_materials(self, mut material: impl FnMut(IVec3) -> MaterialId) -> Self {
+        let size = self.size();
+        if !self.is_grid() {
+            return self;
+        }
+        let mut samples = self.image().samples()[..(size.x * rows(size)) as usize].to_vec();
+        let materials: Vec<u8> = points(size).map(|at| material(at).0).collect();
+        let pairs = materials.chunks(2).map(|pair| u16::from_le_bytes([pair[0], *pair.get(1).unwrap_or(&0)]));
+        samples.extend(pairs);
+        let height = rows(size) + material_rows(size);
+        samples.resize((size.x * height) as usize, 0);
+        match GreyImage::from_samples(size.x, height, samples) {
+            Ok(image) => Self::in_image(Arc::new(image)),
+            Err(_) => self,
+        }
+    }
+
+    /// The material at a sample; [`MaterialId::GROUND`] if it has none. Samples beyond the grid are those at its rim.
+    pub fn material(&self, at: IVec3) -> MaterialId {
+        let size = self.size();
+        if !self.0.has_materials || !self.is_grid() {
+            return MaterialId::GROUND;
+        }
+        let at = at.clamp(IVec3::ZERO, size.as_ivec3() - 1).as_uvec3();
+        let index = (at.z * size.y + at.y) * size.x + at.x;
+        let (row, column) = (index / 2 / size.x, index / 2 % size.x);
+        let pair = self.image().grey(column, rows(size) + row).to_le_bytes();
+        MaterialId(pair[index as usize % 2])
+    }
+
+    /// Whether it has materials.
+    pub fn has_materials(&self) -> bool {
+        self.0.has_materials && self.is_grid()
     }
 
     /// Whether its image holds a grid.
@@ -173,6 +231,16 @@ impl ShapeGrid {
         let at = at.clamp(IVec3::ZERO, (size - 1).max(IVec3::ZERO));
         i32::from(self.image().grey(at.x as u32, (at.z * size.y + at.y + 1) as u32)) - ZERO
     }
+}
+
+/// Rows of an image that hold distances and their size.
+fn rows(size: UVec3) -> u32 {
+    size.y * size.z + 1
+}
+
+/// Rows of an image that hold materials, if it does.
+fn material_rows(size: UVec3) -> u32 {
+    size.element_product().div_ceil(2).div_ceil(size.x)
 }
 
 /// The samples of a grid, in the order in which they are stored.
@@ -232,10 +300,10 @@ impl GridShape {
         Self { scale, ..self }
     }
 
-    pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
+    pub(super) fn transformed(&self, turn: Quat, shift: Shift, scale: f32) -> Self {
         Self {
             grid: self.grid.clone(),
-            center: turn * (self.center * scale) + shift,
+            center: shift.point(turn * (self.center * scale)),
             rotation: turn * self.rotation,
             scale: self.scale * scale,
         }
@@ -304,6 +372,11 @@ impl QuantizedGrid {
         &mut self.samples
     }
 
+    /// The materials of the samples, where they are.
+    pub fn materials(&self) -> Option<GridMaterials> {
+        self.samples.has_materials().then(|| GridMaterials { center: self.center, distance: self.distance() })
+    }
+
     /// Half the sides of the grid.
     fn half(&self) -> [i32; 3] {
         self.samples.size().to_array().map(|side| side.saturating_sub(1) as i32 * self.scale / 2)
@@ -361,6 +434,36 @@ impl ShapeGeometry for QuantizedGrid {
     }
 }
 
+/// The materials of a grid at its place.
+#[derive(Clone, Debug)]
+pub(in crate::brush) struct GridMaterials {
+    center: [i32; 3],
+    distance: GridDistance,
+}
+
+impl GridMaterials {
+    /// The material at a lattice point: that of the nearest sample inside the shape among the eight around it, else of the
+    /// nearest at all. `None` if that has none.
+    pub fn at(&self, point: IVec3) -> Option<MaterialId> {
+        let own = &self.distance;
+        let from = point.as_i64vec3() * i64::from(ONE) - IVec3::from_array(self.center).as_i64vec3();
+        let (place, _) = own.locate(from.to_array());
+        let (cell, part) = own.cell(place);
+        let weight = |corner: i64| -> i64 {
+            (0..3).map(|axis| if corner >> axis & 1 == 1 { part[axis] } else { 256 - part[axis] }).product()
+        };
+        let sample = |corner: i64| {
+            let at = [0, 1, 2].map(|axis| (cell[axis] + (corner >> axis & 1)) as i32);
+            IVec3::from_array(at)
+        };
+        // Of equally near ones, the first.
+        let is_inside = |corner: i64| own.grid.distance(sample(corner)) < 0;
+        let nearest =
+            (0..8).rev().max_by_key(|&corner| (is_inside(corner) && weight(corner) > 0, weight(corner)))?;
+        Some(own.grid.material(sample(nearest))).filter(|material| *material != MaterialId::GROUND)
+    }
+}
+
 /// Distances between the samples of a grid, in integers. Only the CPU computes them.
 #[derive(Clone, Debug)]
 pub struct GridDistance {
@@ -374,8 +477,8 @@ pub struct GridDistance {
 
 impl GridDistance {
     /// The place in the grid nearest to a point, in 1/256 cell from its corner, and how far from it the point is.
-    fn locate(&self, at: [f32; 3]) -> ([i64; 3], f64) {
-        let (from, mut beyond) = (at.map(|v| v as i64), 0.0);
+    fn locate(&self, from: [i64; 3]) -> ([i64; 3], f64) {
+        let mut beyond = 0.0;
         let place = std::array::from_fn(|axis| {
             let along: i64 = (0..3).map(|i| self.rows[i][axis] * from[i]).sum();
             let local = (along + self.squared / 2).div_euclid(self.squared);
@@ -389,10 +492,15 @@ impl GridDistance {
         (place, beyond.sqrt())
     }
 
+    /// The cell that a place in the grid lies in, and where in it, in 1/256.
+    fn cell(&self, place: [i64; 3]) -> ([i64; 3], [i64; 3]) {
+        let cell: [i64; 3] = std::array::from_fn(|axis| (place[axis] >> 8).min(self.size[axis] - 2));
+        (cell, std::array::from_fn(|axis| place[axis] - (cell[axis] << 8)))
+    }
+
     /// The distance at a place in the grid, in 1/256 voxel.
     fn inside(&self, place: [i64; 3]) -> i64 {
-        let cell: [i64; 3] = std::array::from_fn(|axis| (place[axis] >> 8).min(self.size[axis] - 2));
-        let part: [i64; 3] = std::array::from_fn(|axis| place[axis] - (cell[axis] << 8));
+        let (cell, part) = self.cell(place);
         let (image, size) = (self.grid.image(), self.size);
         let sample = |x: i64, y: i64, z: i64| {
             let row = (cell[2] + z) * size[1] + cell[1] + y + 1;
@@ -411,14 +519,14 @@ impl Distance for GridDistance {
         if self.size.iter().any(|&side| side < 2) {
             return f32::MAX;
         }
-        let (place, beyond) = self.locate([x, y, z]);
+        let (place, beyond) = self.locate([x, y, z].map(|v| v as i64));
         let inside = self.inside(place) as f32;
         if beyond > 0.0 { inside.max(beyond as f32) } else { inside }
     }
 
     /// Distances between any samples may change faster than the point moves; the distance to the grid does not.
     fn least(&self, x: f32, y: f32, z: f32) -> f32 {
-        self.locate([x, y, z]).1 as f32
+        self.locate([x, y, z].map(|v| v as i64)).1 as f32
     }
 
     fn constants(&self) -> Vec<f32> {

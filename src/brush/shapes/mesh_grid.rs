@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 
 use super::grid::{SIDES, ShapeGrid, points};
 use crate::brush::BrushError;
+use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
 /// Steps of the lattice of vertices in a cell.
@@ -57,6 +58,37 @@ impl ShapeGrid {
         triangles: &[[u32; 3]],
         samples: u32,
     ) -> Result<MeshGrid, BrushError> {
+        Self::of_mesh(positions, triangles, samples).map(|(mesh, _)| mesh)
+    }
+
+    /// The grid of a closed mesh like [`from_mesh`](Self::from_mesh), with a material for each triangle: a sample has that of
+    /// the triangle nearest to it. A [fill](crate::brush::Brush::fill) builds with them.
+    ///
+    /// # Errors
+    /// Those of `from_mesh`, and [`BrushError::NoTriangles`] if there are not as many materials as triangles.
+    pub fn from_painted_mesh(
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        materials: &[MaterialId],
+        samples: u32,
+    ) -> Result<MeshGrid, BrushError> {
+        if materials.len() != triangles.len() {
+            return Err(BrushError::NoTriangles);
+        }
+        let (MeshGrid { grid, middle, cell }, nearest) = Self::of_mesh(positions, triangles, samples)?;
+        let mut nearest = nearest.into_iter();
+        // In the order of the samples.
+        let mut material = |_| nearest.next().and_then(|triangle| materials.get(triangle as usize).copied());
+        let grid = grid.with_materials(|at| material(at).unwrap_or(MaterialId::GROUND));
+        Ok(MeshGrid { grid, middle, cell })
+    }
+
+    /// The grid of a mesh, and the triangle nearest to each sample.
+    fn of_mesh(
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        samples: u32,
+    ) -> Result<(MeshGrid, Vec<u32>), BrushError> {
         let least = 2 * MARGIN + 4;
         if !(least..=SIDES.1).contains(&samples) {
             return Err(BrushError::GridSize { size: [samples; 3], least, most: SIDES.1 });
@@ -79,23 +111,27 @@ impl ShapeGrid {
         let middle = low.midpoint(high);
         let corner = middle.as_dvec3() - (size.as_dvec3() - 1.0) / 2.0 * f64::from(cell);
         let fine = |at: Vec3| ((at.as_dvec3() - corner) / f64::from(cell) * FINE as f64).round().as_i64vec3();
-        let triangles: Vec<[I64Vec3; 3]> = triangles
-            .iter()
-            .map(|corners| corners.map(|corner| fine(positions[corner as usize])))
-            .filter(|[a, b, c]| a != b && b != c && c != a)
-            .collect();
+        let (numbers, triangles): (Vec<u32>, Vec<[I64Vec3; 3]>) = (0..)
+            .zip(triangles)
+            .map(|(number, corners)| (number, corners.map(|corner| fine(positions[corner as usize]))))
+            .filter(|(_, [a, b, c])| a != b && b != c && c != a)
+            .unzip();
         check_closed(&triangles)?;
         let winding = winding_numbers(size, &triangles);
         let distances = distances(size, &triangles);
         let signed: Vec<i32> = distances
             .iter()
             .zip(&winding)
-            .map(|(distance, winding)| {
+            .map(|((distance, _), winding)| {
                 let distance = (distance * f32::from(ONE as i16)).round_ties_even() as i32;
                 if *winding == 0 { distance.max(1) } else { -distance }
             })
             .collect();
-        Ok(MeshGrid { grid: Self::of(size, &signed)?, middle, cell })
+        let nearest = distances
+            .iter()
+            .map(|(_, triangle)| numbers.get(*triangle as usize).copied().unwrap_or(u32::MAX))
+            .collect();
+        Ok((MeshGrid { grid: Self::of(size, &signed)?, middle, cell }, nearest))
     }
 }
 
@@ -111,6 +147,27 @@ impl ShapeGrid {
         let positions: Vec<Vec3> = triangles.flat_map(|triangle| triangle.vertices).collect();
         let corners = (0..positions.len() as u32 / 3).map(|first| [0, 1, 2].map(|corner| 3 * first + corner));
         Self::from_mesh(&positions, &corners.collect::<Vec<_>>(), samples)
+    }
+
+    /// The grid of the meshes of a scene, each at its place and of its material: see
+    /// [`from_painted_mesh`](Self::from_painted_mesh). Together they have to be closed.
+    ///
+    /// # Errors
+    /// Those of `from_painted_mesh`.
+    pub fn from_bevy_meshes<'a>(
+        meshes: impl IntoIterator<Item = (&'a bevy::mesh::Mesh, glam::Affine3A, MaterialId)>,
+        samples: u32,
+    ) -> Result<MeshGrid, BrushError> {
+        let (mut positions, mut corners, mut materials) = (Vec::new(), Vec::new(), Vec::new());
+        for (mesh, place, material) in meshes {
+            for triangle in mesh.triangles().map_err(|_| BrushError::NoTriangles)? {
+                let first = positions.len() as u32;
+                positions.extend(triangle.vertices.map(|vertex| place.transform_point3(vertex)));
+                corners.push([first, first + 1, first + 2]);
+                materials.push(material);
+            }
+        }
+        Self::from_painted_mesh(&positions, &corners, &materials, samples)
     }
 }
 
@@ -200,12 +257,12 @@ fn to_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     to_segment(a, b).min(to_segment(b, c)).min(to_segment(c, a))
 }
 
-/// Distance from each sample to the nearest triangle, in cells.
-fn distances(size: UVec3, triangles: &[[I64Vec3; 3]]) -> Vec<f32> {
+/// Distance from each sample to the nearest triangle, in cells, and the number of that triangle.
+fn distances(size: UVec3, triangles: &[[I64Vec3; 3]]) -> Vec<(f32, u32)> {
     let side = size.as_ivec3();
     let index = |at: IVec3| ((at.z * side.y + at.y) * side.x + at.x) as usize;
-    let mut all = vec![f32::MAX; size.element_product() as usize];
-    for triangle in triangles {
+    let mut all = vec![(f32::MAX, u32::MAX); size.element_product() as usize];
+    for (number, triangle) in (0..).zip(triangles) {
         let corners = triangle.map(|corner| corner.as_dvec3() / FINE as f64);
         let [a, b, c] = corners;
         let low = (a.min(b).min(c) - NEAR).ceil().as_ivec3().max(IVec3::ZERO);
@@ -215,7 +272,10 @@ fn distances(size: UVec3, triangles: &[[I64Vec3; 3]]) -> Vec<f32> {
                 for x in low.x..=high.x {
                     let at = IVec3::new(x, y, z);
                     let own = &mut all[index(at)];
-                    *own = own.min(to_triangle(at.as_dvec3(), corners) as f32);
+                    let distance = to_triangle(at.as_dvec3(), corners) as f32;
+                    if distance < own.0 {
+                        *own = (distance, number);
+                    }
                 }
             }
         }
@@ -231,9 +291,9 @@ fn distances(size: UVec3, triangles: &[[I64Vec3; 3]]) -> Vec<f32> {
         let near = steps.iter().filter_map(|&(step, length)| {
             let other = at + step * way;
             let is_there = other.cmpge(IVec3::ZERO).all() && other.cmplt(side).all();
-            is_there.then(|| all[index(other)] + length)
+            is_there.then(|| (all[index(other)].0 + length, all[index(other)].1))
         });
-        all[index(at)] = near.fold(own, f32::min);
+        all[index(at)] = near.fold(own, |least, other| if other.0 < least.0 { other } else { least });
     };
     points(size).for_each(|at| pass(at, 1));
     points(size).for_each(|at| pass(side - 1 - at, -1));

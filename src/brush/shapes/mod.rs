@@ -59,13 +59,14 @@ use corridor::QuantizedCorridor;
 pub(super) use corridor::Road;
 use distance::Distance;
 pub(super) use distance::{larger, smaller};
+pub(super) use grid::GridMaterials;
 use grid::QuantizedGrid;
 use numbers::{Check, Convert, Kind, Quantize, Restore, Transform};
 use outline::Outline;
 use path::QuantizedPath;
 
 use super::BrushError;
-use super::quantize::{self, check_extent};
+use super::quantize::{self, Shift, check_extent};
 use crate::lattice::ONE;
 
 /// The integer geometry of a shape. All methods except `check` may rely on checked numbers.
@@ -194,7 +195,7 @@ macro_rules! shapes {
             }
 
             /// The shape after every point p moved to `turn * (p * scale) + shift`.
-            pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
+            pub(super) fn transformed(&self, turn: Quat, shift: Shift, scale: f32) -> Self {
                 match self {
                     $(Self::$custom(shape) => Self::$custom(shape.transformed(turn, shift, scale)),)*
                 }
@@ -410,20 +411,20 @@ shapes! {
 
 impl Shape {
     /// The shape after every point p moved to `turn * (p * scale) + shift`.
-    pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
+    pub(super) fn transformed(&self, turn: Quat, shift: Shift, scale: f32) -> Self {
         self.moved(Transform { arrow: &|v| turn * (v * scale), shift, turn, scale, fields: Vec::new() }).0
     }
 
     /// The shape with its points and arrows stretched, and its sizes as they were.
     #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
     pub(crate) fn stretched(&self, stretch: impl Fn(Vec3) -> Vec3) -> Self {
-        let (shift, turn) = (Vec3::ZERO, Quat::IDENTITY);
+        let (shift, turn) = (Shift::by(Vec3::ZERO), Quat::IDENTITY);
         self.moved(Transform { arrow: &stretch, shift, turn, scale: 1.0, fields: Vec::new() }).0
     }
 
     /// The names of its fields.
     pub(super) fn fields(&self) -> Vec<&'static str> {
-        let (shift, turn) = (Vec3::ZERO, Quat::IDENTITY);
+        let (shift, turn) = (Shift::by(Vec3::ZERO), Quat::IDENTITY);
         self.moved(Transform { arrow: &|v| v, shift, turn, scale: 1.0, fields: Vec::new() }).1
     }
 
@@ -470,6 +471,11 @@ impl QuantizedShape {
     /// The shape's samples, if it is a grid.
     pub(super) fn grid(&self) -> Option<&ShapeGrid> {
         if let Self::Grid(grid) = self { Some(grid.samples()) } else { None }
+    }
+
+    /// The shape's own materials, if it is a grid that has some.
+    pub(super) fn materials(&self) -> Option<GridMaterials> {
+        if let Self::Grid(grid) = self { grid.materials() } else { None }
     }
 
     /// The shape's samples, if it is a grid, to be replaced. The shape has to be [checked](Self::check) then.

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use glam::{Quat, Vec3};
 
 use crate::brush::BrushError;
-use crate::brush::quantize::{self, voxels};
+use crate::brush::quantize::{self, Shift, voxels};
 
 /// The type of numbers in a shape: [`Voxels`] in a brush, [`Units`] in an edit.
 pub trait Numbers: Copy + Debug + PartialEq {
@@ -185,7 +185,7 @@ impl Convert for Restore {
 pub(super) struct Transform<'a> {
     /// What becomes of arrows; points are moved by `shift` after that.
     pub arrow: &'a dyn Fn(Vec3) -> Vec3,
-    pub shift: Vec3,
+    pub shift: Shift,
     /// What becomes of rotations.
     pub turn: Quat,
     /// What becomes of sizes.
@@ -201,7 +201,7 @@ impl Convert for Transform<'_> {
     fn vector(&mut self, field: &'static str, kind: Kind, value: Vec3) -> Made<Vec3> {
         self.fields.push(field);
         Ok(match kind {
-            Kind::Point => (self.arrow)(value) + self.shift,
+            Kind::Point => self.shift.point((self.arrow)(value)),
             Kind::Arrow => (self.arrow)(value),
             Kind::Sides => value * self.scale,
         })

@@ -12,7 +12,7 @@ use super::union::Union;
 use super::{Outline, ShapeGeometry};
 use crate::brush::BrushError;
 use crate::brush::quantize::{
-    self, check_point, check_size, difference, measure, restored_point, sum, voxels,
+    self, Shift, check_point, check_size, difference, measure, restored_point, sum, voxels,
 };
 use crate::lattice::ONE;
 
@@ -78,8 +78,8 @@ impl BrushPath {
     }
 
     /// The path after every point p moved to `turn * (p * scale) + shift`.
-    pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
-        self.map(|at| turn * (at * scale) + shift, |radius| radius * scale)
+    pub(super) fn transformed(&self, turn: Quat, shift: Shift, scale: f32) -> Self {
+        self.map(|at| shift.point(turn * (at * scale)), |radius| radius * scale)
     }
 
     /// The path with its points stretched, and its radii as they were.

@@ -37,7 +37,7 @@ pub(crate) fn draft_group(
 
 /// Returns `true` if the operation can turn solid samples into air.
 fn can_remove(edit: &Edit) -> bool {
-    !matches!(edit.operation(), Operation::Add { .. } | Operation::Paint { .. })
+    !matches!(edit.operation(), Operation::Add { .. } | Operation::Paint { .. } | Operation::Fill)
 }
 
 /// Drafts one at a time each edit that can remove ground; pieces that it cuts off fall before the next edit.

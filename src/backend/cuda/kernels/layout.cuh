@@ -121,7 +121,10 @@ struct EditRecord {
     i32 min[3], max[3];
     float constants[12];
     i32 amplitude, scale;
-    u32 seed, pad;
+    u32 seed;
+    // The point that noise is tied to, in 1/256 voxel.
+    i32 noise_origin[3];
+    u32 pad[2];
 };
 
 // How an edit changes samples, apart from digging, adding and painting (PLAIN).
@@ -266,7 +269,7 @@ struct HeightsParams {
 };
 
 static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout/");
-static_assert(sizeof(EditJob) == 48 && sizeof(EditRecord) == 128 && sizeof(EditResult) == 32, "see layout/");
+static_assert(sizeof(EditJob) == 48 && sizeof(EditRecord) == 144 && sizeof(EditResult) == 32, "see layout/");
 static_assert(sizeof(SculptParams) == 152 && sizeof(StencilEditParams) == 160, "see layout/");
 static_assert(sizeof(Rules) == 296 && sizeof(Protected) == 24, "see layout/");
 static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout/");

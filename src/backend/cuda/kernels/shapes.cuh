@@ -104,9 +104,9 @@ struct Place {
     float t;
 };
 
-__device__ inline Place locate(i32 voxel, i32 scale) {
+__device__ inline Place locate(i32 voxel, i32 origin, i32 scale) {
     const i32 RIM = 1 << 20;
-    i32 place = smallest(largest(voxel, -RIM), RIM) * ONE;
+    i32 place = smallest(largest(voxel, -RIM), RIM) * ONE - origin;
     // Round towards minus infinity.
     i32 cell = place / scale;
     if (place < cell * scale) cell--;
@@ -138,7 +138,9 @@ __device__ inline i32 noise_lane(i32 axis, i32 offset) { return axis * SIDE + of
 // synchronise before it reads them.
 __device__ inline Noise hash_noise(const EditRecord& record, const i32* low, float* points) {
     i32 axis = lane() / SIDE, start = axis == 0 ? low[0] : axis == 1 ? low[1] : low[2];
-    Noise noise = {locate(start + (i32)lane() % SIDE, record.scale), 0, 0};
+    const i32* origins = record.noise_origin;
+    i32 origin = axis == 0 ? origins[0] : axis == 1 ? origins[1] : origins[2];
+    Noise noise = {locate(start + (i32)lane() % SIDE, origin, record.scale), 0, 0};
     i32 first[3], count[3];
 #pragma unroll
     for (i32 i = 0; i < 3; i++) {

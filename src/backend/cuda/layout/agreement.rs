@@ -143,7 +143,8 @@ fn every_field_is_where_the_kernels_expect_it() {
         ScatterJob is ScatterJob: to, from, bytes, pad;
         ScatterParams is ScatterParams: jobs;
         EditJob is EditJob: brick, base, target, stack, first, count, cuts, window, strides, pad;
-        EditRecord is EditRecord: kind, operation, material, is_rough, origin_voxel, origin_fraction, min, max, constants, amplitude, scale, seed, pad;
+        EditRecord is EditRecord: kind, operation, material, is_rough, origin_voxel, origin_fraction, min, max, constants, amplitude, scale, seed, noise_origin,
+            pad;
         SculptParams is SculptParams: operation, material, strength, falloff, amounts, point, half, height, image, columns, rows, power,
             matrix, squared, length;
         EditResult is EditResult: hash, flags, record, material, bounds, uniform, pad;

@@ -67,7 +67,9 @@ pub(crate) struct EditRecord {
     pub amplitude: i32,
     pub scale: i32,
     pub seed: u32,
-    pub pad: u32,
+    /// The point that noise is tied to, in 1/256 voxel.
+    pub noise_origin: [i32; 3],
+    pub pad: [u32; 2],
 }
 
 /// The result for a brick.
@@ -169,7 +171,7 @@ pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Eva
     let of = evaluator.constants();
     let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
     let LatticeBox { min, max } = reach.unwrap_or(nothing);
-    let (amplitude, scale, seed) = of.roughness.unwrap_or((0, 1, 0));
+    let (amplitude, scale, seed, noise_origin) = of.roughness.unwrap_or((0, 1, 0, [0; 3]));
     EditRecord {
         kind: of.kind,
         operation: match operation {
@@ -188,7 +190,8 @@ pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Eva
         amplitude,
         scale,
         seed,
-        pad: 0,
+        noise_origin,
+        pad: [0; 2],
     }
 }
 

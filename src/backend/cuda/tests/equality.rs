@@ -140,7 +140,7 @@ fn engines_take_turns_with_the_same_bricks() {
     let mut rng = Rng::with_seed(21);
     let (ground, chunk_size) = worlds::random_ground(&mut rng, 3);
     let transactions: Vec<Vec<Brush>> =
-        (0..24).map(|_| (0..3).map(|_| worlds::any_random_brush(&mut rng, &ground)).collect()).collect();
+        (0..24).map(|_| (0..3).map(|_| worlds::random_gpu_brush(&mut rng, &ground)).collect()).collect();
     compare_on(ground, chunk_size, &[&first, &second], &transactions);
 }
 
@@ -172,8 +172,8 @@ fn sculpting_of_any_kind_equals_the_cpus() {
         let brushes = |rng: &mut Rng| {
             let place = worlds::random_sculpting_brush(rng, &ground).shape;
             let near = |rng: &mut Rng| match rng.u32(0..3) {
-                0 => worlds::any_random_brush(rng, &ground),
-                1 => Brush { shape: place, ..worlds::any_random_brush(rng, &ground) },
+                0 => worlds::random_gpu_brush(rng, &ground),
+                1 => Brush { shape: place, ..worlds::random_gpu_brush(rng, &ground) },
                 _ => Brush { shape: place, ..worlds::random_sculpting_brush(rng, &ground) },
             };
             (0..6).map(|_| near(rng)).collect()
@@ -198,7 +198,7 @@ fn ground_lowered_and_raised_far_equals_the_cpus() {
         let (lower, raise) = worlds::random_lower_and_raise(&mut rng, &ground);
         let brushes = if rng.bool() { [lower, raise] } else { [raise, lower] };
         let count = rng.usize(1..6);
-        let mut transactions = vec![vec![worlds::any_random_brush(&mut rng, &ground)]];
+        let mut transactions = vec![vec![worlds::random_gpu_brush(&mut rng, &ground)]];
         transactions.extend(brushes.iter().flat_map(|brush| vec![vec![brush.clone()]; count]));
         // Sculpt what is left.
         transactions.push(vec![Brush { operation: Operation::Smooth, ..brushes[0].clone() }; 2]);
@@ -275,7 +275,7 @@ fn edits_under_rules_equal_the_cpus() {
             let rules = if number % 2 == 0 { rules.clone() } else { DiggingRules::default() };
             expected.set_rules(rules.clone()).expect("valid rules");
             found.set_rules(rules).expect("valid rules");
-            let brush = |rng: &mut Rng| Brush { power: rng.u8(..), ..worlds::any_random_brush(rng, &ground) };
+            let brush = |rng: &mut Rng| Brush { power: rng.u8(..), ..worlds::random_gpu_brush(rng, &ground) };
             let brushes: Vec<Brush> = (0..4).map(|_| brush(&mut rng)).collect();
             assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
             assert_same(expected.world(), found.world(), index);

@@ -86,7 +86,7 @@ fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
     for _ in 0..rng.u32(1..5) {
         let brush = |rng: &mut Rng| match rng.u32(0..4) {
             0 => worlds::random_brush_at_a_face(rng, &ground, chunk_size),
-            _ => worlds::any_random_brush(rng, &ground),
+            _ => worlds::random_gpu_brush(rng, &ground),
         };
         let brushes: Vec<Brush> = (0..rng.u32(1..6)).map(|_| brush(rng)).collect();
         assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
