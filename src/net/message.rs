@@ -77,6 +77,7 @@ pub enum Lane {
 /// One step of the order.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
+#[expect(clippy::large_enum_variant, reason = "nearly all entries are orders")]
 pub enum Entry {
     /// Something that is asked of the world: an edit, other rules or settings of loose pieces, or parts that replace
     /// others.

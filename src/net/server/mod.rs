@@ -99,6 +99,7 @@ struct UndoRequest {
 }
 
 /// A waiting undo, or an entry after it.
+#[expect(clippy::large_enum_variant, reason = "nearly all that waits are entries")]
 enum Later {
     Undo(UndoRequest),
     Entry(Ordered),
