@@ -638,6 +638,29 @@ def sculpt(stage):
     if hash_now() == before:
         raise Failed("a reset changes nothing")
     stage.say("a path is one edit, what is copied is pasted, and ground is reset")
+    for key, operation in (("x", "Clear"), ("u", "Merge"), ("v", "Carve")):
+        press_key(key, rf"^tool operation={operation} ")
+        before = hash_now()
+        dig(middle[0] + 40, middle[1])
+        if hash_now() == before:
+            raise Failed(f"{operation} changes nothing")
+    # The brush stays where it is put down, and makes its edit there, wherever the pointer is.
+    press_key("2", r"^tool operation=Add ")
+    since = stage.mark()
+    stage.click(*stage.middle("Model"))
+    stage.wait(r"^tool .*shape=Model ", since)
+    stage.rest()
+    stage.move(*middle)
+    stage.rest()
+    tap(stage, "g")
+    stage.rest()
+    picture(stage, "placing")
+    since, before = stage.mark(), hash_now()
+    stage.xdo("key", "--delay", 0, "Return")
+    stage.wait(strokes, since)
+    if hash_now() == before:
+        raise Failed("a model that was placed changes nothing")
+    stage.say("a model is put down with handles, and built")
     picture(stage, "paste")
     press_key("1", r"^tool operation=Dig ")
     stage.rest()

@@ -37,7 +37,7 @@ impl Plugin for KeysPlugin {
 }
 
 /// The keys of the operations, in the panel's order.
-const OPERATION_KEYS: [(KeyCode, &str); 15] = [
+const OPERATION_KEYS: [(KeyCode, &str); 17] = [
     (KeyCode::Digit1, "1"),
     (KeyCode::Digit2, "2"),
     (KeyCode::Digit3, "3"),
@@ -53,6 +53,8 @@ const OPERATION_KEYS: [(KeyCode, &str); 15] = [
     (KeyCode::KeyP, "P"),
     (KeyCode::KeyR, "R"),
     (KeyCode::KeyX, "X"),
+    (KeyCode::KeyU, "U"),
+    (KeyCode::KeyV, "V"),
 ];
 
 /// Keys of the panel's buttons.
@@ -254,6 +256,11 @@ mod tests {
     use bevy::input::ButtonState;
 
     use super::*;
+
+    #[test]
+    fn each_operation_has_a_key() {
+        assert_eq!(OPERATION_KEYS.len(), ToolOperation::all().count());
+    }
 
     #[test]
     fn undo_and_redo_follow_the_keyboard_layout() {

@@ -15,7 +15,7 @@
 //! | `W` `A` `S` `D`, `Q`, `E`, left `Shift` | flies, down, up, faster |
 //! | `F` | flies to what is under the mouse |
 //! | wheel, `[`, `]` | size of the brush |
-//! | `1` to `9`, `0`, `-`, `=`, `P`, `R`, `X`, or `Tab` | operations |
+//! | `1` to `9`, `0`, `-`, `=`, `P`, `R`, `X`, `U`, `V`, or `Tab` | operations |
 //! | `G`, `B`, `Enter`, `Backspace` | puts the brush down, with handles to move, turn (`G` again) and size it; onto the ground; makes the edit; takes it back |
 //! | click, `Enter`, `Backspace` with the shape *Path* | sets a point, makes one edit of all points, takes the last one back |
 //! | `Ctrl+C`, `Ctrl+Shift+C` | copies what lies in the brush, to paste it; writes it to a `.prefab` file too |

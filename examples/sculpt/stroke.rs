@@ -135,6 +135,8 @@ fn inverse(operation: ToolOperation) -> ToolOperation {
         O::Add => O::Dig,
         O::Raise => O::Lower,
         O::Lower => O::Raise,
+        O::Merge => O::Carve,
+        O::Carve => O::Merge,
         O::Smooth => O::Sharpen,
         O::Sharpen => O::Smooth,
         other => other,

@@ -3,7 +3,7 @@
 use bevy::math::{EulerRot, Quat, Vec3};
 use bevy_egui::egui::{self, Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 
-use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, ROAD_HEIGHT, STEP, TUBE};
+use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, ROAD_HEIGHT, ROUNDING, STEP, TUBE};
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, BAD, FAINT};
 use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
@@ -33,7 +33,7 @@ pub fn show(
     let row = tool.operation.row();
     if row.needs.contains(&Need::Material) {
         section(ui, texts::MATERIAL, true, |ui| material(ui, tool, materials));
-    } else if row.sculpts() {
+    } else if row.may_fill() {
         section(ui, texts::FILL, false, |ui| {
             switch(ui, texts::FILL_MATERIAL, &mut tool.is_of_material);
             if tool.is_of_material {
@@ -101,6 +101,7 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel
             Need::Amount => slider(ui, texts::AMOUNT, &mut tool.amount, AMOUNT.range(voxel), metres),
             Need::Level => slider(ui, texts::HEIGHT, &mut tool.level, -128.0..=256.0, metres),
             Need::Step => slider(ui, texts::STEP, &mut tool.step, STEP.range(voxel), metres),
+            Need::Rounding => slider(ui, texts::ROUNDING, &mut tool.rounding, ROUNDING.range(voxel), metres),
             Need::Height => slider(ui, texts::HEIGHT, &mut tool.length, ROAD_HEIGHT.range(voxel), metres),
         };
     }

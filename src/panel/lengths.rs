@@ -27,6 +27,8 @@ pub const TUBE: Length = Length { metres: (0.5, 16.0), voxels: (0.25, 64.0) };
 pub const LENGTH: Length = Length { metres: (1.0, 64.0), voxels: (0.25, 256.0) };
 /// How far a road levels the ground above and below it.
 pub const ROAD_HEIGHT: Length = Length { metres: (1.0, 32.0), voxels: (0.25, 64.0) };
+/// Radius of a rounded edge.
+pub const ROUNDING: Length = Length { metres: (0.0, 8.0), voxels: (0.0, 16.0) };
 pub const FALLOFF: Length = Length { metres: (0.0, 16.0), voxels: (0.0, 64.0) };
 /// Amount to raise or lower, or height of a stamp.
 pub const AMOUNT: Length = Length { metres: (0.0, 16.0), voxels: (0.0, 64.0) };
@@ -41,7 +43,9 @@ mod tests {
     #[test]
     fn something_is_offered_whatever_the_voxels() {
         for voxel in (-3..=3).map(|power| 2f32.powi(power)) {
-            for length in [RADIUS, TUBE, LENGTH, ROAD_HEIGHT, FALLOFF, AMOUNT, STEP, BUMP, BUMP_WIDTH] {
+            for length in
+                [RADIUS, TUBE, LENGTH, ROAD_HEIGHT, ROUNDING, FALLOFF, AMOUNT, STEP, BUMP, BUMP_WIDTH]
+            {
                 let range = length.range(voxel);
                 assert!(range.start() < range.end(), "{range:?} at {voxel}");
                 // Sliders show tenths. Rounding to tenths must not move an end beyond the limits.

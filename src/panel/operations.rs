@@ -17,8 +17,9 @@ pub(super) enum Need {
     Level,
     Step,
     Height,
+    Rounding,
 }
-use Need::{Amount, Falloff, Height, Level, Material, Step, Strength};
+use Need::{Amount, Falloff, Height, Level, Material, Rounding, Step, Strength};
 
 /// A row of the table: an operation.
 pub(super) struct Row {
@@ -40,6 +41,16 @@ impl Row {
 
     pub fn help(&self) -> &'static str {
         texts::OPERATIONS[self.tool as usize].1
+    }
+
+    /// Whether it rounds edges.
+    pub fn rounds(&self) -> bool {
+        self.needs.contains(&Rounding)
+    }
+
+    /// Whether ground that it adds may have a material that is chosen.
+    pub fn may_fill(&self) -> bool {
+        self.sculpts() || self.tool == ToolOperation::Merge
     }
 
     /// Whether it is a sculpting operation, which has a strength and a falloff.
@@ -85,6 +96,10 @@ pub(super) const OPERATIONS: &[Row] = &[
         profile: |x| (0.6 - 0.4 * bowl(x), 0.6), make: |_, _| Operation::Reset },
     Row { tool: ToolOperation::Clear, needs: &[],
         profile: |x| (0.45 + 0.25 * triangle_wave(x * 5.0), 0.2), make: |_, _| Operation::Paint { material: MaterialId::GROUND } },
+    Row { tool: ToolOperation::Merge, needs: &[Rounding],
+        profile: |x| (0.25, 0.25 + 0.6 * bell(x).max(0.8 * bowl(x))), make: |_, _| Operation::Fill },
+    Row { tool: ToolOperation::Carve, needs: &[Rounding],
+        profile: |x| (0.75, 0.75 - 0.6 * bell(x).max(0.8 * bowl(x))), make: |_, _| Operation::Carve },
 ];
 
 /// A half ellipse in the middle.

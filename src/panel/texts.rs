@@ -30,12 +30,12 @@ texts! {
     ROUGH = "Rough", BUMPS = "Bumps", WIDTH = "Width", PATTERN = "Pattern",
     FITS_NOT = "This operation can't have this shape", HUT = "Hut", COPIED = "Copy", PREFAB = "Copy",
     COPY_HELP = "The last copy, or a prefab file dropped on the window", MIRRORED = "Mirrored",
-    MODEL = "Model", BOULDER = "Boulder", MODEL_HELP = "The closed meshes of a glTF file dropped on the window",
+    ROUNDING = "Rounding", MODEL = "Model", BOULDER = "Boulder", MODEL_HELP = "The closed meshes of a glTF file dropped on the window",
     EDITS_ONLY = "Edits only", SMOOTH_PATH = "Curved", PATH_POINTS = "Points",
     PATH_HELP = "Each click sets a point. The path is one edit and one undo step.",
 }
 /// The operations and what they do, in the order of `ToolOperation`.
-pub const OPERATIONS: [(&str, &str); 15] = [
+pub const OPERATIONS: [(&str, &str); 17] = [
     ("Dig", "Removes ground"),
     ("Build", "Fills the shape with ground"),
     ("Paint", "Changes the material of the ground"),
@@ -51,6 +51,8 @@ pub const OPERATIONS: [(&str, &str); 15] = [
     ("Paste", "Puts down what was copied"),
     ("Reset", "Returns the ground, and what grew on it, to what it was at first"),
     ("Clear", "Removes plants and paint; Reset brings plants back"),
+    ("Merge", "Builds the shape with a rounded foot"),
+    ("Carve", "Digs the shape with a rounded rim"),
 ];
 /// The shapes, in the order of `ToolShape`.
 pub const SHAPES: [&str; 8] = ["Sphere", "Box", "Cylinder", "Capsule", "Cone", "Torus", "Path", "Model"];

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use bevy::prelude::*;
 
-use super::lengths::{AMOUNT, LENGTH, Length, RADIUS, TUBE};
+use super::lengths::{AMOUNT, LENGTH, Length, RADIUS, ROUNDING, TUBE};
 use super::texts;
 pub use super::tool_content::{StampImage, ToolModel, ToolPrefab};
 use super::tool_operation::ToolOperation;
@@ -60,6 +60,8 @@ pub struct BrushTool {
     pub strength: f32,
     /// Sculpting only: width in metres over which the effect fades in, from the border inwards.
     pub falloff: f32,
+    /// Radius in metres of the edges of what is merged or carved.
+    pub rounding: f32,
     /// Metres to raise or lower, or the height of a stamp.
     pub amount: f32,
     /// Target height for levelling, in metres of world space.
@@ -112,6 +114,7 @@ impl Default for BrushTool {
             is_of_material: false,
             strength: 0.6,
             falloff: 3.0,
+            rounding: 2.0,
             amount: 2.0,
             level: 0.0,
             step: 4.0,
@@ -208,10 +211,14 @@ impl BrushTool {
         brush.operation = operation;
         brush.roughness = self.roughness();
         brush.power = self.power;
-        if !row.sculpts() {
-            return brush;
+        if !row.may_fill() {
+            return if row.rounds() { brush.with_falloff(self.rounding) } else { brush };
         }
-        let brush = brush.with_strength(self.strength).with_falloff(self.falloff);
+        let brush = if row.rounds() {
+            brush.with_falloff(self.rounding)
+        } else {
+            brush.with_strength(self.strength).with_falloff(self.falloff)
+        };
         if self.is_of_material { brush.with_material(self.material_id()) } else { brush }
     }
 
@@ -414,6 +421,7 @@ impl BrushTool {
             length: within(self.length, &LENGTH),
             tube: within(self.tube, &TUBE),
             amount: within(self.amount, &AMOUNT),
+            rounding: within(self.rounding, &ROUNDING),
             ..self.clone()
         };
         tool.prefab.scale *= by.clamp(1.0 / 16.0, 16.0);

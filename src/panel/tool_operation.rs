@@ -39,4 +39,8 @@ pub enum ToolOperation {
     Reset,
     /// Removes plants, and returns painted ground to its own material.
     Clear,
+    /// Fills its shape with ground, and rounds the foot by [`BrushTool::rounding`](super::BrushTool::rounding).
+    Merge,
+    /// Removes ground, and rounds the rim by [`BrushTool::rounding`](super::BrushTool::rounding).
+    Carve,
 }
