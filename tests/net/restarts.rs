@@ -7,7 +7,7 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{Rate, Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
+use bevy_burrow::store::{Files, SimulatedDisk, Store, StoreOptions};
 use fastrand::Rng;
 use glam::{Vec2, Vec3};
 
