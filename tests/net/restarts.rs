@@ -7,7 +7,7 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{Rate, Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
+use bevy_burrow::store::{Files, SimulatedDisk, Store, StoreOptions};
 use fastrand::Rng;
 use glam::{Vec2, Vec3};
 
@@ -316,6 +316,32 @@ fn what_was_not_taken_while_the_disk_hung_is_saved_although_nobody_digs_any_more
     let disk = killed(disk);
     let (_, opened) = Store::open_in(Arc::new(disk), ground, options()).expect("a saved world");
     assert_eq!(opened.terrain.world().hash(), server.terrain().world().hash());
+}
+
+#[test]
+fn the_saved_order_takes_a_small_part_of_the_journal() {
+    let mut scene = Scene::new();
+    scene.store = None;
+    let lazy = StoreOptions { loss_window: Duration::MAX, ..options() };
+    let opened = Store::open_in(Arc::new(scene.disk.clone()), Arc::clone(&scene.ground), lazy);
+    let (store, opened) = opened.expect("a saved world");
+    scene.server = Server::open(opened.terrain, &store, scene.settings);
+    scene.store = Some(store);
+    let mut a = scene.join(1);
+    let journal = |disk: &SimulatedDisk| -> usize {
+        let logs = disk.paths().into_iter().filter(|path| path.ends_with(".log"));
+        logs.map(|path| disk.read(&path).map_or(0, |bytes| bytes.len())).sum()
+    };
+    scene.store().flush().expect("the disk works");
+    let before = journal(&scene.disk);
+    // Five digs a second, and a frame each second.
+    for second in 0..100 {
+        scene.dig(&mut [&mut a], second * 5..second * 5 + 5);
+        scene.store().flush().expect("the disk works");
+    }
+    let bytes = (journal(&scene.disk) - before) / 500;
+    println!("{bytes} bytes of the journal for a dig");
+    assert!(bytes < 200, "{bytes}");
 }
 
 /// Servers are killed at any moment, with journals that are cut or damaged: clients always end with the server's world.

@@ -64,6 +64,8 @@ fn of_another_terrain_only_what_was_written_is_durable() {
     assert_eq!(opened.terrain.world().revision(), 1);
     store.flush().expect("the disk works");
     assert_eq!((store.durable(), store.is_durable(point)), (2, true), "durable commits stay durable");
+    let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("a saved world");
+    assert_eq!((opened.replayed, state(&opened.terrain)), (1, state(&second)), "it was saved whole once");
 }
 
 #[test]

@@ -21,19 +21,22 @@ impl Store {
     /// [`StoreError::OtherSize`] if the terrain has another size than the saved world; then nothing is taken;
     /// [`StoreError::Ended`] when the store's thread has panicked.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
-        let is_next = self.follows(terrain)
-            && !self.has_gap
-            && terrain.log_numbers().is_some_and(|numbers| numbers.start == self.next_record);
+        // Those before the next one are of before the whole terrain was saved.
+        let waiting = terrain.log_numbers().filter(|own| (own.start..=own.end).contains(&self.next_record));
+        let is_next = self.follows(terrain) && !self.has_gap && waiting.is_some();
         let revision = terrain.world().revision();
         if is_next && !terrain.has_log() && self.unsent.is_empty() && revision == self.point.revision {
             return Ok(());
         }
         self.check_size(terrain)?;
         self.ground = terrain.world().ground().hash();
-        let records = terrain.take_log();
+        let mut records = terrain.take_log();
         if self.is_full() {
             self.has_gap = true;
             return self.check_thread();
+        }
+        if is_next {
+            records.retain(|record| record.number >= self.next_record);
         }
         let last = records.last().map_or(self.point.revision, |record| record.revision);
         if is_next && last == revision && self.continues(&records) {
