@@ -51,10 +51,12 @@ impl Rounding {
             return plain;
         }
         let own = if is_inside { -surface } else { surface };
-        let arc = radius - hypotenuse(radius - own, radius - shape);
+        // Within both, only the distance to the surface counts, or the middle would get deeper without a radius too.
+        let beside = if is_inside { shape.max(0) } else { shape };
+        let arc = radius - hypotenuse(radius - own, radius - beside);
         let rounded = if is_inside {
-            // As much deeper as the arc is below both surfaces.
-            before.min(shape) - (own.min(shape) - arc)
+            // As much deeper as the arc is below the surface.
+            before.min(shape) - (own - arc)
         } else if arc > 0 && own < shape {
             // The density of ground that is steep changes faster than distances do: the surface moves by the share.
             (i64::from(before) * i64::from(arc) / i64::from(own)) as i32

@@ -19,6 +19,7 @@ use glam::IVec3;
 use super::border::FINE;
 use super::floors::SKY;
 use super::links::Axis;
+use super::settings::LedgeRules;
 use super::tiles::NAV_TILE;
 use super::walkable::WalkableTile;
 use crate::lattice::{Column, SNAP};
@@ -36,20 +37,6 @@ pub struct LedgeLink {
     pub is_jump: bool,
     /// Whether an agent can climb up.
     pub is_climb: bool,
-}
-
-/// How agents pass ledges. Lengths in 1/256 voxel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct LedgeRules {
-    pub jump: i32,
-    pub climb: i32,
-    /// Cells from the upper one to the farthest landing.
-    pub cells: i32,
-    /// Cells to each side of the way, and around the landing, that the agent touches.
-    pub wide: i32,
-    /// Rises up to this are stepped over.
-    pub step: i32,
-    pub height: i32,
 }
 
 /// A link of a single cell.

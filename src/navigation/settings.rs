@@ -1,6 +1,5 @@
 //! The size of an agent and what it can climb.
 
-use super::ledges::LedgeRules;
 use crate::lattice::ONE;
 
 /// The size of an agent and what it can climb, in voxels.
@@ -138,6 +137,20 @@ impl Walker {
     pub fn reach(&self) -> i32 {
         self.reach.len() as i32 + self.ledges.map_or(0, |ledges| ledges.cells + ledges.wide + 1)
     }
+}
+
+/// How agents pass ledges. Lengths in 1/256 voxel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct LedgeRules {
+    pub jump: i32,
+    pub climb: i32,
+    /// Cells from the upper one to the farthest landing.
+    pub cells: i32,
+    /// Cells to each side of the way, and around the landing, that the agent touches.
+    pub wide: i32,
+    /// Rises up to this are stepped over.
+    pub step: i32,
+    pub height: i32,
 }
 
 /// For each row of cells: as many cells to both sides as an agent of this radius touches.

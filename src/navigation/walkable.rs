@@ -1,9 +1,8 @@
 //! Which cells of a tile are walkable.
 
 use super::floors::Floors;
-use super::ledges::LedgeRules;
 use super::links::{Axis, Links};
-use super::settings::Walker;
+use super::settings::{LedgeRules, Walker};
 use super::tiles::{NAV_TILE, NavTilePos};
 use crate::lattice::Column;
 use crate::terrain::World;

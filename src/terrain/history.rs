@@ -73,11 +73,13 @@ pub(super) struct UndoDelta {
 impl UndoDelta {
     /// A change by a group of edits; `replaced_bytes` is the size of the bricks that it replaces.
     pub fn new(
-        change: Change,
+        mut change: Change,
         replaced_bytes: usize,
         group: u64,
         (tags, pieces): (Vec<u64>, Vec<(u64, LoosePiece)>),
     ) -> Self {
+        // Its bytes are counted by what is in its lists.
+        change.shrink();
         let bounds = change.patch.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
         Self {
             change,

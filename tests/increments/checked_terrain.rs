@@ -56,8 +56,15 @@ impl CheckedTerrain {
         }
     }
 
-    /// Applies brushes in one transaction and runs every check.
+    /// Applies brushes in one transaction, but for resets, which are transactions of their own, and runs every check.
     pub fn apply(&mut self, brushes: &[Brush], what: &str) {
+        let is_alone = |brush: &Brush| brush.operation == Operation::Reset;
+        for group in brushes.chunk_by(|a, b| !is_alone(a) && !is_alone(b)) {
+            self.apply_together(group, what);
+        }
+    }
+
+    fn apply_together(&mut self, brushes: &[Brush], what: &str) {
         self.terrain.submit_all(brushes);
         let transaction = self.terrain.begin().expect("queued brushes");
         let mut commit = transaction.run();

@@ -81,7 +81,8 @@ fn rounded(brush: &Brush, before: i32, outside: i32, surface: i32) -> i32 {
     let mut after = if outside <= BAND { own.min(shape) } else { own };
     if shape < radius && if is_in { own > -depth } else { surface < radius } {
         let near = if is_in { -surface.min(radius.max(depth)) } else { surface };
-        let corner = i64::from(radius - near).pow(2) + i64::from(radius - shape).pow(2);
+        let beside = if is_in { shape.max(0) } else { shape };
+        let corner = i64::from(radius - near).pow(2) + i64::from(radius - beside).pow(2);
         // The integer root.
         let mut root = (corner as f64).sqrt() as i64;
         while root * root > corner {
@@ -92,7 +93,7 @@ fn rounded(brush: &Brush, before: i32, outside: i32, surface: i32) -> i32 {
         }
         let arc = radius - root as i32;
         let filled = match (is_in, arc > 0 && near < shape) {
-            (true, _) => own.min(shape) + arc - near.min(shape),
+            (true, _) => own.min(shape) + arc - near,
             (false, true) => (i64::from(own) * i64::from(arc) / i64::from(near)) as i32,
             (false, false) => arc,
         };
