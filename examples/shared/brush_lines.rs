@@ -15,6 +15,7 @@ const LONGEST: u64 = 1 << 24;
 
 /// The content of a line.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "nearly all lines are brushes")]
 pub enum Line {
     Brush(Brush),
     Undo,
