@@ -290,7 +290,9 @@ impl Brush {
     #[cfg(feature = "plugin")]
     pub(crate) fn placed_in_stretched(&self, matrix: Mat3A, rotation: Quat, translation: Vec3) -> Self {
         let scale = matrix.determinant().abs().cbrt();
-        let mut brush = self.placed_in(scale, rotation, translation);
+        let (back, by) = (rotation.inverse(), scale.recip());
+        // The space in between is no terrain's: nothing is rounded there.
+        let mut brush = self.moved(back, Shift::by(back * -translation * by), by);
         // The rest of the transform into the terrain.
         let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;
         brush.custom = brush.custom.map(|custom| Arc::new(custom.stretched(|arrow| rest * arrow)));
