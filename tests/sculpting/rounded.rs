@@ -77,7 +77,8 @@ fn a_fill_never_takes_away_and_a_carve_never_adds_and_both_end_at_the_radius() {
         let mut rng = Rng::with_seed(seed);
         let mut ground = terrain(Ground::from_fn(64, 64, cliffs).expect("finite"));
         for _ in 0..4 {
-            ground.apply([any_random_brush(&mut rng, &ground.world().ground().clone())]);
+            let brush = any_random_brush(&mut rng, ground.world().ground());
+            ground.apply([brush]);
         }
         let like = any_random_brush(&mut rng, ground.world().ground());
         let (radius, is_dig) = (rng.f32() * 9.0, rng.bool());
