@@ -113,7 +113,9 @@ mod tests {
                 let rounding = Rounding { radius, is_dig };
                 let after = rounding.density(before, outside, surface.min(rounding.horizon()));
                 let plain = Rounding { radius: 0, is_dig }.density(before, outside, surface);
-                prop_assert!(if is_dig { after >= plain && plain >= before } else { after <= plain && plain <= before });
+                let is_between =
+                    if is_dig { after >= plain && plain >= before } else { after <= plain && plain <= before };
+                prop_assert!(is_between);
                 prop_assert!(after == before || outside <= radius.max(BAND));
                 prop_assert!(after.abs() <= before.abs().max(DEPTH + outside.abs()));
             }
