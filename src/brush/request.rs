@@ -330,6 +330,7 @@ mod tests {
     #[test]
     fn neighbouring_terrains_get_the_same_brush() {
         let mut rng = fastrand::Rng::with_seed(8);
+        let mut compared = 0;
         let mut place = |most: f32| Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5) * most;
         for voxel in [0.125, 0.5, 1.0, 4.0] {
             for _ in 0..400 {
@@ -341,12 +342,16 @@ mod tests {
                 }
                 let brush = Brush::level(Shape::capsule(at, at + place(9.0), 2.0), at.y)
                     .with_roughness(Roughness::new(1.0, 4.0, 3));
-                let [own, other] = [first, first + apart]
+                let edits = [first, first + apart]
                     .map(|corner| brush.placed_in(voxel, Quat::IDENTITY, corner - 300.0))
-                    .map(|brush| super::super::Edit::quantize(&brush).unwrap());
+                    .map(|brush| super::super::Edit::quantize(&brush));
+                // With small voxels it may lie too far away.
+                let [Ok(own), Ok(other)] = edits else { continue };
+                compared += 1;
                 let back = Brush::from(&other).transformed(Quat::IDENTITY, apart / voxel, 1.0);
                 assert_eq!(super::super::Edit::quantize(&back).unwrap(), own, "{at} in {first} and {apart}");
             }
         }
+        assert!(compared > 400, "{compared}");
     }
 }

@@ -639,7 +639,7 @@ mod tests {
             let most = if shape == ToolShape::Box { tool.half.x } else { tool.radius };
             (0..200).for_each(|_| tool.grow(0.5, voxel));
             let least = if shape == ToolShape::Box { tool.half.x } else { tool.radius };
-            assert_eq!(least..=most, RADIUS.range(voxel));
+            assert_eq!(least..=most, tool.radii(voxel));
         }
     }
 
