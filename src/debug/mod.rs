@@ -26,6 +26,7 @@
 //! and not on the size of the world. [`SeamWires`] and [`draw_shape`] can be used by themselves.
 
 mod lines;
+mod place;
 mod plugin;
 mod settings;
 mod shape;

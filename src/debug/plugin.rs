@@ -9,7 +9,8 @@ use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
 use super::lines::{Layer, LineBuffer};
-use super::views::{self, Dirty, Place};
+use super::place::Place;
+use super::views::{self, Dirty};
 use super::{BurrowDebug, DebugView};
 use crate::lattice::BrickPos;
 use crate::plugin::{BrushApplied, CommitSameFrame, HistoryMoved};

@@ -4,6 +4,7 @@ use bevy::prelude::*;
 
 use super::DebugView;
 use super::lines::LineBuffer;
+use super::place::Place;
 use super::wires::{SeamWires, around, edges_of, voxels};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP};
 use crate::lod::{Cut, Node};
@@ -24,20 +25,6 @@ const NORMAL: f32 = 0.8;
 
 /// A brick that an edit may have changed, and how fresh that is: 1 now, 0 forgotten.
 pub type Dirty = (BrickPos, f32);
-
-/// What a view draws around.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    /// In voxels of the terrain.
-    pub focus: Vec3,
-    /// How far most views reach, in voxels.
-    pub radius: f32,
-    /// How far normals, wires and walkable ground reach, in voxels.
-    pub near: f32,
-    /// Who walks, in voxels.
-    #[cfg(feature = "navigation")]
-    pub agent: crate::navigation::WalkSettings,
-}
 
 /// Draws a view.
 pub fn draw(view: DebugView, terrain: &Terrain, place: Place, dirty: &[Dirty], out: &mut LineBuffer) {

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 
 use super::lines::LineBuffer;
-use super::views::Place;
+use super::place::Place;
 use super::wires::{around, voxels};
 use crate::lattice::{Column, ONE};
 use crate::navigation::{NAV_TILE, NavTilePos, WalkableTile, Walker};
