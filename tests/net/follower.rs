@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::lattice::{ChunkPos, RegionPos};
+use bevy_burrow::lattice::{BrickPos, ChunkPos, RegionPos};
 use bevy_burrow::net::{
     BulkReader, ClientId, Entries, Entry, Epoch, Hello, Join, KickReason, Lane, PROTOCOL, Refusal,
     RegionContent, RegionHashes, RuleState, Server, Stamps, ToClient, ToServer, Welcome, region_hash,
@@ -225,13 +225,18 @@ impl Follower {
     fn compare(&mut self, regions: &RegionHashes) {
         let world = self.terrain.world();
         let table: BTreeMap<RegionPos, u64> = regions.iter().copied().collect();
-        let all: BTreeSet<RegionPos> = world.regions().chain(table.keys().copied()).collect();
+        // Also those with fields alone.
+        let fields = world.fields().flat_map(|(_, fields)| fields.iter());
+        let fields = fields.map(|field| RegionPos::of(BrickPos::of(field.bounds.min)));
+        let all: BTreeSet<RegionPos> = world.regions().chain(fields).chain(table.keys().copied()).collect();
         let differs = |at: &RegionPos| region_hash(world, *at) != table.get(at).copied().unwrap_or(0);
         self.awaited = all.into_iter().filter(differs).collect();
         self.is_joining = false;
         if !self.awaited.is_empty() {
             let regions = self.awaited.iter().copied().collect();
             self.out.push(ToServer::Fetch { number: self.number, regions });
+        } else if let Some(state) = self.table.take() {
+            self.set_names(state.next_field);
         }
     }
 
@@ -261,7 +266,7 @@ impl Follower {
                 let regions = std::mem::take(&mut self.regions);
                 regions.iter().for_each(|content| self.put(content));
                 self.awaited.clear();
-                regions.iter().take(1).for_each(|content| self.lower_names(content.next_field));
+                regions.iter().take(1).for_each(|content| self.set_names(content.next_field));
                 continue;
             }
             match self.waiting.front() {
@@ -352,8 +357,8 @@ impl Follower {
     }
 
     /// Makes later fields have the same names as on the server.
-    fn lower_names(&mut self, next_field: u64) {
-        if self.terrain.world().next_field() > next_field {
+    fn set_names(&mut self, next_field: u64) {
+        if self.terrain.world().next_field() != next_field {
             let mut parts = self.terrain.parts();
             parts.change.next_field = next_field;
             let settings = TerrainSettings::default();
