@@ -3,8 +3,8 @@
 //!
 //! Densities do not say that: pristine ones are heights above the ground, and digs and adds store distances within a few
 //! voxels only. Samples next to the surface know it from where it crosses the edges of their cells; from there distances
-//! go from neighbour to neighbour, through ground for solid samples and through air for others. They are exact next to
-//! planes, at most 8 % too large elsewhere, and depend on nothing but the samples within the distance: not on where bricks
+//! go from neighbour to neighbour, through ground for solid samples and through air for others. They are
+//! exact next to the surface, elsewhere at most 9 % and 0.43 voxels too large, and depend on nothing but the samples within the distance: not on where bricks
 //! begin.
 
 use glam::IVec3;
@@ -194,7 +194,7 @@ mod tests {
                 let found = f64::from(at(&view, point, 8 * ONE));
                 if exact < 1900.0 {
                     assert!(
-                        found > exact - 8.0 && found < exact * 1.09 + 25.0,
+                        found > exact - 8.0 && found < exact * 1.09 + 110.0,
                         "{dx} {dz}, {y}: {found} {exact}"
                     );
                 } else {
