@@ -3,9 +3,9 @@
 //!
 //! Densities do not say that: pristine ones are heights above the ground, and digs and adds store distances within a few
 //! voxels only. Samples next to the surface know it from where it crosses the edges of their cells; from there distances
-//! go from neighbour to neighbour, through ground for solid samples and through air for others. They are
-//! exact next to the surface, elsewhere at most 9 % and 0.43 voxels too large, and depend on nothing but the samples within the distance: not on where bricks
-//! begin.
+//! go from neighbour to neighbour, through ground for solid samples and through air for others. They are exact next to the
+//! surface, elsewhere at most 9 % and 0.43 voxels too large, and depend on nothing but the samples within the distance:
+//! not on where bricks begin.
 
 use glam::IVec3;
 
