@@ -11,7 +11,6 @@ use bevy_burrow::panel::{
 };
 use bevy_burrow::prelude::*;
 
-use crate::placing::Placing;
 use crate::stamps;
 use crate::stroke::{Aim, Strokes, aim};
 
@@ -200,7 +199,6 @@ fn copy(
     input: Option<Res<PanelInput>>,
     aim: Res<Aim>,
     terrains: Query<(&Terrain, &GlobalTransform)>,
-    placing: Query<(), With<Placing>>,
     mut tool: ResMut<BrushTool>,
     mut panel: ResMut<BurrowPanel>,
 ) {
@@ -210,7 +208,7 @@ fn copy(
     if !presses.read().any(is_pressed) || !is_due {
         return;
     }
-    let Some(hit) = aim.0.filter(|_| placing.is_empty()) else { return };
+    let Some(hit) = aim.0 else { return };
     let Ok((terrain, place)) = terrains.get(hit.terrain) else { return };
     let copied = tool.copy(terrain, place, &hit).map_err(|why| why.to_string());
     let is_kept = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);

@@ -16,7 +16,6 @@
 //! | `F` | flies to what is under the mouse |
 //! | wheel, `[`, `]` | size of the brush |
 //! | `1` to `9`, `0`, `-`, `=`, `P`, `R`, `X`, `U`, `V`, or `Tab` | operations |
-//! | `G`, `B`, `Enter`, `Backspace` | puts the brush down, with handles to move, turn (`G` again) and size it; onto the ground; makes the edit; takes it back |
 //! | click, `Enter`, `Backspace` with the shape *Path* | sets a point, makes one edit of all points, takes the last one back |
 //! | `Ctrl+C`, `Ctrl+Shift+C` | copies what lies in the brush, to paste it; writes it to a `.prefab` file too |
 //! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
@@ -36,7 +35,6 @@
 //! | --- | --- |
 //! | `scene.rs` | landscape, sun, camera |
 //! | `stroke.rs` | aim, preview, strokes |
-//! | `placing.rs` | handles for the brush |
 //! | `keys.rs` | keys and the wheel |
 //! | `stamps.rs`, `models.rs` | stamps, prefabs and models from files |
 //! | `journal.rs` | a line for each receipt |
@@ -51,7 +49,6 @@ mod models;
 mod offscreen;
 #[path = "../shared/photo.rs"]
 mod photo;
-mod placing;
 mod scene;
 mod script;
 mod stamps;
@@ -119,13 +116,7 @@ fn main() -> ExitCode {
         ..default()
     }));
     editor(&mut app, &options);
-    app.add_plugins((
-        stroke::StrokePlugin,
-        keys::KeysPlugin,
-        placing::PlacingPlugin,
-        stamps::DropPlugin,
-        models::ModelsPlugin,
-    ));
+    app.add_plugins((stroke::StrokePlugin, keys::KeysPlugin, stamps::DropPlugin, models::ModelsPlugin));
     if let Some(file) = options.model {
         app.world_mut().resource_mut::<models::Reading>().start(file);
     }

@@ -12,10 +12,8 @@ use bevy_burrow::debug::draw_shape;
 use bevy_burrow::panel::{BrushTool, BurrowPanel, PanelInput, ToolOperation, ToolShape, pointer_is_free};
 use bevy_burrow::prelude::*;
 
-use crate::placing::Placing;
-
 /// The reach of the brush in metres.
-pub const REACH: f32 = 400.0;
+const REACH: f32 = 400.0;
 
 /// Parts of a ring, and lines along a side of the preview of a stamp.
 const RING: u32 = 48;
@@ -71,7 +69,7 @@ impl Plugin for StrokePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Strokes>().add_systems(
             Update,
-            (aim, read_modifier, stroke.run_if(pointer_is_free.and_then(not(any_with_component::<Placing>))))
+            (aim, read_modifier, stroke.run_if(pointer_is_free))
                 .chain()
                 .before(BurrowSystems::Collect)
                 .before(preview),
@@ -212,15 +210,10 @@ fn preview(
     tool: Res<BrushTool>,
     modifier: Res<Modifier>,
     terrains: Terrains,
-    placing: Option<Single<&Transform, With<Placing>>>,
-    terrain: Option<Single<&Terrain>>,
     mut gizmos: Gizmos,
 ) {
+    let Some(hit) = &aim.0 else { return };
     let tool = modified(&tool, *modifier);
-    let voxel = terrain.map_or(1.0, |terrain| terrain.voxel_size());
-    let placed = placing.map(|place| tool.placed(&place, voxel));
-    let Some((tool, hit)) = placed.or_else(|| Some((tool, aim.0?))) else { return };
-    let hit = &hit;
     let color = match *modifier {
         Modifier::Invert => Color::srgb(1.0, 0.45, 0.35),
         Modifier::Smooth => Color::srgb(0.45, 0.75, 1.0),
