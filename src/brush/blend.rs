@@ -17,7 +17,8 @@ pub struct Blend {
     /// the shape's depth ends in its middle. With 0 the change ends in a step at the shape's surface.
     /// For fills and carves it is the radius by which their edge with the ground is rounded, at most 16.
     pub falloff: f32,
-    /// The material of new ground. `None`: for a fill with a grid that has materials, those; else that of the first ground straight below it, else straight above,
+    /// The material of new ground. `None`: for a fill with a grid that has materials, those; else that of the first ground
+    /// straight below it, else straight above,
     /// within 64 voxels, else next to it.
     pub material: Option<MaterialId>,
 }

@@ -13,7 +13,8 @@ use crate::ground::MaterialId;
 ///
 /// Dig, add, paint, reset and paste look at one sample at a time, all but the last as far as [`BAND`](super::BAND) beyond
 /// their shape. All others *sculpt*: they read what lies around and have the brush's [`Blend`](super::Blend), by which most
-/// fade; but for fill and carve, they change nothing outside. Beyond the world's rim they assume that everything continues as at the rim.
+/// fade. They change nothing outside, except for fill and carve. Beyond the world's rim they assume that everything
+/// continues as at the rim.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case")]
 #[non_exhaustive]

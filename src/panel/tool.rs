@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use bevy::prelude::*;
 
-use super::lengths::{AMOUNT, LENGTH, Length, RADIUS, ROUNDING, TUBE};
+use super::lengths::RADIUS;
 use super::texts;
 pub use super::tool_content::{StampImage, ToolModel, ToolPrefab};
 use super::tool_operation::ToolOperation;
@@ -265,7 +265,7 @@ impl BrushTool {
         let (prefab, voxel) = (self.prefab.prefab()?, self.prefab.voxel_size);
         let place = (hit.position / voxel).round() * voxel;
         Some(Paste {
-            scale: voxel * self.prefab.scale,
+            scale: voxel,
             mirror: self.is_mirrored,
             edited_only: self.prefab.is_edits_only,
             ..Paste::new(prefab, place).rotated(self.rotation(hit) * self.prefab.rotation)
@@ -401,39 +401,6 @@ impl BrushTool {
         range.start().max(least)..=range.end().max(least)
     }
 
-    /// This tool at a place instead of on the ground: turned as the place is, and all its lengths times the place's scale, of a box
-    /// along each of its sides. Returns the hit for [`brush_at`](Self::brush_at) and [`shape_at`](Self::shape_at). Not for paths.
-    pub fn placed(&self, place: &Transform, voxel_size: f32) -> (Self, TerrainHit) {
-        let normal = place.rotation * Vec3::Y;
-        // What is left when the axis is upright is a rotation about it.
-        let (axis, angle) =
-            (Quat::from_rotation_arc(Vec3::Y, normal).inverse() * place.rotation).to_axis_angle();
-        let scale = place.scale.abs();
-        let by = scale.element_product().cbrt();
-        let within = |length: f32, range: &Length| {
-            let range = range.range(voxel_size);
-            (length * by).clamp(*range.start(), *range.end())
-        };
-        let mut tool = Self {
-            align: ToolAlign::Surface,
-            sink: 0.0,
-            turn: self.turn + (angle * axis.y.signum()).to_degrees(),
-            length: within(self.length, &LENGTH),
-            tube: within(self.tube, &TUBE),
-            amount: within(self.amount, &AMOUNT),
-            rounding: within(self.rounding, &ROUNDING),
-            ..self.clone()
-        };
-        tool.prefab.scale *= by.clamp(1.0 / 16.0, 16.0);
-        if tool.fitting_shape() == ToolShape::Box {
-            let range = tool.radii(voxel_size);
-            tool.half = (tool.half * scale).clamp(Vec3::splat(*range.start()), Vec3::splat(*range.end()));
-        } else {
-            tool.grow(by, voxel_size);
-        }
-        (tool, hit_at(place.translation, normal))
-    }
-
     /// Scales its radius, or the size of a box, within the range of the panel's sliders for this voxel size. Useful
     /// for a mouse wheel.
     pub fn grow(&mut self, factor: f32, voxel_size: f32) {
@@ -461,7 +428,7 @@ fn hit_at(position: Vec3, normal: Vec3) -> TerrainHit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brush::shapes::{Cuboid, Cylinder};
+    use crate::brush::shapes::Cylinder;
     use crate::brush::{Edit, Operation, ShapeGrid};
     use crate::ground::GreyImage;
 
@@ -644,36 +611,22 @@ mod tests {
     }
 
     #[test]
-    fn a_placed_brush_is_turned_and_sized_as_its_place() {
-        let tool =
-            BrushTool { shape: ToolShape::Box, half: Vec3::new(2.0, 3.0, 4.0), sink: 0.7, ..default() };
-        let turns = [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (1.0, -2.0, 0.5), (3.1, 1.5, -1.5), (0.0, 3.0, 0.0)];
-        for (x, y, z) in turns {
-            let rotation = Quat::from_euler(EulerRot::YXZ, x, y, z);
-            let place = Transform {
-                translation: Vec3::new(5.0, 6.0, 7.0),
-                rotation,
-                scale: Vec3::new(2.0, 1.0, 4.0),
-            };
-            let (placed, hit) = tool.placed(&place, 1.0);
-            let Shape::Cuboid(Cuboid { center, half, rotation: found }) = placed.shape_at(&hit) else {
-                panic!("a box")
-            };
-            assert_eq!((center, half), (place.translation, place.scale * tool.half));
-            assert!(found.dot(rotation).abs() > 0.999_9, "{found} instead of {rotation}");
-            let model = BrushTool { shape: ToolShape::Model, ..tool.clone() };
-            let (placed, hit) = model.placed(&place, 1.0);
-            let found = placed.model_at(&hit).expect("a boulder");
-            assert!(found.rotation.dot(rotation).abs() > 0.999_9, "{}", found.rotation);
-            let paste = BrushTool { operation: ToolOperation::Paste, ..tool.clone() };
-            let (placed, hit) = paste.placed(&place, 1.0);
-            let found = placed.paste_at(&hit).expect("a hut");
-            assert!(found.rotation.dot(rotation).abs() > 0.999_9 && found.scale == 2.0, "{found:?}");
-            let small = Transform::from_scale(Vec3::splat(0.5));
-            let torus = BrushTool { shape: ToolShape::Torus, ..default() };
-            let placed = torus.placed(&small, 1.0).0;
-            assert_eq!((placed.radius, placed.tube), (0.5 * torus.radius, 0.5 * torus.tube));
-        }
+    fn a_copy_of_a_turned_terrain_is_pasted_as_it_lay() {
+        let ground = crate::ground::Ground::flat(64, 64, 10.0).expect("valid ground");
+        let terrain = Terrain::new(ground, &Default::default()).expect("valid settings");
+        let turn = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2);
+        let place = GlobalTransform::from(Transform { rotation: turn, scale: Vec3::splat(2.0), ..default() });
+        let hit = TerrainHit { position: place.transform_point(Vec3::new(30.0, 10.0, 30.0)), ..hit() };
+        let mut tool = BrushTool::default();
+        tool.prefab.is_edits_only = false;
+        tool.copy(&terrain, &place, &hit).expect("it lies in the world");
+        let paste = tool.paste_at(&hit).expect("a copy");
+        assert!(paste.rotation.dot(turn).abs() > 0.999_9, "{}", paste.rotation);
+        assert_eq!((paste.scale, paste.edited_only), (2.0, false));
+        // The tool's own turn comes on top.
+        tool.turn = -90.0;
+        let paste = tool.paste_at(&hit).expect("a copy");
+        assert!(paste.rotation.dot(Quat::IDENTITY).abs() > 0.999_9, "{}", paste.rotation);
     }
 
     #[test]

@@ -8,6 +8,20 @@ use super::texts;
 use crate::brush::{GridShape, Prefab, PrefabSample, ShapeGrid};
 use crate::ground::{GreyImage, MaterialId};
 
+/// The label of content in the panel: its name, or its size without one, or the default's name where there is none.
+fn label(size: Option<String>, name: Option<&Name>, default: &str) -> String {
+    match (size, name) {
+        (None, _) => default.into(),
+        (Some(_), Some(name)) => name.to_string(),
+        (Some(size), None) => size,
+    }
+}
+
+fn sides(size: UVec3) -> String {
+    let [x, y, z] = size.to_array();
+    format!("{x} x {y} x {z}")
+}
+
 /// The image of a [`BrushTool`](super::BrushTool)'s stamp; white is high. The default is a mountain with ridges.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StampImage {
@@ -25,11 +39,8 @@ impl StampImage {
 
     /// The label in the panel: the image's name, or its size without one.
     pub(super) fn label(&self) -> String {
-        match (&self.image, &self.name) {
-            (None, _) => texts::RIDGE.into(),
-            (Some(_), Some(name)) => name.to_string(),
-            (Some(image), None) => format!("{} x {} samples", image.width(), image.height()),
-        }
+        let size = self.image.as_ref().map(|image| format!("{} x {} samples", image.width(), image.height()));
+        label(size, self.name.as_ref(), texts::RIDGE)
     }
 
     /// The image, or the default one.
@@ -55,14 +66,7 @@ impl ToolModel {
 
     /// The label in the panel.
     pub(super) fn label(&self) -> String {
-        match (&self.grid, &self.name) {
-            (None, _) => texts::BOULDER.into(),
-            (Some(_), Some(name)) => name.to_string(),
-            (Some(grid), None) => {
-                let [x, y, z] = grid.size().to_array();
-                format!("{x} x {y} x {z}")
-            }
-        }
+        label(self.grid.as_ref().map(|grid| sides(grid.size())), self.name.as_ref(), texts::BOULDER)
     }
 
     /// The form around its middle, with its longest side twice the radius.
@@ -109,8 +113,6 @@ pub struct ToolPrefab {
     pub prefab: Option<Arc<Prefab>>,
     /// Metres of a voxel where it was copied: 1/8 to 8.
     pub voxel_size: f32,
-    /// How many times as large it is pasted.
-    pub scale: f32,
     /// How the terrain was turned from which it was copied.
     pub rotation: Quat,
     /// Whether only samples that were edited are pasted, and not the ground around them.
@@ -122,7 +124,7 @@ pub struct ToolPrefab {
 impl Default for ToolPrefab {
     fn default() -> Self {
         let rotation = Quat::IDENTITY;
-        Self { prefab: None, voxel_size: 1.0, scale: 1.0, rotation, is_edits_only: true, name: None }
+        Self { prefab: None, voxel_size: 1.0, rotation, is_edits_only: true, name: None }
     }
 }
 
@@ -134,20 +136,14 @@ impl ToolPrefab {
 
     /// The label in the panel.
     pub(super) fn label(&self) -> String {
-        match (&self.prefab, &self.name) {
-            (None, _) => texts::HUT.into(),
-            (Some(_), Some(name)) => name.to_string(),
-            (Some(prefab), None) => {
-                let [x, y, z] = prefab.size().to_array();
-                format!("{x} x {y} x {z}")
-            }
-        }
+        let size = self.prefab.as_ref().map(|prefab| sides(prefab.size().as_uvec3()));
+        label(size, self.name.as_ref(), texts::HUT)
     }
 
     /// Half its sides in metres, before it is turned.
     pub(super) fn half(&self) -> Vec3 {
         let size = self.prefab().map_or(Vec3::ONE, |prefab| prefab.size().as_vec3());
-        size * self.voxel_size * self.scale / 2.0
+        size * self.voxel_size / 2.0
     }
 
     /// The prefab, or the default one.

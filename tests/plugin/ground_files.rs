@@ -4,7 +4,7 @@ use bevy::asset::{AssetLoadFailedEvent, LoadState};
 use bevy::math::DVec3;
 use bevy::prelude::*;
 use bevy_burrow::lattice::Column;
-use bevy_burrow::plugin::{GroundAsset, GroundFrom};
+use bevy_burrow::plugin::{EditOutbox, GroundAsset, GroundFrom};
 use bevy_burrow::prelude::*;
 
 use crate::heightmaps::{Folder, png};
@@ -91,6 +91,22 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     let pristine = DVec3::new(8.0, 27.0, 60.0);
     assert!(stage.terrain(terrain).world().is_solid(pristine));
 
+    // The ground of a client is its server's: while edits are collected for one, the file is not followed.
+    stage.app.world_mut().entity_mut(terrain).insert(EditOutbox::default());
+    folder.put("island.png", &heights(|_, z| 30 + (z / 8) as u16));
+    server.reload("island.ground.json");
+    let asset = stage.app.world().get::<GroundFrom>(terrain).expect("it stays").ground.clone();
+    stage.frames_until("the file is read", |stage| {
+        let grounds = stage.app.world().resource::<Assets<GroundAsset>>();
+        grounds.get(&asset).is_some_and(|asset| asset.ground.height(Column::new(0, 0)) / 256 == 30)
+    });
+    stage.frames(5);
+    assert_eq!(height(&stage, terrain, 0, 0), 26);
+    stage.app.world_mut().entity_mut(terrain).remove::<EditOutbox>();
+    stage.frames_until("the ground is the file's", |stage| height(stage, terrain, 0, 0) == 30);
+    stage.settle();
+    assert!(is_open(&stage), "the hole stays");
+
     // An unchanged file changes nothing.
     let hash = stage.hash(terrain);
     server.reload("island.ground.json");
@@ -106,7 +122,7 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
         grounds.get(&handle).is_some_and(|asset| asset.ground.width() == 32)
     });
     stage.frames(3);
-    assert_eq!((stage.hash(terrain), height(&stage, terrain, 0, 0)), (hash, 26));
+    assert_eq!((stage.hash(terrain), height(&stage, terrain, 0, 0)), (hash, 30));
 }
 
 #[test]

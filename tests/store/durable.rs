@@ -157,7 +157,7 @@ fn quiet_change(terrain: &mut Terrain, which: u32) {
 #[test]
 fn lost_records_of_rules_alone_are_noticed() {
     for which in 0..3 {
-        // What comes after the loss: nothing, a dig that obeys what was lost, or a dig and the settings of before.
+        // After the loss there is nothing, a dig that obeys the lost record, or a dig and the earlier settings.
         for after in 0..3 {
             let (disk, ground) = (SimulatedDisk::new(), flat(128, 8.0));
             let mut terrain = terrain(&ground);

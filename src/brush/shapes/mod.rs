@@ -1,7 +1,8 @@
 //! The shapes that a brush can have: a file for each, and here what they have in common.
 //!
-//! Most shapes are structs over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). Paths, corridors
-//! and grids hold more than numbers, and are two structs each. How to add one: see *Add a shape* in `CONTRIBUTING.md`.
+//! Most shapes are structs over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit).
+//! Paths, corridors and grids hold more than numbers, and are two structs each. How to add one: see *Add a shape* in
+//! `CONTRIBUTING.md`.
 
 /// Converts a shape field by field, as in `convert!(Sphere { center: point, radius: length })`.
 macro_rules! convert {

@@ -21,7 +21,7 @@ impl Store {
     /// [`StoreError::OtherSize`] if the terrain has another size than the saved world; then nothing is taken;
     /// [`StoreError::Ended`] when the store's thread has panicked.
     pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
-        // Those before the next one are of before the whole terrain was saved.
+        // Earlier records were made before the whole terrain was saved, which has what they say.
         let waiting = terrain.log_numbers().filter(|own| (own.start..=own.end).contains(&self.next_record));
         let is_next = self.follows(terrain) && !self.has_gap && waiting.is_some();
         let revision = terrain.world().revision();
