@@ -221,7 +221,8 @@ async fn materials(
 
 /// This entity is a terrain whose ground is a file. It gets its [`Terrain`] once the file is loaded; a terrain that is there already
 /// gets the file's ground. When the file or one that it names changes, edits stay and the ground below them becomes the new one, as
-/// with [`Order::Ground`], which clears the history of undo. A [`SharedTerrain`] of a client follows its server, and not the file.
+/// with [`Order::Ground`], which clears the history of undo. A terrain with an [`EditOutbox`], as on a client, follows its server, and
+/// not the file.
 ///
 /// Hot reloading takes Bevy's feature `file_watcher`. A ground of another size takes a new terrain: the change is logged and not shown.
 ///

@@ -128,6 +128,25 @@ fn send(message: impl Message) -> impl FnOnce(&mut App) {
 }
 
 #[test]
+fn agents_jump_into_a_pit_and_climb_out_if_they_can_in_the_frame_after_the_commit() {
+    let pit = Brush::dig(Shape::cuboid(Vec3::new(48.0, 10.0, 14.0), Vec3::new(6.0, 4.0, 6.0)));
+    let (inside, beside) = (Vec3::new(48.0, 6.0, 14.0), Vec3::new(30.0, 10.0, 14.0));
+    for (jump_down, climb_up) in [(0.0, 0.0), (5.0, 0.0), (5.0, 5.0), (3.0, 3.0)] {
+        let (mut app, [terrain, archipelago, _]) = app(false, WalkSettings { jump_down, climb_up, ..AGENT });
+        for _ in 0..2 {
+            commit(&mut app, terrain, send(pit.clone()));
+            app.update();
+            assert_eq!(has_path(&app, archipelago, beside, inside), jump_down > 4.0, "{jump_down}");
+            assert_eq!(has_path(&app, archipelago, inside, beside), climb_up > 4.0, "{climb_up}");
+            commit(&mut app, terrain, send(Undo { terrain: Some(terrain) }));
+            app.update();
+            let links = app.world_mut().query::<&AnimationLink3d>().iter(app.world()).count();
+            assert_eq!(links, 0, "none is left once the pit is gone");
+        }
+    }
+}
+
+#[test]
 fn a_path_through_a_tunnel_exists_in_the_frame_after_the_commit() {
     for same_frame in [false, true] {
         let (mut app, [terrain, archipelago, _]) = app(same_frame, AGENT);
