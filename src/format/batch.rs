@@ -10,11 +10,11 @@ use std::sync::Arc;
 
 use super::bytes::{Reader, put_bytes, put_number, put_signed};
 use super::change::{put_change, read_change};
-use super::contents::Stamps;
+use super::contents::ContentTable;
 use super::edits::{EditSequence, put_edit};
 use super::error::FormatError;
 #[cfg(feature = "store")]
-use super::ids::StampId;
+use super::ids::ContentId;
 use super::plain;
 #[cfg(feature = "store")]
 use crate::brush::Content;
@@ -83,8 +83,11 @@ impl Batch {
     /// # Errors
     /// When anything is invalid. Memory is taken by the length of `bytes`.
     pub fn decode(bytes: &[u8], ground: &Ground) -> Result<Self, FormatError> {
-        let mut edits =
-            EditReader { sequence: EditSequence::whole(), contents: &Stamps::default(), is_partial: false };
+        let mut edits = EditReader {
+            sequence: EditSequence::whole(),
+            contents: &ContentTable::default(),
+            is_partial: false,
+        };
         Self::read(Reader(bytes), &mut edits, ground)
     }
 
@@ -127,7 +130,7 @@ impl Batch {
     /// where [`names`](Self::names) finds them.
     pub(crate) fn encode_named(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let names: Vec<StampId> =
+        let names: Vec<ContentId> =
             self.contents().map(|(name, _)| name).collect::<BTreeSet<_>>().into_iter().collect();
         put_number(&mut bytes, names.len() as u64);
         names.iter().for_each(|name| bytes.extend_from_slice(&name.0.to_le_bytes()));
@@ -136,24 +139,24 @@ impl Batch {
     }
 
     /// The content of its edits, each as often as an edit has it.
-    pub(crate) fn contents(&self) -> impl Iterator<Item = (StampId, Content<'_>)> {
+    pub(crate) fn contents(&self) -> impl Iterator<Item = (ContentId, Content<'_>)> {
         let entries = self.commits.iter().flat_map(|commit| &commit.entries);
         let edits = entries.filter_map(|entry| match entry {
             LogEntry::Order(Order::Edit(edit)) => Some(edit),
             _ => None,
         });
-        edits.flat_map(|edit| edit.contents()).map(|content| (StampId::of_content(content), content))
+        edits.flat_map(|edit| edit.contents()).map(|content| (ContentId::of_content(content), content))
     }
 
     /// A table of the content of its edits.
-    pub(crate) fn table(&self) -> Stamps {
-        let mut contents = Stamps::default();
+    pub(crate) fn table(&self) -> ContentTable {
+        let mut contents = ContentTable::default();
         self.contents().for_each(|(_, content)| contents.add_content(content));
         contents
     }
 
     /// The names with which the bytes of [`encode_named`](Self::encode_named) begin.
-    pub(crate) fn names(bytes: &[u8]) -> Result<Vec<StampId>, FormatError> {
+    pub(crate) fn names(bytes: &[u8]) -> Result<Vec<ContentId>, FormatError> {
         read_names(&mut Reader(bytes))
     }
 
@@ -164,7 +167,7 @@ impl Batch {
     pub(crate) fn decode_named(
         bytes: &[u8],
         ground: &Ground,
-        contents: &Stamps,
+        contents: &ContentTable,
     ) -> Result<Self, FormatError> {
         let mut reader = Reader(bytes);
         let sequence = EditSequence::with_names(read_names(&mut reader)?);
@@ -175,7 +178,7 @@ impl Batch {
     pub(crate) fn decode_without_content(bytes: &[u8], ground: &Ground) -> Result<Self, FormatError> {
         let mut reader = Reader(bytes);
         let sequence = EditSequence::with_names(read_names(&mut reader)?);
-        let mut edits = EditReader { sequence, contents: &Stamps::default(), is_partial: true };
+        let mut edits = EditReader { sequence, contents: &ContentTable::default(), is_partial: true };
         Self::read(reader, &mut edits, ground)
     }
 }
@@ -183,7 +186,7 @@ impl Batch {
 /// Reads the edits of a batch.
 struct EditReader<'a> {
     sequence: EditSequence,
-    contents: &'a Stamps,
+    contents: &'a ContentTable,
     /// Whether edits without their content are accepted.
     is_partial: bool,
 }
@@ -196,9 +199,9 @@ impl EditReader<'_> {
 }
 
 #[cfg(feature = "store")]
-fn read_names(reader: &mut Reader) -> Result<Vec<StampId>, FormatError> {
+fn read_names(reader: &mut Reader) -> Result<Vec<ContentId>, FormatError> {
     let count = reader.count()?;
-    (0..count).map(|_| Ok(StampId(u64::from_le_bytes(reader.array()?)))).collect()
+    (0..count).map(|_| Ok(ContentId(u64::from_le_bytes(reader.array()?)))).collect()
 }
 
 /// Appends a commit of any kind but for its hash.

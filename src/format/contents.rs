@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::Xxh3Default;
 
 use super::bytes::{Reader, put_number};
 use super::error::FormatError;
-use super::ids::StampId;
+use super::ids::ContentId;
 #[cfg(feature = "store")]
 use super::ids::{Kind, WorldId};
 use super::prefab::packed_prefab;
@@ -21,7 +21,7 @@ use crate::ground::GreyImage;
 /// Most bytes of a prefab's file that is sent.
 const MAX_PREFAB: usize = 4 << 20;
 
-impl StampId {
+impl ContentId {
     /// The name of an image: a hash of its size and samples. It is computed once for each image.
     pub fn of(image: &GreyImage) -> Self {
         Self(image.hash_with(|image| {
@@ -64,7 +64,7 @@ pub(crate) struct Resolved {
     /// The edit; with placeholders if any content is missing, or a limit is broken.
     pub edit: Edit,
     /// The names of content that the table lacks.
-    pub missing: Vec<StampId>,
+    pub missing: Vec<ContentId>,
     /// Why the edit is beyond the limits of edits with this content.
     pub refused: Option<BrushError>,
 }
@@ -80,22 +80,21 @@ impl Resolved {
     }
 }
 
-/// The images that stamps may have, and the prefabs that may be pasted. A client sends no edits with others, and a server
-/// refuses them. Clients that lack one of the server's get it at its first use, so only players that use them need
+/// The images, grids and prefabs that edits may hold. A client sends no edits with others, and a server refuses them. Clients that lack one of the server's get it at its first use, so only players that use them need
 /// their own.
 #[derive(Clone, Debug, Default)]
-pub struct Stamps {
-    images: FxHashMap<StampId, Arc<GreyImage>>,
+pub struct ContentTable {
+    images: FxHashMap<ContentId, Arc<GreyImage>>,
     /// Images that hold a grid.
-    grids: FxHashMap<StampId, ShapeGrid>,
-    prefabs: FxHashMap<StampId, Arc<Prefab>>,
+    grids: FxHashMap<ContentId, ShapeGrid>,
+    prefabs: FxHashMap<ContentId, Arc<Prefab>>,
 }
 
-impl Stamps {
+impl ContentTable {
     /// Adds an image.
-    pub fn add(&mut self, image: impl Into<Arc<GreyImage>>) -> StampId {
+    pub fn add(&mut self, image: impl Into<Arc<GreyImage>>) -> ContentId {
         let image = image.into();
-        let id = StampId::of(&image);
+        let id = ContentId::of(&image);
         if self.images.insert(id, Arc::clone(&image)).is_none() {
             let grid = ShapeGrid::in_image(image);
             self.grids.extend(grid.is_grid().then_some((id, grid)));
@@ -105,13 +104,13 @@ impl Stamps {
 
     /// Adds a prefab; `None` for one that is too large to be sent: its [file](super::write_prefab) takes more than
     /// 4 MiB.
-    pub fn add_prefab(&mut self, prefab: impl Into<Arc<Prefab>>) -> Option<StampId> {
+    pub fn add_prefab(&mut self, prefab: impl Into<Arc<Prefab>>) -> Option<ContentId> {
         let prefab = prefab.into();
         (packed_prefab(&prefab).len() <= MAX_PREFAB).then(|| self.insert_prefab(prefab))
     }
 
-    fn insert_prefab(&mut self, prefab: Arc<Prefab>) -> StampId {
-        let id = StampId::of_prefab(&prefab);
+    fn insert_prefab(&mut self, prefab: Arc<Prefab>) -> ContentId {
+        let id = ContentId::of_prefab(&prefab);
         self.prefabs.insert(id, prefab);
         id
     }
@@ -124,21 +123,21 @@ impl Stamps {
     }
 
     /// The image of this name.
-    pub fn get(&self, id: StampId) -> Option<&Arc<GreyImage>> {
+    pub fn get(&self, id: ContentId) -> Option<&Arc<GreyImage>> {
         self.images.get(&id)
     }
 
     /// The prefab of this name.
-    pub fn prefab(&self, id: StampId) -> Option<&Arc<Prefab>> {
+    pub fn prefab(&self, id: ContentId) -> Option<&Arc<Prefab>> {
         self.prefabs.get(&id)
     }
 
     /// Whether the edit can be sent: every content that it has is in the list.
     pub fn can_send(&self, edit: &Edit) -> bool {
         edit.contents().all(|content| match content {
-            Content::Image(image) => self.images.contains_key(&StampId::of(image)),
-            Content::Grid(grid) => self.grids.contains_key(&StampId::of(grid.image())),
-            Content::Prefab(prefab) => self.prefabs.contains_key(&StampId::of_prefab(prefab)),
+            Content::Image(image) => self.images.contains_key(&ContentId::of(image)),
+            Content::Grid(grid) => self.grids.contains_key(&ContentId::of(grid.image())),
+            Content::Prefab(prefab) => self.prefabs.contains_key(&ContentId::of_prefab(prefab)),
         })
     }
 
@@ -150,7 +149,7 @@ impl Stamps {
             }
             // Its samples were looked at already.
             Content::Grid(grid) => {
-                let name = StampId::of(grid.image());
+                let name = ContentId::of(grid.image());
                 self.grids.insert(name, grid.clone());
                 self.images.insert(name, Arc::clone(grid.image()));
             }
@@ -162,26 +161,28 @@ impl Stamps {
 
     /// The names in it, in order.
     #[cfg(feature = "store")]
-    pub(crate) fn names(&self) -> BTreeSet<StampId> {
+    pub(crate) fn names(&self) -> BTreeSet<ContentId> {
         self.images.keys().chain(self.prefabs.keys()).copied().collect()
     }
 
     /// Whether it has content of this name.
     #[cfg(any(feature = "net", feature = "store"))]
-    pub(crate) fn has(&self, name: StampId) -> bool {
+    pub(crate) fn has(&self, name: ContentId) -> bool {
         self.images.contains_key(&name) || self.prefabs.contains_key(&name)
     }
 
     /// Adds what [`content_file`] wrote. Returns `false` if the bytes are not what this name stands for.
     #[cfg(feature = "store")]
-    pub(crate) fn add_file(&mut self, name: StampId, bytes: &[u8]) -> bool {
+    pub(crate) fn add_file(&mut self, name: ContentId, bytes: &[u8]) -> bool {
         let (mut reader, mut found) = (Reader(bytes), Self::default());
         // What follows the last part that can be read is nobody's.
         while let Ok(part) = reader.bytes() {
             match frame::open(part, Kind::Image, WorldId::default(), IMAGE, MAX_IMAGE) {
                 Ok(opened) => {
                     let image = read_image(&mut Reader(&opened.payload));
-                    image.into_iter().for_each(|image| drop(found.images.insert(StampId::of(&image), image)));
+                    image
+                        .into_iter()
+                        .for_each(|image| drop(found.images.insert(ContentId::of(&image), image)));
                 }
                 Err(_) => read_prefab(part).into_iter().for_each(|prefab| {
                     found.insert_prefab(Arc::new(prefab));
@@ -200,7 +201,7 @@ impl Stamps {
     }
 
     /// Puts the content of a name in its place. `Ok(false)` if the table lacks it.
-    fn put(&self, name: StampId, place: ContentMut) -> Result<bool, FormatError> {
+    fn put(&self, name: ContentId, place: ContentMut) -> Result<bool, FormatError> {
         let found = match place {
             ContentMut::Image(own) => self.images.get(&name).map(|image| *own = Arc::clone(image)),
             // An image that holds no grid will never hold one.
@@ -214,7 +215,7 @@ impl Stamps {
     }
 
     /// Replaces the placeholders of an edit by the content of their names, and checks the edit again.
-    pub(crate) fn resolve(&self, named: Edit, names: &[StampId]) -> Result<Resolved, FormatError> {
+    pub(crate) fn resolve(&self, named: Edit, names: &[ContentId]) -> Result<Resolved, FormatError> {
         let (mut edit, mut missing) = (named.clone(), Vec::new());
         for (place, &name) in edit.contents_mut().zip(names) {
             if !place.is_clear() {
@@ -231,8 +232,8 @@ impl Stamps {
 }
 
 /// The names of an edit's content, and the edit with placeholders.
-pub(crate) fn named(edit: &Edit) -> (Vec<StampId>, Edit) {
-    let names = edit.contents().map(StampId::of_content).collect();
+pub(crate) fn named(edit: &Edit) -> (Vec<ContentId>, Edit) {
+    let names = edit.contents().map(ContentId::of_content).collect();
     let mut edit = edit.clone();
     edit.contents_mut().for_each(|mut place| place.clear());
     (names, edit)
@@ -240,7 +241,7 @@ pub(crate) fn named(edit: &Edit) -> (Vec<StampId>, Edit) {
 
 /// The bytes of a file with the content of a name.
 #[cfg(feature = "store")]
-pub(crate) fn content_file(contents: &Stamps, name: StampId) -> Vec<u8> {
+pub(crate) fn content_file(contents: &ContentTable, name: ContentId) -> Vec<u8> {
     let mut bytes = Vec::new();
     if let Some(image) = contents.get(name) {
         let mut payload = Vec::new();

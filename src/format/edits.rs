@@ -7,9 +7,9 @@
 //! journals and portable worlds hold content whole.
 
 use super::bytes::{Reader, put_bytes, put_number, put_signed};
-use super::contents::{Resolved, Stamps, named};
+use super::contents::{ContentTable, Resolved, named};
 use super::error::FormatError;
-use super::ids::StampId;
+use super::ids::ContentId;
 use super::plain;
 use crate::brush::Edit;
 
@@ -71,7 +71,7 @@ impl Parts {
 pub struct EditSequence {
     last: Parts,
     /// Names that have come.
-    names: Vec<StampId>,
+    names: Vec<ContentId>,
     /// Whether content is written whole, in place of its name.
     is_whole: bool,
 }
@@ -84,7 +84,7 @@ impl EditSequence {
 
     /// A sequence in which these names have come.
     #[cfg(feature = "store")]
-    pub fn with_names(names: Vec<StampId>) -> Self {
+    pub fn with_names(names: Vec<ContentId>) -> Self {
         Self { names, ..Self::default() }
     }
 
@@ -118,7 +118,7 @@ impl EditSequence {
         &mut self,
         head: u8,
         reader: &mut Reader,
-        contents: &Stamps,
+        contents: &ContentTable,
     ) -> Result<Resolved, FormatError> {
         let is_named = head == NAMED;
         if is_named && self.is_whole {
@@ -140,9 +140,9 @@ impl EditSequence {
         contents.resolve(edit, &names)
     }
 
-    fn read_name(&mut self, reader: &mut Reader) -> Result<StampId, FormatError> {
+    fn read_name(&mut self, reader: &mut Reader) -> Result<ContentId, FormatError> {
         let Some(place) = reader.number()?.checked_sub(1) else {
-            let name = StampId(u64::from_le_bytes(reader.array()?));
+            let name = ContentId(u64::from_le_bytes(reader.array()?));
             self.names.push(name);
             return Ok(name);
         };

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::ids::{Kind, StampId, WorldId};
+use super::ids::{ContentId, Kind, WorldId};
 use crate::lattice::{BrickPos, ChunkPos};
 
 /// Why bytes can't be read as a part of a saved world.
@@ -69,7 +69,7 @@ pub enum FormatError {
     Edit(String),
     /// An edit names an image or a prefab that is not there.
     #[error("the record names the content {:016x}, which is missing or damaged", .0.0)]
-    ContentMissing(StampId),
+    ContentMissing(ContentId),
     /// A file of a level is missing, or is none of a level's.
     #[error("`{name}`: {why}")]
     File {

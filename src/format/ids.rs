@@ -51,4 +51,4 @@ impl fmt::Display for WorldId {
 
 /// Identifies an image or a prefab by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct StampId(pub u64);
+pub struct ContentId(pub u64);

@@ -1,7 +1,7 @@
 //! The bulk lane: a sequence of messages as one stream of bytes, which the server cuts into pieces according to its
 //! limits.
 
-use super::Stamps;
+use super::ContentTable;
 use super::message::{MAX_TO_CLIENT, ToClient};
 use crate::format::FormatError;
 use crate::format::bytes::{Reader, put_bytes};
@@ -36,9 +36,13 @@ impl BulkReader {
     /// # Errors
     /// When it is invalid: the next call reads the message after it. Or when it is longer than a message may be: then
     /// nothing more can be read.
-    pub fn next(&mut self, ground: &Ground, stamps: &Stamps) -> Result<Option<ToClient>, FormatError> {
+    pub fn next(
+        &mut self,
+        ground: &Ground,
+        contents: &ContentTable,
+    ) -> Result<Option<ToClient>, FormatError> {
         let Some(message) = self.next_bytes()? else { return Ok(None) };
-        match ToClient::from_bytes(&message, ground, stamps)? {
+        match ToClient::from_bytes(&message, ground, contents)? {
             ToClient::Piece(_) => Err(FormatError::Invalid("piece inside a stream")),
             message => Ok(Some(message)),
         }

@@ -13,7 +13,7 @@
 //!                                     <-   Hashes after a mark
 //!   Fetch, where hashes differ        ->
 //!                                     <-   Piece ...      (bulk) these regions at a later number
-//!   Images, where stamps have others  ->
+//!   Images, where edits hold others   ->
 //!                                     <-   Piece ...      (bulk) these images
 //! ```
 //!
@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use glam::IVec3;
 
-use super::StampId;
+use super::ContentId;
 use crate::brush::{Edit, Prefab};
 use crate::format::WorldId;
 use crate::ground::GreyImage;
@@ -210,7 +210,7 @@ pub enum ToServer {
     /// Asks for images of stamps, and for prefabs, that the client does not have.
     Images {
         /// At most [`MAX_IMAGES`].
-        images: Vec<StampId>,
+        images: Vec<ContentId>,
     },
 }
 
@@ -380,9 +380,9 @@ pub enum Refusal {
     /// The edit arrived before the client had joined.
     #[error("the client has not joined yet")]
     NotJoined,
-    /// The server does not have the image of the stamp.
-    #[error("the server does not have the image of the stamp")]
-    UnknownStamp,
+    /// The server does not have an image, grid or prefab that the edit holds.
+    #[error("the server does not have an image, grid or prefab of the edit")]
+    UnknownContent,
 }
 
 /// The reason why a server removes a client.

@@ -18,7 +18,7 @@
 //! A server that lets one client in and orders its dig:
 //!
 //! ```
-//! use bevy_burrow::net::{ClientId, Hello, PROTOCOL, Server, ServerSettings, Stamps, ToClient, ToServer};
+//! use bevy_burrow::net::{ClientId, Hello, PROTOCOL, Server, ServerSettings, ContentTable, ToClient, ToServer};
 //! use bevy_burrow::prelude::*;
 //! use bevy_burrow::terrain::SIMULATION;
 //! use glam::{IVec3, Vec3};
@@ -48,7 +48,7 @@
 //! let sent: Vec<ToClient> = server
 //!     .take_outgoing()
 //!     .iter()
-//!     .map(|(_, _, bytes)| ToClient::from_bytes(bytes, &ground, &Stamps::default()))
+//!     .map(|(_, _, bytes)| ToClient::from_bytes(bytes, &ground, &ContentTable::default()))
 //!     .collect::<Result<_, _>>()?;
 //! assert!(matches!(&sent[..], [ToClient::Welcome(_), ToClient::Entries(_)]));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -66,9 +66,9 @@ mod replica;
 pub mod server;
 
 #[doc(inline)]
-pub use crate::format::contents::Stamps;
+pub use crate::format::contents::ContentTable;
 #[doc(inline)]
-pub use crate::format::ids::StampId;
+pub use crate::format::ids::ContentId;
 use crate::terrain::{Meshing, Terrain, WorkLimits};
 pub use bucket::Rate;
 #[doc(hidden)]
@@ -88,7 +88,7 @@ pub use replica::ShownChange;
 #[doc(hidden)]
 pub use server::{
     Admission, Outgoing, Permission, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
-    UnknownStamp,
+    UnknownContent,
 };
 
 /// Prepares a terrain that is never shown: it builds no meshes, keeps no history, and accepts all work.

@@ -7,8 +7,8 @@ use std::sync::{Mutex, PoisonError};
 
 use super::files::{Files, Opening};
 use super::reading::read_file;
-use crate::format::contents::{Stamps, content_file};
-use crate::format::ids::StampId;
+use crate::format::contents::{ContentTable, content_file};
+use crate::format::ids::ContentId;
 
 /// The folder of the journal.
 pub(super) const FOLDER: &str = "journal";
@@ -16,24 +16,28 @@ pub(super) const FOLDER: &str = "journal";
 /// How the names of such files end.
 const ENDING: &str = ".content";
 
-fn path(name: StampId) -> String {
+fn path(name: ContentId) -> String {
     format!("{FOLDER}/{:016x}{ENDING}", name.0)
 }
 
 /// The content whose file has this name.
-fn name_of(file: &str) -> Option<StampId> {
-    let name = StampId(u64::from_str_radix(file.strip_suffix(ENDING)?, 16).ok()?);
+fn name_of(file: &str) -> Option<ContentId> {
+    let name = ContentId(u64::from_str_radix(file.strip_suffix(ENDING)?, 16).ok()?);
     path(name).ends_with(&format!("/{file}")).then_some(name)
 }
 
 /// Whether a file holds the content of its name.
-fn is_valid(files: &dyn Files, name: StampId) -> bool {
+fn is_valid(files: &dyn Files, name: ContentId) -> bool {
     let bytes = read_file(files, &path(name));
-    bytes.is_ok_and(|read| Stamps::default().add_file(name, &read.bytes))
+    bytes.is_ok_and(|read| ContentTable::default().add_file(name, &read.bytes))
 }
 
 /// Makes the content of these names durable, unless it is in `written` and still there.
-pub(super) fn write(files: &dyn Files, contents: &Stamps, written: &mut BTreeSet<StampId>) -> io::Result<()> {
+pub(super) fn write(
+    files: &dyn Files,
+    contents: &ContentTable,
+    written: &mut BTreeSet<ContentId>,
+) -> io::Result<()> {
     let mut is_new = false;
     for name in contents.names() {
         let path = path(name);
@@ -71,8 +75,8 @@ fn write_file(files: &dyn Files, path: &str, bytes: &[u8]) -> io::Result<()> {
 /// Removes the files of all other content.
 pub(super) fn retain(
     files: &dyn Files,
-    needed: &BTreeSet<StampId>,
-    written: &mut BTreeSet<StampId>,
+    needed: &BTreeSet<ContentId>,
+    written: &mut BTreeSet<ContentId>,
 ) -> io::Result<()> {
     for name in files.list(FOLDER)?.iter().filter_map(|file| name_of(file)) {
         if !needed.contains(&name) {
@@ -89,13 +93,13 @@ pub(super) fn retain(
 /// The content that was found of a world's journal. It is decoded where a frame is.
 #[derive(Debug, Default)]
 pub(super) struct FoundContents {
-    files: Vec<(StampId, Box<[u8]>)>,
-    decoded: Mutex<Stamps>,
+    files: Vec<(ContentId, Box<[u8]>)>,
+    decoded: Mutex<ContentTable>,
 }
 
 impl FoundContents {
     /// Reads the files of these names. Those that are missing or damaged are found out where a frame needs them.
-    pub fn read(files: &dyn Files, names: BTreeSet<StampId>) -> Self {
+    pub fn read(files: &dyn Files, names: BTreeSet<ContentId>) -> Self {
         let read = names.into_iter().filter_map(|name| {
             let read = read_file(files, &path(name)).ok()?;
             Some((name, read.bytes.into_boxed_slice()))
@@ -104,7 +108,7 @@ impl FoundContents {
     }
 
     /// A table with the content of these names, as far as it is there and not damaged.
-    pub fn table(&self, names: &[StampId]) -> Stamps {
+    pub fn table(&self, names: &[ContentId]) -> ContentTable {
         let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
         for name in names {
             let file = self.files.binary_search_by_key(name, |(name, _)| *name).ok();

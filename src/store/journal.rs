@@ -8,9 +8,9 @@ use super::files::{Files, OpenFile, Opening};
 use super::segment::{self, FOLDER};
 use super::{contents, unsaved};
 use crate::format::Batch;
-use crate::format::contents::Stamps;
+use crate::format::contents::ContentTable;
 use crate::format::frame::WorldId;
-use crate::format::ids::StampId;
+use crate::format::ids::ContentId;
 
 /// The most bytes of a segment. Whole segments are removed, so the log is cut in steps of this.
 const SEGMENT_BYTES: u64 = 1 << 20;
@@ -24,7 +24,7 @@ struct Waiting {
     frame: u64,
     entry: Vec<u8>,
     /// The content that it names.
-    contents: Stamps,
+    contents: ContentTable,
 }
 
 /// The segment that is written.
@@ -45,7 +45,7 @@ pub(super) struct Segment {
     pub last_frame: u64,
     pub bytes: u64,
     /// The names of content in its frames.
-    pub names: BTreeSet<StampId>,
+    pub names: BTreeSet<ContentId>,
 }
 
 /// The journal as it is written.
@@ -60,7 +60,7 @@ pub(super) struct Journal {
     waiting_bytes: usize,
     segments: Vec<Segment>,
     /// The content that this process has made durable.
-    written: BTreeSet<StampId>,
+    written: BTreeSet<ContentId>,
     next_frame: u64,
     next_segment: u64,
     /// The head of the next segment: a revision and its checkpoint.
@@ -225,7 +225,7 @@ impl Journal {
             total -= segment::on_disk(oldest.bytes);
             self.segments.remove(0);
         }
-        let mut needed: BTreeSet<StampId> =
+        let mut needed: BTreeSet<ContentId> =
             self.segments.iter().flat_map(|own| &own.names).copied().collect();
         needed.extend(self.waiting.iter().flat_map(|waiting| waiting.contents.names()));
         contents::retain(&*self.files, &needed, &mut self.written)

@@ -15,7 +15,7 @@ use super::contents::FoundContents;
 use super::files::Files;
 use super::reading::{is_refused, read_file};
 use crate::format::frame::{self, Kind, WorldId};
-use crate::format::ids::StampId;
+use crate::format::ids::ContentId;
 use crate::format::{Batch, FormatError};
 use crate::ground::Ground;
 use crate::terrain::SIMULATION;
@@ -104,7 +104,7 @@ pub(super) struct Frame {
     pub base: u64,
     world: WorldId,
     /// The names of the content of its edits; `None` if these hold it whole.
-    pub names: Option<Vec<StampId>>,
+    pub names: Option<Vec<ContentId>>,
     /// Its bytes, which hold the commits. Unpacked they may be far more.
     sealed: Box<[u8]>,
     /// Where its entry is in its segment.
@@ -172,7 +172,7 @@ pub(super) struct Found {
 
 impl Found {
     /// The names of content in its frames up to a number.
-    pub fn names(&self, last_frame: u64) -> BTreeSet<StampId> {
+    pub fn names(&self, last_frame: u64) -> BTreeSet<ContentId> {
         let frames = self.frames.iter().filter(|frame| frame.number <= last_frame);
         frames.flat_map(|frame| frame.names.iter().flatten()).copied().collect()
     }

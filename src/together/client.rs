@@ -150,7 +150,7 @@ impl Turn<'_, '_> {
         }
         if shared.link.is_none() {
             // A terrain that is there has valid settings.
-            shared.link = Link::new(terrain, &shared.stamps).ok();
+            shared.link = Link::new(terrain, &shared.contents).ok();
         }
         let link = shared.link.as_mut()?;
         requests.into_iter().for_each(|request| link.request(request));
@@ -165,11 +165,11 @@ impl Turn<'_, '_> {
             _ => None,
         };
         link.facts.has_joined &= follows.is_some() && follows == link.greeted;
-        link.has_new_stamps |= is_changed;
+        link.has_new_contents |= is_changed;
         let Some(mut client) = link.client.take() else { return standing.trouble() };
-        if std::mem::take(&mut link.has_new_stamps) {
+        if std::mem::take(&mut link.has_new_contents) {
             // It may have got others from the server.
-            client.stamps_mut().add_all(&shared.stamps);
+            client.contents_mut().add_all(&shared.contents);
         }
         client.set_place(shared.place);
         if follows != link.greeted {

@@ -8,7 +8,7 @@ use bevy::platform::time::Instant;
 use super::messages::GroundId;
 use super::service::Service;
 use super::trouble::SharingTrouble;
-use crate::net::{self, Client, KickReason, Lane, ShownChange, Stamps};
+use crate::net::{self, Client, ContentTable, KickReason, Lane, ShownChange};
 use crate::plugin::{LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Asked, Order, Terrain, TerrainError, TerrainSettings, Version, World};
 use crate::threads::{ThreadTask, Threads};
@@ -43,8 +43,8 @@ pub(super) struct Link {
     pub start: Instant,
     pub facts: Facts,
     pub is_playable: bool,
-    /// The game may have changed the images of stamps.
-    pub has_new_stamps: bool,
+    /// The game may have changed the contents that edits may hold.
+    pub has_new_contents: bool,
     pub display: Display,
     /// The rules of the terrain, which have no effect.
     pub rules: Option<DiggingRules>,
@@ -107,13 +107,13 @@ impl Link {
     ///
     /// # Errors
     /// When the terrain's settings are those of no terrain.
-    pub fn new(terrain: &mut Terrain, stamps: &Stamps) -> Result<Self, TerrainError> {
+    pub fn new(terrain: &mut Terrain, contents: &ContentTable) -> Result<Self, TerrainError> {
         let world = terrain.snapshot();
         let ground = GroundId::of(&world);
         let settings =
             TerrainSettings { chunk_size: ground.chunk_size as u32, voxel_size: terrain.voxel_size() };
         let mut client = Client::new(world.shared_ground(), &settings)?;
-        client.stamps_mut().add_all(stamps);
+        client.contents_mut().add_all(contents);
         let is_pristine = world.bricks().next().is_none() && world.fields().next().is_none();
         let (client, task) = if is_pristine {
             (Some(client), None)
@@ -145,7 +145,7 @@ impl Link {
             start: Instant::now(),
             facts: Facts::default(),
             is_playable: false,
-            has_new_stamps: false,
+            has_new_contents: false,
             display: Display::of(terrain),
             rules: terrain.rules().cloned(),
         })

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use super::link::Link;
 use super::sharing::Sharing;
 use super::trouble::SharingTrouble;
-use crate::net::{self, ClientEvent, Refusal, Stamps};
+use crate::net::{self, ClientEvent, ContentTable, Refusal};
 use crate::plugin::EditOutbox;
 use crate::terrain::Receipt;
 
@@ -24,8 +24,9 @@ use crate::terrain::Receipt;
 #[derive(Component, Default)]
 #[component(on_add = warn_without_plugin)]
 pub struct SharedTerrain {
-    /// Images that the player may stamp with. The server needs them too; players that lack one get it from there.
-    pub stamps: Stamps,
+    /// Images, grids and prefabs that the player's edits may hold. The server needs them too; players that lack one get it from
+    /// there.
+    pub contents: ContentTable,
     /// The player's position, in voxels of the terrain: missing ground is fetched from there outwards.
     pub place: IVec3,
     pub(super) link: Option<Link>,

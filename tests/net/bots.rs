@@ -7,7 +7,7 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::ChunkPos;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, Entries, Entry, Lane, Server, ServerSettings, ShownChange, Stamps,
+    Client, ClientEvent, ClientId, ContentTable, Entries, Entry, Lane, Server, ServerSettings, ShownChange,
     ToClient,
 };
 use bevy_burrow::prelude::*;
@@ -42,7 +42,7 @@ fn plants(world: &World) -> Vec<bevy_burrow::scatter::Plant> {
 pub struct Reference {
     terrain: Terrain,
     ground: Arc<Ground>,
-    stamps: Stamps,
+    contents: ContentTable,
     pub number: u64,
     pub hashes: BTreeMap<u64, u64>,
     pub loose: usize,
@@ -54,7 +54,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    fn new(ground: &Arc<Ground>, stamps: Stamps) -> Self {
+    fn new(ground: &Arc<Ground>, contents: ContentTable) -> Self {
         let terrain = terrain(ground);
         let hashes = BTreeMap::from([(0, terrain.world().hash())]);
         let ground = Arc::clone(ground);
@@ -62,7 +62,7 @@ impl Reference {
         Self {
             terrain,
             ground,
-            stamps,
+            contents,
             number: 0,
             hashes,
             loose: 0,
@@ -83,7 +83,7 @@ impl Reference {
 
     /// Applies the new entries of a message.
     fn obey(&mut self, message: &[u8]) {
-        let message = ToClient::from_bytes(message, &self.ground, &self.stamps).expect("a message");
+        let message = ToClient::from_bytes(message, &self.ground, &self.contents).expect("a message");
         let ToClient::Entries(Entries { first, entries }) = message else { return };
         for (number, entry) in (first..).zip(entries) {
             if number != self.number + 1 {
@@ -170,10 +170,10 @@ impl Bot {
     fn new(id: u64, ground: &Arc<Ground>, image: &Arc<GreyImage>, now: Duration) -> Self {
         let mut client =
             Client::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
-        client.stamps_mut().add(Arc::clone(image));
+        client.contents_mut().add(Arc::clone(image));
         // Others get what they lack from the server.
         if id.is_multiple_of(2) {
-            add_contents(client.stamps_mut());
+            add_contents(client.contents_mut());
         }
         client.set_place(IVec3::new(20, 20, 20));
         client.connect(now);
@@ -229,7 +229,7 @@ impl Bot {
         self.edits += 1;
         let brush = brush.with_tag(self.edits).with_stroke(self.edits / 4);
         let Ok(edit) = Edit::quantize(&brush) else { return self.edits -= 1 };
-        if !self.client.stamps_mut().can_send(&edit) {
+        if !self.client.contents_mut().can_send(&edit) {
             return self.edits -= 1;
         }
         self.dug.insert(self.edits, frame);
@@ -315,13 +315,13 @@ pub struct Play {
 }
 
 /// Adds the grids and prefabs of random brushes.
-fn add_contents(stamps: &mut Stamps) {
+fn add_contents(contents: &mut ContentTable) {
     let (grids, prefabs) = contents();
     for grid in grids {
-        stamps.add(Arc::clone(grid.image()));
+        contents.add(Arc::clone(grid.image()));
     }
     for prefab in prefabs {
-        stamps.add_prefab(Arc::clone(prefab)).expect("it is small");
+        contents.add_prefab(Arc::clone(prefab)).expect("it is small");
     }
 }
 
@@ -330,11 +330,11 @@ impl Play {
         let samples = (0..64).map(|at: u16| at * 900).collect();
         let image = Arc::new(GreyImage::from_samples(8, 8, samples).expect("an image"));
         let mut server = Server::new(terrain(ground), settings);
-        let mut stamps = Stamps::default();
-        stamps.add(Arc::clone(&image));
-        add_contents(&mut stamps);
-        server.stamps_mut().add_all(&stamps);
-        let reference = Reference::new(ground, stamps);
+        let mut contents = ContentTable::default();
+        contents.add(Arc::clone(&image));
+        add_contents(&mut contents);
+        server.contents_mut().add_all(&contents);
+        let reference = Reference::new(ground, contents);
         let mut play = Self {
             server,
             ground: Arc::clone(ground),
@@ -438,7 +438,7 @@ impl Play {
                 for (lane, way) in [(Lane::Order, &mut bot.order), (Lane::Bulk, &mut bot.bulk)] {
                     while let Some((at, message)) = way.next(self.now) {
                         if let Ok(ToClient::Entries(Entries { first, entries })) =
-                            ToClient::from_bytes(&message, &self.ground, &self.reference.stamps)
+                            ToClient::from_bytes(&message, &self.ground, &self.reference.contents)
                         {
                             bot.arrived.push_back((at, first + entries.len() as u64 - 1));
                         }

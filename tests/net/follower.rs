@@ -8,8 +8,8 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::{BrickPos, ChunkPos, RegionPos};
 use bevy_burrow::net::{
-    BulkReader, ClientId, Entries, Entry, Epoch, Hello, Join, KickReason, Lane, PROTOCOL, Refusal,
-    RegionContent, RegionHashes, RuleState, Server, Stamps, ToClient, ToServer, Welcome, region_hash,
+    BulkReader, ClientId, ContentTable, Entries, Entry, Epoch, Hello, Join, KickReason, Lane, PROTOCOL,
+    Refusal, RegionContent, RegionHashes, RuleState, Server, ToClient, ToServer, Welcome, region_hash,
     touched_regions,
 };
 use bevy_burrow::prelude::*;
@@ -39,7 +39,7 @@ pub fn terrain(ground: &Arc<Ground>) -> Terrain {
 pub struct Follower {
     pub id: ClientId,
     ground: Arc<Ground>,
-    pub stamps: Stamps,
+    pub contents: ContentTable,
     pub terrain: Terrain,
     pub epoch: Option<Epoch>,
     /// The number of the last applied entry.
@@ -84,7 +84,7 @@ impl Follower {
         Self {
             id: ClientId(id),
             ground: Arc::clone(ground),
-            stamps: Stamps::default(),
+            contents: ContentTable::default(),
             terrain: terrain(ground),
             epoch: None,
             number: 0,
@@ -158,10 +158,10 @@ impl Follower {
 
     pub fn receive(&mut self, lane: Lane, bytes: &[u8]) {
         self.bytes[(lane == Lane::Bulk) as usize] += bytes.len() as u64;
-        let message = ToClient::from_bytes(bytes, &self.ground, &self.stamps).expect("a valid message");
+        let message = ToClient::from_bytes(bytes, &self.ground, &self.contents).expect("a valid message");
         assert_eq!(matches!(message, ToClient::Piece(_)), lane == Lane::Bulk);
         self.take(message);
-        while let Some(message) = self.bulk.next(&self.ground, &self.stamps).expect("a valid stream") {
+        while let Some(message) = self.bulk.next(&self.ground, &self.contents).expect("a valid stream") {
             self.take(message);
         }
         self.go_on();

@@ -7,8 +7,8 @@ use allocation_counter::measure;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    BulkReader, ClientId, Entries, Epoch, Hello, KickReason, Lane, PROTOCOL, Rate, Reach, Refusal, Server,
-    ServerSettings, Stamps, ToClient, ToServer, UndoPolicy,
+    BulkReader, ClientId, ContentTable, Entries, Epoch, Hello, KickReason, Lane, PROTOCOL, Rate, Reach,
+    Refusal, Server, ServerSettings, ToClient, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::SIMULATION;
@@ -59,7 +59,7 @@ fn hostile(rng: &mut Rng, valid: &[Vec<u8>]) -> Vec<u8> {
 
 struct Messages {
     ground: Arc<Ground>,
-    stamps: Stamps,
+    contents: ContentTable,
     image: Arc<GreyImage>,
     to_server: Vec<Vec<u8>>,
     to_client: Vec<Vec<u8>>,
@@ -71,8 +71,8 @@ impl Messages {
         let (ground, mut rng) = (hills(128), Rng::with_seed(7));
         let samples = (0..64).map(|at: u16| at * 1000).collect();
         let image = Arc::new(GreyImage::from_samples(8, 8, samples).unwrap());
-        let mut stamps = Stamps::default();
-        stamps.add(Arc::clone(&image));
+        let mut contents = ContentTable::default();
+        contents.add(Arc::clone(&image));
         let settings = ServerSettings {
             undo: UndoPolicy::Own,
             cost: Rate { per_second: 1 << 40, burst: 1 << 40 },
@@ -80,9 +80,9 @@ impl Messages {
             ..ServerSettings::default()
         };
         let mut server = Server::new(terrain(&ground), settings);
-        *server.stamps_mut() = stamps.clone();
+        *server.contents_mut() = contents.clone();
         let mut bots: Vec<Follower> = (1..4).map(|id| Follower::new(id, &ground)).collect();
-        bots.iter_mut().for_each(|bot| bot.stamps = stamps.clone());
+        bots.iter_mut().for_each(|bot| bot.contents = contents.clone());
         let (mut to_server, mut to_client) = (Vec::new(), Vec::new());
         let mut now = Duration::ZERO;
         for round in 0..60 {
@@ -136,7 +136,7 @@ impl Messages {
                 server.advance(now);
                 for (to, lane, bytes) in server.take_outgoing() {
                     if (to, lane) == (late.id, Lane::Bulk)
-                        && let Ok(ToClient::Piece(piece)) = ToClient::from_bytes(&bytes, &ground, &stamps)
+                        && let Ok(ToClient::Piece(piece)) = ToClient::from_bytes(&bytes, &ground, &contents)
                     {
                         to_client.extend((frame == 0).then_some(bytes));
                         bulk.add(&piece);
@@ -144,7 +144,7 @@ impl Messages {
                         server.receive(late.id, &ack.to_bytes(), now);
                     }
                 }
-                while let Some(message) = bulk.next(&ground, &stamps).unwrap() {
+                while let Some(message) = bulk.next(&ground, &contents).unwrap() {
                     to_client.push(message.to_bytes());
                 }
             }
@@ -156,22 +156,22 @@ impl Messages {
             messages.sort();
             messages.dedup();
         }
-        Self { ground, stamps, image, to_server, to_client }
+        Self { ground, contents, image, to_server, to_client }
     }
 }
 
 #[test]
 fn messages_of_every_kind_come_back_from_their_bytes() {
-    let Messages { ground, stamps, to_server, to_client, .. } = Messages::new();
+    let Messages { ground, contents, to_server, to_client, .. } = Messages::new();
     let mut tags = [[0; 10]; 2];
     for bytes in &to_server {
-        let message = ToServer::from_bytes(bytes, &stamps).unwrap();
+        let message = ToServer::from_bytes(bytes, &contents).unwrap();
         assert_eq!(&message.to_bytes(), bytes);
         tags[0][usize::from(bytes[0])] += 1;
     }
     let mut entries = [0; 5];
     for bytes in &to_client {
-        let message = ToClient::from_bytes(bytes, &ground, &stamps).unwrap();
+        let message = ToClient::from_bytes(bytes, &ground, &contents).unwrap();
         assert_eq!(&message.to_bytes(), bytes);
         tags[1][usize::from(bytes[0])] += 1;
         let ToClient::Entries(Entries { entries: own, .. }) = &message else { continue };
@@ -192,54 +192,54 @@ fn messages_of_every_kind_come_back_from_their_bytes() {
 
 #[test]
 fn stamps_are_sent_by_name() {
-    let Messages { stamps, image, .. } = Messages::new();
+    let Messages { contents, image, .. } = Messages::new();
     let at = Vec3::new(64.0, 20.0, 64.0);
     let stamp = |image: &Arc<GreyImage>| {
         let stamp = Stamp::new(Arc::clone(image), at, Vec2::splat(9.0), 3.0);
         let edit = Edit::quantize(&Brush::stamp(Shape::sphere(at, 6.0), stamp)).unwrap();
-        (stamps.can_send(&edit), ToServer::Edits { first: 1, edits: vec![edit] })
+        (contents.can_send(&edit), ToServer::Edits { first: 1, edits: vec![edit] })
     };
     let (can, message) = stamp(&image);
     let bytes = message.to_bytes();
     assert!(can && bytes.len() < 80, "{} bytes", bytes.len());
-    assert_eq!(ToServer::from_bytes(&bytes, &stamps), Ok(message));
+    assert_eq!(ToServer::from_bytes(&bytes, &contents), Ok(message));
     let other = Arc::new(GreyImage::from_samples(8, 8, vec![9; 64]).unwrap());
     let (can, message) = stamp(&other);
-    assert!(!can && ToServer::from_bytes(&message.to_bytes(), &stamps).is_err());
+    assert!(!can && ToServer::from_bytes(&message.to_bytes(), &contents).is_err());
 }
 
 #[test]
 fn decoders_take_any_bytes() {
-    let Messages { ground, stamps, to_server, to_client, .. } = Messages::new();
+    let Messages { ground, contents, to_server, to_client, .. } = Messages::new();
     let mut rng = Rng::with_seed(count("BURROW_SEED", 1));
     let (runs, mut accepted, mut most) = (count("BURROW_FUZZ", 20_000), [0; 2], [0; 2]);
     for _ in 0..runs {
         let bytes = hostile(&mut rng, &to_server);
         let mut message = None;
-        let memory = measure(|| message = ToServer::from_bytes(&bytes, &stamps).ok()).bytes_max;
+        let memory = measure(|| message = ToServer::from_bytes(&bytes, &contents).ok()).bytes_max;
         assert!(memory < ANYWAY + TO_SERVER * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
         most[0] = memory.max(most[0]);
         if let Some(message) = message {
             accepted[0] += 1;
-            assert_eq!(ToServer::from_bytes(&message.to_bytes(), &stamps), Ok(message));
+            assert_eq!(ToServer::from_bytes(&message.to_bytes(), &contents), Ok(message));
         }
     }
     // Those to clients come from a server that is trusted more, and are larger.
     for _ in 0..runs / 20 {
         let bytes = hostile(&mut rng, &to_client);
         let mut message = None;
-        let memory = measure(|| message = ToClient::from_bytes(&bytes, &ground, &stamps).ok()).bytes_max;
+        let memory = measure(|| message = ToClient::from_bytes(&bytes, &ground, &contents).ok()).bytes_max;
         assert!(memory < ANYWAY + TO_CLIENT * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
         most[1] = memory.max(most[1]);
         if let Some(message) = message {
             accepted[1] += 1;
             let again = message.to_bytes();
-            let read = ToClient::from_bytes(&again, &ground, &stamps).unwrap();
+            let read = ToClient::from_bytes(&again, &ground, &contents).unwrap();
             assert_eq!(read.to_bytes(), again);
         }
         let mut stream = BulkReader::default();
         stream.add(&bytes);
-        while let Ok(Some(_)) = stream.next(&ground, &stamps) {}
+        while let Ok(Some(_)) = stream.next(&ground, &contents) {}
     }
     println!("{runs} messages: {accepted:?} accepted, {most:?} bytes of memory at most");
     assert!(accepted.iter().all(|&count| count > runs / 400), "{accepted:?}");
@@ -261,7 +261,7 @@ fn hello(ground: &Ground) -> Vec<u8> {
 
 #[test]
 fn a_server_takes_any_messages() {
-    let Messages { ground, stamps, to_server, .. } = Messages::new();
+    let Messages { ground, contents, to_server, .. } = Messages::new();
     let mut rng = Rng::with_seed(count("BURROW_SEED", 1) + 1);
     let reach = Reach { distance: 60, speed: 0, latency: Duration::ZERO };
     let settings = ServerSettings {
@@ -271,7 +271,7 @@ fn a_server_takes_any_messages() {
         ..Default::default()
     };
     let mut server = Server::new(terrain(&ground), settings);
-    *server.stamps_mut() = stamps.clone();
+    *server.contents_mut() = contents.clone();
     let mut now = Duration::from_secs(1);
     let begin = |server: &mut Server, client: ClientId, now: Duration| {
         server.connect(client, now);
@@ -279,13 +279,13 @@ fn a_server_takes_any_messages() {
         server.receive(client, &hello(&ground), now);
     };
     let mut honest = Follower::new(99, &ground);
-    honest.stamps = stamps.clone();
+    honest.contents = contents.clone();
     honest.connect(&mut server, now);
     server.set_place(honest.id, Some(IVec3::new(64, 20, 64)));
     let mut attackers: Vec<(ClientId, u64)> = (0..8).map(|id| (ClientId(1000 + id), 1)).collect();
     let edits: Vec<Vec<Edit>> = to_server
         .iter()
-        .filter_map(|bytes| match ToServer::from_bytes(bytes, &stamps) {
+        .filter_map(|bytes| match ToServer::from_bytes(bytes, &contents) {
             Ok(ToServer::Edits { edits, .. }) => Some(edits),
             _ => None,
         })
@@ -319,7 +319,7 @@ fn a_server_takes_any_messages() {
                 if to == honest.id {
                     honest.receive(lane, &bytes);
                 } else if bytes.len() == 2
-                    && let Ok(ToClient::Kicked(why)) = ToClient::from_bytes(&bytes, &ground, &honest.stamps)
+                    && let Ok(ToClient::Kicked(why)) = ToClient::from_bytes(&bytes, &ground, &honest.contents)
                 {
                     kicks[usize::from(why == KickReason::Flood)] += 1;
                     begun += 1;

@@ -63,7 +63,7 @@ fn all_have_the_same_world_at_every_number() {
 /// Calls a function for the entries that are sent to the first player, until it has changed some; it may drop them.
 fn lie(play: &mut Play, mut change: impl FnMut(&mut Vec<Entry>) -> Lie + 'static) {
     let (ground, stamps) = (Arc::clone(&play.ground), Arc::clone(&play.image));
-    let mut known = bevy_burrow::net::Stamps::default();
+    let mut known = bevy_burrow::net::ContentTable::default();
     known.add(stamps);
     let mut is_done = false;
     play.tamper = Some(Box::new(move |to, lane, bytes| {
@@ -205,7 +205,7 @@ fn dig_before(play: &mut Play, edits: u64) {
     for done in 0..edits {
         let edit = Edit::quantize(&any_random_brush(&mut rng, &play.ground));
         if let Ok(edit) = edit
-            && play.server.stamps_mut().can_send(&edit)
+            && play.server.contents_mut().can_send(&edit)
         {
             play.server.edit(edit).expect("its content is known");
         }
@@ -352,9 +352,9 @@ fn a_server_that_was_killed_goes_on_where_it_was_saved() {
     for run in 0..3 {
         // Nothing is ordered while no client is connected.
         play.changes_rules = false;
-        let stamps = play.server.stamps_mut().clone();
+        let stamps = play.server.contents_mut().clone();
         play.server = Server::open(saved, &store, settings());
-        *play.server.stamps_mut() = stamps;
+        *play.server.contents_mut() = stamps;
         for at in 0..3 {
             if run > 0 {
                 let bot = &play.bots[at];
@@ -418,7 +418,7 @@ fn each_edit_is_done_once_though_the_server_is_killed() {
     let mut saved = terrain(&ground);
     let mut store = Store::create_in(Arc::new(disk.clone()), &mut saved, options()).expect("a new world");
     play.server = Server::open(saved, &store, ServerSettings::default());
-    play.server.stamps_mut().add(Arc::clone(&play.image));
+    play.server.contents_mut().add(Arc::clone(&play.image));
     (0..5).for_each(|at| {
         play.cut(at);
         play.reconnect(at);
@@ -439,7 +439,7 @@ fn each_edit_is_done_once_though_the_server_is_killed() {
         let (again, opened) =
             Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), options()).expect("it can be opened");
         play.server = Server::open(opened.terrain, &again, ServerSettings::default());
-        play.server.stamps_mut().add(Arc::clone(&play.image));
+        play.server.contents_mut().add(Arc::clone(&play.image));
         store = again;
         (0..5).for_each(|at| play.cut(at));
         let number = play.server.epoch().number;

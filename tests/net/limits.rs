@@ -8,8 +8,8 @@ use allocation_counter::measure;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, Hello, KickReason, Lane, MAX_SEQUENCE_JUMP, PROTOCOL, Rate, Reach,
-    Refusal, Server, ServerSettings, Stamps, ToClient, ToServer, UndoPolicy,
+    Client, ClientEvent, ClientId, ContentTable, Hello, KickReason, Lane, MAX_SEQUENCE_JUMP, PROTOCOL, Rate,
+    Reach, Refusal, Server, ServerSettings, ToClient, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
@@ -593,8 +593,8 @@ fn who_lacks_the_image_of_a_stamp_gets_it() {
     let (first, later) = (image(8), image(100));
     let (a, b) = (play.join(1), play.join(2));
     for (image, x) in [(&first, 40.0), (&later, 80.0)] {
-        play.server.stamps_mut().add(Arc::clone(image));
-        play.players[a].client.stamps_mut().add(Arc::clone(image));
+        play.server.contents_mut().add(Arc::clone(image));
+        play.players[a].client.contents_mut().add(Arc::clone(image));
         play.dig(a, &stamp(image, x));
         play.dig(a, &ball(30.0, 30.0, 4.0));
         play.frames(40);
@@ -618,13 +618,13 @@ fn a_stamp_that_the_server_does_not_know_is_refused() {
     let ground = flat(128);
     let mut play = Play::new(&ground, ServerSettings::default());
     let (unknown, at) = (image(8), play.join(1));
-    play.players[at].client.stamps_mut().add(Arc::clone(&unknown));
+    play.players[at].client.contents_mut().add(Arc::clone(&unknown));
     play.dig(at, &ball(30.0, 30.0, 4.0));
     play.dig(at, &stamp(&unknown, 64.0).with_tag(5));
     play.dig(at, &ball(90.0, 90.0, 4.0));
     play.frames(10);
     let player = &play.players[at];
-    let refused = ClientEvent::Refused { tag: 5, why: Some(Refusal::UnknownStamp) };
+    let refused = ClientEvent::Refused { tag: 5, why: Some(Refusal::UnknownContent) };
     assert_eq!((player.count(|event| *event == refused), player.confirmed()), (1, 2));
     assert_eq!((player.client.pending(), play.server.figures().malformed), (0, 0));
 }
@@ -663,7 +663,8 @@ fn the_order_lane_keeps_within_its_window() {
             if to == ONE {
                 at_once += if lane == Lane::Order { length } else { 0 };
                 play.players[at].client.receive(lane, bytes);
-            } else if let Ok(ToClient::Entries(_)) = ToClient::from_bytes(&bytes, &ground, &Stamps::default())
+            } else if let Ok(ToClient::Entries(_)) =
+                ToClient::from_bytes(&bytes, &ground, &ContentTable::default())
             {
                 silent += length;
                 longest = longest.max(length);

@@ -267,9 +267,9 @@ fn a_server_that_lacks_content_of_saved_entries_sends_regions() {
     for knows in [true, false] {
         let mut scene = Scene::new();
         let mut away = scene.join(1);
-        away.stamps.add(Arc::clone(&image));
+        away.contents.add(Arc::clone(&image));
         scene.server.disconnect(away.id);
-        scene.server.stamps_mut().add(Arc::clone(&image));
+        scene.server.contents_mut().add(Arc::clone(&image));
         let at = Vec3::new(60.0, 20.0, 60.0);
         let stamp = Stamp::new(Arc::clone(&image), at, Vec2::splat(9.0), 3.0);
         let edit = Edit::quantize(&Brush::stamp(Shape::sphere(at, 6.0), stamp)).expect("a valid brush");
@@ -277,7 +277,7 @@ fn a_server_that_lacks_content_of_saved_entries_sends_regions() {
         scene.play(&mut [], 3);
         scene.restart(|disk| disk);
         if knows {
-            scene.server.stamps_mut().add(Arc::clone(&image));
+            scene.server.contents_mut().add(Arc::clone(&image));
         }
         scene.connect(&mut away);
         agreed(&scene.server, &[&away]);

@@ -7,7 +7,7 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{
     ClientId, Entry, Hello, KickReason, Lane, Rate, Reach, Refusal, Server, ServerEvent, ServerSettings,
-    ToClient, ToServer, UndoPolicy, UnknownStamp,
+    ToClient, ToServer, UndoPolicy, UnknownContent,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
@@ -97,7 +97,7 @@ fn entries_go_out_before_the_server_applies_them_and_without_labels() {
     let before = scene.server.terrain().world().hash();
     let sent = scene.server.take_outgoing();
     assert_eq!((scene.server.terrain().world().hash(), sent.len()), (before, 1));
-    let ToClient::Entries(entries) = ToClient::from_bytes(&sent[0].2, &scene.ground, &a.stamps).unwrap()
+    let ToClient::Entries(entries) = ToClient::from_bytes(&sent[0].2, &scene.ground, &a.contents).unwrap()
     else {
         panic!("no entries")
     };
@@ -337,10 +337,10 @@ fn a_stamp_that_clients_can_not_read_is_not_ordered() {
     let stamp = Stamp::new(Arc::clone(&image), at, glam::Vec2::splat(9.0), 3.0);
     let edit = Edit::quantize(&Brush::stamp(Shape::sphere(at, 6.0), stamp)).expect("a valid brush");
     let number = scene.server.epoch().number;
-    assert_eq!(scene.server.edit(edit.clone()), Err(UnknownStamp));
+    assert_eq!(scene.server.edit(edit.clone()), Err(UnknownContent));
     assert_eq!(scene.server.epoch().number, number);
-    scene.server.stamps_mut().add(Arc::clone(&image));
-    a.stamps.add(image);
+    scene.server.contents_mut().add(Arc::clone(&image));
+    a.contents.add(image);
     assert_eq!(scene.server.edit(edit), Ok(()));
     scene.play(&mut [&mut a], 3);
     agreed(&scene.server, &[&a]);
@@ -399,13 +399,13 @@ fn regions_come_from_the_player_outwards_and_no_faster_than_allowed() {
             if to != late.id || lane != Lane::Bulk {
                 continue;
             }
-            let ToClient::Piece(piece) = ToClient::from_bytes(&bytes, &scene.ground, &late.stamps).unwrap()
+            let ToClient::Piece(piece) = ToClient::from_bytes(&bytes, &scene.ground, &late.contents).unwrap()
             else {
                 panic!("no piece")
             };
             got += piece.len() as u64;
             bevy_burrow::net::BulkReader::add(&mut stream, &piece);
-            while let Some(message) = stream.next(&scene.ground, &late.stamps).unwrap() {
+            while let Some(message) = stream.next(&scene.ground, &late.contents).unwrap() {
                 let ToClient::Region(content) = message else { panic!("no region") };
                 regions.push((content.pos, content.left));
             }

@@ -469,7 +469,7 @@ fn paths_roads_and_grids_reach_everybody() {
     let shape = |x: f32| GridShape::new(grid.clone(), Vec3::new(x, 2.0, 70.0)).with_scale(0.5);
     let edit = |x: f32| Edit::quantize(&Brush::dig(shape(x))).expect("valid");
     assert!(server.edit(edit(50.0)).is_err(), "nobody can get it");
-    server.stamps_mut().add(Arc::clone(grid.image()));
+    server.contents_mut().add(Arc::clone(grid.image()));
     let sent = |server: &Server| server.figures().bulk_bytes;
     let before = sent(&server);
     for x in [50.0, 56.0, 30.0] {
@@ -523,9 +523,9 @@ fn a_paste_within_a_grid_reaches_everybody() {
     };
     let at = Vec3::new(60.0, 8.0, 60.0);
     assert!(server.edit(paste(at)).is_err(), "nobody can get it");
-    server.stamps_mut().add(Arc::clone(grid.image()));
+    server.contents_mut().add(Arc::clone(grid.image()));
     assert!(server.edit(paste(at)).is_err(), "nobody can get the prefab");
-    assert!(server.stamps_mut().add_prefab(Arc::clone(&prefab)).is_some());
+    assert!(server.contents_mut().add_prefab(Arc::clone(&prefab)).is_some());
     let before = server.terrain().world().hash();
     server.edit(paste(at)).expect("both are in the list");
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
@@ -544,7 +544,7 @@ fn a_paste_within_a_grid_reaches_everybody() {
 fn a_grid_that_is_too_large_where_it_is_named_is_refused() {
     let (mut server, mut client, _, mut now) = joined();
     let (small, large) = (ball(5), ball(128));
-    let known = [&small, &large].map(|grid| server.stamps_mut().add(Arc::clone(grid.image())));
+    let known = [&small, &large].map(|grid| server.contents_mut().add(Arc::clone(grid.image())));
     let shape = GridShape::new(small, Vec3::splat(40.0)).with_scale(64.0);
     let edit = Edit::quantize(&Brush::dig(shape)).expect("valid");
     let mut message = ToServer::Edits { first: 1, edits: vec![edit] }.to_bytes();

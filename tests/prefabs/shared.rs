@@ -87,8 +87,8 @@ fn clients_that_lack_a_prefab_get_it_once_and_have_the_servers_world() {
         client.connect(Duration::ZERO);
         clients.push(client);
     }
-    server.stamps_mut().add_prefab(Arc::clone(&prefab)).expect("it is small");
-    clients[0].stamps_mut().add_prefab(Arc::clone(&prefab)).expect("it is small");
+    server.contents_mut().add_prefab(Arc::clone(&prefab)).expect("it is small");
+    clients[0].contents_mut().add_prefab(Arc::clone(&prefab)).expect("it is small");
     let mut play = Play { server, clients, now: Duration::from_secs(1), bytes: [0; 2] };
     play.run();
     let paste = |x: f32, turns| {
@@ -117,6 +117,6 @@ fn clients_that_lack_a_prefab_get_it_once_and_have_the_servers_world() {
     // One that the server does not know is neither sent nor ordered.
     let unknown = own.world().copy(around, IVec3::splat(21)).expect("it lies in the world");
     let edit = Edit::quantize(&Brush::paste(Paste::new(unknown, Vec3::splat(40.0)))).expect("a valid brush");
-    assert!(!play.clients[0].stamps_mut().can_send(&edit));
+    assert!(!play.clients[0].contents_mut().can_send(&edit));
     assert!(play.server.edit(edit).is_err());
 }

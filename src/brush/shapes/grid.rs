@@ -28,7 +28,7 @@ const ZERO: i32 = 1 << 15;
 ///
 /// A grid is made once, of a function or of a [closed mesh](Self::from_mesh), and shared by all brushes that use it. Its
 /// samples are kept as a [`GreyImage`], so that everything that names the images of stamps by their content, such as
-/// [`Stamps`](crate::net::Stamps) of networks, names grids too.
+/// [`ContentTable`](crate::net::ContentTable) of networks, names grids too.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(from = "ImageSamples", into = "ImageSamples")]
 pub struct ShapeGrid(Arc<Samples>);

@@ -4,21 +4,21 @@ use super::round_trips;
 use crate::brush::Edit;
 use crate::format::FormatError;
 use crate::format::bytes::Reader;
-use crate::format::contents::{Resolved, Stamps, named};
+use crate::format::contents::{ContentTable, Resolved, named};
 use crate::format::edits::{EditSequence, put_edit};
-use crate::format::ids::StampId;
+use crate::format::ids::ContentId;
 
 fn edits() -> Vec<Edit> {
     round_trips::with_content().iter().map(|brush| Edit::quantize(brush).unwrap()).collect()
 }
 
-fn table(edits: &[Edit]) -> Stamps {
-    let mut contents = Stamps::default();
+fn table(edits: &[Edit]) -> ContentTable {
+    let mut contents = ContentTable::default();
     edits.iter().flat_map(Edit::contents).for_each(|content| contents.add_content(content));
     contents
 }
 
-fn read(bytes: &[u8], contents: &Stamps) -> Result<Resolved, FormatError> {
+fn read(bytes: &[u8], contents: &ContentTable) -> Result<Resolved, FormatError> {
     let mut reader = Reader(bytes);
     let head = reader.byte()?;
     let resolved = EditSequence::default().read(head, &mut reader, contents)?;
@@ -27,7 +27,7 @@ fn read(bytes: &[u8], contents: &Stamps) -> Result<Resolved, FormatError> {
 }
 
 /// An edit with the names of another one's content behind it.
-fn with_names(edit: &Edit, names: &[StampId]) -> Vec<u8> {
+fn with_names(edit: &Edit, names: &[ContentId]) -> Vec<u8> {
     let (mut bytes, mut whole) = (vec![65], Vec::new());
     put_edit(&mut whole, edit, &mut EditSequence::whole());
     bytes.extend(whole);
@@ -52,7 +52,7 @@ fn every_content_of_an_edit_is_named() {
         assert!(bytes.len() < 120, "{} bytes", bytes.len());
         assert_eq!(read(&bytes, &table(&edits)).unwrap().whole().as_ref(), Ok(edit));
         // Whatever is missing is named.
-        let none = read(&bytes, &Stamps::default()).unwrap();
+        let none = read(&bytes, &ContentTable::default()).unwrap();
         assert_eq!((&none.edit, &none.missing), (&placeholders, &names));
         assert_eq!(none.whole(), Err(FormatError::ContentMissing(names[0])));
     }
@@ -84,7 +84,7 @@ fn content_is_within_the_limits_of_edits_wherever_it_comes_from() {
     let grid = |side: u32| ShapeGrid::from_fn(UVec3::splat(side), |at| at.as_vec3().length() - 1.5).unwrap();
     let (small, large) = (grid(4), grid(100));
     let edit = Edit::quantize(&Brush::dig(GridShape::new(small, Vec3::ZERO).with_scale(60.0))).unwrap();
-    let mut contents = Stamps::default();
+    let mut contents = ContentTable::default();
     let name = contents.add(std::sync::Arc::clone(large.image()));
     let resolved = read(&with_names(&named(&edit).1, &[name]), &contents).unwrap();
     assert!(matches!(resolved.refused, Some(BrushError::TooLarge { what: "box", .. })), "{resolved:?}");
@@ -103,7 +103,7 @@ fn a_prefab_is_packed_once() {
     let packed = std::sync::Arc::clone(packed_prefab(prefab));
     assert_eq!(prefab.bytes(), unpacked + packed.len());
     // Wherever it is sent, listed or saved.
-    assert!(Stamps::default().add_prefab(std::sync::Arc::clone(prefab)).is_some());
+    assert!(ContentTable::default().add_prefab(std::sync::Arc::clone(prefab)).is_some());
     assert_eq!(write_prefab(prefab), packed[..]);
     assert!(std::sync::Arc::ptr_eq(packed_prefab(prefab), &packed));
     assert_eq!(read_prefab(&packed).as_ref(), Ok(&**prefab));

@@ -104,16 +104,16 @@ mod named {
     use super::super::{compare, round_trips, worlds};
     use super::{PathBuf, ground};
     use crate::format::Batch;
-    use crate::format::contents::{Stamps, content_file};
+    use crate::format::contents::{ContentTable, content_file};
     use crate::format::frame::{Kind, WorldId, open, seal_named};
-    use crate::format::ids::StampId;
+    use crate::format::ids::ContentId;
     use crate::terrain::CommitRecord;
 
     fn folder() -> PathBuf {
         PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/store/schema_2")
     }
 
-    fn file_name(StampId(name): StampId) -> String {
+    fn file_name(ContentId(name): ContentId) -> String {
         format!("{name:016x}.content")
     }
 
@@ -150,7 +150,7 @@ mod named {
         let opened =
             open(&files["frame.journal"], Kind::Journal, WorldId(5), &7_u64.to_be_bytes(), 1 << 20).unwrap();
         assert!(opened.is_named);
-        let mut contents = Stamps::default();
+        let mut contents = ContentTable::default();
         for name in Batch::names(&opened.payload).unwrap() {
             assert!(contents.add_file(name, &files[&file_name(name)]));
         }

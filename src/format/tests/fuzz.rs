@@ -8,7 +8,7 @@ use super::damage::damage;
 use super::{compare, count, round_trips, worlds};
 use crate::brush::Edit;
 use crate::format::bytes::Reader;
-use crate::format::contents::Stamps;
+use crate::format::contents::ContentTable;
 use crate::format::edits::{EditSequence, put_edit};
 use crate::format::frame::{self, Kind, WorldId};
 use crate::format::level::{Level, read_level, unpack_level, write_level};
@@ -84,7 +84,7 @@ fn journals() {
 #[test]
 fn edits() {
     let edits = round_trips::all_edits();
-    let mut contents = Stamps::default();
+    let mut contents = ContentTable::default();
     edits.iter().flat_map(|edit| edit.contents()).for_each(|content| contents.add_content(content));
     for of in [EditSequence::default, EditSequence::whole] {
         let encode = |edits: &[Edit]| {

@@ -7,7 +7,7 @@ use glam::{IVec3, Quat, UVec3, Vec2, Vec3};
 use super::{compare, count, worlds};
 use crate::brush::{Brush, Edit, GridShape, Paste, Roughness, Shape, ShapeGrid, Stamp};
 use crate::format::bytes::Reader;
-use crate::format::contents::Stamps;
+use crate::format::contents::ContentTable;
 use crate::format::edits::{EditSequence, put_edit};
 use crate::format::level::{
     Level, pack_level, read_level, region_name, region_of_name, unpack_level, write_level,
@@ -161,7 +161,7 @@ fn edits_come_back_in_whatever_order() {
     let mut rng = fastrand::Rng::with_seed(3);
     for _ in 0..50 {
         let order: Vec<&Edit> = (0..40).filter_map(|_| rng.choice(&edits)).collect();
-        let mut contents = Stamps::default();
+        let mut contents = ContentTable::default();
         order.iter().flat_map(|edit| edit.contents()).for_each(|content| contents.add_content(content));
         for of in [EditSequence::default, EditSequence::whole] {
             let (mut bytes, mut sequence) = (Vec::new(), of());

@@ -7,7 +7,7 @@
 //! | `join` | catching up with the server: old entries, regions, a comparison |
 //! | `outbox` | sends the player's edits and undos as fast as the server's limits allow |
 //! | `repair` | marks, and regions that differ |
-//! | `images` | images of stamps that are missing |
+//! | `images` | images, grids and prefabs that are missing |
 //! | `replica` | the world of the order, and the shown world |
 
 mod events;
@@ -26,7 +26,7 @@ use std::time::Duration;
 
 use glam::IVec3;
 
-use super::Stamps;
+use super::ContentTable;
 use super::bulk::BulkReader;
 use super::message::{ClientId, Entry, Epoch, Hello, Lane, PROTOCOL, Refusal, ToServer};
 use super::price::cost;
@@ -61,7 +61,7 @@ const MAX_NUMBER: u64 = u64::MAX / 2;
 /// [`take_shown`](Self::take_shown) to the shown terrain, and handle the [events](Self::take_events).
 pub struct Client {
     replica: Replica,
-    stamps: Stamps,
+    contents: ContentTable,
     chunk_size: u32,
     place: IVec3,
     /// Regions within this distance, in voxels, have to be there before play begins.
@@ -125,7 +125,7 @@ impl Client {
         let replica = Replica::new(ground.into(), settings)?;
         Ok(Self {
             replica,
-            stamps: Stamps::default(),
+            contents: ContentTable::default(),
             chunk_size: settings.chunk_size,
             place: IVec3::ZERO,
             near: 96,
@@ -179,9 +179,9 @@ impl Client {
         Ok(())
     }
 
-    /// The images that stamps may have: those that the player uses. Others come from the server.
-    pub fn stamps_mut(&mut self) -> &mut Stamps {
-        &mut self.stamps
+    /// The images, grids and prefabs that the player's edits may hold. Others come from the server.
+    pub fn contents_mut(&mut self) -> &mut ContentTable {
+        &mut self.contents
     }
 
     /// Sets the player's position, in voxels: regions are sent from there outwards.
@@ -288,7 +288,7 @@ impl Client {
     pub fn submit(&mut self, edit: Edit) {
         if self.id.is_none() {
             self.early.push(edit);
-        } else if !self.stamps.can_send(&edit) {
+        } else if !self.contents.can_send(&edit) {
             self.events.push(ClientEvent::Refused { tag: edit.tag(), why: None });
         } else {
             let sequence = self.next_sequence;

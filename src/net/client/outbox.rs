@@ -119,7 +119,7 @@ impl Outbox {
 mod tests {
     use glam::Vec3;
 
-    use super::super::super::Stamps;
+    use super::super::super::ContentTable;
     use super::super::super::message::{MAX_EDITS, MAX_TO_SERVER};
     use super::*;
     use crate::brush::{Brush, BrushPath, Corridor, Roughness, Shape};
@@ -155,7 +155,8 @@ mod tests {
             let (messages, mut next) = (outbox.take(Duration::ZERO), 1);
             for message in &messages {
                 assert!(message.len() <= MAX_TO_SERVER, "{} bytes", message.len());
-                let read = ToServer::from_bytes(message, &Stamps::default()).expect("a server reads it");
+                let read =
+                    ToServer::from_bytes(message, &ContentTable::default()).expect("a server reads it");
                 let ToServer::Edits { first, edits: part } = read else { panic!("edits") };
                 assert_eq!(first, next);
                 assert_eq!(part, edits[next as usize - 1..][..part.len()]);

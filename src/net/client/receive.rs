@@ -6,10 +6,10 @@ use super::join::Stage;
 use super::{Client, ClientEvent};
 
 impl Client {
-    /// Looks at a message. Entries with stamps whose images are missing wait for these.
+    /// Looks at a message. Entries whose contents are missing wait for these.
     pub(super) fn read(&mut self, lane: Lane, bytes: Vec<u8>) {
         let ground = self.replica.world().shared_ground();
-        match ToClient::read(&bytes, &ground, &self.stamps) {
+        match ToClient::read(&bytes, &ground, &self.contents) {
             Ok((message, missing)) if missing.is_empty() => self.take(lane, message),
             Ok((ToClient::Entries(entries), missing)) => {
                 if self.has_begun[lane as usize] {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::message::{ClientId, Entry};
-use super::super::{StampId, Stamps};
+use super::super::{ContentId, ContentTable};
 use super::edits::put_edit;
 use super::parts::{flag, read_rules};
 use crate::format::bytes::{Reader, put_bytes, put_number};
@@ -96,9 +96,9 @@ impl OrderWriter {
 pub(super) fn read_entry(
     reader: &mut Reader,
     ground: &Ground,
-    stamps: &Stamps,
+    contents: &ContentTable,
     coder: &mut EditSequence,
-) -> Result<(Entry, Vec<StampId>), FormatError> {
+) -> Result<(Entry, Vec<ContentId>), FormatError> {
     let entry = match reader.byte()? {
         RULES => Entry::of_server(Order::Rules(read_rules(reader.bytes()?)?.map(Arc::new))),
         LOOSE => {
@@ -115,7 +115,7 @@ pub(super) fn read_entry(
         MARK => Entry::HashCheck,
         head => {
             let (author, sequence) = (ClientId(reader.number()?), reader.number()?);
-            let Resolved { edit, missing, refused } = coder.read(head, reader, stamps)?;
+            let Resolved { edit, missing, refused } = coder.read(head, reader, contents)?;
             if let Some(error) = refused {
                 return Err(FormatError::Edit(error.to_string()));
             }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::super::message::*;
-use super::super::{StampId, Stamps};
+use super::super::{ContentId, ContentTable};
 use super::entries::{ENTRIES, put_entry, read_entry};
 use super::joins::{put_welcome, read_welcome};
 use super::packed::{PACKED, unpack};
@@ -42,7 +42,7 @@ const REFUSALS: [Refusal; 10] = [
     Refusal::Touched,
     Refusal::TooLarge,
     Refusal::NotJoined,
-    Refusal::UnknownStamp,
+    Refusal::UnknownContent,
 ];
 
 const KICKS: [KickReason; 8] = [
@@ -123,24 +123,24 @@ impl ToClient {
         to
     }
 
-    /// Reads a message from a server, for a world over this ground. Images of stamps are those of the list.
+    /// Reads a message from a server, for a world over this ground. Images, grids and prefabs are those of the table.
     ///
     /// # Errors
     /// When anything is invalid, longer than it may be, or a stamp has an image that the list lacks.
-    pub fn from_bytes(bytes: &[u8], ground: &Ground, stamps: &Stamps) -> Result<Self, FormatError> {
-        match Self::read(bytes, ground, stamps)? {
+    pub fn from_bytes(bytes: &[u8], ground: &Ground, contents: &ContentTable) -> Result<Self, FormatError> {
+        match Self::read(bytes, ground, contents)? {
             (message, missing) if missing.is_empty() => Ok(message),
-            _ => Err(FormatError::Invalid("image of a stamp")),
+            _ => Err(FormatError::Invalid("name of an image, grid or prefab")),
         }
     }
 
-    /// Reads a message from a server. Stamps whose images the list lacks get another image; the names of these are
-    /// returned too.
+    /// Reads a message from a server. Edits whose contents the table lacks get placeholders; the names of what is missing
+    /// are returned too.
     pub(in crate::net) fn read(
         bytes: &[u8],
         ground: &Ground,
-        stamps: &Stamps,
-    ) -> Result<(Self, BTreeSet<StampId>), FormatError> {
+        contents: &ContentTable,
+    ) -> Result<(Self, BTreeSet<ContentId>), FormatError> {
         within(bytes.len(), MAX_TO_CLIENT)?;
         let (mut reader, mut missing) = (Reader(bytes), BTreeSet::new());
         let message = match reader.byte()? {
@@ -156,7 +156,7 @@ impl ToClient {
                 }
                 let (mut entries, mut coder) = (Vec::new(), EditSequence::default());
                 for _ in 0..count {
-                    let (entry, unknown) = read_entry(&mut reader, ground, stamps, &mut coder)?;
+                    let (entry, unknown) = read_entry(&mut reader, ground, contents, &mut coder)?;
                     missing.extend(unknown);
                     entries.push(entry);
                 }
@@ -181,7 +181,7 @@ impl ToClient {
                 if message.first() == Some(&PACKED) {
                     return Err(FormatError::Invalid("message that is packed twice"));
                 }
-                return Self::read(&message, ground, stamps);
+                return Self::read(&message, ground, contents);
             }
             PIECE => Self::Piece(std::mem::take(&mut reader.0).to_vec()),
             STREAM => Self::Stream { stream: reader.number()? },
@@ -207,7 +207,11 @@ mod tests {
     }
 
     fn read(bytes: &[u8]) -> Result<ToClient, FormatError> {
-        ToClient::from_bytes(bytes, &Ground::flat(8, 8, 4.0).expect("a valid ground"), &Stamps::default())
+        ToClient::from_bytes(
+            bytes,
+            &Ground::flat(8, 8, 4.0).expect("a valid ground"),
+            &ContentTable::default(),
+        )
     }
 
     #[test]

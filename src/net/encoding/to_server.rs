@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::super::message::*;
-use super::super::{StampId, Stamps};
+use super::super::{ContentId, ContentTable};
 use super::edits::{EDITS, put_edit};
 use super::joins::{put_hello, read_hello};
 use super::parts::{put_regions, read_regions, within};
@@ -63,14 +63,14 @@ impl ToServer {
         to
     }
 
-    /// Reads a message from a client. Images of stamps are those of the list.
+    /// Reads a message from a client. Images, grids and prefabs are those of the table.
     ///
     /// # Errors
     /// When anything is invalid, longer than it may be, or a stamp has an image that the list lacks.
-    pub fn from_bytes(bytes: &[u8], stamps: &Stamps) -> Result<Self, FormatError> {
-        match Self::read(bytes, stamps)? {
+    pub fn from_bytes(bytes: &[u8], contents: &ContentTable) -> Result<Self, FormatError> {
+        match Self::read(bytes, contents)? {
             (message, refused) if refused.is_empty() => Ok(message),
-            _ => Err(FormatError::Invalid("image of a stamp")),
+            _ => Err(FormatError::Invalid("name of an image, grid or prefab")),
         }
     }
 
@@ -78,7 +78,7 @@ impl ToServer {
     /// edits, have placeholders; their positions in the message are returned too.
     pub(in crate::net) fn read(
         bytes: &[u8],
-        stamps: &Stamps,
+        contents: &ContentTable,
     ) -> Result<(Self, BTreeMap<usize, Refusal>), FormatError> {
         within(bytes.len(), MAX_TO_SERVER)?;
         let (mut reader, mut refused) = (Reader(bytes), BTreeMap::new());
@@ -91,10 +91,10 @@ impl ToServer {
                 let (mut edits, mut coder) = (Vec::with_capacity(count), EditSequence::default());
                 for place in 0..count {
                     let head = reader.byte()?;
-                    let read = coder.read(head, &mut reader, stamps)?;
+                    let read = coder.read(head, &mut reader, contents)?;
                     let why = match read.refused {
                         Some(_) => Some(Refusal::TooLarge),
-                        None => read.missing.first().map(|_| Refusal::UnknownStamp),
+                        None => read.missing.first().map(|_| Refusal::UnknownContent),
                     };
                     refused.extend(why.map(|why| (place, why)));
                     edits.push(read.edit);
@@ -111,7 +111,7 @@ impl ToServer {
             IMAGES => {
                 let count = reader.count()?;
                 within(count, MAX_IMAGES)?;
-                let image = |_| Ok(StampId(u64::from_le_bytes(reader.array()?)));
+                let image = |_| Ok(ContentId(u64::from_le_bytes(reader.array()?)));
                 Self::Images { images: (0..count).map(image).collect::<Result<_, FormatError>>()? }
             }
             _ => return Err(FormatError::Invalid("tag of a message")),

@@ -142,7 +142,7 @@ impl Server {
     /// that changed since.
     fn entries_after(&mut self, number: u64) -> Option<(Join, Bulk)> {
         let messages = self.log.after(number)?;
-        if !self.log.names_after(number).all(|name| self.stamps.has(name)) {
+        if !self.log.names_after(number).all(|name| self.contents.has(name)) {
             return None;
         }
         let bytes: usize = messages.iter().map(|message| message.len()).sum();

@@ -42,7 +42,7 @@ use std::time::Duration;
 
 use glam::IVec3;
 
-use super::Stamps;
+use super::ContentTable;
 use super::encoding::{OrderWriter, entry_bytes};
 use super::message::{ClientId, Entry, Epoch, KickReason, Lane, MAX_TO_CLIENT, ToClient};
 use super::never_shown;
@@ -74,10 +74,10 @@ const MAX_EVENTS: usize = 4096;
 /// A message with entries is sent once it has this many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
 
-/// The image of a stamp is not among those that both sides have.
+/// An edit holds an image, grid or prefab that is not in the server's [`ContentTable`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the image of the stamp is not registered")]
-pub struct UnknownStamp;
+#[error("an image, grid or prefab of the edit is not in the content table")]
+pub struct UnknownContent;
 
 /// A message that waits to be sent.
 pub type Outgoing = (ClientId, Lane, Vec<u8>);
@@ -124,7 +124,7 @@ impl Later {
 pub struct Server {
     terrain: Terrain,
     settings: ServerSettings,
-    stamps: Stamps,
+    contents: ContentTable,
     permission: Permission,
     admission: Admission,
     /// The latest time.
@@ -205,7 +205,7 @@ impl Server {
         let mut server = Self {
             terrain,
             settings,
-            stamps: Stamps::default(),
+            contents: ContentTable::default(),
             permission: Box::new(|_, _| true),
             admission: Box::new(|_| Ok(())),
             now: Duration::ZERO,
@@ -289,9 +289,9 @@ impl Server {
         &self.settings
     }
 
-    /// The images that stamps may have. A client that lacks an image gets it at its first use.
-    pub fn stamps_mut(&mut self) -> &mut Stamps {
-        &mut self.stamps
+    /// The images, grids and prefabs that edits may hold. A client that lacks one gets it at its first use.
+    pub fn contents_mut(&mut self) -> &mut ContentTable {
+        &mut self.contents
     }
 
     /// Sets a function that decides about each edit, after all other checks. By default every edit is allowed.
@@ -385,10 +385,10 @@ impl Server {
     /// Orders an edit of the game, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
     ///
     /// # Errors
-    /// When it is a stamp whose image is not among the [stamps](Self::stamps_mut): no client could read it.
-    pub fn edit(&mut self, edit: Edit) -> Result<(), UnknownStamp> {
-        if !self.stamps.can_send(&edit) {
-            return Err(UnknownStamp);
+    /// When it holds an image, grid or prefab that is not among the [contents](Self::contents_mut): no client could read it.
+    pub fn edit(&mut self, edit: Edit) -> Result<(), UnknownContent> {
+        if !self.contents.can_send(&edit) {
+            return Err(UnknownContent);
         }
         self.order_edit(ClientId::SERVER, 0, edit, 0);
         Ok(())

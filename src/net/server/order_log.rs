@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use super::FULL_MESSAGE;
-use crate::net::StampId;
+use crate::net::ContentId;
 use crate::net::encoding::{OrderWriter, pack};
 use crate::net::message::Entry;
 
@@ -13,7 +13,7 @@ struct Block {
     last: u64,
     message: Arc<[u8]>,
     /// The content that its edits name, where a store had the message: the present server may lack it.
-    names: BTreeSet<StampId>,
+    names: BTreeSet<ContentId>,
 }
 
 /// The latest entries, within a limit of bytes.
@@ -37,14 +37,14 @@ impl OrderLog {
 
     /// Adds a message before all entries: those from a number up to the first that is kept.
     #[cfg(feature = "store")]
-    pub fn push_front(&mut self, first: u64, message: Vec<u8>, names: BTreeSet<StampId>) {
+    pub fn push_front(&mut self, first: u64, message: Vec<u8>, names: BTreeSet<ContentId>) {
         self.bytes += message.len();
         self.blocks.push_front(Block { last: self.first - 1, message: message.into(), names });
         self.first = first;
     }
 
     /// The names of content in messages [after](Self::after) a number that a store had.
-    pub fn names_after(&self, number: u64) -> impl Iterator<Item = StampId> {
+    pub fn names_after(&self, number: u64) -> impl Iterator<Item = ContentId> {
         let from = self.blocks.partition_point(|block| block.last <= number);
         self.blocks.iter().skip(from).flat_map(|block| block.names.iter().copied())
     }
@@ -107,7 +107,7 @@ impl OrderLog {
 mod tests {
     use super::*;
     use crate::ground::Ground;
-    use crate::net::Stamps;
+    use crate::net::ContentTable;
     use crate::net::message::{Entries, ToClient};
     use crate::terrain::{LooseSettings, Order};
 
@@ -130,7 +130,8 @@ mod tests {
         let ground = Ground::flat(8, 8, 4.0).expect("a valid ground");
         let mut numbers = Vec::new();
         for message in log.after(number)? {
-            let message = ToClient::from_bytes(&message, &ground, &Stamps::default()).expect("a message");
+            let message =
+                ToClient::from_bytes(&message, &ground, &ContentTable::default()).expect("a message");
             let ToClient::Entries(Entries { first, entries }) = message else { panic!("{message:?}") };
             for (number, own) in (first..).zip(entries) {
                 assert_eq!(format!("{own:?}"), format!("{:?}", entry(number)));

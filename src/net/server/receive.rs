@@ -11,7 +11,7 @@ use crate::brush::Edit;
 use crate::format::bricks::is_possible;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
-use crate::net::StampId;
+use crate::net::ContentId;
 use crate::net::message::{ClientId, KickReason, MAX_REGIONS, Refusal, ToClient, ToServer};
 use crate::net::price::{UNDO, cost};
 
@@ -40,7 +40,7 @@ impl Server {
         if !self.may_go_on(client, 1 + bytes.len() as u64 / BYTES, now) {
             return;
         }
-        let is_valid = match ToServer::read(bytes, &self.stamps) {
+        let is_valid = match ToServer::read(bytes, &self.contents) {
             Ok((ToServer::Hello(hello), _)) if self.may_go_on(client, HELLO, now) => {
                 self.greet(client, None, hello);
                 true
@@ -186,11 +186,11 @@ impl Server {
     }
 
     /// Sends images and prefabs that a client lacks, each once.
-    fn receive_images(&mut self, client: ClientId, images: Vec<StampId>) -> bool {
+    fn receive_images(&mut self, client: ClientId, images: Vec<ContentId>) -> bool {
         for id in images {
             let is_small = |image: &&Arc<GreyImage>| size_of_val(image.samples()) <= MAX_IMAGE;
-            let image = self.stamps.get(id).filter(is_small);
-            let prefab = self.stamps.prefab(id);
+            let image = self.contents.get(id).filter(is_small);
+            let prefab = self.contents.prefab(id);
             if image.is_none() && prefab.is_none() {
                 return false;
             }

@@ -16,7 +16,7 @@ use xxhash_rust::xxh3::Xxh3Default;
 use super::keys::{NUMBER, RESERVED};
 use crate::format::bytes::{Reader, put_number};
 use crate::format::{FormatError, plain};
-use crate::net::StampId;
+use crate::net::ContentId;
 use crate::net::encoding::OrderWriter;
 use crate::net::message::Entry;
 use crate::store::Store;
@@ -48,7 +48,7 @@ pub struct Piece {
     pub first: u64,
     pub last: u64,
     /// The content that its edits name.
-    pub names: BTreeSet<StampId>,
+    pub names: BTreeSet<ContentId>,
     pub message: Vec<u8>,
 }
 
@@ -71,7 +71,7 @@ impl Piece {
         let last = reader.number()?;
         let mut names = BTreeSet::new();
         for _ in 0..reader.count()? {
-            names.insert(StampId(u64::from_le_bytes(reader.array()?)));
+            names.insert(ContentId(u64::from_le_bytes(reader.array()?)));
         }
         Ok(Self { first, last, names, message: reader.0.to_vec() })
     }
@@ -103,7 +103,7 @@ pub struct SavedOrder {
     bytes: usize,
     /// The entries of the last piece, which is not complete.
     tail: OrderWriter,
-    names: BTreeSet<StampId>,
+    names: BTreeSet<ContentId>,
     /// Keys that are of no use.
     stale: Vec<String>,
 }
@@ -188,7 +188,7 @@ impl SavedOrder {
                 self.forget(store);
             }
             let edit = entry.edit();
-            self.names.extend(edit.iter().flat_map(|edit| edit.contents()).map(StampId::of_content));
+            self.names.extend(edit.iter().flat_map(|edit| edit.contents()).map(ContentId::of_content));
             self.tail.put(&entry);
             self.number = next;
             if self.tail.len() >= PIECE_BYTES {

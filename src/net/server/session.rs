@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::sender::{BulkSender, OrderSender};
 use super::settings::ServerSettings;
 use crate::lattice::RegionPos;
-use crate::net::StampId;
+use crate::net::ContentId;
 use crate::net::message::Hello;
 use crate::terrain::World;
 
@@ -46,7 +46,7 @@ pub struct Session {
     pub bulk: BulkSender,
     pub fetches: VecDeque<Fetch>,
     /// Images that it was sent.
-    pub images: BTreeSet<StampId>,
+    pub images: BTreeSet<ContentId>,
     /// The world that it compares its own with, and that one's number.
     pub compared: Option<(u64, Arc<World>)>,
     /// The time of its last progress with data for which a world is kept.
