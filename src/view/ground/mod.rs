@@ -334,6 +334,25 @@ mod tests {
     }
 
     #[test]
+    fn a_terrain_that_is_disabled_meanwhile_shows_what_its_color_map_became() {
+        let mut app = stage::app();
+        let terrain = stage::spawn_terrain(&mut app);
+        let handle = app.world().resource::<Assets<Image>>().reserve_handle();
+        let look = GroundLook { color_map: Some(ColorMap::new(handle.clone())), ..default() };
+        app.world_mut().entity_mut(terrain).insert(look);
+        (0..3).for_each(|_| app.update());
+        app.world_mut().entity_mut(terrain).insert(Disabled);
+        app.update();
+        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+        images.insert(&handle, Image::default()).expect("a handle of these assets");
+        // So long that the message of the asset is gone.
+        (0..5).for_each(|_| app.update());
+        app.world_mut().entity_mut(terrain).remove::<Disabled>();
+        app.update();
+        assert_eq!(stage::extension(&app, terrain).color_map, Some(handle));
+    }
+
+    #[test]
     fn a_material_that_the_game_put_on_a_terrain_stays_when_the_look_goes() {
         let mut app = stage::app();
         let terrain = stage::spawn_terrain(&mut app);
