@@ -25,6 +25,7 @@ mod collect;
 mod commit;
 mod components;
 pub mod diagnostics;
+mod display;
 mod engine;
 mod entities;
 mod figures;
