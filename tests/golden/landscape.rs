@@ -10,9 +10,8 @@ use crate::studio::Studio;
 const EYE: Vec3 = Vec3::new(128.0, 22.0, 60.0);
 const AT: Vec3 = Vec3::new(-8.0, 2.0, 22.0);
 
-/// Hills with snow on the tops and sand in the valleys.
-pub fn hills(side: u32) -> Ground {
-    let noise = NoiseHeights { seed: 5, scale: 130.0, amplitude: 46.0, octaves: 6, ..default() };
+/// Grass, with snow on the tops, sand in the valleys and rock on slopes.
+pub fn materials() -> MaterialControl {
     let snow = MaterialRule {
         overlay: MaterialId(3),
         height: (22.0, f64::INFINITY),
@@ -28,9 +27,14 @@ pub fn hills(side: u32) -> Ground {
         slope_fade: 0.4,
     };
     let grass = MaterialRule { overlay: MaterialId(1), slope: (0.0, 0.85), slope_fade: 0.4, ..default() };
-    let rules = MaterialControl::Rules { base: MaterialId(0), rules: vec![snow, sand, grass] };
+    MaterialControl::Rules { base: MaterialId(0), rules: vec![snow, sand, grass] }
+}
+
+/// Hills with these materials.
+pub fn hills(side: u32) -> Ground {
+    let noise = NoiseHeights { seed: 5, scale: 130.0, amplitude: 46.0, octaves: 6, ..default() };
     Ground::from_noise(side, side, &noise)
-        .and_then(|ground| ground.with_materials(&rules))
+        .and_then(|ground| ground.with_materials(&materials()))
         .expect("valid ground")
 }
 

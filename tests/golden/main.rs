@@ -27,6 +27,7 @@ mod debug_views;
 mod far;
 #[path = "../../examples/shared/holes.rs"]
 mod holes;
+mod import;
 mod landscape;
 mod lod;
 #[path = "../../examples/custom_material/map.rs"]

@@ -1,4 +1,4 @@
-//! Fourteen views of one country, to be looked at: `make scenes` renders them.
+//! Fourteen views of one country and one of an imported world, to be looked at: `make scenes` renders them.
 //!
 //! | variable | meaning |
 //! | --- | --- |
@@ -120,7 +120,14 @@ fn scenes_are_rendered() {
     if wants("carpet") {
         book.carpet();
     }
-    if ["swatches", "carpet"].iter().filter(|name| wants(name)).count() < only.len() || only.is_empty() {
+    if wants("import") {
+        let look = book.look();
+        crate::import::shoot(&mut book.studio, look);
+        book.save("import");
+    }
+    if ["swatches", "carpet", "import"].iter().filter(|name| wants(name)).count() < only.len()
+        || only.is_empty()
+    {
         book.country(&wants);
     }
 }
