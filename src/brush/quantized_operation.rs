@@ -87,7 +87,8 @@ impl QuantizedOperation {
                 in_range("step", voxels(*step), STEP.0, STEP.1)?;
                 check_point("base", [0, *base, 0])
             }
-            _ => Ok(()),
+            Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Fill | Self::Carve => Ok(()),
+            Self::Smooth | Self::Sharpen | Self::Reset | Self::Road => Ok(()),
         }
     }
 
@@ -168,7 +169,11 @@ impl QuantizedOperation {
             Self::Paint { material } => Kind::Paint { material },
             Self::Reset => Kind::Reset,
             Self::Paste { .. } => Kind::Paste,
-            _ => Kind::Sculpt,
+            Self::Smooth | Self::Sharpen | Self::Flatten { .. } | Self::Level { .. } => Kind::Sculpt,
+            Self::Raise { .. } | Self::Lower { .. } | Self::Stamp { .. } | Self::Terrace { .. } => {
+                Kind::Sculpt
+            }
+            Self::Road | Self::Fill | Self::Carve => Kind::Sculpt,
         }
     }
 }

@@ -266,7 +266,7 @@ pub enum StoreTrouble {
     /// Commits that were in the log only were made by a version of the crate whose edits differ; they were
     /// replayed. The ground may differ slightly there.
     #[error("{commits} commits of another version, after the last checkpoint, were replayed")]
-    MadeAgain {
+    Replayed {
         /// How many.
         commits: u64,
     },

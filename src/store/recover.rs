@@ -57,7 +57,7 @@ pub(super) struct Findings {
     /// Set if the ground changed since the save: the number of affected regions, and how they were converted.
     pub base_changed: Option<(usize, &'static str)>,
     /// Commits of another [`SIMULATION`](crate::terrain::SIMULATION) that were replayed.
-    pub remade: Option<u64>,
+    pub replayed: Option<u64>,
     /// Whether everything but the regions is lost.
     pub has_lost_rest: bool,
 }
@@ -103,7 +103,7 @@ pub(super) fn recover(
     let other_level = BaseLevel::expect(level, checkpoint.level.as_ref());
     let is_same_base = is_same_ground && other_level.is_ok();
     // Commits after the checkpoint were made by another simulation: they can be replayed, but not verified.
-    let is_remade = is_same_base && tail.iter().any(|frame| frame.base != base);
+    let is_replayed = is_same_base && tail.iter().any(|frame| frame.base != base);
     let size = GroundSize::of(ground);
     let other_size = checkpoint.cells.filter(|saved| *saved != size);
     if let Some(saved) = other_size {
@@ -172,7 +172,7 @@ pub(super) fn recover(
         }
     }
     let terrain = restored?;
-    let is_checked = is_same_base && is_exact && !is_remade;
+    let is_checked = is_same_base && is_exact && !is_replayed;
     let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
     let hash = terrain.world().hash();
     let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone(), level.cloned());
@@ -215,7 +215,7 @@ pub(super) fn recover(
             damaged,
             is_lossy: !is_checked,
             base_changed: (!is_same_base).then_some((regions, "kept")),
-            remade: is_remade.then_some(replayed.commits),
+            replayed: is_replayed.then_some(replayed.commits),
             has_lost_rest,
         },
         refused: replayed.refused,
@@ -277,7 +277,7 @@ impl Findings {
         troubles.extend(has_lost_rest);
         let base_changed = self.base_changed;
         troubles.extend(base_changed.map(|(regions, kept)| StoreTrouble::BaseChanged { regions, kept }));
-        troubles.extend(self.remade.map(|commits| StoreTrouble::MadeAgain { commits }));
+        troubles.extend(self.replayed.map(|commits| StoreTrouble::Replayed { commits }));
         troubles
     }
 }
@@ -377,7 +377,7 @@ mod tests {
             };
             let (_, opened) = open();
             assert_eq!((opened.terrain.world().revision(), opened.terrain.world().hash()), (8, now.hash()));
-            assert_eq!(opened.troubles, [StoreTrouble::MadeAgain { commits: 4 }]);
+            assert_eq!(opened.troubles, [StoreTrouble::Replayed { commits: 4 }]);
             assert!(!opened.is_log_whole);
             let (_, again) = open();
             assert_eq!((again.terrain.world().hash(), again.troubles), (now.hash(), vec![]));
