@@ -337,13 +337,14 @@ mod tests {
                 let (at, first) = (place(300.0), place(9000.0));
                 let apart = (place(4000.0) / voxel).round() * voxel;
                 // As far as floats allow, the terrains lie whole voxels apart.
-                if first + apart - first != apart {
+                let corners = [first, first + apart];
+                if corners[1].as_dvec3() - corners[0].as_dvec3() != apart.as_dvec3() {
                     continue;
                 }
                 let brush = Brush::level(Shape::capsule(at, at + place(9.0), 2.0), at.y)
                     .with_roughness(Roughness::new(1.0, 4.0, 3));
-                let edits = [first, first + apart]
-                    .map(|corner| brush.placed_in(voxel, Quat::IDENTITY, corner - 300.0))
+                let edits = corners
+                    .map(|corner| brush.placed_in(voxel, Quat::IDENTITY, corner))
                     .map(|brush| super::super::Edit::quantize(&brush));
                 // With small voxels it may lie too far away.
                 let [Ok(own), Ok(other)] = edits else { continue };
