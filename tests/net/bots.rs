@@ -315,13 +315,13 @@ pub struct Play {
 }
 
 /// Adds the grids and prefabs of random brushes.
-fn add_contents(contents: &mut ContentTable) {
+fn add_contents(table: &mut ContentTable) {
     let (grids, prefabs) = contents();
     for grid in grids {
-        contents.add(Arc::clone(grid.image()));
+        table.add(Arc::clone(grid.image()));
     }
     for prefab in prefabs {
-        contents.add_prefab(Arc::clone(prefab)).expect("it is small");
+        table.add_prefab(Arc::clone(prefab)).expect("it is small");
     }
 }
 
