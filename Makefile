@@ -152,7 +152,7 @@ scenes: ## Render views of one country, and swatches of all layers, to look at (
 
 pictures: ## Render the still pictures of the README
 	@tools/setup.sh run
-	cargo run $(WITH_BEVY) --example digger -- --headless --width 960 --height 540 --out out/pictures
+	cargo run $(WITH_BEVY) --example digger -- --headless --plants --width 960 --height 540 --out out/pictures
 	cargo run $(WITH_BEVY) --example sculpt -- --headless --width 960 --height 540 --out out/pictures/sculpt
 	mkdir -p docs/pictures
 	cp out/pictures/sculpt/2_sculpted.png docs/pictures/panel.png
