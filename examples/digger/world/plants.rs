@@ -142,6 +142,18 @@ fn fell(
     }
 }
 
+/// The foot of the tree that is nearest to a place; `None` where none stands or plants are not shown.
+pub fn nearest_tree(world: &mut World, place: Vec3) -> Option<Vec3> {
+    let mut terrains = world.query::<(&Terrain, &ShownPlants, &GlobalTransform)>();
+    terrains.iter(world).find_map(|(terrain, shown, at)| {
+        let scatter = shown.scatter()?;
+        let own = at.affine().inverse().transform_point3(place).as_dvec3();
+        let is_tree = |index: usize| scatter.species()[index].stem.is_some();
+        let tree = scatter.nearest(terrain.world(), own, 200.0, is_tree)?;
+        Some(at.transform_point(tree.position().as_vec3()))
+    })
+}
+
 /// A tree that fell, and when.
 #[derive(Component)]
 struct FallenTree {

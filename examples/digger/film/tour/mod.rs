@@ -1,4 +1,4 @@
-//! A minute of play as a film: a flight, a pickaxe, a tunnel, bombs, a boulder, a bridge, a sunset, and lamps in a
+//! A minute of play as a film: a flight, a pickaxe, a tunnel, a tree, bombs, a boulder, a bridge, a sunset, and lamps in a
 //! cave.
 
 mod camera_path;
@@ -26,17 +26,20 @@ use crate::ui::hud::ShowHud;
 use crate::world::day::{AFTERNOON, Clock};
 use crate::world::landscape::CONCRETE;
 use crate::world::particles::{Burst, ParticleKind};
+use crate::world::plants::nearest_tree;
 
 /// Seconds of each scene.
 const FLIGHT: f32 = 8.0;
 const PICKAXE: f32 = 9.0;
 const TUNNEL: f32 = 9.5;
+/// If plants are drawn.
+const TREE: f32 = 6.0;
 const BOMBS: f32 = 7.5;
 const BOULDER: f32 = 7.0;
 const BRIDGE: f32 = 8.5;
 const SUNSET: f32 = 4.0;
 const LAMPS: f32 = 6.5;
-const ALL: f32 = FLIGHT + PICKAXE + TUNNEL + BOMBS + BOULDER + BRIDGE + SUNSET + LAMPS;
+const WITHOUT_PLANTS: f32 = FLIGHT + PICKAXE + TUNNEL + BOMBS + BOULDER + BRIDGE + SUNSET + LAMPS;
 
 /// Records the film, and makes a video of it if ffmpeg is installed.
 pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
@@ -44,14 +47,15 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
         eprintln!("There is no graphics adapter, not even in software: nothing can be recorded.");
         return ExitCode::FAILURE;
     }
-    match film(options, renderer) {
+    let seconds = WITHOUT_PLANTS + if options.plants { TREE } else { 0.0 };
+    match film(options, seconds, renderer) {
         Ok((frames, took)) => {
             println!(
-                "tour: {frames} frames of {ALL} s in {:.0} s, in {}",
+                "tour: {frames} frames of {seconds} s in {:.0} s, in {}",
                 took.as_secs_f64(),
                 options.out.display()
             );
-            make_video(&options.out, (frames as f32 / ALL).clamp(1.0, options.fps as f32), frames)
+            make_video(&options.out, (frames as f32 / seconds).clamp(1.0, options.fps as f32), frames)
         }
         Err(error) => {
             eprintln!("The tour failed: {error}");
@@ -60,17 +64,17 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     }
 }
 
-fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, Duration)> {
+fn film(options: &Options, seconds: f32, renderer: Option<RenderResources>) -> Result<(usize, Duration)> {
     let start = Instant::now();
     let studio = Studio::open(options, renderer)?;
     remove_frames(&options.out)?;
     let places: Places = studio.resource();
-    let all = (ALL * options.fps as f32).round() as usize;
+    let all = (seconds * options.fps as f32).round() as usize;
     let film =
         FrameRecorder::new(studio, options.fps, all, options.frames.map_or(all, |frames| frames as usize));
     // With fewer frames, a fade would be a single black picture.
     let fades = film.rate() * fade::FADE >= 3.0;
-    let bar = ProgressBar::new((ALL * 10.0) as u64);
+    let bar = ProgressBar::new((seconds * 10.0) as u64);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {elapsed} of about {duration} {msg}") {
         bar.set_style(style);
     }
@@ -79,6 +83,9 @@ fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, 
     tour.flight(&places)?;
     tour.pickaxe(&places.hillside)?;
     tour.tunnel(&places.hillside)?;
+    if options.plants {
+        tour.tree(&places)?;
+    }
     tour.bombs(&places)?;
     tour.boulder(&places)?;
     tour.bridge(&places)?;
@@ -233,6 +240,29 @@ impl Tour {
         })?;
         self.stop();
         self.studio().lamp(false);
+        Ok(())
+    }
+
+    /// The pickaxe fells a tree.
+    fn tree(&mut self, places: &Places) -> Result {
+        self.set_hour(15.2);
+        // Plants grow around the player.
+        self.studio().move_to(places.corner.xz())?;
+        self.studio().wait(60);
+        let foot =
+            nearest_tree(self.studio().world(), places.corner).ok_or("no tree stands near the meadow")?;
+        let direction = (foot - places.corner).xz().normalize_or(Vec2::X);
+        self.studio().move_to(foot.xz() - direction * 5.0)?;
+        self.equip(Tool::Pickaxe);
+        self.scene("the tree", TREE, |studio, t| {
+            let seconds = t * TREE;
+            let height = if seconds < 1.8 { 1.6 } else { 3.0 };
+            studio.turn_towards(foot + Vec3::Y * height, 0.12)?;
+            studio.hold(if (1.2..1.6).contains(&seconds) { &[Action::Use] } else { &[] });
+            studio.walk(if (1.6..3.0).contains(&seconds) { direction * -0.6 } else { Vec2::ZERO });
+            Ok(())
+        })?;
+        self.stop();
         Ok(())
     }
 
