@@ -71,6 +71,33 @@ impl Builder {
         self
     }
 
+    /// Branches all round: a cone whose rim is a star of hanging tips, dark inside and light at the tips.
+    pub fn branches(
+        mut self,
+        foot: Vec3,
+        height: f32,
+        radius: f32,
+        tips: u32,
+        colors: (Vec3, Vec3),
+    ) -> Self {
+        let first = self.positions.len() as u32;
+        self.vertex(foot + Vec3::Y * height, Vec3::Y, colors.0);
+        for at in 0..2 * tips {
+            let chance = random(first + at);
+            let out = Vec2::from_angle((at as f32 + 0.5 * chance) / (2 * tips) as f32 * TAU);
+            let is_tip = at % 2 == 0;
+            let (far, up) = if is_tip { (1.0 - 0.2 * chance, -0.15 * chance) } else { (0.6, 0.2) };
+            let place = foot + Vec3::new(out.x * far * radius, up * height, out.y * far * radius);
+            let normal = Vec3::new(out.x, 0.6, out.y);
+            let color = colors.0.lerp(colors.1, if is_tip { 0.75 + 0.25 * chance } else { 0.3 });
+            self.vertex(place, normal, color);
+        }
+        for at in 0..2 * tips {
+            self.indices.extend([first, first + 1 + (at + 1) % (2 * tips), first + 1 + at]);
+        }
+        self
+    }
+
     /// A dented ball.
     pub fn blob(
         mut self,
@@ -89,8 +116,10 @@ impl Builder {
                 let is_pole = ring == 0 || ring == rings;
                 let seed = first + if is_pole { ring } else { ring * sides + side % sides };
                 let dent = 1.0 - dents * random(seed);
-                let color = colors.0.lerp(colors.1, 0.5 - 0.5 * cos + 0.2 * (random(seed + 7) - 0.5));
-                self.vertex(middle + out * radii * dent, out / radii, color);
+                let share = (0.5 - 0.5 * cos + 0.6 * (random(seed + 7) - 0.5)).clamp(0.0, 1.0);
+                let bent = Vec3::new(random(seed + 11), random(seed + 13), random(seed + 17)) - 0.5;
+                let normal = out / radii * radii.min_element() + 2.0 * dents * bent;
+                self.vertex(middle + out * radii * dent, normal, colors.0.lerp(colors.1, share));
             }
         }
         for (ring, side) in (0..rings).flat_map(|ring| (0..sides).map(move |side| (ring, side))) {
@@ -183,14 +212,16 @@ pub fn fir() -> Mesh {
     let layers = (0..6).fold(trunk, |all, layer| {
         let at = layer as f32 / 6.0;
         let radius = 1.9 * (1.0 - at) + 0.35;
-        all.cone(Vec3::Y * (1.3 + 6.4 * at), 2.0, (radius, 0.05), 9, NEEDLE)
+        all.branches(Vec3::Y * (1.3 + 6.4 * at), 2.2, radius, 7, NEEDLE)
     });
     layers.build()
 }
 
 /// A fir far away.
 pub fn far_fir() -> Mesh {
-    Builder::default().cone(Vec3::Y * 1.0, 8.0, (1.8, 0.0), 5, NEEDLE).build()
+    let trunk = Builder::default().cone(Vec3::NEG_Y * 0.4, 2.0, (0.28, 0.24), 3, BARK);
+    let low = trunk.branches(Vec3::Y * 1.3, 4.6, 2.2, 3, NEEDLE);
+    low.branches(Vec3::Y * 4.6, 4.4, 1.3, 3, NEEDLE).build()
 }
 
 /// An oak, 7 m high.

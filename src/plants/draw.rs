@@ -68,7 +68,7 @@ pub struct PlantLook {
     pub material: StandardMaterial,
     /// Metres by which the wind moves what is a metre above the ground.
     pub sway: f32,
-    /// How much the brightness of plants differs, as a share.
+    /// How much plants differ in brightness and hue, as a share.
     pub tint: f32,
     /// Whether plants follow the slope, as grass does, or are upright.
     pub follows_slope: bool,

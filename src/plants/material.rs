@@ -35,7 +35,7 @@ pub(super) struct PlantUniform {
     pub fade: f32,
     /// Metres by which the wind moves what is a metre above the ground.
     pub sway: f32,
-    /// How much brighter or darker a plant may be, as a share.
+    /// How much a plant may differ in brightness and hue, as a share.
     pub tint: f32,
     /// 1 if they follow the slope, 0 if they are upright.
     pub slope: f32,

@@ -84,7 +84,8 @@ struct Placed {
     position: vec3<f32>,
     // Cosine and sine of its turn.
     turn: vec2<f32>,
-    brightness: f32,
+    // What its colour is multiplied by.
+    tint: vec3<f32>,
     is_drawn: bool,
 }
 
@@ -103,7 +104,9 @@ fn place(local: vec3<f32>, slot: u32, world_from_local: mat4x4<f32>) -> Placed {
     let angle = f32(record.z & 0xffffu) * (6.2831853 / 65536.0);
     let random = f32(record.w >> 16u) / 65536.0;
     out.turn = vec2(cos(angle), sin(angle));
-    out.brightness = 1.0 + plants.tint * (random - 0.5);
+    // Brighter or darker, and more yellow or more blue.
+    let hue = fract(16.0 * random) - 0.5;
+    out.tint = (1.0 + plants.tint * (random - 0.5)) * (1.0 + plants.tint * hue * vec3(0.8, 0.0, -0.8));
     let root_world = (world_from_local * vec4(root, 1.0)).xyz;
     let distance = distance(root_world, view.lod_view_world_position);
     // Not all at the same distance, so that no line moves over the ground.
@@ -166,7 +169,7 @@ fn vertex(in: Vertex) -> Varying {
     out.uv_b = in.uv_b;
 #endif
 #ifdef VERTEX_COLORS
-    out.color = vec4(in.color.rgb * placed.brightness, in.color.a);
+    out.color = vec4(in.color.rgb * placed.tint, in.color.a);
 #endif
 #ifdef VERTEX_OUTPUT_INSTANCE_INDEX
     out.instance_index = in.instance_index;

@@ -131,14 +131,14 @@ pub fn bridge(ravine: &Ravine) -> Vec<Brush> {
     let arch = (0..blocks).map(|i| {
         let angle = -opening + step * i as f32;
         let place = centre + (along * angle.sin() + Vec3::Y * angle.cos()) * radius;
-        concrete(place, 0.6 * radius * step, 1.0, WIDTH - 0.4, Quat::from_rotation_z(-angle))
+        concrete(place, 0.6 * radius * step, 1.0, WIDTH - 1.0, Quat::from_rotation_z(-angle))
     });
     let posts = [-0.8f32, -0.5, 0.5, 0.8].into_iter().map(|part| {
         let offset = part * chord;
         let foot = centre.y + (radius * radius - offset * offset).sqrt();
         let place = middle + along * offset;
         let height = (deck - foot) / 2.0;
-        concrete(place.with_y(deck - height), 0.9, height.max(0.5), WIDTH - 0.6, level)
+        concrete(place.with_y(deck - height), 0.9, height.max(0.5), WIDTH - 1.2, level)
     });
     let slab = concrete(middle - Vec3::Y, half + 4.0, 1.0, WIDTH, level);
     let parapets = [-1.0, 1.0].map(|side| {
