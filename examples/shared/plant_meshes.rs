@@ -72,14 +72,7 @@ impl Builder {
     }
 
     /// Branches all round: a cone whose rim is a star of hanging tips, dark inside and light at the tips.
-    pub fn branches(
-        mut self,
-        foot: Vec3,
-        height: f32,
-        radius: f32,
-        tips: u32,
-        colors: (Vec3, Vec3),
-    ) -> Self {
+    pub fn branches(mut self, foot: Vec3, height: f32, radius: f32, tips: u32, colors: (Vec3, Vec3)) -> Self {
         let first = self.positions.len() as u32;
         self.vertex(foot + Vec3::Y * height, Vec3::Y, colors.0);
         for at in 0..2 * tips {

@@ -12,22 +12,11 @@ use glam::IVec3;
 use crate::lattice::{BRICK, BrickPos, Column, LatticeBox, ONE};
 use crate::volume::{SampleView, row};
 
-/// The way to half of the neighbours, and its length in 1/256 voxel. The other half is opposite.
-const STEPS: [([i32; 3], i32); 13] = [
-    ([1, 0, 0], 256),
-    ([0, 1, 0], 256),
-    ([0, 0, 1], 256),
-    ([1, 1, 0], 362),
-    ([1, -1, 0], 362),
-    ([1, 0, 1], 362),
-    ([1, 0, -1], 362),
-    ([0, 1, 1], 362),
-    ([0, 1, -1], 362),
-    ([1, 1, 1], 443),
-    ([1, 1, -1], 443),
-    ([1, -1, 1], 443),
-    ([1, -1, -1], 443),
-];
+/// Farther than any horizon, in 1/256 voxel.
+const FAR: i16 = 1 << 14;
+
+/// The way from a sample to the next one along one, two and three axes, in 1/256 voxel.
+const STEPS: [i16; 3] = [256, 362, 443];
 
 /// Samples around a brick that distances up to `horizon` depend on, along each side.
 pub(super) fn margin(horizon: i32) -> i32 {
@@ -46,48 +35,9 @@ impl SurfaceDistance {
         let around = pos.samples().grown(margin(horizon));
         let all = densities(view, around);
         let side = around.size().as_usizevec3();
-        let strides = [1, (side.x * side.z) as isize, side.x as isize];
-        let mut own = vec![horizon; all.len()];
-        // The outermost samples are there for their neighbours.
-        let inner = || {
-            (1..side.y - 1).flat_map(move |y| {
-                (1..side.z - 1).flat_map(move |z| (1..side.x - 1).map(move |x| (y * side.z + z) * side.x + x))
-            })
-        };
-        let mut has_surface = false;
-        for index in inner() {
-            if let Some(distance) = to_crossings(&all, index, strides) {
-                own[index] = distance.min(horizon);
-                has_surface = true;
-            }
-        }
-        if has_surface {
-            let steps: Vec<(isize, i32)> = STEPS
-                .iter()
-                .map(|(way, length)| ((0..3).map(|axis| way[axis] as isize * strides[axis]).sum(), *length))
-                .collect();
-            let settle = |own: &mut [i32], index: usize| {
-                let (before, is_solid) = (own[index], all[index] < 0);
-                let ways = steps.iter().flat_map(|&(step, length)| [(step, length), (-step, length)]);
-                let after = ways.fold(before, |least, (step, length)| {
-                    let other = index.wrapping_add_signed(step);
-                    if (all[other] < 0) == is_solid { least.min(own[other] + length) } else { least }
-                });
-                own[index] = after;
-                after != before
-            };
-            loop {
-                let mut is_changed = false;
-                inner().for_each(|index| is_changed |= settle(&mut own, index));
-                if !is_changed {
-                    break;
-                }
-                is_changed = false;
-                inner().rev().for_each(|index| is_changed |= settle(&mut own, index));
-                if !is_changed {
-                    break;
-                }
-            }
+        let mut field = Field::new(&all, [side.x, side.y, side.z], horizon as i16);
+        if field.start(&all) {
+            field.spread();
         }
         let low = (pos.origin() - around.min).as_usizevec3();
         let brick = BRICK as usize;
@@ -95,7 +45,7 @@ impl SurfaceDistance {
         let distances = rows
             .flat_map(|(y, z)| {
                 let first = ((low.y + y) * side.z + low.z + z) * side.x + low.x;
-                own[first..first + brick].iter().copied()
+                field.distances[first..first + brick].iter().map(|&distance| distance.into())
             })
             .collect();
         Self { distances }
@@ -104,6 +54,90 @@ impl SurfaceDistance {
     /// The distance of the brick's sample at an index.
     pub fn at(&self, index: usize) -> i32 {
         self.distances[index]
+    }
+}
+
+/// The distances of a box of samples, x fastest, then z, then y.
+struct Field {
+    size: [usize; 3],
+    /// In 1/256 voxel, at most the horizon. Those of the outermost samples are not computed.
+    distances: Vec<i16>,
+    /// 0 for samples of air, [`FAR`] for solid ones: distances go no way on which this changes.
+    kinds: Vec<i16>,
+}
+
+impl Field {
+    fn new(all: &[i32], size: [usize; 3], horizon: i16) -> Self {
+        let kinds = all.iter().map(|&density| if density < 0 { FAR } else { 0 }).collect();
+        Self { size, distances: vec![horizon; all.len()], kinds }
+    }
+
+    /// Sets the distances of samples next to the surface; returns whether there are any.
+    fn start(&mut self, all: &[i32]) -> bool {
+        let [width, height, depth] = self.size;
+        let strides = [1, (width * depth) as isize, width as isize];
+        let mut has_surface = false;
+        for (y, z) in (1..height - 1).flat_map(|y| (1..depth - 1).map(move |z| (y, z))) {
+            let row = (y * depth + z) * width;
+            for index in row + 1..row + width - 1 {
+                let kind = self.kinds[index];
+                let is_like = |stride: isize| self.kinds[index.wrapping_add_signed(stride)] == kind;
+                if strides.iter().all(|&stride| is_like(stride) && is_like(-stride)) {
+                    continue;
+                }
+                if let Some(distance) = to_crossings(all, index, strides) {
+                    self.distances[index] = self.distances[index].min(distance as i16);
+                    has_surface = true;
+                }
+            }
+        }
+        has_surface
+    }
+
+    /// Hands distances on until none gets smaller.
+    fn spread(&mut self) {
+        // A pass leaves nothing that the same pass would change.
+        self.pass(true);
+        while self.pass(false) && self.pass(true) {}
+    }
+
+    /// Hands distances on to the samples after them, or to those before; returns whether any got smaller.
+    fn pass(&mut self, is_forward: bool) -> bool {
+        let [width, height, depth] = self.size;
+        let inner = width - 2;
+        let (mut row, mut is_changed) = (vec![0; inner], false);
+        for number in 0..(height - 2) * (depth - 2) {
+            let number = if is_forward { number } else { (height - 2) * (depth - 2) - 1 - number };
+            let first = ((number / (depth - 2) + 1) * depth + number % (depth - 2) + 1) * width + 1;
+            let kinds = &self.kinds[first..][..inner];
+            row.copy_from_slice(&self.distances[first..][..inner]);
+            // Of the rows next to it, those that come before this one or after it: how many rows apart, and along how many axes.
+            for (apart, axes) in [(1, 1), (depth - 1, 2), (depth, 1), (depth + 1, 2)] {
+                let other = if is_forward { first - apart * width } else { first + apart * width };
+                for (other, length) in
+                    [(other - 1, STEPS[axes]), (other, STEPS[axes - 1]), (other + 1, STEPS[axes])]
+                {
+                    let others = &self.distances[other..][..inner];
+                    let other_kinds = &self.kinds[other..][..inner];
+                    for at in 0..inner {
+                        let way = others[at].wrapping_add(length).max(kinds[at] ^ other_kinds[at]);
+                        row[at] = row[at].min(way);
+                    }
+                }
+            }
+            // Along the row.
+            let mut hand_on = |from: usize, to: usize| {
+                row[to] = row[to].min((row[from] + STEPS[0]).max(kinds[from] ^ kinds[to]));
+            };
+            match is_forward {
+                true => (1..inner).for_each(|at| hand_on(at - 1, at)),
+                false => (1..inner).rev().for_each(|at| hand_on(at, at - 1)),
+            }
+            let distances = &mut self.distances[first..][..inner];
+            is_changed |= *distances != row[..];
+            distances.copy_from_slice(&row);
+        }
+        is_changed
     }
 }
 

@@ -140,6 +140,8 @@ pub struct Bot {
     arrived: VecDeque<(Duration, u64)>,
     /// The most frames until an own edit was shown.
     pub own_frames: u64,
+    /// Whether it has all grids and prefabs from the start; others get what they lack from the server.
+    pub has_contents: bool,
     /// The longest time from the arrival of an entry until it was shown.
     pub lag: Duration,
     pub events: BTreeMap<&'static str, u64>,
@@ -171,8 +173,8 @@ impl Bot {
         let mut client =
             Client::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
         client.contents_mut().add(Arc::clone(image));
-        // Others get what they lack from the server.
-        if id.is_multiple_of(2) {
+        let has_contents = id.is_multiple_of(2);
+        if has_contents {
             add_contents(client.contents_mut());
         }
         client.set_place(IVec3::new(20, 20, 20));
@@ -195,6 +197,7 @@ impl Bot {
             dug,
             arrived,
             own_frames: 0,
+            has_contents,
             lag: Duration::ZERO,
             events,
             playable_at: None,
