@@ -346,8 +346,11 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
             let (world, mut counts) = (terrain.world(), MaterialCounts::default());
             let columns = everything(world);
             // A reset takes bricks away.
-            let bricks: BTreeSet<[i32; 3]> =
-                [world, &*before].into_iter().flat_map(|own| own.bricks()).map(|(pos, _)| pos.0.to_array()).collect();
+            let bricks: BTreeSet<[i32; 3]> = [world, &*before]
+                .into_iter()
+                .flat_map(|own| own.bricks())
+                .map(|(pos, _)| pos.0.to_array())
+                .collect();
             let bricks = bricks.into_iter().map(|pos| BrickPos(IVec3::from_array(pos)).samples());
             let bricks: Vec<LatticeBox> = bricks.filter_map(|own| own.intersection(columns)).collect();
             let mut bounds = None;
@@ -386,7 +389,9 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
             assert_eq!(terrain.world().hash(), after, "{what}: redone");
         }
     }
-    println!("{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting, {pasted} by pastes, {long} by paths and grids; {looks:?}");
+    println!(
+        "{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting, {pasted} by pastes, {long} by paths and grids; {looks:?}"
+    );
     assert!(removed > 50 && broken > 50 && left > 5, "{removed} removed, {broken} broken off, {left} left");
     assert!(sculpted > 10, "{sculpted} pieces were cut off by sculpting");
     assert!(pasted > 0 && long > 0, "{pasted} by pastes, {long} by paths and grids");

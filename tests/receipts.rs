@@ -12,7 +12,9 @@ use bevy_burrow::terrain::World;
 use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
-use worlds::{any_random_brush, random_brush, random_brush_at_a_face, random_ground, random_strata, reference_density};
+use worlds::{
+    any_random_brush, random_brush, random_brush_at_a_face, random_ground, random_strata, reference_density,
+};
 
 /// The difference of two worlds within a box, sample by sample.
 #[derive(Default, Debug)]
@@ -149,8 +151,9 @@ fn a_thousand_receipts_balance_with_the_world() {
                     assert!(is_reset, "the receipt names a field that is not there; {what}");
                     continue;
                 };
-                assert!(is_reset || 
-                    applied.bounds.is_some_and(|bounds| bounds.intersection(field.bounds).is_some()),
+                assert!(
+                    is_reset
+                        || applied.bounds.is_some_and(|bounds| bounds.intersection(field.bounds).is_some()),
                     "{what}"
                 );
             }

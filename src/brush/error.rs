@@ -159,7 +159,9 @@ pub enum BrushError {
     )]
     NoTriangles,
     /// A mesh does not come with one material for each triangle.
-    #[error("{materials} materials for {triangles} triangles: give one for each triangle of the mesh, in their order")]
+    #[error(
+        "{materials} materials for {triangles} triangles: give one for each triangle of the mesh, in their order"
+    )]
     MeshMaterials {
         /// Materials given.
         materials: usize,

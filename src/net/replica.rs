@@ -42,10 +42,7 @@ impl Reads {
 
     fn meets(&self, LatticeBox { min, max }: LatticeBox) -> bool {
         // Samples from which it would read some of these.
-        let near = LatticeBox {
-            min: min.saturating_sub(self.around),
-            max: max.saturating_add(self.around),
-        };
+        let near = LatticeBox { min: min.saturating_sub(self.around), max: max.saturating_add(self.around) };
         let Some(near) = self.reach.intersection(near) else { return false };
         self.evaluator.as_ref().is_none_or(|evaluator| !evaluator.is_out_of_reach(near))
     }

@@ -166,7 +166,11 @@ fn any_edits_of_the_smallest_and_narrowest_worlds_are_closed_and_undone() {
             let height = |x: i32, z: i32| f64::from((x * 7919 + z * 104_729).rem_euclid(64)) / 24.0;
             let ground = Ground::from_fn(width, depth, height).expect("finite heights");
             let mut terrain = terrain(ground, chunk_size);
-            terrain.set_loose(rng.bool().then(|| LooseSettings { crumbs: 9, debris: 200, ..Default::default() }));
+            terrain.set_loose(rng.bool().then(|| LooseSettings {
+                crumbs: 9,
+                debris: 200,
+                ..Default::default()
+            }));
             let pristine = terrain.world().hash();
             for step in 0..12 {
                 let brush = any_random_brush(&mut rng, terrain.world().ground());
@@ -206,11 +210,18 @@ fn paths_roads_grids_fills_pastes_and_resets_at_the_ends_of_the_lattice_are_clos
                 Brush::paste(Paste::new(prefabs[0].clone(), other).turned_about_x(1)),
                 Brush::reset(corridor),
             ] {
-                let receipt = terrain.apply([&brush]).remove(0);
-                assert!(receipt.outcome.is_ok(), "ground at {height}: {brush:?}: {receipt:?}");
+                let outcome = terrain.apply([&brush]).remove(0).outcome;
+                // The middle of a prefab may lie beyond the end.
+                let is_beyond = matches!(outcome, Err(Rejection::Brush(BrushError::OutOfRange { .. })));
+                let is_paste = matches!(brush.operation, Operation::Paste { .. });
+                assert!(
+                    outcome.is_ok() || is_paste && is_beyond,
+                    "ground at {height}: {brush:?}: {outcome:?}"
+                );
                 assert_flawless(&terrain, format!("ground at {height}: {brush:?}"));
             }
-            let around = LatticeBox { min: IVec3::new(0, y as i32 - 6, 0), max: IVec3::new(9, y as i32 + 6, 9) };
+            let around =
+                LatticeBox { min: IVec3::new(0, y as i32 - 6, 0), max: IVec3::new(9, y as i32 + 6, 9) };
             // A copy ends with the lattice.
             assert!(terrain.world().copy(around, around.min).is_err());
             assert!(terrain.world().shape_grid(around).is_ok());

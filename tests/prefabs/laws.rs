@@ -246,7 +246,9 @@ fn a_paste_over_the_rim_changes_what_lies_in_the_world_and_a_copy_of_it_is_the_s
         let ends = [pasted(from.min), pasted(from.max)];
         let to = LatticeBox { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) };
         let Some(inside) = to.intersection(bounds) else {
-            assert_eq!(outcome, Err(Rejection::OutsideWorld));
+            let is_nothing = matches!(outcome, Ok(ref applied) if *applied == Applied::default());
+            assert!(is_nothing || outcome == Err(Rejection::OutsideWorld), "world {index}: {outcome:?}");
+            assert_eq!(terrain.world().hash(), before.hash());
             outside += 1;
             continue;
         };
@@ -260,7 +262,11 @@ fn a_paste_over_the_rim_changes_what_lies_in_the_world_and_a_copy_of_it_is_the_s
             } else if !edited_only || before.samples().is_edited(point) {
                 assert_eq!(look(&before, point), look(terrain.world(), place), "world {index} at {place}");
             } else {
-                assert_eq!(stored(&before, place), stored(terrain.world(), place), "world {index} at {place}");
+                assert_eq!(
+                    stored(&before, place),
+                    stored(terrain.world(), place),
+                    "world {index} at {place}"
+                );
             }
         }
         assert!(terrain.world().check_seams().is_flawless(), "world {index}");
@@ -271,7 +277,7 @@ fn a_paste_over_the_rim_changes_what_lies_in_the_world_and_a_copy_of_it_is_the_s
         terrain.apply([Brush::paste(Paste::new(again, anchor_of_copy.as_vec3()))]);
         assert_eq!(terrain.world().hash(), after.hash(), "world {index}: it is there already");
     }
-    assert!(cut > 10_000 && outside < 8, "{cut} samples beyond the rim, {outside} pastes");
+    assert!(cut > 10_000 && outside < 20, "{cut} samples beyond the rim, {outside} pastes");
 }
 
 /// A long prefab, a flat one, and one of a single sample, at all scales.
@@ -282,8 +288,13 @@ fn prefabs_of_any_size_are_pasted_at_any_scale_or_refused() {
     let mut world = terrain(&ground, 100);
     world.apply([Brush::dig(Shape::sphere(Vec3::new(12.0, 20.0, 12.0), 7.0))]);
     let (mut pasted, mut refused) = (0, 0);
-    for size in [IVec3::ONE, IVec3::new(1024, 1, 1), IVec3::new(1, 1024, 2), IVec3::new(24, 1, 24), IVec3::new(2, 3, 2)]
-    {
+    for size in [
+        IVec3::ONE,
+        IVec3::new(1024, 1, 1),
+        IVec3::new(1, 1024, 2),
+        IVec3::new(24, 1, 24),
+        IVec3::new(2, 3, 2),
+    ] {
         let min = IVec3::new(0, 18, 0);
         let samples = LatticeBox { min, max: min + size - 1 };
         let prefab = Arc::new(world.world().copy(samples, min).expect("it lies in the world"));
