@@ -93,9 +93,12 @@ fn what_is_protected_or_unbreakable_stays() {
 
 #[test]
 fn what_rules_refuse_is_what_would_have_changed_without_them() {
-    let (mut refused, mut by_kind) = (0, [0; 3]);
-    for seed in 600..600 + worlds::world_count(60) {
-        let (ground, chunk_size, rules, brushes) = script(seed);
+    let mut by_kind = [0; 3];
+    for seed in 600..600 + worlds::world_count(24) {
+        let (ground, chunk_size, rules, mut brushes) = script(seed);
+        // Of what the others did.
+        let resets = brushes[..5].iter().map(|brush| Brush { operation: Operation::Reset, ..brush.clone() });
+        brushes.extend(resets.collect::<Vec<_>>());
         let mut terrain = terrain(&ground, chunk_size, &DiggingRules::default());
         for brush in &brushes {
             terrain.set_rules(DiggingRules::default()).expect("valid rules");
@@ -125,11 +128,9 @@ fn what_rules_refuse_is_what_would_have_changed_without_them() {
                 _ => 2,
             };
             by_kind[kind] += own;
-            refused += own;
         }
     }
-    println!("{refused} voxels refused: {by_kind:?} by resets, pastes, and others");
-    assert!(by_kind.iter().all(|&voxels| voxels > 50), "{by_kind:?}");
+    assert!(by_kind.iter().all(|&voxels| voxels > 50), "voxels of resets, pastes, and others: {by_kind:?}");
 }
 
 #[test]

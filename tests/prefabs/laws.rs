@@ -236,7 +236,7 @@ fn a_paste_over_the_rim_changes_what_lies_in_the_world_and_a_copy_of_it_is_the_s
         let (is_mirrored, turns, edited_only) = (rng.bool(), rng.i32(0..4), rng.u32(0..3) == 0);
         // Its anchor lies on the rim or not far beyond it.
         let rim = [0, bounds.max.x][rng.usize(0..2)] + rng.i32(-3..4);
-        let at = IVec3::new(rim, anchor.y + rng.i32(-9..9), rng.i32(-20..=bounds.max.z + 20));
+        let at = IVec3::new(rim, anchor.y + rng.i32(-9..9), rng.i32(0..=bounds.max.z));
         let at = if rng.bool() { at } else { IVec3::new(at.z, at.y, at.x) };
         let paste = Paste::new(prefab, at.as_vec3()).turned_about_y(turns);
         let paste = Paste { mirror: is_mirrored, edited_only, ..paste };
@@ -277,7 +277,7 @@ fn a_paste_over_the_rim_changes_what_lies_in_the_world_and_a_copy_of_it_is_the_s
         terrain.apply([Brush::paste(Paste::new(again, anchor_of_copy.as_vec3()))]);
         assert_eq!(terrain.world().hash(), after.hash(), "world {index}: it is there already");
     }
-    assert!(cut > 10_000 && outside < 20, "{cut} samples beyond the rim, {outside} pastes");
+    assert!(cut > 10_000 && outside < 15, "{cut} samples beyond the rim, {outside} pastes");
 }
 
 /// A long prefab, a flat one, and one of a single sample, at all scales.
@@ -319,7 +319,7 @@ fn prefabs_of_any_size_are_pasted_at_any_scale_or_refused() {
             }
         }
     }
-    assert!(pasted > 10 && refused > 2, "{pasted} {refused}");
+    assert!(pasted > 7 && refused > 2, "{pasted} {refused}");
     while world.undo().outcome.is_ok() {}
     assert_eq!(world.world().bricks().count(), 0);
 }
