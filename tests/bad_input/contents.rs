@@ -100,8 +100,16 @@ fn paste(rng: &mut Rng) -> Paste {
 
 fn brush(rng: &mut Rng) -> Brush {
     let material = MaterialId(rng.u8(..));
-    let brush = match rng.u32(0..12) {
-        0 => Brush::dig(shape(rng)),
+    let brush = match rng.u32(0..13) {
+        0 => {
+            let points = path(rng).points;
+            let mut curves: Vec<Shape> = match rng.bool() {
+                true => Shape::along_spline(&points).collect(),
+                false => Shape::along_polyline(&points).collect(),
+            };
+            Brush::dig(curves.pop().unwrap_or_else(|| Shape::sphere(point(rng), number(rng, 0.3, 5.0))))
+        }
+        12 => Brush::dig(shape(rng)),
         1 => Brush::add(shape(rng), material),
         2 => Brush::paint(shape(rng), material),
         3 => Brush::reset(shape(rng)),
