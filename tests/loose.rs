@@ -4,7 +4,7 @@ mod worlds;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use bevy_burrow::lattice::{LatticeBox, SNAP};
+use bevy_burrow::lattice::{BrickPos, LatticeBox, SNAP};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::vertex::crossing;
 use bevy_burrow::surface::{MaterialMix, cases};
@@ -13,7 +13,8 @@ use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
 use glam::{DVec3, IVec3, Vec3};
 use worlds::{
-    random_brush, random_brush_at_a_face, random_ground, random_rules, random_sculpting_brush, world_count,
+    any_random_brush, random_brush, random_brush_at_a_face, random_ground, random_rules,
+    random_sculpting_brush, world_count,
 };
 
 const STEPS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
@@ -81,10 +82,11 @@ fn check_piece(world: &World, piece: &LoosePiece, what: &str) {
     assert_eq!(piece.materials.iter().collect::<BTreeMap<_, _>>(), counts, "{what}");
 }
 
-/// Edits that leave many loose pieces: rough digs, thin walls, cut balls in the air, and sculpting on top of these.
+/// Edits that leave many loose pieces: rough digs, thin walls, cut balls in the air, and anything else on top of these.
 fn crumbling_brush(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
-    let brush = match rng.u32(0..9) {
+    let brush = match rng.u32(0..12) {
         0 => random_brush_at_a_face(rng, ground, chunk_size),
+        9.. => any_random_brush(rng, ground),
         1 => {
             // A horizontal cut through hills and everything above them.
             let (low, high) = ground.height_range();
@@ -288,7 +290,7 @@ fn cut_off(before: &World, after: &World) -> Vec<Piece> {
 
 #[test]
 fn edits_take_out_what_they_cut_off_and_nothing_else() {
-    let (mut removed, mut broken, mut left, mut sculpted) = (0, 0, 0, 0);
+    let (mut removed, mut broken, mut left, mut sculpted, mut pasted, mut long) = (0, 0, 0, 0, 0, 0);
     let mut looks = PieceVertices::default();
     for index in 0..world_count(150) {
         let mut rng = Rng::with_seed(52_000 + index);
@@ -309,11 +311,17 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
             assert!(terrain.undo().outcome.is_ok());
             terrain.set_loose(Some(settings));
             let applied = terrain.apply([&brush]).remove(0).outcome.expect("it changed something before");
-            let expected: BTreeSet<Piece> =
-                cut_off(&before, &plain).into_iter().filter(|piece| piece.len() <= 3000).collect();
+            // Ground that loses its support by a reset does not fall.
+            let cut = match brush.operation {
+                Operation::Reset => Vec::new(),
+                _ => cut_off(&before, &plain),
+            };
+            let expected: BTreeSet<Piece> = cut.into_iter().filter(|piece| piece.len() <= 3000).collect();
             let own: BTreeSet<Piece> = applied.loose.iter().map(samples_of).collect();
             assert_eq!(own, expected, "{what}");
             sculpted += if brush.operation.is_sculpting() { own.len() } else { 0 };
+            pasted += if matches!(brush.operation, Operation::Paste { .. }) { own.len() } else { 0 };
+            long += if brush.custom.is_some() { own.len() } else { 0 };
 
             let mut gone = Piece::new();
             let is_broken = applied.loose.iter().any(|piece| piece.mesh.is_some());
@@ -337,8 +345,14 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
             // Which samples are solid, their materials, and the position of the surface.
             let (world, mut counts) = (terrain.world(), MaterialCounts::default());
             let columns = everything(world);
-            let bricks = world.bricks().filter_map(|(pos, _)| pos.samples().intersection(columns));
-            let bricks: Vec<LatticeBox> = bricks.collect();
+            // A reset takes bricks away.
+            let bricks: BTreeSet<[i32; 3]> = [world, &*before]
+                .into_iter()
+                .flat_map(|own| own.bricks())
+                .map(|(pos, _)| pos.0.to_array())
+                .collect();
+            let bricks = bricks.into_iter().map(|pos| BrickPos(IVec3::from_array(pos)).samples());
+            let bricks: Vec<LatticeBox> = bricks.filter_map(|own| own.intersection(columns)).collect();
             let mut bounds = None;
             for point in bricks.iter().flat_map(|brick| brick.points()) {
                 let (old, new) = (plain.samples(), world.samples());
@@ -375,9 +389,12 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
             assert_eq!(terrain.world().hash(), after, "{what}: redone");
         }
     }
-    println!("{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting; {looks:?}");
+    println!(
+        "{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting, {pasted} by pastes, {long} by paths and grids; {looks:?}"
+    );
     assert!(removed > 50 && broken > 50 && left > 5, "{removed} removed, {broken} broken off, {left} left");
     assert!(sculpted > 10, "{sculpted} pieces were cut off by sculpting");
+    assert!(pasted > 0 && long > 0, "{pasted} by pastes, {long} by paths and grids");
     let PieceVertices { drawn, built, sides, normals } = looks;
     assert!(drawn.min(normals) > 300 && built.min(sides) > 20, "{looks:?}");
 }

@@ -92,6 +92,48 @@ fn what_is_protected_or_unbreakable_stays() {
 }
 
 #[test]
+fn what_rules_refuse_is_what_would_have_changed_without_them() {
+    let mut by_kind = [0; 3];
+    for seed in 600..600 + worlds::world_count(24) {
+        let (ground, chunk_size, rules, mut brushes) = script(seed);
+        // Of what the others did.
+        let resets = brushes[..5].iter().map(|brush| Brush { operation: Operation::Reset, ..brush.clone() });
+        brushes.extend(resets.collect::<Vec<_>>());
+        let mut terrain = terrain(&ground, chunk_size, &DiggingRules::default());
+        for brush in &brushes {
+            terrain.set_rules(DiggingRules::default()).expect("valid rules");
+            let before = terrain.snapshot();
+            terrain.apply([brush]);
+            let plain = terrain.snapshot();
+            if plain.hash() != before.hash() {
+                assert!(terrain.undo().outcome.is_ok());
+            }
+            terrain.set_rules(rules.clone()).expect("valid rules");
+            let Ok(applied) = terrain.apply([brush]).remove(0).outcome else { continue };
+            // Voxels that turned to ground, to air, or to another material.
+            let bricks = plain.bricks().chain(before.bricks()).map(|(pos, _)| pos);
+            let bricks: std::collections::BTreeSet<_> = bricks.collect();
+            let voxel =
+                |world: &World, at: IVec3| world.samples().is_solid(at).then(|| world.samples().material(at));
+            let changed = |world: &World| {
+                let points = bricks.iter().flat_map(|pos| pos.samples().points());
+                points.filter(|&at| voxel(world, at) != voxel(&before, at)).count() as u64
+            };
+            let (all, allowed) = (changed(&plain), changed(terrain.world()));
+            let own = applied.refused.total();
+            assert_eq!(all - allowed, own, "world {seed}: {brush:?} under {rules:?}");
+            let kind = match brush.operation {
+                Operation::Reset => 0,
+                Operation::Paste { .. } => 1,
+                _ => 2,
+            };
+            by_kind[kind] += own;
+        }
+    }
+    assert!(by_kind.iter().all(|&voxels| voxels > 50), "voxels of resets, pastes, and others: {by_kind:?}");
+}
+
+#[test]
 fn rules_that_refuse_nothing_change_nothing() {
     let (none, nowhere) = (DiggingRules::default, MaterialId(200));
     let far = LatticeBox::point(IVec3::new(3, 32_000, 3));

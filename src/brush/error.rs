@@ -151,9 +151,23 @@ pub enum BrushError {
     /// A stamp is pressed within a grid.
     #[error("a stamp cannot be pressed within a grid: give the brush another shape")]
     StampInGrid,
-    /// A mesh has no triangles, no extent, or triangles whose corners have no position.
-    #[error("the mesh has no list of triangles with positions, or all of them are one point")]
+    /// A mesh has no triangles with an area, is too small or too large to be divided into cells, or has triangles whose
+    /// corners have no position.
+    #[error(
+        "the mesh has no triangles with positions and an area, or is too small or too large: give it a list of triangles, and \
+         sides that are normal numbers"
+    )]
     NoTriangles,
+    /// A mesh does not come with one material for each triangle.
+    #[error(
+        "{materials} materials for {triangles} triangles: give one for each triangle of the mesh, in their order"
+    )]
+    MeshMaterials {
+        /// Materials given.
+        materials: usize,
+        /// Triangles of the mesh.
+        triangles: usize,
+    },
     /// A mesh has a hole, or its triangles face different ways.
     #[error(
         "{edges} edges of the mesh are open: close its holes, and let all triangles that share an edge face the same way"

@@ -53,7 +53,8 @@ pub enum PrefabError {
     },
     /// The anchor is too far from the box.
     #[error(
-        "the anchor is {anchor} from the lowest sample, but at most {FARTHEST_ANCHOR} voxels are possible"
+        "the anchor is {anchor} from the lowest sample, but at most {FARTHEST_ANCHOR} voxels along each axis are possible: \
+         choose one that is nearer to the box"
     )]
     Anchor {
         /// From the lowest sample to the anchor.

@@ -36,6 +36,8 @@ pub(crate) use effect::{DraftedBrick, EditEffect, MergedBricks, Overlay};
 #[cfg(feature = "cuda")]
 pub(crate) use jobs::Job;
 pub(crate) use prepared::PreparedEdits;
+#[cfg(feature = "net")]
+pub(crate) use prepared_edit::most_read_around;
 pub(crate) use prepared_edit::{most_bricks, reach};
 pub(crate) use removal::take_out;
 pub(crate) use reset::{ResetBrick, edited_within, reset};

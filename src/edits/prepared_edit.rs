@@ -58,12 +58,9 @@ impl PreparedEdit {
 
     /// The samples that the edit reads, if it reads others than those that it changes.
     pub(super) fn reads(&self) -> Option<LatticeBox> {
-        let rounding = self.sculptor.as_ref().and_then(SculptKernel::rounding);
-        let around = rounding.map_or(1, |rounding| margin(rounding.horizon()));
-        let all = self.reach.filter(|_| self.looks_around())?.grown(around);
-        let has_to_look = self.sculptor.as_ref().is_some_and(|own| own.material().is_none());
-        let look = IVec3::Y * if has_to_look { LOOK } else { 0 };
-        Some(LatticeBox { min: all.min - look, max: all.max + look })
+        let LatticeBox { min, max } = self.reach.filter(|_| self.looks_around())?;
+        let around = reads_around(self.sculptor.as_ref());
+        Some(LatticeBox { min: min - around, max: max + around })
     }
 
     /// Returns `true` if the edit may change some of these samples; `false` if it certainly changes none.
@@ -71,6 +68,21 @@ impl PreparedEdit {
         let reached = self.reach.and_then(|reach| reach.intersection(samples));
         reached.is_some_and(|samples| !self.evaluator.is_out_of_reach(samples))
     }
+}
+
+/// How far from the samples that it changes an edit with this kernel, or one that rules restrict, reads others, in voxels
+/// along each axis.
+fn reads_around(sculptor: Option<&SculptKernel>) -> IVec3 {
+    let rounding = sculptor.and_then(SculptKernel::rounding);
+    let around = rounding.map_or(1, |rounding| margin(rounding.horizon()));
+    let has_to_look = sculptor.is_some_and(|own| own.material().is_none());
+    IVec3::splat(around) + IVec3::Y * if has_to_look { LOOK } else { 0 }
+}
+
+/// How far from the samples that it changes an edit reads others, in voxels along each axis, whatever the rules.
+#[cfg(feature = "net")]
+pub(crate) fn most_read_around(edit: &Edit) -> IVec3 {
+    reads_around(edit.sculptor().as_ref())
 }
 
 /// The part of an edit's reach that lies in the world; `None` when it lies outside.

@@ -6,10 +6,13 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use glam::IVec3;
+
 use super::message::{Entry, RuleState};
 use super::never_shown;
 use super::regions::{RegionSums, Steps, chunks_of, touched_regions};
 use crate::brush::{Edit, Evaluator};
+use crate::edits::most_read_around;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{
@@ -21,12 +24,12 @@ use crate::world::{Overlay, Places, State};
 
 type Stored = Option<Arc<Brick>>;
 
-/// An edit reads at most this many voxels beyond the samples that it may change.
-const MARGIN: i32 = 8;
-
 /// The samples that a pending edit may read.
 struct Reads {
-    around: LatticeBox,
+    /// The samples that it may change.
+    reach: LatticeBox,
+    /// How far from those it reads, along each axis.
+    around: IVec3,
     /// Of an edit whose box is mostly empty, such as a long path.
     evaluator: Option<Evaluator>,
 }
@@ -34,12 +37,14 @@ struct Reads {
 impl Reads {
     fn of(edit: &Edit) -> Self {
         let evaluator = edit.most_bricks().map(|_| edit.evaluator());
-        Self { around: edit.reach().grown(MARGIN), evaluator }
+        Self { reach: edit.reach(), around: most_read_around(edit), evaluator }
     }
 
-    fn meets(&self, samples: LatticeBox) -> bool {
-        let Some(samples) = self.around.intersection(samples) else { return false };
-        self.evaluator.as_ref().is_none_or(|evaluator| !evaluator.is_out_of_reach(samples.grown(MARGIN)))
+    fn meets(&self, LatticeBox { min, max }: LatticeBox) -> bool {
+        // Samples from which it would read some of these.
+        let near = LatticeBox { min: min.saturating_sub(self.around), max: max.saturating_add(self.around) };
+        let Some(near) = self.reach.intersection(near) else { return false };
+        self.evaluator.as_ref().is_none_or(|evaluator| !evaluator.is_out_of_reach(near))
     }
 }
 

@@ -7,7 +7,7 @@ use fastrand::Rng;
 use glam::{Vec2, Vec3};
 
 use super::*;
-use crate::brush::{Brush, Shape, Stamp};
+use crate::brush::{Brush, BrushPath, Corridor, Shape, Stamp};
 use crate::ground::{GreyImage, MaterialId};
 use crate::net::ClientId;
 use crate::terrain::{Asked, LooseSettings, Order};
@@ -16,8 +16,14 @@ use crate::volume::DiggingRules;
 const SIDE: u32 = 72;
 const OWN: ClientId = ClientId(1);
 
-/// Places of edits that meet each other.
-const NEAR: (f32, f32) = (8.0, 48.0);
+/// Where edits are: the least and the greatest x, and y.
+type EditPlaces = [(f32, f32); 2];
+
+/// Heights around the surface.
+const SURFACE: (f32, f32) = (12.0, 26.0);
+
+/// EditPlaces of edits that meet each other.
+const NEAR: EditPlaces = [(8.0, 48.0), SURFACE];
 
 fn ground() -> Arc<Ground> {
     let height = |x: i32, z: i32| 20.0 + 3.0 * (f64::from(x) * 0.2).sin() + (f64::from(z) * 0.3).cos();
@@ -34,17 +40,19 @@ fn terrain(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
-/// An edit of any operation, between these places.
-fn edit(rng: &mut Rng, image: &Arc<GreyImage>, (low, high): (f32, f32)) -> Edit {
-    let mut within = |low: f32, high: f32| low + rng.f32() * (high - low);
-    let at = Vec3::new(within(low, high), within(12.0, 26.0), within(8.0, 48.0));
-    let size = within(1.0, 6.0);
+/// An edit of any operation, at these places.
+fn edit(rng: &mut Rng, image: &Arc<GreyImage>, [x, y]: EditPlaces) -> Edit {
+    let mut within = |(low, high): (f32, f32)| low + rng.f32() * (high - low);
+    let at = Vec3::new(within(x), within(y), within((8.0, 48.0)));
+    let size = within((1.0, 6.0));
     let shape = match rng.u32(0..3) {
         0 => Shape::cuboid(at, Vec3::new(size, 1.5, size)),
         _ => Shape::sphere(at, size),
     };
     let material = MaterialId(rng.u8(0..4));
-    let brush = match rng.u32(0..14) {
+    let end = at + Vec3::new(6.0, rng.f32() * 4.0 - 2.0, 5.0);
+    let path = BrushPath::polyline([(at, 1.5), (end, 2.0)]);
+    let brush = match rng.u32(0..20) {
         0 | 1 => Brush::add(shape, material),
         2 => Brush::paint(shape, material),
         3 => Brush::smooth(shape, 0.7),
@@ -55,6 +63,11 @@ fn edit(rng: &mut Rng, image: &Arc<GreyImage>, (low, high): (f32, f32)) -> Edit 
         8 => Brush::lower(shape, 1.5),
         9 => Brush::terrace(shape, 3.0),
         10 => Brush::stamp(shape, Stamp::new(Arc::clone(image), at, Vec2::splat(8.0), 3.0)),
+        11 | 12 => Brush::fill(shape, size * 2.0),
+        13 => Brush::fill(path, 1.0).with_material(material),
+        14 => Brush::carve(shape, size * 2.0),
+        15 => Brush::road(Corridor::new(path, 4.0, 4.0), 2.0),
+        16 => Brush::reset(shape),
         _ => Brush::dig(shape),
     };
     Edit::quantize(&brush.with_power(rng.u8(100..=255))).expect("a valid brush")
@@ -215,8 +228,12 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
     for round in 0..rounds {
         let mut rng = Rng::with_seed(round);
         let mut play = Play::new();
-        // In every other round the others are mostly too far away to meet what own edits read.
-        let (near, others) = if round % 2 == 0 { (NEAR, NEAR) } else { ((8.0, 22.0), (34.0, 66.0)) };
+        // In every other round the others are mostly too far away to meet what own edits read: beside them, or below.
+        let (near, others) = match round % 4 {
+            1 => ([(8.0, 22.0), SURFACE], [(34.0, 66.0), SURFACE]),
+            3 => ([(8.0, 48.0), (34.0, 90.0)], NEAR),
+            _ => (NEAR, NEAR),
+        };
         for own in 1..=40 {
             if rng.u32(0..3) > 0 {
                 let edit = edit(&mut rng, &image, near);

@@ -1,11 +1,12 @@
 //! Worlds and edits at the limits of size, lattice coordinates and height.
 
-use bevy_burrow::lattice::{Column, LIMIT};
+use bevy_burrow::lattice::{Column, LIMIT, LatticeBox};
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 
 use crate::terrains::{assert_flawless, terrain};
+use crate::worlds::{any_random_brush, contents};
 
 /// Digs, fills and paints at several places on the surface, the rim and the corners, and checks the world after each
 /// edit.
@@ -154,4 +155,78 @@ fn a_cliff_over_the_whole_lattice_is_dug_without_a_hole() {
         terrain.apply([Brush::dig(Shape::sphere(Vec3::new(1.5, y, 1.0), 2.0))]);
     }
     assert_flawless(&terrain, "a cliff of 64000 voxels");
+}
+
+#[test]
+fn any_edits_of_the_smallest_and_narrowest_worlds_are_closed_and_undone() {
+    let mut changed = 0;
+    for (width, depth) in [(1, 1), (1, 2), (1, 9), (9, 1), (3, 17), (40, 1), (8, 8)] {
+        for chunk_size in [8, 25] {
+            let mut rng = Rng::with_seed(u64::from(width * 100 + depth + chunk_size));
+            let height = |x: i32, z: i32| f64::from((x * 7919 + z * 104_729).rem_euclid(64)) / 24.0;
+            let ground = Ground::from_fn(width, depth, height).expect("finite heights");
+            let mut terrain = terrain(ground, chunk_size);
+            terrain.set_loose(rng.bool().then(|| LooseSettings {
+                crumbs: 9,
+                debris: 200,
+                ..Default::default()
+            }));
+            let pristine = terrain.world().hash();
+            for step in 0..12 {
+                let brush = any_random_brush(&mut rng, terrain.world().ground());
+                let outcome = terrain.apply([&brush]).remove(0).outcome;
+                changed += usize::from(outcome.is_ok_and(|applied| applied.bounds.is_some()));
+                let what = format!("{width} x {depth} cells, chunks of {chunk_size}, step {step}: {brush:?}");
+                assert_flawless(&terrain, what);
+            }
+            while terrain.undo().outcome.is_ok() {}
+            assert_eq!(terrain.world().hash(), pristine);
+        }
+    }
+    assert!(changed > 50, "{changed}");
+}
+
+#[test]
+fn paths_roads_grids_fills_pastes_and_resets_at_the_ends_of_the_lattice_are_closed() {
+    let limit = LIMIT as f32;
+    let (grids, prefabs) = contents();
+    for height in [3.0, f64::from(LIMIT), -f64::from(LIMIT)] {
+        let mut terrain = terrain(Ground::flat(14, 13, height).expect("finite heights"), 25);
+        let pristine = terrain.world().hash();
+        for y in [limit, -limit, limit - 0.5, 2.0 - limit] {
+            let (at, other) = (Vec3::new(5.0, y, 6.0), Vec3::new(11.0, y - 3.0 * y.signum(), 9.0));
+            let path = BrushPath::spline([(at, 2.0), (other, 2.5), (at + Vec3::Z, 1.0)]);
+            let corridor = Corridor::new(path.clone(), 5.0, 4.0);
+            let (ball, grid) = (Shape::sphere(at, 3.0), GridShape::new(grids[4].clone(), at));
+            for brush in [
+                Brush::add(path.clone(), MaterialId(1)),
+                Brush::dig(path),
+                Brush::road(corridor.clone(), 2.0),
+                Brush::fill(grid.clone(), 5.0),
+                Brush::fill(ball, 16.0),
+                Brush::carve(grid, 16.0),
+                Brush::raise(corridor.clone(), 2.0),
+                Brush::paste(Paste::new(prefabs[1].clone(), at)),
+                Brush::paste(Paste::new(prefabs[0].clone(), other).turned_about_x(1)),
+                Brush::reset(corridor),
+            ] {
+                let outcome = terrain.apply([&brush]).remove(0).outcome;
+                // The middle of a prefab may lie beyond the end.
+                let is_beyond = matches!(outcome, Err(Rejection::Brush(BrushError::OutOfRange { .. })));
+                let is_paste = matches!(brush.operation, Operation::Paste { .. });
+                assert!(
+                    outcome.is_ok() || is_paste && is_beyond,
+                    "ground at {height}: {brush:?}: {outcome:?}"
+                );
+                assert_flawless(&terrain, format!("ground at {height}: {brush:?}"));
+            }
+            let around =
+                LatticeBox { min: IVec3::new(0, y as i32 - 6, 0), max: IVec3::new(9, y as i32 + 6, 9) };
+            // A copy ends with the lattice.
+            assert!(terrain.world().copy(around, around.min).is_err());
+            assert!(terrain.world().shape_grid(around).is_ok());
+        }
+        while terrain.undo().outcome.is_ok() {}
+        assert_eq!(terrain.world().hash(), pristine);
+    }
 }

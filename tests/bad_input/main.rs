@@ -1,6 +1,7 @@
 //! Untrusted input never causes a panic, a lost edit or a broken surface.
 
 mod brushes;
+mod contents;
 mod ends;
 mod integers;
 mod operations;

@@ -39,6 +39,9 @@ pub fn random_world(index: u64) -> (Terrain, Cut) {
         let rules = random_rules(&mut rng, terrain.world().ground());
         terrain.set_rules(rules).expect("valid rules");
     }
+    if index % 5 == 2 {
+        terrain.set_loose(Some(LooseSettings { largest: 4000, crumbs: 20, debris: 4000 }));
+    }
     for _ in 0..rng.u32(1..4) {
         let brushes = random_brushes(&mut rng, &terrain, &cut);
         terrain.apply(brushes);

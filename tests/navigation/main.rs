@@ -47,7 +47,8 @@ fn random_settings(rng: &mut Rng) -> WalkSettings {
     }
 }
 
-/// A hilly world of a few tiles with tunnels, pits, platforms and bridges.
+/// A hilly world of a few tiles with tunnels, pits, platforms and bridges; in some, loose ground falls, rules protect parts of
+/// it, and steps are undone.
 fn random_dug_world(rng: &mut Rng, index: u64) -> Terrain {
     let (width, depth) = (rng.u32(20..100), rng.u32(20..70));
     let ground = match index % 3 {
@@ -56,10 +57,23 @@ fn random_dug_world(rng: &mut Rng, index: u64) -> Terrain {
     };
     let chunk_size = [8, 16, 32][rng.usize(0..3)];
     let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
+    let rules = worlds::random_rules(rng, &ground);
     let mut terrain = Terrain::new(ground, &settings).expect("a valid terrain");
+    if index % 4 == 1 {
+        terrain.set_rules(rules).expect("valid rules");
+    }
+    if index % 4 > 1 {
+        terrain.set_loose(Some(LooseSettings { largest: 4000, crumbs: 20, debris: 4000 }));
+    }
     for _ in 0..rng.usize(1..25) {
-        let brush = random_works(rng, terrain.world());
-        terrain.apply([brush]);
+        match rng.u8(0..12) {
+            0 => drop(terrain.undo()),
+            1 => drop(terrain.redo()),
+            _ => {
+                let brush = random_works(rng, terrain.world());
+                terrain.apply([brush]);
+            }
+        }
     }
     terrain
 }
@@ -77,7 +91,7 @@ fn random_works(rng: &mut Rng, world: &World) -> Brush {
     let radius = 1.5 + 3.0 * rng.f32();
     let raised = Vec3::Y * (rng.f32() - 0.5) * 6.0;
     let half = Vec3::new(1.0 + 6.0 * rng.f32(), 0.5 + 2.0 * rng.f32(), 1.0 + 6.0 * rng.f32());
-    match rng.u8(0..7) {
+    match rng.u8(0..9) {
         0 | 1 => Brush::dig(Shape::capsule(at + raised, to + raised, radius)),
         2 => Brush::dig(Shape::sphere(at, radius)),
         3 => Brush::add(Shape::cuboid(at + raised, half), MaterialId(1)),

@@ -218,6 +218,112 @@ fn a_shape_cuts_what_is_pasted() {
     assert!(terrain.world().check_seams().is_flawless());
 }
 
+/// A way from the anchor of a prefab, mirrored along x and then turned by quarter turns about the y axis.
+fn turned(way: IVec3, is_mirrored: bool, turns: i32) -> IVec3 {
+    let way = if is_mirrored { way.with_x(-way.x) } else { way };
+    (0..turns).fold(way, |way, _| IVec3::new(way.z, way.y, -way.x))
+}
+
+#[test]
+fn a_paste_over_the_rim_changes_what_lies_in_the_world_and_a_copy_of_it_is_the_same() {
+    let (mut cut, mut outside) = (0, 0);
+    for index in 0..world_count(30) {
+        let mut rng = Rng::with_seed(index + 900);
+        let mut terrain = edited(&mut rng, index);
+        let (from, bounds) = (some_box(&mut rng, terrain.world()), terrain.world().grid().edit_bounds());
+        let anchor = (from.min + from.max) / 2;
+        let prefab = terrain.world().copy(from, anchor).expect("it lies in the world");
+        let (is_mirrored, turns, edited_only) = (rng.bool(), rng.i32(0..4), rng.u32(0..3) == 0);
+        // Its anchor lies on the rim or not far beyond it.
+        let rim = [0, bounds.max.x][rng.usize(0..2)] + rng.i32(-3..4);
+        let at = IVec3::new(rim, anchor.y + rng.i32(-9..9), rng.i32(0..=bounds.max.z));
+        let at = if rng.bool() { at } else { IVec3::new(at.z, at.y, at.x) };
+        let paste = Paste::new(prefab, at.as_vec3()).turned_about_y(turns);
+        let paste = Paste { mirror: is_mirrored, edited_only, ..paste };
+        let before = terrain.snapshot();
+        let outcome = terrain.apply([Brush::paste(paste)]).remove(0).outcome;
+        let pasted = |point: IVec3| at + turned(point - anchor, is_mirrored, turns);
+        let ends = [pasted(from.min), pasted(from.max)];
+        let to = LatticeBox { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) };
+        let Some(inside) = to.intersection(bounds) else {
+            let is_nothing = matches!(outcome, Ok(ref applied) if *applied == Applied::default());
+            assert!(is_nothing || outcome == Err(Rejection::OutsideWorld), "world {index}: {outcome:?}");
+            assert_eq!(terrain.world().hash(), before.hash());
+            outside += 1;
+            continue;
+        };
+        let applied = outcome.expect("some of it lies in the world");
+        assert!(applied.bounds.is_none_or(|changed| inside.encloses(changed)), "world {index}");
+        check_outside(&before, terrain.world(), inside);
+        for point in from.points() {
+            let place = pasted(point);
+            if !bounds.contains(place) {
+                cut += 1;
+            } else if !edited_only || before.samples().is_edited(point) {
+                assert_eq!(look(&before, point), look(terrain.world(), place), "world {index} at {place}");
+            } else {
+                assert_eq!(
+                    stored(&before, place),
+                    stored(terrain.world(), place),
+                    "world {index} at {place}"
+                );
+            }
+        }
+        assert!(terrain.world().check_seams().is_flawless(), "world {index}");
+        // A copy of it, turned and mirrored back, looks the same where it came from.
+        let anchor_of_copy = inside.min;
+        let again = terrain.world().copy(inside, anchor_of_copy).expect("it lies in the world");
+        let after = terrain.snapshot();
+        terrain.apply([Brush::paste(Paste::new(again, anchor_of_copy.as_vec3()))]);
+        assert_eq!(terrain.world().hash(), after.hash(), "world {index}: it is there already");
+    }
+    assert!(cut > 10_000 && outside < 15, "{cut} samples beyond the rim, {outside} pastes");
+}
+
+/// A long prefab, a flat one, and one of a single sample, at all scales.
+#[test]
+fn prefabs_of_any_size_are_pasted_at_any_scale_or_refused() {
+    let ground = Arc::new(Ground::flat(1100, 24, 20.0).expect("valid"));
+    let mut rng = Rng::with_seed(8);
+    let mut world = terrain(&ground, 100);
+    world.apply([Brush::dig(Shape::sphere(Vec3::new(12.0, 20.0, 12.0), 7.0))]);
+    let (mut pasted, mut refused) = (0, 0);
+    for size in [
+        IVec3::ONE,
+        IVec3::new(1024, 1, 1),
+        IVec3::new(1, 1024, 2),
+        IVec3::new(24, 1, 24),
+        IVec3::new(2, 3, 2),
+    ] {
+        let min = IVec3::new(0, 18, 0);
+        let samples = LatticeBox { min, max: min + size - 1 };
+        let prefab = Arc::new(world.world().copy(samples, min).expect("it lies in the world"));
+        for scale in [0.125, 0.3, 1.0, 8.0] {
+            let at = Vec3::new(12.0 + rng.f32(), 20.0, 12.0 + rng.f32());
+            let turn = Quat::from_scaled_axis(Vec3::new(rng.f32(), rng.f32(), rng.f32()));
+            let paste = Paste { scale, ..Paste::new(Arc::clone(&prefab), at) };
+            for paste in [paste.clone(), paste.rotated(turn)] {
+                let before = world.world().hash();
+                match world.apply([Brush::paste(paste)]).remove(0).outcome {
+                    Ok(applied) => {
+                        assert_eq!(applied.bounds.is_some(), world.world().hash() != before);
+                        pasted += usize::from(applied.bounds.is_some());
+                    }
+                    Err(error) => {
+                        assert!(scale == 8.0 && size.max_element() == 1024, "{size} x {scale}: {error}");
+                        assert!(error.to_string().contains("1024"), "{error}");
+                        refused += 1;
+                    }
+                }
+                assert!(world.world().check_seams().is_flawless(), "{size} x {scale}");
+            }
+        }
+    }
+    assert!(pasted > 7 && refused > 2, "{pasted} {refused}");
+    while world.undo().outcome.is_ok() {}
+    assert_eq!(world.world().bricks().count(), 0);
+}
+
 #[test]
 fn rules_hold_for_pastes() {
     let mut refused = 0;

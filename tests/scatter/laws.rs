@@ -71,9 +71,18 @@ fn check(world: &World, scatter: &Scatter, rules: &ScatterRules, plants: &[Plant
 
 /// One random step of a game.
 fn step(rng: &mut Rng, terrain: &mut Terrain, standing: &[Plant]) {
-    match rng.u8(0..12) {
+    match rng.u8(0..14) {
         0 | 1 => drop(terrain.undo()),
         2 => drop(terrain.redo()),
+        12 => {
+            let rules = crate::worlds::random_rules(rng, terrain.world().ground());
+            let rules = if rng.bool() { rules } else { DiggingRules::default() };
+            terrain.set_rules(rules).expect("valid rules");
+        }
+        13 => {
+            let loose = LooseSettings { largest: 4000, crumbs: 20, debris: rng.u32(..4000) };
+            terrain.set_loose(rng.bool().then_some(loose));
+        }
         3 | 4 if !standing.is_empty() => drop(terrain.apply([rng.choice(standing).expect("some").removal()])),
         5 => {
             let place = any_random_brush(rng, terrain.world().ground()).shape;

@@ -7,7 +7,7 @@ use fastrand::Rng;
 use glam::{IVec3, Quat, UVec3, Vec3};
 
 use crate::measured::{assert_closed, terrain};
-use crate::worlds::{any_random_brush, random_roughness};
+use crate::worlds::{any_random_brush, random_ground, random_roughness, random_strata, world_count};
 
 fn flat(height: f64) -> Terrain {
     terrain(Ground::flat(96, 96, height).expect("a valid height"))
@@ -301,6 +301,56 @@ fn a_mesh_with_materials_has_them_on_its_faces() {
             assert_eq!(near(middle + axis * half * side), MaterialId(number), "{axis} {side}");
         }
     }
+}
+
+#[test]
+fn any_piece_of_a_random_world_is_built_again_in_the_air() {
+    let mut solid = 0;
+    for seed in 0..world_count(16) {
+        let mut rng = Rng::with_seed(seed + 40);
+        let (own, chunk_size) = random_ground(&mut rng, seed);
+        let (low, high) = own.height_range();
+        let strata = random_strata(&mut rng, [low as f32 / 256.0 - 20.0, high as f32 / 256.0 + 2.0]);
+        let own = if rng.bool() { own.with_strata(&strata).expect("valid strata") } else { own };
+        let brushes: Vec<Brush> = (0..8).map(|_| any_random_brush(&mut rng, &own)).collect();
+        let settings = TerrainSettings { chunk_size, ..Default::default() };
+        let mut ground = Terrain::new(own, &settings).expect("valid");
+        ground.apply(brushes);
+        let world = ground.snapshot();
+        let bricks: Vec<IVec3> = world.bricks().map(|(pos, _)| pos.origin()).collect();
+        let Some(&middle) = rng.choice(&bricks) else { continue };
+        let size = IVec3::from_array([(); 3].map(|()| rng.i32(3..30)));
+        // Some of it may lie beyond the rim, where the ground goes on as at the rim.
+        let piece = LatticeBox { min: middle - size / 2, max: middle - size / 2 + size - 1 };
+        let grid = world.shape_grid(piece).expect("a valid size");
+        // Far above anything else.
+        let by = IVec3::Y * (high / 256 + 700 - piece.min.y);
+        let place = (piece.min + piece.max).as_vec3() / 2.0 + by.as_vec3();
+        let bounds = world.grid().edit_bounds();
+        if piece.intersection(bounds).is_none() {
+            continue;
+        }
+        let fill = Brush::fill(GridShape::new(grid, place), 0.0);
+        let receipt = ground.apply_one(fill.clone());
+        let added = receipt.outcome.expect("it lies in the world").added;
+        let (own, samples, mut counted) = (world.samples(), ground.world().samples(), 0);
+        for point in piece.points().filter(|&point| bounds.contains(point + by)) {
+            let is_rim = (point - piece.min).min(piece.max - point).min_element() == 0;
+            let is_solid = own.is_solid(point) && !is_rim;
+            assert_eq!(samples.is_solid(point + by), is_solid, "world {seed} at {point}");
+            if is_solid {
+                assert_eq!(samples.material(point + by), own.material(point), "world {seed} at {point}");
+                counted += 1;
+            }
+        }
+        assert_eq!(added.total(), counted, "world {seed}");
+        solid += counted;
+        assert_closed(&ground);
+        // A reset of the same shape takes all of it away again.
+        ground.apply([Brush { operation: Operation::Reset, ..fill }]);
+        assert_eq!(ground.world().hash(), world.hash(), "world {seed}");
+    }
+    assert!(solid > 5000, "{solid}");
 }
 
 #[test]

@@ -225,10 +225,14 @@ impl ShapeGrid {
         if self.is_grid() { (i64::from(ZERO) - i64::from(self.0.least)).max(0) } else { 0 }
     }
 
-    /// Distance outside the shape at a sample, in 1/256 cell. Samples beyond the grid are those at its rim.
+    /// Distance outside the shape at a sample, in 1/256 cell. Samples beyond the grid are those at its rim; without any,
+    /// as when it was read from an image that holds none, everything is outside.
     pub fn distance(&self, at: IVec3) -> i32 {
+        if !self.is_grid() {
+            return ZERO - 1;
+        }
         let size = self.size().as_ivec3();
-        let at = at.clamp(IVec3::ZERO, (size - 1).max(IVec3::ZERO));
+        let at = at.clamp(IVec3::ZERO, size - 1);
         i32::from(self.image().grey(at.x as u32, (at.z * size.y + at.y + 1) as u32)) - ZERO
     }
 }

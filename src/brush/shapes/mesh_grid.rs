@@ -65,7 +65,7 @@ impl ShapeGrid {
     /// the triangle nearest to it. A [fill](crate::brush::Brush::fill) builds with them.
     ///
     /// # Errors
-    /// Those of `from_mesh`, and [`BrushError::NoTriangles`] if there are not as many materials as triangles.
+    /// Those of `from_mesh`, and [`BrushError::MeshMaterials`] if there are not as many materials as triangles.
     pub fn from_painted_mesh(
         positions: &[Vec3],
         triangles: &[[u32; 3]],
@@ -73,7 +73,8 @@ impl ShapeGrid {
         samples: u32,
     ) -> Result<MeshGrid, BrushError> {
         if materials.len() != triangles.len() {
-            return Err(BrushError::NoTriangles);
+            let (materials, triangles) = (materials.len(), triangles.len());
+            return Err(BrushError::MeshMaterials { materials, triangles });
         }
         let (MeshGrid { grid, middle, cell }, nearest) = Self::of_mesh(positions, triangles, samples)?;
         let mut nearest = nearest.into_iter();
@@ -101,14 +102,13 @@ impl ShapeGrid {
             }
             (low, high) = (low.min(at), high.max(at));
         }
-        let longest = (high - low).max_element();
-        if !(longest > 0.0 && longest.is_finite()) {
+        let cell = (high - low).max_element() / (samples - 1 - 2 * MARGIN) as f32;
+        let middle = low.midpoint(high);
+        if !(cell.is_normal() && cell > 0.0 && middle.is_finite()) {
             return Err(BrushError::NoTriangles);
         }
-        let cell = longest / (samples - 1 - 2 * MARGIN) as f32;
         let size = ((high - low) / cell).ceil().as_uvec3() + 1 + 2 * MARGIN;
         let size = size.clamp(UVec3::splat(SIDES.0), UVec3::splat(samples));
-        let middle = low.midpoint(high);
         let corner = middle.as_dvec3() - (size.as_dvec3() - 1.0) / 2.0 * f64::from(cell);
         let fine = |at: Vec3| ((at.as_dvec3() - corner) / f64::from(cell) * FINE as f64).round().as_i64vec3();
         let (numbers, triangles): (Vec<u32>, Vec<[I64Vec3; 3]>) = (0..)
@@ -116,6 +116,9 @@ impl ShapeGrid {
             .map(|(number, corners)| (number, corners.map(|corner| fine(positions[corner as usize]))))
             .filter(|(_, [a, b, c])| a != b && b != c && c != a)
             .unzip();
+        if triangles.is_empty() {
+            return Err(BrushError::NoTriangles);
+        }
         check_closed(&triangles)?;
         let winding = winding_numbers(size, &triangles);
         let distances = distances(size, &triangles);
