@@ -4,7 +4,7 @@ use bevy::asset::{AssetLoadFailedEvent, LoadState};
 use bevy::math::DVec3;
 use bevy::prelude::*;
 use bevy_burrow::lattice::Column;
-use bevy_burrow::plugin::{EditOutbox, GroundAsset, GroundFrom};
+use bevy_burrow::plugin::{EditOutbox, GroundAsset, GroundFileRead, GroundFrom};
 use bevy_burrow::prelude::*;
 
 use crate::heightmaps::{Folder, png};
@@ -16,7 +16,7 @@ struct Failures(Vec<(String, String)>);
 
 fn stage_in(folder: &Folder) -> Stage {
     let assets = AssetPlugin { file_path: folder.path().to_string_lossy().into_owned(), ..default() };
-    let mut stage = Stage::with((MinimalPlugins, assets));
+    let mut stage = Stage::with((MinimalPlugins, assets)).recording::<GroundFileRead>();
     stage.app.init_resource::<Failures>().add_systems(
         Update,
         |mut failed: MessageReader<AssetLoadFailedEvent<GroundAsset>>, mut kept: ResMut<Failures>| {
@@ -68,6 +68,11 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     let mut stage = stage_in(&folder);
     let terrain = spawn(&mut stage, "island.ground.json");
     wait_for_terrain(&mut stage, terrain);
+    let read = |stage: &mut Stage| -> Vec<_> {
+        let all = stage.recorded::<GroundFileRead>();
+        all.into_iter().map(|message| (message.terrain == terrain, message.outcome.is_ok())).collect()
+    };
+    assert_eq!(read(&mut stage), [(true, true)]);
     assert_eq!(stage.terrain(terrain).world().ground().width(), 64);
     assert_eq!([height(&stage, terrain, 0, 0), height(&stage, terrain, 64, 0)], [20, 28]);
     let material =
@@ -88,6 +93,7 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     stage.settle();
     assert_eq!(material(&stage), MaterialId(5));
     assert!(is_open(&stage), "the hole stays");
+    assert_eq!(read(&mut stage), [(true, true)]);
     let pristine = DVec3::new(8.0, 27.0, 60.0);
     assert!(stage.terrain(terrain).world().is_solid(pristine));
 
@@ -110,8 +116,21 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     // An unchanged file changes nothing.
     let hash = stage.hash(terrain);
     server.reload("island.ground.json");
+    assert_eq!(read(&mut stage), [(true, true)]);
     stage.frames(20);
     assert_eq!(stage.hash(terrain), hash);
+    assert_eq!(read(&mut stage), []);
+
+    // Neither does one that can't be read, of which there is one message.
+    let picture = std::fs::read(folder.path().join("island.png")).expect("it is there");
+    folder.put("island.png", b"no picture");
+    server.reload("island.ground.json");
+    stage.frames_until("it is refused", |stage| read(stage) == [(true, false)]);
+    stage.frames(20);
+    assert_eq!((stage.hash(terrain), read(&mut stage)), (hash, vec![]));
+    folder.put("island.png", &picture);
+    server.reload("island.ground.json");
+    stage.frames(20);
 
     // Another size takes another terrain.
     folder.put("island.png", &png(image::DynamicImage::ImageLuma16(image::ImageBuffer::new(17, 17))));
@@ -123,6 +142,7 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     });
     stage.frames(3);
     assert_eq!((stage.hash(terrain), height(&stage, terrain, 0, 0)), (hash, 30));
+    assert_eq!(read(&mut stage), [(true, false)]);
 }
 
 #[test]
@@ -191,6 +211,13 @@ fn wrong_files_say_what_is_wrong_and_make_no_terrain() {
     for (name, _, reason) in &files {
         let (_, error) = failures.iter().find(|(path, _)| path == name).expect("it fails");
         assert!(error.contains(reason), "{name}: {error}");
+    }
+    stage.frames(10);
+    let read = stage.recorded::<GroundFileRead>();
+    assert_eq!(read.len(), files.len(), "one message each");
+    for (terrain, (name, _, reason)) in terrains.iter().zip(&files) {
+        let own = read.iter().find(|message| message.terrain == *terrain).expect("a message");
+        assert!(own.outcome.as_ref().is_err_and(|error| error.contains(reason)), "{name}: {own:?}");
     }
     for terrain in terrains {
         assert!(stage.app.world().get::<Terrain>(terrain).is_none());
