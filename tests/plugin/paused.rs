@@ -5,7 +5,6 @@ use std::time::Duration;
 use avian3d::prelude::*;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::system::RunSystemOnce;
-use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::navigation::WalkSettings;
@@ -54,7 +53,7 @@ struct Playing(bool);
 
 fn stage() -> Stage {
     let mut stage = Stage::with_all(
-        (MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin),
+        (MinimalPlugins, AssetPlugin::default()),
         (
             PhysicsPlugins::default(),
             TerrainPhysicsPlugin,
