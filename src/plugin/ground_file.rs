@@ -281,7 +281,9 @@ impl Plugin for GroundFilePlugin {
 
 fn register(app: &mut App) {
     if register_loader::<GroundLoader>(app) {
-        app.add_message::<GroundFileRead>().add_observer(forget_followed).add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
+        app.add_message::<GroundFileRead>()
+            .add_observer(forget_followed)
+            .add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
     }
 }
 

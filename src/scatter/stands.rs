@@ -31,7 +31,9 @@ impl Scatter {
         let Some(rule) = self.rules.get(usize::from(plant.id.species)) else { return false };
         let (cell, sheet) = (plant.cell(), cell_sheet(world.ground(), plant.cell()));
         let is_as_it_was = |at: Column| is_as_it_was(world, at, sheet.start..=sheet.end);
-        world.mask().contains(cell) && cell.corners().into_iter().all(is_as_it_was) && has_clearance(rule, world, plant)
+        world.mask().contains(cell)
+            && cell.corners().into_iter().all(is_as_it_was)
+            && has_clearance(rule, world, plant)
     }
 
     /// How far, in voxels along x and z, an edit may lie from the plants that it removes.

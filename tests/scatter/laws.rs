@@ -80,7 +80,8 @@ fn has_its_ground(world: &World, plant: &Plant) -> bool {
     // Stored densities end at 128 voxels.
     let stored = |distance: i32| distance.clamp(-i32::from(i16::MAX), i32::from(i16::MAX));
     points.all(|at| {
-        stored(samples.distance(at)) == stored(ground.distance(at)) && samples.material(at) == ground.material(at)
+        stored(samples.distance(at)) == stored(ground.distance(at))
+            && samples.material(at) == ground.material(at)
     })
 }
 
