@@ -244,7 +244,8 @@ fn a_mesh_off_its_origin_lies_where_its_points_go() {
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
     terrain.apply([Brush::dig(grid.placed(place, rotation, scale))]);
     let (mut inside, samples) = (0, terrain.world().samples());
-    for at in LatticeBox { min: middle.as_ivec3() - 14, max: middle.as_ivec3() + 14 }.points() {
+    let around = LatticeBox { min: middle.as_ivec3() - 14, max: middle.as_ivec3() + 14 };
+    for at in around.points() {
         let (winding, distance) = mesh.look(at.as_dvec3());
         if distance > 1.5 {
             assert_eq!(samples.is_solid(at), winding.abs() < 0.5, "{at}");
