@@ -3,6 +3,7 @@
 use bevy::asset::{AssetLoadFailedEvent, LoadState};
 use bevy::math::DVec3;
 use bevy::prelude::*;
+use bevy_burrow::format::Level;
 use bevy_burrow::lattice::Column;
 use bevy_burrow::plugin::{EditOutbox, GroundAsset, GroundFileRead, GroundFrom};
 use bevy_burrow::prelude::*;
@@ -253,4 +254,24 @@ fn a_saved_world_on_the_ground_of_a_file_keeps_its_edits() {
         stage.app.world_mut().despawn(terrain);
         stage.frames(5);
     }
+}
+
+#[test]
+fn a_level_begins_on_the_ground_of_a_file() {
+    let folder = Folder::new("level_on_ground_file");
+    folder.put("island.png", &heights(|x, _| 20 + (x / 4) as u16));
+    folder.put("island.ground.json", format!(r#"{{ "heights": ["island.png"], {SCALE} }}"#).as_bytes());
+    let mut stage = stage_in(&folder);
+    let terrain = spawn(&mut stage, "island.ground.json");
+    wait_for_terrain(&mut stage, terrain);
+    stage.send(dig(32.0, 24.0, 32.0, 5.0));
+    stage.settle();
+    let sculpted = stage.hash(terrain);
+    let level = BurrowLevel::new(&Level::of(stage.terrain(terrain))).expect("it can be written");
+    stage.app.world_mut().despawn(terrain);
+    let level = stage.app.world_mut().resource_mut::<Assets<BurrowLevel>>().add(level);
+    let ground = stage.app.world().resource::<AssetServer>().load("island.ground.json");
+    let terrain = stage.app.world_mut().spawn((GroundFrom::new(ground), StartLevel(level))).id();
+    wait_for_terrain(&mut stage, terrain);
+    stage.frames_until("the level is there", |stage| stage.hash(terrain) == sculpted);
 }
