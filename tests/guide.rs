@@ -1,7 +1,7 @@
 //! The README and the guide: links resolve, every page is in the summary, and commands name existing targets. Their
 //! programs are documentation tests of the crate.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -244,16 +244,88 @@ fn unlisted_features_and_examples_are_found() {
     assert_eq!(found, ["feature c", "feature d", "example f"]);
 }
 
+/// The features that the documentation online is built with.
+fn online_features(manifest: &str) -> BTreeSet<&str> {
+    let online =
+        manifest.split("[package.metadata.docs.rs]").nth(1).and_then(|rest| rest.split("\n[").next());
+    online.expect("a section").split('"').skip(1).step_by(2).collect()
+}
+
 #[test]
 fn the_documentation_online_has_every_feature_of_the_library() {
     let manifest = read(&root().join("Cargo.toml"));
-    let online =
-        manifest.split("[package.metadata.docs.rs]").nth(1).and_then(|rest| rest.split("\n[").next());
-    let online: BTreeSet<&str> = online.expect("a section").split('"').skip(1).step_by(2).collect();
     // `render`, and `plugin` with it, are on by default; the last four are for examples and tests only.
     let others = ["default", "render", "plugin", "examples", "gamepad", "sound", "tools"];
     let expected = &features(&manifest) - &BTreeSet::from(others);
-    assert_eq!(online, expected);
+    assert_eq!(online_features(&manifest), expected);
+    // So has the one that a reader builds.
+    for page in ["README.md", "docs/guide/src/introduction.md"] {
+        let text = read(&root().join(page));
+        let list = named(&text, "cargo doc --open --features ").next().expect("a command");
+        assert_eq!(list.split(',').collect::<BTreeSet<&str>>(), expected, "{page}");
+    }
+}
+
+/// The features of each module that needs some, of `lib.rs`. `plugin` and `render` are on by default.
+fn features_of_modules(library: &str) -> BTreeMap<&str, Vec<&str>> {
+    let (mut modules, mut needed) = (BTreeMap::new(), Vec::new());
+    for line in library.lines() {
+        if line.starts_with("#[cfg(") {
+            needed = line
+                .split('"')
+                .skip(1)
+                .step_by(2)
+                .filter(|name| !["plugin", "render"].contains(name))
+                .collect();
+        } else if let Some(name) = line.strip_prefix("pub mod ").and_then(|rest| rest.strip_suffix(';')) {
+            modules.insert(name, std::mem::take(&mut needed));
+        } else {
+            needed.clear();
+        }
+    }
+    modules.retain(|_, features| !features.is_empty());
+    modules
+}
+
+/// The features that a feature includes, itself too.
+fn included<'a>(manifest: &'a str, feature: &'a str) -> BTreeSet<&'a str> {
+    let section = manifest.split(&format!("\n{feature} = [")).nth(1).and_then(|rest| rest.split(']').next());
+    let listed =
+        section.unwrap_or_default().split('"').skip(1).step_by(2).filter(|name| !name.contains([':', '/']));
+    listed.flat_map(|name| included(manifest, name)).chain([feature]).collect()
+}
+
+/// Modules that the programs of a page import, of which the page names no feature that they need.
+fn unnamed_features(text: &str, modules: &BTreeMap<&str, Vec<&str>>, manifest: &str) -> Vec<String> {
+    let imported: BTreeSet<&str> =
+        lines(text, true).flat_map(|line| named(line, "use bevy_burrow::")).collect();
+    let is_named = |feature: &str| {
+        text.contains(&format!("`{feature}`"))
+            || lines(text, true).any(|line| line.contains(&format!("\"{feature}\"")))
+    };
+    let named = features(manifest).into_iter().filter(|feature| *feature != "examples" && is_named(feature));
+    let named: BTreeSet<&str> = named.flat_map(|feature| included(manifest, feature)).collect();
+    let needed = modules.iter().filter(|(module, _)| imported.contains(*module));
+    let pairs = needed.flat_map(|(module, features)| features.iter().map(move |feature| (module, feature)));
+    pairs
+        .filter(|(_, feature)| !named.contains(*feature))
+        .map(|(module, feature)| format!("{module}: {feature}"))
+        .collect()
+}
+
+#[test]
+fn pages_name_the_features_that_their_programs_need() {
+    let (library, manifest) = (read(&root().join("src/lib.rs")), read(&root().join("Cargo.toml")));
+    let modules = features_of_modules(&library);
+    assert!(
+        modules.len() > 8 && modules["plants"] == ["scatter"] && modules["paths"] == ["landmass"],
+        "{modules:?}"
+    );
+    for page in documents() {
+        assert_eq!(unnamed_features(&read(&page), &modules, &manifest), [""; 0], "{}", page.display());
+    }
+    let text = "```rust\nuse bevy_burrow::plants::Plants;\nuse bevy_burrow::net::{Client, Server};\n```\nThe feature `net`.";
+    assert_eq!(unnamed_features(text, &modules, &manifest), ["plants: scatter"]);
 }
 
 #[test]

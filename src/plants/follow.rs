@@ -5,8 +5,8 @@ use bevy::prelude::*;
 
 use super::{News, NewsList, PlantRemoved, PlantReturned, ShownPlants, transform_of};
 use crate::plugin::{GroundChanged, Places, TerrainEntities};
-use crate::scatter::PlantChange;
-use crate::terrain::Terrain;
+use crate::scatter::{PlantChange, Scatter};
+use crate::terrain::{Terrain, World};
 
 /// Sends the messages of plants that go and return.
 #[derive(SystemParam)]
@@ -19,8 +19,9 @@ impl PlantMessages<'_> {
     /// Writes a message for each change of a terrain's plants, and the news for what draws them.
     pub fn tell(
         &mut self,
-        terrain: Entity,
+        (terrain, world): (Entity, &World),
         place: &GlobalTransform,
+        scatter: &Scatter,
         changes: Vec<PlantChange>,
         news: &mut NewsList,
     ) {
@@ -29,7 +30,8 @@ impl PlantMessages<'_> {
             if change.stands {
                 self.returned.write(PlantReturned { terrain, plant, transform });
             } else {
-                self.removed.write(PlantRemoved { terrain, plant, transform });
+                let is_felled = scatter.is_felled(world, &plant);
+                self.removed.write(PlantRemoved { terrain, plant, transform, is_felled });
             }
             news.push(News::Changed(change));
         }
@@ -64,6 +66,7 @@ pub(super) fn follow_commits(
         if changes.is_empty() {
             continue;
         }
-        messages.tell(*terrain, &places.of(*terrain).unwrap_or_default(), changes, news);
+        let place = places.of(*terrain).unwrap_or_default();
+        messages.tell((*terrain, world), &place, patches.scatter(), changes, news);
     }
 }

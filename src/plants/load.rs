@@ -79,7 +79,8 @@ pub(super) fn choose_patches(
         if shown.version != version {
             // Follows commits that were not seen, where a game gates their systems.
             let changes = patches.update(world, None);
-            messages.tell(entity, &places.of(entity).unwrap_or_default(), changes, &mut shown.news);
+            let place = places.of(entity).unwrap_or_default();
+            messages.tell((entity, world), &place, patches.scatter(), changes, &mut shown.news);
             shown.version = version;
         }
         if let Some(LoadTask(task)) = &mut shown.task {

@@ -158,7 +158,8 @@ impl ShownPlants {
 }
 
 /// A plant that was shown does not stand any more, from the frame of this message on: the ground under it or in its clearance
-/// changed, or it was removed.
+/// changed, or it was removed. Not sent when patches are unloaded, nor when the terrain, its [`Plants`] or its world as a whole are
+/// removed or replaced.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct PlantRemoved {
     /// The terrain.
@@ -167,6 +168,9 @@ pub struct PlantRemoved {
     pub plant: Plant,
     /// Where it stood, in world space: its foot, how it is turned, and its size.
     pub transform: Transform,
+    /// Whether a game felled it, as with [`removal_of`]: its ground and the air around it are as they were. `false` if they were
+    /// dug, built over or painted. See [`Scatter::is_felled`].
+    pub is_felled: bool,
 }
 
 /// A plant stands again from the frame of this message on.

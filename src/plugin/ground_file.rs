@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use bevy::asset::io::Reader;
-use bevy::asset::{AssetLoader, LoadContext, ParseAssetPathError, ReadAssetBytesError};
+use bevy::asset::{
+    AssetLoadError, AssetLoader, LoadContext, LoadState, ParseAssetPathError, ReadAssetBytesError,
+};
 use bevy::ecs::entity::EntityHashMap;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::Allow;
@@ -225,6 +227,7 @@ async fn materials(
 /// not the file.
 ///
 /// Hot reloading takes Bevy's feature `file_watcher`. A ground of another size takes a new terrain: the change is logged and not shown.
+/// A [`GroundFileRead`] says what was read, or why the file can't be used.
 ///
 /// ```no_run
 /// # use bevy::prelude::*;
@@ -250,6 +253,17 @@ impl GroundFrom {
     }
 }
 
+/// A terrain with a [`GroundFrom`] got the ground of its file, or the file can't be used. Sent each time the file is read with another
+/// result than before.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct GroundFileRead {
+    /// The terrain's entity.
+    pub terrain: Entity,
+    /// What was read, guessed and doubted, a line for each file and each note; the terrain was inserted in this frame, or its new
+    /// ground queued behind the edits that wait. Or the reason why the file can't be used: then everything stays as it is.
+    pub outcome: Result<String, String>,
+}
+
 /// Adds the asset of grounds with its loader, and makes terrains of them, where there is an asset server.
 #[derive(Default)]
 pub struct GroundFilePlugin;
@@ -267,7 +281,9 @@ impl Plugin for GroundFilePlugin {
 
 fn register(app: &mut App) {
     if register_loader::<GroundLoader>(app) {
-        app.add_observer(forget_followed).add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
+        app.add_message::<GroundFileRead>()
+            .add_observer(forget_followed)
+            .add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
     }
 }
 
@@ -288,23 +304,40 @@ fn follow_ground_files(
         (Entity, &GroundFrom, Option<&mut Terrain>, Option<&FollowedGround>, Has<EditOutbox>),
         Allow<Disabled>,
     >,
+    assets: Res<AssetServer>,
+    mut messages: MessageWriter<GroundFileRead>,
     mut failed: Local<EntityHashMap<u64>>,
+    mut refused: Local<EntityHashMap<Arc<AssetLoadError>>>,
 ) {
+    let (last_failed, last_refused) = (std::mem::take(&mut *failed), std::mem::take(&mut *refused));
     for (entity, from, terrain, followed, is_shared) in &mut terrains {
+        let mut tell = |outcome| {
+            messages.write(GroundFileRead { terrain: entity, outcome });
+        };
+        if let Some(LoadState::Failed(why)) = assets.get_load_state(from.ground.id()) {
+            // Bevy has logged it.
+            if !is_shared && !last_refused.get(&entity).is_some_and(|last| Arc::ptr_eq(last, &why)) {
+                tell(Err(why.to_string()));
+            }
+            refused.insert(entity, why);
+        }
         let Some(GroundAsset { ground, report }) = grounds.get(&from.ground) else { continue };
         let hash = ground.hash();
         let Some(mut terrain) = terrain else {
-            if failed.get(&entity) == Some(&hash) {
+            if last_failed.get(&entity) == Some(&hash) {
+                failed.insert(entity, hash);
                 continue;
             }
             match Terrain::new(Arc::clone(ground), &from.settings) {
                 Ok(terrain) => {
                     info!("{report}");
                     commands.entity(entity).try_insert(terrain);
+                    tell(Ok(report.clone()));
                 }
                 Err(error) => {
                     error!("no terrain is made of the ground of {entity}: {error}");
                     failed.insert(entity, hash);
+                    tell(Err(error.to_string()));
                 }
             }
             continue;
@@ -318,10 +351,12 @@ fn follow_ground_files(
         let size = |ground: &Ground| (ground.width(), ground.depth());
         if size(before) != size(ground) {
             let ((width, depth), (new_width, new_depth)) = (size(before), size(ground));
-            error!(
+            let error = format!(
                 "the file of the ground of {entity} has {new_width} x {new_depth} cells now, and the terrain {width} x {depth}: \
                  despawn it and spawn another one to show the file"
             );
+            error!("{error}");
+            tell(Err(error));
         } else if followed.is_some() || before.hash() != hash {
             let order = Request::from(Order::Ground(Arc::clone(ground)));
             // In a later frame, if too much waits.
@@ -330,6 +365,7 @@ fn follow_ground_files(
             }
             info!("{report}");
             terrain.submit(order);
+            tell(Ok(report.clone()));
         }
         commands.entity(entity).try_insert(FollowedGround(hash));
     }

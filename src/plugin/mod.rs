@@ -69,8 +69,8 @@ pub(crate) use entities::trigger_if_alive;
 pub use figures::BurrowFigures;
 #[cfg(feature = "format")]
 pub use ground_file::{
-    GroundAsset, GroundDescription, GroundFileError, GroundFilePlugin, GroundFrom, GroundLoader,
-    MaterialFiles,
+    GroundAsset, GroundDescription, GroundFileError, GroundFilePlugin, GroundFileRead, GroundFrom,
+    GroundLoader, MaterialFiles,
 };
 #[doc(hidden)]
 pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};

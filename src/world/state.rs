@@ -121,8 +121,8 @@ impl World {
         &self.ground
     }
 
-    /// A shared handle to [`Self::ground`].
-    pub(crate) fn shared_ground(&self) -> Arc<Ground> {
+    /// The pristine world, shared: for another terrain over it.
+    pub fn shared_ground(&self) -> Arc<Ground> {
         Arc::clone(&self.ground)
     }
 

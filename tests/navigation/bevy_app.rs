@@ -7,7 +7,9 @@ use bevy::ecs::query::Allow;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy_burrow::navigation::{NavTilePos, WalkSettings, WalkableTile, Walker};
-use bevy_burrow::paths::bevy_landmass::{PermittedAnimationLinks, PointSampleDistance3d, prelude::*};
+use bevy_burrow::paths::bevy_landmass::{
+    PermittedAnimationLinks, PointSampleDistance3d, UsingAnimationLink, prelude::*,
+};
 use bevy_burrow::paths::{
     Navigation, NavigationArea, NavigationPlugin, NavigationSource, NavigationTiles, archipelago_options,
 };
@@ -144,6 +146,62 @@ fn agents_jump_into_a_pit_and_climb_out_if_they_can_in_the_frame_after_the_commi
             assert_eq!(links, 0, "none is left once the pit is gone");
         }
     }
+}
+
+/// Where an agent lands.
+#[derive(Component)]
+struct Landing(Vec3);
+
+/// Moves agents over the ground, and over ledges as the guide does.
+fn walk(
+    mut commands: Commands,
+    arrived: Query<(Entity, &ReachedAnimationLink3d), Without<UsingAnimationLink>>,
+    mut jumping: Query<(Entity, &Landing, &mut Transform)>,
+    mut walking: Query<(&mut Transform, &mut Velocity3d, &AgentDesiredVelocity3d), Without<Landing>>,
+    terrains: Terrains,
+) {
+    for (mut place, mut velocity, wanted) in &mut walking {
+        velocity.velocity = wanted.velocity();
+        place.translation += wanted.velocity() / 60.0;
+        if let Some(hit) = terrains.raycast(Ray3d::new(place.translation + Vec3::Y, Dir3::NEG_Y), 3.0) {
+            place.translation = hit.position;
+        }
+    }
+    for (agent, landing, mut place) in &mut jumping {
+        place.translation = landing.0;
+        commands.entity(agent).remove::<(Landing, UsingAnimationLink)>();
+    }
+    for (agent, reached) in &arrived {
+        commands.entity(agent).insert((Landing(reached.end_point), UsingAnimationLink));
+    }
+}
+
+#[test]
+fn an_agent_jumps_into_a_pit_climbs_out_and_arrives() {
+    let agent = WalkSettings { jump_down: 5.0, climb_up: 5.0, ..AGENT };
+    let (mut app, [terrain, archipelago, _]) = app(false, agent);
+    let pit = Brush::dig(Shape::cuboid(Vec3::new(48.0, 10.0, 14.0), Vec3::new(6.0, 4.0, 40.0)));
+    commit(&mut app, terrain, send(pit));
+    app.add_systems(Update, walk);
+    let agent = Agent3dBundle {
+        agent: default(),
+        settings: AgentSettings { radius: agent.radius, desired_speed: 5.0, max_speed: 6.0 },
+        archipelago_ref: ArchipelagoRef3d::new(archipelago),
+    };
+    let target = Vec3::new(70.0, 10.0, 14.0);
+    let start = Transform::from_xyz(30.0, 10.0, 14.0);
+    let agent = app.world_mut().spawn((start, agent, AgentTarget3d::Point(target))).id();
+    let mut lowest = f32::MAX;
+    for _ in 0..6000 {
+        app.update();
+        let at = app.world().get::<Transform>(agent).expect("an agent").translation;
+        lowest = lowest.min(at.y);
+        if at.distance(target) < 1.0 {
+            assert!(lowest < 7.0, "{lowest}: it went through the pit");
+            return;
+        }
+    }
+    panic!("stuck at {:?}, {:?}", app.world().get::<Transform>(agent), app.world().get::<AgentState>(agent));
 }
 
 #[test]

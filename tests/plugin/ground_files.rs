@@ -3,8 +3,9 @@
 use bevy::asset::{AssetLoadFailedEvent, LoadState};
 use bevy::math::DVec3;
 use bevy::prelude::*;
+use bevy_burrow::format::Level;
 use bevy_burrow::lattice::Column;
-use bevy_burrow::plugin::{EditOutbox, GroundAsset, GroundFrom};
+use bevy_burrow::plugin::{EditOutbox, GroundAsset, GroundFileRead, GroundFrom};
 use bevy_burrow::prelude::*;
 
 use crate::heightmaps::{Folder, png};
@@ -16,7 +17,7 @@ struct Failures(Vec<(String, String)>);
 
 fn stage_in(folder: &Folder) -> Stage {
     let assets = AssetPlugin { file_path: folder.path().to_string_lossy().into_owned(), ..default() };
-    let mut stage = Stage::with((MinimalPlugins, assets));
+    let mut stage = Stage::with((MinimalPlugins, assets)).recording::<GroundFileRead>();
     stage.app.init_resource::<Failures>().add_systems(
         Update,
         |mut failed: MessageReader<AssetLoadFailedEvent<GroundAsset>>, mut kept: ResMut<Failures>| {
@@ -68,6 +69,11 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     let mut stage = stage_in(&folder);
     let terrain = spawn(&mut stage, "island.ground.json");
     wait_for_terrain(&mut stage, terrain);
+    let read = |stage: &mut Stage| -> Vec<_> {
+        let all = stage.recorded::<GroundFileRead>();
+        all.into_iter().map(|message| (message.terrain == terrain, message.outcome.is_ok())).collect()
+    };
+    assert_eq!(read(&mut stage), [(true, true)]);
     assert_eq!(stage.terrain(terrain).world().ground().width(), 64);
     assert_eq!([height(&stage, terrain, 0, 0), height(&stage, terrain, 64, 0)], [20, 28]);
     let material =
@@ -88,6 +94,7 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     stage.settle();
     assert_eq!(material(&stage), MaterialId(5));
     assert!(is_open(&stage), "the hole stays");
+    assert_eq!(read(&mut stage), [(true, true)]);
     let pristine = DVec3::new(8.0, 27.0, 60.0);
     assert!(stage.terrain(terrain).world().is_solid(pristine));
 
@@ -110,8 +117,21 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     // An unchanged file changes nothing.
     let hash = stage.hash(terrain);
     server.reload("island.ground.json");
+    assert_eq!(read(&mut stage), [(true, true)]);
     stage.frames(20);
     assert_eq!(stage.hash(terrain), hash);
+    assert_eq!(read(&mut stage), []);
+
+    // Neither does one that can't be read, of which there is one message.
+    let picture = std::fs::read(folder.path().join("island.png")).expect("it is there");
+    folder.put("island.png", b"no picture");
+    server.reload("island.ground.json");
+    stage.frames_until("it is refused", |stage| read(stage) == [(true, false)]);
+    stage.frames(20);
+    assert_eq!((stage.hash(terrain), read(&mut stage)), (hash, vec![]));
+    folder.put("island.png", &picture);
+    server.reload("island.ground.json");
+    stage.frames(20);
 
     // Another size takes another terrain.
     folder.put("island.png", &png(image::DynamicImage::ImageLuma16(image::ImageBuffer::new(17, 17))));
@@ -123,6 +143,7 @@ fn a_file_becomes_a_terrain_and_its_ground_changes_with_the_file_below_all_edits
     });
     stage.frames(3);
     assert_eq!((stage.hash(terrain), height(&stage, terrain, 0, 0)), (hash, 30));
+    assert_eq!(read(&mut stage), [(true, false)]);
 }
 
 #[test]
@@ -192,6 +213,13 @@ fn wrong_files_say_what_is_wrong_and_make_no_terrain() {
         let (_, error) = failures.iter().find(|(path, _)| path == name).expect("it fails");
         assert!(error.contains(reason), "{name}: {error}");
     }
+    stage.frames(10);
+    let read = stage.recorded::<GroundFileRead>();
+    assert_eq!(read.len(), files.len(), "one message each");
+    for (terrain, (name, _, reason)) in terrains.iter().zip(&files) {
+        let own = read.iter().find(|message| message.terrain == *terrain).expect("a message");
+        assert!(own.outcome.as_ref().is_err_and(|error| error.contains(reason)), "{name}: {own:?}");
+    }
     for terrain in terrains {
         assert!(stage.app.world().get::<Terrain>(terrain).is_none());
         let from = stage.app.world().get::<GroundFrom>(terrain).expect("it waits");
@@ -226,4 +254,24 @@ fn a_saved_world_on_the_ground_of_a_file_keeps_its_edits() {
         stage.app.world_mut().despawn(terrain);
         stage.frames(5);
     }
+}
+
+#[test]
+fn a_level_begins_on_the_ground_of_a_file() {
+    let folder = Folder::new("level_on_ground_file");
+    folder.put("island.png", &heights(|x, _| 20 + (x / 4) as u16));
+    folder.put("island.ground.json", format!(r#"{{ "heights": ["island.png"], {SCALE} }}"#).as_bytes());
+    let mut stage = stage_in(&folder);
+    let terrain = spawn(&mut stage, "island.ground.json");
+    wait_for_terrain(&mut stage, terrain);
+    stage.send(dig(32.0, 24.0, 32.0, 5.0));
+    stage.settle();
+    let sculpted = stage.hash(terrain);
+    let level = BurrowLevel::new(&Level::of(stage.terrain(terrain))).expect("it can be written");
+    stage.app.world_mut().despawn(terrain);
+    let level = stage.app.world_mut().resource_mut::<Assets<BurrowLevel>>().add(level);
+    let ground = stage.app.world().resource::<AssetServer>().load("island.ground.json");
+    let terrain = stage.app.world_mut().spawn((GroundFrom::new(ground), StartLevel(level))).id();
+    wait_for_terrain(&mut stage, terrain);
+    stage.frames_until("the level is there", |stage| stage.hash(terrain) == sculpted);
 }

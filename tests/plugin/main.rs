@@ -25,6 +25,8 @@ mod materials;
 mod mistakes;
 mod order;
 mod origins;
+#[cfg(feature = "examples")]
+mod paused;
 #[cfg(feature = "picking")]
 mod picking;
 mod plugins;

@@ -2,6 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_burrow::brush::BrushError;
+use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
@@ -170,4 +171,29 @@ fn a_dig_in_the_air_gets_a_receipt_without_change() {
     assert_eq!(applied.receipt.outcome, Ok(Applied::default()));
     assert_eq!(stage.hash(terrain), before);
     assert_eq!(stage.count::<Chunk>(), 0);
+}
+
+#[test]
+fn a_paste_in_voxels_is_moved_to_world_space_as_it_is() {
+    let mut model = level(0.5);
+    let tower = Shape::cuboid(Vec3::new(16.0, 11.0, 16.0), Vec3::new(3.0, 4.0, 2.0));
+    model.apply([Brush::add(tower, MaterialId(3))]);
+    let around = LatticeBox { min: IVec3::new(10, 4, 10), max: IVec3::new(22, 18, 22) };
+    let copied = model.world().copy(around, IVec3::new(16, 8, 16)).expect("it is small");
+    let paste = Paste::new(copied, Vec3::new(44.0, 0.0, 40.0)).turned_about_y(1).edited_only();
+    let paste = Brush::paste(paste.onto_ground(model.world().ground()));
+
+    let mut stage = Stage::server();
+    let mut shown = level(0.5);
+    shown.apply([Brush::add(tower, MaterialId(3))]);
+    let terrain = stage.spawn_at(shown, Vec3::new(-64.0, 32.0, 8.0));
+    stage.settle();
+    let place = *stage.app.world().get::<GlobalTransform>(terrain).expect("it has a place");
+    let (scale, rotation, translation) = place.to_scale_rotation_translation();
+    stage.send(paste.transformed(rotation, translation, scale.x));
+    stage.frames_until("it is pasted", |stage| !stage.receipts().is_empty());
+    let before = model.world().hash();
+    model.apply([paste]);
+    assert_eq!(stage.hash(terrain), model.world().hash());
+    assert_ne!(model.world().hash(), before);
 }

@@ -55,6 +55,8 @@ fn check(world: &World, scatter: &Scatter, rules: &ScatterRules, plants: &[Plant
     for plant in plants {
         let stands = scatter.stands(world, plant);
         assert_eq!(stands, !is_disturbed(world, rules, plant), "{plant:?}");
+        let is_felled = scatter.is_felled(world, plant);
+        assert!(!is_felled || !stands && has_its_ground(world, plant), "{plant:?}");
         if stands {
             let at = plant.position();
             let spans = world.spans(at.x, at.z);
@@ -67,6 +69,20 @@ fn check(world: &World, scatter: &Scatter, rules: &ScatterRules, plants: &[Plant
         }
     }
     standing
+}
+
+/// Whether the samples over the four columns around a plant's foot have the densities and the materials of the ground.
+fn has_its_ground(world: &World, plant: &Plant) -> bool {
+    let (ground, samples, cell) = (world.ground(), world.samples(), plant.cell());
+    let sheet = cell_sheet(ground, cell);
+    let mut points =
+        cell.corners().into_iter().flat_map(|at| (sheet.start..=sheet.end).map(move |y| at.at(y)));
+    // Stored densities end at 128 voxels.
+    let stored = |distance: i32| distance.clamp(-i32::from(i16::MAX), i32::from(i16::MAX));
+    points.all(|at| {
+        stored(samples.distance(at)) == stored(ground.distance(at))
+            && samples.material(at) == ground.material(at)
+    })
 }
 
 /// One random step of a game.
@@ -179,6 +195,7 @@ fn a_removed_plant_is_gone_alone_until_it_is_undone_or_grows_again() {
         assert_eq!((applied.removed.total(), applied.added.total()), (0, 0));
         let missing = gone(&terrain, &scatter, &plants);
         assert!(missing.contains(tree));
+        assert!(missing.iter().all(|plant| scatter.is_felled(terrain.world(), plant)));
         // What grows within a voxel of the mark goes too, and no other tree.
         for other in missing.iter().filter(|other| *other != tree) {
             let apart = other.position() - tree.position();
@@ -193,7 +210,21 @@ fn a_removed_plant_is_gone_alone_until_it_is_undone_or_grows_again() {
         assert_eq!(terrain.world().hash(), before, "a world without removed plants has the hash that it had");
         terrain.redo();
         assert_eq!(gone(&terrain, &scatter, &plants), missing);
+        // Dug away as well, it is no longer felled, and neither is one that was painted or built over.
+        let foot = tree.position().as_vec3();
+        let others = [
+            Brush::dig(Shape::sphere(foot, 2.0)),
+            Brush::paint(Shape::sphere(foot, 1.5), MaterialId(7)),
+            Brush::add(Shape::sphere(foot, 2.0), MaterialId(7)),
+        ];
+        for brush in others {
+            assert!(scatter.is_felled(terrain.world(), tree));
+            terrain.apply([brush]);
+            assert!(!scatter.stands(terrain.world(), tree) && !scatter.is_felled(terrain.world(), tree));
+            terrain.undo();
+        }
         terrain.apply([tree.regrowth()]);
+        assert!(!scatter.is_felled(terrain.world(), tree), "it stands");
         assert!(gone(&terrain, &scatter, &plants).is_empty());
     }
 }

@@ -129,6 +129,7 @@ fn plants_go_in_the_frame_of_their_ground_and_return_with_it() {
             assert!(before.contains(&removed.plant) && !now.contains(&removed.plant));
             let foot = removed.plant.position().as_vec3();
             assert!(removed.transform.translation.distance(foot) < 1e-3 && removed.terrain == terrain);
+            assert!(!removed.is_felled, "its ground is gone");
         }
         for _ in 0..6 {
             app.world_mut().write_message(Undo::default()).expect("the plugin added it");
@@ -154,6 +155,7 @@ fn a_game_removes_a_plant_with_a_brush() {
     let removed = app.world().resource::<Log>().removed.iter().find(|removed| removed.plant == tree).cloned();
     let removed = removed.expect("the tree");
     assert!(removed.transform.translation.distance(place.translation + tree.position().as_vec3()) < 1e-3);
+    assert!(removed.is_felled);
     assert!(!standing(&app, terrain).contains(&tree));
 }
 

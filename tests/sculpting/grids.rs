@@ -4,6 +4,7 @@ use std::f32::consts::{PI, TAU};
 use std::time::Instant;
 
 use bevy_burrow::brush::{BrushError, Edit, MeshGrid};
+use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 use glam::{DVec3, Quat, UVec3, Vec3};
@@ -227,4 +228,29 @@ fn meshes_with_holes_and_grids_of_wrong_sizes_are_refused() {
         two.grid.distance(((at - two.middle) / two.cell + (size - 1.0) / 2.0).round().as_ivec3()) < 0
     };
     assert!(inside(Vec3::ZERO) && inside(Vec3::X * 40.0) && !inside(Vec3::X * 20.0));
+}
+
+#[test]
+fn a_mesh_off_its_origin_lies_where_its_points_go() {
+    let mut mesh = cave(400);
+    mesh.positions.iter_mut().for_each(|at| *at += Vec3::new(30.0, -7.0, 12.0));
+    let grid = ShapeGrid::from_mesh(&mesh.positions, &mesh.triangles, 48).expect("closed");
+    let (middle, rotation, scale) = (Vec3::new(32.0, 30.0, 31.0), Quat::from_rotation_z(0.7), 0.8);
+    let rotation = rotation * Quat::from_rotation_y(1.9);
+    let place = middle - rotation * (grid.middle * scale);
+    mesh.positions.iter_mut().for_each(|at| *at = rotation * (*at * scale) + place);
+
+    let ground = Ground::flat(64, 64, 60.0).expect("valid");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    terrain.apply([Brush::dig(grid.placed(place, rotation, scale))]);
+    let (mut inside, samples) = (0, terrain.world().samples());
+    let around = LatticeBox { min: middle.as_ivec3() - 14, max: middle.as_ivec3() + 14 };
+    for at in around.points() {
+        let (winding, distance) = mesh.look(at.as_dvec3());
+        if distance > 1.5 {
+            assert_eq!(samples.is_solid(at), winding.abs() < 0.5, "{at}");
+            inside += usize::from(winding.abs() > 0.5);
+        }
+    }
+    assert!(inside > 100, "{inside}");
 }

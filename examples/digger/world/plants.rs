@@ -170,7 +170,7 @@ fn fall(
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
     // Not a whole wood at once.
-    for PlantRemoved { terrain, plant, transform } in removed.read().take(8) {
+    for PlantRemoved { terrain, plant, transform, .. } in removed.read().take(8) {
         let Ok((shown, PlantLooks(looks))) = terrains.get(*terrain) else { continue };
         let index = usize::from(plant.id.species);
         let Some(species) = shown.scatter().and_then(|scatter| scatter.species().get(index)) else {

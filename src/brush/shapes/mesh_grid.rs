@@ -4,10 +4,10 @@
 //! triangles that a ray leaves through, less those that it enters through. Vertices are rounded to a fine lattice, and a
 //! ray through an edge belongs to exactly one of its triangles, so no ray slips through and every number is exact.
 
-use glam::{DVec3, I64Vec3, IVec3, UVec3, Vec3};
+use glam::{DVec3, I64Vec3, IVec3, Quat, UVec3, Vec3};
 use rustc_hash::FxHashMap;
 
-use super::grid::{SIDES, ShapeGrid, points};
+use super::grid::{GridShape, SIDES, ShapeGrid, points};
 use crate::brush::BrushError;
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
@@ -32,6 +32,16 @@ pub struct MeshGrid {
     pub cell: f32,
 }
 
+impl MeshGrid {
+    /// The shape that the mesh has after every point p of it moved to `rotation * (p * scale) + place`. In metres, as in a message, a
+    /// scale of 1 makes a unit of the mesh a metre; in voxels, a voxel.
+    pub fn placed(&self, place: Vec3, rotation: Quat, scale: f32) -> GridShape {
+        GridShape::new(self.grid.clone(), place + rotation * (self.middle * scale))
+            .with_rotation(rotation)
+            .with_scale(self.cell * scale)
+    }
+}
+
 impl ShapeGrid {
     /// The grid of a closed mesh, with this many samples along its longest side: 8 to 128.
     ///
@@ -40,12 +50,12 @@ impl ShapeGrid {
     ///
     /// ```
     /// use bevy_burrow::prelude::*;
-    /// use glam::Vec3;
+    /// use glam::{Quat, Vec3};
     ///
     /// // A tetrahedron.
     /// let corners = [Vec3::ZERO, Vec3::X * 9.0, Vec3::Y * 9.0, Vec3::Z * 9.0];
     /// let mesh = ShapeGrid::from_mesh(&corners, &[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], 24)?;
-    /// let shape = GridShape::new(mesh.grid, Vec3::splat(20.0) + mesh.middle).with_scale(mesh.cell);
+    /// let shape = mesh.placed(Vec3::splat(20.0), Quat::from_rotation_y(0.5), 1.0);
     /// assert!(Brush::dig(shape).voxel_count()? > 30);
     /// # Ok::<(), BrushError>(())
     /// ```

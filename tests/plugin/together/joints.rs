@@ -9,6 +9,7 @@ use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_burrow::format::Level;
 use bevy_burrow::net::{KickReason, Server, ServerSettings};
+use bevy_burrow::plugin::Held;
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble};
 use bevy_replicon::prelude::*;
@@ -403,6 +404,39 @@ fn a_terrain_that_is_disabled_for_a_while_misses_nothing() {
         assert_eq!(outcomes.iter().filter(is_answer).count(), 3, "{outcomes:?}");
     }
 }
+
+#[test]
+fn a_player_who_pauses_is_shown_later_what_others_dug() {
+    for is_gated in [true, false] {
+        let mut party = Party::new(2);
+        party.all_join();
+        let (pristine, terrain) = (party.terrain_hash(1), party.players[1].1);
+        let all = (
+            BurrowSystems::Load,
+            BurrowSystems::Collect,
+            BurrowSystems::Commit,
+            BurrowSystems::Begin,
+            BurrowSystems::Propagate,
+        );
+        if is_gated {
+            let app = &mut party.players[1].0.app;
+            app.insert_resource(Paused).configure_sets(Update, all.run_if(not(resource_exists::<Paused>)));
+        } else {
+            party.world_mut(1).entity_mut(terrain).insert(Held);
+        }
+        party.dig_at(0, 30.0, 30.0);
+        party.rounds_until("it is dug", |party| party.terrain_hash(0) != pristine);
+        party.rounds(30);
+        assert_eq!(party.terrain_hash(1), pristine, "nothing is shown");
+        party.world_mut(1).remove_resource::<Paused>();
+        party.world_mut(1).entity_mut(terrain).remove::<Held>();
+        party.rounds_until("it is shown", |party| party.agrees() && party.terrain_hash(1) != pristine);
+        assert!(party.shared(1).trouble().is_none());
+    }
+}
+
+#[derive(Resource)]
+struct Paused;
 
 #[test]
 fn what_waits_in_a_shared_terrain_is_answered_when_it_goes_while_it_is_disabled() {
