@@ -74,11 +74,10 @@ pub fn shoot(studio: &mut Studio, look: GroundLook) {
     let ring = Mesh::from(Torus::new(7.0, 11.0));
     let gate = ShapeGrid::from_bevy_meshes([(&ring, Affine3A::IDENTITY, BRICKS)], 64).expect("a closed mesh");
     let place = on_ground(studio, 545.0, 470.0);
-    let gate = GridShape::new(gate.grid, place + gate.middle)
-        .with_rotation(Quat::from_rotation_z(std::f32::consts::FRAC_PI_2))
-        .with_scale(gate.cell);
-    studio.apply([Brush::fill(gate, 1.0)]);
+    let upright = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
+    studio.apply([Brush::fill(gate.placed(place, upright, 1.0), 1.0)]);
 
     let eye = on_ground(studio, 480.0, 560.0) + Vec3::Y * 40.0;
-    studio.look(eye, on_ground(studio, 540.0, 475.0));
+    let target = on_ground(studio, 540.0, 475.0);
+    studio.look(eye, target);
 }
