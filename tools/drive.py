@@ -645,6 +645,7 @@ def sculpt(stage):
         if hash_now() == before:
             raise Failed(f"{operation} changes nothing")
     press_key("2", r"^tool operation=Add ")
+    stage.rest()
     since = stage.mark()
     stage.click(*stage.middle("Model"))
     stage.wait(r"^tool .*shape=Model ", since)
