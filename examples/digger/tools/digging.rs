@@ -27,6 +27,7 @@ pub struct DiggingPlugin;
 impl Plugin for DiggingPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<PendingHits>()
+            .init_resource::<Misses>()
             .add_observer(dig)
             .add_observer(build_or_paint)
             .add_observer(tell_reach)
@@ -91,17 +92,32 @@ fn dig(
     shake.add(if used.tool == Tool::Drill { 0.12 } else { 0.3 });
 }
 
+/// When the first and the last of the latest blows missed, if they did.
+#[derive(Resource, Default)]
+pub struct Misses(Option<(f32, f32)>);
+
+impl Misses {
+    /// A blow hit something.
+    pub fn end(&mut self) {
+        self.0 = None;
+    }
+}
+
 /// Tells the player why nothing happens. At the edge of the reach some blows hit and others don't: only when none has
 /// hit for a while, the player needs the hint.
 fn tell_reach(
     used: On<ToolUsed>,
     time: Res<Time>,
     mut hints: MessageWriter<Hint>,
-    mut missing: Local<Option<f32>>,
+    mut misses: ResMut<Misses>,
 ) {
     if used.aim.is_some() || matches!(used.tool, Tool::Bomb | Tool::Ball) {
-        *missing = None;
-    } else if time.elapsed_secs() - *missing.get_or_insert(time.elapsed_secs()) >= MISSES {
+        return misses.end();
+    }
+    let now = time.elapsed_secs();
+    let first = misses.0.filter(|(_, last)| now - last < MISSES).map_or(now, |(first, _)| first);
+    misses.0 = Some((first, now));
+    if now - first >= MISSES {
         hints.write(Hint(texts::TOO_FAR.into()));
     }
 }

@@ -73,12 +73,15 @@ fn brushes_are_as_large_as_the_inventory_allows_and_reserve_their_material() {
 
 #[test]
 fn the_hint_that_something_is_too_far_away_waits_until_no_blow_has_hit_for_a_while() {
-    // Ten blows a second; a letter says whether one hits.
+    // Ten blows a second; a letter says whether one hits, and a dot is a pause.
     let hints = |blows: &str| -> Vec<usize> {
         let mut app = app();
         app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)));
         let blow = |(at, letter): (usize, char)| {
             app.update();
+            if letter == '.' {
+                return None;
+            }
             let aim = Aim { point: Vec3::splat(10.0), direction: Vec3::NEG_Y, normal: Vec3::Y };
             let (eye, direction, tool) = (Vec3::ZERO, aim.direction, Tool::Pickaxe);
             let aim = (letter == 'h').then_some(aim);
@@ -88,6 +91,7 @@ fn the_hint_that_something_is_too_far_away_waits_until_no_blow_has_hit_for_a_whi
         blows.chars().enumerate().filter_map(blow).collect()
     };
     assert!(hints(&"mmmmmmmmh".repeat(9)).is_empty(), "digging at the edge of the reach");
+    assert!(hints(&format!("m{}mm", ".".repeat(20))).is_empty(), "after a pause, blows begin anew");
     let told = hints(&"m".repeat(20));
     assert!(told.len() > 5 && (9..=11).contains(&told[0]), "{told:?}");
     let again = hints(&format!("{}h{}", "m".repeat(12), "m".repeat(8)));

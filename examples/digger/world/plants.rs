@@ -11,6 +11,7 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::scatter::{Clearance, Clusters, PlantId, ScatterRules, Species, Stem, ViewDistances};
 
 use crate::player::camera::PlayerCamera;
+use crate::tools::digging::Misses;
 use crate::tools::{Tool, ToolUsed};
 use crate::world::landscape::{DespawnOnNewGame, GRASS, ROCK};
 
@@ -124,6 +125,7 @@ fn fell(
     camera: Single<&GlobalTransform, With<PlayerCamera>>,
     terrains: Query<(Entity, &Terrain, &ShownPlants, &GlobalTransform)>,
     mut brushes: MessageWriter<TargetedBrush>,
+    mut misses: ResMut<Misses>,
 ) {
     if !matches!(used.tool, Tool::Pickaxe | Tool::Drill) {
         return;
@@ -138,6 +140,7 @@ fn fell(
         let most = f64::from(reach.min(REACH) / terrain.voxel_size());
         if let Some(hit) = scatter.raycast(world, origin, direction, most, |_| true) {
             brushes.write(TargetedBrush { terrain: entity, brush: removal_of(&hit.plant, place) });
+            misses.end();
         }
     }
 }
