@@ -20,9 +20,7 @@ fn survey() -> Ground {
     let (grid, _) = ElevationGrid::open(path, &ImportOptions::default()).expect("a file of heights");
     let heights = HeightScale::FullScale { low: -60.0, high: 140.0 };
     let scale = ElevationScale { voxels_per_sample: 3, heights, ..default() };
-    grid.into_ground(&scale)
-        .and_then(|ground| Ok(ground.with_materials(&materials())?))
-        .expect("a valid ground")
+    grid.into_ground(&scale).and_then(|ground| ground.with_materials(&materials())).expect("a valid ground")
 }
 
 /// A round tower with battlements, a door and a roof, 32 samples wide and 48 high.

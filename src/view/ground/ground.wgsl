@@ -181,12 +181,9 @@ fn vertex(in: Vertex) -> Varying {
 }
 
 // Borders between layers: the size of a cell on the screen in pixels, how many voxels the noise spans, its strength, and the
-// largest power of two by which it multiplies a weight, near the camera and where cells are larger than voxels. Near the camera,
-// noise of this share of the size and of the strength is added: crumbs, and blades of grass.
+// largest power of two by which it multiplies a weight, near the camera and where cells are larger than voxels.
 const BORDER_PIXELS: f32 = 9.0;
 const BORDER_VOXELS: f32 = 5.0;
-const CRUMB_SIZE: f32 = 0.27;
-const CRUMB_STRENGTH: f32 = 0.7;
 const BORDER_NOISE: f32 = 6.0;
 const BORDER_MOST: f32 = 2.0;
 const BORDER_MOST_FAR: f32 = 2.6;
@@ -195,8 +192,6 @@ const BORDER_MOST_FAR: f32 = 2.6;
 const HEIGHT_SHIFT: f32 = 0.4;
 const BORDER_WIDTH: f32 = 0.10;
 const BORDER_WIDTH_FAR: f32 = 0.25;
-// Borders near the camera are darker by this share, as if one layer lay on the other.
-const BORDER_SHADE: f32 = 0.45;
 
 // How many times larger textures are far away, and how much coarser than a pixel asks for. Each time that the distance grows by
 // `FAR_STEP`, they do too: ground looks as rough as the same ground nearer by.
@@ -495,15 +490,11 @@ fn octave_of(distance: f32) -> f32 {
 // Noise of about the size of a cell.
 fn border_noise(place: vec3<f32>, octave: f32) -> vec4<f32> {
     let metres = BORDER_VOXELS * ground.voxel * exp2(floor(octave));
-    var noise = noise_at(place, metres);
-    if octave > 0.0 {
-        noise = mix(noise, noise_at(place, 2.0 * metres), fract(octave));
+    let noise = noise_at(place, metres);
+    if octave <= 0.0 {
+        return noise;
     }
-    let crumbs = CRUMB_STRENGTH * (1.0 - octave);
-    if crumbs > 0.0 {
-        noise += crumbs * noise_at(place.zxy, CRUMB_SIZE * BORDER_VOXELS * ground.voxel);
-    }
-    return noise;
+    return mix(noise, noise_at(place, 2.0 * metres), fract(octave));
 }
 
 // The noise of a layer: no two layers have the same one. By the layer's number, since its place in the list may be another one
@@ -679,8 +670,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
         texels = mix_texels(texels, other, share);
         metallic = mix(metallic, ground.layers[next].metallic, share);
     }
-    let border = smoothstep(0.22, 0.5, choice.share) * (1.0 - site.far);
-    var color = texels.color.rgb * (1.0 - BORDER_SHADE * min(2.0 * ground.variety, 1.0) * border);
+    var color = texels.color.rgb;
     // No two places have quite the same tint.
     color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(in.mood.x, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-in.mood.x, 0.0));
     color *= 1.0 + (0.16 + 0.3 * site.far) * in.mood.y;
