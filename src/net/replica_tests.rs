@@ -22,7 +22,7 @@ type EditPlaces = [(f32, f32); 2];
 /// Heights around the surface.
 const SURFACE: (f32, f32) = (12.0, 26.0);
 
-/// EditPlaces of edits that meet each other.
+/// Places of edits that meet each other.
 const NEAR: EditPlaces = [(8.0, 48.0), SURFACE];
 
 fn ground() -> Arc<Ground> {
@@ -228,7 +228,7 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
     for round in 0..rounds {
         let mut rng = Rng::with_seed(round);
         let mut play = Play::new();
-        // In every other round the others are mostly too far away to meet what own edits read: beside them, or below.
+        // In every other round the others are mostly too far away to meet what own edits read: to the side of them, or below.
         let (near, others) = match round % 4 {
             1 => ([(8.0, 22.0), SURFACE], [(34.0, 66.0), SURFACE]),
             3 => ([(8.0, 48.0), (34.0, 90.0)], NEAR),

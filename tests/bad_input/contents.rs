@@ -12,7 +12,7 @@ use glam::{IVec3, Quat, UVec3, Vec3};
 use crate::terrains::{assert_flawless, small_terrain};
 use crate::worlds::{any_random_brush, contents};
 
-/// A plausible number, or now and then any.
+/// A plausible number, or occasionally any.
 fn number(rng: &mut Rng, low: f32, high: f32) -> f32 {
     let (limit, reach) = (LIMIT as f32, REACH as f32);
     let special = [
@@ -236,7 +236,7 @@ fn damaged_edits_and_lines_of_any_kind_are_refused_or_applied() {
         ];
         for _ in 0..20 {
             if let Ok(edit) = serde_json::from_str::<Edit>(&damage(&mut rng, &json[0])) {
-                edit.check().expect("what was read is valid");
+                edit.check().expect("an edit that is read is valid");
                 let again = serde_json::to_string(&edit).expect("edits are written");
                 assert_eq!(serde_json::from_str::<Edit>(&again).expect("its own line"), edit);
                 if is_affordable(&terrain, &edit) {

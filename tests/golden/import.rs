@@ -57,7 +57,7 @@ pub fn shoot(studio: &mut Studio, look: GroundLook) {
         Brush::fill(GridShape::new(tower(), first + Vec3::Y * 21.0), 2.0),
     ]);
 
-    // The same tower again, where others want it.
+    // Two copies of the tower, turned and mirrored.
     let anchor = first.round().as_ivec3();
     let around = LatticeBox { min: anchor - IVec3::new(16, 6, 16), max: anchor + IVec3::new(16, 50, 16) };
     let prefab = studio.one::<Terrain>().world().copy(around, anchor).expect("a small box");

@@ -140,9 +140,9 @@ pub struct Bot {
     arrived: VecDeque<(Duration, u64)>,
     /// The most frames until an own edit was shown.
     pub own_frames: u64,
-    /// Whether it has all grids and prefabs from the start; others get what they lack from the server.
-    pub has_contents: bool,
-    /// The longest time from the arrival of an entry until it was shown.
+    /// When the latest message arrived that may hold a grid or a prefab which entries wait for.
+    content_at: Duration,
+    /// The longest time from the arrival of an entry, and of what it needs, until it was shown.
     pub lag: Duration,
     pub events: BTreeMap<&'static str, u64>,
     pub playable_at: Option<Duration>,
@@ -173,8 +173,8 @@ impl Bot {
         let mut client =
             Client::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
         client.contents_mut().add(Arc::clone(image));
-        let has_contents = id.is_multiple_of(2);
-        if has_contents {
+        // Others get what they lack from the server.
+        if id.is_multiple_of(2) {
             add_contents(client.contents_mut());
         }
         client.set_place(IVec3::new(20, 20, 20));
@@ -197,7 +197,7 @@ impl Bot {
             dug,
             arrived,
             own_frames: 0,
-            has_contents,
+            content_at: Duration::ZERO,
             lag: Duration::ZERO,
             events,
             playable_at: None,
@@ -445,6 +445,9 @@ impl Play {
                         {
                             bot.arrived.push_back((at, first + entries.len() as u64 - 1));
                         }
+                        if lane == Lane::Bulk {
+                            bot.content_at = at;
+                        }
                         bot.client.receive(lane, message);
                     }
                 }
@@ -466,7 +469,7 @@ impl Play {
             assert_eq!(bot.shown.world().hash(), bot.client.shown_hash(), "{:?} at {number}", bot.id);
             while let Some((at, _)) = bot.arrived.pop_front_if(|(_, last)| *last <= number) {
                 if bot.joined_at.is_some_and(|joined| joined < at) && !is_busy {
-                    bot.lag = bot.lag.max(self.now - at);
+                    bot.lag = bot.lag.max(self.now - at.max(bot.content_at));
                 }
             }
         }

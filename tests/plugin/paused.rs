@@ -1,4 +1,4 @@
-//! Ways to pause a terrain, as a table of the guide compares them: what goes on meanwhile, and what waits.
+//! Ways to pause a terrain, as a table of the guide compares them: what continues meanwhile, and what waits.
 
 use std::time::Duration;
 
@@ -29,7 +29,7 @@ enum Pause {
     Hidden,
 }
 
-/// A row of the table: what is so while a terrain is paused.
+/// A row of the table: the facts about a terrain that is paused.
 #[derive(Debug, PartialEq)]
 struct Row {
     /// Whether a brush that is sent is applied; `None` if it waits.
@@ -181,7 +181,11 @@ fn check(pause: Pause, expected: &Row) {
         is_found && stage.count::<Island>() > 0 && stage.count::<Tile>() == 16 && hits(stage)
     });
     let gone = stage.recorded::<PlantRemoved>();
-    assert_eq!(gone.is_empty(), expected.plants, "{pause:?}: the plants that waited are told afterwards");
+    assert_eq!(
+        gone.is_empty(),
+        expected.plants,
+        "{pause:?}: messages of the plants that waited are sent afterwards"
+    );
     assert!(gone.iter().all(|plant| plant.terrain == terrain && !plant.is_felled));
 }
 

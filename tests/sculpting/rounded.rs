@@ -320,7 +320,7 @@ fn any_piece_of_a_random_world_is_built_again_in_the_air() {
         let bricks: Vec<IVec3> = world.bricks().map(|(pos, _)| pos.origin()).collect();
         let Some(&middle) = rng.choice(&bricks) else { continue };
         let size = IVec3::from_array([(); 3].map(|()| rng.i32(3..30)));
-        // Some of it may lie beyond the rim, where the ground goes on as at the rim.
+        // Some of it may lie beyond the rim, where the ground continues as at the rim.
         let piece = LatticeBox { min: middle - size / 2, max: middle - size / 2 + size - 1 };
         let grid = world.shape_grid(piece).expect("a valid size");
         // Far above anything else.
