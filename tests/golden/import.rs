@@ -9,16 +9,16 @@ use bevy_burrow::prelude::*;
 use crate::landscape::materials;
 use crate::studio::Studio;
 
-/// Bricks, planks and gravel among the default layers.
-const BRICKS: MaterialId = MaterialId(5);
-const ROOF: MaterialId = MaterialId(7);
-const GRAVEL: MaterialId = MaterialId(8);
+/// Of the default layers.
+const CONCRETE: MaterialId = MaterialId(5);
+const CLAY: MaterialId = MaterialId(4);
+const SOIL: MaterialId = MaterialId(8);
 
 /// The survey of the assets: three voxels from sample to sample.
 fn survey() -> Ground {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/jacksboro_fault.png");
     let (grid, _) = ElevationGrid::open(path, &ImportOptions::default()).expect("a file of heights");
-    let heights = HeightScale::FullScale { low: -60.0, high: 140.0 };
+    let heights = HeightScale::FullScale { low: -32.0, high: 26.0 };
     let scale = ElevationScale { voxels_per_sample: 3, heights, ..default() };
     grid.into_ground(&scale).and_then(|ground| ground.with_materials(&materials())).expect("a valid ground")
 }
@@ -36,7 +36,7 @@ fn tower() -> ShapeGrid {
         wall.max(if from.z > 0.0 { -door } else { f32::NEG_INFINITY }).min(battlements.max(gap)).min(roof)
     };
     let grid = ShapeGrid::from_fn(UVec3::new(33, 49, 33), distance).expect("a valid size");
-    grid.with_materials(|at| if at.y > 40 { ROOF } else { BRICKS })
+    grid.with_materials(|at| if at.y > 40 { CLAY } else { CONCRETE })
 }
 
 /// Shows it all from a hill.
@@ -52,8 +52,8 @@ pub fn shoot(studio: &mut Studio, look: GroundLook) {
     let first = on_ground(studio, 520.0, 510.0);
     studio.apply([
         Brush::road(corridor.clone(), 6.0),
-        Brush::paint(corridor, GRAVEL),
-        Brush::fill(BrushPath::polyline(wall), 1.0).with_material(BRICKS),
+        Brush::paint(corridor, SOIL),
+        Brush::fill(BrushPath::polyline(wall), 1.0).with_material(CONCRETE),
         Brush::fill(GridShape::new(tower(), first + Vec3::Y * 21.0), 2.0),
     ]);
 
@@ -70,7 +70,8 @@ pub fn shoot(studio: &mut Studio, look: GroundLook) {
 
     // A gate from a mesh.
     let ring = Mesh::from(Torus::new(7.0, 11.0));
-    let gate = ShapeGrid::from_bevy_meshes([(&ring, Affine3A::IDENTITY, BRICKS)], 64).expect("a closed mesh");
+    let gate =
+        ShapeGrid::from_bevy_meshes([(&ring, Affine3A::IDENTITY, CONCRETE)], 64).expect("a closed mesh");
     let place = on_ground(studio, 545.0, 470.0);
     let upright = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
     studio.apply([Brush::fill(gate.placed(place, upright, 1.0), 1.0)]);
