@@ -156,4 +156,5 @@ pictures: ## Render the still pictures of the README
 	cargo run $(WITH_BEVY) --example sculpt -- --headless --width 960 --height 540 --out out/pictures/sculpt
 	mkdir -p docs/pictures
 	cp out/pictures/sculpt/2_sculpted.png docs/pictures/panel.png
+	BURROW_SCENES='$(CURDIR)/docs/pictures' BURROW_ONLY=import BURROW_SIZE=960x540 cargo test $(WITH_BEVY) --test golden -- --ignored scenes_are_rendered
 	cd out/pictures && cp 1_landscape.png 3_tunnel_outside.png 4_tunnel_inside.png 7_bridge.png 9_seam.png ../../docs/pictures/

@@ -18,7 +18,7 @@ const SOIL: MaterialId = MaterialId(8);
 fn survey() -> Ground {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/jacksboro_fault.png");
     let (grid, _) = ElevationGrid::open(path, &ImportOptions::default()).expect("a file of heights");
-    let heights = HeightScale::FullScale { low: -32.0, high: 26.0 };
+    let heights = HeightScale::FullScale { low: -32.0, high: 20.0 };
     let scale = ElevationScale { voxels_per_sample: 3, heights, ..default() };
     grid.into_ground(&scale).and_then(|ground| ground.with_materials(&materials())).expect("a valid ground")
 }
@@ -76,7 +76,7 @@ pub fn shoot(studio: &mut Studio, look: GroundLook) {
     let upright = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
     studio.apply([Brush::fill(gate.placed(place, upright, 1.0), 1.0)]);
 
-    let eye = on_ground(studio, 480.0, 560.0) + Vec3::Y * 40.0;
+    let eye = on_ground(studio, 470.0, 600.0) + Vec3::Y * 55.0;
     let target = on_ground(studio, 540.0, 475.0);
     studio.look(eye, target);
 }
