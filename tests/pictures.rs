@@ -35,12 +35,12 @@ const EXAMPLES: [Example; 6] = [
         ground: 0.5,
         black: 0.05,
     },
-    // Its last frame shows coal by lamplight.
+    // One frame shows a boulder against the sky, and the last one coal by lamplight.
     Example {
         name: "digger",
         arguments: "--tour --fps 10 --frames 12 --width 320 --height 180",
         pictures: 12,
-        ground: 0.3,
+        ground: 0.25,
         black: 0.45,
     },
     Example {

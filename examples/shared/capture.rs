@@ -7,7 +7,8 @@ use bevy::prelude::*;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use image::RgbImage;
 
-/// Draws frames until the image, of format `Rgba8UnormSrgb`, is read back; `None` if that takes longer than `timeout`.
+/// Draws a frame, and reads back the image, of format `Rgba8UnormSrgb`; `None` if that takes longer than `timeout`. Cameras
+/// are off while it waits: a software renderer would draw a frame for nothing at each look.
 pub fn capture(app: &mut App, film: &Handle<Image>, timeout: Duration) -> Option<RgbImage> {
     let taken = Arc::new(Mutex::new(None));
     let place = Arc::clone(&taken);
@@ -18,13 +19,26 @@ pub fn capture(app: &mut App, film: &Handle<Image>, timeout: Duration) -> Option
         *place.lock().expect("not poisoned") =
             RgbImage::from_raw(shot.image.width(), shot.image.height(), rgb);
     });
-    let start = Instant::now();
-    while start.elapsed() < timeout {
-        app.update();
-        let picture = taken.lock().expect("not poisoned").take();
-        if picture.is_some() {
-            return picture;
+    app.update();
+    let world = app.world_mut();
+    let mut drawing: Vec<Entity> = vec![];
+    for (entity, mut camera) in world.query::<(Entity, &mut Camera)>().iter_mut(world) {
+        if camera.is_active {
+            camera.is_active = false;
+            drawing.push(entity);
         }
     }
-    None
+    let start = Instant::now();
+    let mut picture = None;
+    while picture.is_none() && start.elapsed() < timeout {
+        std::thread::sleep(Duration::from_millis(1));
+        app.update();
+        picture = taken.lock().expect("not poisoned").take();
+    }
+    for entity in drawing {
+        if let Some(mut camera) = app.world_mut().get_mut::<Camera>(entity) {
+            camera.is_active = true;
+        }
+    }
+    picture
 }

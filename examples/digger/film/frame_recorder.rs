@@ -34,6 +34,7 @@ impl FrameRecorder {
     /// Draws `drawn` of all `frames`, evenly spread.
     pub fn new(mut studio: Studio, fps: u32, frames: usize, drawn: usize) -> Self {
         studio.world().init_resource::<PictureError>();
+        studio.frame = Duration::from_secs(1) / fps;
         let interval = frames as f64 / drawn.clamp(1, frames.max(1)) as f64;
         Self { studio, fps, interval, played: 0, drawn: 0, is_warm: false }
     }
@@ -110,7 +111,7 @@ impl FrameRecorder {
             }
         }
         self.is_warm = is_drawn;
-        self.set_frame_time(Duration::from_secs(1) / self.fps);
+        self.set_frame_time(self.studio.frame);
         if !is_drawn {
             self.studio.app.update();
             return Ok(());

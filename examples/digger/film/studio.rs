@@ -65,6 +65,8 @@ pub struct Studio {
     /// The folder for the pictures.
     pub folder: PathBuf,
     is_warm: bool,
+    /// Game time of a frame.
+    pub frame: Duration,
     /// Times of frames without a picture.
     pub frames: Durations,
     /// Times of frames that were drawn.
@@ -133,6 +135,7 @@ impl Studio {
             photographer: renders.then_some(photographer),
             folder: options.out.clone(),
             is_warm: false,
+            frame: FRAME,
             frames: Durations::default(),
             drawn: Durations::default(),
             transactions: Durations::default(),
@@ -286,8 +289,10 @@ impl Studio {
         }
     }
 
-    /// Turns the player's head towards a place by a part of the angle.
-    pub fn turn_towards(&mut self, place: Vec3, part: f32) -> Result {
+    /// Turns the player's head towards a place: the angle shrinks by a factor of e in `1 / rate` seconds of the film,
+    /// whatever its frames per second.
+    pub fn turn_towards(&mut self, place: Vec3, rate: f32) -> Result {
+        let part = 1.0 - (-rate * self.frame.as_secs_f32()).exp();
         let eye = self.body()?.eye;
         let mut player = self.app.world_mut().get_mut::<Player>(self.player).ok_or("there is no player")?;
         let goal = Player::looking(eye, place);

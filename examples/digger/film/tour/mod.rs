@@ -201,7 +201,7 @@ impl Tour {
                 aside * ((seconds - 1.6) * 1.9).sin() * 1.3 + Vec3::Y * ((seconds * 1.3).cos() * 0.8 + 1.5);
             studio.turn_towards(
                 wall + flat(inward) * (0.5 * seconds) + if digs { sweep } else { Vec3::Y * 2.4 },
-                0.12,
+                3.8,
             )?;
             studio.hold(if digs { &[Action::Use] } else { &[] });
             Ok(())
@@ -234,7 +234,7 @@ impl Tour {
             } else {
                 feet + onward * 9.0 + Vec3::Y * (1.75 + 9.0 * ahead.y / ahead.xz().length()) + sway
             };
-            studio.turn_towards(target, 0.09)?;
+            studio.turn_towards(target, 2.8)?;
             studio.hold(if seconds > 2.2 { &[Action::Use] } else { &[] });
             Ok(())
         })?;
@@ -257,7 +257,7 @@ impl Tour {
         self.scene("the tree", TREE, |studio, t| {
             let seconds = t * TREE;
             let height = if seconds < 1.8 { 1.6 } else { 3.0 };
-            studio.turn_towards(foot + Vec3::Y * height, 0.12)?;
+            studio.turn_towards(foot + Vec3::Y * height, 3.8)?;
             studio.hold(if (1.2..1.6).contains(&seconds) { &[Action::Use] } else { &[] });
             studio.walk(if (1.6..3.0).contains(&seconds) { direction * -0.6 } else { Vec2::ZERO });
             Ok(())
@@ -284,7 +284,7 @@ impl Tour {
             } else {
                 corner - Vec3::Y * 0.6
             };
-            studio.turn_towards(target, 0.10)?;
+            studio.turn_towards(target, 3.2)?;
             let holds = throws.iter().any(|&throw| (throw..throw + 0.1).contains(&seconds));
             studio.hold(if holds { &[Action::Use] } else { &[] });
             studio.walk(if seconds > 5.4 { direction * 0.7 } else { Vec2::ZERO });
@@ -311,7 +311,7 @@ impl Tour {
                 ..3.3 => foot + Vec3::Y * 1.8,
                 _ => foot + Vec3::Y * 2.5 + flat(direction) * 3.0,
             };
-            studio.turn_towards(target, 0.09)?;
+            studio.turn_towards(target, 2.8)?;
             let reaches = (studio.feet()? - foot).xz().length() < 4.5;
             studio.walk(match seconds {
                 ..2.4 if !reaches => direction * 0.6,
@@ -388,9 +388,9 @@ impl Tour {
             let seconds = t * LAMPS;
             let at = ((seconds / 1.35) as usize).min(spots.len());
             let target = spots.get(at).copied().unwrap_or(room);
-            studio.turn_towards(target, 0.16)?;
+            studio.turn_towards(target, 5.2)?;
             let within = seconds - 1.35 * at as f32;
-            studio.hold(if at < spots.len() && (0.75..0.85).contains(&within) {
+            studio.hold(if at < spots.len() && (0.7..0.9).contains(&within) {
                 &[Action::Use]
             } else {
                 &[]
