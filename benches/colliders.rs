@@ -1,9 +1,10 @@
-//! The cost of colliders in tasks, by kind, and on the main thread: `cargo bench --features avian --bench colliders`.
+//! The cost of colliders: building them in tasks, by kind of shape, and updating them on the main thread.
+//! `cargo bench --features avian --bench colliders`.
 //!
 //! For tiles and chunks of hills with tunnels, it compares the crate's own shape, a parry triangle mesh with fixed
-//! internal edges, one without, and, for unedited tiles, a height field. Then it digs in colliders that can be edited, one of
-//! meshes and one of voxels. Last, it measures the systems that update colliders on 4096 tiles, and commits with and without a
-//! snapshot of the world held.
+//! internal edges, one without, and, for unedited tiles, a height field. Then it digs, in the crate's shapes, which are
+//! rebuilt, and in parry's voxels, which are edited in place. Last, it measures the systems that update colliders on
+//! 4096 tiles, and commits with and without a snapshot of the world held.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -76,8 +77,9 @@ fn shapes_over(terrain: &Terrain, tile: TilePos) -> Vec<(Vec3, GroundShape)> {
     of(origin(0), world.tile_mesh(tile)).into_iter().chain(chunks).collect()
 }
 
-/// A ball of radius 4 is dug out of colliders again and again. The crate's own shapes are those of the ground's meshes, and are built
-/// anew for the parts that a dig touches; a voxel at a time is taken out of parry's `Voxels`, which has no slopes. Then rays are cast down.
+/// Digs balls of radius 4 out of colliders. The crate's own shapes have the triangles of the ground's meshes, and are
+/// rebuilt for the parts that a dig touches; parry's `Voxels`, which has no slopes, is edited voxel by voxel. Then
+/// casts rays downwards.
 fn digs() -> Result<(), Box<dyn std::error::Error>> {
     let noise = NoiseHeights { seed: 11, scale: 60.0, amplitude: 20.0, base: 4.0, ..Default::default() };
     let ground = Ground::from_noise(SIDE as u32, SIDE as u32, &noise)?;

@@ -4,9 +4,9 @@
 //!
 //! Ground that players can dig, for [Bevy](https://bevy.org).
 //!
-//! The world is a heightmap: cheap, huge, familiar to every artist. Where gameplay digs or builds, marching cubes take
-//! over, and nothing shows where one ends and the other begins: both sides compute the same bits, so there is no open
-//! edge and no jump in shading, on any slope.
+//! The world is a heightmap: cheap, huge, and familiar to every artist. Where players dig or build, marching cubes take
+//! over, without a visible seam: both sides compute the same bits, so there is no open edge and no jump in shading, on
+//! any slope.
 //!
 //! # Quick start
 //!
@@ -86,14 +86,14 @@
 //! | to copy a place and paste it | [`World::copy`](terrain::World::copy), [`Paste`](brush::Paste) |
 //! | glTF of the surface | [`World::to_glb`](terrain::World::to_glb) |
 //! | ground that resists | [`Terrain::set_rules`](terrain::Terrain::set_rules) with [`DiggingRules`](volume::DiggingRules) |
-//! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
+//! | to learn the result | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to undo it | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
-//! | ground that was cut off to fall | the `LooseGround` component, `LoosePieceFound` messages, `physics::DebrisPlugin` (feature `avian`); [`LooseSettings`](terrain::LooseSettings) |
-//! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
+//! | ground that falls when it is cut off | the `LooseGround` component, `LoosePieceFound` messages, `physics::DebrisPlugin` (feature `avian`); [`LooseSettings`](terrain::LooseSettings) |
+//! | to query the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for the game's own textures |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
 //! | paths over ground that is dug | `Navigation`, `NavigationSource` and the `NavigationPlugin` of `paths` (feature `landmass`) |
-//! | plants and stones that follow the ground | `Plants`, `PlantLooks` and the `plants` plugins (feature `scatter`) |
+//! | plants and stones that disappear and return with the ground | `Plants`, `PlantLooks` and the `plants` plugins (feature `scatter`) |
 //! | other cameras, no shadows | `RenderLayers`, `NotShadowCaster`, `NotShadowReceiver` on the terrain |
 //! | more from the same surfaces, in the same commit | `SurfaceProcessor`s |
 //! | a custom look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
@@ -291,13 +291,12 @@
 //!   -> commit in one frame, all or nothing: world, meshes, entities, receipts
 //! ```
 //!
-//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the
-//! others. Rules and loose settings bind the edits that are sent after them. A
-//! [stroke](brush::Brush::stroke), or everything sent in one frame, is a step of undo. A transaction holds as
-//! many edits as its [limit](terrain::WorkLimits) of work allows, and more work than may wait is rejected
-//! when it is sent; an edit that panics is rejected, and the others are applied without it. Integers decide
-//! solidity, and floats are only drawn, so equal edits give an equal [`hash`](terrain::World::hash) on every
-//! machine.
+//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the others.
+//! Rules and loose settings apply to edits that are sent after them. A [stroke](brush::Brush::stroke), or everything
+//! sent in one frame, is a step of undo. A transaction holds as many edits as its [limit](terrain::WorkLimits) of work
+//! allows, and more work than may wait is rejected when it is sent; an edit that panics is rejected, and the others are
+//! applied without it. Integers decide solidity, and floats are only drawn, so equal edits give an equal
+//! [`hash`](terrain::World::hash) on every machine.
 //!
 //! # What an edit costs
 //!
@@ -327,7 +326,7 @@
 //! | `net` | multiplayer: a server and clients without a transport | |
 //! | `picking` | Bevy's pointer events on the ground, with the `TerrainHit` as extra data | |
 //! | `replicon` | multiplayer over bevy_replicon | |
-//! | `scatter` | plants and stones that go and return with their ground | |
+//! | `scatter` | plants and stones that disappear and return with the ground they stand on | |
 //! | `navigation` | where agents can walk, as polygons of tiles | |
 //! | `landmass` | navigation meshes for `bevy_landmass`, replaced with each commit | `navigation`, `plugin` |
 //! | `egui` | the panel: brush, settings, live figures | |

@@ -188,7 +188,7 @@ impl<T: Send + 'static> ThreadTask<T> {
         let is_wanted = Arc::downgrade(&wanted);
         threads.spawn(move || {
             if is_wanted.strong_count() > 0 {
-                // A panic is passed on. An error means that nobody waits any more.
+                // A panic is passed on. An error means that the result is no longer awaited.
                 let _ = sender.send(catch_unwind(AssertUnwindSafe(work)));
             }
         });

@@ -1,4 +1,4 @@
-//! Times of node meshes by level, without edits and with few and many of them.
+//! Time to mesh a node at each level of detail: without edits, with a few, and with craters everywhere.
 
 use std::time::Instant;
 

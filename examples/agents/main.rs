@@ -1,4 +1,4 @@
-//! `agents`: a dozen figures cross a ridge. A wall is built in their way, a tunnel is dug, and they take it.
+//! `agents`: a dozen agents cross a ridge. A wall is built in their way, then a tunnel is dug, and they take it.
 //!
 //! ```text
 //! cargo run --release --features examples --example agents
@@ -14,8 +14,8 @@
 //! | `G` | shows or hides spans, navigation meshes and paths |
 //! | `R` | sends the figures back |
 //!
-//! Without a display, or with `--headless`, it plays until all have arrived, and leaves pictures and `report.json` in `--out`; it
-//! fails if one does not arrive.
+//! Without a display, or with `--headless`, it plays until all have arrived, and saves pictures and `report.json` in
+//! `--out`; it fails if one does not arrive.
 
 #[path = "../shared/display.rs"]
 mod display;

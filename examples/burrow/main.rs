@@ -1,4 +1,4 @@
-//! `burrow`: looks at saved worlds, checks and repairs them. Does not use Bevy.
+//! `burrow`: inspects, checks, repairs and converts saved worlds. Does not use Bevy.
 //!
 //! ```text
 //! cargo run --release --no-default-features --features store --example burrow -- info WORLD
@@ -7,23 +7,23 @@
 //!
 //! | command | does | needs the ground |
 //! | --- | --- | --- |
-//! | `info` | prints what is known of a world | no |
-//! | `check` | reads all of it, and replays its log from the first commit on; changes nothing | to do so in full |
-//! | `repair` | opens whatever is left of it, rebuilds what is damaged, and saves it | yes |
-//! | `compact` | makes the file of regions as small as it can be | yes |
-//! | `replay` | replays the log alone, and verifies each commit | yes |
+//! | `info` | prints facts about a world | no |
+//! | `check` | reads all of it, and replays its log from the first commit on; changes nothing | for a full check |
+//! | `repair` | opens whatever is left of it, rebuilds damaged parts, and saves it | yes |
+//! | `compact` | makes the file of regions as small as possible | yes |
+//! | `replay` | replays only the log, and verifies each commit | yes |
 //! | `export` | writes the world to one file | yes |
-//! | `import` | makes a world of such a file | yes |
+//! | `import` | makes a world from such a file | yes |
 //!
-//! Each prints one JSON object with `revision` and `hash`. A world holds only what differs from its ground: `--heights`
-//! and the the options next to it name it as for the example `export`, `--side` as for the example `server`. `--level`
-//! names the level that it was begun on, if it was begun on one. `repair`, `compact` and `import` refuse another ground
-//! or level than the world's own, as one wrong number would move the world there for good; `--other-base keep` or
-//! `replay` does so on purpose.
+//! Each prints one JSON object with `revision` and `hash`. A world holds only the differences from its ground. Choose
+//! the ground with `--heights` and the options next to it, as for the example `export`, or with `--side`, as for the
+//! example `server`. Choose the level that it is based on, if there is one, with `--level`. `repair`, `compact` and
+//! `import` refuse another ground or level than the world's own, because a single wrong number would move the world
+//! there permanently; `--other-base keep` or `replay` does so on purpose.
 //!
-//! `info`, `check`, `replay` and `export` change nothing, so that they work on read-only media too. `repair` opens
-//! worlds that a game refuses to open, as a file can't be read or only regions are left; it replaces a file only once
-//! the new one is complete, and keeps the old one in `quarantine`.
+//! `info`, `check`, `replay` and `export` change nothing, so they also work on read-only media. `repair` opens worlds
+//! that a game refuses to open because a file can't be read or only regions are left. It replaces a file only once the
+//! new one is complete, and keeps the old one in `quarantine`.
 //!
 //! | exit code | when |
 //! | --- | --- |

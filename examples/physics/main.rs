@@ -14,8 +14,8 @@
 //! | `Space` | throws a ball |
 //! | `P` | stops or restarts the digging machine |
 //!
-//! Without a display, or with `--headless`, it plays automatically for some seconds of game time and leaves pictures
-//! and `report.json` in `--out`; it fails if a ball is below the ground then.
+//! Without a display, or with `--headless`, it plays automatically for some seconds of game time and saves pictures and
+//! `report.json` in `--out`; it fails if a ball is below the ground then.
 
 #[path = "../shared/display.rs"]
 mod display;

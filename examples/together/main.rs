@@ -23,7 +23,7 @@
 //! | `proxy.rs` | a bad network |
 //! | `../shared/party.rs` | connections over UDP |
 //! | `../shared/tokens.rs` | keys and tokens |
-//! | `../shared/reconnect.rs` | players come back by themselves |
+//! | `../shared/reconnect.rs` | players reconnect automatically |
 
 mod bots;
 #[path = "../shared/party.rs"]

@@ -19,8 +19,8 @@ const STACKS: usize = 4;
 /// About how many vertices a list has room for that several threads make.
 const LIST: usize = 1 << 13;
 
-/// Most lists whose memory is kept for the next large transaction, for each thread; and for how many threads at least
-/// and at most. A list takes some 400 KB, and none that is kept takes more than 1.2 MB.
+/// The maximum number of lists whose memory is kept for the next large transaction, for each thread; and for how many
+/// threads at least and at most. A list takes some 400 KB, and none that is kept takes more than 1.2 MB.
 const KEPT_LISTS: usize = 8;
 const FEW_THREADS: usize = 4;
 const MANY_THREADS: usize = 8;

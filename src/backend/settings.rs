@@ -33,11 +33,11 @@ pub struct EngineSettings {
     pub backend: Backend,
     /// Selects the GPU. One that does not exist is treated like one that fails.
     pub gpu: GpuChoice,
-    /// Most bytes of GPU memory. Up to half may hold bricks and ground, which stay there between
+    /// The maximum number of bytes of GPU memory. Up to half may hold bricks and ground, which stay there between
     /// transactions. `None`: a quarter of the memory that is free when the GPU is opened, at most 2 GiB.
     pub device_memory: Option<usize>,
-    /// Most bytes of pinned host memory, through which all data passes to the GPU and back. A transaction
-    /// that needs more of either runs on the CPU. 1 GiB by default.
+    /// The maximum number of bytes of pinned host memory, through which all data passes to the GPU and back. A
+    /// transaction that needs more of either runs on the CPU. 1 GiB by default.
     pub pinned_memory: usize,
 }
 

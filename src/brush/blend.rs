@@ -11,15 +11,15 @@ use crate::lattice::ONE;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blend {
-    /// Share of the change that is made: 0 for nothing, 1 for all of it.
+    /// Share of the change that is applied, from 0 (none) to 1 (all).
     pub strength: f32,
     /// Width in voxels, from the shape's surface inwards, over which the change fades in: 0 to 64. A falloff wider than
     /// the shape's depth ends in its middle. With 0 the change ends in a step at the shape's surface.
     /// For fills and carves it is the radius by which their edge with the ground is rounded, at most 16.
     pub falloff: f32,
-    /// The material of new ground. `None`: for a fill with a grid that has materials, those; else that of the first ground
-    /// straight below it, else straight above,
-    /// within 64 voxels, else next to it.
+    /// The material of new ground. With `None`, a fill uses the materials of its grid, if that has any. Otherwise new
+    /// ground has the material of the first ground straight below it within 64 voxels, or else straight above within
+    /// 64, or else next to it.
     pub material: Option<MaterialId>,
 }
 
@@ -29,7 +29,7 @@ impl Default for Blend {
     }
 }
 
-/// Most voxels of falloff.
+/// The maximum falloff, in voxels.
 const MOST: i32 = 64;
 
 /// A quantised [`Blend`]: strength in 1/256, falloff in 1/256 voxel.

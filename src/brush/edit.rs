@@ -138,7 +138,7 @@ impl Edit {
         self.roughness.map_or(Ok(()), |roughness| roughness.check())
     }
 
-    /// The shape, in floats as in a brush; of a custom shape, a box around it.
+    /// The shape in floats, as in a brush. For a custom shape, the box around it.
     pub fn shape(&self) -> Shape {
         self.shape.shape().parts().0
     }
@@ -194,7 +194,8 @@ impl Edit {
         Self { tag, stroke, ..self }
     }
 
-    /// The image of the stamp, if it is one; of a [`ShapeGrid`](super::ShapeGrid), the image that holds its samples.
+    /// The image of the stamp, or the image that holds the samples of a [`ShapeGrid`](super::ShapeGrid); `None` if the
+    /// edit has neither.
     pub fn stamp_image(&self) -> Option<&Arc<GreyImage>> {
         self.shape.grid().map(ShapeGrid::image).or_else(|| self.operation.stamp_image())
     }
@@ -237,9 +238,9 @@ impl Edit {
         self.operation.paste().map(|paste| paste.source())
     }
 
-    /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6), or the radius
-    /// of a fill or a carve if that is greater. A paste
-    /// changes none beyond its prefab: where that lies outside the shape, it is a single point.
+    /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6), or the
+    /// radius of a fill or a carve if that is greater. A paste changes no samples outside its prefab; if the prefab
+    /// lies outside the shape, the box is a single point.
     ///
     /// At the rim of the lattice the box reaches beyond its [limits](super#limits) by at most some thousand
     /// voxels; the world cuts it.

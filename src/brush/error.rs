@@ -15,7 +15,7 @@ pub enum BrushError {
         /// The number.
         value: f32,
     },
-    /// A radius or half side is negative, zero or below the least.
+    /// A radius or half side is negative, zero or below the minimum.
     #[error("`{what}` is {value} voxels, but the least is {least}")]
     TooSmall {
         /// The field.
@@ -25,7 +25,7 @@ pub enum BrushError {
         /// The least length.
         least: f32,
     },
-    /// A size, the box around the shape, or its volume is above the most.
+    /// A size, the box around the shape, or its volume is above the maximum.
     #[error("`{what}` is {value} voxels, but the most is {most}")]
     TooLarge {
         /// The field, or `box` (its longest side), or `volume`.
@@ -108,9 +108,9 @@ pub enum BrushError {
         width: u32,
         /// Rows.
         height: u32,
-        /// Least samples along a side.
+        /// The minimum number of samples along a side.
         least: u32,
-        /// Most samples along a side.
+        /// The maximum number of samples along a side.
         most: u32,
     },
     /// The image of a deserialised stamp does not have as many samples as its sides say.
@@ -130,9 +130,9 @@ pub enum BrushError {
     PathPoints {
         /// Its points.
         count: usize,
-        /// Least points.
+        /// The minimum number of points.
         least: usize,
-        /// Most points.
+        /// The maximum number of points.
         most: usize,
     },
     /// A grid of distances has too few or too many samples along a side.
@@ -140,9 +140,9 @@ pub enum BrushError {
     GridSize {
         /// Samples along x, y and z.
         size: [u32; 3],
-        /// Least samples along a side.
+        /// The minimum number of samples along a side.
         least: u32,
-        /// Most samples along a side.
+        /// The maximum number of samples along a side.
         most: u32,
     },
     /// The image of a deserialised grid does not hold one.

@@ -19,15 +19,16 @@ use crate::ground::MaterialId;
 #[serde(tag = "op", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Operation {
-    /// Takes ground away.
+    /// Removes ground.
     Dig,
     /// Fills with ground of one material.
     Add {
         /// The material of the new ground.
         material: MaterialId,
     },
-    /// Changes the material of ground that is there, and no density. [`MaterialId::GROUND`] gives ground its own look
-    /// back; ground that has it is handed over to marching cubes all the same, without a difference to be seen.
+    /// Changes the material of ground that is there, and no density. [`MaterialId::GROUND`] restores the ground's own
+    /// material. Ground that still has it is drawn by marching cubes afterwards all the same, without a visible
+    /// difference.
     ///
     /// It stores the density of what it paints: exactly within 127 voxels of the surface. On taller cliffs, between
     /// neighbouring columns, painting may move the surface by less than a voxel.
@@ -59,11 +60,11 @@ pub enum Operation {
     /// value, or to 1/256 voxel off for each time that it would have been exactly 4 voxels from the surface.
     /// Samples cut off by a dig or an add return to their side of the surface.
     ///
-    /// Densities end 127.996 voxels from the surface, and anything moved beyond is lost: raise and lower
-    /// leave it unchanged. So at most about 128 voxels return. Natural ground that was lowered by more, and
-    /// raised again, is lower than before, but nowhere higher; ground that was raised by more, and lowered
-    /// again, is higher, but nowhere lower. Once the ground is higher than nature made it, further raising
-    /// fills what is missing from the sides, by a voxel each time at most.
+    /// Densities end 127.996 voxels from the surface, and anything moved beyond is lost: raise and lower leave it
+    /// unchanged. So at most about 128 voxels return. Natural ground that was lowered by more, and raised again, is
+    /// lower than before, but nowhere higher; ground that was raised by more, and lowered again, is higher, but nowhere
+    /// lower. Once the ground is higher than the pristine ground, further raising fills the rest from the sides, by at
+    /// most a voxel each time.
     Raise {
         /// Distance in voxels: 0 to 64.
         amount: f32,
@@ -87,12 +88,12 @@ pub enum Operation {
         #[serde(rename = "height", default, skip_serializing_if = "is_default")]
         base: f32,
     },
-    /// Returns ground to what it was before any edit: densities and materials, exactly. Where nothing edited is left,
+    /// Returns ground to what it was before any edit: densities and materials, exactly. Where no edits are left,
     /// nothing is stored any more.
     ///
-    /// It reaches as far as a dig of the same shape, [`BAND`](super::BAND) beyond it, so a reset of that shape takes a
-    /// dig back. The terrain's rules hold: a sample is reset entirely, or refused. Ground that loses its support does
-    /// not fall.
+    /// It reaches as far as a dig of the same shape, [`BAND`](super::BAND) beyond it, so a reset with the same shape
+    /// undoes a dig. The terrain's rules apply: a sample is reset entirely, or refused. Ground that loses its support
+    /// does not fall.
     Reset,
     /// Makes the ground a road along the path of a [`Corridor`](super::Corridor): level across, with air above it and
     /// ground below it, as far as the corridor goes up and down. It fades into the ground at its sides over the falloff,
@@ -104,11 +105,11 @@ pub enum Operation {
     /// where that has [some](super::ShapeGrid::with_materials), or that of the ground below it. Each application rounds
     /// again, by at most 0.42 of the radius.
     Fill,
-    /// Takes ground away like a [`Dig`](Self::Dig), and rounds the rim of the hole. The radius is the blend's falloff, as of
-    /// a [`Fill`](Self::Fill).
+    /// Removes ground like a [`Dig`](Self::Dig), and rounds the rim of the hole. The radius is the blend's falloff, as
+    /// for a [`Fill`](Self::Fill).
     Carve,
-    /// Puts a copy of another place here, as far as it lies inside the shape. It changes nothing outside, not even
-    /// within [`BAND`](super::BAND). The terrain's rules hold: a sample is pasted entirely, or refused.
+    /// Pastes a copy of another place, where it lies inside the shape. It changes nothing outside, not even within
+    /// [`BAND`](super::BAND). The terrain's rules apply: a sample is pasted entirely, or refused.
     Paste {
         /// The copy, and where it goes.
         paste: Paste,
@@ -124,7 +125,7 @@ impl Operation {
         }
     }
 
-    /// Returns `true` if it sculpts. Only then the brush's [`Blend`](super::Blend) is used.
+    /// Returns `true` if it sculpts. Only then is the brush's [`Blend`](super::Blend) used.
     pub fn is_sculpting(&self) -> bool {
         !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Reset | Self::Paste { .. })
     }

@@ -13,7 +13,7 @@ use super::{BrushError, Prefab, Shape, is_default};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{Column, LatticeBox, ONE};
 
-/// Least and most scale.
+/// The minimum and maximum scale.
 const SCALE: (f32, f32) = (0.125, 8.0);
 
 /// A [`Prefab`] at a place: its anchor is placed at [`at`](Self::at).
@@ -22,8 +22,9 @@ const SCALE: (f32, f32) = (0.125, 8.0);
 /// quarter turns: then every sample is one of the prefab's, mirrored or not. Otherwise densities are interpolated
 /// between the eight nearest samples, in integers, and materials are those of the nearest solid one.
 ///
-/// All samples of the prefab's box are pasted: ground and air that nobody had edited too, unless the place has the same
-/// already. With [`edited_only`](Self::edited_only), only those are that were edited, and the ground around them stays.
+/// All samples of the prefab's box are pasted: ground and air that were never edited too, unless they are already the
+/// same in the new place. With [`edited_only`](Self::edited_only), only samples that were edited are pasted, and the
+/// ground around them stays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paste {
@@ -38,7 +39,7 @@ pub struct Paste {
     /// Whether it is mirrored along its own x axis, before it is rotated.
     #[serde(default, skip_serializing_if = "is_default")]
     pub mirror: bool,
-    /// The size of its voxels, 1/8 to 8. A brush in metres says the terrain's voxel size here.
+    /// The size of its voxels, 1/8 to 8. For a brush in metres, the terrain's voxel size.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub scale: f32,
     /// Whether only samples that were edited are pasted.
@@ -110,7 +111,7 @@ impl Paste {
     }
 
     /// Moves it up or down, by whole voxels, so that its anchor lies as high above the ground as where it was copied.
-    /// For pastes in voxels of the terrain, on the ground as nature made it.
+    /// For pastes in voxels of the terrain; `ground` is the pristine ground.
     #[must_use]
     pub fn onto_ground(self, ground: &Ground) -> Self {
         let column = Column::new(self.at.x.round() as i32, self.at.z.round() as i32);

@@ -11,13 +11,13 @@ use thiserror::Error;
 use crate::ground::MaterialId;
 use crate::lattice::hash::hash_words;
 
-/// Most samples along a side of a prefab.
+/// The maximum number of samples along a side of a prefab.
 pub const MAX_PREFAB_SIDE: i32 = 1024;
 
-/// Most samples of a prefab, which take 4 bytes each.
+/// The maximum number of samples of a prefab, which take 4 bytes each.
 pub const MAX_PREFAB_SAMPLES: u64 = 1 << 23;
 
-/// Most voxels from the lowest sample of a prefab to its anchor, along each axis.
+/// The maximum number of voxels from the lowest sample of a prefab to its anchor, along each axis.
 const FARTHEST_ANCHOR: i32 = 1 << 11;
 
 /// Why a box cannot be a [`Prefab`].
@@ -60,7 +60,7 @@ pub enum PrefabError {
         /// From the lowest sample to the anchor.
         anchor: IVec3,
     },
-    /// A serialised prefab holds what no prefab does.
+    /// A serialised prefab holds values that no prefab can have.
     #[error("the prefab holds an invalid {what}")]
     Invalid {
         /// The part that is wrong.
@@ -115,7 +115,7 @@ pub struct Prefab {
     materials: Vec<MaterialId>,
     marks: Vec<u8>,
     hash: u64,
-    /// Its file, once somebody needed it.
+    /// Its file, made when it is first needed.
     packed: OnceLock<Arc<[u8]>>,
 }
 
@@ -209,7 +209,7 @@ impl Prefab {
         self.marks.iter().filter(|&&marks| marks & EDITED != 0).count() as u64
     }
 
-    /// A hash of its content, the same on every machine. It is no secret, and no proof against forgery.
+    /// A hash of its content, the same on every machine. It is not cryptographic.
     pub fn hash(&self) -> u64 {
         self.hash
     }
@@ -236,7 +236,7 @@ impl Prefab {
         self.at_index((at.y * size.z + at.z) * size.x + at.x)
     }
 
-    /// The bytes of its file, which `pack` makes where nobody has needed them yet: a large prefab takes a while.
+    /// The bytes of its file, which `pack` makes when they are first needed: a large prefab takes a while.
     #[cfg(feature = "format")]
     pub(crate) fn packed(&self, pack: impl FnOnce(&Self) -> Vec<u8>) -> &Arc<[u8]> {
         self.packed.get_or_init(|| pack(self).into())

@@ -5,11 +5,11 @@ use glam::{IVec3, Quat, Vec3};
 use super::BrushError;
 use crate::lattice::{LIMIT, ONE, REACH};
 
-/// Least radius, half side and axis.
+/// The minimum radius, half side and length of an axis.
 const LEAST: i32 = ONE / 4;
 /// Longest side of the box around a shape.
 pub(super) const LONGEST: i32 = 1024 * ONE;
-/// Most volume of a shape, in cubic voxels.
+/// The maximum volume of a shape, in cubic voxels.
 const VOLUME: f64 = (1 << 25) as f64;
 /// What the components of integer quaternions and directions mean 1 by.
 const UNIT: f64 = 32767.0;

@@ -16,10 +16,10 @@ use super::{BrushError, Kind, Operation, Prefab, Rounding};
 use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::{LIMIT, ONE};
 
-/// Most voxels that a raise or a lower moves the surface.
+/// The maximum number of voxels that a raise or a lower moves the surface.
 const AMOUNT: f32 = 64.0;
 
-/// Least and most height of a terrace's steps.
+/// The minimum and maximum height of a terrace's steps.
 const STEP: (f32, f32) = (1.0, 256.0);
 
 /// An [`Operation`] in integers. Lengths are in 1/256 voxel.

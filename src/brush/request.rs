@@ -54,14 +54,14 @@ pub struct Brush {
     pub roughness: Option<Roughness>,
     /// Any number that the game chooses; the receipt returns it.
     pub tag: u64,
-    /// The steps of undo: brushes of one stroke that follow each other are one step, over however many frames
-    /// they come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply). A
-    /// brush of another stroke in between, a second player's say, ends a step.
+    /// The stroke: consecutive brushes of one stroke are one undo step, over any number of frames. With `None`, the
+    /// brushes of one frame are a step, or those of one [`apply`](crate::terrain::Terrain::apply). A brush of another
+    /// stroke in between, for example of a second player, ends the step.
     pub stroke: Option<u64>,
     /// The falloff, strength and material of operations that sculpt.
     pub blend: Blend,
-    /// The greatest hardness of material that it removes, where the terrain has rules for that: [`FULL_POWER`] takes
-    /// away all that can be.
+    /// The greatest hardness of material that it removes at full speed, if the terrain has rules for that.
+    /// [`FULL_POWER`] removes everything that can be removed.
     pub power: u8,
 }
 
@@ -88,7 +88,7 @@ impl Brush {
         }
     }
 
-    /// A brush that takes ground away.
+    /// A brush that removes ground.
     pub fn dig(shape: impl Into<AnyShape>) -> Self {
         Self::new(shape, Operation::Dig)
     }
@@ -113,8 +113,8 @@ impl Brush {
         Self::new(shape, Operation::Sharpen).with_strength(strength)
     }
 
-    /// A brush that makes its surface a plane through `point`, with the air where `normal` points to: floors, walls and
-    /// ceilings.
+    /// A brush that flattens the surface to a plane through `point`, with air on the side that `normal` points to: for
+    /// floors, walls and ceilings.
     pub fn flatten(shape: impl Into<AnyShape>, point: Vec3, normal: Vec3) -> Self {
         Self::new(shape, Operation::Flatten { point, normal })
     }
@@ -164,7 +164,7 @@ impl Brush {
         Self::new(shape, Operation::Fill).with_falloff(rounding)
     }
 
-    /// A brush that takes ground away and rounds the rim of the hole, by a radius of 0 to 16 voxels: see
+    /// A brush that removes ground and rounds the rim of the hole, by a radius of 0 to 16 voxels: see
     /// [`Operation::Carve`].
     pub fn carve(shape: impl Into<AnyShape>, rounding: f32) -> Self {
         Self::new(shape, Operation::Carve).with_falloff(rounding)
@@ -220,7 +220,8 @@ impl Brush {
         Self { blend: Blend { material: Some(material), ..self.blend }, ..self }
     }
 
-    /// The brush with less than full power: what the terrain's rules call harder takes longer, or can't be dug.
+    /// The brush with less than full power: materials that are harder by the terrain's rules take longer, or can't be
+    /// dug.
     #[must_use]
     pub fn with_power(self, power: u8) -> Self {
         Self { power, ..self }

@@ -20,7 +20,7 @@ pub struct Roughness {
     pub amplitude: f32,
     /// Width of a bump in voxels, 1 to 256.
     pub scale: f32,
-    /// Which of the patterns.
+    /// Seed of the pattern.
     pub seed: u32,
     /// The point that the pattern is tied to: by default the origin, of the world for a brush that is sent to the plugin,
     /// and of the terrain otherwise. Terrains that move keep their pattern if this point moves with them. It is rounded

@@ -12,7 +12,7 @@
 
 use super::{BAND, DEPTH};
 
-/// Most voxels of a radius.
+/// The maximum radius, in voxels.
 pub(super) const MOST: i32 = 16;
 
 /// A union or a subtraction with a rounded edge. Lengths are in 1/256 voxel.

@@ -62,10 +62,10 @@ impl Stamp {
     }
 }
 
-/// Least and most samples along a side of an image.
+/// The minimum and maximum number of samples along a side of an image.
 const SIDES: (u32, u32) = (2, 256);
 
-/// Most height.
+/// The maximum height.
 const HEIGHT: f32 = 256.0;
 
 /// The name that errors use for the length they report, which is half of the stamp's.

@@ -11,7 +11,7 @@ pub struct Place {
     pub radius: f32,
     /// How far normals, wires and walkable ground reach, in voxels.
     pub near: f32,
-    /// Who walks, in voxels.
+    /// The agent of the view `walkable`, in voxels.
     #[cfg(feature = "navigation")]
     pub agent: crate::navigation::WalkSettings,
 }

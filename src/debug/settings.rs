@@ -28,13 +28,14 @@ pub struct BurrowDebug {
     /// The agent of that view, in metres.
     #[cfg(feature = "navigation")]
     pub agent: crate::navigation::WalkSettings,
-    /// The place around which is drawn, in world space; `None` for where the camera looks at the ground.
+    /// The point around which views are drawn, in world space; `None` for the point of the ground that the camera looks
+    /// at.
     pub focus: Option<Vec3>,
     /// How far views reach, in metres; normals, wires and walkable ground reach [`near`](Self::near).
     pub radius: f32,
     /// How far normals, wires and walkable ground reach, in metres.
     pub near: f32,
-    /// Most lines of a view of one terrain.
+    /// The maximum number of lines of a view of one terrain.
     pub most_lines: usize,
     /// How long dirty bricks are shown, in seconds.
     pub fade: f32,

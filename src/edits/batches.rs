@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::prepared_edit::PreparedEdit;
 
-/// Most edits of a batch in which some edit reads its surroundings, so that comparing each with all others stays cheap.
+/// The maximum number of edits of a batch in which some edit reads its surroundings, so that comparing each with all
+/// others stays cheap.
 const LONGEST: usize = 1 << 12;
 
-/// Most bricks around all edits of a batch, unless it is a single edit: their jobs take 16 MiB.
+/// The maximum number of bricks around all edits of a batch, unless it is a single edit: their jobs take 16 MiB.
 pub(super) const MAX_BRICKS: u64 = 1 << 20;
 
 /// Splits edits into batches, in order, in which no edit reads what an earlier edit of the batch may write, except for

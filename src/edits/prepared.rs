@@ -19,8 +19,8 @@ use crate::volume::{DiggingRules, SampleView};
 /// and most bricks of a large cave are replaced by a shared one.
 const JOBS_AT_ONCE: usize = 8192;
 
-/// Least and most jobs of a delta: few, so that all threads end together, but not so few that there are many deltas to
-/// add up.
+/// The minimum and maximum number of jobs of a delta: few, so that all threads end together, but not so few that there
+/// are many deltas to add up.
 const GROUP: [usize; 2] = [16, 64];
 
 /// Desired number of groups for each thread.

@@ -18,7 +18,7 @@ use super::{bytes::put_bytes, frame, prefab::read_prefab};
 use crate::brush::{BrushError, Content, ContentMut, Edit, Prefab, ShapeGrid};
 use crate::ground::GreyImage;
 
-/// Most bytes of a prefab's file that is sent.
+/// The maximum size in bytes of a prefab's file that is sent.
 const MAX_PREFAB: usize = 4 << 20;
 
 impl ContentId {
@@ -175,7 +175,7 @@ impl ContentTable {
     #[cfg(feature = "store")]
     pub(crate) fn add_file(&mut self, name: ContentId, bytes: &[u8]) -> bool {
         let (mut reader, mut found) = (Reader(bytes), Self::default());
-        // What follows the last part that can be read is nobody's.
+        // Bytes after the last part that can be read belong to nothing.
         while let Ok(part) = reader.bytes() {
             match frame::open(part, Kind::Image, WorldId::default(), IMAGE, MAX_IMAGE) {
                 Ok(opened) => {

@@ -70,7 +70,7 @@ pub enum FormatError {
     /// An edit names an image or a prefab that is not there.
     #[error("the record names the content {:016x}, which is missing or damaged", .0.0)]
     ContentMissing(ContentId),
-    /// A file of a level is missing, or is none of a level's.
+    /// A file of a level is missing, or a file does not belong to a level.
     #[error("`{name}`: {why}")]
     File {
         /// The file's name.

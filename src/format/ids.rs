@@ -35,7 +35,7 @@ pub enum Kind {
 pub struct WorldId(pub u128);
 
 impl WorldId {
-    /// A new name. It is no secret.
+    /// A new random id. It is not a secret.
     pub fn random() -> Self {
         // Each state has keys that the system drew at random.
         let word = || u128::from(RandomState::new().build_hasher().finish());

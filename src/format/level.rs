@@ -69,7 +69,7 @@ impl Level {
         Self { settings, ground: ground.hash(), next_field, rules, loose, game, regions }
     }
 
-    /// Its parts, of which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
+    /// Its parts, from which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
     pub fn parts(&self) -> WorldParts {
         let change = of_regions(&self.regions, self.next_field);
         let (chunk_size, rules) = (self.settings.chunk_size, self.rules.clone());
@@ -128,10 +128,11 @@ pub(super) fn write_within(level: &Level, limits: &Limits) -> Result<LevelFiles,
     Ok(files)
 }
 
-/// Reads the files of a level over its ground, or over another one: [`Level::ground`] and the regions' hashes tell.
+/// Reads the files of a level over its ground, or over another one, which [`Level::ground`] and the hashes of regions
+/// reveal.
 ///
 /// # Errors
-/// When a file is damaged, missing, or none of the level's.
+/// When a file is damaged or missing, or does not belong to the level.
 pub fn read_level(files: &LevelFiles, ground: &Ground) -> Result<Level, FormatError> {
     read_within(files, ground, &Limits::FORMAT)
 }
@@ -209,7 +210,7 @@ pub(super) fn pack_within(files: &LevelFiles, limits: &Limits) -> Result<Vec<u8>
 /// Reads what [`pack_level`] wrote; no ground is needed.
 ///
 /// # Errors
-/// When it is damaged, or holds a file whose name none of a level's has.
+/// When it is damaged, or holds a file with a name that is not used in levels.
 pub fn unpack_level(packed: &[u8]) -> Result<LevelFiles, FormatError> {
     unpack_within(packed, &Limits::FORMAT)
 }

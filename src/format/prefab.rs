@@ -10,8 +10,8 @@ use crate::brush::{MAX_PREFAB_SAMPLES, Prefab};
 /// The key of every prefab's frame.
 const KEY: &[u8] = b"prefab";
 
-/// Most bytes of an unpacked prefab: 3 for the density of a sample, and 9 for materials and marks that differ from
-/// sample to sample.
+/// The maximum size in bytes of an unpacked prefab: 3 for the density of a sample, and 9 for materials and marks that
+/// differ from sample to sample.
 const LIMIT: usize = 12 * MAX_PREFAB_SAMPLES as usize + 64;
 
 /// The bytes of a prefab's file: packed, with a checksum and the number of the format. Equal prefabs give equal bytes.

@@ -42,7 +42,7 @@ pub enum MaterialControl {
         /// The material of the deep.
         base: MaterialId,
     },
-    /// As a map has it: each column's materials are those of the nearest sample.
+    /// By a material map: each column has the materials of the nearest sample.
     Map(Arc<MaterialMap>),
 }
 

@@ -6,7 +6,8 @@ use std::sync::OnceLock;
 use super::MAX_SIZE;
 use super::error::ImageError;
 
-/// Most samples along one side of an image, whatever the limits say: one more than the largest world has cells.
+/// The maximum number of samples along one side of an image, whatever the limits say: one more than the largest world
+/// has cells.
 const MAX_SIDE: u32 = MAX_SIZE + 1;
 
 /// Byte order of a headerless file of unsigned 16-bit samples, as terrain editors export it ("RAW16", `.r16`).
@@ -22,13 +23,13 @@ pub enum RawFormat {
 /// Limits of an image's size, checked against the file's header before memory is allocated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ImageLimits {
-    /// Most bytes of the file.
+    /// The maximum size in bytes of the file.
     pub max_file_bytes: u64,
-    /// Most samples in a row; never more than 16385 are accepted.
+    /// The maximum number of samples in a row; never more than 16385 are accepted.
     pub max_width: u32,
-    /// Most rows; never more than 16385 are accepted.
+    /// The maximum number of rows; never more than 16385 are accepted.
     pub max_height: u32,
-    /// Most bytes of memory that decoding may take, the finished image included.
+    /// The maximum number of bytes of memory that decoding may take, the finished image included.
     pub max_alloc_bytes: u64,
 }
 
@@ -78,7 +79,7 @@ pub struct GreyImage {
     width: u32,
     height: u32,
     samples: Vec<u16>,
-    /// A hash of all of it, once somebody needed it.
+    /// A hash of its content, computed when it is first needed.
     #[cfg_attr(not(feature = "format"), allow(dead_code, reason = "for names of content"))]
     hash: OnceLock<u64>,
 }
@@ -142,7 +143,7 @@ impl GreyImage {
         (self.width, self.height) == (2, 2) && self.samples == [0; 4]
     }
 
-    /// A hash of its content, which `hash` computes where nobody has needed it yet.
+    /// A hash of its content, which `hash` computes when it is first needed.
     #[cfg(feature = "format")]
     pub(crate) fn hash_with(&self, hash: impl FnOnce(&Self) -> u64) -> u64 {
         *self.hash.get_or_init(|| hash(self))

@@ -7,7 +7,7 @@ use super::noise_heights::{NoiseHeights, check_voxels};
 use super::sources::fill_row;
 use super::world::Ground;
 
-/// Most voxels from one sample of an image to the next.
+/// The maximum number of voxels from one sample of an image to the next.
 pub const MAX_VOXELS_PER_SAMPLE: u32 = 64;
 
 /// The scale of an image of heights. Its columns run along +x, its rows along +z; its first sample lies at column (0,

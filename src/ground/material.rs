@@ -33,7 +33,7 @@ impl MaterialId {
 /// The materials of one column: a base all the way down and an overlay as its skin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct ColumnMaterial {
-    /// The material of the deep, seen wherever the overlay is not.
+    /// The material below the overlay, and on the surface where the overlay does not cover it.
     pub base: MaterialId,
     /// The skin, [`OVERLAY_DEPTH`] thick.
     pub overlay: MaterialId,

@@ -84,10 +84,11 @@ pub use strata::{MAX_COLUMN_CONDITIONS, MAX_STRATA};
 pub use world::Ground;
 pub(crate) use world::RowBuffer;
 
-/// Most cells along one side of a world whose heights are kept in memory.
+/// The maximum number of cells along one side of a world whose heights are kept in memory.
 pub const MAX_SIZE: u32 = 16_384;
 
-/// Most cells along one side of a world with a [`HeightSource`]: the same as brushes [reach](crate::lattice::REACH).
+/// The maximum number of cells along one side of a world with a [`HeightSource`]: the same as brushes
+/// [reach](crate::lattice::REACH).
 ///
 /// Positions in 1/4096 voxel, counted from the world's origin, would fit 32 bits up to 524,287 voxels. But a
 /// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536

@@ -6,7 +6,7 @@ use super::error::GroundError;
 use super::world::Ground;
 use crate::lattice::LIMIT;
 
-/// Most octaves of a noise; each is about half as large as the one before.
+/// The maximum number of octaves of a noise; each is about half as large as the one before.
 pub const MAX_OCTAVES: u32 = 16;
 
 /// Largest size of a noise's features, in voxels; the smallest is 1.

@@ -24,7 +24,7 @@ const SIDE: usize = (BEFORE + PAGE + AFTER) as usize;
 /// Bytes of pages that a ground keeps by default.
 pub(super) const DEFAULT_BUDGET: usize = 32 << 20;
 
-/// Most parts of the cache that are locked on their own.
+/// The maximum number of parts of the cache that are locked on their own.
 const MAX_SHARDS: usize = 16;
 
 /// Which page: its column of pages along x, and along z.
@@ -121,7 +121,7 @@ pub(super) struct Pages {
     number: u64,
     budget: usize,
     page_bytes: usize,
-    /// Most pages of a shard.
+    /// The maximum number of pages of a shard.
     most: usize,
     shards: Box<[Mutex<Shard>]>,
 }

@@ -1,4 +1,4 @@
-//! Chooses the cut for an eye by the size of cells and errors on the screen.
+//! Chooses the cut for a set of viewpoints by the size of cells and errors on the screen.
 
 use glam::Vec3;
 
@@ -22,9 +22,9 @@ const MAX_GROWTHS: u32 = 60;
 /// A viewpoint that the level of detail is chosen for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// Where, in voxels.
+    /// Position, in voxels.
     pub position: Vec3,
-    /// Voxels a second.
+    /// Velocity, in voxels a second.
     pub velocity: Vec3,
     /// Pixels that one voxel covers. In perspective, one voxel away: the height of the picture over twice the tangent
     /// of half the angle of view.
@@ -119,12 +119,12 @@ pub struct LodSettings {
     pub error_pixels: f32,
     /// The greatest size of cells in nodes with edits, 4 unless set otherwise.
     pub edited_pixels: f32,
-    /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing
-    /// changes back and forth while an eye moves to and fro.
+    /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So levels
+    /// do not flicker while a viewpoint moves back and forth.
     pub hysteresis: f32,
-    /// The choice also considers where each eye will be in this many seconds; 0.5 by default.
+    /// The choice also considers where each viewpoint will be in this many seconds; 0.5 by default.
     pub look_ahead: f32,
-    /// Nodes farther from all eyes than this many voxels are not split; 8,192 by default.
+    /// Nodes farther from all viewpoints than this many voxels are not split; 8,192 by default.
     pub view_distance: f32,
     /// The most nodes, about 2,400 unless set otherwise: beyond them, all limits grow.
     pub most_nodes: usize,
@@ -145,8 +145,8 @@ impl Default for LodSettings {
 }
 
 impl LodSettings {
-    /// The cut that these eyes need, all together, wherever they look: turning changes nothing. `before` is the one
-    /// that they had. Eyes whose numbers are not finite see nothing.
+    /// The cut that these viewpoints need together, wherever they look: turning changes nothing. `before` is the
+    /// previous cut. Viewpoints whose numbers are not finite are ignored.
     pub fn cut(&self, before: &Cut, eyes: &[Viewpoint], facts: impl Fn(Node) -> NodeFacts) -> Cut {
         let grid = before.grid();
         let eyes: Vec<Viewpoint> = eyes.iter().filter(|eye| eye.is_finite()).copied().collect();

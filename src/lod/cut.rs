@@ -24,8 +24,8 @@ impl Cut {
         Self { grid, split: Arc::default() }
     }
 
-    /// The coarsest cut in which every node is split that ought to be. Nodes are asked about from above; the children
-    /// of one that neither ought to be split nor has to be, for the sake of its neighbours, are not.
+    /// The coarsest cut in which every node is split for which `is_split` returns `true`. It is called from coarse
+    /// nodes to fine ones, and not for the children of nodes that are not split.
     pub fn new(grid: LodGrid, mut is_split: impl FnMut(Node) -> bool) -> Self {
         let mut cut = Self::coarsest(grid);
         let mut asked: Vec<Node> = grid.roots().collect();

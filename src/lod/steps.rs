@@ -9,7 +9,7 @@ use super::{Cut, Node};
 /// One step: some nodes split or merged, and the meshes that change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Step {
-    /// Nodes that are drawn no more.
+    /// Nodes that are no longer drawn.
     pub gone: Vec<Node>,
     /// Nodes that are drawn from now on.
     pub new: Vec<Node>,

@@ -23,13 +23,13 @@ pub enum PieceFate {
     BrokeOff,
 }
 
-/// Names a loose piece.
+/// Identifies a loose piece.
 ///
-/// The name is a hash of the piece's samples and materials. The edit that cuts a piece off and the ground that it meets
-/// decide these, so an edit gives its pieces the same names on every machine: as a client's prediction, on the server,
-/// and when it is redone.
+/// The id is a hash of the piece's samples and materials. These depend only on the edit that cuts the piece off and on
+/// the ground that it changes, so the pieces of an edit have the same ids on every machine: in a client's prediction,
+/// on the server, and when it is redone.
 ///
-/// Two pieces have the same name only if they came from exactly the same samples and materials: for example if a game
+/// Two pieces have the same id only if they consisted of exactly the same samples and materials: for example if a game
 /// builds the same wall again and cuts it off once more. An undo then returns the later one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct PieceId(pub u64);
@@ -60,7 +60,7 @@ pub struct Run {
 #[serde(from = "Plain", into = "Plain")]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct LoosePiece {
-    /// Its name. A saved piece does not store it, since `runs` and `materials` decide it.
+    /// Its id. A saved piece does not store it, because it follows from `runs` and `materials`.
     pub id: PieceId,
     /// What happened to it.
     pub fate: PieceFate,
@@ -80,7 +80,7 @@ pub struct LoosePiece {
 /// A piece that came back: what an undo restored as ground.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReturnedPiece {
-    /// The name that it had when it was cut off.
+    /// The id that it had when it was cut off.
     pub id: PieceId,
     /// The tag of the brush that had cut it off; 0 where players share the terrain.
     pub tag: u64,

@@ -58,7 +58,7 @@ impl WalkSettings {
     }
 }
 
-/// Why no agent can have these settings.
+/// Why settings are invalid.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WalkError {

@@ -40,15 +40,15 @@ use crate::volume::{Brick, DiggingRules, Fields};
 /// The version of the protocol. It changes whenever the encoding of messages does.
 pub const PROTOCOL: u32 = 6;
 
-/// Most bytes of a message to a server.
+/// The maximum size in bytes of a message to a server.
 pub const MAX_TO_SERVER: usize = 64 << 10;
-/// Most bytes of a message to a client, in either lane.
+/// The maximum size in bytes of a message to a client, in either lane.
 pub const MAX_TO_CLIENT: usize = 8 << 20;
-/// Most edits in a message.
+/// The maximum number of edits in a message.
 pub const MAX_EDITS: usize = 256;
-/// Most regions that a message names.
+/// The maximum number of regions that a message names.
 pub const MAX_REGIONS: usize = 4096;
-/// Most images that a message asks for.
+/// The maximum number of images that a message asks for.
 pub const MAX_IMAGES: usize = 64;
 /// The most by which the sequence number of a client's edit may exceed the previous one. Larger jumps are invalid, so
 /// no client can use up the numbers of a player.
@@ -79,8 +79,7 @@ pub enum Lane {
 #[non_exhaustive]
 #[expect(clippy::large_enum_variant, reason = "nearly all entries are orders")]
 pub enum Entry {
-    /// Something that is asked of the world: an edit, other rules or settings of loose pieces, or parts that replace
-    /// others.
+    /// An order to the world: an edit, other rules or settings of loose pieces, or parts that replace others.
     Order {
         /// The client that asked for it, and its sequence number there. `None` for the game's server; an edit of the
         /// game's server has [`ClientId::SERVER`] here.

@@ -14,7 +14,7 @@ const SCULPTED: u64 = 4;
 pub const UNDO: u64 = 200;
 /// Restored bytes of an undo that cost 1.
 pub const UNDO_BYTES: u64 = 256;
-/// Most bytes that an undo may restore, because they are sent to all clients in one message.
+/// The maximum number of bytes that an undo may restore, because they are sent to all clients in one message.
 pub const MAX_UNDO_BYTES: usize = 1 << 20;
 
 /// The cost of an edit: see [`ServerSettings::cost`](super::ServerSettings::cost). `None` for one that reaches nothing

@@ -134,7 +134,7 @@ impl Default for BrushTool {
     }
 }
 
-/// Most points that a path of a [`BrushTool`] has before its last one.
+/// The maximum number of points that a path of a [`BrushTool`] has before its last one.
 pub const PATH_POINTS: usize = 255;
 
 /// The shape of a [`BrushTool`].

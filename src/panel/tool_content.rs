@@ -1,4 +1,4 @@
-//! What a brush of the panel may hold besides numbers: an image, a model, a piece of a world.
+//! The content of a brush of the panel that is not a number: an image, a model, or a piece of a world.
 
 use std::sync::{Arc, LazyLock};
 
@@ -93,7 +93,7 @@ impl ToolModel {
     }
 }
 
-/// Least voxels between two samples of a [`GridShape`].
+/// The minimum number of voxels between two samples of a [`GridShape`].
 const LEAST_SCALE: f32 = 1.0 / 16.0;
 
 /// A boulder with bumps, in a grid of 17 samples a side.

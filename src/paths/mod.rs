@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | [`Navigation`] | whose ground, for what agent, in which archipelago, and where |
 //! | [`NavigationSource`] | a place around which there are islands |
-//! | [`NavigationTiles`] | the tiles that there are |
+//! | [`NavigationTiles`] | the loaded tiles |
 //! | [`archipelago_options`] | options for landmass that fit an agent |
 //! | [`JUMP_DOWN`], [`CLIMB_UP`] | kinds of landmass' animation links over ledges |
 
@@ -74,10 +74,10 @@ impl Plugin for NavigationPlugin {
     }
 }
 
-/// The ground of a terrain that agents of one kind walk on. It may be on the entity of the terrain or of the archipelago, or on one
-/// of its own: several kinds of agents need several, with an archipelago each.
+/// The ground of a terrain that agents of one kind walk on. It may be on the entity of the terrain or of the
+/// archipelago, or on a separate one. Each kind of agent needs its own, with its own archipelago.
 ///
-/// Settings with an error give no islands, and the error is logged.
+/// If the settings are invalid, there are no islands, and the error is logged.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component)]
 #[require(NavigationTiles)]

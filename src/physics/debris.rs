@@ -43,9 +43,9 @@ pub struct DebrisPlugin;
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct DebrisSettings {
-    /// The most pieces at once. Further ones vanish.
+    /// The greatest number of pieces at a time. Further ones vanish.
     pub most: usize,
-    /// Seconds of physics from when a piece becomes a body until it crumbles. They stand still while `Time<Physics>` does.
+    /// Seconds of `Time<Physics>` from the moment when a piece becomes a body until it crumbles.
     pub stay: f32,
     /// Friction of the pieces.
     pub friction: Friction,
@@ -64,7 +64,7 @@ impl Default for DebrisSettings {
 #[derive(Component, Clone, Debug, PartialEq)]
 #[require(RigidBody::Dynamic, Visibility, TransformInterpolation)]
 pub struct Debris {
-    /// Which piece it is.
+    /// The id of the piece.
     pub id: PieceId,
     /// The tag of the brush that cut it off.
     pub tag: u64,

@@ -128,7 +128,7 @@ pub struct PhysicsFigures {
     pub swaps: u64,
     /// Colliders dropped because their surface had changed again.
     pub stale: u64,
-    /// Colliders that could not be made: each is tried again, and then its tile or chunk keeps what it has.
+    /// Colliders that could not be made: each is retried, and then its tile or chunk keeps the collider that it has.
     pub failed: u64,
     /// Tiles and chunks checked since the start, because they changed or a source arrived or left.
     pub looked_at: u64,

@@ -66,7 +66,7 @@ pub(super) fn find_near(
             if !(from.is_finite() && way.is_finite() && radius >= 0.0) {
                 continue;
             }
-            // A source reaches at least its own size, or it could be held for ever.
+            // A source reaches at least its own size; otherwise it could be held forever.
             let reach = solids.reach(&extent, layers).map_or(Vec3::ZERO, |reach| reach.farthest());
             let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(reach)).xz().length();
             let radius = (radius / size).max(own);

@@ -81,8 +81,8 @@ fn attach(world: &mut World) {
     world.resource_mut::<PhysicsFigures>().main_thread += start.elapsed();
 }
 
-/// Reports a collider that could not be built. It is missing, so it is built again; after some attempts its tile or chunk stays
-/// as it is until its surface changes, as bodies would be held over it for ever.
+/// Reports a collider that could not be built. It is missing, so it is built again; after some attempts its tile or
+/// chunk stays as it is until its surface changes, because otherwise bodies would be held over it forever.
 fn fail(world: &mut World, entity: Entity, Failure { part, why }: &Failure) {
     let mut tasks = world.resource_mut::<ColliderTasks>();
     let count = tasks.failures.entry(entity).or_default();

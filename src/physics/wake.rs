@@ -137,9 +137,9 @@ pub(super) fn wake(
     figures.main_thread += start.elapsed();
 }
 
-/// Finds bodies in the ground where nothing changed, a share of all bodies in each frame, and adds them to the watched ones.
-/// Ground is one-sided, so a body that was pushed or placed inside would fall for ever. Bodies that sleep or are locked
-/// along y are left alone.
+/// Finds bodies in the ground where nothing changed, a share of all bodies in each frame, and adds them to the watched
+/// ones. Ground is one-sided, so a body that was pushed or placed inside would fall forever. Bodies that sleep or are
+/// locked along y are left alone.
 pub(super) fn find_buried(
     mut watched: ResMut<WatchedBodies>,
     bodies: Query<

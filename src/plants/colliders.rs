@@ -14,8 +14,8 @@ use crate::terrain::Terrain;
 /// Metres around a source within which stems have colliders, if its own radius is not smaller.
 const NEAR: f32 = 32.0;
 
-/// Gives the [stems](crate::scatter::Stem) of plants colliders near to [`ColliderSource`]s: static cylinders, children of the
-/// terrain, which go and return with their plants.
+/// Gives the [stems](crate::scatter::Stem) of plants colliders near to [`ColliderSource`]s: static cylinders, children
+/// of the terrain, which disappear and return with their plants.
 #[derive(Default)]
 pub struct PlantCollidersPlugin;
 

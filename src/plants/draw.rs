@@ -25,9 +25,9 @@ use crate::terrain::Terrain;
 /// Vertices that a mesh of copies has at most, if a single plant does not have more.
 const VERTICES: usize = 2048;
 
-/// Draws the plants of terrains with [`PlantLooks`]. Add it after Bevy's plugins, beside [`PlantsPlugin`](super::PlantsPlugin);
-/// a game that draws plants itself leaves it out and reads [`ShownPlants`]. Needs storage buffers in vertex shaders, which
-/// WebGL lacks.
+/// Draws the plants of terrains with [`PlantLooks`]. Add it after Bevy's plugins, in addition to
+/// [`PlantsPlugin`](super::PlantsPlugin); a game that draws plants itself leaves it out and reads [`ShownPlants`].
+/// Needs storage buffers in vertex shaders, which WebGL lacks.
 #[derive(Default)]
 pub struct PlantDrawingPlugin;
 
@@ -88,8 +88,8 @@ impl Default for PlantLook {
     }
 }
 
-/// How the species of a terrain look. Insert it on the terrain's entity, beside its [`Plants`](super::Plants). Species without a
-/// look are not drawn.
+/// How the species of a terrain look. Insert it on the terrain's entity, together with its [`Plants`](super::Plants).
+/// Species without a look are not drawn.
 #[derive(Component, Clone, Debug, Default)]
 #[require(DrawnPlants)]
 pub struct PlantLooks(pub Vec<PlantLook>);
@@ -207,7 +207,7 @@ fn draw_plants(
     grow(buffers, &mut assets, &mut materials);
 }
 
-/// Without looks nothing is drawn, and nobody follows the news.
+/// Without looks nothing is drawn, and nothing reads the changes.
 fn forget_looks(
     gone: On<Remove, PlantLooks>,
     mut terrains: Query<(&mut DrawnPlants, &mut ShownPlants), Allow<Disabled>>,

@@ -1,4 +1,4 @@
-//! Follows commits: plants go and return in the frame of their ground.
+//! Follows commits: plants disappear and return in the same frame as their ground.
 
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;

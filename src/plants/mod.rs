@@ -1,14 +1,14 @@
-//! Plants of terrains: they go in the frame in which their ground goes, and return with it.
+//! Plants on terrains: they disappear in the frame in which their ground is dug away, and return with it.
 //!
-//! Put [`Plants`] with [`ScatterRules`] on a terrain, and add the [`PlantsPlugin`]. It keeps the plants around cameras and
-//! [`PlantSource`]s in a [`ShownPlants`] component, up to date in each commit, and sends a [`PlantRemoved`] or
-//! [`PlantReturned`] for each one that goes or returns there.
+//! Put [`Plants`] with [`ScatterRules`] on a terrain, and add the [`PlantsPlugin`]. It keeps the plants around cameras
+//! and [`PlantSource`]s in a [`ShownPlants`] component, up to date in each commit, and sends a [`PlantRemoved`] or
+//! [`PlantReturned`] for each plant that disappears or returns there.
 //!
 //! | part | content |
 //! | --- | --- |
 //! | [`Plants`] | the rules, on the terrain |
 //! | [`ShownPlants`] | the patches that are loaded, and which of their plants stand |
-//! | [`PlantRemoved`], [`PlantReturned`] | what a commit changed of them |
+//! | [`PlantRemoved`], [`PlantReturned`] | plants that a commit removed or brought back |
 //! | `PlantLooks`, `PlantDrawingPlugin` | meshes for species, and how they are drawn (feature `render`) |
 //! | `PlantCollidersPlugin` | stems as colliders, around `ColliderSource`s (feature `avian`) |
 //!
@@ -81,7 +81,7 @@ impl Plugin for PlantsPlugin {
 
 /// The plants of a terrain. Insert it on the terrain's entity; plants follow when it changes. Lengths are in voxels.
 ///
-/// Rules with an error grow nothing, and the error is logged.
+/// If the rules are invalid, nothing grows, and the error is logged.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default)]
 #[require(ShownPlants)]
@@ -157,9 +157,9 @@ impl ShownPlants {
     }
 }
 
-/// A plant that was shown does not stand any more, from the frame of this message on: the ground under it or in its clearance
-/// changed, or it was removed. Not sent when patches are unloaded, nor when the terrain, its [`Plants`] or its world as a whole are
-/// removed or replaced.
+/// A plant that was shown no longer stands, from the frame of this message on: the ground under it or in its clearance
+/// changed, or it was removed. Not sent when patches are unloaded, nor when the terrain, its [`Plants`] or its world as
+/// a whole are removed or replaced.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct PlantRemoved {
     /// The terrain.

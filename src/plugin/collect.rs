@@ -1,4 +1,4 @@
-//! Moves messages into the queues of terrains: brushes, undo, redo.
+//! Queues the brushes, undos and redos that the game sends, and reports those that no transaction answers.
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::system::SystemParam;
@@ -76,7 +76,7 @@ pub(super) fn collect_brushes(
             }
         }
         if let Some(why) = unanswered {
-            // Later ones may be meant so.
+            // Later ones may be intentional.
             if figures.brushes == 0
                 && let Some((entity, terrain, ..)) = terrains.iter().next()
                 && reports.is_new(entity, Report::BrushBeside)
@@ -120,7 +120,7 @@ fn is_edit(asked: Asked) -> bool {
     asked == Asked::Edit
 }
 
-/// Logs the first brush that a terrain cannot apply. Receipts say it of each.
+/// Logs the first brush that a terrain cannot apply. Receipts report all of them.
 fn warn_of_invalid(terrain: Entity, error: &BrushError, reports: &Reports) {
     if reports.is_new(terrain, Report::BrushInvalid) {
         warn!(
@@ -235,7 +235,7 @@ pub(super) fn pieces_again(terrain: Entity, receipt: &Receipt) -> impl Iterator<
     pieces.map(move |(tag, piece)| LoosePieceFound { terrain, tag: *tag, piece: piece.clone(), mesh: None })
 }
 
-/// A terrain with [`LooseGround`] looks for pieces at once.
+/// Makes a terrain that gets [`LooseGround`] search for pieces at once.
 pub(super) fn enable_loose_search(
     new: On<Insert, (LooseGround, Terrain)>,
     mut terrains: Query<(&mut Terrain, &LooseGround), Allow<Disabled>>,
@@ -245,7 +245,7 @@ pub(super) fn enable_loose_search(
     }
 }
 
-/// A terrain without [`LooseGround`] stops looking for pieces.
+/// Makes a terrain that loses [`LooseGround`] stop searching for pieces.
 pub(super) fn disable_loose_search(
     gone: On<Remove, LooseGround>,
     mut terrains: Query<&mut Terrain, Allow<Disabled>>,

@@ -191,29 +191,30 @@ pub struct Held;
 /// [`Terrain::submit`] and [`Order::Parts`].
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 pub struct EditOutbox {
-    /// What was asked for, in order. Undos and redos come behind the edits of their frame.
+    /// The collected orders. Undos and redos follow the edits of their frame.
     pub orders: Vec<Order>,
 }
 
 /// The meshes of this terrain have vertices of 32 bytes: positions, normals, materials; no colours and no depth in the
-/// ground, which take 20 more. A `GroundLook` brings it and takes it away again; insert it for materials of your own
-/// that need neither.
+/// ground, which take 20 more. A `GroundLook` inserts and removes it; insert it yourself for materials of your own that
+/// need neither.
 ///
 /// A terrain that gets or loses it is loaded again, and its former tiles and chunks stay until then.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct SlimVertices;
 
-/// Whether the meshes of this terrain have [`ATTRIBUTE_SKY_LIGHT`](super::ATTRIBUTE_SKY_LIGHT): how much of the sky lights each
-/// vertex, so that pits, gullies and tunnels are darker than meadows, near and far, and as soon as they are dug. It takes 4 bytes
-/// a vertex. A `GroundLook` brings it, unless the terrain has [`SkyLight::OFF`]; insert it for a material of your own that reads
-/// the attribute. Servers and other apps without meshes compute no light.
+/// Whether the meshes of this terrain have [`ATTRIBUTE_SKY_LIGHT`](super::ATTRIBUTE_SKY_LIGHT): how much of the sky
+/// lights each vertex, so that pits, gullies and tunnels are darker than meadows, near and far, and as soon as they are
+/// dug. It takes 4 bytes a vertex. A `GroundLook` inserts it, unless the terrain has [`SkyLight::OFF`]; insert it
+/// yourself for a material of your own that reads the attribute. Servers and other apps without meshes compute no
+/// light.
 ///
 /// A terrain whose meshes have it or lose it is loaded again, and its former tiles and chunks stay until then.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct SkyLight {
-    /// Whether they have it.
+    /// Whether vertices have the attribute.
     pub is_on: bool,
 }
 

@@ -113,7 +113,7 @@ impl Display<'_, '_> {
         }
     }
 
-    /// Draws a tile or chunk no more. A tile that nothing else needs has no entity any more.
+    /// Stops drawing a tile or chunk. A tile that nothing else needs loses its entity.
     fn hide_part(&mut self, terrain: Entity, entities: &mut TerrainEntities, drawn: MeshKey) {
         let Some(child) = entities.get(&mut self.commands, drawn) else { return };
         match drawn {

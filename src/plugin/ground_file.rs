@@ -1,11 +1,9 @@
-//! Grounds as assets: a file that says which heights and which maps of materials a world has.
+//! Grounds as assets: a file that lists the heights and material maps of a world.
 
 use std::sync::Arc;
 
 use bevy::asset::io::Reader;
-use bevy::asset::{
-    AssetLoadError, AssetLoader, LoadContext, LoadState, ParseAssetPathError, ReadAssetBytesError,
-};
+use bevy::asset::{AssetLoader, LoadContext, LoadState, ParseAssetPathError, ReadAssetBytesError};
 use bevy::ecs::entity::EntityHashMap;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::Allow;
@@ -24,7 +22,7 @@ use crate::terrain::{Order, Request, Terrain, TerrainSettings};
 /// The largest file of a [`GroundDescription`], in bytes.
 const MAX_DESCRIPTION: u64 = 1 << 20;
 
-/// What a ground is made of, as a JSON file with the extension `ground.json` says it. Paths are relative to that file.
+/// The description of a ground in a JSON file with the extension `ground.json`. Paths are relative to that file.
 ///
 /// ```
 /// # use bevy_burrow::plugin::GroundDescription;
@@ -43,7 +41,7 @@ const MAX_DESCRIPTION: u64 = 1 << 20;
 pub struct GroundDescription {
     /// One file of heights, or several whose names contain the place of a tile, as in `island_x3_y5.png`.
     pub heights: Vec<String>,
-    /// How they are read.
+    /// How the files of heights are read.
     pub import: ImportOptions,
     /// How tiles meet.
     pub tiles: TileEdges,
@@ -75,16 +73,16 @@ pub enum MaterialFiles {
     },
 }
 
-/// A ground that was made of files.
+/// A ground that was made from files.
 #[derive(Asset, TypePath, Clone, Debug)]
 pub struct GroundAsset {
     /// The ground.
     pub ground: Arc<Ground>,
-    /// What was read, guessed and doubted, a line for each file and each note.
+    /// What was read, what was guessed and what looks doubtful, a line for each file and each note.
     pub report: String,
 }
 
-/// The reason why a ground can't be made of its files.
+/// The reason why a ground can't be made from its files.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GroundFileError {
@@ -96,10 +94,10 @@ pub enum GroundFileError {
         "the description of a ground has at most {MAX_DESCRIPTION} bytes: name the files in it, and put nothing else there"
     )]
     TooLarge,
-    /// The description is not what it should be.
+    /// The description is invalid.
     #[error("the description of a ground is wrong: {0}")]
     Description(#[from] serde_json::Error),
-    /// It names no heights.
+    /// The description lists no heights.
     #[error("the description of a ground names no file of heights: add \"heights\": [\"island.png\"]")]
     NoHeights,
     /// One of several files of heights has no place in its name.
@@ -107,7 +105,7 @@ pub enum GroundFileError {
         "`{0}` is one of several files of heights, and no place is in its name: name it like island_x3_y5.png"
     )]
     NoPlace(String),
-    /// A file's path is no path.
+    /// The path of a file is invalid.
     #[error("`{0}` is no path of a file: {1}")]
     Path(String, ParseAssetPathError),
     /// A file can't be read.
@@ -221,13 +219,13 @@ async fn materials(
     Ok(map)
 }
 
-/// This entity is a terrain whose ground is a file. It gets its [`Terrain`] once the file is loaded; a terrain that is there already
-/// gets the file's ground. When the file or one that it names changes, edits stay and the ground below them becomes the new one, as
-/// with [`Order::Ground`], which clears the history of undo. A terrain with an [`EditOutbox`], as on a client, follows its server, and
-/// not the file.
+/// Makes its entity a terrain whose ground comes from a file. The entity gets its [`Terrain`] once the file is loaded;
+/// a terrain that exists already gets the file's ground. When the file or one that it names changes, edits stay and the
+/// ground below them becomes the new one, as with [`Order::Ground`], which clears the history of undo. A terrain with
+/// an [`EditOutbox`], as on a client, follows its server, and not the file.
 ///
-/// Hot reloading takes Bevy's feature `file_watcher`. A ground of another size takes a new terrain: the change is logged and not shown.
-/// A [`GroundFileRead`] says what was read, or why the file can't be used.
+/// Hot reloading needs Bevy's feature `file_watcher`. A ground of another size needs a new terrain: the change is
+/// logged and not shown. A [`GroundFileRead`] reports what was read, or why the file can't be used.
 ///
 /// ```no_run
 /// # use bevy::prelude::*;
@@ -259,8 +257,9 @@ impl GroundFrom {
 pub struct GroundFileRead {
     /// The terrain's entity.
     pub terrain: Entity,
-    /// What was read, guessed and doubted, a line for each file and each note; the terrain was inserted in this frame, or its new
-    /// ground queued behind the edits that wait. Or the reason why the file can't be used: then everything stays as it is.
+    /// What was read, what was guessed and what looks doubtful, a line for each file and each note; the terrain was
+    /// inserted in this frame, or its new ground queued behind the edits that wait. Or the reason why the file can't be
+    /// used; then nothing changes.
     pub outcome: Result<String, String>,
 }
 
@@ -307,19 +306,25 @@ fn follow_ground_files(
     assets: Res<AssetServer>,
     mut messages: MessageWriter<GroundFileRead>,
     mut failed: Local<EntityHashMap<u64>>,
-    mut refused: Local<EntityHashMap<Arc<AssetLoadError>>>,
+    mut refused: Local<EntityHashMap<String>>,
 ) {
     let (last_failed, last_refused) = (std::mem::take(&mut *failed), std::mem::take(&mut *refused));
     for (entity, from, terrain, followed, is_shared) in &mut terrains {
         let mut tell = |outcome| {
             messages.write(GroundFileRead { terrain: entity, outcome });
         };
-        if let Some(LoadState::Failed(why)) = assets.get_load_state(from.ground.id()) {
-            // Bevy has logged it.
-            if !is_shared && !last_refused.get(&entity).is_some_and(|last| Arc::ptr_eq(last, &why)) {
-                tell(Err(why.to_string()));
+        // Bevy logs it, and loads a file that can't be read once more, so a reason is told once until the file is read.
+        let last_reason = last_refused.get(&entity);
+        let reason = match assets.get_load_state(from.ground.id()) {
+            Some(LoadState::Failed(error)) => Some(error.to_string()),
+            Some(LoadState::Loading) => last_reason.cloned(),
+            _ => None,
+        };
+        if let Some(reason) = reason {
+            if !is_shared && last_reason != Some(&reason) {
+                tell(Err(reason.clone()));
             }
-            refused.insert(entity, why);
+            refused.insert(entity, reason);
         }
         let Some(GroundAsset { ground, report }) = grounds.get(&from.ground) else { continue };
         let hash = ground.hash();

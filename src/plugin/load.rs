@@ -275,7 +275,7 @@ fn build_nodes(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
 const ATTEMPTS: u32 = 3;
 
 /// What a load built; `None` if it panicked and is to be tried again. After some attempts the terrain is shown without
-/// surfaces: otherwise its brushes would have no answers, and bodies above it would be held for ever.
+/// surfaces: otherwise its brushes would have no answers, and bodies above it would be held forever.
 fn loaded(
     entity: Entity,
     done: std::thread::Result<BuiltWorld>,

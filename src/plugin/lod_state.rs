@@ -21,13 +21,13 @@ use crate::terrain::{KnownNodes, Version};
 /// | --- | --- |
 /// | any perspective, custom and off-axis ones included | by distance. Where it looks does not matter, so turning changes nothing |
 /// | orthographic | by size on the screen in what is in view, coarser around it |
-/// | inactive, or with a picture of no size, as of a minimised window | none |
-/// | whose `RenderLayers` do not meet the terrain's | none |
+/// | inactive, or with a picture of size 0, as of a minimised window | none |
+/// | with no `RenderLayers` in common with the terrain | none |
 /// | a `Camera2d` | none |
-/// | none, but a [`DetailSource`] | as for a camera at its place |
+/// | no camera, but a [`DetailSource`] | as for a camera in its place |
 ///
-/// All that count decide together. While none does, all stays as it is for those that looked last. Distances and speeds
-/// are measured in the terrain's own space and in real time: shifted origins and slow motion change nothing.
+/// Levels are chosen for all of these cameras together. While there is none, levels stay as they are. Distances and
+/// speeds are measured in the terrain's own space and in real time, so shifted origins and slow motion change nothing.
 ///
 /// The defaults need no change. A terrain that gets or loses this component is loaded again.
 ///
@@ -40,9 +40,10 @@ use crate::terrain::{KnownNodes, Version};
 pub struct LevelsOfDetail {
     /// Metres; ground farther away from all cameras is drawn at the coarsest level that the rest allows.
     pub view_distance: f32,
-    /// Ground is drawn finer while it would differ by more than this many pixels from the next finer level.
+    /// Ground is drawn finer while it would differ by more than this many pixels from the next finer level, and its
+    /// cells are larger than [`cell_pixels`](Self::cell_pixels).
     pub error_pixels: f32,
-    /// And while its cells are larger than this many pixels.
+    /// The least size of cells in pixels, except for dug and built ground: see [`error_pixels`](Self::error_pixels).
     pub cell_pixels: f32,
     /// Dug and built ground is drawn finer while its cells are larger than this many pixels.
     pub edited_pixels: f32,
@@ -97,7 +98,7 @@ impl LevelsOfDetail {
 pub struct ShownLevels {
     /// How many squares of each level are drawn, from level 0 on.
     pub nodes: Vec<usize>,
-    /// Squares that are still to be drawn otherwise for what cameras see now; 0 once all is drawn as it should be.
+    /// Squares that are not drawn at their chosen level yet; 0 once all are.
     pub waiting: usize,
 }
 
@@ -115,7 +116,7 @@ impl ShownLevels {
     }
 }
 
-/// A place around which ground is drawn as finely as for a perspective camera there, though there is none: for a
+/// A place around which ground is drawn as finely as for a perspective camera there, even if there is no camera: for a
 /// loading screen that waits for [`TerrainReady`](super::TerrainReady) before it spawns the player's camera, or for a
 /// place that a cut scene will soon show. Insert it on an entity with a `Transform`, and remove it when it is no longer
 /// needed.
@@ -140,7 +141,7 @@ impl Default for DetailSource {
 #[derive(Component, Default)]
 pub(super) struct Watchers {
     pub eyes: Vec<(Entity, Viewpoint)>,
-    /// Whether somebody looked in the last frame.
+    /// Whether there was a camera or source in the last frame.
     pub is_current: bool,
     /// The size of the voxels.
     pub voxel_size: f32,

@@ -70,7 +70,7 @@ pub struct Undo {
     pub terrain: Option<Entity>,
 }
 
-/// Does again what was undone last. See [`Undo`].
+/// Redoes the step that was undone last. See [`Undo`].
 #[derive(Message, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Message, Default, Clone, Debug, PartialEq)]
 pub struct Redo {
@@ -107,9 +107,9 @@ pub struct LoosePieceFound {
 }
 
 /// A piece that had been cut off is ground again from this frame on: by an undo, a player's own or another's, or
-/// because a server refused the dig. What a game made of the piece has to go; `DebrisPlugin` does that for its debris,
-/// wherever it has rolled. Of several pieces with the same [id](ReturnedPiece::id) this is the one that was cut off
-/// last.
+/// because a server refused the dig. The game must remove everything that it made from the piece; `DebrisPlugin` does
+/// that for its debris, wherever it has rolled. Of several pieces with the same [id](ReturnedPiece::id) this is the one
+/// that was cut off last.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct LoosePieceReturned {
     /// The terrain.

@@ -112,8 +112,8 @@ pub use crate::threads::ThreadSettings;
 
 /// The plugin's system sets in `Update`, in this order.
 ///
-/// A game may run them in some states only. Nothing is lost meanwhile: brushes, undos and redos are kept and answered
-/// afterwards, and changes of a terrain's components take effect then. Despawned terrains answer at once.
+/// A game may run them in certain states only. Nothing is lost in the meantime: brushes, undos and redos are kept and
+/// answered afterwards, and changes of a terrain's components take effect then. Despawned terrains answer at once.
 ///
 /// ```
 /// # use bevy::prelude::*;

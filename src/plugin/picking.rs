@@ -15,8 +15,8 @@ use crate::terrain::Terrain;
 /// `BurrowPlugins` contain it with the feature `picking`. It needs Bevy's `DefaultPickingPlugins`, which
 /// `DefaultPlugins` have with Bevy's own feature `bevy_picking`; without them it does nothing.
 ///
-/// Hit are terrains that are visible and on a layer of the camera's, unless they have a `Pickable` with `is_hoverable:
-/// false`.
+/// Pointers hit terrains that are visible and on a layer of the camera, unless they have a `Pickable` with
+/// `is_hoverable: false`.
 ///
 /// ```
 /// # use bevy::prelude::*;

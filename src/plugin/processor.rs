@@ -151,7 +151,7 @@ pub(super) struct BuiltNode {
     pub mesh: Option<Option<PendingMesh>>,
     /// Tile and chunks that are drawn from now on.
     pub shown: Vec<BuiltSurface>,
-    /// Tile and chunks that are drawn no more.
+    /// Tile and chunks that are no longer drawn.
     pub hidden: Vec<MeshKey>,
 }
 

@@ -106,7 +106,7 @@ impl<C: Component> Default for Overruled<C> {
 /// Terrains whose component of this type is propagated.
 type Active<C> = (With<Terrain>, Without<Overruled<C>>);
 
-/// Terrains whose component of this type is not, or no more.
+/// Terrains that have no component of this type, or no longer have it.
 type Inactive<C> = (With<Terrain>, Or<(Without<C>, With<Overruled<C>>)>);
 
 /// Propagates a component of a terrain to its tiles and chunks.

@@ -12,8 +12,8 @@ use crate::terrain::{Span, Terrain};
 /// A system parameter for queries about the ground of all terrains in world space, hidden ones too.
 ///
 /// Terrains may be moved, rotated, scaled, stretched and mirrored. [`height`](Self::height) and [`spans`](Self::spans)
-/// leave out those whose y axis does not point straight up. The place of a terrain is the one at its insertion or at
-/// the start of this frame's [`BurrowSystems::Load`](super::BurrowSystems::Load), whichever came last; where another
+/// leave out those whose y axis does not point straight up. The transform of a terrain is the one at its insertion or
+/// at the start of this frame's [`BurrowSystems::Load`](super::BurrowSystems::Load), whichever was later; where another
 /// plugin maintains `GlobalTransform`s, as for floating origins, it is the one that this plugin wrote last.
 ///
 /// ```

@@ -26,7 +26,7 @@ impl Default for BurrowEngine {
     }
 }
 
-/// How the plugin spends its frames.
+/// How much the plugin does in a frame, and how it builds meshes.
 #[derive(Resource, Reflect, Clone, Debug, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct BurrowSettings {
@@ -42,7 +42,7 @@ pub struct BurrowSettings {
     /// meshes of a game, for colliders, navigation or mesh picking, need `RenderAssetUsages::default()`, which keeps
     /// them in both worlds.
     ///
-    /// It holds for meshes that are built after a change; see [`Redraw`](super::Redraw).
+    /// A change applies to meshes that are built afterwards; see [`Redraw`](super::Redraw).
     pub mesh_usages: RenderAssetUsages,
     /// How long a frame waits, in `PostUpdate`, for small transactions that began in it, so that a brush is seen in the
     /// frame in which it was sent. What takes longer is seen in a later frame, and where the latest transactions all

@@ -161,7 +161,7 @@ impl InFlight {
 
     /// Whether its result is a transaction with edits or a step through history, and no piece of ground breaks off or
     /// comes back. Debris is made and removed in `Update`: earlier, a piece would be nowhere for a frame, or twice.
-    /// Other players' edits come as parts, and their pieces besides.
+    /// Other players' edits arrive as parts, and their pieces separately.
     pub fn is_plain(&self) -> bool {
         let Some(Ok(TaskOutput { change: Change::Transaction(commit), pieces, .. })) = &self.done else {
             return false;

@@ -16,7 +16,7 @@ pub(crate) struct AbandonedStores(Arc<Mutex<State>>);
 #[derive(Default)]
 struct State {
     stores: Vec<Abandoned>,
-    /// Whether the app has ended, so that nobody will wait for a store that is abandoned now.
+    /// Whether the app has ended, so that nothing will wait for a store that is abandoned now.
     has_ended: bool,
 }
 

@@ -19,8 +19,8 @@ pub(crate) const EXIT_WAIT: Duration = Duration::from_secs(10);
 /// Saves the terrain of its entity in a folder, and continues the world that is there. Insert it with the terrain.
 /// Scenes may contain it; they leave out the terrain itself.
 ///
-/// Removing it, or the entity, saves what is not saved yet and closes the world; [`WorldClosed`](super::WorldClosed)
-/// says so. Changing it in its place is like inserting another one.
+/// If it or the entity is removed, remaining changes are saved and the world is closed, which
+/// [`WorldClosed`](super::WorldClosed) reports. Changing it in place is like inserting another one.
 ///
 /// | inserted on the same entity | what happens |
 /// | --- | --- |
@@ -32,7 +32,7 @@ pub(crate) const EXIT_WAIT: Duration = Duration::from_secs(10);
 #[component(on_insert = hold)]
 #[reflect(Component)]
 pub struct SavedWorld {
-    /// The folder, for this world alone. It is made if it is missing, with those around it.
+    /// The folder, for this world alone. It is created if it is missing, together with its parent folders.
     pub path: PathBuf,
     /// The longest time whose commits may be lost if the machine loses power, plus a little for the disk.
     pub loss_window: Duration,
@@ -85,7 +85,7 @@ impl WorldStore {
         }
     }
 
-    /// The terrain would be there after a crash up to this revision.
+    /// The revision up to which the terrain would survive a crash.
     pub fn durable(&self) -> u64 {
         self.store.as_ref().map_or(0, Store::durable)
     }
@@ -99,7 +99,7 @@ impl WorldStore {
         }
     }
 
-    /// Removes data of the game's.
+    /// Removes data of the game.
     pub fn remove(&mut self, key: impl Into<String>) {
         if let Some(store) = &mut self.store {
             store.remove(key);
@@ -116,14 +116,14 @@ impl WorldStore {
 #[derive(Resource)]
 pub(super) struct SavesWorlds;
 
-/// Warns if the plugin is missing: the terrain would be held for ever, without any message.
+/// Warns if the plugin is missing: the terrain would be held forever, without any message.
 pub(super) fn warn_without_plugin(world: &DeferredWorld, component: &str) {
     if world.get_resource::<SavesWorlds>().is_none() {
         error!("a {component} holds its terrain until there is a SavePlugin: add BurrowPlugins");
     }
 }
 
-/// A world that nobody has begun to read.
+/// A world that is not being read yet.
 #[derive(Component)]
 pub(super) struct Unopened {
     pub since: Instant,

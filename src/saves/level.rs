@@ -17,8 +17,8 @@ use crate::store::RestoreLevelError;
 use crate::terrain::{Terrain, Version};
 use crate::threads::ThreadTask;
 
-/// A level, packed in one file with the extension `burrow_level`. Its content is checked when it is loaded; that it
-/// fits its ground, when a terrain is made of it.
+/// A level, packed in one file with the extension `burrow_level`. Its content is checked when it is loaded. Whether it
+/// fits the ground is checked when a terrain is made from it.
 #[derive(Asset, TypePath, Clone, Debug, Default, PartialEq)]
 pub struct BurrowLevel(pub LevelFiles);
 
@@ -51,7 +51,7 @@ pub enum LevelError {
     /// The file can't be read or written.
     #[error("the level can't be read or written: {0}")]
     File(#[from] std::io::Error),
-    /// The file is damaged, or none of a level.
+    /// The file is damaged, or is not a level.
     #[error(transparent)]
     Format(#[from] FormatError),
 }
@@ -103,9 +103,9 @@ impl AssetSaver for LevelSaver {
     }
 }
 
-/// The terrain of this entity begins as a level. Insert it with a terrain without edits, which gives the ground; the
-/// terrain is [`Held`](crate::plugin::Held) until the level is loaded, and begins without it where it can't be, which
-/// is logged as an error.
+/// Makes the terrain of its entity start as a level. Insert it with a terrain without edits, which provides the ground.
+/// The terrain is [`Held`](crate::plugin::Held) until the level is loaded. If the level can't be loaded, an error is
+/// logged, and the terrain starts without it.
 ///
 /// With a [`SavedWorld`](super::SavedWorld) on the same entity, an existing world is continued, and only a new one
 /// starts from the level. That world saves only its differences from the level, and needs a level to be opened: if that

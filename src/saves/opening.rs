@@ -17,7 +17,7 @@ use crate::store::{Store, StoreTrouble};
 use crate::terrain::Terrain;
 use crate::threads::free_later;
 
-/// Most bytes of commits that a terrain keeps until the store takes them, which it does each frame.
+/// The maximum number of bytes of commits that a terrain keeps until the store takes them, which it does each frame.
 const LOG_BYTES: usize = 64 << 20;
 
 /// How long a component waits for a terrain before that is logged.

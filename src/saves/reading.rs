@@ -20,7 +20,7 @@ const LOCK_WAIT: Duration = Duration::from_secs(15);
 const LOCK_TRY: Duration = Duration::from_millis(50);
 const REPORT_LOCK_AFTER: Duration = Duration::from_secs(2);
 
-/// The world of a [`SavedWorld`] is being read; the plugin inserts it and takes it away.
+/// Present while the world of a [`SavedWorld`] is being read; the plugin inserts and removes it.
 #[derive(Component)]
 pub struct OpeningWorld {
     pub(super) reader: Arc<WorldReader>,
@@ -148,7 +148,7 @@ impl WorldReader {
         }
     }
 
-    /// Reads the world, or makes one, unless somebody has it open.
+    /// Reads the world, or creates one, unless it is open elsewhere.
     fn try_read(&self) -> Result<Found, StoreError> {
         let Self { saved, folder, level, ground, id, parts, progress, .. } = self;
         // An unreadable level was reported when the terrain was built from it.

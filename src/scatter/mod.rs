@@ -9,8 +9,8 @@
 //! 1. its cell is drawn as heightmap: no sample at the surface over the four columns around it has been edited, and
 //! 2. in its [clearance](Clearance), the topmost ground of each column is there, and the air above it is free.
 //!
-//! So a plant goes when the ground under it or in its clearance changes, and returns when undo or a
-//! [reset](crate::brush::Brush::reset) restores that ground. It never stands in the air or in the ground.
+//! So a plant disappears when the ground under it or in its clearance changes, and returns when undo or a
+//! [reset](crate::brush::Brush::reset) restores that ground. It never hangs in the air or stands in the ground.
 //!
 //! To remove a plant, mark the ground under it: [`Plant::removal`] is a brush that paints one sample with the ground's own
 //! material. Nothing looks different, and the plant is gone, together with what grows within a voxel of that sample. As it is a
@@ -38,7 +38,7 @@
 //! | --- | --- |
 //! | `rules` | species, as a game writes them |
 //! | `species` | species as integers |
-//! | `spots` | the spots of a species, before others are asked |
+//! | `spots` | the spots of a species, before other species are considered |
 //! | `plants` | the plants of an area |
 //! | `stands` | whether a plant stands in a world |
 //! | `patches` | squares of plants that follow a world from commit to commit |

@@ -20,7 +20,7 @@ pub struct PatchPos {
     pub z: i32,
 }
 
-/// A plant that went or returned.
+/// A plant that disappeared or returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlantChange {
     /// Its patch.

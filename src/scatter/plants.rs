@@ -9,7 +9,7 @@ use crate::brush::{Brush, Shape};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{Column, ONE, ceil};
 
-/// Names a plant: the same for as long as the ground and the rules of its species stay.
+/// Identifies a plant; it stays the same as long as the ground and the rules of its species do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PlantId {
     /// Its species, as an index of the rules.
@@ -23,7 +23,7 @@ pub struct PlantId {
 /// A plant on the undug ground. All numbers are integers, so equal plants are equal on every machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Plant {
-    /// Its name.
+    /// Its id.
     pub id: PlantId,
     /// Its place along x, in 1/256 voxel.
     pub x: i32,
@@ -96,7 +96,7 @@ impl Plant {
     }
 }
 
-/// Rules that were checked, and tell where plants are.
+/// Checked rules, from which the plants of a ground are computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scatter {
     pub(super) rules: Vec<Rule>,

@@ -92,8 +92,8 @@ impl Scatter {
         best.map(|(_, plant)| plant)
     }
 
-    /// The first plant whose [stem](super::Stem) a ray meets within `most` voxels. The ground is not asked: compare the distance
-    /// with that of [`World::raycast`].
+    /// The first plant whose [stem](super::Stem) a ray meets within `most` voxels. The ground is ignored: compare the
+    /// distance with that of [`World::raycast`].
     pub fn raycast(
         &self,
         world: &World,

@@ -18,9 +18,9 @@ use crate::ground::MaterialId;
     reflect(opaque, Clone, Debug, Default, PartialEq, Serialize, Deserialize)
 )]
 pub struct ScatterRules {
-    /// Another number gives other plants.
+    /// The seed; another one gives other plants.
     pub seed: u64,
-    /// At most 255 species, each with a name of its own. Earlier ones come first where there is not room for all.
+    /// At most 255 species, each with a different name. Earlier ones take precedence where there is not room for all.
     pub species: Vec<Species>,
 }
 

@@ -27,7 +27,7 @@ pub(super) fn write(files: &dyn Files, world: WorldId, revision: u64, checkpoint
     files.sync_folder(FOLDER)
 }
 
-/// Removes a file. A folder that somebody made in its place is moved aside, as nothing could ever be saved otherwise.
+/// Removes a file. If there is a folder in its place, it is moved aside, because otherwise nothing could be saved.
 fn remove(files: &dyn Files, path: &str) -> io::Result<()> {
     use io::ErrorKind::{IsADirectory, NotFound, PermissionDenied};
     match files.remove(path) {

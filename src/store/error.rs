@@ -14,7 +14,7 @@ pub enum StoreError {
     /// There is a world already.
     #[error("there is a world in {0} already")]
     Exists(String),
-    /// Another process has it open, or this one twice.
+    /// Another process has the world open, or this process has it open already.
     #[error("the world in {0} is open already: close the game or server that has it open")]
     Locked(String),
     /// A newer version of the crate wrote it.
@@ -58,7 +58,7 @@ pub enum StoreError {
         /// Regions with edits over changed ground; 0 if only materials or places without edits changed.
         regions: usize,
     },
-    /// The world was begun on a level, which is not given. Nothing is lost.
+    /// The world is based on a level that was not given. Nothing is lost.
     #[error("the world was begun on the level `{label}`, without which it can't be opened: give that level")]
     LevelMissing {
         /// What the game called the level.

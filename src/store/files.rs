@@ -121,8 +121,8 @@ pub trait OpenFile: fmt::Debug + Send + Sync {
 pub struct Folder(PathBuf);
 
 impl Folder {
-    /// The files below a folder, which need not exist yet. A relative path, of which an empty one is one, is below the
-    /// current folder of now.
+    /// The files below a folder, which need not exist yet. A relative path, including an empty one, is resolved against
+    /// the current folder at the time of the call.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         let path: PathBuf = path.into();
         let path = if path.as_os_str().is_empty() { PathBuf::from(".") } else { path };
@@ -130,7 +130,7 @@ impl Folder {
         Self(std::path::absolute(&path).unwrap_or(path))
     }
 
-    /// Where it is.
+    /// The path of the folder.
     pub fn path(&self) -> &Path {
         &self.0
     }
@@ -211,7 +211,7 @@ impl Files for Folder {
     fn rename(&self, from: &str, to: &str) -> io::Result<()> {
         let to = self.at(to);
         self.with(from, |from| {
-            // Only holders of the lock create files here, so nobody creates one in between.
+            // Only holders of the lock create files here, so no file is created in between.
             if to.symlink_metadata().is_ok() {
                 return Err(named(to.display(), &io::ErrorKind::AlreadyExists.into()));
             }

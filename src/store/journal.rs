@@ -213,7 +213,7 @@ impl Journal {
     pub fn trim(&mut self, bytes: u64, needed: u64) -> io::Result<()> {
         let mut total: u64 = self.segments.iter().map(|segment| segment::on_disk(segment.bytes)).sum();
         let own = self.current.as_ref().map(|current| current.number);
-        // One stays, so that a journal that somebody removed is missed.
+        // One stays, so that the removal of a journal is detected.
         while let [oldest, _, ..] = &self.segments[..] {
             if total <= bytes || oldest.last_frame > needed || own == Some(oldest.number) {
                 break;

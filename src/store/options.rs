@@ -25,8 +25,8 @@ pub enum BaseChanged {
 /// How a store saves. Any duration may be [`Duration::MAX`], which stands for never.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoreOptions {
-    /// Commits are durable this long after they were appended, and a little more for the disk: the most that is lost
-    /// when the power fails. 0 writes each batch at once.
+    /// The longest time until commits are durable, plus a little for the disk. At most this much is lost in a power
+    /// failure. 0 writes each batch at once.
     pub loss_window: Duration,
     /// Bytes that the log may take on the disk; then the oldest part of it is removed. Without a complete log, a
     /// damaged region can't be rebuilt. The part that the last two checkpoints need is kept in any case.

@@ -46,7 +46,7 @@ pub(super) fn path(segment: u64) -> String {
 /// world reaches it.
 pub(super) const MAX_NUMBER: u64 = 1 << 60;
 
-/// The segment with this file name. Files that somebody else put there have other names.
+/// The segment with this file name. Files that do not belong to the store have other names.
 fn number_of(name: &str) -> Option<u64> {
     let number = name.strip_suffix(".log")?.parse().ok().filter(|number| *number <= MAX_NUMBER)?;
     path(number).ends_with(&format!("/{name}")).then_some(number)

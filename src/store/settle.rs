@@ -77,7 +77,7 @@ fn cut_journal(
     let last_kept = contents.segments.iter().filter(is_kept).map(|found| found.number).max().unwrap_or(0);
     let (mut bytes, mut place) = (0, None);
     let mut moved = Vec::new();
-    // What the disk did not take whole, and was written elsewhere, is nobody's concern.
+    // Parts that were not written completely, and were written again elsewhere, do not matter.
     let is_harmless = |found: &Found| {
         let mut frames = found.frames.iter().map(|frame| frame.number);
         let is_harmless = |bad| contents.is_harmless(found.number, bad, recovered.frame);
@@ -108,7 +108,7 @@ fn cut_journal(
                 file.sync()?;
             }
         } else if found.length == 0 && found.error.is_none() {
-            // It is nobody's, whatever its name says.
+            // It belongs to no world, whatever its name is.
         } else if found.frames.is_empty() && found.bad.is_empty() {
             segments.push(Segment { number: found.number, last_frame: 0, bytes: all, names });
         } else {

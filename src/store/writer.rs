@@ -310,7 +310,7 @@ impl Writer {
         }
     }
 
-    /// Answers a request, for which nobody may wait any more.
+    /// Answers a request, which may no longer be awaited.
     fn answer(&self, answer: &Answer, done: Result<(), StoreError>) {
         let revision = || self.shared.durable().map_or(0, SavePoint::revision);
         drop(answer.send(done.map(|()| revision())));

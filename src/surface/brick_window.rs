@@ -5,7 +5,7 @@ use glam::IVec3;
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::volume::{Brick, SampleView};
 
-/// Most places of a window, so that it fits into the first caches.
+/// The maximum number of places of a window, so that it fits into the first caches.
 const MOST: u64 = 4096;
 
 /// Places that a window may have for any number of bricks.

@@ -34,7 +34,8 @@ pub const fn spread(word: u64) -> LayerBits {
     bits & rows | (bits & rows << 8) << 1
 }
 
-/// The bits of 9x9 corners from the words of four bricks: the own one, the ones beyond x, beyond z and beyond both.
+/// The bits of 9x9 corners from the words of four bricks: the brick itself, and its neighbours along x, along z and
+/// along both.
 #[inline]
 pub fn join([own, x, z, xz]: [u64; 4]) -> LayerBits {
     const FIRST_OF_ROWS: u64 = 0x0101_0101_0101_0101;
@@ -109,7 +110,8 @@ pub struct Place {
     pub z: i32,
     /// Index in a layer of the padded samples.
     pub padded: usize,
-    /// Which of the four bricks that hold corners holds it: the own one, those beyond x, beyond z and beyond both.
+    /// Which of the four bricks that hold corners holds it: the brick itself, or its neighbour along x, along z or
+    /// along both.
     pub brick: usize,
     /// Index in a layer of that brick.
     pub index: usize,

@@ -38,7 +38,7 @@ impl<'a> Neighbours<'a> {
         }
     }
 
-    /// Those that hold corners of the own brick's cells.
+    /// The bricks that hold corners of the cells of the brick itself.
     #[inline]
     pub fn near(&self) -> CornerBricks<'a> {
         CornerBricks([1, 2].map(|level| CORNER_STACKS.map(|i| self.bricks[level][i])))

@@ -1,4 +1,4 @@
-//! The terrain: a world, the edits that wait for it, and the one transaction that may be under way.
+//! The terrain: a world, the edits that wait for it, and the one transaction that may be running.
 
 use std::collections::VecDeque;
 use std::fmt;

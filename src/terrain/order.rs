@@ -1,4 +1,4 @@
-//! Orders: what can be asked of a terrain.
+//! Orders: requests to a terrain.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
 use crate::world::Patch;
 
-/// What can be asked of a terrain: the queue, the commit log, servers and clients use the same orders. See
+/// A request to a terrain. The queue, the commit log, servers and clients use the same orders. See
 /// [`Terrain::submit`](super::Terrain::submit).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]

@@ -23,10 +23,10 @@ use crate::volume::DiggingRules;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorkLimits {
-    /// Most work of a transaction, which holds at least one edit in any case; other edits wait for the next. Smaller
-    /// transactions are shown sooner, larger ones take less time per edit.
+    /// The maximum work in a transaction, which holds at least one edit in any case; other edits wait for the next.
+    /// Smaller transactions are shown sooner, larger ones take less time per edit.
     pub transaction: u64,
-    /// Most work that may wait, the running transaction included. An edit that would exceed it is
+    /// The maximum work that may wait, the running transaction included. An edit that would exceed it is
     /// [rejected](Rejection::Overloaded) when it is submitted, unless nothing else waits.
     pub waiting: u64,
 }

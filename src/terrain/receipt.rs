@@ -1,4 +1,4 @@
-//! Receipts: what came of an order.
+//! Receipts: the outcomes of orders.
 
 use std::fmt;
 
@@ -8,12 +8,12 @@ use crate::lattice::{ChunkPos, LatticeBox};
 use crate::loose::{LoosePiece, ReturnedPiece};
 use crate::volume::{FieldId, MaterialCounts, Refused, RulesError, Scenario};
 
-/// What came of an order. Each brush, step through history, replacement of parts and ground that was submitted gets
+/// The outcome of an order. Each brush, step through history, replacement of parts and ground that was submitted gets
 /// exactly one; rules and settings of loose pieces get one only if they are invalid.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct Receipt {
-    /// What was asked for.
+    /// The kind of order.
     pub asked: Asked,
     /// The tag of the brush; 0 for everything else.
     pub tag: u64,
@@ -83,9 +83,9 @@ impl Asked {
 
 /// What an order changed. An order that changed nothing, such as a dig in the air, leaves all of this empty.
 ///
-/// Inventories that follow receipts must follow those of undos and redos too. There, voxels of loose pieces count in
-/// `removed` and `added`, although an edit's `removed` leaves them out: what an inventory has to give for an undo is
-/// `added` less the materials of `returned`, and what it gets from a redo is `removed` less those of `cut_again`.
+/// Inventories that follow receipts must follow those of undos and redos too. There, voxels of loose pieces are
+/// included in `removed` and `added`, although an edit's `removed` does not include them. So an undo takes `added`
+/// minus the materials of `returned` out of an inventory, and a redo puts `removed` minus those of `cut_again` into it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Applied {
     /// The scenario in each chunk whose samples changed, of an edit; more than one chunk is the paper's fifth scenario.
@@ -149,7 +149,7 @@ pub enum Rejection {
     /// The brush reaches no column of the world.
     #[error("the brush lies outside the world")]
     OutsideWorld,
-    /// Nothing was edited, everything was undone, or the history exceeded its budget of bytes.
+    /// Nothing was edited, everything was undone already, or the history exceeded its budget of bytes.
     #[error("there is nothing to undo")]
     NothingToUndo,
     /// Nothing was undone since the last edit, or the history exceeded its budget of bytes.

@@ -26,7 +26,7 @@ pub enum RestoreError {
     /// Bricks or fields are invalid.
     #[error(transparent)]
     Parts(#[from] PartsError),
-    /// It panicked.
+    /// Restoring panicked.
     #[error("restoring the world panicked: this is a bug in bevy_burrow")]
     Panicked,
 }
@@ -126,7 +126,7 @@ impl Terrain {
     /// Fields of steps and of parts belong to the chunk size of the terrain that they were logged by, which this one
     /// needs too.
     ///
-    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as
+    /// A transaction that is running elsewhere is abandoned first; its commit will be rejected as
     /// [stale](super::StaleCommit).
     ///
     /// # Errors

@@ -15,8 +15,8 @@ impl Terrain {
     /// separate step of undo, unless it is part of a [stroke](crate::brush::Brush::stroke).
     ///
     /// The receipt comes with the commit of its transaction. An invalid order is rejected in turn, and one that exceeds
-    /// the [limits](Self::set_work_limits) [at once](Self::take_receipts). Rules and settings of loose pieces hold at
-    /// once, for later edits.
+    /// the [limits](Self::set_work_limits) [at once](Self::take_receipts). Rules and settings of loose pieces take
+    /// effect at once, for later edits.
     pub fn submit(&mut self, order: impl Into<Request>) {
         self.submit_all([order]);
     }
@@ -81,7 +81,8 @@ impl Terrain {
         Ok(())
     }
 
-    /// Sets how much work a transaction takes, and how much may wait. Takes effect at once; what waits already stays.
+    /// Sets how much work a transaction takes, and how much may wait. Takes effect at once; orders that wait already
+    /// stay.
     pub fn set_work_limits(&mut self, limits: WorkLimits) {
         self.queue.limits = limits;
     }
@@ -91,19 +92,19 @@ impl Terrain {
         self.queue.limits
     }
 
-    /// The work of all that waits, the transaction under way included, in bricks as [`WorkLimits`] counts them.
+    /// The work of everything that waits, the running transaction included, in bricks as [`WorkLimits`] counts them.
     pub fn waiting_work(&self) -> u64 {
         self.queue.work()
     }
 
-    /// Carries out orders at once, after everything that waits: queue, transactions and commits in one call, on this
-    /// thread. Returns their receipts; those of orders that waited are kept for
-    /// [`take_receipts`](Self::take_receipts). Tools and tests want this; a game lets the plugin do it.
+    /// Carries out orders at once, after everything that waits: queues them, runs and commits transactions in one call,
+    /// on this thread. Returns their receipts; those of orders that waited are kept for
+    /// [`take_receipts`](Self::take_receipts). This is for tools and tests; in a game the plugin does it.
     ///
     /// Edits that follow each other are one step of undo, except for strokes among them; a game that replays a journal
     /// may want to [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.
     ///
-    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as
+    /// A transaction that is running elsewhere is abandoned first; its commit will be rejected as
     /// [stale](super::StaleCommit).
     pub fn apply<O: Into<Request>>(&mut self, orders: impl IntoIterator<Item = O>) -> Vec<Receipt> {
         self.abandon();

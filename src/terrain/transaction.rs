@@ -8,8 +8,8 @@ use crate::backend::{Compute, Engine};
 use crate::redraw::{DrawnCut, Scene};
 use crate::world::{Meshing, World};
 
-/// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit;
-/// a terrain takes one of them.
+/// Edits to be applied, or a step through history, with the snapshot that they apply to. A clone gives the same commit;
+/// a terrain accepts only one of them.
 #[derive(Clone)]
 pub struct Transaction {
     pub(super) ticket: u64,

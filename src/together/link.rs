@@ -14,7 +14,7 @@ use crate::terrain::{Asked, Order, Terrain, TerrainError, TerrainSettings, Versi
 use crate::threads::{ThreadTask, Threads};
 use crate::volume::DiggingRules;
 
-/// Most edits that wait for the server's answer.
+/// The maximum number of edits that wait for the server's answer.
 pub(super) const MAX_PENDING: usize = 1 << 16;
 
 /// What a shared terrain knows of its server.
@@ -57,7 +57,7 @@ pub(super) struct Worked {
     pub whole: Option<ShownChange>,
 }
 
-/// What the client said last.
+/// The client's values after its last update.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Facts {
     pub number: u64,
@@ -65,7 +65,7 @@ pub(super) struct Facts {
     pub has_joined: bool,
 }
 
-/// What is put into the shown terrain, and what waits for it.
+/// The changes of the shown terrain that were submitted, and those that wait.
 pub(super) struct Display {
     /// The world that is shown.
     pub version: Version,
@@ -102,11 +102,11 @@ pub(super) enum Standing {
 }
 
 impl Link {
-    /// The client begins with what the terrain holds, such as the level that the game ships, so only regions that
-    /// differ from the server's have to come.
+    /// The client starts with the content of the terrain, such as the level that the game ships, so only regions that
+    /// differ from the server's have to be sent.
     ///
     /// # Errors
-    /// When the terrain's settings are those of no terrain.
+    /// When the terrain's settings are invalid.
     pub fn new(terrain: &mut Terrain, contents: &ContentTable) -> Result<Self, TerrainError> {
         let world = terrain.snapshot();
         let ground = GroundId::of(&world);
@@ -256,7 +256,7 @@ impl Display {
     }
 
     /// Compares what is shown with what should be, which has this hash, once nothing waits for the terrain. They differ
-    /// where somebody else has changed the terrain, for example with brushes that were under way when it became shared.
+    /// if something else has changed the terrain, for example brushes that were running when it became shared.
     pub fn compare(&mut self, shown: &World, hash: u64) {
         if self.is_idle() && !self.is_broken && shown.hash() != hash {
             self.is_broken = true;

@@ -66,7 +66,7 @@ type Request = Box<dyn FnOnce(&mut ServerState, Duration) + Send + Sync>;
 /// An event of the ground's server.
 #[derive(Message, Clone, Debug)]
 pub enum GroundServerEvent {
-    /// Its world was read; or can't be read, and nothing is served.
+    /// Its world was read; or it can't be read, and nothing is served.
     Opened(Result<(), Arc<StoreError>>),
     /// An event about its players.
     Players(ServerEvent),
@@ -94,7 +94,7 @@ impl GroundServer {
         Self::with_state(State::Opening(task, progress))
     }
 
-    /// How much of a saved world is read, 0 to 1; `None` once it is.
+    /// The share of a saved world that has been read, 0 to 1; `None` once all of it has.
     pub fn opening(&self) -> Option<f32> {
         if let State::Opening(_, progress) = &self.state { Some(progress.share()) } else { None }
     }
@@ -254,7 +254,7 @@ impl Drop for GroundServer {
             waiting.into_iter().for_each(|request| request(&mut parts, now));
             parts.advance(now);
             if let Some(store) = parts.store.take() {
-                // An error means that nobody waits for it.
+                // An error means that the result is no longer awaited.
                 let _ = closed.send(store.close());
             }
         });

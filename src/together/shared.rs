@@ -11,8 +11,8 @@ use crate::plugin::EditOutbox;
 use crate::terrain::Receipt;
 
 /// Insert it with a [`Terrain`](crate::terrain::Terrain) of the same ground and chunk size as the server's: the world
-/// that players share takes its place, and brushes for it go to the server. A terrain that has edits already, such as
-/// those of a level, keeps what is the same on the server, and only regions that differ are sent. While the terrain is
+/// that players share replaces it, and brushes for it are sent to the server. If the terrain has edits already, such as
+/// those of a level, only regions that differ from the server's are sent. While the terrain is
 /// [`Held`](crate::plugin::Held), because its `StartLevel` is still loaded for example, it does not join yet.
 ///
 /// It joins as soon as a server that this app is connected to, or this app itself, has a
@@ -20,7 +20,7 @@ use crate::terrain::Receipt;
 /// despawned, removed and inserted again at any time, and another `Terrain` may be inserted on its entity. An app
 /// shares one terrain at a time: the first one, until it is gone.
 ///
-/// If something keeps it from following a server, a [`SharingTroubleFound`](super::SharingTroubleFound) is sent.
+/// If it cannot stay in sync with a server, a [`SharingTroubleFound`](super::SharingTroubleFound) is sent.
 #[derive(Component, Default)]
 #[component(on_add = warn_without_plugin)]
 pub struct SharedTerrain {
@@ -54,17 +54,17 @@ impl SharedTerrain {
         self.link.as_ref().and_then(|link| link.facts.id)
     }
 
-    /// Whether the ground around the player is there.
+    /// Whether the ground around the player has arrived.
     pub fn is_playable(&self) -> bool {
         self.link.as_ref().is_some_and(|link| link.is_playable)
     }
 
-    /// Whether all of the world is there, and follows the server.
+    /// Whether the whole world has arrived and is in sync with the server.
     pub fn has_joined(&self) -> bool {
         self.link.as_ref().is_some_and(|link| link.facts.has_joined)
     }
 
-    /// What keeps it from following a server; `None` while it follows one, joins it, or waits for one.
+    /// The reason why it is not in sync with a server; `None` while it is, or while it joins a server or waits for one.
     pub fn trouble(&self) -> Option<SharingTrouble> {
         self.trouble
     }
@@ -82,7 +82,7 @@ fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lif
 /// The outcome of an edit.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EditOutcome {
-    /// It is shown as the player's machine predicts it.
+    /// It is shown, with the result that the player's machine predicts.
     Predicted(Receipt),
     /// The server has ordered it, with this result for all players. `None` if the player was disconnected at that
     /// moment, so that the result is not known; the [`BrushApplied`](crate::plugin::BrushApplied) then has an empty

@@ -1,11 +1,11 @@
-//! Reasons why a shared terrain follows no server, or why it refuses a request.
+//! Problems of a shared terrain: why it is not in sync with a server, or why it refuses a request.
 
 use bevy::prelude::*;
 
 use crate::net::{KickReason, Refusal};
 
-/// The reason why a [`SharedTerrain`](super::SharedTerrain) follows no server, or refuses a request. The text contains
-/// the remedy.
+/// The reason why a [`SharedTerrain`](super::SharedTerrain) is not in sync with a server, or refuses a request. The
+/// text says what to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SharingTrouble {
@@ -32,8 +32,8 @@ pub enum SharingTrouble {
         /// The server's chunk size.
         their_chunks: i32,
     },
-    /// The server has sent the player away. Digs are refused until there is another connection. After
-    /// [`KickReason::ConnectedAgain`] there should be none, as it would end the one that took its place.
+    /// The server has removed the player. Digs are refused until there is another connection. Do not connect again
+    /// after [`KickReason::ConnectedAgain`], because that would end the later connection of the same player.
     #[error("the server has sent this player away: {0}")]
     Kicked(KickReason),
     /// Another terrain of this app is shared already, and a connection carries one ground. Digs on this one are refused
@@ -45,7 +45,7 @@ pub enum SharingTrouble {
     /// The entity of the `SharedTerrain` has no `Terrain`. Sharing begins once there is one.
     #[error("a SharedTerrain needs a Terrain on the same entity; sharing begins once it is inserted")]
     NoTerrain,
-    /// The rules of the terrain were changed, which changes nothing: rules come from the server.
+    /// The rules of the terrain were changed, which has no effect: rules come from the server.
     #[error(
         "rules that are set on a shared terrain do nothing; set them on the server, with \
          GroundServer::with(|server| server.set_rules(rules))"
@@ -54,17 +54,17 @@ pub enum SharingTrouble {
     /// The server does not undo the player's last stroke.
     #[error("the server does not undo the last stroke: {0}")]
     UndoRefused(Refusal),
-    /// The limit of edits that wait for the server is reached, and no more are taken.
+    /// The limit of edits that wait for the server is reached; further edits are refused.
     #[error("the server has not answered {0} edits; further ones are refused until it does")]
     TooManyPending(usize),
 }
 
-/// A [`SharedTerrain`](super::SharedTerrain) follows no server, or refuses a request. It is logged as a
-/// warning as well.
+/// Reports that a [`SharedTerrain`](super::SharedTerrain) is not in sync with a server, or refuses a request. The
+/// problem is also logged as a warning.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SharingTroubleFound {
     /// The terrain.
     pub terrain: Entity,
-    /// What is wrong.
+    /// The problem.
     pub trouble: SharingTrouble,
 }

@@ -286,7 +286,7 @@ impl Brick {
         self.materials.as_deref()
     }
 
-    /// Removes what samples of a layer that turned to air store besides their density: air has no material.
+    /// Removes the materials of samples of a layer that became air: air has no material.
     pub(crate) fn clear_materials(&mut self, y: usize, samples: u64) {
         self.set_materials(y, samples, MaterialId::GROUND);
     }

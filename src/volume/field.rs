@@ -2,7 +2,7 @@
 
 use crate::lattice::LatticeBox;
 
-/// Names a field for as long as it lives; never used again.
+/// Identifies a field; an id is never used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FieldId(pub u64);
 

@@ -33,9 +33,9 @@ pub struct DiggingRules {
     /// half of it or less takes nothing away, and in between its speed grows linearly. Painting is not restricted:
     /// ground that is painted with a softer material is softer from then on.
     pub hardness: BTreeMap<MaterialId, u8>,
-    /// Materials that no brush takes away, nor paints over.
+    /// Materials that no brush removes or paints over.
     pub unbreakable: BTreeSet<MaterialId>,
-    /// Nothing solid below this height, in voxels, is taken away.
+    /// No solid ground below this height, in voxels, is removed.
     pub bedrock: Option<i32>,
     /// Samples that no operation changes at all, paint included. Each edit searches all boxes, each brick only those
     /// near the edits of its batch.
@@ -50,7 +50,7 @@ impl DiggingRules {
         self
     }
 
-    /// The rules with one more material that no brush takes away.
+    /// The rules with one more material that no brush removes.
     #[must_use]
     pub fn with_unbreakable(mut self, material: MaterialId) -> Self {
         self.unbreakable.insert(material);

@@ -72,9 +72,10 @@ impl World {
         Prefab::new(size, from_min, above_ground, layers.into_iter().flatten())
     }
 
-    /// A piece of the world as a shape with its materials: a [fill](crate::brush::Brush::fill) builds it again, at any
-    /// rotation and scale, with its edge rounded if wanted, and a dig takes its form out of the ground. A box has 3 to 128
-    /// samples along each side; the outermost count as air. Beyond the world's rim everything continues as at the rim.
+    /// A piece of the world as a shape with its materials: a [fill](crate::brush::Brush::fill) builds it again, with
+    /// any rotation and scale and with a rounded edge if wanted, and a dig cuts its form out of the ground. A box has 3
+    /// to 128 samples along each side; the outermost count as air. Beyond the world's rim everything continues as at
+    /// the rim.
     ///
     /// Where a piece has to be the same to the bit, air included, [copy](Self::copy) it.
     ///

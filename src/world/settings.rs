@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TerrainSettings {
-    /// Cells along a chunk's side, 8..=128. Small chunks redraw faster, large ones need fewer draws.
+    /// Cells along a chunk's side, 8..=128. Small chunks are rebuilt faster, large ones need fewer draw calls.
     pub chunk_size: u32,
     /// Metres along a voxel's side: a power of two from 1/8 to 8, so that scaling loses no bits. The model itself
     /// counts in voxels.

@@ -23,7 +23,7 @@ pub enum Meshing {
     /// All changed meshes, ready to be shown.
     #[default]
     All,
-    /// None: for servers and tools that show nothing. Meshes that are asked for are made at that moment.
+    /// None: for servers and tools that show nothing. Meshes are made when they are requested.
     Never,
 }
 

@@ -12,7 +12,7 @@ use crate::brush::BrushError;
 use crate::brush::quantize::{Shift, difference, in_range, measure, voxels};
 use crate::lattice::ONE;
 
-/// Most voxels above and below a path.
+/// The maximum number of voxels above and below a path.
 const HEIGHT: f32 = 256.0;
 
 /// The space along a path: as wide to either side as the path's radius, from `below` the path to `above` it. Its ends

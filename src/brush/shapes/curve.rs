@@ -15,7 +15,7 @@ use crate::brush::quantize::{difference, measure};
 /// Straight pieces that stand for the curve.
 const PIECES: usize = 32;
 
-/// A tube along a cubic Bézier curve; its radius goes from that of the one end to that of the other.
+/// A tube along a cubic Bézier curve, whose radius changes evenly from one end to the other.
 ///
 /// It is made of 32 round cones: the curve's points at equal steps of its parameter, joined by straight lines, along
 /// which the radius changes evenly.
@@ -23,9 +23,9 @@ const PIECES: usize = 32;
 pub struct Curve<N: Numbers = Voxels> {
     /// Where it begins.
     pub from: N::Vector,
-    /// The point towards which it begins.
+    /// The second control point: the curve starts towards it.
     pub from_control: N::Vector,
-    /// The point from which it comes at its end.
+    /// The third control point: the curve arrives from it.
     pub to_control: N::Vector,
     /// Where it ends.
     pub to: N::Vector,

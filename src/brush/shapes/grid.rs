@@ -14,10 +14,10 @@ use crate::brush::{BrushError, is_default};
 use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::ONE;
 
-/// Least and most samples along a side of a grid.
+/// The minimum and maximum number of samples along a side of a grid.
 pub(super) const SIDES: (u32, u32) = (3, 128);
 
-/// Least and most voxels between two samples.
+/// The minimum and maximum number of voxels between two samples.
 const SCALE: (f32, f32) = (1.0 / 16.0, 64.0);
 
 /// What a distance of 0 is stored as.
@@ -26,14 +26,14 @@ const ZERO: i32 = 1 << 15;
 /// Signed distances on a grid, in 1/256 of its cells: negative inside. The outermost samples are outside. It may have
 /// [materials](Self::with_materials), which a [fill](crate::brush::Operation::Fill) builds with.
 ///
-/// A grid is made once, of a function or of a [closed mesh](Self::from_mesh), and shared by all brushes that use it. Its
-/// samples are kept as a [`GreyImage`], so that everything that names the images of stamps by their content, such as
-/// [`ContentTable`](crate::net::ContentTable) of networks, names grids too.
+/// A grid is made once, from a function or from a [closed mesh](Self::from_mesh), and shared by all brushes that use
+/// it. Its samples are kept as a [`GreyImage`], so that everything that names the images of stamps by their content,
+/// such as [`ContentTable`](crate::net::ContentTable) of networks, names grids too.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(from = "ImageSamples", into = "ImageSamples")]
 pub struct ShapeGrid(Arc<Samples>);
 
-/// The image of a grid, and what a look at all of its samples found out. Edits share it, so nobody looks twice.
+/// The image of a grid, and facts derived from all of its samples. Edits share it, so they are derived only once.
 #[derive(Debug)]
 struct Samples {
     image: Arc<GreyImage>,
@@ -292,7 +292,7 @@ impl GridShape {
         Self { grid, center, rotation: Quat::IDENTITY, scale: 1.0 }
     }
 
-    /// The shape turned.
+    /// The shape with another rotation.
     #[must_use]
     pub fn with_rotation(self, rotation: Quat) -> Self {
         Self { rotation, ..self }

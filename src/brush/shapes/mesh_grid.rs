@@ -45,8 +45,9 @@ impl MeshGrid {
 impl ShapeGrid {
     /// The grid of a closed mesh, with this many samples along its longest side: 8 to 128.
     ///
-    /// Inside is what the mesh's winding number is not 0 for, whichever way it faces; so parts may overlap. Vertices with
-    /// equal positions count as one. Distances are exact within two cells of the surface, and roughly right beyond.
+    /// Points are inside where the mesh's winding number is not 0, so parts may overlap and face either way. Vertices
+    /// with equal positions count as one. Distances are exact within two cells of the surface, and roughly right
+    /// beyond.
     ///
     /// ```
     /// use bevy_burrow::prelude::*;

@@ -118,7 +118,7 @@ macro_rules! shapes {
             $($(#[$attribute])* $name($name),)*
         }
 
-        /// A shape of more numbers than a [`Shape`] holds.
+        /// A shape of variable size, which does not fit into a [`Shape`].
         #[derive(Clone, Debug, PartialEq)]
         #[non_exhaustive]
         #[allow(missing_docs, reason = "each variant is the struct of its name")]

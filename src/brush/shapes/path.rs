@@ -16,13 +16,13 @@ use crate::brush::quantize::{
 };
 use crate::lattice::ONE;
 
-/// Least and most points of a path.
+/// The minimum and maximum number of points of a path.
 pub(super) const POINTS: (usize, usize) = (2, 256);
 
 /// Longest side of the box around a path, in voxels.
 pub(super) const LONGEST: i32 = 8192;
 
-/// Most straight pieces that stand for the curve between two points.
+/// The maximum number of straight pieces that stand for the curve between two points.
 const PIECES: i32 = 32;
 
 /// A path through points, with a radius at each. As a shape it is the tube around it: a tunnel if it is dug, a wall or a

@@ -15,7 +15,7 @@ use crate::brush::quantize::{disc, voxels};
 pub struct Torus<N: Numbers = Voxels> {
     /// Its middle.
     pub center: N::Vector,
-    /// Where its hole points; only the direction counts.
+    /// The axis through its hole; only its direction matters.
     pub axis: N::Direction,
     /// Radius of the circle.
     pub radius: N::Length,

@@ -1,4 +1,4 @@
-//! Content that edits name: each name stands for one content, and nothing holds both.
+//! Images, grids and prefabs that edits refer to by name: an encoded edit holds either the content or its name.
 
 use super::round_trips;
 use crate::brush::Edit;

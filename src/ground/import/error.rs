@@ -51,7 +51,7 @@ pub enum ImportError {
         /// The decoder's own words.
         reason: String,
     },
-    /// The file has colours, of which no height follows.
+    /// The file has colours, from which no heights can be derived.
     #[error("the {format} file has colours, first at sample ({x}, {z}): export the heights as plain grey")]
     Colour {
         /// The format.
@@ -190,7 +190,7 @@ pub enum ImportError {
         layers: usize,
         /// Channels of all files.
         channels: usize,
-        /// Most layers.
+        /// The maximum number of layers.
         most: usize,
     },
     /// A sample of an id map has no material.
@@ -210,7 +210,7 @@ pub enum ImportError {
     TooManyMaterials {
         /// Materials of the surface.
         found: usize,
-        /// Most layers.
+        /// The maximum number of layers.
         most: usize,
     },
     /// The distance between samples is no whole number of voxels.

@@ -12,7 +12,7 @@ use super::kind::HeightFormat;
 use super::open::read_file;
 use crate::ground::{ColumnMaterial, ImageLimits, MaterialId, MaterialMap};
 
-/// Most layers of splat maps.
+/// The maximum number of layers of splat maps.
 pub const MAX_LAYERS: usize = 16;
 
 /// The layers of splat maps.
@@ -30,7 +30,7 @@ pub struct SplatOptions {
 }
 
 impl SplatOptions {
-    /// These materials, one for each channel.
+    /// Options with these materials, one for each channel.
     pub fn of(layers: impl IntoIterator<Item = MaterialId>) -> Self {
         Self { layers: layers.into_iter().map(Some).collect(), ..Self::default() }
     }

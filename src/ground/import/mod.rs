@@ -27,7 +27,7 @@
 //!
 //! **Voids** are samples without a value: NaN, infinity, the value that the file or [`ImportOptions`] declares, and
 //! well-known ones such as -9999 that lie far outside of all others. **Outliers** are single samples far above or below
-//! all that surrounds them. [`Repair`] chooses what becomes of either. The report counts both.
+//! all that surrounds them. [`Repair`] chooses how each of them is repaired. The report counts both.
 
 mod ascii;
 mod decoded;

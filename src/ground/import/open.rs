@@ -88,7 +88,7 @@ impl ElevationGrid {
     }
 }
 
-/// The format of a file, by its first bytes; RAW if there are none that say it.
+/// The format of a file, detected by its first bytes; RAW if they match no other format.
 fn format_of(bytes: &[u8]) -> Result<HeightFormat, ImportError> {
     const HEIGHTS: [(&[u8], HeightFormat); 6] = [
         (b"\x89PNG", HeightFormat::Png),

@@ -8,7 +8,7 @@ use crate::ground::{ImageLimits, RawFormat};
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImportOptions {
-    /// The file's format; `None`: by its first bytes.
+    /// The file's format; `None` detects it by the first bytes.
     pub format: Option<HeightFormat>,
     /// The layout of a RAW file.
     pub raw: RawLayout,
@@ -16,9 +16,9 @@ pub struct ImportOptions {
     pub no_data: Option<f32>,
     /// The least and greatest value: samples outside are voids.
     pub valid: Option<[f32; 2]>,
-    /// What becomes of voids. With [`Repair::Clamp`] they get the lowest value of the file.
+    /// How voids are repaired. With [`Repair::Clamp`] they get the lowest value of the file.
     pub voids: Repair,
-    /// What becomes of outliers. With [`Repair::Clamp`] they are moved to the highest or lowest of the 8 samples
+    /// How outliers are repaired. With [`Repair::Clamp`] they are moved to the highest or lowest of the 8 samples
     /// around them.
     ///
     /// [`Repair::Keep`] unless set: a lone tower is an outlier, too.
@@ -26,7 +26,8 @@ pub struct ImportOptions {
     /// How far an outlier lies from the median of the 8 samples around it, in the file's unit, more than 0. `None`:
     /// 64 times the median difference between neighbours, and at least 1/64 of the file's range.
     pub outlier_distance: Option<f32>,
-    /// What a file may cost: by default 2 GiB on disk and 4 GiB of memory, enough for 16385 x 16385 floats.
+    /// Limits on the size of a file and on memory: by default 2 GiB on disk and 4 GiB of memory, enough for 16385 x
+    /// 16385 floats.
     pub limits: ImageLimits,
 }
 
@@ -69,11 +70,11 @@ impl ImportOptions {
     }
 }
 
-/// What becomes of samples that are voids or outliers.
+/// How samples that are voids or outliers are repaired.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Repair {
-    /// They stay as they are and are reported; voids stay NaN, of which no ground can be made.
+    /// They are kept and reported; voids stay NaN, from which no ground can be made.
     Keep,
     /// They are interpolated from what surrounds them.
     #[default]

@@ -14,7 +14,7 @@ impl<F: Fn(i32, i32) -> f64 + Send + Sync + 'static> FunctionSource<F> {
     /// The height over the column (x, z) is `height(x, z)` voxels, rounded to 1/256 voxel, between `low` and `high`
     /// voxels. Heights outside are clamped to these; NaN counts as 0.
     ///
-    /// `id` stands for the function: give another one to every function.
+    /// `id` represents the function in hashes: use a different one for every function.
     pub fn new(id: u64, low: f64, high: f64, height: F) -> Self {
         Self { id, bounds: (rounded(low), rounded(high)), height }
     }

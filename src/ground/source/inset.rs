@@ -1,4 +1,4 @@
-//! A source inside a rectangle of another one.
+//! A height source placed inside a rectangle of another one, with blended edges.
 
 use super::{ColumnGrid, HeightSource};
 use crate::ground::material::ColumnMaterial;
@@ -10,8 +10,8 @@ const SHARE_BITS: u32 = 12;
 
 /// A source inside a rectangle, and another one around it: a surveyed landscape with noise to the horizon.
 ///
-/// Along the rectangle's rim heights are blended, smoothly and in integers, over a margin that lies inside it. The
-/// inner source is asked for columns counted from the rectangle's lowest one.
+/// Along the rectangle's rim, heights are blended smoothly, in integers, over a margin that lies inside it. The inner
+/// source gets columns relative to the rectangle's lowest one.
 pub struct InsetSource<Inner, Outer> {
     inner: Inner,
     outer: Outer,
@@ -21,14 +21,14 @@ pub struct InsetSource<Inner, Outer> {
 }
 
 impl<Inner: HeightSource, Outer: HeightSource> InsetSource<Inner, Outer> {
-    /// `inner` over the columns from `low` to `low + size`, both included, and `outer` around. From the rectangle's
-    /// rim, where all is `outer`, it takes `margin` voxels until all is `inner`; 0 is a sharp edge. Negative sizes and
-    /// margins count as 0.
+    /// Uses `inner` for the columns from `low` to `low + size`, both included, and `outer` around them. At the
+    /// rectangle's rim heights are those of `outer`; `margin` voxels farther inside they are those of `inner`. With a
+    /// margin of 0 the edge is sharp. Negative sizes and margins count as 0.
     pub fn new(inner: Inner, outer: Outer, low: Column, size: [i32; 2], margin: i32) -> Self {
         Self { inner, outer, low, size: size.map(|cells| cells.max(0)), margin: margin.max(0) }
     }
 
-    /// How much of a column the inner source has, in 1/4096; outside the rectangle nothing.
+    /// The share of the inner source in a column, in 1/4096; 0 outside the rectangle.
     fn share(&self, column: Column) -> i64 {
         let along = |at: i32, low: i32, size: i32| {
             let at = i64::from(at) - i64::from(low);
@@ -65,7 +65,7 @@ impl<Inner: HeightSource, Outer: HeightSource> InsetSource<Inner, Outer> {
         (part.count() > 0).then_some((ColumnGrid { low, ..part }, start))
     }
 
-    /// Fills a grid with what `blend` makes of what both sources have, and of the share of the inner one.
+    /// Fills a grid with the results of `blend`, which gets the values of both sources and the share of the inner one.
     fn fill<T: Copy + Default>(
         &self,
         grid: ColumnGrid,

@@ -1,4 +1,4 @@
-//! Sources of heights: functions of the column that are asked on demand, so that memory follows the view.
+//! Sources of heights: functions of the column that are called on demand, so that memory depends on the view.
 
 mod function;
 mod image;

@@ -5,13 +5,13 @@ use std::borrow::Cow;
 use super::{Interval, MAX_COLUMN_CONDITIONS, MAX_STRATA, Strata, Stratum, StratumBody, StratumBounds};
 use crate::ground::GroundError;
 
-/// Most voxels by which noise or folds move anything.
+/// The maximum number of voxels by which noise or folds move anything.
 const MAX_ROUGH: f32 = 127.0;
-/// Most voxels of any other length.
+/// The maximum of any other length, in voxels.
 const MAX_VOXELS: f32 = 32_768.0;
-/// Most voxels by which beds sink for each voxel along an axis.
+/// The maximum number of voxels by which beds sink for each voxel along an axis.
 const MAX_DIP: f32 = 4.0;
-/// Most rise over run of a condition.
+/// The maximum rise over run in a condition.
 const MAX_SLOPE: f32 = 65_536.0;
 
 fn check(

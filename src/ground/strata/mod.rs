@@ -37,10 +37,10 @@ pub(crate) use records::{BeddingRecord, StratumRecord};
 pub(in crate::ground) use steep::steep_word;
 pub(crate) use steep_cells::SteepCells;
 
-/// Most strata of a ground.
+/// The maximum number of strata of a ground.
 pub const MAX_STRATA: usize = 32;
 
-/// Most strata of a ground that ask something of a column: a slope, a box or a picture.
+/// The maximum number of strata of a ground that have a condition on columns: a slope, a box or a picture.
 pub const MAX_COLUMN_CONDITIONS: usize = 16;
 
 /// Bodies of material below the surface: soil, beds of rock, veins and pockets of ore.

@@ -7,7 +7,7 @@ use crate::ground::GroundError;
 use crate::ground::world::Ground;
 use crate::lattice::{Column, ceil};
 
-/// Most lattice levels on a line between two columns of a steep cell.
+/// The maximum number of lattice levels on a line between two columns of a steep cell.
 ///
 /// Each level is a vertex on every line, and a voxel whose material is computed. Faces of one cell's width that are
 /// higher are no cliffs but errors in the data, such as a void of a survey, whose height has no bound.

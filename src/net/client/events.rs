@@ -4,7 +4,7 @@ use super::super::message::{ClientId, KickReason, Refusal};
 use crate::lattice::RegionPos;
 use crate::terrain::{Applied, LoosePiece, Receipt, ReturnedPiece};
 
-/// What a game may want to know.
+/// An event for the game.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ClientEvent {
@@ -15,9 +15,9 @@ pub enum ClientEvent {
         /// How far from its player it may dig, in voxels; `None` if that is not checked.
         reach: Option<u32>,
     },
-    /// The ground around the player is there.
+    /// The ground around the player has arrived.
     Playable,
-    /// All of the world is there, and the client follows the order.
+    /// The whole world has arrived, and the client follows the order.
     Joined,
     /// An edit of the player is shown with the predicted result.
     Predicted(Receipt),
@@ -61,7 +61,8 @@ pub enum ClientEvent {
     },
     /// Everything up to this number is saved on the server.
     Durable(u64),
-    /// These regions differed from the server's, and were fetched. This is a bug: of the plugin's or of a machine.
+    /// These regions differed from the server's, and were fetched. This indicates a bug in the plugin, or faulty
+    /// hardware.
     Repaired(Vec<RegionPos>),
     /// The server has removed the client.
     Kicked(KickReason),

@@ -11,7 +11,7 @@ use super::{Client, ClientEvent};
 use crate::lattice::{LatticeBox, RegionPos};
 use crate::terrain::{Order, Patch, Receipt};
 
-/// Most entries that one [`advance`](Client::advance) applies.
+/// The maximum number of entries that one [`advance`](Client::advance) applies.
 const BATCH: usize = 2048;
 
 impl Client {

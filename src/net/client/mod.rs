@@ -165,8 +165,8 @@ impl Client {
         })
     }
 
-    /// Begins with a world that is here already, such as the level that the game ships, instead of the pristine one:
-    /// its [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent.
+    /// Starts with a world that the game already has, such as a level that it ships, instead of the pristine one: its
+    /// [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent.
     /// Call it before the first [`connect`](Self::connect).
     ///
     /// # Errors
@@ -189,7 +189,7 @@ impl Client {
         self.place = place;
     }
 
-    /// Sets how far around the player the ground has to be there before play begins, in voxels; 96 by default.
+    /// Sets how far around the player the ground must have arrived before play begins, in voxels; 96 by default.
     pub fn set_near(&mut self, near: u32) {
         self.near = near;
     }
@@ -238,7 +238,7 @@ impl Client {
         self.outgoing.push(ToServer::Greeting { stream: self.stream, hello }.to_bytes());
     }
 
-    /// The world after the entries up to [`number`](Self::number). While regions come, it is a part of it.
+    /// The world after the entries up to [`number`](Self::number). While regions are still arriving, it is incomplete.
     pub fn world(&self) -> &World {
         self.replica.world()
     }
@@ -248,7 +248,7 @@ impl Client {
         self.epoch.map_or(0, |epoch| epoch.number)
     }
 
-    /// Who this client is; `None` before the server has welcomed it.
+    /// The id of this client; `None` before the server has welcomed it.
     pub fn id(&self) -> Option<ClientId> {
         self.id
     }

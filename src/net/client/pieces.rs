@@ -10,7 +10,7 @@ use super::{Client, ClientEvent};
 use crate::lattice::LatticeBox;
 use crate::terrain::{LoosePiece, PieceFate, Receipt, ReturnedPiece, Run};
 
-/// Most pieces that are remembered.
+/// The maximum number of pieces that are remembered.
 const MOST: usize = 1 << 13;
 
 /// A piece that is out of the ground.

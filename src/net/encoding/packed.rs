@@ -5,7 +5,7 @@ use crate::format::bytes::{Reader, put_number};
 
 /// The tag of a compressed message.
 pub(super) const PACKED: u8 = 10;
-/// Most bytes of a compressed message after decompression, so that few bytes can't take much memory.
+/// The maximum size in bytes of a compressed message after decompression, so that few bytes can't take much memory.
 pub(super) const MAX_PACKED: usize = 64 << 10;
 
 /// Compresses a message to a client, if that makes it shorter.

@@ -12,10 +12,10 @@ pub enum ServerEvent {
     Joined(ClientId),
     /// A client was kicked: its connection should be closed once what waits for it is sent.
     Kicked(ClientId, KickReason),
-    /// A client's world differed, and it fetched these regions. This is a bug: of the plugin's, of the client's, or of
-    /// its machine.
+    /// A client's world differed, and it fetched these regions. This indicates a bug in the plugin or the client, or
+    /// faulty hardware.
     Repaired(ClientId, Vec<RegionPos>),
-    /// An entry could not be applied. This is a bug of the plugin's.
+    /// An entry could not be applied. This indicates a bug in the plugin.
     EntryFailed(u64),
 }
 

@@ -369,7 +369,7 @@ impl Server {
     /// Sets the rules of later edits.
     ///
     /// # Errors
-    /// When they are for a material that nothing has.
+    /// When a rule is for [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND).
     pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
         rules.check()?;
         let rules = (!rules.is_empty()).then(|| Arc::new(rules));

@@ -1,4 +1,4 @@
-//! How fast the bulk lane of a client is: as fast as its line carries, as acknowledgements show.
+//! The rate of a client's bulk lane: as fast as its connection allows, according to acknowledgements.
 
 use std::time::Duration;
 
@@ -24,8 +24,8 @@ const GROWTH: u64 = 150;
 const LATER_GROWTH: u64 = 110;
 const BACK: u64 = 85;
 
-/// The rate of a lane: it grows as long as the line delivers what is sent, and falls below what the line delivers otherwise, so that a
-/// queue in the line drains again.
+/// The rate of a lane: it grows as long as the connection delivers everything that is sent, and otherwise falls below
+/// the rate of delivery, so that queues in the connection drain again.
 ///
 /// Delays are not looked at, because lanes are reliable: a lost packet delays all later ones, but after it has been sent
 /// again they arrive together, so it hardly changes what arrives in a longer time.

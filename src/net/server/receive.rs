@@ -23,9 +23,9 @@ const REGION: u64 = 1;
 /// Bytes of a message that cost 1.
 const BYTES: u64 = 64;
 
-/// Most messages and regions that wait in a client's bulk lane before it may fetch more.
+/// The maximum number of messages and regions that wait in a client's bulk lane before it may fetch more.
 const MAX_JOBS: usize = 2 * MAX_REGIONS;
-/// Most bytes of an image that is sent: no stamp and no grid has larger ones.
+/// The maximum size in bytes of an image that is sent: no stamp and no grid has larger ones.
 const MAX_IMAGE: usize = 2 * 128 * (128 * 128 + 1);
 
 impl Server {

@@ -33,9 +33,10 @@ impl Saving {
 
 impl Server {
     /// A server of a world that is saved: the [terrain](crate::store::Opened::terrain) of a store that was opened, or
-    /// one that a store was created of. What its clients send again that the world holds already is not done twice: the
-    /// last numbers of the 1024 players who dug last are saved with it, and the latest entries, so that clients that
-    /// return after a restart get what they miss of these. Of older changes they get the regions that differ.
+    /// one that a store was created of. Edits that clients send again are not applied twice if the world already
+    /// contains them: the last sequence numbers of the 1024 players who dug last are saved with it. The latest entries
+    /// are saved too, so that clients that return after a restart get the entries that they lack; for older changes
+    /// they get the regions that differ.
     pub fn open(terrain: Terrain, store: &Store, settings: ServerSettings) -> Self {
         let number = store
             .get(&format!("{}{NUMBER}", prefix(store)))

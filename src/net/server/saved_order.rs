@@ -27,7 +27,7 @@ const ORDER: &str = "order/";
 const RUNS: &str = "runs";
 const STATE: &str = "state";
 
-/// Most bytes of entries that are saved; a checkpoint holds all of them.
+/// The maximum number of bytes of entries that are saved; a checkpoint holds all of them.
 const MAX_BYTES: usize = 256 << 10;
 
 /// Bytes after which a piece is complete. Until then, each frame of the journal has it again.
@@ -36,10 +36,10 @@ const PIECE_BYTES: usize = 256;
 /// Bytes that a piece takes in addition to its message.
 const PIECE_HEAD: usize = 64;
 
-/// Most entries that wait until the server is saved.
+/// The maximum number of entries that wait until the server is saved.
 const MAX_UNSAVED: usize = 1 << 16;
 
-/// Most runs that are known.
+/// The maximum number of runs that are known.
 const MAX_RUNS: usize = 64;
 
 /// Entries with consecutive numbers, as a message.
@@ -92,7 +92,7 @@ pub struct SavedOrder {
     /// present one.
     runs: VecDeque<(u64, u64)>,
     is_whole: bool,
-    /// Most bytes of saved entries.
+    /// The maximum number of bytes of saved entries.
     limit: usize,
     /// The number of the last entry that was saved.
     number: u64,

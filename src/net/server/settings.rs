@@ -5,7 +5,8 @@ use std::time::Duration;
 use crate::net::bucket::Rate;
 
 /// How far from its player a client may dig: the whole shape of an edit must be within this distance, exact to a voxel.
-/// It is measured from the last known position of the player, plus the way that the player can move within the latency.
+/// It is measured from the last known position of the player, plus the distance that the player can move within the
+/// latency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reach {
     /// In voxels.
@@ -24,7 +25,7 @@ impl Reach {
     }
 }
 
-/// Who may take back strokes.
+/// Who may undo strokes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UndoPolicy {
     /// No player. Nothing is stored for undo.
@@ -50,23 +51,23 @@ pub struct ServerSettings {
     pub flood: u64,
     /// Invalid messages: a client with more is kicked.
     pub malformed: Rate,
-    /// Who may take back strokes. Anything but [`UndoPolicy::Nobody`] makes a transaction of each stroke.
+    /// Who may undo strokes. With anything but [`UndoPolicy::Nobody`], each stroke is a separate transaction.
     pub undo: UndoPolicy,
     /// Bytes of strokes that can be undone.
     pub undo_bytes: usize,
     /// Bytes of old entries that are kept for clients that reconnect.
     pub log_bytes: usize,
-    /// The most bytes of the bulk lane for each client. The lane begins at 256 KiB a second, or this rate if it is lower, and becomes
-    /// faster as long as acknowledgements show that the client's line carries it.
+    /// The most bytes of the bulk lane for each client. The lane begins at 256 KiB a second, or this rate if it is
+    /// lower, and becomes faster as long as acknowledgements show that the client's connection keeps up.
     pub bulk: Rate,
     /// Bytes of each lane that a client may not have acknowledged. In the order lane, one message is sent in any case; in the bulk
     /// lane, there are more in proportion to its rate.
     pub window: u64,
-    /// Most bytes of a piece of the bulk lane.
+    /// The maximum size in bytes of a piece of the bulk lane.
     pub piece: usize,
-    /// Most work of an [`advance`](super::Server::advance), in costs of edits; one edit is applied in any case.
+    /// The maximum work in an [`advance`](super::Server::advance), in costs of edits; one edit is applied in any case.
     pub work: u64,
-    /// Most work that may wait; edits beyond are refused.
+    /// The maximum amount of work that may wait; edits beyond it are refused.
     pub waiting: u64,
     /// The time between marks.
     pub mark: Duration,

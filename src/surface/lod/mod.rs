@@ -1,6 +1,6 @@
 //! Nodes of a quadtree cut, drawn so that everything drawn together is closed.
 //!
-//! Rules 1 to 6 hold at each level, on that level's lattice; three more rules close the gaps between levels:
+//! Rules 1 to 6 apply at each level, on that level's lattice; three more rules close the gaps between levels:
 //!
 //! 7. **Fan.** At an undisturbed interval, where the side of a coarse cell meets two finer ones, the coarse cell fans
 //!    over the line of its finer neighbours (`drawing`). Where it is volumetric, a zipper joins both lines. A disturbed

@@ -61,7 +61,7 @@ pub(super) fn shares_of(ground: &Ground, low: Column, stride: i32, counts: [usiz
     shares_in(ground, &page, low, stride, counts)
 }
 
-/// What columns at the sides of a node show, where finer nodes are beside.
+/// What columns at the sides of a node show, where finer nodes are adjacent.
 #[derive(Default)]
 pub(super) struct FinerShares {
     columns: FxHashMap<Column, (i32, ColumnMaterial, MaterialMix)>,

@@ -9,21 +9,21 @@ use crate::terrain::receipt::{Applied, ChunkScenario, Rejection};
 use crate::volume::{Absorbed, FieldId, Fields};
 use crate::world::World;
 
-/// Something that happened to a field in a commit.
+/// A change of a field in a commit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldChange {
     /// It is new.
     Created(FieldId),
     /// Its samples or its box changed.
     Changed(FieldId),
-    /// It went into another field of its chunk.
+    /// It was merged into another field of its chunk.
     Merged {
         /// The field that is gone.
         gone: FieldId,
         /// The field that holds its data now.
         into: FieldId,
     },
-    /// It is gone, because its edits were undone.
+    /// It was removed, because its edits were undone.
     Removed(FieldId),
 }
 

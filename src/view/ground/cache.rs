@@ -31,8 +31,8 @@ const MAGIC: [u8; 8] = *b"burrow\x00\x01";
 /// The bytes before those of the arrays: what files begin with, and a checksum.
 const HEADER: usize = 16;
 
-/// Layers of a size from the folder, or painted and written there. `coarse` are all layers at some smaller size: as recipes
-/// decide what they are, their bytes tell whether a file is up to date.
+/// Layers of a size from the folder, or painted and written there. `coarse` are all layers at some smaller size: as
+/// recipes decide what they are, their bytes show whether a file is up to date.
 pub(super) fn fetch_or_paint(folder: Option<&Path>, coarse: &Layers, side: u32, meter: &Meter) -> Layers {
     let Some(folder) = folder else { return Layers::paint(side, meter) };
     let start = format!("ground_{side}_");

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use crate::plugin::{SkyLight, SlimVertices};
 
-/// Most layers of a ground; ids from the last one on share it.
+/// The maximum number of layers of a ground; ids from the last one on share it.
 pub const MAX_LAYERS: usize = 16;
 
 /// The look of a terrain's ground, whose meshes then have [`SlimVertices`]. Put it on the terrain's entity instead of a material, and
@@ -26,10 +26,11 @@ pub const MAX_LAYERS: usize = 16;
 pub struct GroundLook {
     /// The layers, by number; [`MAX_LAYERS`] at most.
     pub layers: Vec<GroundLayer>,
-    /// Distances from the camera in metres: up to the first, textures have their own scale; beyond the second, six times it,
-    /// four times as much each time that the distance grows as much, with a large relief that fades out until 3 km.
+    /// Distances from the camera in metres. Up to the first, textures have their own scale. Beyond the second, they are
+    /// six times as large, and four times larger again each time that the distance grows fourfold; there, a large-scale
+    /// relief is added, which fades out until 3 km.
     pub distance: (f32, f32),
-    /// The variation of tints from place to place, and far away by slope, and on dug faces: 0 to 1.
+    /// The strength of variations in tint, 0 to 1: from place to place, by slope in the distance, and on dug faces.
     pub variety: f32,
     /// The texture fetches per pixel.
     pub quality: GroundQuality,
@@ -46,7 +47,7 @@ pub struct GroundLook {
 pub struct ColorMap {
     /// The picture. Until it is loaded, the ground has the colours of its layers.
     pub image: Handle<Image>,
-    /// Metres from the camera at which its colours begin to show, and from which on they show fully.
+    /// Metres from the camera at which its colours begin to show, and at which they show fully.
     pub distance: (f32, f32),
     /// How much they show there, 0 to 1; multiplied by each layer's [`map_tint`](GroundLayer::map_tint).
     pub strength: f32,
@@ -67,17 +68,17 @@ pub struct GroundLayer {
     pub metres: f32,
     /// The strength of its relief: 1 as in its texture, 0 flat.
     pub relief: f32,
-    /// The strength of its large relief, far from the camera, which is that of layer 0 or, if it has another [`top`](Self::top), its
-    /// own: 1 for crags, less for what lies smooth, 0 for works.
+    /// The strength of the large-scale relief that is shown far from the camera: 1 for crags, less for smooth ground, 0
+    /// for built materials. It is the relief of layer 0, or the layer's own if it has another [`top`](Self::top).
     pub broad_relief: f32,
     /// How metallic it is, 0 to 1.
     pub metallic: f32,
-    /// Its colours are multiplied by this.
+    /// The colour by which its colours are multiplied.
     pub tint: LinearRgba,
-    /// How much a [`ColorMap`] tints it: 1 for natural ground, 0 for works such as bricks and snow that somebody put down.
+    /// How much a [`ColorMap`] tints it: 1 for natural ground, 0 for built materials such as bricks and placed snow.
     pub map_tint: f32,
-    /// Whether its texture is cut into pieces near the camera, so that its repetition does not show: up to three times the
-    /// fetches. Not for textures with a pattern, such as bricks.
+    /// Whether its texture is cut into pieces near the camera, which hides its repetition and takes up to three times
+    /// the fetches. Unsuitable for textures with a pattern, such as bricks.
     pub has_pieces: bool,
     /// The texture layer for floors and ceilings, if it differs: bedded rock shows its laminae on walls only.
     pub top: Option<u8>,
@@ -103,9 +104,9 @@ impl Default for GroundLayer {
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default)]
 pub enum GroundQuality {
-    /// Layers repeat: for weak machines and software renderers.
+    /// Textures visibly repeat: for weak machines and software renderers.
     Low,
-    /// Layers do not repeat near the camera.
+    /// Textures do not visibly repeat near the camera.
     #[default]
     High,
 }

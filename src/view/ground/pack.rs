@@ -9,15 +9,16 @@ use super::GroundTextures;
 use super::bake::array;
 use super::paint::{levels, mean_roughness};
 
-/// Most texels along a side.
+/// The maximum number of texels along a side.
 const MAX_SIDE: u32 = 4096;
-/// Most layers: the limit of any GPU, and the number of values of a `u8`.
+/// The maximum number of layers: the limit that every GPU supports, and the number of values of a `u8`.
 const MAX_ARRAY_LAYERS: usize = 256;
 /// Anisotropic filtering of slanting ground.
 const ANISOTROPY: u16 = 4;
 
-/// The pictures of one layer, as texture libraries have them. All are square, as large as those of the other layers, and
-/// have 8 bits per channel. Their bytes are taken as they are in the file, whether it was loaded as sRGB or not.
+/// The pictures of one layer, as texture libraries provide them. All must be square, as large as those of the other
+/// layers, and have 8 bits per channel. Their bytes are used as they are in the file, whether it was loaded as sRGB or
+/// not.
 #[derive(Clone, Debug, Default)]
 pub struct GroundLayerImages {
     /// Colours in sRGB; heights in alpha, unless [`height`](Self::height) has them.
@@ -25,13 +26,14 @@ pub struct GroundLayerImages {
     /// Heights in red, 0 low to 255 high: the higher layer is on top where layers meet. Without it, and with an albedo
     /// that is opaque throughout, the layer lies flat at half height.
     pub height: Option<Image>,
-    /// A normal map as [`StandardMaterial`] takes it, x right and y up; none is flat.
+    /// A normal map as for [`StandardMaterial`], x right and y up. Without one, the surface is flat.
     pub normal: Option<Image>,
     /// Whether the normal map is made for DirectX, with a green channel that points down.
     pub flip_normal_map_y: bool,
-    /// Occlusion in red, as glTF has it; none is no occlusion.
+    /// Occlusion in red, as in glTF. Without it, nothing is occluded.
     pub occlusion: Option<Image>,
-    /// Perceptual roughness in green, as glTF has it; none is 0.9. A picture that holds occlusion too is given twice.
+    /// Perceptual roughness in green, as in glTF. Without it, the roughness is 0.9. If one picture holds both occlusion
+    /// and roughness, set both fields to it.
     pub roughness: Option<Image>,
 }
 
@@ -116,10 +118,11 @@ pub struct GroundArrays {
 }
 
 impl GroundArrays {
-    /// Packs the pictures of all layers, in the order of their numbers. Takes up to seconds, over all of rayon's threads:
-    /// work for a task or a loading screen. Colours are averaged as light, normals keep their length, and what they vary by
-    /// makes smaller versions rougher, so that nothing sparkles far away. Samplers repeat,
-    /// with fourfold anisotropic filtering, which software renderers skip; both images can be given other samplers.
+    /// Packs the pictures of all layers, in the order of their numbers. This can take seconds on all of rayon's
+    /// threads, so run it in a task or during a loading screen. For smaller mip levels, colours are averaged as light,
+    /// normals keep their length, and the variation of normals makes them rougher, so that distant ground does not
+    /// sparkle. Samplers repeat, with fourfold anisotropic filtering, which software renderers skip; both images can be
+    /// given other samplers.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Textures: baked by the project, or a game's own.
+//! Textures: baked by this crate, or a game's own.
 
 use std::fmt;
 
@@ -19,12 +19,11 @@ use crate::threads::{ThreadTask, Threads};
 #[reflect(Resource, Default)]
 #[non_exhaustive]
 pub enum GroundTextures {
-    /// The project's own, painted from noise in a task when the first [`GroundLook`](super::GroundLook) comes, coarse ones at
-    /// once and fine ones after some seconds, or read from a [`GroundTextureCache`]:
-    /// 0 rock, 1 grass, 2 sand, 3 snow, 4 clay, 5 concrete, 6 coal, 7 gold, 8 soil, 9 sandstone, 10 shale, 11 gravel,
-    /// 12 iron, 13 copper; 14 and 15 are 9 and 10 as they look from above, see [`GroundLayer::top`](super::GroundLayer::top).
-    /// The bytes are equal on every machine. They are kept when the last look is removed, so the next one need not
-    /// wait.
+    /// This crate's own, painted from noise in a task when the first [`GroundLook`](super::GroundLook) is inserted,
+    /// coarse ones at once and fine ones after some seconds, or read from a [`GroundTextureCache`]: 0 rock, 1 grass, 2
+    /// sand, 3 snow, 4 clay, 5 concrete, 6 coal, 7 gold, 8 soil, 9 sandstone, 10 shale, 11 gravel, 12 iron, 13 copper;
+    /// 14 and 15 are 9 and 10 as they look from above, see [`GroundLayer::top`](super::GroundLayer::top). The bytes are
+    /// equal on every machine. They are kept when the last look is removed, so the next one need not wait.
     Baked {
         /// Texels along a side: a power of two from 16 to 2048, else the next larger one.
         side: u32,

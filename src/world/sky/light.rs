@@ -228,7 +228,7 @@ pub(crate) trait SkyLights {
         (open * 255 / (8 * RAYS[0].len() as u32)) as u8
     }
 
-    /// Whether a ray leads to the open sky, which rises by so many 1/256 voxels with each of so many steps.
+    /// Whether a ray leads to the open sky, given its rise in 1/256 voxel in each step and its number of steps.
     fn is_open(&mut self, from: IVec3, (dx, dz): (i32, i32), steps: i32, rise: i32) -> bool {
         let mut y = from.y * ONE;
         // Most rays of a tunnel end in the ground, wherever they enter it.

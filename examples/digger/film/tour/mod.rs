@@ -390,11 +390,7 @@ impl Tour {
             let target = spots.get(at).copied().unwrap_or(room);
             studio.turn_towards(target, 5.2)?;
             let within = seconds - 1.35 * at as f32;
-            studio.hold(if at < spots.len() && (0.7..0.9).contains(&within) {
-                &[Action::Use]
-            } else {
-                &[]
-            });
+            studio.hold(if at < spots.len() && (0.7..0.9).contains(&within) { &[Action::Use] } else { &[] });
             studio.walk(if (0.6..4.6).contains(&seconds) { hillside.onward * 0.32 } else { Vec2::ZERO });
             fade::set_logo(studio.world(), ((seconds - (LAMPS - 1.6)) / 0.6).clamp(0.0, 1.0));
             Ok(())

@@ -1,4 +1,4 @@
-//! Devices that cannot be opened or not be trusted.
+//! Opening a GPU: missing drivers and devices, the choice of a GPU, waiting for it, and wrong results.
 
 use super::super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
 use super::super::emulator_process::skip;
