@@ -25,14 +25,14 @@ SOUND = $(shell { [ "$$(uname -s)" != Linux ] || pkg-config --exists alsa 2>/dev
 PLUGIN_TESTS := $(patsubst tests/%,--test %,$(patsubst %/main,%,$(basename \
 	$(shell grep -ls '^.!.cfg.feature' tests/*.rs tests/*/main.rs)))) --test scatter --test navigation
 
-# Examples that leave pictures without a display.
+# Examples that save pictures without a display.
 DRAWING := digger sculpt physics custom_material agents
 
 # Random worlds of `make soak`.
 WORLDS ?= 10000
 # Repeats of each run of `make paper`.
 REPEATS ?= 10
-# Where `make test` leaves pictures and meshes.
+# Where `make test` saves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
 # In CI, a test without a GPU, compiler or renderer fails instead of being skipped. Only Linux can

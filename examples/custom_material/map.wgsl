@@ -1,3 +1,5 @@
+// The ground as a map: contour lines, shaded relief from the north-west, dug ground warm and built ground blue.
+
 #import bevy_burrow::position::position_of
 #import bevy_pbr::mesh_functions
 

@@ -556,10 +556,10 @@ mod tests {
         for (shape, message) in [
             (
                 r#"{"sphere":{"center":[0,0,0],"radius":-2147483648}}"#,
-                "`radius` is -8388608 voxels, but the least is 0.25",
+                "`radius` is -8388608 voxels, but the minimum is 0.25",
             ),
             (r#"{"sphere":{"center":[0,-2147483648,0],"radius":64}}"#, "beyond +-32768 voxels"),
-            (r#"{"cone":{"base":[0,0,0],"axis":[-2147483648,0,0],"radius":64}}"#, "the most is 1024"),
+            (r#"{"cone":{"base":[0,0,0],"axis":[-2147483648,0,0],"radius":64}}"#, "the maximum is 1024"),
             (r#"{"cuboid":{"center":[0,0,0],"half":[64,64,64],"rotation":[0,0,0,0]}}"#, "length 0"),
             (r#"{"cuboid":{"center":[0,0,0],"half":[64,64,64],"rotation":[0,0,0,-32767]}}"#, "wrong sign"),
             (r#"{"ball":{}}"#, "unknown variant `ball`"),

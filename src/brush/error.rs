@@ -16,7 +16,7 @@ pub enum BrushError {
         value: f32,
     },
     /// A radius or half side is negative, zero or below the minimum.
-    #[error("`{what}` is {value} voxels, but the least is {least}")]
+    #[error("`{what}` is {value} voxels, but the minimum is {least}")]
     TooSmall {
         /// The field.
         what: &'static str,
@@ -26,7 +26,7 @@ pub enum BrushError {
         least: f32,
     },
     /// A size, the box around the shape, or its volume is above the maximum.
-    #[error("`{what}` is {value} voxels, but the most is {most}")]
+    #[error("`{what}` is {value} voxels, but the maximum is {most}")]
     TooLarge {
         /// The field, or `box` (its longest side), or `volume`.
         what: &'static str,
@@ -47,7 +47,7 @@ pub enum BrushError {
         most: f32,
     },
     /// The axis of a cylinder or cone is too short to have a direction.
-    #[error("`axis` is {length} voxels long, but the least is {least}")]
+    #[error("`axis` is {length} voxels long, but the minimum is {least}")]
     ZeroAxis {
         /// Length after quantisation.
         length: f32,
@@ -146,10 +146,10 @@ pub enum BrushError {
         most: u32,
     },
     /// The image of a deserialised grid does not hold one.
-    #[error("the image holds no grid of distances: make it by `ShapeGrid`")]
+    #[error("the image holds no grid of distances: make it with `ShapeGrid`")]
     NoGrid,
-    /// A stamp is pressed within a grid.
-    #[error("a stamp cannot be pressed within a grid: give the brush another shape")]
+    /// A stamp has a grid as its shape.
+    #[error("a stamp cannot have a grid as its shape: give the brush another shape")]
     StampInGrid,
     /// A mesh has no triangles with an area, is too small or too large to be divided into cells, or has triangles whose
     /// corners have no position.

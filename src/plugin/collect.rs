@@ -124,7 +124,7 @@ fn is_edit(asked: Asked) -> bool {
 fn warn_of_invalid(terrain: Entity, error: &BrushError, reports: &Reports) {
     if reports.is_new(terrain, Report::BrushInvalid) {
         warn!(
-            "a brush was rejected by the terrain {terrain}: {error}. Read `BrushApplied` to hear of others"
+            "a brush was rejected by the terrain {terrain}: {error}. Read `BrushApplied` to learn of others"
         );
     }
 }
@@ -135,7 +135,7 @@ fn warn_of_beside((entity, terrain): (Entity, &Terrain), brush: &Brush, place: O
     let bounds = terrain.world().grid().edit_bounds();
     let corners = place.map(|place| [bounds.min, bounds.max].map(|at| place.transform_point(at.as_vec3())));
     let extent = corners.map_or_else(
-        || "has no place".to_owned(),
+        || "has no valid transform".to_owned(),
         |[min, max]| {
             let (low, high) = (min.min(max), min.max(max));
             format!(
@@ -146,7 +146,7 @@ fn warn_of_beside((entity, terrain): (Entity, &Terrain), brush: &Brush, place: O
     );
     warn!(
         "a brush at {at} reaches no terrain: brushes are in world space and metres, and the terrain {entity} {extent}. Read \
-         `BrushApplied` to hear of others"
+         `BrushApplied` to learn of others"
     );
 }
 

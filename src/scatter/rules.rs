@@ -155,6 +155,6 @@ pub enum ScatterError {
     #[error("two species are called `{0}`: give each a name of its own")]
     SameName(String),
     /// There are more species than numbers for them.
-    #[error("there are {0} species, but the most is 255")]
+    #[error("there are {0} species, but the maximum is 255")]
     TooMany(usize),
 }
