@@ -273,7 +273,7 @@ impl Edit {
     }
 
     /// Distance outside the rough shape up to which samples may change.
-    fn own_band(&self) -> i32 {
+    pub(crate) fn own_band(&self) -> i32 {
         let rounding = self.blend.and_then(|blend| self.operation.rounding(blend.falloff));
         rounding.map_or(BAND, |rounding| rounding.radius.max(BAND))
     }

@@ -25,7 +25,7 @@ pub fn count(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
 }
 
-pub use crate::load::hills;
+pub use crate::load::{hills, layered_hills};
 
 /// A terrain without meshes.
 pub fn terrain(ground: &Arc<Ground>) -> Terrain {

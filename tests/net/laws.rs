@@ -14,7 +14,7 @@ use fastrand::Rng;
 use glam::Vec3;
 
 use crate::bots::{Bot, Play, TICK};
-use crate::follower::{count, hills, terrain};
+use crate::follower::{count, hills, layered_hills, terrain};
 use crate::worlds::any_random_brush;
 
 fn settings() -> ServerSettings {
@@ -411,7 +411,7 @@ fn begin_again(play: &mut Play) {
 
 #[test]
 fn each_edit_is_done_once_though_the_server_is_killed() {
-    let ground = hills(96);
+    let ground = layered_hills(96);
     let mut play = Play::new(&ground, 5, ServerSettings::default());
     play.bots.iter_mut().for_each(|bot| bot.is_undoing = false);
     let mut disk = SimulatedDisk::new();

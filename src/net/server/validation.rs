@@ -6,19 +6,18 @@ use glam::{I64Vec3, IVec3};
 
 use super::{Server, UndoPolicy};
 use crate::brush::{Edit, Shape};
+use crate::lattice::ONE;
 use crate::net::message::{ClientId, Refusal};
 use crate::net::price::{UNDO, cost};
-
-/// Samples beyond a shape that its edit may change.
-const BAND_VOXELS: i64 = 2;
 
 /// Whether all of an edit's shape, with its roughness, lies within a distance of a place.
 fn is_within(place: IVec3, edit: &Edit, allowed: u32) -> bool {
     let samples = edit.reach();
-    // Its reach is what its shape and its roughness take up, and the band around them.
+    // Its reach is what its shape and its roughness take up, and a band around them.
+    let band = i64::from(edit.own_band() / ONE);
     let middle = (samples.min.as_i64vec3() + samples.max.as_i64vec3()).div_euclid(I64Vec3::splat(2));
-    let min = (samples.min.as_i64vec3() + BAND_VOXELS).min(middle);
-    let max = (samples.max.as_i64vec3() - BAND_VOXELS).max(middle);
+    let min = (samples.min.as_i64vec3() + band).min(middle);
+    let max = (samples.max.as_i64vec3() - band).max(middle);
     let place = place.as_i64vec3();
     if let Shape::Sphere(_) = edit.shape() {
         // In half voxels, with one voxel for rounding.
@@ -113,6 +112,17 @@ mod tests {
             (ball(1.0e5, 4.0), u32::MAX, true),
         ] {
             assert_eq!(within(shape, allowed), expected, "{shape:?} {allowed}");
+        }
+    }
+
+    #[test]
+    fn the_radius_of_a_rounded_edit_does_not_count() {
+        let ball = Shape::sphere(Vec3::new(70.0, 15.0, 64.0), 2.0);
+        let fill = Edit::quantize(&Brush::fill(ball, 16.0)).expect("a valid brush");
+        let dig = Edit::quantize(&Brush::dig(ball)).expect("a valid brush");
+        for (allowed, expected) in [(6, false), (8, true)] {
+            let found = [&fill, &dig].map(|edit| is_within(IVec3::new(64, 15, 64), edit, allowed));
+            assert_eq!(found, [expected; 2], "{allowed}");
         }
     }
 }
