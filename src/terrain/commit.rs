@@ -153,12 +153,17 @@ impl Commit {
     /// none.
     #[doc(hidden)]
     pub fn changed_boxes(&self) -> Vec<LatticeBox> {
-        let mut boxes = BTreeMap::<RegionPos, LatticeBox>::new();
+        let mut boxes = BTreeMap::new();
+        self.add_changed_boxes(&mut boxes);
+        boxes.into_values().collect()
+    }
+
+    /// Adds the bricks that it changes to the boxes of their regions.
+    pub(super) fn add_changed_boxes(&self, boxes: &mut BTreeMap<RegionPos, LatticeBox>) {
         for (pos, _) in self.changes.iter().flat_map(|delta| &delta.change.patch.bricks) {
             let own = pos.samples();
             boxes.entry(RegionPos::of(*pos)).and_modify(|all| *all = all.union(own)).or_insert(own);
         }
-        boxes.into_values().collect()
     }
 
     /// The receipts of its orders.
