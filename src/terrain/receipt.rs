@@ -79,6 +79,11 @@ impl Asked {
     pub fn is_step(self) -> bool {
         matches!(self, Self::Undo | Self::Redo)
     }
+
+    /// Whether it sets what later edits obey, and does not change the world.
+    pub(crate) fn is_setting(self) -> bool {
+        matches!(self, Self::Rules | Self::Loose)
+    }
 }
 
 /// What an order changed. An order that changed nothing, such as a dig in the air, leaves all of this empty.

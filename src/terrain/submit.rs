@@ -47,8 +47,8 @@ impl Terrain {
             let request = order.into();
             let (asked, tag) = (request.asked(), request.tag);
             let outcome = match self.admit(&request) {
-                Ok(()) => self.queue_order(request, together),
-                full => full,
+                Ok(work) => self.queue_order(request, work, together),
+                Err(full) => Err(full),
             };
             if let Err(why) = outcome {
                 self.answer(Receipt { asked, tag, outcome: Err(why) });
@@ -56,18 +56,28 @@ impl Terrain {
         }
     }
 
-    /// Whether there is room for an order. Rules and settings of loose pieces are not queued.
-    pub(crate) fn admit(&self, request: &Request) -> Result<(), Rejection> {
-        let is_queued = !matches!(request.asked(), Asked::Rules | Asked::Loose);
-        let has_room = !is_queued || self.queue.has_room(request.work(self.world.grid()));
-        if has_room { Ok(()) } else { Err(Rejection::Overloaded) }
+    /// The work of an order, if there is room for it. Rules and settings of loose pieces are not queued, and are none.
+    ///
+    /// # Errors
+    /// When there is no room.
+    pub(crate) fn admit(&self, request: &Request) -> Result<u64, Rejection> {
+        if request.asked().is_setting() {
+            return Ok(0);
+        }
+        let work = request.work(self.world.grid());
+        if self.queue.has_room(work) { Ok(work) } else { Err(Rejection::Overloaded) }
     }
 
-    /// Queues an order, whether there is room for it or not.
+    /// Queues an order of this much work, whether there is room for it or not.
     ///
     /// # Errors
     /// When rules are invalid.
-    pub(crate) fn queue_order(&mut self, request: Request, together: Together) -> Result<(), Rejection> {
+    pub(crate) fn queue_order(
+        &mut self,
+        request: Request,
+        work: u64,
+        together: Together,
+    ) -> Result<(), Rejection> {
         match request.order {
             Ok(Order::Rules(rules)) => {
                 self.set_rules(rules.as_deref().map_or_else(DiggingRules::default, Clone::clone))?;
@@ -75,7 +85,7 @@ impl Terrain {
             Ok(Order::Loose(settings)) => self.set_loose(settings),
             _ => {
                 let rules = (self.rules.clone(), self.loose);
-                self.queue.push(self.world.grid(), request, together, rules);
+                self.queue.push(request, work, together, rules);
             }
         }
         Ok(())
@@ -113,7 +123,8 @@ impl Terrain {
         for order in orders {
             let request = order.into();
             let asked = request.asked();
-            let outcome = self.queue_order(request, together);
+            let work = request.work(self.world.grid());
+            let outcome = self.queue_order(request, work, together);
             invalid.extend(outcome.err().map(|why| Receipt::of(asked, Err(why))));
         }
         let mut receipts = self.finish();
