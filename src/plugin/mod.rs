@@ -76,6 +76,8 @@ pub use ground_file::{
 pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};
 #[doc(hidden)]
 pub use heightmap::{HeightmapLoader, HeightmapPlugin};
+#[cfg(feature = "store")]
+pub(crate) use heightmap::{read_limited, register_loader};
 pub(crate) use lod_state::WantedTiles;
 pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[cfg(feature = "render")]

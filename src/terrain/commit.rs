@@ -88,7 +88,11 @@ impl Commit {
 
     /// The bricks and fields that it leads to, as its [record](super::CommitRecord) lists them.
     pub fn change(&self) -> Patch {
-        patch_of(&self.changes, self.whole.as_deref(), self.next_field)
+        // A record holds it already, merged from all groups.
+        match &self.record {
+            Some(record) => record.change().clone(),
+            None => patch_of(&self.changes, self.whole.as_deref(), self.next_field),
+        }
     }
 
     /// Computes the light of all surfaces that a commit to this world makes or lights otherwise, and returns the number of
