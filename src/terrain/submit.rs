@@ -22,7 +22,7 @@ impl Terrain {
     }
 
     /// Queues brushes, edits and other orders. Edits that follow each other are one step of undo, except for those that
-    /// are part of strokes.
+    /// are part of strokes. Rules and settings of loose pieces have no receipt, unless the rules are invalid.
     ///
     /// ```
     /// # use bevy_burrow::prelude::*;
@@ -109,6 +109,9 @@ impl Terrain {
     /// Carries out orders at once, after everything that waits: queue, transactions and commits in one call, on this
     /// thread. Returns their receipts; those of orders that waited are kept for
     /// [`take_receipts`](Self::take_receipts). Tools and tests want this; a game lets the plugin do it.
+    ///
+    /// Rules and settings of loose pieces have no receipt, unless the rules are invalid: then it comes last, behind those of all
+    /// orders.
     ///
     /// Edits that follow each other are one step of undo, except for strokes among them; a game that replays a journal
     /// may want to [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.

@@ -27,6 +27,7 @@ pub struct ImportOptions {
     /// 64 times the median difference between neighbours, and at least 1/64 of the file's range.
     pub outlier_distance: Option<f32>,
     /// What a file may cost: by default 2 GiB on disk and 4 GiB of memory, enough for 16385 x 16385 floats.
+    /// Files of more than 16385 samples along a side are refused in any case.
     pub limits: ImageLimits,
 }
 
