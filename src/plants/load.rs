@@ -114,7 +114,9 @@ pub(super) fn choose_patches(
             }
             // Only the new patches lag behind. They were not shown yet, so no message says what changed in them.
             match changed {
-                Some(boxes) => boxes.into_iter().for_each(|samples| drop(patches.update(world, Some(samples)))),
+                Some(boxes) => {
+                    boxes.into_iter().for_each(|samples| drop(patches.update(world, Some(samples))))
+                }
                 None => drop(patches.update(world, None)),
             }
         }

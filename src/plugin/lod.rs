@@ -15,7 +15,7 @@ use super::figures::MainThread;
 use super::load::Loading;
 use super::lod_state::{DetailSource, LevelsOfDetail, LodState, WantedTiles, Watchers};
 use super::meshes::{VertexExtras, VertexKind};
-use super::places::Places;
+use super::places::{Places, voxel_metres};
 use super::processor::BuildSettings;
 use super::task::{InFlight, TaskCounter};
 use super::{BurrowEngine, BurrowFigures, Held, MaterialColors, SkyLight, SlimVertices};

@@ -93,10 +93,10 @@ pub use messages::{
 };
 #[cfg(feature = "picking")]
 pub use picking::TerrainPickingPlugin;
+pub(crate) use places::Places;
 #[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
 #[cfg(any(feature = "scatter", feature = "landmass", feature = "debug"))]
 pub(crate) use places::voxel_metres;
-pub(crate) use places::Places;
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 pub use propagate::TerrainPropagatePlugin;
 #[cfg(feature = "render")]

@@ -158,8 +158,7 @@ impl PlantPatches {
             let squares = zs.flat_map(|z| xs.clone().map(move |x| PatchPos { species, x, z }));
             return squares.filter(|pos| self.patches.contains_key(pos)).collect();
         }
-        let is_there =
-            |pos: &PatchPos| pos.species == species && xs.contains(&pos.x) && zs.contains(&pos.z);
+        let is_there = |pos: &PatchPos| pos.species == species && xs.contains(&pos.x) && zs.contains(&pos.z);
         let mut found: Vec<PatchPos> = self.patches.keys().copied().filter(is_there).collect();
         found.sort_unstable_by_key(|pos| (pos.z, pos.x));
         found

@@ -3,7 +3,7 @@
 use super::model::Terrain;
 use super::order::{Order, Request};
 use super::queue::{Together, WorkLimits};
-use super::receipt::{Applied, Asked, Receipt, Rejection};
+use super::receipt::{Applied, Receipt, Rejection};
 use crate::volume::DiggingRules;
 use crate::world::unique;
 

@@ -351,7 +351,10 @@ fn a_box_that_is_larger_than_the_world_holds_all_its_plants() {
     let all = patches.iter().map(|(_, patch)| patch.standing().count()).sum::<usize>();
     let (low, high) = (Column::new(i32::MIN, i32::MIN), Column::new(i32::MAX, i32::MAX));
     assert_eq!(patches.near_of(low, high, [true; 5]).count(), all);
-    let shape = Shape::sphere(Vec3::new(30.0, terrain.world().ground().height(Column::new(30, 25)) as f32 / 256.0, 25.0), 9.0);
+    let shape = Shape::sphere(
+        Vec3::new(30.0, terrain.world().ground().height(Column::new(30, 25)) as f32 / 256.0, 25.0),
+        9.0,
+    );
     terrain.apply_one(Brush::dig(shape));
     let mut expected = patches.clone();
     let mut expected = expected.update(terrain.world(), None);
