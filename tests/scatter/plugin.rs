@@ -311,7 +311,8 @@ fn plants_that_load_while_the_ground_changes_are_up_to_date() {
     wait(&mut app, |world| {
         let model = world.get::<Terrain>(terrain).expect("a terrain");
         let shown = world.get::<ShownPlants>(terrain).expect("plants");
-        model.history().undos == 12 && !shown.is_loading()
+        let is_loaded = shown.patches().is_some_and(|patches| !patches.is_empty()) && !shown.is_loading();
+        model.history().undos == 12 && is_loaded
     });
     (0..3).for_each(|_| app.update());
     assert_up_to_date(&app, terrain, "at the end");
