@@ -212,7 +212,12 @@ impl<T: Send + 'static> ThreadTask<T> {
 
     /// The result once it is there; resumes the panic if the work panicked.
     pub fn finish(&mut self) -> Option<T> {
-        self.check().map(|result| result.unwrap_or_else(|panic| resume_unwind(panic)))
+        self.finish_within(Duration::ZERO)
+    }
+
+    /// The result if it is there within a time, for which this waits; resumes the panic if the work panicked.
+    pub fn finish_within(&mut self, time: Duration) -> Option<T> {
+        self.check_within(time).map(|result| result.unwrap_or_else(|panic| resume_unwind(panic)))
     }
 }
 

@@ -26,8 +26,6 @@ mod state;
 pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::Cpu;
 pub use engine::{Engine, EngineFigures};
-#[doc(hidden)]
-pub use settings::GpuChoice as CardChoice;
 pub use settings::{EngineSettings, GpuChoice};
 pub use state::EngineState;
 

@@ -13,7 +13,7 @@ use super::place::Place;
 use super::views::{self, Dirty};
 use super::{BurrowDebug, DebugView};
 use crate::lattice::BrickPos;
-use crate::plugin::{BrushApplied, CommitSameFrame, HistoryMoved};
+use crate::plugin::{BrushApplied, CommitSameFrame, HistoryMoved, voxel_metres};
 use crate::terrain::{DrawnCut, Terrain, Version};
 
 /// The shortest time between two drawings of a view while the world changes.
@@ -151,7 +151,7 @@ fn draw(
     let now = time.map_or(Duration::ZERO, |time| time.elapsed());
     for (entity, terrain, own_place, render_layers, _) in terrains.iter().filter(|(.., seen)| seen.get()) {
         let Some(focus) = focus(&debug, terrain, own_place, &cameras) else { continue };
-        let scale = own_place.scale().x.abs().max(f32::MIN_POSITIVE);
+        let scale = voxel_metres(own_place);
         // Rounded, so that small moves of the camera draw nothing again.
         let step = (debug.near / scale / 4.0).max(1.0);
         let steps = (focus / step).round();

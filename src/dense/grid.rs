@@ -56,6 +56,9 @@ impl<'a, S: Density> DenseGrid<'a, S> {
     /// `x + size[0] * (y + size[1] * z)`.
     ///
     /// Gradients in the grid's border are one-sided differences.
+    ///
+    /// # Errors
+    /// When a side is too short or too long, or when the number of samples is not the product of the sides.
     pub fn new(samples: &'a [S], size: [usize; 3]) -> Result<Self, DenseGridError> {
         Self::checked(samples, size, 0)
     }
@@ -64,6 +67,9 @@ impl<'a, S: Density> DenseGrid<'a, S> {
     /// gradients: cells that touch it are not meshed.
     ///
     /// Grids that overlap so have the same normals where they meet, and mesh faster too.
+    ///
+    /// # Errors
+    /// When a side is too short or too long, or when the number of samples is not the product of the sides.
     pub fn with_apron(samples: &'a [S], size: [usize; 3]) -> Result<Self, DenseGridError> {
         Self::checked(samples, size, 1)
     }

@@ -97,6 +97,18 @@ pub(crate) fn most_bricks(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     Some(edit.most_bricks().map_or(around, |most| most.min(around)))
 }
 
+/// The fixed work of an edit, in bricks.
+pub(crate) const EDIT_WORK: u64 = 20;
+/// How many times as much work a brick is for an edit that sculpts: it reads a stencil around each sample.
+const SCULPTED: u64 = 4;
+
+/// The work of an edit, in bricks: what queues limit, and what servers charge. `None` for an edit that reaches nothing of the
+/// world.
+pub(crate) fn edit_work(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
+    let weight = if edit.kind() == Kind::Sculpt { SCULPTED } else { 1 };
+    Some(EDIT_WORK + weight * most_bricks(grid, edit)?)
+}
+
 /// Returns `true` if some rule may restrict an edit of this power that changes these samples.
 fn may_restrict(rules: &DiggingRules, samples: LatticeBox, power: u8) -> bool {
     let around = samples.grown(1);

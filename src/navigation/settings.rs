@@ -97,6 +97,9 @@ pub struct Walker {
 
 impl Walker {
     /// Checks settings. Lengths are rounded to 1/256 voxel: radius and height up, steps and slopes down.
+    ///
+    /// # Errors
+    /// When a setting is not a number, or out of its range.
     pub fn new(settings: &WalkSettings) -> Result<Self, WalkError> {
         let check = |name, value: f32, least: f32, most: f32| match value >= least && value <= most {
             true => Ok(value * ONE as f32),

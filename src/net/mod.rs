@@ -74,8 +74,6 @@ pub use bucket::Rate;
 #[doc(hidden)]
 pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
-#[doc(hidden)]
-pub use message::KickReason as Kick;
 pub use message::{ClientId, KickReason, Lane, MAX_TO_SERVER, PROTOCOL, Refusal};
 #[doc(hidden)]
 pub use message::{

@@ -9,7 +9,7 @@ use super::state::{BurrowPanel, Note, PanelAction};
 use super::texts;
 use crate::format::Level;
 use crate::store::{StoreError, load_level, save_level};
-use crate::terrain::{Terrain, TerrainError, TerrainSettings};
+use crate::terrain::{Terrain, TerrainError, TerrainSettings, WorldParts};
 use crate::threads::{ThreadTask, Threads};
 
 /// A level on its way.
@@ -40,12 +40,18 @@ pub(super) fn save(
     (entity, terrain): (Entity, &Terrain),
     folder: PathBuf,
 ) {
-    let (level, path) = (Level::of(terrain), folder.clone());
-    let state = LevelState::of(terrain);
     if !begin(panel, files, texts::SAVING) {
         return;
     }
-    let task = ThreadTask::start(Threads::Background, move || save_level(&path, &level).map(drop));
+    let (state, path) = (LevelState::of(terrain), folder.clone());
+    let (world, rules, loose) = (terrain.snapshot(), terrain.rules().cloned(), terrain.loose().copied());
+    let voxel_size = terrain.voxel_size();
+    let task = ThreadTask::start(Threads::Background, move || {
+        let level = Level::of_parts(WorldParts::of(&world, rules, loose), voxel_size, &world);
+        // While a snapshot is held, commits have to copy the world's index.
+        drop(world);
+        save_level(&path, &level).map(drop)
+    });
     commands.insert_resource(LevelTask::Save(task, folder, entity, state));
 }
 

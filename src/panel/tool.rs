@@ -16,7 +16,8 @@ use crate::lattice::LatticeBox;
 use crate::plugin::TerrainHit;
 use crate::terrain::Terrain;
 
-/// The current brush, in metres of world space. The panel and the game may change it. The game turns it into
+/// The current brush, in metres of world space. The panel and the game may change it. A size that
+/// the game sets is not clamped: a brush with one that is out of range is rejected. The game turns it into
 /// brushes:
 ///
 /// ```

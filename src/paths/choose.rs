@@ -10,7 +10,7 @@ use super::tiles::NavigationTiles;
 use super::{Navigation, NavigationArea, NavigationSource};
 use crate::lattice::Column;
 use crate::navigation::{NAV_TILE, NavTilePos, Walker};
-use crate::plugin::{Places, TerrainEntities};
+use crate::plugin::{Places, TerrainEntities, voxel_metres};
 use crate::terrain::{Terrain, World};
 
 /// Reads settings that changed, chooses tiles, and starts to build those that are missing.
@@ -29,7 +29,8 @@ pub(super) fn choose_tiles(
             tiles.walker = None;
             continue;
         };
-        let scale = place.scale().x;
+        // Negative if it is mirrored.
+        let scale = voxel_metres(&place).copysign(place.affine().matrix3.determinant());
         // A turned terrain has a scale that is rounded in another way.
         let is_scaled = (tiles.scale - scale).abs() > 1e-4 * scale.abs();
         if navigation.is_changed() || tiles.walker.is_none() || is_scaled {

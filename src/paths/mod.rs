@@ -107,7 +107,7 @@ pub enum NavigationArea {
 #[reflect(Component)]
 #[require(Transform)]
 pub struct NavigationSource {
-    /// Metres, along x and z.
+    /// Metres, along x and z. More than 65536 voxels count as 65536, also an infinite radius, and a negative one as 0.
     pub radius: f32,
 }
 

@@ -6,7 +6,7 @@ use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
 
 use super::columns::Columns;
-use super::near::{ahead, voxel_size};
+use super::near::{ahead, shortest_side};
 use crate::lattice::{Column, TilePos};
 use crate::plugin::TerrainEntities;
 use crate::terrain::Terrain;
@@ -48,7 +48,7 @@ impl<'a> TerrainFrame<'a> {
     ) -> Self {
         let is_shown = entities.is_some_and(|entities| entities.show(model.world()));
         let inverse = place.affine().inverse();
-        Self { terrain, model, inverse, size: voxel_size(place), is_shown, layers, entities }
+        Self { terrain, model, inverse, size: shortest_side(place), is_shown, layers, entities }
     }
 
     /// The distance from a place to a column along x or z, whichever is larger, in voxels.

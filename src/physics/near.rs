@@ -12,8 +12,8 @@ use crate::lattice::{ChunkGrid, TilePos};
 /// The most stops on a way ahead, one for each chunk's width.
 const STOPS: u32 = 64;
 
-/// The side of a voxel in world space, in metres, including the scale of parents; the shortest side if they stretch it.
-pub(super) fn voxel_size(place: &GlobalTransform) -> f32 {
+/// The shortest side of a voxel in world space, in metres: where parents stretch a terrain, colliders must not fall short.
+pub(super) fn shortest_side(place: &GlobalTransform) -> f32 {
     place.scale().abs().min_element()
 }
 

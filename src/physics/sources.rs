@@ -7,7 +7,7 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::colliders::GroundColliders;
-use super::near::{Neighbourhood, ahead, stops, voxel_size};
+use super::near::{Neighbourhood, ahead, shortest_side, stops};
 use super::solids::{Extent, Solids};
 use super::{ColliderSource, HeldByGround, PhysicsFigures, TerrainPhysicsDisabled};
 use crate::lattice::ChunkGrid;
@@ -54,7 +54,7 @@ pub(super) fn find_near(
     let mut near = Neighbourhood::default();
     for (terrain, model, _) in &terrains {
         let Ok(place) = places.compute_global_transform(terrain) else { continue };
-        let (inverse, size) = (place.affine().inverse(), voxel_size(&place));
+        let (inverse, size) = (place.affine().inverse(), shortest_side(&place));
         let (grid, layers) = (model.world().grid(), solids.layers(terrain));
         let mut all = Vec::new();
         for (source, &ColliderSource { radius }, velocity, hold, extent) in &sources {

@@ -9,19 +9,37 @@ use bevy::prelude::*;
 
 use super::follow::PlantMessages;
 use super::{News, PlantSource, Plants, ShownPlants};
-use crate::plugin::{Places, TerrainEntities};
-use crate::scatter::{PatchPos, Plant, PlantPatches, Scatter};
+use crate::lattice::LatticeBox;
+use crate::plugin::{Places, TerrainEntities, voxel_metres};
+use crate::scatter::{PatchPos, PlantPatch, PlantPatches, Scatter};
 use crate::terrain::Terrain;
 use crate::threads::{ThreadTask, Threads, free_later};
 
 /// The most cells whose patches one task makes.
 const CELLS: i32 = 1 << 16;
 
+/// The largest radius of a source, in voxels. A world may be far larger, and its squares are counted whenever a viewer moves.
+const LARGEST_RADIUS: f32 = 2048.0;
+
 /// The place of a camera, or of a source with its radius, in voxels of the terrain.
 pub(super) type Viewer = (Vec2, Option<f32>);
 
-/// A task that makes patches.
-pub(super) struct LoadTask(ThreadTask<Vec<(PatchPos, Vec<Plant>)>>);
+/// A task that makes patches as they stand in the world when it starts.
+pub(super) struct LoadTask {
+    task: ThreadTask<Vec<(PatchPos, PlantPatch)>>,
+    /// Boxes around the samples that changed meanwhile; `None` if they are not known.
+    changed: Option<Vec<LatticeBox>>,
+}
+
+impl LoadTask {
+    /// Notes what a commit changed while the task runs.
+    pub(super) fn note_changes(&mut self, boxes: Option<&[LatticeBox]>) {
+        match (&mut self.changed, boxes) {
+            (Some(changed), Some(boxes)) => changed.extend(boxes),
+            _ => self.changed = None,
+        }
+    }
+}
 
 impl std::fmt::Debug for LoadTask {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -78,21 +96,32 @@ pub(super) fn choose_patches(
         let Some(patches) = &mut shown.patches else { continue };
         if shown.version != version {
             // Follows commits that were not seen, where a game gates their systems.
+            if let Some(task) = &mut shown.task {
+                task.note_changes(None);
+            }
             let changes = patches.update(world, None);
             let place = places.of(entity).unwrap_or_default();
             messages.tell((entity, world), &place, patches.scatter(), changes, &mut shown.news);
             shown.version = version;
         }
-        if let Some(LoadTask(task)) = &mut shown.task {
+        if let Some(LoadTask { task, changed }) = &mut shown.task {
             let Some(done) = task.check() else { continue };
+            let changed = changed.take();
             shown.task = None;
-            for (pos, plants) in done.unwrap_or_default() {
-                patches.insert(world, pos, plants);
+            for (pos, patch) in done.unwrap_or_default() {
+                patches.insert_patch(pos, patch);
                 shown.news.push(News::Loaded(pos));
+            }
+            // Only the new patches lag behind. They were not shown yet, so no message says what changed in them.
+            match changed {
+                Some(boxes) => {
+                    boxes.into_iter().for_each(|samples| drop(patches.update(world, Some(samples))))
+                }
+                None => drop(patches.update(world, None)),
             }
         }
         let Some(place) = places.of(entity) else { continue };
-        let (inverse, voxel) = (place.affine().inverse(), terrain.voxel_size());
+        let (inverse, voxel) = (place.affine().inverse(), voxel_metres(&place));
         let viewers: Vec<Viewer> = viewers
             .iter()
             .filter_map(|(viewer, source)| {
@@ -127,10 +156,11 @@ pub(super) fn choose_patches(
             cells += scatter.patch_size(pos.species).pow(2);
             fits
         });
-        let (first, ground): (Vec<PatchPos>, _) = (first.collect(), world.shared_ground());
-        shown.task = Some(LoadTask(ThreadTask::start(Threads::Background, move || {
-            first.into_iter().map(|pos| (pos, scatter.patch(&ground, pos))).collect()
-        })));
+        let (first, world): (Vec<PatchPos>, _) = (first.collect(), terrain.snapshot());
+        let task = ThreadTask::start(Threads::Background, move || {
+            first.into_iter().map(|pos| (pos, scatter.patch_in(&world, pos))).collect()
+        });
+        shown.task = Some(LoadTask { task, changed: Some(Vec::new()) });
     }
 }
 
@@ -149,7 +179,7 @@ fn wanted(scatter: &Scatter, world: (i32, i32), viewers: &[Viewer]) -> Wanted {
         let size = scatter.patch_size(species);
         let side = size as f32;
         for &(at, radius) in viewers {
-            let radius = radius.unwrap_or(own.view.end).clamp(0.0, 65536.0);
+            let radius = radius.map_or(own.view.end, |radius| radius.clamp(0.0, LARGEST_RADIUS));
             // Half a patch more keeps one from coming and going.
             let kept = radius + side / 2.0;
             let along = |at: f32, cells: i32| {

@@ -92,7 +92,7 @@ pub struct Plants(pub ScatterRules);
 #[reflect(Component)]
 #[require(Transform)]
 pub struct PlantSource {
-    /// Metres.
+    /// Metres. A radius of more than 2048 voxels counts as 2048, an infinite one too, and a negative one as 0.
     pub radius: f32,
 }
 
@@ -113,19 +113,25 @@ pub struct ShownPlants {
 
 /// News for what draws the plants; none are kept before something does.
 #[derive(Debug, Default)]
-struct NewsList(Option<Vec<News>>);
+struct NewsList {
+    /// News since the last call of `take`.
+    waiting: Option<Vec<News>>,
+    /// Number of all news so far: while it stays the same, nothing has changed.
+    count: u64,
+}
 
 impl NewsList {
     fn push(&mut self, news: News) {
-        if let Self(Some(all)) = self {
-            all.push(news);
+        self.count += 1;
+        if let Some(waiting) = &mut self.waiting {
+            waiting.push(news);
         }
     }
 
     /// All news since the last call; `None` the first time.
     #[cfg(feature = "render")]
     fn take(&mut self) -> Option<Vec<News>> {
-        self.0.replace(Vec::new())
+        self.waiting.replace(Vec::new())
     }
 }
 
@@ -198,6 +204,7 @@ pub fn regrowth_of(plant: &Plant, terrain: &GlobalTransform) -> Brush {
 /// The mark of a plant in world space.
 fn to_world(brush: Brush, terrain: &GlobalTransform) -> Brush {
     let Shape::Sphere(sphere) = brush.shape else { return brush };
+    // The mean, as brushes take it when they are brought into the terrain.
     let scale = terrain.affine().matrix3.determinant().abs().cbrt();
     let center = terrain.transform_point(sphere.center);
     Brush { shape: Shape::sphere(center, sphere.radius * scale), ..brush }

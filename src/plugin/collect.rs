@@ -111,8 +111,8 @@ pub(super) fn collect_brushes(
 
 /// Queues an edit if there is room for it.
 fn queue(terrain: &mut Terrain, request: Request, together: Together) -> Result<(), Rejection> {
-    terrain.admit(&request)?;
-    terrain.queue_order(request, together)
+    let work = terrain.admit(&request)?;
+    terrain.queue_order(request, work, together)
 }
 
 /// Whether the plugin reports an order's receipt as [`BrushApplied`].

@@ -245,7 +245,7 @@ fn commit(
                 messages.changed.write(GroundChanged {
                     terrain: entity,
                     versions: [entities.shown, pending.version()],
-                    boxes: None,
+                    boxes: Some(pending.boxes()),
                 });
                 entities.shown = pending.version();
                 display.show((entity, terrain.world()), &mut entities, surfaces, pending.fields(), true);

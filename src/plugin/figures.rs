@@ -26,9 +26,12 @@ pub struct BurrowFigures {
     pub transactions: Times,
     /// How long the latest commits took on the main thread.
     pub commit_times: Times,
-    /// How long collecting brushes, committing and starting transactions took together on the main thread in this
-    /// frame: systems, and changes to entities.
+    /// How long showing loaded terrains, collecting brushes, committing and starting transactions took together on the main
+    /// thread in this frame: systems, and changes to entities.
     pub main_thread: Duration,
+    /// How long showing loaded terrains took in this frame, until it is part of [`main_thread`](Self::main_thread).
+    #[reflect(ignore)]
+    loading: Duration,
 }
 
 /// The durations of the parts of a transaction in its task.
@@ -61,7 +64,10 @@ impl BurrowFigures {
 
 /// How long the main thread took, without a change that the game would notice.
 pub(super) trait MainThread {
-    /// Begins a frame.
+    /// Notes how long showing loaded terrains took, before the frame begins.
+    fn measure_loading(&mut self, took: Duration);
+
+    /// Begins a frame: what is measured from now on is added to this time and to that of loading.
     fn begin_frame(&mut self, took: Duration);
 
     /// Adds to this frame.
@@ -69,8 +75,13 @@ pub(super) trait MainThread {
 }
 
 impl MainThread for ResMut<'_, BurrowFigures> {
+    fn measure_loading(&mut self, took: Duration) {
+        self.bypass_change_detection().loading = took;
+    }
+
     fn begin_frame(&mut self, took: Duration) {
-        self.bypass_change_detection().main_thread = took;
+        let figures = self.bypass_change_detection();
+        figures.main_thread = took + std::mem::take(&mut figures.loading);
     }
 
     fn measure(&mut self, took: Duration) {

@@ -175,9 +175,7 @@ async fn heights(
     let (mut tiles, mut scale) = (Vec::new(), description.scale);
     for name in heights {
         let failed = |error| GroundFileError::Import(name.clone(), error);
-        // Without a header, its name is all that says what it is.
-        let is_hgt = name.to_ascii_lowercase().ends_with(".hgt");
-        let format = import.format.or(is_hgt.then_some(HeightFormat::Hgt));
+        let format = import.format.or_else(|| HeightFormat::of_name(name));
         let bytes = read(name, context).await?;
         let (grid, found) =
             ElevationGrid::decode(&bytes, &ImportOptions { format, ..import.clone() }).map_err(failed)?;

@@ -84,7 +84,7 @@ impl AssetLoader for HeightmapLoader {
 }
 
 /// Reads a file up to one byte past the limit; the decoder reports what is wrong.
-pub(super) async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, std::io::Error> {
+pub(crate) async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, std::io::Error> {
     use bevy::tasks::futures_lite::AsyncReadExt;
     let mut bytes = Vec::new();
     reader.take(limit.saturating_add(1)).read_to_end(&mut bytes).await?;
@@ -116,7 +116,7 @@ fn register(app: &mut App) {
 }
 
 /// Registers a loader and its asset. Does nothing and returns `false` without an asset server, or if called again.
-pub(super) fn register_loader<L: AssetLoader + FromWorld>(app: &mut App) -> bool {
+pub(crate) fn register_loader<L: AssetLoader + FromWorld>(app: &mut App) -> bool {
     let world = app.world();
     if !world.contains_resource::<AssetServer>() || world.contains_resource::<Registered<L>>() {
         return false;

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use bevy::ecs::entity::EntityHashMap;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::platform::collections::HashMap;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
+use super::figures::MainThread;
 use super::lod_state::{LevelsOfDetail, LodState, ShownLevels};
 use super::meshes::{VertexExtras, VertexKind};
 use super::new_mesh::PendingMesh;
@@ -17,7 +19,7 @@ use super::places::{LocalPlaces, TerrainPlace, place_terrain};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::reports::{Report, Reports};
 use super::task::{InFlight, TaskCounter};
-use super::{BurrowSettings, ChunkCreated, Held, MaterialColors, SkyLight, SlimVertices};
+use super::{BurrowFigures, BurrowSettings, ChunkCreated, Held, MaterialColors, SkyLight, SlimVertices};
 use crate::lattice::ChunkPos;
 use crate::lod::Cut;
 use crate::terrain::{DrawnCut, KnownNodes, MeshKey, Terrain, World};
@@ -314,7 +316,9 @@ pub(super) fn finish_loading(
     mut assets: Option<ResMut<Assets<Mesh>>>,
     mut terrains: Query<(Entity, &mut Terrain, &mut Loading, Option<&TerrainEntities>, Option<&Children>)>,
     mut failures: Local<EntityHashMap<u32>>,
+    mut figures: ResMut<BurrowFigures>,
 ) {
+    let start = Instant::now();
     let mut budget = if assets.is_some() { settings.loads_per_frame.max(1) } else { usize::MAX };
     for (entity, mut terrain, mut loading, old, children) in &mut terrains {
         if let Some(task) = &mut loading.task {
@@ -369,6 +373,7 @@ pub(super) fn finish_loading(
         }
         commands.entity(entity).try_insert(entities).try_remove::<Loading>();
     }
+    figures.measure_loading(start.elapsed());
 }
 
 /// Spawns tiles, chunks and fields of a world that has loaded.

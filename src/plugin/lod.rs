@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bevy::camera::visibility::RenderLayers;
 use bevy::camera::{Camera, CameraProjection, Projection};
-use bevy::math::{Affine3A, Vec3A, Vec4Swizzles};
+use bevy::math::{Affine3A, Vec4Swizzles};
 use bevy::platform::collections::HashSet;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -15,7 +15,7 @@ use super::figures::MainThread;
 use super::load::Loading;
 use super::lod_state::{DetailSource, LevelsOfDetail, LodState, WantedTiles, Watchers};
 use super::meshes::{VertexExtras, VertexKind};
-use super::places::Places;
+use super::places::{Places, voxel_metres};
 use super::processor::BuildSettings;
 use super::task::{InFlight, TaskCounter};
 use super::{BurrowEngine, BurrowFigures, Held, MaterialColors, SkyLight, SlimVertices};
@@ -170,13 +170,6 @@ pub(super) fn find_eyes(
             watchers.eyes = seen;
         }
     }
-}
-
-/// Metres along a voxel's side, of the longest one.
-fn voxel_metres(place: &GlobalTransform) -> f32 {
-    let matrix = place.affine().matrix3;
-    let sides = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3A::length);
-    sides.into_iter().fold(f32::MIN_POSITIVE, f32::max)
 }
 
 /// The velocity of an eye from its previous position, also across a pause without cameras.

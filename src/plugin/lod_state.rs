@@ -29,7 +29,8 @@ use crate::terrain::{KnownNodes, Version};
 /// Levels are chosen for all of these cameras together. While there is none, levels stay as they are. Distances and
 /// speeds are measured in the terrain's own space and in real time, so shifted origins and slow motion change nothing.
 ///
-/// The defaults need no change. A terrain that gets or loses this component is loaded again.
+/// The defaults need no change. Values of 0, negative ones and NaN are allowed: `most_nodes` bounds what they can cost. A
+/// terrain that gets or loses this component is loaded again.
 ///
 /// With it, a [`Tile`](super::Tile) has an entity while it is drawn, and of level 0 also while something else needs it,
 /// like a collider. [`SurfaceProcessor`](super::SurfaceProcessor)s are called for tiles and chunks of level 0 only,
@@ -38,20 +39,22 @@ use crate::terrain::{KnownNodes, Version};
 #[reflect(Component, Default)]
 #[require(ShownLevels, Watchers)]
 pub struct LevelsOfDetail {
-    /// Metres; ground farther away from all cameras is drawn at the coarsest level that the rest allows.
+    /// Metres; ground farther away from all cameras is drawn at the coarsest level that the rest allows. With 0 or less, all
+    /// ground is.
     pub view_distance: f32,
     /// Ground is drawn finer while it would differ by more than this many pixels from the next finer level, and its
-    /// cells are larger than [`cell_pixels`](Self::cell_pixels).
+    /// cells are larger than [`cell_pixels`](Self::cell_pixels). Less than 0.01 counts as
+    /// 0.01, here and in both fields below.
     pub error_pixels: f32,
     /// The least size of cells in pixels, except for dug and built ground: see [`error_pixels`](Self::error_pixels).
     pub cell_pixels: f32,
     /// Dug and built ground is drawn finer while its cells are larger than this many pixels.
     pub edited_pixels: f32,
-    /// Levels are chosen for where cameras will be in this many seconds, too.
+    /// Levels are chosen for where cameras will be in this many seconds, too. With 0, only for where they are.
     pub look_ahead: f32,
     /// The approximate maximum of drawn squares; if more would be needed, all ground is drawn coarser.
     pub most_nodes: usize,
-    /// Meshes made for one change of levels, unless a single square needs more.
+    /// Meshes made for one change of levels, unless a single square needs more. 0 counts as 1.
     pub meshes_per_change: usize,
 }
 
@@ -124,9 +127,9 @@ impl ShownLevels {
 #[reflect(Component, Default)]
 #[require(Transform)]
 pub struct DetailSource {
-    /// The vertical field of view in radians.
+    /// The vertical field of view in radians. A source whose field of view is not between 0 and pi is ignored.
     pub fov: f32,
-    /// The height of the picture in pixels.
+    /// The height of the picture in pixels. A source without a height greater than 0 is ignored.
     pub picture_height: f32,
 }
 

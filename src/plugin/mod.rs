@@ -76,6 +76,8 @@ pub use ground_file::{
 pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};
 #[doc(hidden)]
 pub use heightmap::{HeightmapLoader, HeightmapPlugin};
+#[cfg(feature = "store")]
+pub(crate) use heightmap::{read_limited, register_loader};
 pub(crate) use lod_state::WantedTiles;
 pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[cfg(feature = "render")]
@@ -91,8 +93,10 @@ pub use messages::{
 };
 #[cfg(feature = "picking")]
 pub use picking::TerrainPickingPlugin;
-#[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
 pub(crate) use places::Places;
+#[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
+#[cfg(any(feature = "scatter", feature = "landmass", feature = "debug"))]
+pub(crate) use places::voxel_metres;
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 pub use propagate::TerrainPropagatePlugin;
 #[cfg(feature = "render")]

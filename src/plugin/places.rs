@@ -6,6 +6,7 @@
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::system::SystemParam;
+use bevy::math::Vec3A;
 use bevy::prelude::*;
 #[cfg(feature = "avian")]
 use bevy::transform::helper::ComputeGlobalTransformError;
@@ -146,6 +147,14 @@ fn is_same_place(a: &GlobalTransform, b: &GlobalTransform) -> bool {
     let size = a.translation.abs().max_element().max(1.0);
     let scale = a.matrix3.x_axis.abs().max_element().max(a.matrix3.y_axis.abs().max_element()).max(1e-6);
     a.translation.abs_diff_eq(b.translation, 1e-5 * size) && a.matrix3.abs_diff_eq(b.matrix3, 1e-5 * scale)
+}
+
+/// The side of a voxel in world space, in metres, including the scale of parents; the longest side if they stretch it. Always
+/// positive.
+pub(crate) fn voxel_metres(place: &GlobalTransform) -> f32 {
+    let matrix = place.affine().matrix3;
+    let sides = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3A::length);
+    sides.into_iter().fold(f32::MIN_POSITIVE, f32::max)
 }
 
 /// How far from the origin terrains may be, in metres: farther away, places are rounded to more than a centimetre.

@@ -32,10 +32,10 @@ impl Default for BurrowEngine {
 pub struct BurrowSettings {
     /// Meshes swapped per frame. A commit is never split: a larger one is shown whole, and others wait for the next
     /// frame. A commit with more than 64 meshes is uploaded at 64 a frame and then shown at once; later edits of that
-    /// terrain wait meanwhile.
+    /// terrain wait meanwhile. By default 256; with 0, one commit a frame.
     pub swaps_per_frame: usize,
     /// Meshes of tiles and chunks passed to the renderer per frame while a terrain loads. They are shown once all are
-    /// there.
+    /// there. By default 256; 0 counts as 1.
     pub loads_per_frame: usize,
     /// Where the meshes of tiles and chunks are kept. In the render world only, unless set otherwise: that saves memory
     /// and a copy of each mesh, but Bevy's `Mesh` methods panic once such a mesh was extracted. Crates that read the

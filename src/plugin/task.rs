@@ -109,23 +109,19 @@ impl InFlight {
         pending: PendingDisplay,
         builder: SurfaceBuilder,
     ) -> Self {
-        // What was there before is not known, so all ground near is lit again.
-        let mut drawn: BTreeSet<MeshKey> = pending.drawn().collect();
-        if builder.has_sky_light() {
-            drawn.extend(parts_near(terrain.world(), pending.drawn()));
-        }
-        let drafts = drawn.iter().map(|&drawn| (drawn, terrain.world().draft(drawn))).collect();
-        let builder = match builder.has_sky_light() {
-            true => builder.lit_by(&Arc::new(LitWorld::new(terrain.snapshot(), Vec::new()))),
-            false => builder,
-        };
-        // Nodes are made from all of the world.
-        let cut = terrain.drawn_cut().map(|cut| (terrain.snapshot(), Arc::clone(cut)));
+        let (world, cut) = (terrain.snapshot(), terrain.drawn_cut().cloned());
         Self::start(number, None, move || {
             let _span = info_span!("burrow_mesh").entered();
-            let surfaces = builder.build_all(drafts, cut.as_ref().map(|(_, cut)| cut.as_ref()));
-            let nodes =
-                cut.map(|(world, cut)| world.redraw_tiles(&cut, drawn.iter().map(|drawn| drawn.tile())));
+            let mut drawn: BTreeSet<MeshKey> = pending.drawn().collect();
+            let mut builder = builder;
+            if builder.has_sky_light() {
+                // What was there before is not known, so all ground near is lit again.
+                drawn.extend(parts_near(&world, pending.drawn()));
+                builder = builder.lit_by(&Arc::new(LitWorld::new(Arc::clone(&world), Vec::new())));
+            }
+            let drafts = drawn.iter().map(|&drawn| (drawn, world.draft(drawn))).collect();
+            let surfaces = builder.build_all(drafts, cut.as_deref());
+            let nodes = cut.map(|cut| world.redraw_tiles(&cut, drawn.iter().map(|drawn| drawn.tile())));
             let nodes = builder.build_nodes(nodes.unwrap_or_default());
             let (change, times) = (Change::PendingDisplay(pending), TaskTimes::default());
             TaskOutput { change, surfaces, nodes, pieces: Vec::new(), times }

@@ -12,7 +12,9 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::components::{WorldStore, hold_now, warn_without_plugin};
+use crate::format::limits::Limits;
 use crate::format::{FormatError, Level, LevelFiles, pack_level, read_level, unpack_level};
+use crate::plugin::read_limited;
 use crate::store::RestoreLevelError;
 use crate::terrain::{Terrain, Version};
 use crate::threads::ThreadTask;
@@ -71,8 +73,7 @@ impl AssetLoader for LevelLoader {
         (): &(),
         _: &mut LoadContext<'_>,
     ) -> Result<BurrowLevel, LevelError> {
-        let mut bytes = Vec::new();
-        reader.read_to_end(&mut bytes).await?;
+        let bytes = read_limited(reader, Limits::FORMAT.packed_level as u64).await?;
         Ok(BurrowLevel(unpack_level(&bytes)?))
     }
 

@@ -44,7 +44,7 @@ pub(crate) use reading::{ReadWorld, WorldReader};
 
 use bevy::prelude::*;
 
-use crate::plugin::{BeforeLoad, BurrowSystems};
+use crate::plugin::{BeforeLoad, BurrowSystems, register_loader};
 
 /// Commits are handed to the store, in `Update`. What a game [puts](WorldStore::put) before this is saved with the
 /// commits of this frame.
@@ -92,8 +92,11 @@ impl Plugin for SavePlugin {
                 ),
             )
             .add_systems(Last, saving::finish_at_exit);
-        if app.world().contains_resource::<AssetServer>() {
-            app.init_asset::<BurrowLevel>().init_asset_loader::<LevelLoader>();
-        }
+        register_loader::<LevelLoader>(app);
+    }
+
+    // Once all plugins are there, the asset server is, in any order.
+    fn finish(&self, app: &mut App) {
+        register_loader::<LevelLoader>(app);
     }
 }

@@ -9,10 +9,10 @@ use bevy::prelude::*;
 use super::components::{LevelId, SavedWorld};
 use super::level::BurrowLevel;
 use crate::format::read_level;
-use crate::ground::Ground;
 use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble};
-use crate::terrain::{Terrain, TerrainSettings, Version, WorldParts};
+use crate::terrain::{self, LooseSettings, Terrain, TerrainSettings, Version, WorldParts};
 use crate::threads::{ThreadTask, Threads, free_later};
+use crate::volume::DiggingRules;
 
 /// How long to wait for a world that is open elsewhere: longer than an exiting server takes to close it.
 const LOCK_WAIT: Duration = Duration::from_secs(15);
@@ -118,10 +118,11 @@ pub(crate) struct WorldReader {
     /// The absolute folder: the process may change its working directory before it is read.
     folder: Folder,
     level: Option<(BurrowLevel, String)>,
-    ground: Arc<Ground>,
     pub(super) id: LevelId,
     /// The content of a world that does not exist yet.
-    parts: WorldParts,
+    world: Arc<terrain::World>,
+    rules: Option<DiggingRules>,
+    loose: Option<LooseSettings>,
     /// The number of the next record in the log of the terrain that this content is of.
     pub(super) next_record: u64,
     pub progress: Progress,
@@ -131,10 +132,11 @@ impl WorldReader {
     /// A reader for this saved world. If there is none yet, it is created from the terrain, on the level if one is
     /// given. The terrain's rules and loose settings also hold in a world that exists.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
-        let (ground, parts) = (terrain.world().shared_ground(), terrain.parts());
+        let (world, rules, loose) = (terrain.snapshot(), terrain.rules().cloned(), terrain.loose().copied());
         let next_record = terrain.log_numbers().map_or(0, |numbers| numbers.end);
         let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));
-        Self { saved, folder, level, ground, id, parts, next_record, progress: Progress::default() }
+        let progress = Progress::default();
+        Self { saved, folder, level, id, world, rules, loose, next_record, progress }
     }
 
     /// Reads the world, or creates it. Waits while another process has it open.
@@ -150,7 +152,8 @@ impl WorldReader {
 
     /// Reads the world, or creates one, unless it is open elsewhere.
     fn try_read(&self) -> Result<Found, StoreError> {
-        let Self { saved, folder, level, ground, id, parts, progress, .. } = self;
+        let Self { saved, folder, level, id, world, rules, loose, progress, .. } = self;
+        let ground = &world.shared_ground();
         // An unreadable level was reported when the terrain was built from it.
         let level = level.as_ref();
         let level =
@@ -158,7 +161,8 @@ impl WorldReader {
         let options = StoreOptions { level, progress: Some(progress.clone()), ..saved.options() };
         if !Store::is_in(folder.path()) {
             let settings = TerrainSettings { chunk_size: id.chunk_size, voxel_size: id.voxel_size };
-            let mut terrain = Terrain::restore(Arc::clone(ground), &settings, parts.clone())?;
+            let parts = WorldParts::of(world, rules.clone(), *loose);
+            let mut terrain = Terrain::restore(Arc::clone(ground), &settings, parts)?;
             match Store::create(folder.path(), &mut terrain, options.clone()) {
                 // Another process created it meanwhile.
                 Err(StoreError::Exists(_)) => {}
@@ -171,13 +175,13 @@ impl WorldReader {
         let (store, opened) = Store::open(folder.path(), Arc::clone(ground), options)?;
         let (mut terrain, troubles) = (opened.terrain, opened.troubles);
         // A new version of the game may have other rules than the one that saved the world.
-        if let Some(rules) = parts.rules.clone().filter(|rules| terrain.rules() != Some(rules))
+        if let Some(rules) = rules.clone().filter(|rules| terrain.rules() != Some(rules))
             && let Err(why) = terrain.set_rules(rules)
         {
             error!("the rules of the terrain do not hold for its saved world: {why}");
         }
-        if parts.loose.is_some() && parts.loose.as_ref() != terrain.loose() {
-            terrain.set_loose(parts.loose);
+        if loose.is_some() && loose.as_ref() != terrain.loose() {
+            terrain.set_loose(*loose);
         }
         Ok(Found::Old(ReadWorld { store, terrain, troubles }))
     }

@@ -1,5 +1,6 @@
 //! Patches: squares of plants of one species, kept up to date with a world.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
@@ -42,6 +43,13 @@ pub struct PlantPatch {
 }
 
 impl PlantPatch {
+    /// The patch of plants that [`Scatter::patch`] gave, as they stand in a world.
+    fn new(scatter: &Scatter, world: &World, plants: Vec<Plant>) -> Self {
+        let gone: Vec<bool> = plants.iter().map(|plant| !scatter.stands(world, plant)).collect();
+        let gone_count = gone.iter().filter(|gone| **gone).count();
+        Self { plants, gone, gone_count }
+    }
+
     /// All of its plants, those that do not stand too, in order of their ids.
     pub fn plants(&self) -> &[Plant] {
         &self.plants
@@ -100,9 +108,12 @@ impl PlantPatches {
 
     /// Adds a patch with the plants that [`Scatter::patch`] gave, which may have been made on another thread.
     pub fn insert(&mut self, world: &World, pos: PatchPos, plants: Vec<Plant>) {
-        let gone: Vec<bool> = plants.iter().map(|plant| !self.scatter.stands(world, plant)).collect();
-        let gone_count = gone.iter().filter(|gone| **gone).count();
-        self.patches.insert(pos, PlantPatch { plants, gone, gone_count });
+        self.insert_patch(pos, PlantPatch::new(&self.scatter, world, plants));
+    }
+
+    /// Adds a patch that [`Scatter::patch_in`] made. The caller checks what changed since.
+    pub(crate) fn insert_patch(&mut self, pos: PatchPos, patch: PlantPatch) {
+        self.patches.insert(pos, patch);
     }
 
     /// Removes a patch.
@@ -111,10 +122,13 @@ impl PlantPatches {
     }
 
     /// Checks the plants that may have gone or returned because these samples changed; all of them if `samples` is `None`.
+    ///
+    /// The time grows with the number of plants that are checked: those of the loaded patches within the
+    /// [reach](Scatter::reach) of the box. The box may be larger than the world.
     pub fn update(&mut self, world: &World, samples: Option<LatticeBox>) -> Vec<PlantChange> {
-        let Self { scatter, patches } = self;
         let mut changes = Vec::new();
         let Some(samples) = samples else {
+            let Self { scatter, patches } = self;
             for (&pos, patch) in patches.iter_mut() {
                 let (low, high) = scatter.patch_cells(pos);
                 patch.update(scatter, world, pos, (low, high), &mut changes);
@@ -122,20 +136,32 @@ impl PlantPatches {
             changes.sort_by_key(|change| change.plant.id);
             return changes;
         };
-        let (low, high) = scatter.affected(samples);
-        for species in 0..scatter.species().len() as u8 {
-            let size = scatter.patch_size(species);
-            let along = |low: i32, high: i32| low.div_euclid(size)..=high.div_euclid(size);
-            for z in along(low.z, high.z) {
-                for x in along(low.x, high.x) {
-                    let pos = PatchPos { species, x, z };
-                    if let Some(patch) = patches.get_mut(&pos) {
-                        patch.update(scatter, world, pos, (low, high), &mut changes);
-                    }
+        let (low, high) = self.scatter.affected(samples);
+        for species in 0..self.scatter.species().len() as u8 {
+            for pos in self.covering(species, low, high) {
+                if let Some(patch) = self.patches.get_mut(&pos) {
+                    patch.update(&self.scatter, world, pos, (low, high), &mut changes);
                 }
             }
         }
         changes
+    }
+
+    /// The patches of a species with cells of a rectangle, both corners included, row by row. Visits the squares of the
+    /// rectangle or all patches, whichever are fewer: the rectangle may be far larger than the world.
+    fn covering(&self, species: u8, low: Column, high: Column) -> Vec<PatchPos> {
+        let size = self.scatter.patch_size(species);
+        let along = |low: i32, high: i32| low.div_euclid(size)..=high.div_euclid(size);
+        let (xs, zs) = (along(low.x, high.x), along(low.z, high.z));
+        let count = |along: &RangeInclusive<i32>| along.end().abs_diff(*along.start()) as usize + 1;
+        if count(&xs).saturating_mul(count(&zs)) <= self.patches.len() {
+            let squares = zs.flat_map(|z| xs.clone().map(move |x| PatchPos { species, x, z }));
+            return squares.filter(|pos| self.patches.contains_key(pos)).collect();
+        }
+        let is_there = |pos: &PatchPos| pos.species == species && xs.contains(&pos.x) && zs.contains(&pos.z);
+        let mut found: Vec<PatchPos> = self.patches.keys().copied().filter(is_there).collect();
+        found.sort_unstable_by_key(|pos| (pos.z, pos.x));
+        found
     }
 
     /// Plants of these patches that stand on cells of a rectangle, both corners included; of each species for which `wanted`
@@ -151,12 +177,7 @@ impl PlantPatches {
             (low.x..=high.x).contains(&cell.x) && (low.z..=high.z).contains(&cell.z)
         };
         let wanted = (0..=u8::MAX).zip(wanted).filter(|(_, wanted)| *wanted).map(|(species, _)| species);
-        let positions = wanted.flat_map(move |species| {
-            let size = self.scatter.patch_size(species);
-            let along = move |low: i32, high: i32| low.div_euclid(size)..=high.div_euclid(size);
-            along(low.z, high.z)
-                .flat_map(move |z| along(low.x, high.x).map(move |x| PatchPos { species, x, z }))
-        });
+        let positions = wanted.flat_map(move |species| self.covering(species, low, high));
         positions.filter_map(|pos| self.get(pos)).flat_map(PlantPatch::standing).filter(is_near)
     }
 }
@@ -221,5 +242,11 @@ impl Scatter {
     pub fn patch(&self, ground: &Ground, pos: PatchPos) -> Vec<Plant> {
         let (low, high) = self.patch_cells(pos);
         self.plants(ground, low, high, |species| species == usize::from(pos.species))
+    }
+
+    /// A patch as it stands in a world.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn patch_in(&self, world: &World, pos: PatchPos) -> PlantPatch {
+        PlantPatch::new(self, world, self.patch(world.ground(), pos))
     }
 }

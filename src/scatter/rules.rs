@@ -44,9 +44,9 @@ pub struct Species {
     pub room: f32,
     /// Smallest and largest size, 1/16 to 16, as a factor.
     pub size: (f32, f32),
-    /// Lowest and highest ground.
+    /// Lowest and highest ground, -32768 to 32768.
     pub height: (f32, f32),
-    /// Least and greatest slope of the ground, as rise over run: 0 is level, 1 is 45 degrees.
+    /// Least and greatest slope of the ground, as rise over run, 0 to 128: 0 is level, 1 is 45 degrees.
     pub slope: (f32, f32),
     /// Materials on which it grows; all of them if there are none.
     pub materials: Vec<MaterialId>,
@@ -117,7 +117,7 @@ pub struct Stem {
     pub height: f32,
 }
 
-/// How far a species is drawn, in voxels. Where plants stand does not depend on it.
+/// How far a species is drawn, in voxels, each 0 to 65536. Where plants stand does not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ViewDistances {

@@ -13,7 +13,7 @@ use crate::format::FormatError;
 use crate::format::level::{self, Level, LevelFiles};
 use crate::format::limits::Limits;
 use crate::ground::Ground;
-use crate::terrain::{RestoreError, Terrain};
+use crate::terrain::{RestoreError, Terrain, World, WorldParts};
 
 /// The reason why no terrain can be made from a level.
 #[derive(Debug, thiserror::Error)]
@@ -30,7 +30,12 @@ pub enum RestoreLevelError {
 impl Level {
     /// The present state of a terrain as a level, without history and waiting edits.
     pub fn of(terrain: &Terrain) -> Self {
-        Self::new(terrain.parts(), terrain.voxel_size(), Default::default(), terrain.world().ground())
+        Self::of_parts(terrain.parts(), terrain.voxel_size(), terrain.world())
+    }
+
+    /// The level of a world whose parts these are.
+    pub(crate) fn of_parts(parts: WorldParts, voxel_size: f32, world: &World) -> Self {
+        Self::new(parts, voxel_size, Default::default(), world.ground())
     }
 
     /// A terrain from this level over a ground, which should be the one that the level was made on.

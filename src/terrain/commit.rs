@@ -8,11 +8,10 @@ use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
 use super::resolve::{FieldChange, Resolved, install, patch_of};
-use crate::lattice::{ChunkPos, LatticeBox, RegionPos, SNAP};
-use crate::redraw::{DrawnCut, MeshUpdates, Stages, relit_parts};
+use crate::lattice::{ChunkPos, LatticeBox, RegionPos};
+use crate::redraw::{DrawnCut, MeshUpdates, Stages};
 use crate::volume::UniformBricks;
-use crate::world::sky::{LitWorld, SkyColumns, SkyLights};
-use crate::world::{MeshKey, NewSurfaces, Patch, World};
+use crate::world::{NewSurfaces, Patch, World};
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
@@ -88,40 +87,11 @@ impl Commit {
 
     /// The bricks and fields that it leads to, as its [record](super::CommitRecord) lists them.
     pub fn change(&self) -> Patch {
-        patch_of(&self.changes, self.whole.as_deref(), self.next_field)
-    }
-
-    /// Computes the light of all surfaces that a commit to this world makes or lights otherwise, and returns the number of
-    /// their vertices: for benchmarks.
-    #[doc(hidden)]
-    pub fn light(&self, before: Arc<World>) -> usize {
-        let lit = LitWorld::new(before, self.change().bricks);
-        let tiles = self.meshes.tiles.iter().map(|(tile, _)| MeshKey::Tile(*tile));
-        let chunks = self.meshes.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk));
-        let redrawn: Vec<MeshKey> = tiles.chain(chunks).collect();
-        let relit = relit_parts(&lit, |drawn| redrawn.contains(&drawn));
-        let mut parts: Vec<MeshKey> = redrawn.into_iter().chain(relit).collect();
-        parts.sort_unstable_by_key(|drawn| (drawn.tile(), *drawn));
-        let mut count = 0;
-        for parts in parts.chunk_by(|a, b| a.tile() == b.tile()) {
-            let (low, high) = lit.before().grid().tile_cells(parts[0].tile());
-            let mut lights = SkyColumns::new(lit.view(), low, high);
-            for &drawn in parts {
-                let MeshKey::Chunk(chunk) = drawn else {
-                    count += std::hint::black_box(lights.ground_lights()).len();
-                    continue;
-                };
-                let fresh = self.meshes.chunks.iter().find(|(own, _)| *own == chunk);
-                let kept = || lit.before().meshes.surfaces.get(chunk).map(|surface| surface.mesh());
-                let Some(mesh) = fresh.map(|(_, surface)| surface.mesh()).or_else(kept) else { continue };
-                let origin = lit.before().grid().origin(chunk) * SNAP;
-                for vertex in &mesh.vertices {
-                    std::hint::black_box(lights.light(origin + vertex.position));
-                }
-                count += mesh.vertices.len();
-            }
+        // A record holds it already, merged from all groups.
+        match &self.record {
+            Some(record) => record.change().clone(),
+            None => patch_of(&self.changes, self.whole.as_deref(), self.next_field),
         }
-        count
     }
 
     /// Hash of every edited sample, once this is committed: equal for equal edits of equal samples, whatever ran them.
@@ -153,12 +123,17 @@ impl Commit {
     /// none.
     #[doc(hidden)]
     pub fn changed_boxes(&self) -> Vec<LatticeBox> {
-        let mut boxes = BTreeMap::<RegionPos, LatticeBox>::new();
+        let mut boxes = BTreeMap::new();
+        self.add_changed_boxes(&mut boxes);
+        boxes.into_values().collect()
+    }
+
+    /// Adds the bricks that it changes to the boxes of their regions.
+    pub(super) fn add_changed_boxes(&self, boxes: &mut BTreeMap<RegionPos, LatticeBox>) {
         for (pos, _) in self.changes.iter().flat_map(|delta| &delta.change.patch.bricks) {
             let own = pos.samples();
             boxes.entry(RegionPos::of(*pos)).and_modify(|all| *all = all.union(own)).or_insert(own);
         }
-        boxes.into_values().collect()
     }
 
     /// The receipts of its orders.

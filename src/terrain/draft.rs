@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::model::Terrain;
+use super::order::Request;
 use super::queue::{Queue, Together, WorkLimits};
 use super::receipt::Receipt;
 use super::transaction::Transaction;
@@ -33,7 +34,9 @@ impl Terrain {
         queue.limits = WorkLimits::UNBOUNDED;
         let together = Together::Batch(unique());
         for edit in edits {
-            queue.push(self.world.grid(), edit.into(), together, (self.rules.clone(), self.loose));
+            let request = Request::from(edit);
+            let work = request.work(self.world.grid());
+            queue.push(request, work, together, (self.rules.clone(), self.loose));
         }
         let mut world = Arc::clone(&self.world);
         let (mut receipts, mut regions_hash) = (Vec::new(), world.sample_hash);

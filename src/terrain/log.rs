@@ -44,7 +44,7 @@ impl RecordDraft {
         let (mut rules, mut entries) = (None::<[Rules; 2]>, Vec::with_capacity(submissions.len() + 2));
         for (submission, receipt) in submissions.iter().zip(receipts) {
             let (Ok(order), Ok(_)) = (&submission.order, &receipt.outcome) else { continue };
-            if let Order::Undo | Order::Redo | Order::Parts { .. } = order {
+            if order.asked().is_logged_as_change() {
                 entries.push(LogEntry::Change);
                 continue;
             }
@@ -64,6 +64,11 @@ impl RecordDraft {
         let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
         let bytes = bytes_of(&entries, &change) + room;
         Self { rules, entries, change, bytes }
+    }
+
+    /// What changes.
+    pub fn change(&self) -> &Patch {
+        &self.change
     }
 }
 

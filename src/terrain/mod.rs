@@ -14,6 +14,8 @@
 //! ```
 
 mod commit;
+#[cfg(feature = "tools")]
+mod commit_light;
 mod draft;
 #[cfg(feature = "net")]
 mod for_net;
@@ -58,7 +60,7 @@ pub(crate) use crate::world::unique;
 pub use crate::world::{GlbError, SplatMaps};
 pub use crate::world::{Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, World};
 #[doc(hidden)]
-pub use crate::world::{MeshKey, MeshKey as Drawn, Version};
+pub use crate::world::{MeshKey, Version};
 pub use commit::Commit;
 #[doc(hidden)]
 pub use draft::Draft;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::receipt::{Asked, Rejection};
 #[cfg(feature = "plugin")]
 use crate::brush::BrushError;
-use crate::brush::{Brush, Edit, Kind};
-use crate::edits::most_bricks;
+use crate::brush::{Brush, Edit};
+use crate::edits::{EDIT_WORK, edit_work};
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, LatticeBox};
 use crate::loose::LooseSettings;
@@ -51,12 +51,8 @@ pub enum Order {
     Loose(Option<LooseSettings>),
 }
 
-/// The fixed work of an edit, in bricks.
-const EDIT: u64 = 20;
 /// The work that any other order counts as, in bricks.
 const STEP: u64 = 200;
-/// How many times as much work a brick is for an operation that reads a stencil around each sample.
-const LOOKS_AROUND: u64 = 4;
 
 impl Order {
     /// Replaces parts of the world; see [`Order::Parts`].
@@ -90,8 +86,7 @@ impl Order {
     /// Its work, in bricks.
     pub(super) fn work(&self, grid: ChunkGrid) -> u64 {
         let Some(edit) = self.edit() else { return STEP };
-        let weight = if edit.kind() == Kind::Sculpt { LOOKS_AROUND } else { 1 };
-        EDIT + weight * most_bricks(grid, edit).unwrap_or(0)
+        edit_work(grid, edit).unwrap_or(EDIT_WORK)
     }
 
     /// Whether it replaces parts of the world that steps of history refer to.
@@ -135,7 +130,7 @@ impl Request {
 
     /// Its work, in bricks.
     pub(super) fn work(&self, grid: ChunkGrid) -> u64 {
-        self.order.as_ref().map_or(EDIT, |order| order.work(grid))
+        self.order.as_ref().map_or(EDIT_WORK, |order| order.work(grid))
     }
 
     /// The kind of its order. Only edits are invalid.

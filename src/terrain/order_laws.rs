@@ -119,7 +119,7 @@ fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rn
                 let together = *frames.entry(*frame).or_insert_with(|| Together::Batch(unique()));
                 let request = Request::from(brush);
                 match terrain.admit(&request) {
-                    Ok(()) => terrain.queue_order(request, together).expect("no rules"),
+                    Ok(work) => terrain.queue_order(request, work, together).expect("no rules"),
                     Err(rejection) => said.hear(vec![Receipt::of_edit(brush.tag, Err(rejection))]),
                 }
             }

@@ -1,24 +1,27 @@
 //! Changes that a game committed to a terrain directly, until the plugin shows them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::commit::Commit;
 use super::resolve::FieldChange;
-use crate::lattice::ChunkPos;
+use crate::lattice::{ChunkPos, LatticeBox, RegionPos};
 use crate::world::{MeshKey, Version, World};
 
-/// Tiles, chunks and fields that changed, and the versions before and after.
+/// Tiles, chunks, fields and samples that changed, and the versions before and after.
 pub(crate) struct PendingDisplay {
     from: Version,
     to: Version,
     drawn: BTreeSet<MeshKey>,
     fields: Vec<(ChunkPos, FieldChange)>,
+    /// Boxes around the bricks that changed, by region.
+    boxes: BTreeMap<RegionPos, LatticeBox>,
 }
 
 impl PendingDisplay {
     /// Nothing yet, on top of what is shown.
     pub(super) fn nothing(shown: Version) -> Self {
-        Self { from: shown, to: shown, drawn: BTreeSet::new(), fields: Vec::new() }
+        let (drawn, fields, boxes) = (BTreeSet::new(), Vec::new(), BTreeMap::new());
+        Self { from: shown, to: shown, drawn, fields, boxes }
     }
 
     /// The version of the world with all of it.
@@ -51,12 +54,21 @@ impl PendingDisplay {
         &self.fields
     }
 
+    /// Boxes around the samples that changed, one for each region of the lattice.
+    #[cfg(any(feature = "scatter", feature = "landmass"))]
+    pub fn boxes(&self) -> Vec<LatticeBox> {
+        self.boxes.values().copied().collect()
+    }
+
     /// The changes of a commit to the world at this version. They are read from its lists, because the game may have
     /// taken its meshes.
     pub(super) fn of(commit: &Commit, before: Version) -> Self {
         let tiles = commit.kept.rings.iter().map(|(tile, _)| MeshKey::Tile(*tile));
         let chunks = commit.kept.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk));
-        Self { drawn: tiles.chain(chunks).collect(), fields: commit.news.clone(), ..Self::nothing(before) }
+        let mut boxes = BTreeMap::new();
+        commit.add_changed_boxes(&mut boxes);
+        let (drawn, fields) = (tiles.chain(chunks).collect(), commit.news.clone());
+        Self { from: before, to: before, drawn, fields, boxes }
     }
 
     /// Adds what follows it directly and leads to this version; anything else is left out, and makes it useless.
@@ -64,6 +76,9 @@ impl PendingDisplay {
         if self.to == next.from {
             self.drawn.extend(next.drawn);
             self.fields.extend(next.fields);
+            for (region, samples) in next.boxes {
+                self.boxes.entry(region).and_modify(|all| *all = all.union(samples)).or_insert(samples);
+            }
             self.to = to;
         }
     }

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use super::order::{Order, Request};
 use super::receipt::{Asked, Rejection};
 use crate::brush::Edit;
-use crate::lattice::ChunkGrid;
 use crate::loose::LooseSettings;
 use crate::volume::DiggingRules;
 
@@ -118,16 +117,16 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    /// Queues an order. An edit joins the group of the one before it if both belong `together`; edits after any other
+    /// Queues an order of this much work. An edit joins the group of the one before it if both belong `together`; edits after any other
     /// order begin a new group.
     pub fn push(
         &mut self,
-        grid: ChunkGrid,
         request: Request,
+        work: u64,
         together: Together,
         (rules, loose): (Option<Arc<DiggingRules>>, Option<LooseSettings>),
     ) {
-        let (work, is_edit) = (request.work(grid), request.asked() == Asked::Edit);
+        let is_edit = request.asked() == Asked::Edit;
         let together = request.stroke.map_or(together, Together::Stroke);
         let group = match self.open {
             Some((open, group)) if open == together => group,

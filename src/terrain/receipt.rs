@@ -79,6 +79,16 @@ impl Asked {
     pub fn is_step(self) -> bool {
         matches!(self, Self::Undo | Self::Redo)
     }
+
+    /// Whether logs hold it as a change of parts, and not as an order.
+    pub(crate) fn is_logged_as_change(self) -> bool {
+        matches!(self, Self::Undo | Self::Redo | Self::Parts)
+    }
+
+    /// Whether it sets what later edits obey, and does not change the world.
+    pub(crate) fn is_setting(self) -> bool {
+        matches!(self, Self::Rules | Self::Loose)
+    }
 }
 
 /// What an order changed. An order that changed nothing, such as a dig in the air, leaves all of this empty.

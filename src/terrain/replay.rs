@@ -10,8 +10,9 @@ use super::receipt::{Receipt, Rejection};
 use super::record::{CommitRecord, WorldParts};
 use super::resolve::world_of;
 use crate::ground::Ground;
-use crate::volume::RulesError;
-use crate::world::{TerrainError, TerrainSettings};
+use crate::loose::LooseSettings;
+use crate::volume::{DiggingRules, RulesError};
+use crate::world::{TerrainError, TerrainSettings, World};
 
 /// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -76,18 +77,20 @@ impl ReplayError {
     }
 }
 
+impl WorldParts {
+    /// All of a world but its ground, under these rules and settings of loose pieces. Bricks are shared, not copied, but listing them
+    /// takes long in a large world.
+    pub(crate) fn of(world: &World, rules: Option<DiggingRules>, loose: Option<LooseSettings>) -> Self {
+        let (change, chunk_size) = (world.all_parts(), world.grid.size() as u32);
+        Self { change, chunk_size, revision: world.revision, rules, loose }
+    }
+}
+
 impl Terrain {
     /// All of the world but its ground, as [`restore`](Self::restore) takes it. Bricks are shared, not copied. History
     /// and what waits are not part of it.
     pub fn parts(&self) -> WorldParts {
-        let world = &self.world;
-        WorldParts {
-            change: world.all_parts(),
-            chunk_size: world.grid.size() as u32,
-            revision: world.revision,
-            rules: self.rules().cloned(),
-            loose: self.loose,
-        }
+        WorldParts::of(&self.world, self.rules().cloned(), self.loose)
     }
 
     /// A terrain from the parts of a world over this ground. Nothing is meshed: surfaces are made when they are asked

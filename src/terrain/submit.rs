@@ -3,7 +3,7 @@
 use super::model::Terrain;
 use super::order::{Order, Request};
 use super::queue::{Together, WorkLimits};
-use super::receipt::{Applied, Asked, Receipt, Rejection};
+use super::receipt::{Applied, Receipt, Rejection};
 use crate::volume::DiggingRules;
 use crate::world::unique;
 
@@ -22,7 +22,7 @@ impl Terrain {
     }
 
     /// Queues brushes, edits and other orders. Edits that follow each other are one step of undo, except for those that
-    /// are part of strokes.
+    /// are part of strokes. Rules and settings of loose pieces have no receipt, unless the rules are invalid.
     ///
     /// ```
     /// # use bevy_burrow::prelude::*;
@@ -47,8 +47,8 @@ impl Terrain {
             let request = order.into();
             let (asked, tag) = (request.asked(), request.tag);
             let outcome = match self.admit(&request) {
-                Ok(()) => self.queue_order(request, together),
-                full => full,
+                Ok(work) => self.queue_order(request, work, together),
+                Err(full) => Err(full),
             };
             if let Err(why) = outcome {
                 self.answer(Receipt { asked, tag, outcome: Err(why) });
@@ -56,18 +56,28 @@ impl Terrain {
         }
     }
 
-    /// Whether there is room for an order. Rules and settings of loose pieces are not queued.
-    pub(crate) fn admit(&self, request: &Request) -> Result<(), Rejection> {
-        let is_queued = !matches!(request.asked(), Asked::Rules | Asked::Loose);
-        let has_room = !is_queued || self.queue.has_room(request.work(self.world.grid()));
-        if has_room { Ok(()) } else { Err(Rejection::Overloaded) }
+    /// The work of an order, if there is room for it. Rules and settings of loose pieces are not queued, and are none.
+    ///
+    /// # Errors
+    /// When there is no room.
+    pub(crate) fn admit(&self, request: &Request) -> Result<u64, Rejection> {
+        if request.asked().is_setting() {
+            return Ok(0);
+        }
+        let work = request.work(self.world.grid());
+        if self.queue.has_room(work) { Ok(work) } else { Err(Rejection::Overloaded) }
     }
 
-    /// Queues an order, whether there is room for it or not.
+    /// Queues an order of this much work, whether there is room for it or not.
     ///
     /// # Errors
     /// When rules are invalid.
-    pub(crate) fn queue_order(&mut self, request: Request, together: Together) -> Result<(), Rejection> {
+    pub(crate) fn queue_order(
+        &mut self,
+        request: Request,
+        work: u64,
+        together: Together,
+    ) -> Result<(), Rejection> {
         match request.order {
             Ok(Order::Rules(rules)) => {
                 self.set_rules(rules.as_deref().map_or_else(DiggingRules::default, Clone::clone))?;
@@ -75,7 +85,7 @@ impl Terrain {
             Ok(Order::Loose(settings)) => self.set_loose(settings),
             _ => {
                 let rules = (self.rules.clone(), self.loose);
-                self.queue.push(self.world.grid(), request, together, rules);
+                self.queue.push(request, work, together, rules);
             }
         }
         Ok(())
@@ -101,6 +111,9 @@ impl Terrain {
     /// on this thread. Returns their receipts; those of orders that waited are kept for
     /// [`take_receipts`](Self::take_receipts). This is for tools and tests; in a game the plugin does it.
     ///
+    /// Rules and settings of loose pieces have no receipt, unless the rules are invalid: then it comes last, behind those of all
+    /// orders.
+    ///
     /// Edits that follow each other are one step of undo, except for strokes among them; a game that replays a journal
     /// may want to [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.
     ///
@@ -114,7 +127,8 @@ impl Terrain {
         for order in orders {
             let request = order.into();
             let asked = request.asked();
-            let outcome = self.queue_order(request, together);
+            let work = request.work(self.world.grid());
+            let outcome = self.queue_order(request, work, together);
             invalid.extend(outcome.err().map(|why| Receipt::of(asked, Err(why))));
         }
         let mut receipts = self.finish();

@@ -5,7 +5,6 @@ use std::time::Duration;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::lifecycle::Discard;
 use bevy::ecs::system::SystemParam;
-use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::link::{Link, MAX_PENDING, PieceMessage, Standing, Worked};
@@ -403,10 +402,10 @@ const LAST_FRAME: Duration = Duration::from_secs(2);
 pub(super) fn send_last(mut shared: Query<&mut SharedTerrain>, mut messages: ToOwnServer) {
     for mut shared in &mut shared {
         let Some(link) = &mut shared.bypass_change_detection().link else { continue };
-        let start = Instant::now();
-        while link.client.is_none() && link.task.is_some() && start.elapsed() < LAST_FRAME {
-            link.client = link.task.as_mut().and_then(ThreadTask::finish).map(|worked| worked.client);
-            std::thread::sleep(Duration::from_millis(1));
+        if link.client.is_none()
+            && let Some(task) = &mut link.task
+        {
+            link.client = task.finish_within(LAST_FRAME).map(|worked| worked.client);
         }
         let Some(client) = link.client.as_mut().filter(|_| link.greeted.is_some()) else { continue };
         for request in link.requests.drain(..) {

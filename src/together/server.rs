@@ -185,17 +185,17 @@ impl GroundServer {
     /// world that is still being read has nothing to save.
     pub fn finish(&mut self) {
         let deadline = Instant::now() + EXIT_WAIT;
-        while let State::Running(_) = self.state {
-            if let Some(parts) = self.take_state(|_| {}) {
-                self.state = State::Idle(parts);
-            } else if Instant::now() > deadline {
-                error!("the last edits are not saved: the server is still busy");
-                self.has_timed_out = true;
-                return;
-            } else {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        }
+        self.state = match std::mem::replace(&mut self.state, State::Unavailable) {
+            State::Running(mut task) => match task.finish_within(EXIT_WAIT) {
+                Some(parts) => State::Idle(parts),
+                None => {
+                    error!("the last edits are not saved: the server is still busy");
+                    (self.state, self.has_timed_out) = (State::Running(task), true);
+                    return;
+                }
+            },
+            other => other,
+        };
         let now = self.start.elapsed();
         if let State::Idle(parts) = &mut self.state {
             self.waiting.drain(..).for_each(|request| request(parts, now));

@@ -181,3 +181,18 @@ fn tiles_and_chunks_belong_to_their_terrain_when_they_are_added() {
     assert!(all > 17, "{all}");
     assert_eq!(orphans, 0, "of {all} came without a parent");
 }
+
+#[cfg(feature = "store")]
+#[test]
+fn levels_are_assets_in_whatever_order_plugins_are_added() {
+    use bevy_burrow::saves::BurrowLevel;
+
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, BurrowPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin));
+    app.finish();
+    app.cleanup();
+    assert!(app.world().contains_resource::<Assets<BurrowLevel>>());
+    let assets = app.world().resource::<AssetServer>();
+    let loader = bevy::tasks::block_on(assets.get_asset_loader_with_extension("burrow_level"));
+    assert!(loader.is_ok(), "{:?}", loader.err());
+}

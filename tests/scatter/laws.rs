@@ -334,3 +334,34 @@ fn patches_that_follow_edits_are_those_made_anew() {
         }
     }
 }
+
+#[test]
+fn a_box_that_is_larger_than_the_world_holds_all_its_plants() {
+    let rng = &mut Rng::with_seed(6);
+    let ground = random_ground_of_size(rng, 3, 60, 50);
+    let scatter = std::sync::Arc::new(scatter(&random_rules(rng)));
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    let mut patches = PlantPatches::new(scatter.clone());
+    for species in 0..scatter.species().len() as u8 {
+        for (x, z) in (0..4).flat_map(|x| (0..4).map(move |z| (x, z))) {
+            let pos = PatchPos { species, x, z };
+            patches.insert(terrain.world(), pos, scatter.patch(terrain.world().ground(), pos));
+        }
+    }
+    let all = patches.iter().map(|(_, patch)| patch.standing().count()).sum::<usize>();
+    let (low, high) = (Column::new(i32::MIN, i32::MIN), Column::new(i32::MAX, i32::MAX));
+    assert_eq!(patches.near_of(low, high, [true; 5]).count(), all);
+    let shape = Shape::sphere(
+        Vec3::new(30.0, terrain.world().ground().height(Column::new(30, 25)) as f32 / 256.0, 25.0),
+        9.0,
+    );
+    terrain.apply_one(Brush::dig(shape));
+    let mut expected = patches.clone();
+    let mut expected = expected.update(terrain.world(), None);
+    let everything = LatticeBox { min: glam::IVec3::MIN, max: glam::IVec3::MAX };
+    let mut changes = patches.update(terrain.world(), Some(everything));
+    changes.sort_by_key(|change| change.plant.id);
+    expected.sort_by_key(|change| change.plant.id);
+    assert!(!changes.is_empty());
+    assert_eq!(changes, expected);
+}

@@ -252,3 +252,68 @@ fn what_a_game_digs_through_the_model_is_told_too() {
     assert!(gone > 0);
     assert_eq!(app.world().resource::<Log>().removed.len(), gone);
 }
+
+/// Moves the source away until nothing is loaded, and then to a place.
+fn move_source(app: &mut App, terrain: Entity, radius: f32, to: Vec3) {
+    let world = app.world_mut();
+    let source = world.query_filtered::<Entity, With<PlantSource>>().single(world).expect("one");
+    world.entity_mut(source).insert((PlantSource { radius: 10.0 }, Transform::from_xyz(9000.0, 0.0, 0.0)));
+    wait(app, |world| {
+        world.get::<ShownPlants>(terrain).expect("plants").patches().expect("rules").is_empty()
+    });
+    app.world_mut().entity_mut(source).insert((PlantSource { radius }, Transform::from_translation(to)));
+    app.update();
+    wait(app, |world| {
+        let shown = world.get::<ShownPlants>(terrain).expect("plants");
+        !shown.is_loading() && !shown.patches().expect("rules").is_empty()
+    });
+}
+
+#[test]
+fn a_radius_is_in_metres_under_a_scaled_parent_too() {
+    let (mut app, terrain) = app(false, ());
+    let parent = app.world_mut().spawn(Transform::from_scale(Vec3::splat(2.0))).id();
+    app.world_mut().entity_mut(terrain).insert(ChildOf(parent));
+    // Ten voxels around cell 93: the patch of cells 64 to 79 is farther away.
+    move_source(&mut app, terrain, 20.0, Vec3::new(186.0, 0.0, 186.0));
+    let shown = app.world().get::<ShownPlants>(terrain).expect("plants");
+    for (pos, _) in shown.patches().expect("rules").iter() {
+        assert_eq!((pos.x, pos.z), (5, 5));
+    }
+}
+
+#[test]
+fn an_infinite_radius_loads_what_is_near_enough() {
+    let (mut app, terrain) = app(false, ());
+    move_source(&mut app, terrain, f32::INFINITY, Vec3::new(48.0, 0.0, 48.0));
+    assert_up_to_date(&app, terrain, "with an infinite radius");
+    let shown = app.world().get::<ShownPlants>(terrain).expect("plants");
+    assert_eq!(shown.patches().expect("rules").len(), 2 * 36, "all of the world is near enough");
+}
+
+#[test]
+fn plants_that_load_while_the_ground_changes_are_up_to_date() {
+    let (mut app, terrain) = app(false, ());
+    let world = app.world_mut();
+    let source = world.query_filtered::<Entity, With<PlantSource>>().single(world).expect("one");
+    for turn in 0..12 {
+        let away = Transform::from_xyz(if turn % 2 == 0 { 9000.0 } else { 48.0 }, 0.0, 48.0);
+        app.world_mut().entity_mut(source).insert(away);
+        let at = Vec3::new(20.0 + 5.0 * turn as f32, 20.5, 50.0);
+        if turn % 4 == 3 {
+            let mut model = app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
+            model.apply([Brush::dig(Shape::sphere(at, 3.0))]);
+        } else {
+            dig(&mut app, at, 3.0);
+        }
+        (0..4).for_each(|_| app.update());
+    }
+    wait(&mut app, |world| {
+        let model = world.get::<Terrain>(terrain).expect("a terrain");
+        let shown = world.get::<ShownPlants>(terrain).expect("plants");
+        let is_loaded = shown.patches().is_some_and(|patches| !patches.is_empty()) && !shown.is_loading();
+        model.history().undos == 12 && is_loaded
+    });
+    (0..3).for_each(|_| app.update());
+    assert_up_to_date(&app, terrain, "at the end");
+}

@@ -73,6 +73,9 @@ impl ElevationGrid {
     /// The grid as a grey image whose black and white are the least and greatest value, which are returned: for an
     /// [`ImageSource`](crate::ground::ImageSource) or a stamp. Values are rounded to 1/65535 of that range; voids
     /// become black.
+    ///
+    /// # Errors
+    /// When all samples are voids.
     pub fn to_grey_image(&self) -> Result<(GreyImage, [f32; 2]), ImportError> {
         let count = self.samples.len() as u64;
         let [low, high] = self.range().ok_or(ImportError::AllVoid { samples: count })?;

@@ -20,6 +20,13 @@ pub enum HeightFormat {
     Ascii,
 }
 
+impl HeightFormat {
+    /// The format of files that are recognised by their name alone, because they have no header: `.hgt`.
+    pub(crate) fn of_name(name: &str) -> Option<Self> {
+        name.to_ascii_lowercase().ends_with(".hgt").then_some(Self::Hgt)
+    }
+}
+
 impl fmt::Display for HeightFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -37,8 +37,7 @@ impl ElevationGrid {
         options: &ImportOptions,
     ) -> Result<(Self, ImportReport), ImportError> {
         let path = path.as_ref();
-        let is_hgt = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hgt"));
-        let format = options.format.or(is_hgt.then_some(HeightFormat::Hgt));
+        let format = options.format.or_else(|| HeightFormat::of_name(&path.to_string_lossy()));
         Self::decode(&read_file(path, &options.limits)?, &ImportOptions { format, ..options.clone() })
     }
 

@@ -28,6 +28,7 @@ pub struct ImportOptions {
     pub outlier_distance: Option<f32>,
     /// Limits on the size of a file and on memory: by default 2 GiB on disk and 4 GiB of memory, enough for 16385 x
     /// 16385 floats.
+    /// Files of more than 16385 samples along a side are refused in any case.
     pub limits: ImageLimits,
 }
 

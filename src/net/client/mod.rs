@@ -301,12 +301,6 @@ impl Client {
         }
     }
 
-    /// An earlier name of [`submit`](Self::submit).
-    #[doc(hidden)]
-    pub fn dig(&mut self, edit: Edit) {
-        self.submit(edit);
-    }
-
     fn send_edit(&mut self, sequence: u64, edit: Edit) {
         let cost = cost(self.replica.world().grid(), &edit).unwrap_or_default();
         self.outbox.edit(sequence, edit, cost);

@@ -114,8 +114,8 @@ impl Server {
                 SequenceCheck::Impossible => return false,
             }
             // One that is too large is refused, however often it comes: that is no flood.
-            let cost = cost(self.terrain.world().grid(), &edit).unwrap_or_default();
-            let counted = cost.min(self.settings.cost.burst / 16);
+            let cost = cost(self.terrain.world().grid(), &edit);
+            let counted = cost.unwrap_or_default().min(self.settings.cost.burst / 16);
             if !self.may_go_on(client, counted, now) {
                 return true;
             }
@@ -123,7 +123,7 @@ impl Server {
                 self.refuse(client, sequence, *why);
                 continue;
             }
-            match self.validate(client, &edit, now) {
+            match self.validate(client, &edit, cost, now) {
                 Ok(cost) => self.order_edit(client, sequence, edit, cost),
                 Err(why) => self.refuse(client, sequence, why),
             }

@@ -8,7 +8,7 @@ use super::{Server, UndoPolicy};
 use crate::brush::{Edit, Shape};
 use crate::lattice::ONE;
 use crate::net::message::{ClientId, Refusal};
-use crate::net::price::{UNDO, cost};
+use crate::net::price::UNDO;
 
 /// Whether all of an edit's shape, with its roughness, lies within a distance of a place.
 fn is_within(place: IVec3, edit: &Edit, allowed: u32) -> bool {
@@ -35,9 +35,16 @@ fn squared_length(way: I64Vec3) -> u128 {
 }
 
 impl Server {
-    /// Checks an edit, and charges its cost to the client's bucket; returns the cost.
-    pub(super) fn validate(&mut self, client: ClientId, edit: &Edit, now: Duration) -> Result<u64, Refusal> {
-        let cost = cost(self.terrain.world().grid(), edit).ok_or(Refusal::OutsideWorld)?;
+    /// Checks an edit, and charges its cost to the client's bucket; returns the cost. An edit without a cost reaches nothing
+    /// of the world.
+    pub(super) fn validate(
+        &mut self,
+        client: ClientId,
+        edit: &Edit,
+        cost: Option<u64>,
+        now: Duration,
+    ) -> Result<u64, Refusal> {
+        let cost = cost.ok_or(Refusal::OutsideWorld)?;
         let player = self.players.player(client);
         if let Some(reach) = self.settings.reach
             && !player.place.is_some_and(|place| is_within(place, edit, reach.allowed()))
