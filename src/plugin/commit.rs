@@ -13,11 +13,11 @@ use super::entities::TerrainEntities;
 use super::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
 use super::load::Loading;
 use super::lod_state::{LodState, ShownLevels, Watchers};
-use super::meshes::{VertexExtras, VertexKind};
 use super::processor::{BuildSettings, BuiltSurface};
 use super::reports::{Report, Reports};
 use super::same_frame::SameFrame;
 use super::task::{Change, InFlight, TaskCounter, TaskOutput, UPLOADS_PER_FRAME};
+use super::vertex_kind::{VertexExtras, VertexKind};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, Held, LoosePieceFound, MaterialColors,
     SkyLight, SlimVertices,

@@ -4,8 +4,8 @@ use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
-use super::meshes::VertexKind;
 use super::processor::node_origin;
+use super::vertex_kind::VertexKind;
 use super::{
     Chunk, CommitAction, Field, FieldChanged, FieldCreated, FieldMerged, ShownSurface, TerrainReady, Tile,
 };

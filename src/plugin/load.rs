@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use bevy::ecs::entity::EntityHashMap;
-use bevy::ecs::entity_disabling::Disabled;
 use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -13,12 +12,10 @@ use rayon::prelude::*;
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
 use super::figures::MainThread;
 use super::lod_state::{LevelsOfDetail, LodState, ShownLevels};
-use super::meshes::{VertexExtras, VertexKind};
 use super::new_mesh::PendingMesh;
-use super::places::{LocalPlaces, TerrainPlace, place_terrain};
 use super::processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder};
-use super::reports::{Report, Reports};
 use super::task::{InFlight, TaskCounter};
+use super::vertex_kind::{VertexExtras, VertexKind};
 use super::{BurrowFigures, BurrowSettings, ChunkCreated, Held, MaterialColors, SkyLight, SlimVertices};
 use crate::lattice::ChunkPos;
 use crate::lod::Cut;
@@ -30,7 +27,7 @@ use crate::world::sky::LitWorld;
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
-    vertices: VertexKind,
+    pub(super) vertices: VertexKind,
     has_lod: bool,
     task: Option<ThreadTask<BuiltWorld>>,
     waiting: Vec<BuiltSurface>,
@@ -50,152 +47,13 @@ struct BuiltNodes {
 
 impl Loading {
     /// Whether these are surfaces of this terrain, even if the game has changed it since.
-    fn is_of(&self, terrain: &Terrain) -> bool {
+    pub(super) fn is_of(&self, terrain: &Terrain) -> bool {
         self.world.version().is_same_world(terrain.world().version())
     }
 }
 
 /// Terrains without a task that are not held.
 type Idle = (Without<Loading>, Without<InFlight>, Without<Held>);
-
-/// Scales the entities of terrains to the size of their voxels.
-pub(super) fn scale_terrains(
-    mut terrains: Query<
-        (Entity, &Terrain, &mut Transform, &mut TerrainPlace),
-        Or<(Changed<Transform>, Changed<Terrain>)>,
-    >,
-    reports: Reports,
-) {
-    for (entity, terrain, mut transform, mut place) in &mut terrains {
-        scale((entity, terrain), &mut transform, &mut place, &reports);
-    }
-}
-
-fn scale(
-    (entity, terrain): (Entity, &Terrain),
-    transform: &mut Mut<Transform>,
-    place: &mut Mut<TerrainPlace>,
-    reports: &Reports,
-) {
-    let size = terrain.voxel_size();
-    let (scale, own) = (Vec3::splat(size), transform.scale);
-    let former = Vec3::splat(place.scale);
-    place.set_if_neq(TerrainPlace { scale: size, ..**place });
-    if own == scale {
-        return;
-    }
-    transform.scale = scale;
-    // Not one that the plugin wrote for another voxel size.
-    if own != Vec3::ONE && own != former && reports.is_new(entity, Report::ScaleReplaced) {
-        warn!(
-            "the scale {own} of the terrain {entity} was replaced by the size of its voxels, {size} m: choose another \
-             `voxel_size` in its `TerrainSettings`, or scale a parent of it"
-        );
-    }
-}
-
-/// Scales and places a new terrain at once, so that queries in the frame that spawned it, for example in `Startup`,
-/// find it in its place. Tasks of another terrain on its entity are dropped. The tiles and chunks of that terrain stay
-/// until the new one has loaded, unless they have another size.
-pub(super) fn prepare_new(
-    new: On<Insert, Terrain>,
-    mut commands: Commands,
-    terrains: Query<(&Terrain, Option<&TerrainEntities>, Option<&Children>), Allow<Disabled>>,
-    mut places: ParamSet<(
-        Query<(&mut Transform, &mut TerrainPlace), Allow<Disabled>>,
-        LocalPlaces,
-        Query<(&mut GlobalTransform, &mut TerrainPlace), Allow<Disabled>>,
-    )>,
-    reports: Reports,
-) {
-    let entity = new.entity;
-    let Ok((terrain, entities, children)) = terrains.get(entity) else { return };
-    commands.entity(entity).try_remove::<(Loading, InFlight)>();
-    drop_resized(&mut commands, entity, terrain, entities, children);
-    if let Ok((mut transform, mut place)) = places.p0().get_mut(entity) {
-        scale((entity, terrain), &mut transform, &mut place, &reports);
-    }
-    let now = places.p1().of(entity);
-    if let Ok((mut global, mut place)) = places.p2().get_mut(entity) {
-        place_terrain(now, &mut global, &mut place);
-    }
-}
-
-/// Drops tasks of terrains that have no entities: such a task belongs to a former terrain, and the new one must not
-/// wait for it.
-pub(super) fn drop_stray_tasks(
-    mut commands: Commands,
-    strays: Query<Entity, (With<Terrain>, With<InFlight>, Without<TerrainEntities>)>,
-) {
-    for entity in &strays {
-        commands.entity(entity).try_remove::<InFlight>();
-    }
-}
-
-/// Does the same for a terrain that replaced another one without an insertion, for example by `mem::swap`.
-pub(super) fn drop_replaced(
-    mut commands: Commands,
-    terrains: Query<
-        (Entity, &Terrain, Option<&Loading>, Option<&TerrainEntities>, Option<&Children>),
-        Changed<Terrain>,
-    >,
-) {
-    for (entity, terrain, loading, entities, children) in &terrains {
-        if loading.is_some_and(|loading| !loading.is_of(terrain)) {
-            commands.entity(entity).try_remove::<Loading>();
-        }
-        drop_resized(&mut commands, entity, terrain, entities, children);
-    }
-}
-
-/// Despawns tiles and chunks that were built for voxels of another size: they would be drawn too large or too small.
-fn drop_resized(
-    commands: &mut Commands,
-    entity: Entity,
-    terrain: &Terrain,
-    entities: Option<&TerrainEntities>,
-    children: Option<&Children>,
-) {
-    if let Some(entities) = entities.filter(|entities| entities.voxel_size != terrain.voxel_size()) {
-        entities.despawn(commands, children);
-        // A running transaction belongs to the former terrain.
-        commands.entity(entity).try_remove::<(TerrainEntities, InFlight)>();
-    }
-}
-
-/// Despawns the entities below a terrain when only its component is removed.
-pub(super) fn remove_with_terrain(
-    gone: On<Remove, Terrain>,
-    terrains: Query<(&TerrainEntities, Option<&Children>), Allow<Disabled>>,
-    mut commands: Commands,
-) {
-    if let Ok((entities, children)) = terrains.get(gone.entity) {
-        entities.despawn(&mut commands, children);
-    }
-    commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight, LodState)>();
-}
-
-/// Cancels a load without slim vertices when a terrain gets them; it is then loaded again with them.
-pub(super) fn drop_other_vertices(
-    new: On<Insert, SlimVertices>,
-    mut commands: Commands,
-    loading: Query<&Loading, Allow<Disabled>>,
-) {
-    if loading.get(new.entity).is_ok_and(|loading| !loading.vertices.is_slim) {
-        commands.entity(new.entity).try_remove::<Loading>();
-    }
-}
-
-/// Cancels a load with slim vertices when a terrain loses the marker; it is then loaded again without them.
-pub(super) fn drop_slim_vertices(
-    gone: On<Remove, SlimVertices>,
-    mut commands: Commands,
-    loading: Query<&Loading, Allow<Disabled>>,
-) {
-    if loading.get(gone.entity).is_ok_and(|loading| loading.vertices.is_slim) {
-        commands.entity(gone.entity).try_remove::<Loading>();
-    }
-}
 
 /// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces
 /// are built.

@@ -8,85 +8,26 @@ use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::NoAutoAabb;
 use bevy::color::{ColorToComponents, LinearRgba};
 use bevy::math::{IVec3, Vec3};
-use bevy::mesh::{
-    Indices, Mesh, MeshVertexAttribute, PrimitiveTopology, VertexAttributeValues, VertexFormat,
-};
+use bevy::mesh::{Indices, Mesh, PrimitiveTopology, VertexAttributeValues};
 
+use super::MeshBytes;
+use super::ground_depth::{Heights, NodeHeights, depth};
 use super::palettes::{Arranged, Palettes};
-use super::{MaterialColors, MeshBytes, SkyLight};
+use super::vertex_kind::{
+    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
+    CUT_VOXELS, VertexExtras,
+};
 use crate::ground::Ground;
 use crate::lattice::{Column, LatticeBox, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex, tile};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
 use crate::world::sky::{LitWorld, SkyColumns, SkyLights, SparseSky};
 
-/// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have the same ids in
-/// the same order, so a shader may take those of any corner and blend the weights alone.
-pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
-    MeshVertexAttribute::new("Vertex_BurrowMaterialIds", 0x6275_7272_6f77_0001, VertexFormat::Uint8x4);
-
-/// The weight of each of a vertex's material ids, 0..=1.
-pub const ATTRIBUTE_MATERIAL_WEIGHTS: MeshVertexAttribute =
-    MeshVertexAttribute::new("Vertex_BurrowMaterialWeights", 0x6275_7272_6f77_0002, VertexFormat::Unorm8x4);
-
-/// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it. Not
-/// on terrains with [`SlimVertices`](super::SlimVertices).
-pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
-    MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
-
-/// The share of the sky that lights a vertex, 0..=1, in x: 1 on a plain, 0 in a cave; see
-/// [`World::sky_light`](crate::terrain::World::sky_light). In y how deep it lies below the surface that was there before anyone
-/// dug, of which 1 is [`CUT_VOXELS`] or more. z and w are 0. Materials multiply ambient and indirect light by it,
-/// and never that of the sun. Only on terrains with [`SkyLight`](super::SkyLight).
-pub const ATTRIBUTE_SKY_LIGHT: MeshVertexAttribute =
-    MeshVertexAttribute::new("Vertex_BurrowSkyLight", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
-
-/// The depth in voxels that is 1 in [`ATTRIBUTE_SKY_LIGHT`].
-pub const CUT_VOXELS: i32 = 8;
-
 /// The components of an entity in addition to its mesh: bounds that Bevy need not compute, and bytes.
 pub(crate) type MeshFacts = (Aabb, NoAutoAabb, MeshBytes);
 
 /// A mesh ready to be swapped in; `None` where nothing is to be drawn.
 pub(crate) type BuiltMesh = Option<(Mesh, MeshFacts)>;
-
-/// The attributes of a terrain's vertices in addition to positions, normals and materials.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct VertexExtras {
-    /// The depth in the ground.
-    pub has_depth: bool,
-    /// The light of the sky.
-    pub has_sky_light: bool,
-    /// The colours of materials, blended; none if it is empty.
-    pub colors: Vec<LinearRgba>,
-}
-
-/// Which attributes a terrain's components ask for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct VertexKind {
-    /// [`SlimVertices`](super::SlimVertices).
-    pub is_slim: bool,
-    /// [`SkyLight`](super::SkyLight).
-    pub has_sky_light: bool,
-}
-
-impl VertexKind {
-    pub fn of(is_slim: bool, sky_light: Option<&SkyLight>) -> Self {
-        Self { is_slim, has_sky_light: sky_light.is_some_and(|light| light.is_on) }
-    }
-}
-
-impl VertexExtras {
-    /// The extras of a terrain with these components.
-    pub(crate) fn of(colors: Option<&MaterialColors>, kind: VertexKind) -> Self {
-        let VertexKind { is_slim, has_sky_light } = kind;
-        if is_slim {
-            return Self { has_sky_light, ..Self::default() };
-        }
-        let colors = colors.map_or(Vec::new(), |colors| colors.0.clone());
-        Self { has_depth: true, has_sky_light, colors }
-    }
-}
 
 /// Builds Bevy meshes from surfaces of a terrain.
 #[derive(Clone)]
@@ -352,62 +293,10 @@ impl<'a> Arrays<'a> {
     }
 }
 
-/// Where the heights of the pristine surface come from.
-enum Heights {
-    Ground,
-    Node(NodeHeights),
-}
-
-/// Heights of a node's columns.
-struct NodeHeights {
-    low: Column,
-    high: Column,
-    stride: i32,
-    width: usize,
-    heights: Vec<i32>,
-}
-
-impl NodeHeights {
-    /// Those of columns from `low` to `high`, both included.
-    fn new(ground: &Ground, (low, high): (Column, Column), stride: i32) -> Self {
-        let count = |low: i32, high: i32| ((high - low).max(0) as usize).div_ceil(stride as usize) + 1;
-        let [width, depth] = [count(low.x, high.x), count(low.z, high.z)];
-        Self { low, high, stride, width, heights: ground.page_heights(low, stride, [width, depth]) }
-    }
-
-    /// The height over any column.
-    fn height(&self, ground: &Ground, column: Column) -> i32 {
-        // The last column may lie nearer, at the rim.
-        let place = |at: i32, low: i32, high: i32| {
-            let is_drawn = (low..=high).contains(&at) && ((at - low) % self.stride == 0 || at == high);
-            is_drawn.then(|| ((at - low) as usize).div_ceil(self.stride as usize))
-        };
-        let x = place(column.x, self.low.x, self.high.x);
-        let known = x.zip(place(column.z, self.low.z, self.high.z));
-        let known = known.and_then(|(x, z)| self.heights.get(z * self.width + x));
-        known.copied().unwrap_or_else(|| ground.lone_height(column))
-    }
-}
-
 /// Appends copies of some values; nothing if there are no values.
 fn copy<T: Copy>(values: &mut Vec<T>, of: &[u32]) {
     let copies: Vec<T> = of.iter().filter_map(|&at| values.get(at as usize).copied()).collect();
     values.extend(copies);
-}
-
-/// How many voxels a vertex, in 1/4096 voxel of the terrain, lies below the pristine surface; above it less than 0. It
-/// depends on the position alone, so both sides of a seam get the same bits.
-fn depth(place: IVec3, height: impl Fn(Column) -> i32) -> f32 {
-    let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-    // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are
-    // the same.
-    let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
-    let next = column.offset(i32::from(x > 0), i32::from(z > 0));
-    let here = i64::from(height(column));
-    // Nearly all vertices lie over a column.
-    let there = if next == column { here } else { i64::from(height(next)) };
-    let height = here * i64::from(SNAP) + (there - here) * i64::from(x.max(z));
-    (height - i64::from(place.y) * i64::from(ONE)) as f32 / (SNAP * ONE) as f32
 }
 
 /// The mixed colour of a vertex.
@@ -431,6 +320,8 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights, NoiseSource};
     use crate::lod::Cut;
+    use crate::plugin::MaterialColors;
+    use crate::plugin::vertex_kind::VertexKind;
     use crate::terrain::{MeshKey, NodeUpdate, Terrain, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };

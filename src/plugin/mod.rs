@@ -29,6 +29,7 @@ mod display;
 mod engine;
 mod entities;
 mod figures;
+mod ground_depth;
 #[cfg(feature = "format")]
 mod ground_file;
 pub mod heightmap;
@@ -41,6 +42,7 @@ mod materials;
 mod meshes;
 pub mod messages;
 mod new_mesh;
+mod outdated;
 mod palettes;
 #[cfg(feature = "picking")]
 mod picking;
@@ -54,6 +56,7 @@ mod same_frame;
 mod settings;
 mod task;
 mod times;
+mod vertex_kind;
 
 #[cfg(any(feature = "scatter", feature = "landmass"))]
 pub(crate) use commit::GroundChanged;
@@ -82,10 +85,6 @@ pub(crate) use lod_state::WantedTiles;
 pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[cfg(feature = "render")]
 pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
-pub use meshes::{
-    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
-    CUT_VOXELS,
-};
 #[doc(hidden)]
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
@@ -107,6 +106,10 @@ pub(crate) use same_frame::CommitSameFrame;
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 #[doc(hidden)]
 pub use times::Times;
+pub use vertex_kind::{
+    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
+    CUT_VOXELS,
+};
 
 use bevy::ecs::reflect::ReflectMessage;
 use bevy::prelude::*;
@@ -194,14 +197,14 @@ impl Plugin for TerrainPlugin {
             .add_message::<HistoryMoved>()
             .add_message::<LoosePieceFound>()
             .add_message::<LoosePieceReturned>()
-            .add_observer(load::prepare_new)
+            .add_observer(outdated::prepare_new)
             .add_observer(collect::free_history)
             .add_observer(collect::answer_removed)
             .add_observer(collect::enable_loose_search)
             .add_observer(collect::disable_loose_search)
-            .add_observer(load::remove_with_terrain)
-            .add_observer(load::drop_other_vertices)
-            .add_observer(load::drop_slim_vertices)
+            .add_observer(outdated::remove_with_terrain)
+            .add_observer(outdated::drop_other_vertices)
+            .add_observer(outdated::drop_slim_vertices)
             .add_observer(redraw::redraw)
             .add_observer(reports::forget_reports)
             .configure_sets(
@@ -221,9 +224,9 @@ impl Plugin for TerrainPlugin {
                 Update,
                 (
                     (
-                        load::scale_terrains,
-                        load::drop_stray_tasks,
-                        load::drop_replaced,
+                        places::scale_terrains,
+                        outdated::drop_stray_tasks,
+                        outdated::drop_replaced,
                         load::start_loading,
                         places::place_terrains,
                         lod::find_eyes,
@@ -258,7 +261,7 @@ impl Plugin for TerrainPlugin {
                 (diagnostics::measure_frame, engine::trim_engines).after(CommitSameFrame),
             )
             // Terrains that were spawned before the plugin was added.
-            .add_systems(PreStartup, (load::scale_terrains, places::place_terrains).chain());
+            .add_systems(PreStartup, (places::scale_terrains, places::place_terrains).chain());
         same_frame::add(app);
         app.add_systems(PostUpdate, commit::commit_begun.in_set(CommitSameFrame));
         diagnostics::register(app);

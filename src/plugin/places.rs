@@ -202,6 +202,43 @@ fn check_place(entity: Entity, terrain: &Terrain, global: &GlobalTransform, repo
     }
 }
 
+/// Scales the entities of terrains to the size of their voxels.
+pub(super) fn scale_terrains(
+    mut terrains: Query<
+        (Entity, &Terrain, &mut Transform, &mut TerrainPlace),
+        Or<(Changed<Transform>, Changed<Terrain>)>,
+    >,
+    reports: Reports,
+) {
+    for (entity, terrain, mut transform, mut place) in &mut terrains {
+        scale((entity, terrain), &mut transform, &mut place, &reports);
+    }
+}
+
+/// Scales one terrain, and logs once a scale of the game's own that this replaces.
+pub(super) fn scale(
+    (entity, terrain): (Entity, &Terrain),
+    transform: &mut Mut<Transform>,
+    place: &mut Mut<TerrainPlace>,
+    reports: &Reports,
+) {
+    let size = terrain.voxel_size();
+    let (scale, own) = (Vec3::splat(size), transform.scale);
+    let former = Vec3::splat(place.scale);
+    place.set_if_neq(TerrainPlace { scale: size, ..**place });
+    if own == scale {
+        return;
+    }
+    transform.scale = scale;
+    // Not one that the plugin wrote for another voxel size.
+    if own != Vec3::ONE && own != former && reports.is_new(entity, Report::ScaleReplaced) {
+        warn!(
+            "the scale {own} of the terrain {entity} was replaced by the size of its voxels, {size} m: choose another \
+             `voxel_size` in its `TerrainSettings`, or scale a parent of it"
+        );
+    }
+}
+
 /// Whether places in the world have a counterpart in a terrain here.
 pub(super) fn is_usable(place: &GlobalTransform) -> bool {
     let affine = place.affine();

@@ -10,8 +10,9 @@ use bevy::ecs::system::SystemParam;
 use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
-use super::meshes::{MeshBuilder, TileLights, VertexExtras};
+use super::meshes::{MeshBuilder, TileLights};
 use super::new_mesh::PendingMesh;
+use super::vertex_kind::VertexExtras;
 use super::{BurrowSettings, ShownSurface};
 use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
 use crate::lod::{LodGrid, Node};

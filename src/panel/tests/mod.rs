@@ -1,6 +1,7 @@
 //! Tests of the panel on a simulated screen, mostly without an app.
 
 mod level_files;
+mod tool;
 
 use std::time::Duration;
 
