@@ -15,7 +15,11 @@ use bevy_burrow::net::{
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{Meshing, Patch, SIMULATION};
 use bevy_burrow::volume::Fields;
+use fastrand::Rng;
 use glam::IVec3;
+
+use crate::load::wavy;
+use crate::worlds::random_strata;
 
 /// A frame of the tests.
 pub const FRAME: Duration = Duration::from_millis(50);
@@ -25,7 +29,13 @@ pub fn count(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
 }
 
-pub use crate::load::{hills, layered_hills};
+pub use crate::load::hills;
+
+/// Hills with strata.
+pub fn layered_hills(side: u32) -> Arc<Ground> {
+    let strata = random_strata(&mut Rng::with_seed(6), [-10.0, 25.0]);
+    Arc::new(wavy(side).with_strata(&strata).expect("valid strata"))
+}
 
 /// A terrain without meshes.
 pub fn terrain(ground: &Arc<Ground>) -> Terrain {

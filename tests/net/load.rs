@@ -11,8 +11,6 @@ use bevy_burrow::terrain::{Meshing, SIMULATION};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
-use crate::worlds::random_strata;
-
 /// Frames of a server in a second.
 const FRAMES: u64 = 30;
 /// Edits of a player in a second.
@@ -62,13 +60,8 @@ pub fn hills(side: u32) -> Arc<Ground> {
     Arc::new(wavy(side))
 }
 
-/// Hills with strata.
-pub fn layered_hills(side: u32) -> Arc<Ground> {
-    let strata = random_strata(&mut Rng::with_seed(6), [-10.0, 25.0]);
-    Arc::new(wavy(side).with_strata(&strata).expect("valid strata"))
-}
-
-fn wavy(side: u32) -> Ground {
+/// The ground of the hills.
+pub fn wavy(side: u32) -> Ground {
     let height = |x: i32, z: i32| 20.0 + (f64::from(x) * 0.11).sin() + (f64::from(z) * 0.07).cos();
     Ground::from_fn(side, side, height).expect("valid heights")
 }
