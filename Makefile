@@ -66,7 +66,7 @@ test-model:
 	cargo test $(WITHOUT_BEVY) --lib --tests --example export --example figures --example paper
 
 test-plugin:
-	cargo test $(WITH_BEVY) --lib -- threads:: plugin:: saves:: together:: view:: physics:: panel:: debug::
+	cargo test $(WITH_BEVY) --lib -- threads:: plugin:: saves:: together:: view:: physics:: panel:: debug:: plants:: paths:: brush::request:: brush::shapes::mesh_grid::
 	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example physics --example sculpt --example server --example together
 	cargo test $(WITH_BEVY) --doc
 

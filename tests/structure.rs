@@ -392,6 +392,32 @@ fn crate_of(files: &[(&str, &str)]) -> Sources {
     files.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned())).collect()
 }
 
+/// The modules whose tests use Bevy, as filters of tests name them.
+fn modules_tested_with_bevy(sources: &Sources) -> BTreeSet<String> {
+    let uses_bevy = |text: &str| text.contains("#[test]") && text.contains("use bevy::");
+    let files = sources.iter().filter(|(_, text)| uses_bevy(text));
+    files
+        .map(|(path, _)| path.trim_end_matches(".rs").trim_end_matches("/mod").replace('/', "::") + "::")
+        .collect()
+}
+
+#[test]
+fn all_tests_that_use_bevy_are_run() {
+    // A package has no Makefile.
+    let Ok(makefile) = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Makefile")) else {
+        return;
+    };
+    let line = makefile.lines().find_map(|line| line.split_once("$(WITH_BEVY) --lib -- "));
+    let filters: Vec<&str> = line.expect("the line of test-plugin").1.split_whitespace().collect();
+    let is_run = |module: &String| filters.iter().any(|filter| module.contains(filter));
+    let mut missing = modules_tested_with_bevy(&library());
+    missing.retain(|module| !is_run(module));
+    assert!(missing.is_empty(), "`make test-plugin` leaves out tests of {missing:?}");
+    let control =
+        crate_of(&[("a/b.rs", "use bevy::prelude::*; #[test] fn it() {}"), ("c.rs", "#[test] fn it() {}")]);
+    assert_eq!(modules_tested_with_bevy(&control), BTreeSet::from(["a::b::".to_owned()]));
+}
+
 #[test]
 fn modules_import_only_lower_ones() {
     let found = upward_imports(&library(), MODULES);
