@@ -75,7 +75,7 @@ pub struct BrushTool {
     pub points: Vec<Vec3>,
     /// Whether a path is a curve without kinks.
     pub is_smooth: bool,
-    /// Power against the hardness of materials, see [`Brush::power`]; 255 digs everything.
+    /// Power against the hardness of materials, see [`Brush::power`](crate::brush::Brush::power); 255 digs everything.
     pub power: u8,
     /// Whether its surface is rough.
     pub is_rough: bool,
