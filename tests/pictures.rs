@@ -35,12 +35,12 @@ const EXAMPLES: [Example; 6] = [
         ground: 0.5,
         black: 0.05,
     },
-    // One frame shows a boulder against the sky, and the last one coal by lamplight.
+    // Its last frame shows coal by lamplight.
     Example {
         name: "digger",
         arguments: "--tour --fps 10 --frames 12 --width 320 --height 180",
         pictures: 12,
-        ground: 0.25,
+        ground: 0.3,
         black: 0.45,
     },
     Example {

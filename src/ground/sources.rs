@@ -15,8 +15,8 @@ impl Ground {
     }
 
     /// Ground of `width` x `depth` cells whose height in voxels over the column (x, z) is `height(x, z)`, rounded to
-    /// 1/256. Rows are evaluated in parallel. The ground has the same bits on every machine only if `height` returns
-    /// the same bits on every machine.
+    /// 1/256. Rows are evaluated in parallel. The ground has equal bits on all machines only if `height` returns equal
+    /// bits on all of them.
     ///
     /// # Errors
     /// - [`GroundError::Size`] unless width and depth are 1 to [`MAX_SIZE`](super::MAX_SIZE).

@@ -31,15 +31,11 @@ impl Plugin for PlantCollidersPlugin {
 
 /// The stems of a terrain that have colliders.
 #[derive(Component, Default)]
-struct Stems {
-    colliders: HashMap<PlantId, Entity>,
-    /// The rectangles of cells around sources, and the count of the plants' news, that these are for.
-    of: Option<(Vec<(Column, Column)>, u64)>,
-}
+struct Stems(HashMap<PlantId, Entity>);
 
 fn keep_colliders(
     mut commands: Commands,
-    mut terrains: Query<(Entity, Ref<ShownPlants>, Option<&mut Stems>), With<Terrain>>,
+    mut terrains: Query<(Entity, &ShownPlants, Option<&mut Stems>), With<Terrain>>,
     sources: Query<(Entity, &ColliderSource)>,
     places: Places,
 ) {
@@ -50,28 +46,19 @@ fn keep_colliders(
         };
         let Some(place) = places.of(entity) else { continue };
         let (inverse, voxel) = (place.affine().inverse(), voxel_metres(&place));
-        let around = |(source, &ColliderSource { radius })| {
-            let at = inverse.transform_point3(places.of(source)?.translation());
+        let mut near = HashSet::new();
+        let stems = stems.bypass_change_detection();
+        for (source, &ColliderSource { radius }) in &sources {
+            let (Some(at), Some(patches)) = (places.of(source), shown.patches()) else { continue };
+            let at = inverse.transform_point3(at.translation());
             let radius = radius.min(NEAR) / voxel;
             let cell = |more: f32| Column::new((at.x + more).floor() as i32, (at.z + more).floor() as i32);
-            Some((cell(-radius), cell(radius)))
-        };
-        let around: Vec<(Column, Column)> = sources.iter().filter_map(around).collect();
-        let stems = stems.bypass_change_detection();
-        let of = Some((around, shown.news.count));
-        // This system runs twice in a frame, and most frames change nothing.
-        if stems.of == of && !shown.is_added() {
-            continue;
-        }
-        let mut near = HashSet::new();
-        for &(low, high) in of.iter().flat_map(|(around, _)| around) {
-            let Some(patches) = shown.patches() else { continue };
             let species = patches.scatter().species();
             let has_stem = species.iter().map(|own| own.stem.is_some());
-            for plant in patches.near_of(low, high, has_stem) {
+            for plant in patches.near_of(cell(-radius), cell(radius), has_stem) {
                 let Some(stem) = species[usize::from(plant.id.species)].stem else { continue };
                 near.insert(plant.id);
-                stems.colliders.entry(plant.id).or_insert_with(|| {
+                stems.0.entry(plant.id).or_insert_with(|| {
                     let size = f32::from(plant.size) / 256.0;
                     let (radius, height) = (stem.radius * size, stem.height * size);
                     let middle = plant.position().as_vec3() + Vec3::Y * height / 2.0;
@@ -84,8 +71,7 @@ fn keep_colliders(
                 });
             }
         }
-        stems.of = of;
-        stems.colliders.retain(|id, child| {
+        stems.0.retain(|id, child| {
             let stays = near.contains(id);
             if !stays {
                 commands.entity(*child).try_despawn();

@@ -47,7 +47,7 @@ pub(super) fn follow_commits(
 ) {
     for GroundChanged { terrain, versions: [before, after], boxes } in changed.read() {
         let Ok((model, _, mut shown)) = terrains.get_mut(*terrain) else { continue };
-        let ShownPlants { patches: Some(patches), version, news, task, .. } = &mut *shown else { continue };
+        let ShownPlants { patches: Some(patches), version, news, .. } = &mut *shown else { continue };
         if version.is_none_or(|version| !version.is_same_world(*after)) {
             continue; // Another world: loaded again as a whole.
         }
@@ -56,13 +56,11 @@ pub(super) fn follow_commits(
         if *version == Some(world.version()) {
             continue;
         }
-        let boxes = boxes.as_deref().filter(|_| *version == Some(*before));
-        if let Some(task) = task {
-            task.note_changes(boxes);
-        }
         let changes: Vec<PlantChange> = match boxes {
-            Some(boxes) => boxes.iter().flat_map(|&samples| patches.update(world, Some(samples))).collect(),
-            None => patches.update(world, None),
+            Some(boxes) if *version == Some(*before) => {
+                boxes.iter().flat_map(|&samples| patches.update(world, Some(samples))).collect()
+            }
+            _ => patches.update(world, None),
         };
         *version = Some(*after);
         if changes.is_empty() {

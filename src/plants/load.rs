@@ -9,9 +9,8 @@ use bevy::prelude::*;
 
 use super::follow::PlantMessages;
 use super::{News, PlantSource, Plants, ShownPlants};
-use crate::lattice::LatticeBox;
 use crate::plugin::{Places, TerrainEntities, voxel_metres};
-use crate::scatter::{PatchPos, PlantPatch, PlantPatches, Scatter};
+use crate::scatter::{PatchPos, Plant, PlantPatches, Scatter};
 use crate::terrain::Terrain;
 use crate::threads::{ThreadTask, Threads, free_later};
 
@@ -24,22 +23,8 @@ const LARGEST_RADIUS: f32 = 2048.0;
 /// The place of a camera, or of a source with its radius, in voxels of the terrain.
 pub(super) type Viewer = (Vec2, Option<f32>);
 
-/// A task that makes patches as they stand in the world when it starts.
-pub(super) struct LoadTask {
-    task: ThreadTask<Vec<(PatchPos, PlantPatch)>>,
-    /// Boxes around the samples that changed meanwhile; `None` if they are not known.
-    changed: Option<Vec<LatticeBox>>,
-}
-
-impl LoadTask {
-    /// Notes what a commit changed while the task runs.
-    pub(super) fn note_changes(&mut self, boxes: Option<&[LatticeBox]>) {
-        match (&mut self.changed, boxes) {
-            (Some(changed), Some(boxes)) => changed.extend(boxes),
-            _ => self.changed = None,
-        }
-    }
-}
+/// A task that makes patches.
+pub(super) struct LoadTask(ThreadTask<Vec<(PatchPos, Vec<Plant>)>>);
 
 impl std::fmt::Debug for LoadTask {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -96,28 +81,17 @@ pub(super) fn choose_patches(
         let Some(patches) = &mut shown.patches else { continue };
         if shown.version != version {
             // Follows commits that were not seen, where a game gates their systems.
-            if let Some(task) = &mut shown.task {
-                task.note_changes(None);
-            }
             let changes = patches.update(world, None);
             let place = places.of(entity).unwrap_or_default();
             messages.tell((entity, world), &place, patches.scatter(), changes, &mut shown.news);
             shown.version = version;
         }
-        if let Some(LoadTask { task, changed }) = &mut shown.task {
+        if let Some(LoadTask(task)) = &mut shown.task {
             let Some(done) = task.check() else { continue };
-            let changed = changed.take();
             shown.task = None;
-            for (pos, patch) in done.unwrap_or_default() {
-                patches.insert_patch(pos, patch);
+            for (pos, plants) in done.unwrap_or_default() {
+                patches.insert(world, pos, plants);
                 shown.news.push(News::Loaded(pos));
-            }
-            // Only the new patches lag behind. They were not shown yet, so no message says what changed in them.
-            match changed {
-                Some(boxes) => {
-                    boxes.into_iter().for_each(|samples| drop(patches.update(world, Some(samples))))
-                }
-                None => drop(patches.update(world, None)),
             }
         }
         let Some(place) = places.of(entity) else { continue };
@@ -156,11 +130,11 @@ pub(super) fn choose_patches(
             cells += scatter.patch_size(pos.species).pow(2);
             fits
         });
-        let (first, world): (Vec<PatchPos>, _) = (first.collect(), terrain.snapshot());
-        let task = ThreadTask::start(Threads::Background, move || {
-            first.into_iter().map(|pos| (pos, scatter.patch_in(&world, pos))).collect()
-        });
-        shown.task = Some(LoadTask { task, changed: Some(Vec::new()) });
+        // Not a snapshot of the world: digs would have to copy its index meanwhile.
+        let (first, ground): (Vec<PatchPos>, _) = (first.collect(), world.shared_ground());
+        shown.task = Some(LoadTask(ThreadTask::start(Threads::Background, move || {
+            first.into_iter().map(|pos| (pos, scatter.patch(&ground, pos))).collect()
+        })));
     }
 }
 

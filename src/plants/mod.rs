@@ -113,25 +113,19 @@ pub struct ShownPlants {
 
 /// News for what draws the plants; none are kept before something does.
 #[derive(Debug, Default)]
-struct NewsList {
-    /// News since the last call of `take`.
-    waiting: Option<Vec<News>>,
-    /// Number of all news so far: while it stays the same, nothing has changed.
-    count: u64,
-}
+struct NewsList(Option<Vec<News>>);
 
 impl NewsList {
     fn push(&mut self, news: News) {
-        self.count += 1;
-        if let Some(waiting) = &mut self.waiting {
-            waiting.push(news);
+        if let Self(Some(all)) = self {
+            all.push(news);
         }
     }
 
     /// All news since the last call; `None` the first time.
     #[cfg(feature = "render")]
     fn take(&mut self) -> Option<Vec<News>> {
-        self.waiting.replace(Vec::new())
+        self.0.replace(Vec::new())
     }
 }
 

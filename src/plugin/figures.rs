@@ -67,7 +67,7 @@ pub(super) trait MainThread {
     /// Notes how long showing loaded terrains took, before the frame begins.
     fn measure_loading(&mut self, took: Duration);
 
-    /// Begins a frame: what is measured from now on is added to this time and to that of loading.
+    /// Begins a frame with this time and that of loading, to which [`measure`](Self::measure) adds.
     fn begin_frame(&mut self, took: Duration);
 
     /// Adds to this frame.

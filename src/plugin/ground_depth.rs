@@ -10,7 +10,7 @@ use crate::lattice::{Column, ONE, SNAP};
 pub(super) fn depth(place: IVec3, height: impl Fn(Column) -> i32) -> f32 {
     let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
     // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are
-    // the same.
+    // equal.
     let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
     let next = column.offset(i32::from(x > 0), i32::from(z > 0));
     let here = i64::from(height(column));

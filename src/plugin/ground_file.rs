@@ -78,7 +78,7 @@ pub enum MaterialFiles {
 pub struct GroundAsset {
     /// The ground.
     pub ground: Arc<Ground>,
-    /// What was read, what was guessed and what looks doubtful, a line for each file and each note.
+    /// A report of the files: a line for each file with what was read, and for each guess and doubt.
     pub report: String,
 }
 
@@ -255,9 +255,8 @@ impl GroundFrom {
 pub struct GroundFileRead {
     /// The terrain's entity.
     pub terrain: Entity,
-    /// What was read, what was guessed and what looks doubtful, a line for each file and each note; the terrain was
-    /// inserted in this frame, or its new ground queued behind the edits that wait. Or the reason why the file can't be
-    /// used; then nothing changes.
+    /// The [report](GroundAsset::report) of the files; the terrain was inserted in this frame, or its new ground queued
+    /// behind the edits that wait. Or the reason why a file can't be used; then nothing changes.
     pub outcome: Result<String, String>,
 }
 
@@ -311,7 +310,7 @@ fn follow_ground_files(
         let mut tell = |outcome| {
             messages.write(GroundFileRead { terrain: entity, outcome });
         };
-        // Bevy logs it, and loads a file that can't be read once more, so a reason is told once until the file is read.
+        // Bevy logs it, and loads a file that can't be read once more: each reason is sent once until the file is read.
         let last_reason = last_refused.get(&entity);
         let reason = match assets.get_load_state(from.ground.id()) {
             Some(LoadState::Failed(error)) => Some(error.to_string()),

@@ -50,7 +50,8 @@ pub(super) fn drop_stray_tasks(
     }
 }
 
-/// Does the same for a terrain that replaced another one without an insertion, for example by `mem::swap`.
+/// Drops the load and the entities of a terrain that another one replaced without an insertion, for example by
+/// `mem::swap`.
 pub(super) fn drop_replaced(
     mut commands: Commands,
     terrains: Query<

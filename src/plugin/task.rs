@@ -115,13 +115,17 @@ impl InFlight {
             let mut drawn: BTreeSet<MeshKey> = pending.drawn().collect();
             let mut builder = builder;
             if builder.has_sky_light() {
-                // What was there before is not known, so all ground near is lit again.
+                // The ground before the changes is not known, so all ground near them is lit again.
                 drawn.extend(parts_near(&world, pending.drawn()));
                 builder = builder.lit_by(&Arc::new(LitWorld::new(Arc::clone(&world), Vec::new())));
             }
             let drafts = drawn.iter().map(|&drawn| (drawn, world.draft(drawn))).collect();
-            let surfaces = builder.build_all(drafts, cut.as_deref());
-            let nodes = cut.map(|cut| world.redraw_tiles(&cut, drawn.iter().map(|drawn| drawn.tile())));
+            // Nodes are made from all of the world. Where there are none it is dropped here: commits copy the index of a
+            // world that others hold.
+            let cut = cut.map(|cut| (world, cut));
+            let surfaces = builder.build_all(drafts, cut.as_ref().map(|(_, cut)| cut.as_ref()));
+            let nodes =
+                cut.map(|(world, cut)| world.redraw_tiles(&cut, drawn.iter().map(|drawn| drawn.tile())));
             let nodes = builder.build_nodes(nodes.unwrap_or_default());
             let (change, times) = (Change::PendingDisplay(pending), TaskTimes::default());
             TaskOutput { change, surfaces, nodes, pieces: Vec::new(), times }

@@ -5,8 +5,8 @@ use bevy::mesh::{MeshVertexAttribute, VertexFormat};
 
 use super::{MaterialColors, SkyLight};
 
-/// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have the same ids in
-/// the same order, so a shader may take those of any corner and blend the weights alone.
+/// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have equal ids in
+/// equal order, so a shader may take those of any corner and blend the weights alone.
 pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowMaterialIds", 0x6275_7272_6f77_0001, VertexFormat::Uint8x4);
 

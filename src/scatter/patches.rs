@@ -43,13 +43,6 @@ pub struct PlantPatch {
 }
 
 impl PlantPatch {
-    /// The patch of plants that [`Scatter::patch`] gave, as they stand in a world.
-    fn new(scatter: &Scatter, world: &World, plants: Vec<Plant>) -> Self {
-        let gone: Vec<bool> = plants.iter().map(|plant| !scatter.stands(world, plant)).collect();
-        let gone_count = gone.iter().filter(|gone| **gone).count();
-        Self { plants, gone, gone_count }
-    }
-
     /// All of its plants, those that do not stand too, in order of their ids.
     pub fn plants(&self) -> &[Plant] {
         &self.plants
@@ -108,12 +101,9 @@ impl PlantPatches {
 
     /// Adds a patch with the plants that [`Scatter::patch`] gave, which may have been made on another thread.
     pub fn insert(&mut self, world: &World, pos: PatchPos, plants: Vec<Plant>) {
-        self.insert_patch(pos, PlantPatch::new(&self.scatter, world, plants));
-    }
-
-    /// Adds a patch that [`Scatter::patch_in`] made. The caller checks what changed since.
-    pub(crate) fn insert_patch(&mut self, pos: PatchPos, patch: PlantPatch) {
-        self.patches.insert(pos, patch);
+        let gone: Vec<bool> = plants.iter().map(|plant| !self.scatter.stands(world, plant)).collect();
+        let gone_count = gone.iter().filter(|gone| **gone).count();
+        self.patches.insert(pos, PlantPatch { plants, gone, gone_count });
     }
 
     /// Removes a patch.
@@ -242,11 +232,5 @@ impl Scatter {
     pub fn patch(&self, ground: &Ground, pos: PatchPos) -> Vec<Plant> {
         let (low, high) = self.patch_cells(pos);
         self.plants(ground, low, high, |species| species == usize::from(pos.species))
-    }
-
-    /// A patch as it stands in a world.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn patch_in(&self, world: &World, pos: PatchPos) -> PlantPatch {
-        PlantPatch::new(self, world, self.patch(world.ground(), pos))
     }
 }

@@ -14,7 +14,6 @@
 //! ```
 
 mod commit;
-#[cfg(feature = "tools")]
 mod commit_light;
 mod draft;
 #[cfg(feature = "net")]

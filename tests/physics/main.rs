@@ -15,5 +15,7 @@ mod placement;
 mod shared;
 mod sources;
 mod stage;
+#[cfg(feature = "scatter")]
+mod stems;
 mod waiting;
 mod walkers;

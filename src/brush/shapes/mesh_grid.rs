@@ -7,7 +7,8 @@
 use glam::{DVec3, I64Vec3, IVec3, Quat, UVec3, Vec3};
 use rustc_hash::FxHashMap;
 
-use super::grid::{GridShape, SIDES, ShapeGrid, points};
+use super::grid::GridShape;
+use super::shape_grid::{SIDES, ShapeGrid, points};
 use crate::brush::BrushError;
 use crate::ground::MaterialId;
 use crate::lattice::ONE;

@@ -307,7 +307,7 @@ impl Tour {
         self.scene("the boulder", BOULDER, |studio, t| {
             let seconds = t * BOULDER;
             let target = match seconds {
-                ..1.4 => boulder - Vec3::Y * 2.0,
+                ..1.4 => boulder - Vec3::Y * 4.0,
                 ..3.3 => foot + Vec3::Y * 1.8,
                 _ => foot + Vec3::Y * 2.5 + flat(direction) * 3.0,
             };
