@@ -76,7 +76,7 @@ impl ShapeGrid {
     ///
     /// ```
     /// use bevy_burrow::prelude::*;
-    /// use glam::{IVec3, UVec3};
+    /// use glam::{IVec3, UVec3, Vec3};
     ///
     /// let mut terrain = Terrain::new(Ground::flat(64, 64, 20.0)?, &TerrainSettings::default())?;
     /// let mound = Brush::add(Shape::sphere(Vec3::new(12.0, 20.0, 12.0), 5.0), MaterialId(0));
@@ -153,7 +153,7 @@ impl ShapeGrid {
     ///
     /// ```
     /// use bevy_burrow::prelude::*;
-    /// use glam::{IVec3, UVec3};
+    /// use glam::{IVec3, UVec3, Vec3};
     ///
     /// let ball = ShapeGrid::from_fn(UVec3::splat(17), |at| (at - 8).as_vec3().length() - 6.0)?
     ///     .with_materials(|at| MaterialId(if at.y > 8 { 1 } else { 2 }));
