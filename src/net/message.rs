@@ -34,8 +34,8 @@ use crate::brush::{Edit, Prefab};
 use crate::format::WorldId;
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
-use crate::terrain::{LooseSettings, Order, Patch};
-use crate::volume::{Brick, DiggingRules, Fields};
+use crate::terrain::{EditSettings, Order, Patch};
+use crate::volume::{Brick, Fields};
 
 /// The version of the protocol. It changes whenever the encoding of messages does.
 pub const PROTOCOL: u32 = 6;
@@ -240,10 +240,8 @@ pub enum Join {
 /// The state at a number in addition to bricks and fields.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RuleState {
-    /// The rules.
-    pub rules: Option<DiggingRules>,
-    /// The settings of loose pieces.
-    pub loose: Option<LooseSettings>,
+    /// The rules and the search for loose pieces that later edits obey.
+    pub edit_settings: EditSettings,
     /// The greatest name that a field has had.
     pub next_field: u64,
 }

@@ -145,8 +145,7 @@ impl Replica {
     /// The present state in addition to bricks and fields.
     pub fn rule_state(&self) -> RuleState {
         RuleState {
-            rules: self.confirmed.rules().cloned(),
-            loose: self.confirmed.loose().copied(),
+            edit_settings: self.confirmed.edit_settings().clone(),
             next_field: self.world().next_field(),
         }
     }
@@ -313,8 +312,8 @@ impl Replica {
         }
         let kept = if keeps_world { change } else { Patch::default() };
         let change = Patch { next_field: state.next_field, ..kept };
-        let (rules, loose) = (state.rules.clone(), state.loose);
-        let parts = WorldParts { change, chunk_size, revision: 0, rules, loose };
+        let edit_settings = state.edit_settings.clone();
+        let parts = WorldParts { change, chunk_size, revision: 0, edit_settings };
         let settings = TerrainSettings { chunk_size, voxel_size: self.confirmed.voxel_size() };
         self.confirmed = Terrain::restore(self.confirmed.world().shared_ground(), &settings, parts)?;
         never_shown(&mut self.confirmed);

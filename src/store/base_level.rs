@@ -13,7 +13,7 @@ use crate::format::portable::SavedRegion;
 use crate::format::region::region_key;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
-use crate::terrain::{Patch, RestoreError, Terrain, TerrainSettings, WorldParts, brick_over};
+use crate::terrain::{EditSettings, Patch, RestoreError, Terrain, TerrainSettings, WorldParts, brick_over};
 use crate::volume::{Brick, Fields, NO_FIELDS};
 use crate::world::{Places, State};
 
@@ -109,7 +109,7 @@ impl BaseLevel {
 
     /// The level's bricks and fields on a ground, which may differ from the one it was read on.
     pub(super) fn parts(&self, ground: &Ground) -> WorldParts {
-        let mut parts = WorldParts { rules: None, loose: None, ..self.level.parts() };
+        let mut parts = WorldParts { edit_settings: EditSettings::default(), ..self.level.parts() };
         for (pos, brick) in &mut parts.change.bricks {
             *brick = brick.take().map(|brick| brick_over(ground, *pos, brick));
         }

@@ -108,7 +108,7 @@ impl Writer {
     }
 
     pub(super) fn metadata(&self) -> format::Metadata {
-        let Mirror { revision, hash, next_field, rules, loose, game, .. } = &self.mirror;
+        let Mirror { revision, hash, next_field, edit_settings, game, .. } = &self.mirror;
         let mut game = game.iter().map(|(key, value)| (key.clone(), value.clone())).collect();
         GroundSize::of(&self.ground).put(&mut game);
         format::Metadata {
@@ -116,8 +116,7 @@ impl Writer {
             revision: *revision,
             hash: *hash,
             next_field: *next_field,
-            rules: rules.clone(),
-            loose: *loose,
+            edit_settings: edit_settings.clone(),
             simulation: SIMULATION,
             ground: self.ground.hash(),
             game,

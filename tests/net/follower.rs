@@ -13,7 +13,7 @@ use bevy_burrow::net::{
     touched_regions,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Meshing, Patch, SIMULATION};
+use bevy_burrow::terrain::{EditSettings, Meshing, Patch, SIMULATION};
 use bevy_burrow::volume::Fields;
 use fastrand::Rng;
 use glam::IVec3;
@@ -228,8 +228,10 @@ impl Follower {
             }
         };
         self.number = welcome.epoch.number;
-        self.terrain.set_rules(state.rules.unwrap_or_default()).expect("valid rules");
-        self.terrain.set_loose(state.loose);
+        let EditSettings { rules, loose } = state.edit_settings;
+        let rules = rules.as_deref().cloned().unwrap_or_default();
+        self.terrain.set_rules(rules).expect("valid rules");
+        self.terrain.set_loose(loose);
     }
 
     fn compare(&mut self, regions: &RegionHashes) {

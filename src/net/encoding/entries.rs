@@ -1,7 +1,5 @@
 //! Entries of the order, one by one and in messages.
 
-use std::sync::Arc;
-
 use super::super::message::{ClientId, Entry};
 use super::super::{ContentId, ContentTable};
 use super::edits::put_edit;
@@ -100,7 +98,7 @@ pub(super) fn read_entry(
     coder: &mut EditSequence,
 ) -> Result<(Entry, Vec<ContentId>), FormatError> {
     let entry = match reader.byte()? {
-        RULES => Entry::of_server(Order::Rules(read_rules(reader.bytes()?)?.map(Arc::new))),
+        RULES => Entry::of_server(Order::Rules(read_rules(reader.bytes()?)?)),
         LOOSE => {
             let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
             Entry::of_server(Order::Loose(loose))

@@ -1,5 +1,7 @@
 //! Parts of messages: numbers, flags, reasons, regions, rules.
 
+use std::sync::Arc;
+
 use super::super::message::*;
 use crate::format::bytes::{Reader, put_number};
 use crate::format::fields::{point, put_point};
@@ -36,10 +38,10 @@ pub(super) fn at_place<T: Copy>(all: &[T], place: u8) -> Result<T, FormatError> 
     all.get(usize::from(place)).copied().ok_or(FormatError::Invalid("reason"))
 }
 
-pub(super) fn read_rules(bytes: &[u8]) -> Result<Option<DiggingRules>, FormatError> {
+pub(super) fn read_rules(bytes: &[u8]) -> Result<Option<Arc<DiggingRules>>, FormatError> {
     let rules: Option<DiggingRules> = plain::from_bytes(bytes, "rules")?;
     match rules.as_ref().map_or(Ok(()), DiggingRules::check) {
-        Ok(()) => Ok(rules),
+        Ok(()) => Ok(rules.map(Arc::new)),
         Err(_) => Err(FormatError::Invalid("rules")),
     }
 }

@@ -38,8 +38,7 @@ impl Server {
         let (now, number) = (self.now, self.applied);
         let kept = self.kept.get_or_insert_with(|| {
             let state = RuleState {
-                rules: self.terrain.rules().cloned(),
-                loose: self.terrain.loose().copied(),
+                edit_settings: self.terrain.edit_settings().clone(),
                 next_field: self.terrain.world().next_field(),
             };
             Kept { world: (number, self.terrain.snapshot()), state, table: None, since: now }

@@ -50,7 +50,7 @@ use super::regions::RegionSums;
 use crate::brush::Edit;
 use crate::format::{FormatError, WorldId};
 use crate::lattice::RegionPos;
-use crate::terrain::{LooseSettings, Order, Patch, Terrain};
+use crate::terrain::{EditSettings, LooseSettings, Order, Patch, Terrain};
 use crate::volume::{DiggingRules, RulesError};
 pub use events::{ServerEvent, ServerFigures};
 use kept::Kept;
@@ -200,7 +200,7 @@ impl Server {
             && world.next_field() == 0
             && world.bricks().next().is_none()
             && world.fields().next().is_none();
-        let (rules, loose) = (terrain.rules().cloned().map(Arc::new), terrain.loose().copied());
+        let edit_settings = terrain.edit_settings().clone();
         let run = WorldId::random().0 as u64;
         let mut server = Self {
             terrain,
@@ -242,11 +242,9 @@ impl Server {
             figures: ServerFigures::default(),
         };
         // What holds already is part of what leads from the pristine world.
-        if let (true, Some(rules)) = (is_whole, rules) {
-            server.order(Entry::of_server(Order::Rules(Some(rules))));
-        }
-        if let (true, Some(loose)) = (is_whole, loose) {
-            server.order(Entry::of_server(Order::Loose(Some(loose))));
+        if is_whole {
+            let orders = edit_settings.orders_after(Some(&EditSettings::default()));
+            orders.for_each(|order| server.order(Entry::of_server(order)));
         }
         server
     }

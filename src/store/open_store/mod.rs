@@ -35,7 +35,7 @@ use super::unsaved;
 use super::writer::{Content, Message, Writer};
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Order, Patch, Terrain, TerrainSettings, Version};
+use crate::terrain::{CommitRecord, EditSettings, LogEntry, Patch, Terrain, TerrainSettings, Version};
 
 /// The file that is locked while a world is open.
 const LOCK: &str = "lock";
@@ -154,7 +154,7 @@ impl Store {
         let world = WorldId::random();
         let ground = terrain.world().shared_ground();
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let (rules, loose) = (parts.rules.clone(), parts.loose);
+        let edit_settings = parts.edit_settings.clone();
         let (grid, level) = (terrain.world().grid(), options.level.clone());
         let progress = options.progress.clone();
         let mirror = Mirror::new(grid, parts, hash, data.clone(), level);
@@ -162,8 +162,8 @@ impl Store {
         let is_whole = revision == 0 && mirror.is_as_level() && data.is_empty();
         let mut entries = Vec::new();
         if is_whole {
-            entries.extend(rules.map(|rules| LogEntry::Order(Order::Rules(Some(Arc::new(rules))))));
-            entries.extend(loose.map(|loose| LogEntry::Order(Order::Loose(Some(loose)))));
+            let orders = edit_settings.orders_after(Some(&EditSettings::default()));
+            entries.extend(orders.map(LogEntry::Order));
         }
         let frame = u64::from(!is_whole);
         let shared = Arc::new(Shared::default());

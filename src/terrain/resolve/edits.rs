@@ -146,7 +146,7 @@ pub(crate) fn edits(scene: Scene, submissions: &[Submission]) -> Resolved {
         let mask = exact(mask.word_count(), mask.words());
         let patch = Patch { bricks: changed_bricks(bricks), fields, next_field };
         let change = Change { patch, mask, sample_hash };
-        let number = submissions.first().map_or(0, |first| first.context.group);
+        let number = submissions.first().map_or(0, |first| first.group);
         UndoDelta::new(change, replaced_bytes, number, (tags, pieces))
     });
     let changes = changes.collect();

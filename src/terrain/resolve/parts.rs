@@ -52,11 +52,7 @@ pub(crate) fn ground(scene: Scene, ground: &Arc<Ground>) -> Resolved {
 }
 
 /// Adds the receipt.
-fn answered(
-    world: &World,
-    asked: Asked,
-    result: Result<(Resolved, Applied), PartsError>,
-) -> Resolved {
+fn answered(world: &World, asked: Asked, result: Result<(Resolved, Applied), PartsError>) -> Resolved {
     let (resolved, outcome) = match result {
         Ok((resolved, applied)) => (resolved, Ok(applied)),
         Err(why) => (Resolved::nothing(world), Err(why.into())),

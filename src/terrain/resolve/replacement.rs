@@ -47,10 +47,10 @@ impl<'a> Replacement<'a> {
             let pristine = || Arc::new(Brick::pristine(pristine_layers(&world.ground, *pos)));
             (brick.clone().unwrap_or_else(pristine), changed, effect)
         };
-        let compared = Stages::time(&mut stages.edit, || {
-            parallel_map(&change.patch.bricks, ItemCost::Brick, compare)
-        });
-        let (mut bricks, mut changed) = (Vec::with_capacity(compared.len()), Vec::with_capacity(compared.len()));
+        let compared =
+            Stages::time(&mut stages.edit, || parallel_map(&change.patch.bricks, ItemCost::Brick, compare));
+        let (mut bricks, mut changed) =
+            (Vec::with_capacity(compared.len()), Vec::with_capacity(compared.len()));
         let mut applied = Applied::default();
         for (&(pos, _), (brick, differs, effect)) in change.patch.bricks.iter().zip(compared) {
             bricks.push((pos, brick));
@@ -142,12 +142,8 @@ impl<'a> Replacement<'a> {
         let sample_hash = change.sample_hash;
         let next_field = world.next_field.max(change.patch.next_field);
         let delta = UndoDelta::new(change, replaced_bytes, group, (tags, pieces));
-        let resolved = Resolved {
-            news,
-            next_field,
-            stages,
-            ..Resolved::new(world, vec![delta], sample_hash, meshes)
-        };
+        let resolved =
+            Resolved { news, next_field, stages, ..Resolved::new(world, vec![delta], sample_hash, meshes) };
         (resolved, applied)
     }
 }

@@ -28,7 +28,7 @@ pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resol
     }
     // Counts only what rules refuse.
     let mut effect = EditEffect::default();
-    let rules = submission.context.rules.as_deref();
+    let rules = submission.edit_settings.rules.as_deref();
     let found = Stages::time(&mut stages.edit, || {
         edits::reset(world.samples(), world.grid, edit, rules, &mut effect)
     });
@@ -40,7 +40,7 @@ pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resol
     let mut replacement = Replacement::new(scene, change, true, stages);
     replacement.update_hash();
     replacement.update_mask();
-    let (resolved, applied) = replacement.resolve(submission.context.group, (tags, Vec::new()));
+    let (resolved, applied) = replacement.resolve(submission.group, (tags, Vec::new()));
     let applied = Applied { chunks, refused: effect.refused, ..applied };
     Resolved { receipts: vec![Receipt::of_edit(tag, Ok(applied))], ..resolved }
 }
