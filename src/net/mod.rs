@@ -82,7 +82,6 @@ pub use message::{
 };
 #[doc(hidden)]
 pub use regions::{region_hash, touched_regions};
-pub use replica::ShownChange;
 #[doc(hidden)]
 pub use server::{
     Admission, Outgoing, Permission, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,

@@ -52,15 +52,6 @@ impl Reads {
 /// predicted alone, and not together with all previous ones.
 const MANY: usize = 16;
 
-/// A change of the shown world.
-#[derive(Clone, Debug)]
-pub struct ShownChange {
-    /// Bricks and fields.
-    pub change: Patch,
-    /// The hash that the shown world has afterwards.
-    pub hash: u64,
-}
-
 /// An edit of this client that the server has not ordered yet.
 #[derive(Clone, Debug)]
 struct Pending {
@@ -371,9 +362,9 @@ impl Replica {
                 .all(|pos| !self.predicted.bricks.contains_key(pos) && !is_read(pos.samples()))
     }
 
-    /// Updates the shown world. Returns its change, if there is one, and the receipts of the pending edits that were
-    /// predicted last, in order.
-    pub fn update(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
+    /// Updates the shown world. Returns the order that changes it, if there is a change, and the receipts of the pending edits
+    /// that were predicted last, in order.
+    pub fn update(&mut self) -> (Option<Order>, Option<Vec<Receipt>>) {
         // Names of fields may differ that were drafted one after the other.
         self.is_outdated |= self.pending.is_empty() && !self.predicted.is_empty();
         let updated = match self.can_append().then(|| self.append()).flatten() {
@@ -381,8 +372,8 @@ impl Replica {
             None => {
                 self.is_outdated |= self.appended > 0;
                 let updated = self.update_all();
-                if let (Some(shown), Some(ShownChange { change, hash })) = (&mut self.shown, &updated.0)
-                    && shown.apply_one(Order::parts(change.clone(), Some(*hash))).outcome.is_err()
+                if let (Some(shown), Some(order)) = (&mut self.shown, &updated.0)
+                    && shown.apply_one(order).outcome.is_err()
                 {
                     self.shown = None;
                 }
@@ -401,7 +392,7 @@ impl Replica {
     }
 
     /// Predicts the last pending edits over the shown world. `None` if that world can't be built.
-    fn append(&mut self) -> Option<(Option<ShownChange>, Vec<Receipt>)> {
+    fn append(&mut self) -> Option<(Option<Order>, Vec<Receipt>)> {
         if self.shown.is_none() {
             self.shown = self.fork_shown();
         }
@@ -426,9 +417,7 @@ impl Replica {
             (shown.world().regions_hash(), shown.world().next_field());
         self.hash_offset = self.shown_regions_hash.wrapping_sub(world.regions_hash());
         change.next_field = self.next_field;
-        let is_empty = change.is_empty();
-        let hash = self.shown_hash();
-        Some(((!is_empty).then_some(ShownChange { change, hash }), receipts))
+        Some((self.order_of(change), receipts))
     }
 
     /// The shown world, as a terrain.
@@ -440,7 +429,12 @@ impl Replica {
         Some(shown)
     }
 
-    fn update_all(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
+    /// The order that makes a change of the shown world; `None` if nothing changes.
+    fn order_of(&self, change: Patch) -> Option<Order> {
+        (!change.is_empty()).then(|| Order::parts(change, Some(self.shown_hash())))
+    }
+
+    fn update_all(&mut self) -> (Option<Order>, Option<Vec<Receipt>>) {
         if self.changes_are_independent && !self.is_outdated {
             self.changes_are_independent = false;
             return (self.follow_apart(), None);
@@ -470,30 +464,26 @@ impl Replica {
         self.hash_offset = draft.regions_hash.wrapping_sub(world.regions_hash());
         (self.predicted, self.shown_regions_hash) = (predicted, draft.regions_hash);
         self.next_field = change.next_field;
-        let is_empty = change.is_empty();
-        let shown = (!is_empty).then_some(ShownChange { change, hash: draft.hash });
-        (shown, Some(draft.receipts))
+        (self.order_of(change), Some(draft.receipts))
     }
 
     /// The change of the shown world if the confirmed world has changed apart from the pending edits, whose results
     /// stay.
-    fn follow_apart(&mut self) -> Option<ShownChange> {
+    fn follow_apart(&mut self) -> Option<Order> {
         let before = std::mem::take(&mut self.before);
         self.shown_regions_hash = self.world().regions_hash().wrapping_add(self.hash_offset);
-        let (hash, world) = (self.shown_hash(), self.confirmed.world());
+        let world = self.confirmed.world();
         self.next_field = self.next_field.max(world.next_field());
-        let change = Patch::between(&before.over(world), world, before.places(), self.next_field);
-        let is_empty = change.is_empty();
-        (!is_empty).then_some(ShownChange { change, hash })
+        self.order_of(Patch::between(&before.over(world), world, before.places(), self.next_field))
     }
 
-    /// The change that makes any world equal to the one to be shown.
-    pub fn whole(&self, shown: &World) -> ShownChange {
+    /// The order that makes any world equal to the one to be shown.
+    pub fn whole(&self, shown: &World) -> Order {
         let world = self.confirmed.world();
         let places = Places::of(world).and(self.predicted.places()).and(Places::of(shown));
         let next_field = self.next_field.max(world.next_field());
         let change = Patch::between(shown, &self.predicted.over(world), places, next_field);
-        ShownChange { change, hash: self.shown_hash() }
+        Order::parts(change, Some(self.shown_hash()))
     }
 }
 

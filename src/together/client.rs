@@ -14,7 +14,7 @@ use super::service::Service;
 use super::shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
 use super::sharing::Sharing;
 use super::trouble::{SharingTrouble, SharingTroubleFound};
-use crate::net::{Client, ClientEvent, KickReason, Lane, Refusal, ShownChange};
+use crate::net::{Client, ClientEvent, KickReason, Lane, Refusal};
 use crate::plugin::{BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Applied, Asked, Order, Receipt, Rejection, Terrain};
 use crate::threads::{ThreadTask, Threads, free_later};
@@ -270,11 +270,9 @@ pub(super) fn show(
             // All of it comes once those that wait are answered.
             changes.clear();
         }
-        for ShownChange { change, hash } in changes {
-            // One that finds no room is rejected, and comes again with all others.
-            terrain.submit(Order::parts(change, Some(hash)));
-            display.submitted += 1;
-        }
+        display.submitted += changes.len() as u64;
+        // One that finds no room is rejected, and comes again with all others.
+        terrain.submit_all(changes);
         display.compare(terrain.world(), client.shown_hash());
         let broken = (display.is_broken && display.is_idle()).then(|| terrain.snapshot());
         client.take_events().into_iter().for_each(|event| edit_messages.report(entity, link, event));

@@ -8,7 +8,7 @@ use bevy::platform::time::Instant;
 use super::messages::GroundId;
 use super::service::Service;
 use super::trouble::SharingTrouble;
-use crate::net::{self, Client, ContentTable, KickReason, Lane, ShownChange};
+use crate::net::{self, Client, ContentTable, KickReason, Lane};
 use crate::plugin::{LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Asked, Order, Terrain, TerrainError, TerrainSettings, Version, World};
 use crate::threads::{ThreadTask, Threads};
@@ -54,7 +54,7 @@ pub(super) struct Link {
 pub(super) struct Worked {
     pub client: Client,
     /// All that has to be put into the shown terrain, if that was asked for.
-    pub whole: Option<ShownChange>,
+    pub whole: Option<Order>,
 }
 
 /// The client's values after its last update.
@@ -75,7 +75,7 @@ pub(super) struct Display {
     /// Whether the shown world is wrong, so that all of it has to be replaced.
     pub is_broken: bool,
     /// All of it, to be put next.
-    pub whole: Option<ShownChange>,
+    pub whole: Option<Order>,
     /// Messages about pieces, each with the number of answered changes at which it is sent: the ground changes with
     /// these.
     pub pieces: VecDeque<(u64, PieceMessage)>,

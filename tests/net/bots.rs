@@ -7,7 +7,7 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::ChunkPos;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, ContentTable, Entries, Entry, Lane, Server, ServerSettings, ShownChange,
+    Client, ClientEvent, ClientId, ContentTable, Entries, Entry, Lane, Server, ServerSettings,
     ToClient,
 };
 use bevy_burrow::prelude::*;
@@ -245,8 +245,8 @@ impl Bot {
     }
 
     fn look(&mut self, frame: u64, now: Duration) {
-        for ShownChange { change, hash } in self.client.take_shown() {
-            self.shown.apply_one(Order::parts(change, Some(hash))).outcome.expect("it fits");
+        for order in self.client.take_shown() {
+            self.shown.apply_one(order).outcome.expect("it fits");
         }
         for event in self.client.take_events() {
             let name = match event {

@@ -632,8 +632,8 @@ fn who_begins_with_the_level_gets_only_what_differs() {
             server.advance(now);
             server.take_outgoing().into_iter().for_each(|(_, lane, message)| client.receive(lane, message));
             client.advance(now);
-            for change in client.take_shown() {
-                shown.apply_one(Order::parts(change.change, Some(change.hash))).outcome.expect("it fits");
+            for order in client.take_shown() {
+                shown.apply_one(order).outcome.expect("it fits");
             }
         }
         assert!(client.has_joined());

@@ -30,12 +30,12 @@ use super::ContentTable;
 use super::bulk::BulkReader;
 use super::message::{ClientId, Entry, Epoch, Hello, Lane, PROTOCOL, Refusal, ToServer};
 use super::price::cost;
-use super::replica::{Replica, ShownChange};
+use super::replica::Replica;
 use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
+use crate::terrain::{Order, Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
@@ -111,7 +111,7 @@ pub struct Client {
     undos: BTreeSet<u64>,
     pieces: Pieces,
     outgoing: Vec<Vec<u8>>,
-    shown: Vec<ShownChange>,
+    shown: Vec<Order>,
     events: Vec<ClientEvent>,
     figures: ClientFigures,
 }
@@ -263,9 +263,9 @@ impl Client {
         self.replica.shown_hash()
     }
 
-    /// All that is to be put into a terrain that does not hold what it should, for example because a change was refused
-    /// there. It takes the place of everything that [`take_shown`](Self::take_shown) would return now.
-    pub fn show_whole(&mut self, shown: &World) -> ShownChange {
+    /// The order that repairs a shown terrain with this world, for example because a change was refused there. It takes the
+    /// place of everything that [`take_shown`](Self::take_shown) would return now.
+    pub fn show_whole(&mut self, shown: &World) -> Order {
         let (_, receipts) = self.replica.update();
         self.shown.clear();
         self.report_predictions(receipts.unwrap_or_default());
@@ -338,9 +338,9 @@ impl Client {
         self.inbox.push_back((lane, bytes));
     }
 
-    /// Changes for the shown terrain, in order, for [`Terrain::submit`](crate::terrain::Terrain::submit);
-    /// each is returned once.
-    pub fn take_shown(&mut self) -> Vec<ShownChange> {
+    /// The changes of the shown terrain, for [`Terrain::submit_all`](crate::terrain::Terrain::submit_all); each is
+    /// returned once.
+    pub fn take_shown(&mut self) -> Vec<Order> {
         std::mem::take(&mut self.shown)
     }
 
