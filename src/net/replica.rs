@@ -10,7 +10,7 @@ use glam::IVec3;
 
 use super::message::{Entry, RuleState};
 use super::never_shown;
-use super::regions::{RegionSums, Steps, chunks_of, touched_regions};
+use super::regions::{RegionSums, chunks_of, run_submitted};
 use crate::brush::{Edit, Evaluator};
 use crate::edits::most_read_around;
 use crate::ground::Ground;
@@ -244,20 +244,12 @@ impl Replica {
 
     /// Runs all that is submitted.
     fn run(&mut self) -> Applied {
-        let mut applied = Applied { receipts: self.confirmed.take_receipts(), ..Applied::default() };
-        while let Some(transaction) = self.confirmed.begin() {
-            let commit = transaction.run();
-            let change = commit.change();
-            self.before.keep(change.inverse(self.confirmed.world()));
-            applied.regions.append(&mut touched_regions(self.world().grid(), &change));
-            let steps = Steps::of(self.confirmed.world(), &change);
-            // It is the one under way.
-            applied.receipts.extend(self.confirmed.commit(commit).unwrap_or_default());
-            self.sums.add(self.confirmed.world(), steps);
-        }
-        let mut parts = applied.receipts.iter().filter(|receipt| receipt.asked == Asked::Parts);
-        applied.failed_locally = parts.any(Receipt::is_local_failure);
-        applied
+        let Self { confirmed, sums, before, .. } = self;
+        let keep = |world: &World, change: &Patch| before.keep(change.inverse(world));
+        let (receipts, regions) = run_submitted(confirmed, sums, keep);
+        let mut parts = receipts.iter().filter(|receipt| receipt.asked == Asked::Parts);
+        let failed_locally = parts.any(Receipt::is_local_failure);
+        Applied { receipts, regions, failed_locally }
     }
 
     /// Shares the shown bricks with the confirmed world where they are equal, and forgets these differences.

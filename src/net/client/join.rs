@@ -95,25 +95,20 @@ impl Client {
         }
         // The answers to these were sent while the client was disconnected; if they were applied, the world contains
         // them.
-        for tag in self.take_answered(sequence) {
-            self.events.push(ClientEvent::Confirmed { tag, receipt: None });
-        }
-        let undone = self.take_answered_undos(sequence).map(|_| ClientEvent::Undone(None));
-        self.events.extend(undone);
+        let edit = |tag| ClientEvent::Confirmed { tag, receipt: None };
+        self.settle(sequence, edit, || ClientEvent::Undone(None));
     }
 
-    /// Removes pending edits up to a number; returns their tags.
-    fn take_answered(&mut self, sequence: u64) -> Vec<u64> {
-        let answered: Vec<u64> =
-            self.replica.pending().map(|(number, _)| number).filter(|number| *number <= sequence).collect();
+    /// Removes pending edits and undos up to a number, and reports an event for each, of an edit with its tag.
+    fn settle(&mut self, sequence: u64, edit: impl Fn(u64) -> ClientEvent, undo: impl Fn() -> ClientEvent) {
+        let numbers = self.replica.pending().map(|(number, _)| number);
+        let answered: Vec<u64> = numbers.filter(|number| *number <= sequence).collect();
         answered.iter().for_each(|number| self.settle_pieces(*number));
-        answered.into_iter().filter_map(|number| Some(self.replica.take_back(number)?.tag())).collect()
-    }
-
-    /// Removes waiting undos up to a number; returns their numbers.
-    fn take_answered_undos(&mut self, sequence: u64) -> impl Iterator<Item = u64> + use<> {
+        let edits = answered.into_iter().filter_map(|number| self.replica.take_back(number));
+        self.events.extend(edits.map(|own| edit(own.tag())));
         let later = self.undos.split_off(&sequence.saturating_add(1));
-        std::mem::replace(&mut self.undos, later).into_iter()
+        let undos = std::mem::replace(&mut self.undos, later);
+        self.events.extend(undos.iter().map(|_| undo()));
     }
 
     /// Sends edits that the server has not seen, and those from before the first welcome.
@@ -157,11 +152,8 @@ impl Client {
             && self.number() >= to
         {
             // They were refused while the client was away.
-            for tag in self.take_answered(sequence) {
-                self.events.push(ClientEvent::Refused { tag, why: None });
-            }
-            let refused = self.take_answered_undos(sequence).map(|_| ClientEvent::UndoRefused(None));
-            self.events.extend(refused);
+            let edit = |tag| ClientEvent::Refused { tag, why: None };
+            self.settle(sequence, edit, || ClientEvent::UndoRefused(None));
             self.follow_from_now();
         }
     }

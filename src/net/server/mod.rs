@@ -5,6 +5,7 @@
 //! | --- | --- |
 //! | `settings`, `events` | its limits, its events and statistics |
 //! | `session`, `players` | a connected client, data that is kept for its player |
+//! | `recent` | a table of clients that forgets the oldest |
 //! | `receive`, `validation` | received messages, and the reasons to refuse edits |
 //! | `order_log` | the latest entries, in long messages |
 //! | `sequences` | the last sequence numbers of players' edits |
@@ -24,6 +25,7 @@ mod order_log;
 mod pace;
 mod players;
 mod receive;
+mod recent;
 #[cfg(feature = "store")]
 mod save;
 #[cfg(feature = "store")]
