@@ -75,6 +75,34 @@ impl RegionRecord {
     }
 }
 
+/// The valid records of files.
+#[derive(Default)]
+struct Records {
+    checkpoints: Vec<Checkpoint>,
+    regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
+}
+
+impl Records {
+    /// Adds a record, or returns why it is not valid.
+    fn enter(&mut self, world: WorldId, key: &[u8], record: Vec<u8>) -> Result<(), (FormatError, Vec<u8>)> {
+        match Key::of(key) {
+            Some(Key::Checkpoint) => match frame::open(&record, Kind::Checkpoint, world, key, FRAME_LIMIT) {
+                Ok(opened) => self.checkpoints.extend(decode_checkpoint(&opened.payload)),
+                Err(why) => return Err((why, record)),
+            },
+            Some(Key::Region(at)) => {
+                let (found, known) =
+                    (RegionRecord::open(record, world, key)?, self.regions.entry(at).or_default());
+                if known.iter().all(|own| own.revision != found.revision) {
+                    known.push(found);
+                }
+            }
+            None => {}
+        }
+        Ok(())
+    }
+}
+
 /// The files of a world.
 pub(super) struct Contents {
     pub world: WorldId,
@@ -91,16 +119,13 @@ pub(super) struct Contents {
     pub has_lost_journal: bool,
     /// Why the file of regions can't be read at the moment.
     error: Option<io::Error>,
-    /// The checkpoints that the file of regions holds: two alike, but for damage.
-    checkpoints: Vec<Checkpoint>,
-    /// The copies next to the journal.
+    /// The records of the file of regions. It holds each checkpoint twice, and one record of a region, but for what was
+    /// salvaged from a damaged file.
+    records: Records,
+    /// The records of other files that may hold regions.
+    others: Records,
+    /// The copies of checkpoints next to the journal.
     copies: Vec<Checkpoint>,
-    /// The checkpoints of other files that may hold regions.
-    other_checkpoints: Vec<Checkpoint>,
-    /// Valid records of each region: one, but for what was salvaged from a damaged file.
-    regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
-    /// The records of other files.
-    other_regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
     /// Records that are not valid, by region.
     pub invalid: BTreeMap<RegionPos, Vec<u8>>,
 }
@@ -155,11 +180,9 @@ impl Contents {
             segments,
             named,
             error,
-            checkpoints: Vec::new(),
+            records: Records::default(),
+            others: Records::default(),
             copies: Vec::new(),
-            other_checkpoints: Vec::new(),
-            regions: BTreeMap::new(),
-            other_regions: BTreeMap::new(),
             invalid: BTreeMap::new(),
         };
         let mut others = Vec::new();
@@ -180,10 +203,15 @@ impl Contents {
             None => return Err(contents.no_world(&raw)?),
         }
         for (key, record) in raw {
-            contents.enter(&key, record)?;
+            let entered = contents.records.enter(contents.world, &key, record);
+            let Err((error, record)) = entered else { continue };
+            refuse_newer(error.newer_schema())?;
+            if let Some(Key::Region(at)) = Key::of(&key) {
+                contents.invalid.insert(at, record);
+            }
         }
-        for source in others {
-            contents.enter_others(source);
+        for (key, record) in others.into_iter().flat_map(Source::into_records) {
+            drop(contents.others.enter(contents.world, &key, record));
         }
         for copy in checkpoint_copy::read(files, contents.world) {
             match copy {
@@ -207,52 +235,9 @@ impl Contents {
         })
     }
 
-    fn enter(&mut self, key: &[u8], record: Vec<u8>) -> Result<(), StoreError> {
-        match Key::of(key) {
-            Some(Key::Checkpoint) => {
-                match frame::open(&record, Kind::Checkpoint, self.world, key, FRAME_LIMIT) {
-                    Ok(opened) => self.checkpoints.extend(decode_checkpoint(&opened.payload)),
-                    Err(error) => refuse_newer(error.newer_schema())?,
-                }
-            }
-            Some(Key::Region(at)) => match RegionRecord::open(record, self.world, key) {
-                Ok(found) => self.regions.entry(at).or_default().push(found),
-                Err((error, record)) => {
-                    refuse_newer(error.newer_schema())?;
-                    self.invalid.insert(at, record);
-                }
-            },
-            None => {}
-        }
-        Ok(())
-    }
-
-    /// Adds the records of a file other than the current one.
-    fn enter_others(&mut self, source: Source) {
-        let (Source::Whole(records) | Source::Damaged { records, .. }) = source else { return };
-        for (key, record) in records {
-            match Key::of(&key) {
-                Some(Key::Checkpoint) => {
-                    let opened = frame::open(&record, Kind::Checkpoint, self.world, &key, FRAME_LIMIT);
-                    let checkpoint = opened.ok().and_then(|opened| decode_checkpoint(&opened.payload));
-                    self.other_checkpoints.extend(checkpoint);
-                }
-                Some(Key::Region(at)) => {
-                    let known = self.other_regions.entry(at).or_default();
-                    if let Ok(found) = RegionRecord::open(record, self.world, &key)
-                        && known.iter().all(|own| own.revision != found.revision)
-                    {
-                        known.push(found);
-                    }
-                }
-                None => {}
-            }
-        }
-    }
-
     /// The record of a region at a revision.
     pub fn region(&self, at: RegionPos, revision: u64) -> Option<&RegionRecord> {
-        let all = [&self.regions, &self.other_regions].into_iter().filter_map(|own| own.get(&at));
+        let all = [&self.records, &self.others].into_iter().filter_map(|own| own.regions.get(&at));
         all.flatten().find(|record| record.revision == revision)
     }
 
@@ -272,10 +257,10 @@ impl Contents {
     /// most regions agree. It is the database's, a segment's, or that of another file if the database has none.
     pub fn choose_checkpoint(&self) -> Option<Checkpoint> {
         let heads: Vec<Checkpoint> = self.heads().collect();
-        let others = if self.checkpoints.is_empty() { &self.other_checkpoints[..] } else { &[] };
+        let others = if self.records.checkpoints.is_empty() { &self.others.checkpoints[..] } else { &[] };
         // A damaged database may hold a checkpoint that was never finished, and other files may be old: they say
         // nothing about what the latest state is.
-        let finished = if self.damaged.is_none() { &self.checkpoints[..] } else { &[] };
+        let finished = if self.damaged.is_none() { &self.records.checkpoints[..] } else { &[] };
         let known = heads.iter().chain(finished).map(|checkpoint| checkpoint.frame);
         let latest = known.chain([self.greatest_frame()]).max().unwrap_or_default();
         let runs = self.frame_runs();
@@ -285,7 +270,7 @@ impl Contents {
         };
         // Those in a file with their regions come first: over another ground, regions have equal revisions and
         // different content.
-        let all = self.checkpoints.iter().chain(others).chain(&heads);
+        let all = self.records.checkpoints.iter().chain(others).chain(&heads);
         // Among equals the newest, after which least has to be replayed.
         let rank = |checkpoint: &&Checkpoint| {
             let (missing, unknown) = self.disagreeing(checkpoint);
@@ -295,10 +280,14 @@ impl Contents {
         all.min_by_key(rank).cloned()
     }
 
+    /// All frames of the journal, in the order in which they lie there.
+    fn frames(&self) -> impl Iterator<Item = &Frame> {
+        self.segments.iter().flat_map(|found| &found.frames)
+    }
+
     /// The first and the last number of frames that follow each other.
     fn frame_runs(&self) -> BTreeMap<u64, u64> {
-        let frames = self.segments.iter().flat_map(|found| &found.frames);
-        let numbers: BTreeSet<u64> = frames.map(|frame| frame.number).collect();
+        let numbers: BTreeSet<u64> = self.frames().map(|frame| frame.number).collect();
         let mut runs = BTreeMap::<u64, u64>::new();
         for number in numbers {
             match runs.last_entry() {
@@ -313,7 +302,7 @@ impl Contents {
     /// regions are unknown.
     pub fn assume_checkpoint(&self) -> Checkpoint {
         let mut regions = BTreeMap::new();
-        for (at, records) in self.regions.iter().chain(&self.other_regions) {
+        for (at, records) in self.records.regions.iter().chain(&self.others.regions) {
             let latest = records.iter().map(|record| record.revision).max().unwrap_or_default();
             let known = regions.entry(*at).or_insert(latest);
             *known = latest.max(*known);
@@ -327,7 +316,7 @@ impl Contents {
     /// How many regions of a checkpoint are not there as it says, and how many others are.
     fn disagreeing(&self, checkpoint: &Checkpoint) -> (usize, usize) {
         let is_missing = |(at, revision): &(&RegionPos, &u64)| self.region(**at, **revision).is_none();
-        let found = self.regions.keys().chain(self.invalid.keys());
+        let found = self.records.regions.keys().chain(self.invalid.keys());
         let unknown: BTreeSet<_> = found.filter(|at| !checkpoint.regions.contains_key(at)).collect();
         (checkpoint.regions.iter().filter(is_missing).count(), unknown.len())
     }
@@ -336,7 +325,7 @@ impl Contents {
     pub fn frames_from(&self, first: u64) -> Vec<&Frame> {
         let mut next = first;
         let mut chain = Vec::new();
-        for frame in self.segments.iter().flat_map(|found| &found.frames) {
+        for frame in self.frames() {
             if frame.number == next {
                 chain.push(frame);
                 next += 1;
@@ -347,8 +336,7 @@ impl Contents {
 
     /// The greatest number of a frame that was found, or 0.
     pub fn greatest_frame(&self) -> u64 {
-        let frames = self.segments.iter().flat_map(|found| &found.frames);
-        frames.map(|frame| frame.number).max().unwrap_or_default()
+        self.frames().map(|frame| frame.number).max().unwrap_or_default()
     }
 
     /// Whether the log leads to a checkpoint, as far as its last commit before it says: one of another branch of the
@@ -370,8 +358,7 @@ impl Contents {
     fn last_commit(&self, frame: u64) -> Result<Option<(u64, u64)>, FormatError> {
         // Revisions and hashes do not depend on it.
         let any_ground = Ground::flat(1, 1, 0.0).map_err(|_| FormatError::Invalid("ground"))?;
-        let frames = self.segments.iter().flat_map(|found| &found.frames);
-        let mut before: Vec<&Frame> = frames.filter(|own| own.number <= frame).collect();
+        let mut before: Vec<&Frame> = self.frames().filter(|own| own.number <= frame).collect();
         before.sort_by_key(|own| Reverse(own.number));
         for frame in before {
             let batch = frame.batch_without_content(&any_ground)?;
@@ -384,7 +371,12 @@ impl Contents {
 
     /// Whether regions are stored as they differ from a level.
     pub fn is_on_level(&self) -> bool {
-        self.regions.values().chain(self.other_regions.values()).flatten().any(|record| record.is_change)
+        self.records
+            .regions
+            .values()
+            .chain(self.others.regions.values())
+            .flatten()
+            .any(|record| record.is_change)
     }
 
     /// Whether what can't be read of a segment makes no difference to a world at a frame: frames that follow are part

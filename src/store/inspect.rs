@@ -9,13 +9,12 @@ use super::error::{StoreError, StoreTrouble};
 use super::files::{Files, Folder};
 use super::found::Contents;
 use super::keys;
-use super::open_store::take_lock;
+use super::open_store::read;
 use super::options::{BaseChanged, StoreOptions};
 use super::recover::recover;
 use super::replay_log::replay_all;
 use super::segment::{self, Bad};
 use super::shared::apply_game;
-use super::sources::has_world;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
@@ -71,7 +70,7 @@ pub fn inspect(folder: impl AsRef<Path>) -> Result<WorldInfo, StoreError> {
 /// # Errors
 /// As for a folder.
 pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
-    let (_lock, contents) = read(files)?;
+    let (_lock, contents) = read(files, None)?;
     let unreadable = || StoreError::Unreadable("neither journal nor database hold a valid checkpoint".into());
     let checkpoint = contents.choose_checkpoint().ok_or_else(unreadable)?;
     let mut damage: Vec<String> = contents.damaged.iter().cloned().collect();
@@ -122,14 +121,6 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
         game: game.into_iter().map(|(key, bytes): (String, Vec<u8>)| (key, bytes.len())).collect(),
         damage,
     })
-}
-
-fn read(files: &dyn Files) -> Result<(Box<dyn super::files::Lock>, Contents), StoreError> {
-    if !has_world(files).map_err(StoreError::files("reading the world's folder"))? {
-        return Err(StoreError::Missing(files.name()));
-    }
-    let lock = take_lock(files)?;
-    Ok((lock, Contents::read(files, None)?))
 }
 
 /// Descriptions of unreadable parts of the journal that matter to a world at a frame.
@@ -215,7 +206,7 @@ fn look(
     level: Option<&BaseLevel>,
     replays: bool,
 ) -> Result<WorldCheck, StoreError> {
-    let (_lock, mut contents) = read(files)?;
+    let (_lock, mut contents) = read(files, None)?;
     let level = level.cloned();
     let options = StoreOptions { base_changed: BaseChanged::Refuse, level, ..StoreOptions::default() };
     let recovered = recover(&contents, ground, &options)?;

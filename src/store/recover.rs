@@ -192,15 +192,7 @@ pub(super) fn recover(
         replayed.records.iter().for_each(|record| mirror.apply(record));
         mirror.game = replayed.game;
     } else {
-        mirror = Mirror::new(
-            grid,
-            replayed.terrain.parts(),
-            replayed.terrain.world().hash(),
-            replayed.game,
-            level.cloned(),
-        );
-        // Also those whose records go.
-        mirror.put_back(checkpoint.regions.keys().copied());
+        mirror = mirror_of(&replayed.terrain, replayed.game, level, &checkpoint);
     }
     Ok(Recovered {
         terrain: replayed.terrain,
@@ -222,6 +214,20 @@ pub(super) fn recover(
     })
 }
 
+/// The mirror of a world that takes the place of all records of a checkpoint.
+fn mirror_of(
+    terrain: &Terrain,
+    game: GameData,
+    level: Option<&BaseLevel>,
+    checkpoint: &Checkpoint,
+) -> Mirror {
+    let world = terrain.world();
+    let mut mirror = Mirror::new(world.grid(), terrain.parts(), world.hash(), game, level.cloned());
+    // Also those whose records go.
+    mirror.put_back(checkpoint.regions.keys().copied());
+    mirror
+}
+
 impl Recovered {
     /// The sizes of its chunks and voxels.
     pub fn settings(&self) -> TerrainSettings {
@@ -230,13 +236,8 @@ impl Recovered {
 
     /// A world that was replayed from its first commit.
     fn whole(replayed: Replayed, level: Option<&BaseLevel>, checkpoint: &Checkpoint) -> Self {
-        let world = replayed.terrain.world();
-        let parts = replayed.terrain.parts();
-        let mut mirror = Mirror::new(world.grid(), parts, world.hash(), replayed.game, level.cloned());
-        // Also those whose records go.
-        mirror.put_back(checkpoint.regions.keys().copied());
         Self {
-            mirror,
+            mirror: mirror_of(&replayed.terrain, replayed.game, level, checkpoint),
             terrain: replayed.terrain,
             frame: replayed.frame,
             checkpoint: 0,

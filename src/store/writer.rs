@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 use super::checkpoint::Checkpoint;
 use super::error::{StoreError, StoreTrouble};
 use super::files::{Files, Lock};
-use super::journal::Journal;
+use super::journal::{Journal, Segment};
 use super::mirror::Mirror;
 use super::options::StoreOptions;
 use super::region_file::RegionFile;
@@ -164,22 +164,23 @@ impl Writer {
     pub fn new(
         files: Arc<dyn Files>,
         options: StoreOptions,
-        shared: Arc<Shared>,
         world: WorldId,
         ground: Arc<Ground>,
         settings: TerrainSettings,
         mirror: Mirror,
-        journal: Journal,
+        (segments, next_frame): (Vec<Segment>, u64),
         database: RegionFile,
         checkpoint: u64,
         lock: Box<dyn Lock>,
     ) -> Self {
+        let base = base(&ground, mirror.level.as_ref());
+        let journal = Journal::new(Arc::clone(&files), world, base, segments, next_frame);
         let (checkpoints, state) = ([checkpoint; 2], State::default());
         let point = SavePoint { revision: mirror.revision, ..SavePoint::default() };
         Self {
             files,
             options,
-            shared,
+            shared: Arc::default(),
             world,
             ground,
             settings,

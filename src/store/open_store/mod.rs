@@ -21,13 +21,11 @@ use super::database::DATABASE;
 use super::error::{StoreError, StoreTrouble, WorldSize};
 use super::files::{Files, Folder, Lock};
 use super::found::Contents;
-use super::journal::Journal;
 use super::mirror::Mirror;
 use super::options::StoreOptions;
-use super::progress::Work;
+use super::progress::{Progress, Work};
 use super::recover::recover;
 use super::region_file::RegionFile;
-use super::segment::base;
 use super::settle::settle;
 use super::shared::{GameData, SavePoint, Shared};
 use super::sources::has_world;
@@ -143,7 +141,7 @@ impl Store {
         files.create_folder("").map_err(StoreError::files("creating the world's folder"))?;
         let lock = take_lock(&*files)?;
         if has_world(&*files).map_err(StoreError::files("reading the world's folder"))? {
-            return Err(StoreError::Exists(name(&*files)));
+            return Err(StoreError::Exists(files.name()));
         }
         // The marker of a world that was removed.
         unsaved::clear(&*files).map_err(StoreError::files("creating the world"))?;
@@ -166,22 +164,11 @@ impl Store {
             entries.extend(orders.map(LogEntry::Order));
         }
         let frame = u64::from(!is_whole);
-        let shared = Arc::new(Shared::default());
-        let journal = Journal::new(
-            Arc::clone(&files),
-            world,
-            base(&ground, mirror.level.as_ref()),
-            Vec::new(),
-            frame + 1,
-            (0, Vec::new()),
-        );
-        let saved = Arc::clone(&shared);
-        let database = RegionFile::new();
-        let mut writer = Writer::new(
-            files, options, saved, world, ground, settings, mirror, journal, database, frame, lock,
-        );
+        let (journal, database) = ((Vec::new(), frame + 1), RegionFile::new());
+        let mut writer =
+            Writer::new(files, options, world, ground, settings, mirror, journal, database, frame, lock);
         writer.save_all()?;
-        let mut store = Self::start(writer, shared, world, terrain)?;
+        let mut store = Self::start(writer, terrain)?;
         if !entries.is_empty() {
             let record = CommitRecord { number: 0, revision, hash, entries, change: Patch::default() };
             store.give(store.point, Content::Commits(vec![record]))?;
@@ -216,13 +203,8 @@ impl Store {
         ground: impl Into<Arc<Ground>>,
         options: StoreOptions,
     ) -> Result<(Self, Opened), StoreError> {
-        if !has_world(&*files).map_err(StoreError::files("reading the world's folder"))? {
-            return Err(StoreError::Missing(name(&*files)));
-        }
-        let lock = take_lock(&*files)?;
-        let ground = ground.into();
-        let progress = options.progress.clone();
-        let mut contents = Contents::read(&*files, progress.as_ref())?;
+        let (ground, progress) = (ground.into(), options.progress.clone());
+        let (lock, mut contents) = read(&*files, progress.as_ref())?;
         let recovered = recover(&contents, &ground, &options)?;
         if !options.salvage {
             contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
@@ -235,39 +217,29 @@ impl Store {
         );
         let (settings, findings) = (recovered.settings(), recovered.findings.clone());
         let (mut terrain, mirror) = (recovered.terrain, recovered.mirror);
-        let shared = Arc::new(Shared::default());
-        let world = contents.world;
         let database = match &contents.damaged {
             None => RegionFile::new(),
             Some(_) => RegionFile::damaged(contents.choose_checkpoint().map_or(0, |own| own.frame)),
         };
-        let journal = Journal::new(
-            Arc::clone(&files),
-            world,
-            base(&ground, mirror.level.as_ref()),
-            settled.segments,
-            settled.next_frame,
-            (0, Vec::new()),
-        );
+        let (journal, frame) = ((settled.segments, settled.next_frame), recovered.checkpoint);
         let mut writer = Writer::new(
             files,
             options,
-            Arc::clone(&shared),
-            world,
+            contents.world,
             ground,
             settings,
             mirror,
             journal,
             database,
-            recovered.checkpoint,
+            frame,
             lock,
         );
         let mut failures = Vec::new();
         if is_new {
             writer.save_all_or_later();
-            failures = shared.take_troubles();
+            failures = writer.shared.take_troubles();
         } else {
-            shared.set_durable(writer.point);
+            writer.shared.set_durable(writer.point);
         }
         // Where it could not be replaced yet, the damaged file is still in its place.
         let is_in_place = contents.has_database && !failures.is_empty();
@@ -277,18 +249,14 @@ impl Store {
         troubles.extend(failures);
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
-        let store = Self::start(writer, shared, world, &terrain)?;
+        let store = Self::start(writer, &terrain)?;
         Work::until(progress.as_ref(), 1.0, 1).finish();
         Ok((store, Opened { terrain, replayed, is_log_whole, troubles }))
     }
 
-    fn start(
-        mut writer: Writer,
-        shared: Arc<Shared>,
-        world: WorldId,
-        terrain: &Terrain,
-    ) -> Result<Self, StoreError> {
+    fn start(mut writer: Writer, terrain: &Terrain) -> Result<Self, StoreError> {
         writer.begin_segment();
+        let (shared, world) = (Arc::clone(&writer.shared), writer.world);
         let StoreOptions { waiting_bytes, close_timeout, .. } = writer.options;
         let (point, game) = (writer.point, writer.mirror.game.clone());
         let (messages, inbox): (Sender<Message>, Receiver<Message>) = channel();
@@ -344,12 +312,19 @@ impl Drop for Store {
     }
 }
 
-pub(super) fn take_lock(files: &dyn Files) -> Result<Box<dyn Lock>, StoreError> {
-    let lock = files.lock(LOCK).map_err(StoreError::files("locking the world"))?;
-    lock.ok_or_else(|| StoreError::Locked(name(files)))
+/// Locks a world, and reads its files.
+pub(super) fn read(
+    files: &dyn Files,
+    progress: Option<&Progress>,
+) -> Result<(Box<dyn Lock>, Contents), StoreError> {
+    if !has_world(files).map_err(StoreError::files("reading the world's folder"))? {
+        return Err(StoreError::Missing(files.name()));
+    }
+    let lock = take_lock(files)?;
+    Ok((lock, Contents::read(files, progress)?))
 }
 
-/// How messages name the world.
-pub(super) fn name(files: &dyn Files) -> String {
-    files.name()
+fn take_lock(files: &dyn Files) -> Result<Box<dyn Lock>, StoreError> {
+    let lock = files.lock(LOCK).map_err(StoreError::files("locking the world"))?;
+    lock.ok_or_else(|| StoreError::Locked(files.name()))
 }
