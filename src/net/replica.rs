@@ -12,7 +12,7 @@ use super::message::{Entry, RuleState};
 use super::never_shown;
 use super::regions::{RegionSums, chunks_of, run_submitted};
 use crate::brush::{Edit, Evaluator};
-use crate::edits::most_read_around;
+use crate::edits::max_read_around;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{
@@ -36,8 +36,8 @@ struct Reads {
 
 impl Reads {
     fn of(edit: &Edit) -> Self {
-        let evaluator = edit.most_bricks().map(|_| edit.evaluator());
-        Self { reach: edit.reach(), around: most_read_around(edit), evaluator }
+        let evaluator = edit.max_bricks().map(|_| edit.evaluator());
+        Self { reach: edit.reach(), around: max_read_around(edit), evaluator }
     }
 
     fn meets(&self, LatticeBox { min, max }: LatticeBox) -> bool {

@@ -94,11 +94,11 @@ pub struct Encodings {
 impl Encodings {
     /// Resets what is left for another call.
     pub fn refill(&mut self) {
-        (self.left, self.is_short) = (Self::MOST, false);
+        (self.left, self.is_short) = (Self::MAX_PER_CALL, false);
     }
 
     /// Regions in a call: at 60 calls a second, 480, of some 20 to 100 KB each.
-    const MOST: usize = 8;
+    const MAX_PER_CALL: usize = 8;
 
     /// Whether a region was not encoded since the last refill because too many others were.
     pub fn is_short(&self) -> bool {
@@ -122,7 +122,7 @@ impl Encodings {
     /// Estimates the bytes of regions in messages from those that were encoded. If there were none, some are.
     pub fn estimate(&mut self, world: &Snapshot, regions: &[RegionPos]) -> usize {
         if self.count == 0 {
-            let step = regions.len().div_ceil(Self::MOST).max(1);
+            let step = regions.len().div_ceil(Self::MAX_PER_CALL).max(1);
             regions.iter().step_by(step).for_each(|region| self.note(region_bytes(world, *region, 0).len()));
         }
         self.bytes / self.count.max(1) * regions.len()

@@ -69,7 +69,7 @@ pub struct Store {
     unsent: BTreeMap<String, Option<Vec<u8>>>,
     world: WorldId,
     /// Bytes that may wait for the thread.
-    most_queued: usize,
+    max_queued: usize,
     close_timeout: Duration,
 }
 
@@ -273,7 +273,7 @@ impl Store {
             game,
             unsent: BTreeMap::new(),
             world,
-            most_queued: waiting_bytes.max(LEAST_QUEUED),
+            max_queued: waiting_bytes.max(LEAST_QUEUED),
             close_timeout,
         })
     }

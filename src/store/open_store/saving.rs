@@ -75,7 +75,7 @@ impl Store {
 
     /// Whether more data waits for the thread than allowed.
     fn is_full(&self) -> bool {
-        self.shared.queued() > self.most_queued
+        self.shared.queued() > self.max_queued
     }
 
     fn check_thread(&self) -> Result<(), StoreError> {
