@@ -110,10 +110,10 @@ pub use query::{TerrainHit, Terrains};
 pub use redraw::Redraw;
 pub(crate) use same_frame::CommitSameFrame;
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
-#[cfg(any(feature = "scatter", feature = "landmass"))]
-pub(crate) use squares::{Squares, are_same, position_on};
 #[cfg(feature = "avian")]
 pub(crate) use squares::squares_within;
+#[cfg(any(feature = "scatter", feature = "landmass"))]
+pub(crate) use squares::{Squares, are_same, position_on};
 #[doc(hidden)]
 pub use times::Times;
 pub use vertex_kind::{

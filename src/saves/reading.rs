@@ -9,13 +9,13 @@ use bevy::prelude::*;
 use super::components::{LevelId, SavedWorld};
 use super::level::BurrowLevel;
 use crate::format::read_level;
-use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble};
+use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreWarning};
 use crate::terrain::{self, EditSettings, Terrain, TerrainSettings, Version, WorldParts};
 use crate::threads::{ThreadTask, Threads, free_later};
 
 /// How long to wait for a world that is open elsewhere: longer than an exiting server takes to close it.
 const LOCK_WAIT: Duration = Duration::from_secs(15);
-/// The interval of attempts to open it, and the time after which a trouble is reported.
+/// The interval of attempts to open it, and the time after which a warning is reported.
 const LOCK_TRY: Duration = Duration::from_millis(50);
 const REPORT_LOCK_AFTER: Duration = Duration::from_secs(2);
 
@@ -92,7 +92,7 @@ impl Drop for OpeningWorld {
 pub(crate) struct ReadWorld {
     pub store: Store,
     pub terrain: Terrain,
-    pub troubles: Vec<StoreTrouble>,
+    pub warnings: Vec<StoreWarning>,
 }
 
 /// The result of reading.
@@ -165,13 +165,13 @@ impl WorldReader {
                 // Another process created it meanwhile.
                 Err(StoreError::Exists(_)) => {}
                 created => {
-                    let (store, troubles) = (created?, Vec::new());
-                    return Ok(Found::New(ReadWorld { store, terrain, troubles }));
+                    let (store, warnings) = (created?, Vec::new());
+                    return Ok(Found::New(ReadWorld { store, terrain, warnings }));
                 }
             }
         }
         let (store, opened) = Store::open(folder.path(), Arc::clone(ground), options)?;
-        let (mut terrain, troubles) = (opened.terrain, opened.troubles);
+        let (mut terrain, warnings) = (opened.terrain, opened.warnings);
         // A new version of the game may have other rules than the one that saved the world.
         let EditSettings { rules, loose } = edit_settings;
         if let Some(rules) = rules.as_deref().filter(|rules| terrain.rules() != Some(rules))
@@ -182,6 +182,6 @@ impl WorldReader {
         if loose.is_some() && loose.as_ref() != terrain.loose() {
             terrain.set_loose(*loose);
         }
-        Ok(Found::Old(ReadWorld { store, terrain, troubles }))
+        Ok(Found::Old(ReadWorld { store, terrain, warnings }))
     }
 }

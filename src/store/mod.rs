@@ -43,7 +43,7 @@ pub use closing::ClosingStore;
 #[cfg(any(test, feature = "tools"))]
 #[doc(hidden)]
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
-pub use error::{StoreError, StoreTrouble, WorldSize};
+pub use error::{StoreError, StoreWarning, WorldSize};
 #[doc(hidden)]
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
 pub use inspect::{WorldCheck, WorldInfo, check, inspect};

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use rustc_hash::FxHashMap;
 
 use super::checkpoint::Checkpoint;
-use super::error::{StoreError, StoreTrouble};
+use super::error::{StoreError, StoreWarning};
 use super::files::{Files, Lock};
 use super::journal::{Journal, Segment};
 use super::mirror::Mirror;
@@ -377,7 +377,7 @@ impl Writer {
     fn leave_gap(&mut self) {
         if !self.state.has_gap {
             let revision = self.shared.durable().map_or(0, SavePoint::revision);
-            self.shared.report_trouble(StoreTrouble::LogGap { revision });
+            self.shared.report_warning(StoreWarning::LogGap { revision });
         }
         self.give_up_waiting();
         self.checkpoint_soon();
@@ -471,7 +471,7 @@ impl Writer {
             None => RETRY.0,
         };
         if self.state.failing.as_ref().is_none_or(|failing| failing.why != why) {
-            self.shared.report_trouble(StoreTrouble::NotSaved(why.into()));
+            self.shared.report_warning(StoreWarning::NotSaved(why.into()));
         }
         self.shared.set_failing(Some(why));
         self.state.failing = Some(Failing { wait, again: Instant::now() + wait, why: why.into() });
@@ -480,7 +480,7 @@ impl Writer {
 
     pub(super) fn succeed(&mut self) {
         if self.state.failing.take().is_some_and(|failing| !failing.why.is_empty()) {
-            self.shared.report_trouble(StoreTrouble::SavedAgain);
+            self.shared.report_warning(StoreWarning::SavedAgain);
         }
         self.shared.set_failing(None);
     }

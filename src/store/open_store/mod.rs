@@ -18,7 +18,7 @@ use std::time::Duration;
 
 use super::closing::{ClosingStore, StoreThread};
 use super::database::DATABASE;
-use super::error::{StoreError, StoreTrouble, WorldSize};
+use super::error::{StoreError, StoreWarning, WorldSize};
 use super::files::{Files, Folder, Lock};
 use super::found::Contents;
 use super::mirror::Mirror;
@@ -92,8 +92,8 @@ pub struct Opened {
     pub replayed: u64,
     /// Whether damaged regions can be rebuilt from the log.
     pub is_log_whole: bool,
-    /// Troubles to show to a player or an operator.
-    pub troubles: Vec<StoreTrouble>,
+    /// Warnings to show to a player or an operator.
+    pub warnings: Vec<StoreWarning>,
 }
 
 impl Store {
@@ -185,7 +185,7 @@ impl Store {
     /// has changed and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is
     /// missing, and when nothing of it can be read. Also when a file that can't be read at the moment holds something
     /// that no other file has, and when this ground has no room for edits that were made on a ground of another size.
-    /// Nothing is changed then. All other problems are reported in [`Opened::troubles`].
+    /// Nothing is changed then. All other problems are reported in [`Opened::warnings`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -237,21 +237,21 @@ impl Store {
         let mut failures = Vec::new();
         if is_new {
             writer.save_all_or_later();
-            failures = writer.shared.take_troubles();
+            failures = writer.shared.take_warnings();
         } else {
             writer.shared.set_durable(writer.point);
         }
         // Where it could not be replaced yet, the damaged file is still in its place.
         let is_in_place = contents.has_database && !failures.is_empty();
         let kept = writer.database.kept().or(is_in_place.then_some(DATABASE));
-        let mut troubles = findings.troubles(&settled.copies, contents.damaged.as_deref(), kept);
-        troubles.extend(settled.troubles);
-        troubles.extend(failures);
+        let mut warnings = findings.warnings(&settled.copies, contents.damaged.as_deref(), kept);
+        warnings.extend(settled.warnings);
+        warnings.extend(failures);
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
         let store = Self::start(writer, &terrain)?;
         Work::until(progress.as_ref(), 1.0, 1).finish();
-        Ok((store, Opened { terrain, replayed, is_log_whole, troubles }))
+        Ok((store, Opened { terrain, replayed, is_log_whole, warnings }))
     }
 
     fn start(mut writer: Writer, terrain: &Terrain) -> Result<Self, StoreError> {
@@ -278,10 +278,10 @@ impl Store {
         })
     }
 
-    /// Troubles since the last call, to show to a player or an operator. If they are not taken, the latest 256 are
+    /// Warnings since the last call, to show to a player or an operator. If they are not taken, the latest 256 are
     /// kept.
-    pub fn take_troubles(&self) -> Vec<StoreTrouble> {
-        self.shared.take_troubles()
+    pub fn take_warnings(&self) -> Vec<StoreWarning> {
+        self.shared.take_warnings()
     }
 
     /// The unique id of the world.
