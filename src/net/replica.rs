@@ -1,4 +1,4 @@
-//! The confirmed world, which follows the order, and the shown world, which also contains the client's pending edits.
+//! The confirmed world, which follows the log, and the shown world, which also contains the client's pending edits.
 //!
 //! Both share their bricks. The shown world is never edited: after each update, its difference from the expected state
 //! is applied as one change.
@@ -72,7 +72,7 @@ pub(super) struct Applied {
 
 /// The confirmed and the shown world.
 pub(super) struct Replica {
-    /// The world after the order's entries. It is never meshed.
+    /// The world after the entries of the log. It is never meshed.
     confirmed: Terrain,
     pending: VecDeque<Pending>,
     /// The hashes of its regions.
@@ -128,7 +128,7 @@ impl Replica {
         })
     }
 
-    /// The world after the order's entries.
+    /// The world after the entries of the log.
     pub fn world(&self) -> &World {
         self.confirmed.world()
     }
@@ -198,7 +198,7 @@ impl Replica {
         self.pending.remove(at).map(|pending| pending.edit)
     }
 
-    /// Applies entries of the order. This client's edits among them are no longer pending; `sequence_of`
+    /// Applies entries of the log. This client's edits among them are no longer pending; `sequence_of`
     /// returns their sequence numbers.
     pub fn apply(&mut self, entries: &[Entry], sequence_of: impl Fn(&Entry) -> Option<u64>) -> Applied {
         // Those may be among them.
@@ -283,7 +283,7 @@ impl Replica {
         }
     }
 
-    /// Continues from another position of an order with the rules and settings there, either with the present world or
+    /// Continues from another position of a log with the rules and settings there, either with the present world or
     /// from the pristine one.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Compares a replica with a world that applies the order entry by entry, with the pending edits on top.
+//! Compares a replica with a world that applies the log entry by entry, with the pending edits on top.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -118,12 +118,12 @@ struct Play {
     replica: Replica,
     /// Only put.
     shown: Terrain,
-    /// Obeys the order one entry at a time.
+    /// Obeys the log one entry at a time.
     reference: Terrain,
-    /// How much of the order it has obeyed.
+    /// How much of the log it has obeyed.
     obeyed: usize,
     order: Vec<Entry>,
-    /// How much of the order the replica has.
+    /// How much of the log the replica has.
     given: usize,
     /// Own edits that the server has not answered.
     sent: VecDeque<(u64, Edit)>,

@@ -9,7 +9,7 @@ use bevy::prelude::*;
 
 use super::error::{SharingError, SharingErrorFound};
 use super::link::{Link, MAX_PENDING, PieceMessage, Standing, Worked};
-use super::messages::{BulkLane, FromPlayer, OrderLane};
+use super::messages::{BulkLane, FromPlayer, MainLane};
 use super::replicon::ToOwnServer;
 use super::service::Service;
 use super::shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
@@ -32,10 +32,10 @@ pub(super) struct EditMessages<'w> {
 /// Reads messages of the server. The client ignores those from before its last greeting.
 pub(super) fn receive(
     mut shared: Query<&mut SharedTerrain>,
-    mut order: MessageReader<OrderLane>,
+    mut order: MessageReader<MainLane>,
     mut bulk: MessageReader<BulkLane>,
 ) {
-    let order = order.read().map(|message| (Lane::Order, &message.0));
+    let order = order.read().map(|message| (Lane::Main, &message.0));
     let messages: Vec<_> = order.chain(bulk.read().map(|message| (Lane::Bulk, &message.0))).collect();
     if messages.is_empty() {
         return;

@@ -339,7 +339,7 @@ pub(super) fn serve(
     }
     ground.receive(&messages, &peers);
     for client in ground.players.take_replaced(&peers) {
-        to_players.send(client.into(), Lane::Order, ToClient::Kicked(KickReason::ConnectedAgain).to_bytes());
+        to_players.send(client.into(), Lane::Main, ToClient::Kicked(KickReason::ConnectedAgain).to_bytes());
         to_players.disconnect(client);
     }
     let parts = ground.take_state(|event| {

@@ -39,7 +39,7 @@ pub struct SharedTerrain {
 }
 
 impl SharedTerrain {
-    /// The number in the server's order of the last entry that the player's world holds.
+    /// The number in the server's log of the last entry that the player's world holds.
     pub fn number(&self) -> u64 {
         self.link.as_ref().map_or(0, |link| link.facts.number)
     }

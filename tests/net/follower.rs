@@ -1,4 +1,4 @@
-//! The simplest client: it applies the order, predicts nothing, and fetches regions that differ. Tests of the server
+//! The simplest client: it applies the log, predicts nothing, and fetches regions that differ. Tests of the server
 //! use it.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -45,7 +45,7 @@ pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
-/// A client that applies the order.
+/// A client that applies the log.
 pub struct Follower {
     pub id: ClientId,
     ground: Arc<Ground>,

@@ -116,7 +116,7 @@ impl Messages {
             server.advance(now);
             for (to, lane, bytes) in server.take_outgoing() {
                 let bot = bots.iter_mut().find(|bot| bot.id == to).unwrap();
-                if lane == Lane::Order {
+                if lane == Lane::Main {
                     to_client.push(bytes.clone());
                 }
                 bot.receive(lane, &bytes);

@@ -77,11 +77,11 @@ fn join(ground: &Arc<Ground>, world: &Terrain, line: &Line, settings: ServerSett
             }
             server.advance(now);
             for (_, lane, message) in server.take_outgoing() {
-                let way = if lane == Lane::Order { &mut order } else { &mut bulk };
+                let way = if lane == Lane::Main { &mut order } else { &mut bulk };
                 way.send(message, now, &mut free[0], line, &mut rng);
             }
         }
-        for (lane, way) in [(Lane::Order, &mut order), (Lane::Bulk, &mut bulk)] {
+        for (lane, way) in [(Lane::Main, &mut order), (Lane::Bulk, &mut bulk)] {
             while let Some((_, message)) = way.next(now) {
                 client.receive(lane, message);
             }

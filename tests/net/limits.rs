@@ -632,7 +632,7 @@ fn a_stamp_that_the_server_does_not_know_is_refused() {
 /// Parts that a game replaces are sent as clients acknowledge them, and reach all in the end; a client that
 /// acknowledges nothing gets at most a window.
 #[test]
-fn the_order_lane_keeps_within_its_window() {
+fn the_main_lane_keeps_within_its_window() {
     let ground = flat(512);
     let mut other = terrain(&ground);
     let mut rng = fastrand::Rng::with_seed(2);
@@ -661,7 +661,7 @@ fn the_order_lane_keeps_within_its_window() {
         for (to, lane, bytes) in play.server.take_outgoing() {
             let length = bytes.len();
             if to == ONE {
-                at_once += if lane == Lane::Order { length } else { 0 };
+                at_once += if lane == Lane::Main { length } else { 0 };
                 play.players[at].client.receive(lane, bytes);
             } else if let Ok(ToClient::Entries(_)) =
                 ToClient::from_bytes(&bytes, &ground, &ContentTable::default())
@@ -675,6 +675,6 @@ fn the_order_lane_keeps_within_its_window() {
     }
     println!("{silent} bytes to one that is silent, {longest} in a message");
     assert_eq!(play.players[at].client.world().hash(), play.hash());
-    assert!(play.server.figures().order_bytes as usize > 2 * window, "there is too little to send");
+    assert!(play.server.figures().main_bytes as usize > 2 * window, "there is too little to send");
     assert!(silent <= window.max(longest));
 }

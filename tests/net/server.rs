@@ -1,4 +1,4 @@
-//! The server's order, its refusals, the policies of undo, and how clients join and reconnect.
+//! The server's log, its refusals, the policies of undo, and how clients join and reconnect.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

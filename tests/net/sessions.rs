@@ -140,7 +140,7 @@ impl Play {
         }
         self.send();
         for player in &mut self.players {
-            for (lane, messages) in [Lane::Order, Lane::Bulk].into_iter().zip(&mut player.down) {
+            for (lane, messages) in [Lane::Main, Lane::Bulk].into_iter().zip(&mut player.down) {
                 for _ in 0..self.rng.usize(0..=messages.len()) {
                     messages.pop_front().into_iter().for_each(|message| player.client.receive(lane, message));
                 }
@@ -183,7 +183,7 @@ impl Play {
                 .into_iter()
                 .for_each(|bytes| self.server.receive(player.id, &bytes, self.now));
         }
-        for (lane, messages) in [Lane::Order, Lane::Bulk].into_iter().zip(&mut player.down) {
+        for (lane, messages) in [Lane::Main, Lane::Bulk].into_iter().zip(&mut player.down) {
             for _ in 0..self.rng.usize(0..=messages.len()) {
                 messages.pop_front().into_iter().for_each(|bytes| player.client.receive(lane, bytes));
             }

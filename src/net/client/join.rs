@@ -27,7 +27,7 @@ pub(super) enum Stage {
     ByRegions { to: u64, left: usize },
     /// The table of regions at a number arrives.
     ByTable { to: u64 },
-    /// It follows the order.
+    /// It follows the log.
     Following,
 }
 
@@ -88,7 +88,7 @@ impl Client {
         self.finish_regions();
     }
 
-    /// Continues from another position of the order.
+    /// Continues from another position of the log.
     fn restart(&mut self, state: &RuleState, keeps_world: bool, sequence: u64) {
         if self.replica.restart(state, keeps_world).is_err() {
             self.figures.malformed += 1;

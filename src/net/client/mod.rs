@@ -1,14 +1,14 @@
-//! The client: it shows the player's edits at once, and follows the server's order.
+//! The client: it shows the player's edits at once, and follows the server's log.
 //!
 //! | file | what it does |
 //! | --- | --- |
 //! | `client` | the interface for games |
-//! | `receive`, `follow` | received messages, and entries of the order |
+//! | `receive`, `follow` | received messages, and entries of the log |
 //! | `join` | catching up with the server: old entries, regions, a comparison |
 //! | `outbox` | sends the player's edits and undos as fast as the server's limits allow |
 //! | `repair` | marks, and regions that differ |
 //! | `images` | images, grids and prefabs that are missing |
-//! | `replica` | the world of the order, and the shown world |
+//! | `replica` | the world of the log, and the shown world |
 
 mod events;
 mod follow;
@@ -85,7 +85,7 @@ pub struct Client {
     acknowledged: (u64, u64, Duration),
     /// Entries that came and are not applied yet.
     waiting: BTreeMap<u64, Entry>,
-    /// The number of the last entry that came in the order lane.
+    /// The number of the last entry that came in the main lane.
     received: u64,
     marks: Marks,
     reaches: Reaches,
@@ -173,7 +173,7 @@ impl Client {
     /// When the parts do not fit the ground or the chunk size.
     pub fn begin_with(&mut self, change: Patch) -> Result<(), Rejection> {
         self.replica.put(change)?;
-        // It is in no order, so the server has to compare.
+        // It is in no log, so the server has to compare.
         self.epoch = Some(Epoch { world: WorldId(0), run: 0, number: 0 });
         self.is_part = true;
         Ok(())
@@ -253,7 +253,7 @@ impl Client {
         self.id
     }
 
-    /// Whether it has the whole world and follows the order.
+    /// Whether it has the whole world and follows the log.
     pub fn has_joined(&self) -> bool {
         matches!(self.stage, Stage::Following)
     }

@@ -1,4 +1,4 @@
-//! Entries of the order, one by one and in messages.
+//! Entries of the log, one by one and in messages.
 
 use super::super::message::{ClientId, Entry};
 use super::super::{ContentId, ContentTable};
@@ -58,13 +58,13 @@ pub(in crate::net) fn entry_bytes(entry: &Entry) -> usize {
 
 /// Writes entries as they are ordered into one message.
 #[derive(Debug, Default)]
-pub(in crate::net) struct OrderWriter {
+pub(in crate::net) struct EntryWriter {
     bytes: Vec<u8>,
     count: u64,
     coder: EditSequence,
 }
 
-impl OrderWriter {
+impl EntryWriter {
     pub fn put(&mut self, entry: &Entry) {
         put_entry(&mut self.bytes, entry, &mut self.coder);
         self.count += 1;

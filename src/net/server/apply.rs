@@ -1,4 +1,4 @@
-//! Applies entries of the order to the server's world.
+//! Applies entries of the log to the server's world.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -140,7 +140,7 @@ impl Server {
         self.figures.failed += 1;
         self.failed.insert(number);
         #[cfg(feature = "store")]
-        self.saved_order.iter_mut().for_each(|saved| saved.fail(number));
+        self.saved_log.iter_mut().for_each(|saved| saved.fail(number));
         self.report(ServerEvent::EntryFailed(number));
         self.send_to_all(&ToClient::Failed { number });
     }

@@ -113,7 +113,7 @@ impl Server {
             join,
         };
         let Some(session) = self.sessions.get_mut(&client) else { return };
-        session.order = super::sender::OrderSender::new(&self.settings, number);
+        session.order = super::sender::EntrySender::new(&self.settings, number);
         match bulk {
             Bulk::Messages(messages) => messages.into_iter().for_each(|message| session.bulk.push(message)),
             Bulk::Regions(world, regions) => session.bulk.push_regions(world, &regions),
@@ -127,12 +127,12 @@ impl Server {
         self.report(ServerEvent::Joined(client));
     }
 
-    /// Whether the order leads from this position to the present one: a position of this run, or of an earlier run of
+    /// Whether the log leads from this position to the present one: a position of this run, or of an earlier run of
     /// which everything up to it was saved.
     fn has_passed(&self, epoch: Epoch) -> bool {
         let of_this_run = (epoch.run == self.epoch.run).then_some(self.epoch.number);
         #[cfg(feature = "store")]
-        let last = of_this_run.or_else(|| self.saved_order.as_ref()?.shared_with(epoch.run));
+        let last = of_this_run.or_else(|| self.saved_log.as_ref()?.shared_with(epoch.run));
         #[cfg(not(feature = "store"))]
         let last = of_this_run;
         epoch.world == self.epoch.world && last.is_some_and(|last| epoch.number <= last)
@@ -245,8 +245,8 @@ impl Server {
                         ToClient::Greet.to_bytes()
                     }
                 };
-                self.figures.order_bytes += message.len() as u64;
-                self.outgoing.push((*client, Lane::Order, message));
+                self.figures.main_bytes += message.len() as u64;
+                self.outgoing.push((*client, Lane::Main, message));
             }
         }
     }

@@ -53,7 +53,7 @@ impl Server {
                 session.begin_again(&self.settings, now);
                 self.figures.stuck += 1;
                 self.outgoing.retain(|(to, ..)| to != client);
-                self.outgoing.push((*client, Lane::Order, ToClient::Greet.to_bytes()));
+                self.outgoing.push((*client, Lane::Main, ToClient::Greet.to_bytes()));
             }
         }
     }

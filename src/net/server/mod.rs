@@ -1,4 +1,4 @@
-//! The server: it owns the order. It numbers the edits of clients, sends them on, and applies them to its own terrain,
+//! The server: it owns the log. It numbers the edits of clients, sends them on, and applies them to its own terrain,
 //! which has no meshes.
 //!
 //! | file | what it does |
@@ -7,21 +7,21 @@
 //! | `session`, `players` | a connected client, data that is kept for its player |
 //! | `recent` | a table of clients that forgets the oldest |
 //! | `receive`, `validation` | received messages, and the reasons to refuse edits |
-//! | `order_log` | the latest entries, in long messages |
+//! | `entry_log` | the latest entries, in long messages |
 //! | `sequences` | the last sequence numbers of players' edits |
 //! | `apply` | applies entries to the world |
 //! | `strokes` | strokes that can be undone |
 //! | `join`, `sender`, `pace` | clients that join, reconnect, or differ; the bulk lane; how fast it is |
 //! | `kept` | older states of the world that are kept for joining clients |
-//! | `save`, `saved_order` | a server that survives a restart; the entries that it saves |
+//! | `save`, `saved_log` | a server that survives a restart; the entries that it saves |
 
 mod apply;
+mod entry_log;
 mod events;
 mod join;
 mod kept;
 #[cfg(feature = "store")]
 mod keys;
-mod order_log;
 mod pace;
 mod players;
 mod receive;
@@ -29,7 +29,7 @@ mod recent;
 #[cfg(feature = "store")]
 mod save;
 #[cfg(feature = "store")]
-mod saved_order;
+mod saved_log;
 mod sender;
 mod sequences;
 mod session;
@@ -45,7 +45,7 @@ use std::time::Duration;
 use glam::IVec3;
 
 use super::ContentTable;
-use super::encoding::{OrderWriter, entry_bytes};
+use super::encoding::{EntryWriter, entry_bytes};
 use super::message::{ClientId, Entry, Epoch, KickReason, Lane, MAX_TO_CLIENT, ToClient};
 use super::never_shown;
 use super::regions::RegionSums;
@@ -54,9 +54,9 @@ use crate::format::{FormatError, WorldId};
 use crate::lattice::RegionPos;
 use crate::terrain::{EditSettings, LooseSettings, Order, Patch, Terrain};
 use crate::volume::{DiggingRules, RulesError};
+use entry_log::EntryLog;
 pub use events::{ServerEvent, ServerFigures};
 use kept::Kept;
-use order_log::OrderLog;
 use players::Players;
 use sender::Encodings;
 use sequences::Sequences;
@@ -139,11 +139,11 @@ pub struct Server {
     applied: u64,
     waiting: VecDeque<Ordered>,
     waiting_cost: u64,
-    writer: OrderWriter,
-    log: OrderLog,
+    writer: EntryWriter,
+    log: EntryLog,
     /// Entries of the log that could not be applied.
     failed: BTreeSet<u64>,
-    /// Whether the order leads from the pristine world to this one.
+    /// Whether the log leads from the pristine world to this one.
     is_whole: bool,
     /// An undo and all later entries, which get numbers after the undo has one, so it applies to everything before it.
     later: VecDeque<Later>,
@@ -169,9 +169,9 @@ pub struct Server {
     durable: u64,
     #[cfg(feature = "store")]
     saving: save::Saving,
-    /// The order in the store; `None` without one.
+    /// The log in the store; `None` without one.
     #[cfg(feature = "store")]
-    saved_order: Option<saved_order::SavedOrder>,
+    saved_log: Option<saved_log::SavedLog>,
     outgoing: Vec<Outgoing>,
     events: VecDeque<ServerEvent>,
     figures: ServerFigures,
@@ -216,8 +216,8 @@ impl Server {
             applied: number,
             waiting: VecDeque::new(),
             waiting_cost: 0,
-            writer: OrderWriter::default(),
-            log: OrderLog::new(settings.log_bytes, number),
+            writer: EntryWriter::default(),
+            log: EntryLog::new(settings.log_bytes, number),
             failed: BTreeSet::new(),
             is_whole,
             later: VecDeque::new(),
@@ -238,7 +238,7 @@ impl Server {
             #[cfg(feature = "store")]
             saving: save::Saving::at(0, number),
             #[cfg(feature = "store")]
-            saved_order: None,
+            saved_log: None,
             outgoing: Vec::new(),
             events: VecDeque::new(),
             figures: ServerFigures::default(),
@@ -434,7 +434,7 @@ impl Server {
         self.writer.put(&ordered.entry);
         self.log.push(&ordered.entry);
         #[cfg(feature = "store")]
-        if let Some(saved) = &mut self.saved_order {
+        if let Some(saved) = &mut self.saved_log {
             saved.push(self.epoch.number, &ordered.entry);
         }
         self.waiting.push_back(ordered);
@@ -453,16 +453,16 @@ impl Server {
                 && session.order.sent() == before
                 && session.order.send(last, message.len())
             {
-                self.figures.order_bytes += message.len() as u64;
-                self.outgoing.push((*client, Lane::Order, message.clone()));
+                self.figures.main_bytes += message.len() as u64;
+                self.outgoing.push((*client, Lane::Main, message.clone()));
             }
         }
     }
 
     fn send(&mut self, client: ClientId, message: &ToClient) {
         let bytes = message.to_bytes();
-        self.figures.order_bytes += bytes.len() as u64;
-        self.outgoing.push((client, Lane::Order, bytes));
+        self.figures.main_bytes += bytes.len() as u64;
+        self.outgoing.push((client, Lane::Main, bytes));
     }
 
     /// Sends a message to all clients that have joined, after all ordered entries.
@@ -471,8 +471,8 @@ impl Server {
         let bytes = message.to_bytes();
         for (client, session) in &self.sessions {
             if session.has_joined() {
-                self.figures.order_bytes += bytes.len() as u64;
-                self.outgoing.push((*client, Lane::Order, bytes.clone()));
+                self.figures.main_bytes += bytes.len() as u64;
+                self.outgoing.push((*client, Lane::Main, bytes.clone()));
             }
         }
     }

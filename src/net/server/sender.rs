@@ -15,8 +15,8 @@ use crate::net::message::{RegionContent, ToClient};
 use crate::net::regions::chunks_of;
 use crate::terrain::World;
 
-/// Unacknowledged entries in the order lane of a client: at most the bytes of the window, or one message.
-pub struct OrderSender {
+/// Unacknowledged entries in the main lane of a client: at most the bytes of the window, or one message.
+pub struct EntrySender {
     /// The number of the last entry that was sent.
     sent: u64,
     /// Messages that are not acknowledged: the numbers of their last entries, and their bytes.
@@ -25,7 +25,7 @@ pub struct OrderSender {
     window: u64,
 }
 
-impl OrderSender {
+impl EntrySender {
     /// For a client that starts from this number.
     pub fn new(settings: &ServerSettings, number: u64) -> Self {
         Self { sent: number, on_the_way: VecDeque::new(), bytes: 0, window: settings.window }

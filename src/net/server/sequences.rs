@@ -19,7 +19,7 @@ pub(super) const MAX_SAVED: usize = 1024;
 pub(super) struct Applied {
     /// Its sequence number.
     pub sequence: u64,
-    /// Its number in the order.
+    /// Its number in the log.
     pub number: u64,
 }
 
@@ -95,7 +95,7 @@ impl Sequences {
         }
     }
 
-    /// The number in the order of a player's last edit that is applied; 0 where it is not known.
+    /// The number in the log of a player's last edit that is applied; 0 where it is not known.
     pub fn last_applied(&self, client: ClientId) -> u64 {
         self.applied.get(&client).map_or(0, |last| last.number)
     }

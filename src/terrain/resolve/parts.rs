@@ -124,7 +124,7 @@ fn replaced(
 
 fn check_order(bricks: &[ChangedBrick]) -> Result<(), PartsError> {
     let wrong = bricks.windows(2).find(|pair| pair[0].0 >= pair[1].0);
-    wrong.map_or(Ok(()), |pair| Err(PartsError::Order(pair[1].0)))
+    wrong.map_or(Ok(()), |pair| Err(PartsError::Unsorted(pair[1].0)))
 }
 
 /// Checks the fields of a change; returns the greatest name that a field will have had.
