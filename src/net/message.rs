@@ -161,7 +161,7 @@ pub struct Hello {
     /// The position that it has reached, if it has joined before.
     pub epoch: Option<Epoch>,
     /// Where its player is, in voxels: regions come from there outwards.
-    pub place: IVec3,
+    pub position: IVec3,
 }
 
 /// A message to the server.

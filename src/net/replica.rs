@@ -20,7 +20,7 @@ use crate::terrain::{
     WorldParts,
 };
 use crate::volume::{Brick, Fields};
-use crate::world::{Overlay, Places, State};
+use crate::world::{Overlay, Positions, State};
 
 type Stored = Option<Arc<Brick>>;
 
@@ -264,9 +264,9 @@ impl Replica {
         // The shown world does not change: all changes were shown before.
         self.hash_offset = self.shown_regions_hash.wrapping_sub(self.world().regions_hash());
         let before = std::mem::take(&mut self.before);
-        let places = before.places();
+        let positions = before.positions();
         self.predicted.keep(before.patch(0));
-        self.predicted.forget(self.confirmed.world(), &places);
+        self.predicted.forget(self.confirmed.world(), &positions);
     }
 
     /// Replaces parts of the confirmed world by those of another machine.
@@ -404,7 +404,7 @@ impl Replica {
         }
         let world = self.confirmed.world();
         self.predicted.lay(&change);
-        self.predicted.forget(world, &change.places());
+        self.predicted.forget(world, &change.positions());
         (self.shown_regions_hash, self.next_field) =
             (shown.world().regions_hash(), shown.world().next_field());
         self.hash_offset = self.shown_regions_hash.wrapping_sub(world.regions_hash());
@@ -442,11 +442,11 @@ impl Replica {
         let (world, before) = (self.confirmed.world(), std::mem::take(&mut self.before));
         let mut predicted = Overlay::default();
         predicted.lay(&draft.change);
-        predicted.forget(world, &draft.change.places());
-        let places = before.places().and(self.predicted.places()).and(predicted.places());
+        predicted.forget(world, &draft.change.positions());
+        let positions = before.positions().and(self.predicted.positions()).and(predicted.positions());
         let confirmed = before.over(world);
         let shown = self.predicted.over(&confirmed);
-        let change = Patch::between(&shown, &predicted.over(world), places, draft.change.next_field);
+        let change = Patch::between(&shown, &predicted.over(world), positions, draft.change.next_field);
         // Of equal bricks the one that is shown stays, so that it is held once.
         for (pos, brick) in &mut predicted.bricks {
             if change.bricks.binary_search_by_key(pos, |(at, _)| *at).is_err() {
@@ -466,15 +466,15 @@ impl Replica {
         self.shown_regions_hash = self.world().regions_hash().wrapping_add(self.hash_offset);
         let world = self.confirmed.world();
         self.next_field = self.next_field.max(world.next_field());
-        self.order_of(Patch::between(&before.over(world), world, before.places(), self.next_field))
+        self.order_of(Patch::between(&before.over(world), world, before.positions(), self.next_field))
     }
 
     /// The order that makes any world equal to the one to be shown.
     pub fn whole(&self, shown: &World) -> Order {
         let world = self.confirmed.world();
-        let places = Places::of(world).and(self.predicted.places()).and(Places::of(shown));
+        let positions = Positions::of(world).and(self.predicted.positions()).and(Positions::of(shown));
         let next_field = self.next_field.max(world.next_field());
-        let change = Patch::between(shown, &self.predicted.over(world), places, next_field);
+        let change = Patch::between(shown, &self.predicted.over(world), positions, next_field);
         Order::parts(change, Some(self.shown_hash()))
     }
 }

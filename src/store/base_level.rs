@@ -15,7 +15,7 @@ use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
 use crate::terrain::{EditSettings, Patch, RestoreError, Terrain, TerrainSettings, WorldParts, brick_over};
 use crate::volume::{Brick, Fields, NO_FIELDS};
-use crate::world::{Places, State};
+use crate::world::{Positions, State};
 
 /// A level below a world, for [`StoreOptions::level`](super::StoreOptions::level).
 #[derive(Clone)]
@@ -134,7 +134,7 @@ impl BaseLevel {
         // Fields of other chunks are other fields.
         let is_alike = self.level.settings.chunk_size == chunk_size;
         let below = Below { bricks: &region.bricks, fields: if is_alike { &region.fields } else { &[] } };
-        Patch::between(&below, now, now.places().and(below.places()), 0)
+        Patch::between(&below, now, now.positions().and(below.positions()), 0)
     }
 }
 
@@ -145,8 +145,8 @@ struct Below<'a> {
 }
 
 impl Below<'_> {
-    fn places(&self) -> Places {
-        Places {
+    fn positions(&self) -> Positions {
+        Positions {
             bricks: self.bricks.iter().map(|(pos, _)| *pos).collect(),
             chunks: self.fields.iter().map(|(chunk, _)| *chunk).collect(),
         }

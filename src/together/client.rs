@@ -170,7 +170,7 @@ impl Turn<'_, '_> {
             // It may have got others from the server.
             client.contents_mut().add_all(&shared.contents);
         }
-        client.set_place(shared.place);
+        client.set_position(shared.position);
         if follows != link.greeted {
             change_server(link, &mut client, follows, service, messages);
             shared.was_served |= link.was_served;

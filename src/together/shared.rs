@@ -28,7 +28,7 @@ pub struct SharedTerrain {
     /// there.
     pub contents: ContentTable,
     /// The player's position, in voxels of the terrain: missing ground is fetched from there outwards.
-    pub place: IVec3,
+    pub position: IVec3,
     pub(super) link: Option<Link>,
     /// The position among all shared terrains, in the order of insertion.
     pub(super) order: u64,

@@ -176,7 +176,7 @@ impl Bot {
         if id.is_multiple_of(2) {
             add_contents(client.contents_mut());
         }
-        client.set_place(IVec3::new(20, 20, 20));
+        client.set_position(IVec3::new(20, 20, 20));
         client.connect(now);
         let (up, order, bulk, free, dug, arrived, events) = Default::default();
         Self {

@@ -57,7 +57,7 @@ pub struct Follower {
     /// The number that the last welcome led to. Marks up to it were compared with others.
     joined_at: u64,
     pub last_sequence: u64,
-    pub place: IVec3,
+    pub position: IVec3,
     /// Messages to send.
     pub out: Vec<ToServer>,
     /// Received entries that can't be applied yet.
@@ -100,7 +100,7 @@ impl Follower {
             number: 0,
             joined_at: 0,
             last_sequence: 0,
-            place: IVec3::ZERO,
+            position: IVec3::ZERO,
             out: Vec::new(),
             waiting: VecDeque::new(),
             awaited: BTreeSet::new(),
@@ -130,7 +130,7 @@ impl Follower {
             ground: self.ground.hash(),
             chunk_size: 32,
             epoch: self.epoch.map(|epoch| Epoch { number: self.number, ..epoch }),
-            place: self.place,
+            position: self.position,
         }
     }
 

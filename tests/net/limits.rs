@@ -36,9 +36,9 @@ fn edit(brush: &Brush) -> Edit {
 
 /// A client of this test, which greets, joins, and can send any messages.
 fn let_in(server: &mut Server, id: ClientId, ground: &Ground, now: Duration) {
-    let (chunk_size, ground, place) = (32, ground.hash(), IVec3::splat(20));
+    let (chunk_size, ground, position) = (32, ground.hash(), IVec3::splat(20));
     let (protocol, simulation) = (PROTOCOL, SIMULATION);
-    let hello = Hello { protocol, simulation, ground, chunk_size, epoch: None, place };
+    let hello = Hello { protocol, simulation, ground, chunk_size, epoch: None, position };
     server.connect(id, now);
     server.receive(id, &ToServer::Hello(hello).to_bytes(), now);
     server.advance(now);
@@ -366,7 +366,7 @@ fn nobody_digs_beyond_the_reach() {
     let is_left = |shape: Shape| {
         let settings = ServerSettings { reach, ..ServerSettings::default() };
         let mut server = Server::new(terrain(&ground), settings);
-        server.set_place(ONE, Some(IVec3::new(64, 15, 64)));
+        server.set_position(ONE, Some(IVec3::new(64, 15, 64)));
         let_in(&mut server, ONE, &ground, BEGIN);
         send(&mut server, ONE, 1, vec![edit(&Brush::dig(shape))], BEGIN);
         server.advance(BEGIN);

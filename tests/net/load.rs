@@ -85,7 +85,7 @@ pub fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) 
         ground: ground.hash(),
         chunk_size: 32,
         epoch: None,
-        place: IVec3::ZERO,
+        position: IVec3::ZERO,
     };
     let mut now = Duration::from_secs(1);
     for player in &players {

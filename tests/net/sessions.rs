@@ -120,7 +120,7 @@ impl Play {
     fn client(&self) -> Client {
         let settings = TerrainSettings::default();
         let mut client = Client::new(Arc::clone(&self.ground), &settings).expect("valid settings");
-        client.set_place(IVec3::new(30, 18, 30));
+        client.set_position(IVec3::new(30, 18, 30));
         client
     }
 
@@ -374,7 +374,7 @@ const ID: ClientId = ClientId(1);
 
 fn new_client(ground: &Arc<Ground>, now: Duration) -> Client {
     let mut client = Client::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid");
-    client.set_place(IVec3::new(64, 2, 64));
+    client.set_position(IVec3::new(64, 2, 64));
     client.connect(now);
     client
 }

@@ -82,7 +82,7 @@ fn clients_that_lack_a_prefab_get_it_once_and_have_the_servers_world() {
     let mut clients = Vec::new();
     for id in 1..=3 {
         let mut client = Client::new(Arc::clone(&ground), &settings).expect("valid settings");
-        client.set_place(IVec3::splat(20));
+        client.set_position(IVec3::splat(20));
         server.connect(ClientId(id), Duration::ZERO);
         client.connect(Duration::ZERO);
         clients.push(client);

@@ -194,7 +194,7 @@ fn place(
             }
         }
         let (player, at) = (GroundServer::player(*client_id, &ids), new.voxel());
-        server.with(move |server: &mut net::Server| server.set_place(player, Some(at)));
+        server.with(move |server: &mut net::Server| server.set_position(player, Some(at)));
     }
 }
 

@@ -191,7 +191,7 @@ impl Client {
             region_hash(world, *region) != theirs.get(region).copied().unwrap_or_default()
         };
         let mut wanted: Vec<RegionPos> = all.into_iter().filter(differs).collect();
-        wanted.sort_by_key(|region| distance(*region, self.place));
+        wanted.sort_by_key(|region| distance(*region, self.position));
         self.stage = Stage::ByRegions { to, left: wanted.len() };
         self.wanted = wanted.into();
         self.fetch_more();
@@ -225,7 +225,7 @@ impl Client {
         if content.number != to || left == 0 {
             return;
         }
-        if distance(content.pos, self.place) > i64::from(self.near) && !self.is_playable {
+        if distance(content.pos, self.position) > i64::from(self.near) && !self.is_playable {
             self.is_playable = true;
             self.events.push(ClientEvent::Playable);
         }
@@ -255,9 +255,9 @@ impl Client {
 }
 
 /// The distance from a position to a region along the axis on which it is farthest, in voxels.
-fn distance(region: RegionPos, place: IVec3) -> i64 {
+fn distance(region: RegionPos, position: IVec3) -> i64 {
     let samples = region.samples();
     let (low, high) = (samples.min.as_i64vec3(), samples.max.as_i64vec3());
-    let place = place.as_i64vec3();
-    (low - place).max(place - high).max_element().max(0)
+    let position = position.as_i64vec3();
+    (low - position).max(position - high).max_element().max(0)
 }

@@ -63,7 +63,7 @@ pub struct Client {
     replica: Replica,
     contents: ContentTable,
     chunk_size: u32,
-    place: IVec3,
+    position: IVec3,
     /// Regions within this distance, in voxels, have to be there before play begins.
     near: u32,
     id: Option<ClientId>,
@@ -127,7 +127,7 @@ impl Client {
             replica,
             contents: ContentTable::default(),
             chunk_size: settings.chunk_size,
-            place: IVec3::ZERO,
+            position: IVec3::ZERO,
             near: 96,
             id: None,
             epoch: None,
@@ -185,8 +185,8 @@ impl Client {
     }
 
     /// Sets the player's position, in voxels: regions are sent from there outwards.
-    pub fn set_place(&mut self, place: IVec3) {
-        self.place = place;
+    pub fn set_position(&mut self, position: IVec3) {
+        self.position = position;
     }
 
     /// Sets how far around the player the ground must have arrived before play begins, in voxels; 96 by default.
@@ -233,7 +233,7 @@ impl Client {
             epoch: self
                 .epoch
                 .map(|epoch| if self.is_part { Epoch { number: u64::MAX, ..epoch } } else { epoch }),
-            place: self.place,
+            position: self.position,
         };
         self.outgoing.push(ToServer::Greeting { stream: self.stream, hello }.to_bytes());
     }

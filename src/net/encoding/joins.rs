@@ -16,7 +16,7 @@ pub(super) fn put_hello(to: &mut Vec<u8>, hello: &Hello) {
     put_number(to, hello.simulation.into());
     to.extend_from_slice(&hello.ground.to_le_bytes());
     put_number(to, hello.chunk_size.into());
-    put_point(to, hello.place);
+    put_point(to, hello.position);
     to.push(hello.epoch.is_some().into());
     hello.epoch.iter().for_each(|epoch| put_epoch(to, epoch));
 }
@@ -27,7 +27,7 @@ pub(super) fn read_hello(reader: &mut Reader) -> Result<Hello, FormatError> {
         simulation: small(reader)?,
         ground: u64::from_le_bytes(reader.array()?),
         chunk_size: small(reader)?,
-        place: point(reader)?,
+        position: point(reader)?,
         epoch: if flag(reader)? { Some(epoch(reader)?) } else { None },
     })
 }

@@ -29,13 +29,13 @@ pub(super) fn flag(reader: &mut Reader) -> Result<bool, FormatError> {
     }
 }
 
-pub(super) fn place_in<T: PartialEq>(all: &[T], one: &T) -> u8 {
+pub(super) fn index_of<T: PartialEq>(all: &[T], one: &T) -> u8 {
     debug_assert!(all.contains(one), "a reason without a number");
     all.iter().position(|other| other == one).unwrap_or_default() as u8
 }
 
-pub(super) fn at_place<T: Copy>(all: &[T], place: u8) -> Result<T, FormatError> {
-    all.get(usize::from(place)).copied().ok_or(FormatError::Invalid("reason"))
+pub(super) fn at_index<T: Copy>(all: &[T], index: u8) -> Result<T, FormatError> {
+    all.get(usize::from(index)).copied().ok_or(FormatError::Invalid("reason"))
 }
 
 pub(super) fn read_rules(bytes: &[u8]) -> Result<Option<Arc<DiggingRules>>, FormatError> {

@@ -100,7 +100,7 @@ impl Server {
             (Some(log), _) => (self.epoch.number, log),
             // Whatever its state is, it needs the differences.
             (None, Some(_)) => self.compare(client),
-            (None, None) => self.all_regions(hello.place),
+            (None, None) => self.all_regions(hello.position),
         };
         let now = self.now;
         let welcome = Welcome {
@@ -163,10 +163,10 @@ impl Server {
     }
 
     /// All regions, nearest first.
-    fn all_regions(&mut self, place: IVec3) -> (u64, (Join, Bulk)) {
+    fn all_regions(&mut self, position: IVec3) -> (u64, (Join, Bulk)) {
         let (world, state) = self.keep();
         let mut regions: Vec<RegionPos> = regions_of(&world.1).into_iter().collect();
-        regions.sort_by_cached_key(|region| squared_distance(*region, place));
+        regions.sort_by_cached_key(|region| squared_distance(*region, position));
         let join = Join::Regions { regions: regions.len() as u32, state: Box::new(state) };
         (world.0, (join, Bulk::Regions(world, regions)))
     }
@@ -276,7 +276,7 @@ impl Server {
 }
 
 /// The distance from a position to the middle of a region.
-fn squared_distance(region: RegionPos, place: IVec3) -> i128 {
-    let way = region.samples().min.as_i64vec3() + i64::from(RegionPos::VOXELS / 2) - place.as_i64vec3();
+fn squared_distance(region: RegionPos, position: IVec3) -> i128 {
+    let way = region.samples().min.as_i64vec3() + i64::from(RegionPos::VOXELS / 2) - position.as_i64vec3();
     way.to_array().into_iter().map(|way| i128::from(way).pow(2)).sum()
 }

@@ -351,9 +351,9 @@ impl Server {
 
     /// Sets the position of a client's player, in voxels, from which its [reach](ServerSettings::reach) is measured;
     /// `None` if it is unknown. It can be set before the client connects, and persists over its connections.
-    pub fn set_place(&mut self, client: ClientId, place: Option<IVec3>) {
-        if place.is_some() || self.players.get(client).is_some() {
-            self.players.player(client).place = place;
+    pub fn set_position(&mut self, client: ClientId, position: Option<IVec3>) {
+        if position.is_some() || self.players.get(client).is_some() {
+            self.players.player(client).position = position;
             self.players.trim(|client| self.sessions.contains_key(&client));
         }
     }

@@ -25,7 +25,7 @@ pub struct Player {
     pub malformed: Bucket,
     pub greetings: Bucket,
     pub bulk: Bucket,
-    pub place: Option<IVec3>,
+    pub position: Option<IVec3>,
     pub is_administrator: bool,
 }
 
@@ -39,7 +39,7 @@ impl Player {
             malformed: full(settings.malformed),
             greetings: full(GREETINGS),
             bulk: full(Pace::new(settings).rate()),
-            place: None,
+            position: None,
             is_administrator: false,
         }
     }

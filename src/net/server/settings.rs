@@ -41,7 +41,7 @@ pub enum UndoPolicy {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServerSettings {
     /// How far from its player a client may dig; `None` does not check it. Otherwise a client whose
-    /// [place](super::Server::set_place) is not known may not dig.
+    /// [position](super::Server::set_position) is not known may not dig.
     pub reach: Option<Reach>,
     /// The budget for a client's edits. An edit costs 20, and 1 for each brick that it reaches, or 4 if it sculpts;
     /// edits beyond the budget are refused.
