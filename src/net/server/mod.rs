@@ -7,6 +7,7 @@
 //! | `session`, `players` | a connected client, data that is kept for its player |
 //! | `recent` | a table of clients that forgets the oldest |
 //! | `receive`, `validation` | received messages, and the reasons to refuse edits |
+//! | `numbering` | numbers entries, and sends them |
 //! | `entry_log` | the latest entries, in long messages |
 //! | `sequences` | the last sequence numbers of players' edits |
 //! | `apply` | applies entries to the world |
@@ -22,6 +23,7 @@ mod join;
 mod kept;
 #[cfg(feature = "store")]
 mod keys;
+mod numbering;
 mod pace;
 mod players;
 mod receive;
@@ -406,82 +408,6 @@ impl Server {
         }
         self.order(entry);
         Ok(())
-    }
-
-    fn order_edit(&mut self, author: ClientId, sequence: u64, edit: Edit, cost: u64) {
-        let labels = (edit.tag(), edit.stroke());
-        let entry = Entry::of(author, sequence, Order::Edit(edit.with_labels(0, None)));
-        self.enter(Ordered { entry, labels, cost });
-    }
-
-    /// Gives an entry the next number.
-    fn order(&mut self, entry: Entry) {
-        self.enter(Ordered { entry, labels: (0, None), cost: 0 });
-    }
-
-    fn enter(&mut self, ordered: Ordered) {
-        self.waiting_cost += ordered.cost;
-        if self.later.is_empty() {
-            self.number(ordered);
-        } else {
-            self.later.push_back(Later::Entry(ordered));
-        }
-    }
-
-    fn number(&mut self, ordered: Ordered) {
-        self.epoch.number += 1;
-        self.figures.ordered += 1;
-        self.writer.put(&ordered.entry);
-        self.log.push(&ordered.entry);
-        #[cfg(feature = "store")]
-        if let Some(saved) = &mut self.saved_log {
-            saved.push(self.epoch.number, &ordered.entry);
-        }
-        self.waiting.push_back(ordered);
-        if self.writer.len() >= FULL_MESSAGE {
-            self.flush();
-        }
-    }
-
-    /// Sends ordered entries to all clients that have everything before them, and room for them.
-    fn flush(&mut self) {
-        let (last, writer) = (self.epoch.number, std::mem::take(&mut self.writer));
-        let Some(message) = writer.message(last) else { return };
-        let before = last - writer.count();
-        for (client, session) in &mut self.sessions {
-            if session.has_joined()
-                && session.order.sent() == before
-                && session.order.send(last, message.len())
-            {
-                self.figures.main_bytes += message.len() as u64;
-                self.outgoing.push((*client, Lane::Main, message.clone()));
-            }
-        }
-    }
-
-    fn send(&mut self, client: ClientId, message: &ToClient) {
-        let bytes = message.to_bytes();
-        self.figures.main_bytes += bytes.len() as u64;
-        self.outgoing.push((client, Lane::Main, bytes));
-    }
-
-    /// Sends a message to all clients that have joined, after all ordered entries.
-    fn send_to_all(&mut self, message: &ToClient) {
-        self.flush();
-        let bytes = message.to_bytes();
-        for (client, session) in &self.sessions {
-            if session.has_joined() {
-                self.figures.main_bytes += bytes.len() as u64;
-                self.outgoing.push((*client, Lane::Main, bytes.clone()));
-            }
-        }
-    }
-
-    fn report(&mut self, event: ServerEvent) {
-        if self.events.len() == MAX_EVENTS {
-            self.events.pop_front();
-        }
-        self.events.push_back(event);
     }
 
     /// Applies ordered entries, welcomes new clients, and sends bulk data within its limits.

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use super::{LOG_BYTES, Store};
 use crate::store::error::{StoreError, WorldSize};
+use crate::store::message::{Answer, Content, Given, Message};
 use crate::store::shared::SavePoint;
-use crate::store::writer::{Answer, Content, Given, Message};
 use crate::terrain::{CommitRecord, Terrain};
 
 impl Store {
