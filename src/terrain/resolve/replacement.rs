@@ -81,8 +81,8 @@ impl<'a> Replacement<'a> {
     /// Sets the words of the mask that change: evaluates rule 2 again near changed bricks, as samples may have become
     /// pristine again.
     pub fn update_mask(&mut self) {
-        let Self { scene: Scene { world, .. }, bricks, changed, stages, .. } = self;
-        self.change.mask = Stages::time(&mut stages.ring, || {
+        let (world, bricks, changed) = (self.scene.world, &self.bricks, &self.changed);
+        self.change.mask = Stages::time(&mut self.stages.ring, || {
             // A cell has its corners in its own stack of bricks and in those behind it.
             let stacks: FxHashSet<(i32, i32)> = changed.iter().map(|(pos, _)| pos.stack()).collect();
             let behind = |&(x, z): &(i32, i32)| [(x, z), (x - 1, z), (x, z - 1), (x - 1, z - 1)];
