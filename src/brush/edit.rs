@@ -269,11 +269,11 @@ impl Edit {
     /// Distance outside the shape up to which samples may change.
     fn band(&self) -> i32 {
         // Two more units for the rounding of the distance.
-        self.own_band() + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2
+        self.shape_band() + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2
     }
 
     /// Distance outside the rough shape up to which samples may change.
-    pub(crate) fn own_band(&self) -> i32 {
+    pub(crate) fn shape_band(&self) -> i32 {
         let rounding = self.blend.and_then(|blend| self.operation.rounding(blend.falloff));
         rounding.map_or(BAND, |rounding| rounding.radius.max(BAND))
     }
@@ -288,7 +288,7 @@ impl Edit {
 
     /// The edit's signed distance function, ready to evaluate.
     pub fn evaluator(&self) -> Evaluator {
-        Evaluator::new(&self.shape, self.roughness, self.own_band())
+        Evaluator::new(&self.shape, self.roughness, self.shape_band())
     }
 }
 

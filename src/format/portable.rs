@@ -187,7 +187,7 @@ pub(crate) fn read_within(
     limits: &Limits,
 ) -> Result<PortableWorld, FormatError> {
     let container = container::read(Kind::Portable, file, limits.head)?;
-    let (world, head) = (container.world, portable_head(&container.own)?);
+    let (world, head) = (container.world, portable_head(&container.data)?);
     let regions = usize::try_from(head.regions).ok().filter(|&regions| regions <= container.frames.len());
     let (regions, batches) = container.frames.split_at(regions.ok_or(FormatError::Truncated)?);
     if head.journal != batches.len() as u64 {

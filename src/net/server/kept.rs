@@ -61,10 +61,12 @@ impl Server {
 
 impl Kept {
     /// Whether a returning client may get it: it contains everything that the client has done and seen.
-    pub fn is_for(&self, hello: &Hello, run: u64, last_own: u64) -> bool {
+    pub fn is_for(&self, hello: &Hello, run: u64, last_applied: u64) -> bool {
         let number = self.world.0;
         // A client with a part of a world sends no number.
         let has_more = |number_there: u64| number_there > number && number_there != u64::MAX;
-        hello.epoch.is_none_or(|epoch| last_own <= number && !(epoch.run == run && has_more(epoch.number)))
+        hello
+            .epoch
+            .is_none_or(|epoch| last_applied <= number && !(epoch.run == run && has_more(epoch.number)))
     }
 }

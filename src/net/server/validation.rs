@@ -14,7 +14,7 @@ use crate::net::price::UNDO;
 fn is_within(position: IVec3, edit: &Edit, allowed: u32) -> bool {
     let samples = edit.reach();
     // Its reach is what its shape and its roughness take up, and a band around them.
-    let band = i64::from(edit.own_band() / ONE);
+    let band = i64::from(edit.shape_band() / ONE);
     let middle = (samples.min.as_i64vec3() + samples.max.as_i64vec3()).div_euclid(I64Vec3::splat(2));
     let min = (samples.min.as_i64vec3() + band).min(middle);
     let max = (samples.max.as_i64vec3() - band).max(middle);
