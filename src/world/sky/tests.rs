@@ -169,7 +169,7 @@ fn light_changes_between_neighbours_as_the_seen_sky_does() {
         println!(
             "{name}: light jumps by {mean:.3}, and by more than 0.25 in {share:.3} of {count} triangles"
         );
-        assert!(count > 200 && mean < 0.06 && share < 0.01, "{name}: {mean:.3}, {share:.3}");
+        assert!(count > 200 && mean < 0.08 && share < 0.05, "{name}: {mean:.3}, {share:.3}");
     }
 }
 
