@@ -122,7 +122,7 @@ fn other_places(studio: &mut Studio, album: &mut Album) {
         println!("{name}: {x}, {z}, rise {:.2}, {} pixels along the seam", rise((x, z)), band.len());
         for (number, (before, after)) in before.iter().zip(&after).enumerate() {
             let (mean, along) = (flip(before, after).0, flip_at(before, after, &band));
-            println!("{name}, sun {}: FLIP {mean:.5}, {along:.5} along the seam", number);
+            println!("{name}, sun {number}: FLIP {mean:.5}, {along:.5} along the seam");
             if mean.max(along) > noise {
                 keep(&format!("seam_{name}_{number}"), "without", before);
                 keep(&format!("seam_{name}_{number}"), "with", after);
