@@ -21,7 +21,7 @@ use crate::ground::Ground;
 use crate::lattice::{Column, LatticeBox, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex, tile};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
-use crate::world::sky::{LitWorld, SkyColumns, SkyLights, SparseSky};
+use crate::world::sky::{Light, LitWorld, SkyColumns, SkyLights, SparseSky};
 
 /// The components of an entity in addition to its mesh: bounds that Bevy need not compute, and bytes.
 pub(crate) type MeshFacts = (Aabb, NoAutoAabb, MeshBytes);
@@ -134,7 +134,7 @@ impl MeshBuilder {
         arrays.push(rings, origin);
         if let Some(lights) = lights.get() {
             // Columns lie on the undug surface, so they have no depth below it.
-            let of_columns = lights.ground_lights().into_iter().map(|light| [light, 0, 0, 0]);
+            let of_columns = lights.ground_lights().into_iter().map(|light| [light.sky, 0, light.daylight, 0]);
             arrays.lights.extend(of_columns.take(columns.len()));
             arrays.push_lights(rings, origin, lights);
         }
@@ -246,7 +246,8 @@ impl<'a> Arrays<'a> {
         let light = |vertex: &Vertex| {
             let place = origin * SNAP + vertex.position;
             let depth = lights.depth(place).clamp(0, CUT_VOXELS * ONE) * 255 / (CUT_VOXELS * ONE);
-            [lights.light(place), depth as u8, 0, 0]
+            let Light { sky, daylight } = lights.light(place);
+            [sky, depth as u8, daylight, 0]
         };
         self.lights.extend(vertices.iter().map(light));
     }

@@ -115,14 +115,14 @@ fn other_places(studio: &mut Studio, album: &mut Album) {
             studio.height(x as f32, z as f32 - 1.0) - studio.height(x as f32, z as f32 + 1.0),
         );
         studio.look(middle + down.normalize_or(Vec3::X) * 13.0 + Vec3::Y * 10.0, middle);
-        let before = photograph(studio, suns().step_by(5));
+        let before = photograph(studio, suns());
         studio.apply([Brush::paint(Shape::sphere(middle, 6.0), MaterialId::GROUND)]);
-        let after = photograph(studio, suns().step_by(5));
+        let after = photograph(studio, suns());
         let band = grown(&seam(studio), 2);
         println!("{name}: {x}, {z}, rise {:.2}, {} pixels along the seam", rise((x, z)), band.len());
         for (number, (before, after)) in before.iter().zip(&after).enumerate() {
             let (mean, along) = (flip(before, after).0, flip_at(before, after, &band));
-            println!("{name}, sun {}: FLIP {mean:.5}, {along:.5} along the seam", 5 * number);
+            println!("{name}, sun {number}: FLIP {mean:.5}, {along:.5} along the seam");
             if mean.max(along) > noise {
                 keep(&format!("seam_{name}_{number}"), "without", before);
                 keep(&format!("seam_{name}_{number}"), "with", after);

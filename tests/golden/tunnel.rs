@@ -1,4 +1,4 @@
-//! Inside a tunnel: strata on the walls show the depth.
+//! Inside a tunnel: strata on the walls show the depth. And the mouth of one from outside, which fades into the dark.
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -36,4 +36,21 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     album.compare("tunnel", &studio.picture());
     studio.app.world_mut().despawn(lamp);
     studio.sky(900.0);
+    mouth(studio, album);
+}
+
+/// A tunnel that runs level into a hillside, and a trench with upright walls in front of it.
+fn mouth(studio: &mut Studio, album: &mut Album) {
+    let hillside = |x: i32, z: i32| {
+        let along = (f64::from(x) - 40.0 + 2.0 * (f64::from(z) / 7.0).sin()) / 24.0;
+        20.0 + 22.0 * along.clamp(0.0, 1.0)
+    };
+    studio.terrain(Ground::from_fn(96, 96, hillside).expect("valid ground"), GroundLook::default());
+    let (from, to) = (Vec3::new(44.0, 22.5, 48.0), Vec3::new(80.0, 22.5, 52.0));
+    studio.apply([
+        Brush::dig(Shape::capsule(from, to, 3.5)),
+        Brush::dig(Shape::cuboid(Vec3::new(30.0, 18.0, 56.0), Vec3::new(5.0, 5.0, 3.0))),
+    ]);
+    studio.look(Vec3::new(24.0, 27.0, 44.0), Vec3::new(46.0, 21.0, 50.0));
+    album.compare("mouth", &studio.picture());
 }

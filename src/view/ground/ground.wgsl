@@ -118,8 +118,9 @@ struct Varying {
     @location(6) weights: vec4<f32>,
 #endif
 #ifdef GROUND_SKY_LIGHT
-    // The share of the sky that lights this place, and how many voxels it was dug below the surface, `CUT_VOXELS` at most.
-    @location(7) sky_light: vec2<f32>,
+    // The share of the sky that lights this place; how many voxels it was dug below the surface, `CUT_VOXELS` at most; and the
+    // share of daylight, which under roofs is also that of ground in the open.
+    @location(7) sky_light: vec3<f32>,
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -169,7 +170,7 @@ fn vertex(in: Vertex) -> Varying {
     out.weights = in.weights;
 #endif
 #ifdef GROUND_SKY_LIGHT
-    out.sky_light = in.sky_light.xy * vec2(1.0, CUT_VOXELS);
+    out.sky_light = in.sky_light.xyz * vec3(1.0, CUT_VOXELS, 1.0);
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -183,8 +184,8 @@ fn vertex(in: Vertex) -> Varying {
 // Borders between layers: the size of a cell on the screen in pixels, how many voxels the noise spans, its strength, and the
 // largest power of two by which it multiplies a weight, near the camera and where cells are larger than voxels.
 const BORDER_PIXELS: f32 = 9.0;
-const BORDER_VOXELS: f32 = 5.0;
-const BORDER_NOISE: f32 = 6.0;
+const BORDER_VOXELS: f32 = 3.0;
+const BORDER_NOISE: f32 = 4.0;
 const BORDER_MOST: f32 = 2.0;
 const BORDER_MOST_FAR: f32 = 2.6;
 // How much heights move a border, and how wide it is: near the camera, and where cells are larger than voxels, as their weights
@@ -584,12 +585,12 @@ fn fragment(in: VertexOutput) {
 }
 #endif
 #else
-// The share of ambient and indirect light that reaches a place: that of the sky above it.
-fn sky_light_of(in: Varying) -> f32 {
+// The share of reflected light that reaches a place, which is that of the sky above it, and the share of ambient light.
+fn sky_light_of(in: Varying) -> vec2<f32> {
 #ifdef GROUND_SKY_LIGHT
-    return in.sky_light.x;
+    return in.sky_light.xz;
 #else
-    return 1.0;
+    return vec2(1.0);
 #endif
 }
 
@@ -689,8 +690,8 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     pbr_input.material.perceptual_roughness = clamp(texels.finish.y, 0.089, 1.0);
     pbr_input.material.metallic = metallic;
     let open_sky = texels.finish.x * sky_light_of(in);
-    pbr_input.diffuse_occlusion = vec3(open_sky);
-    pbr_input.specular_occlusion = open_sky;
+    pbr_input.diffuse_occlusion = vec3(open_sky.y);
+    pbr_input.specular_occlusion = open_sky.x;
     pbr_input.N = facing(normalize(bent * turn), normalize(in.world_normal), pbr_input.V);
     // What changes from pixel to pixel would sparkle: it is rough (Tokuyoshi and Kaplanyan 2019).
     let bend_x = dpdx(pbr_input.N);

@@ -8,13 +8,11 @@ use std::ops::Range;
 use glam::IVec3;
 
 use super::columns::{Run, SkyColumns};
-use super::light::{FAR, NEAR, REACH, SkyLights, Step, below};
+use super::light::{
+    FAR, LOWEST_RAY, NEAR, RAY_REACH, REACH, SkyLights, Step, below, columns_of, is_covered, is_wall,
+};
 use super::{LitWorld, SkyView};
 use crate::lattice::{Column, ONE, SNAP};
-
-/// How far from ground that changed rays under roofs start, in columns along x or z: they have up to 13 steps, and begin in a
-/// column next to their vertex.
-const RAY_REACH: i32 = 15;
 
 /// The difference of what eight directions hide that always shows: light counts it in eighths.
 const SHOWS: i16 = 8;
@@ -117,35 +115,44 @@ impl<'a> LightChange<'a> {
 
     /// Whether the light of a vertex at a place, in 1/4096 voxel, differs.
     pub fn shows_at(&mut self, place: IVec3) -> bool {
-        let y = place.y.div_euclid(SNAP / ONE);
-        let cell = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-        // Light comes from above.
-        if y >= self.highest || self.before.place(cell).is_none() {
+        let columns = columns_of(place);
+        if self.before.place(columns[0]).is_none() {
             return false;
         }
-        let next = cell.offset(i32::from(place.x % SNAP != 0), i32::from(place.z % SNAP != 0));
-        let ends = [cell, next];
-        let (mut is_open, mut may_differ) = (false, false);
-        for &column in &ends[..if next == cell { 1 } else { 2 }] {
-            let top = self.before.top(column);
-            if self.after.top(column) != top {
-                return self.differs(place);
-            }
-            if y + ONE < top {
-                continue;
-            }
-            is_open = true;
-            may_differ |= match self.before.place(column) {
-                Some(at) if y <= top + ONE => self.shows_on_top(at),
-                _ => self.sees_moved(column),
-            };
+        let y = place.y.div_euclid(SNAP / ONE);
+        let [(low, bottom), (high, top)] = self.before.by_top(columns);
+        if self.after.top(low) != bottom || self.after.top(high) != top {
+            return self.differs(place);
         }
-        let is_near_rays = || {
-            let [low, high] = self.stacks;
-            (low.x - RAY_REACH..=high.x + RAY_REACH).contains(&cell.x)
-                && (low.z - RAY_REACH..=high.z + RAY_REACH).contains(&cell.z)
+        if is_covered(y, bottom) {
+            let [first, last] = self.stacks;
+            let is_near =
+                |at: i32, first: i32, last: i32| (first - RAY_REACH..=last + RAY_REACH).contains(&at);
+            return y - LOWEST_RAY < self.highest
+                && is_near(columns[0].x, first.x, last.x)
+                && is_near(columns[0].z, first.z, last.z)
+                && self.differs(place);
+        }
+        // Light comes from above, and a slope is lit as its foot and its edge are.
+        if y.min(bottom) >= self.highest {
+            return false;
+        }
+        let may_differ = if y > top + ONE {
+            self.sees_moved(high)
+        } else {
+            let are_changed = [low, high].map(|column| self.before.is_changed(column));
+            columns.iter().any(|&column| self.may_show_on_top(column))
+                || is_wall(top - bottom, are_changed) && self.sees_moved(low)
         };
-        (if is_open { may_differ } else { is_near_rays() }) && self.differs(place)
+        may_differ && self.differs(place)
+    }
+
+    /// Whether the light on top of a column may differ; the top stays.
+    fn may_show_on_top(&mut self, column: Column) -> bool {
+        match self.before.place(column) {
+            Some(at) => self.shows_on_top(at),
+            None => self.sees_moved(column),
+        }
     }
 
     /// Compares the light of a place.

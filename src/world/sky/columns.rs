@@ -7,7 +7,8 @@ use glam::IVec3;
 use rustc_hash::FxHashMap;
 
 use super::light::{
-    FAR, HIGHEST_RISE, NEAR, REACH, SkyLights, Step, below, hide, light_of, raise, raise_where, slope,
+    AirLight, FAR, HIGHEST_RISE, Light, NEAR, REACH, SkyLights, Step, below, hide, light_of, raise,
+    raise_where, slope,
 };
 use super::{LitWorld, SkyView};
 use crate::lattice::{Column, ONE, SNAP};
@@ -70,7 +71,7 @@ pub(crate) struct SkyColumns<'a> {
     /// On the tops of the rectangle's columns, for those rows for which it was asked.
     lights: Vec<u8>,
     is_lit: Vec<bool>,
-    known: FxHashMap<IVec3, u8>,
+    known: FxHashMap<IVec3, Option<AirLight>>,
 }
 
 impl<'a> SkyColumns<'a> {
@@ -305,8 +306,8 @@ impl<'a> SkyColumns<'a> {
     }
 
     /// The light over the rectangle's columns at the ground's own height, x fastest: that of a tile's vertices.
-    pub fn ground_lights(&mut self) -> Vec<u8> {
-        let mut lights = self.lights().to_vec();
+    pub fn ground_lights(&mut self) -> Vec<Light> {
+        let mut lights: Vec<Light> = self.lights().iter().map(|&sky| Light::open(sky)).collect();
         let width = self.size[0];
         for z in 0..self.size[1] {
             for x in self.changed_run(z).within(width) {
@@ -393,16 +394,16 @@ impl SkyLights for SkyColumns<'_> {
         light_of(hidden)
     }
 
-    fn known(&mut self) -> &mut FxHashMap<IVec3, u8> {
+    fn known(&mut self) -> &mut FxHashMap<IVec3, Option<AirLight>> {
         &mut self.known
     }
 
-    fn covered_light(&mut self, air: IVec3) -> u8 {
+    fn covered_light(&mut self, place: IVec3, columns: [Column; 2]) -> Option<Light> {
         let tops = || self.tops[..self.row_count() * self.width].iter();
         let lowest = *self.lowest.get_or_init(|| tops().copied().min().unwrap_or_default());
-        if (air.y + 1) * ONE + HIGHEST_RISE < lowest {
-            return 0;
+        if place.y.div_euclid(SNAP / ONE) + HIGHEST_RISE < lowest {
+            return Some(Light::NONE);
         }
-        self.covered_light_by_rays(air)
+        self.covered_light_by_rays(place, columns)
     }
 }

@@ -116,6 +116,32 @@ pub(super) fn light_of(hidden: u16) -> u8 {
     255 - (hidden / 8) as u8
 }
 
+/// The light of a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Light {
+    /// The share of the sky that lights it, weighted by the cosine to the vertical.
+    pub sky: u8,
+    /// That share or, if it is larger, the share of level directions in which a place under a roof sees the open: ground there
+    /// is lit, and lights what is under the roof.
+    pub daylight: u8,
+}
+
+impl Light {
+    pub const NONE: Self = Self::open(0);
+
+    /// The light of a place under the open sky.
+    pub const fn open(sky: u8) -> Self {
+        Self { sky, daylight: sky }
+    }
+}
+
+/// A point of air that has ground above it, or near ground that has.
+#[derive(Clone, Copy)]
+pub(crate) struct AirLight {
+    light: Light,
+    is_under_open_sky: bool,
+}
+
 /// Columns, as far as light depends on them.
 pub(crate) trait SkyLights {
     /// The world.
@@ -129,8 +155,8 @@ pub(crate) trait SkyLights {
         let y = self.top(column);
         self.open_light(column, y)
     }
-    /// The light under roofs that is known already.
-    fn known(&mut self) -> &mut FxHashMap<IVec3, u8>;
+    /// The light of points under roofs that is known already; `None` for solid ones.
+    fn known(&mut self) -> &mut FxHashMap<IVec3, Option<AirLight>>;
 
     /// The light over a column at a height, in 1/256 voxel, that is not below its top.
     fn open_light(&mut self, column: Column, y: i32) -> u8 {
@@ -163,82 +189,140 @@ pub(crate) trait SkyLights {
     /// How far a place in 1/4096 voxel, as [`light`](Self::light) takes it, lies below the surface that was there before
     /// anyone dug, in 1/256 voxel; less than 0 above it.
     fn depth(&mut self, place: IVec3) -> i32 {
-        let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-        let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
-        let next = column.offset(i32::from(x > 0), i32::from(z > 0));
+        let [column, next] = columns_of(place);
+        let part = place.x.rem_euclid(SNAP).max(place.z.rem_euclid(SNAP));
         let here = i64::from(self.undug_height(column));
         let there = if next == column { here } else { i64::from(self.undug_height(next)) };
-        let height = here + (there - here) * i64::from(x.max(z)) / i64::from(SNAP);
+        let height = here + (there - here) * i64::from(part) / i64::from(SNAP);
         height as i32 - place.y.div_euclid(SNAP / ONE)
     }
 
     /// The light at a place on the surface, in 1/4096 voxel, that lies on an edge of the lattice or over the diagonal of a
     /// cell. It depends on the place alone.
-    fn light(&mut self, place: IVec3) -> u8 {
-        let cell = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-        let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
-        let ends = [cell, cell.offset(i32::from(x > 0), i32::from(z > 0))];
-        let columns = &ends[..if ends[0] == ends[1] { 1 } else { 2 }];
+    fn light(&mut self, place: IVec3) -> Light {
+        let columns = columns_of(place);
         let y = place.y.div_euclid(SNAP / ONE);
-        // Of a wall's two columns, the one in front of it is open, and it counts.
-        let mut light = None;
-        for &column in columns {
-            let top = self.top(column);
-            if y + ONE >= top {
-                let own = if y <= top + ONE { self.top_light(column) } else { self.open_light(column, y) };
-                light = light.max(Some(own));
-            }
+        let [low, high] = self.by_top(columns);
+        if is_covered(y, low.1)
+            && let Some(light) = self.covered_light(place, columns)
+        {
+            return light;
         }
-        light.unwrap_or_else(|| {
-            let low = place.y.div_euclid(SNAP);
-            let high = low + i32::from(place.y.rem_euclid(SNAP) > 0);
-            let points = columns.iter().flat_map(|column| [column.at(high), column.at(low)]);
-            let view = self.view();
-            let air = { points }.find(|&point| !view.is_solid(point));
-            air.map_or(0, |air| self.covered_light(air))
-        })
+        Light::open(self.open_light_between(low, high, y))
     }
 
-    /// The light at a point of air that has ground above it.
-    fn covered_light(&mut self, air: IVec3) -> u8 {
-        self.covered_light_by_rays(air)
+    /// Two columns and their tops, the lower one first.
+    fn by_top(&mut self, columns: [Column; 2]) -> [(Column, i32); 2] {
+        let [a, b] = columns.map(|column| (column, self.top(column)));
+        if a.1 <= b.1 { [a, b] } else { [b, a] }
     }
 
-    /// The same, where some ground around may be low enough.
-    fn covered_light_by_rays(&mut self, air: IVec3) -> u8 {
-        // One of eight points counts for all of them, if it is air too.
-        let shared = air & !1;
-        let point = if shared == air || !self.view().is_solid(shared) { shared } else { air };
+    /// The light at a height between the tops of two columns, in 1/256 voxel, or above both.
+    fn open_light_between(&mut self, low: (Column, i32), high: (Column, i32), y: i32) -> u8 {
+        let ((low, bottom), (high, top)) = (low, high);
+        if y > top + ONE {
+            return self.open_light(high, y);
+        }
+        let up = self.top_light(high);
+        if y >= top || bottom == top {
+            return up;
+        }
+        let (up, down) = (i64::from(up), i64::from(self.top_light(low)));
+        let rise = top - bottom;
+        let on_slope = down + (up - down) * i64::from((y - bottom).max(0)) / i64::from(rise);
+        if !is_wall(rise, [low, high].map(|column| self.is_changed(column))) {
+            return on_slope as u8;
+        }
+        let on_wall = i64::from(self.open_light(low, y)) - i64::from(hidden_by_wall(top - y));
+        let share = i64::from((STEEPEST_SLOPE + ONE - rise).max(0));
+        (on_wall + (on_slope - on_wall) * share / i64::from(ONE)).clamp(0, 255) as u8
+    }
+
+    /// The light of a place under a roof, between two columns; `None` if none of the points next to it is air.
+    fn covered_light(&mut self, place: IVec3, columns: [Column; 2]) -> Option<Light> {
+        self.covered_light_by_rays(place, columns)
+    }
+
+    /// The same, where some ground around may be low enough: a mean of the corners of its cube of 2x2x2 voxels that are air.
+    fn covered_light_by_rays(&mut self, place: IVec3, columns: [Column; 2]) -> Option<Light> {
+        const SIDE: i32 = 2 * SNAP;
+        let low = place.y.div_euclid(SNAP);
+        let heights = [low + i32::from(place.y.rem_euclid(SNAP) > 0), low];
+        let view = self.view();
+        let points = heights.into_iter().flat_map(|y| columns.map(|column| column.at(y)));
+        let air = { points }.find(|&point| !view.is_solid(point))?;
+        let first = place.div_euclid(IVec3::splat(SIDE)) * 2;
+        let part = place.rem_euclid(IVec3::splat(SIDE));
+        let (mut sky, mut daylight, mut sum) = (0, 0, 0);
+        for corner in 0..8 {
+            let side = IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2);
+            let near = (IVec3::ONE - side) * SIDE + (2 * side - 1) * part;
+            let weight = near.to_array().map(|near| near as u64).into_iter().product::<u64>();
+            if weight == 0 {
+                continue;
+            }
+            let point = first + 2 * side;
+            let Some(AirLight { light, is_under_open_sky }) = self.air_light(point) else { continue };
+            // Behind a thin roof or wall, another light counts for nothing.
+            let middle = (point + air + (point - air).signum().max(IVec3::ZERO)) >> 1;
+            if is_under_open_sky && self.view().is_solid(middle) {
+                continue;
+            }
+            sky += weight * u64::from(light.sky);
+            daylight += weight * u64::from(light.daylight);
+            sum += weight;
+        }
+        if sum == 0 {
+            return Some(self.air_light(air).map_or(Light::NONE, |air| air.light));
+        }
+        Some(Light { sky: (sky / sum) as u8, daylight: (daylight / sum) as u8 })
+    }
+
+    /// The light at a point, by rays; `None` if it is solid.
+    fn air_light(&mut self, point: IVec3) -> Option<AirLight> {
         if let Some(&known) = self.known().get(&point) {
             return known;
         }
-        let light = self.ray_light(point);
+        let is_air = !self.view().is_solid(point);
+        let light = is_air.then(|| AirLight {
+            light: self.ray_light(point),
+            is_under_open_sky: self.top(Column::of(point)) <= point.y * ONE,
+        });
         self.known().insert(point, light);
         light
     }
 
     /// The share of rays from a point that get out.
-    fn ray_light(&mut self, from: IVec3) -> u8 {
-        let mut open = 0;
-        for (number, &(dx, dz)) in DIRECTIONS.iter().enumerate() {
-            for (steps, rise) in RAYS[number % 2] {
-                open += u32::from(self.is_open(from, (dx, dz), steps, rise));
+    fn ray_light(&mut self, from: IVec3) -> Light {
+        let (mut open, mut open_level) = (0, 0);
+        for (number, &direction) in AROUND.iter().enumerate() {
+            if number % 2 == 0 {
+                for (steps, rise) in RAYS[number / 2 % 2] {
+                    open += u32::from(self.escapes(from, direction, steps, rise));
+                }
             }
+            let (steps, rise) = LEVEL_RAYS[number % 4];
+            let may_escape = from.y * ONE + steps * rise >= self.top(along(from, direction, steps));
+            let mut rises = [0, rise, -rise].into_iter();
+            open_level +=
+                u32::from(may_escape && rises.any(|rise| self.escapes(from, direction, steps, rise)));
         }
-        (open * 255 / (8 * RAYS[0].len() as u32)) as u8
+        let sky = (open * 255 / (8 * RAYS[0].len() as u32)) as u8;
+        Light { sky, daylight: sky.max((open_level * 255 / AROUND.len() as u32) as u8) }
     }
 
-    /// Whether a ray leads to the open sky, given its rise in 1/256 voxel in each step and its number of steps.
-    fn is_open(&mut self, from: IVec3, (dx, dz): (i32, i32), steps: i32, rise: i32) -> bool {
+    /// Whether a ray leads to the open, given its direction in half columns, its number of steps and its rise in each of them,
+    /// in 1/256 voxel.
+    fn escapes(&mut self, from: IVec3, direction: (i32, i32), steps: i32, rise: i32) -> bool {
         let mut y = from.y * ONE;
         // Most rays of a tunnel end in the ground, wherever they enter it.
-        if y + steps * rise < self.top(Column::of(from).offset(dx * steps, dz * steps)) {
+        if y + steps * rise < self.top(along(from, direction, steps)) {
             return false;
         }
         for step in 1..=steps {
             let before = y;
             y += rise;
-            let column = Column::of(from).offset(dx * step, dz * step);
+            let column = along(from, direction, step);
             if y < self.top(column) {
                 // Steep rays pass several points of a column.
                 let (low, high) = (round(before) + 1, round(y));
@@ -251,14 +335,76 @@ pub(crate) trait SkyLights {
     }
 }
 
+/// The columns at the ends of the edge or diagonal on which a place in 1/4096 voxel lies; the same one twice over a column.
+pub(super) fn columns_of(place: IVec3) -> [Column; 2] {
+    let cell = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
+    [cell, cell.offset(i32::from(place.x.rem_euclid(SNAP) > 0), i32::from(place.z.rem_euclid(SNAP) > 0))]
+}
+
+/// Whether the surface at a height is under a roof, given the lower top of its columns, both in 1/256 voxel: what is open has air
+/// up to the sky in one of them. The heights of places and tops are rounded separately.
+pub(super) fn is_covered(y: i32, lower_top: i32) -> bool {
+    y + 2 < lower_top
+}
+
+/// The largest rise from one column to the next, in 1/256 voxel, that is a slope where ground was dug; a voxel more is a wall.
+const STEEPEST_SLOPE: i32 = 2 * ONE;
+
+/// Whether ground that rises this high from one column to the next is lit as a wall, given which of them were dug or built: ground
+/// that is neither is lit as its tile is, whose triangles reach from column to column.
+pub(super) fn is_wall(rise: i32, are_changed: [bool; 2]) -> bool {
+    rise > STEEPEST_SLOPE && are_changed != [false; 2]
+}
+
+/// What a wall hides that rises this high above a place on it, in 1/256 voxel, in addition to what it hides over the column in
+/// front, from which it is half a column farther away: in three of eight directions.
+fn hidden_by_wall(rise: i32) -> u16 {
+    let slope = (rise >> 3).min(255) as i16;
+    3 * (below(2 * slope) - below(slope)) / 8
+}
+
+/// The column that a ray from a point reaches with a step, given its direction in half columns.
+fn along(from: IVec3, (dx, dz): (i32, i32), step: i32) -> Column {
+    Column::of(from).offset((dx * step) >> 1, (dz * step) >> 1)
+}
+
 /// The lattice point nearest to a height in 1/256 voxel.
 fn round(y: i32) -> i32 {
     (y + ONE / 2).div_euclid(ONE)
 }
 
+/// The directions of rays, in half columns: the even ones are straight and diagonal.
+const AROUND: [(i32, i32); 16] = [
+    (2, 0),
+    (2, 1),
+    (2, 2),
+    (1, 2),
+    (0, 2),
+    (-1, 2),
+    (-2, 2),
+    (-2, 1),
+    (-2, 0),
+    (-2, -1),
+    (-2, -2),
+    (-1, -2),
+    (0, -2),
+    (1, -2),
+    (2, -2),
+    (2, -1),
+];
+
 /// Rays that stand for equal shares of the sky: their steps, and by how much each rises, for straight and for diagonal
 /// directions. Their slopes are 0.45, 1 and 2.24.
 const RAYS: [[(i32, i32); 3]; 2] = [[(13, 114), (9, 256), (5, 572)], [(9, 162), (7, 362), (4, 810)]];
 
-/// No ray rises further than this, in 1/256 voxel: where all ground around is higher, nothing is light.
-pub(super) const HIGHEST_RISE: i32 = 13 * ONE;
+/// Rays of some 14 voxels that rise or fall slightly, with a slope of 0.25 at most, for every fourth direction.
+const LEVEL_RAYS: [(i32, i32); 4] = [(14, 64), (12, 72), (10, 90), (12, 72)];
+
+/// How far from the column of a place, along x or z, ground may be on which its light under a roof depends: rays start at the
+/// corners of its cube of 2x2x2 voxels.
+pub(super) const RAY_REACH: i32 = 16;
+
+/// How far above a place, in 1/256 voxel, nothing is light where all ground around is higher; and how far below, ground may be on
+/// which its light under a roof depends.
+pub(super) const HIGHEST_RISE: i32 = 15 * ONE;
+pub(super) const LOWEST_RAY: i32 = 6 * ONE;

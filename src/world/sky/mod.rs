@@ -6,7 +6,10 @@
 //!
 //! - **Under the open sky**, light depends on the *tops* of the columns around: the height of the highest ground in each.
 //!   In eight directions, the steepest rise to the top of a column at one of a few distances is the horizon.
-//! - **Under a roof**, rays in eight directions and at three angles look for a way out.
+//!   On dug walls, what the wall itself hides is added.
+//! - **Under a roof**, rays in eight directions and at three angles look for a way out, from every second lattice point along each
+//!   axis. Light is interpolated between these, so it does not jump. Level rays in sixteen directions tell how much of the
+//!   daylight is seen from there.
 //!
 //! No light depends on ground that is more than [`REACH`](light::REACH) columns away, so a dig changes light near it only.
 //!
@@ -39,7 +42,7 @@ use crate::volume::Brick;
 
 pub(crate) use change::LightChange;
 pub(crate) use columns::SkyColumns;
-pub(crate) use light::{REACH, SkyLights};
+pub(crate) use light::{Light, REACH, SkyLights};
 pub(crate) use sparse::SparseSky;
 use tops::{StackTops, stack_tops};
 
@@ -216,6 +219,6 @@ impl World {
         }
         let (column, y) = (place.round().as_ivec3(), (place.y * f64::from(SNAP)).round() as i32);
         let place = (column * SNAP).with_y(y);
-        f32::from(SparseSky::new(SkyView::of(self)).light(place)) / 255.0
+        f32::from(SparseSky::new(SkyView::of(self)).light(place).sky) / 255.0
     }
 }

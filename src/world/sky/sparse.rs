@@ -4,7 +4,7 @@ use glam::IVec3;
 use rustc_hash::FxHashMap;
 
 use super::SkyView;
-use super::light::{FAR, REACH, SkyLights, Step, below, light_of, slope};
+use super::light::{AirLight, FAR, REACH, SkyLights, Step, below, light_of, slope};
 use super::tops::StackTops;
 use crate::lattice::Column;
 
@@ -14,7 +14,7 @@ pub(crate) struct SparseSky<'a> {
     stacks: FxHashMap<(i32, i32), Option<Box<StackTops>>>,
     heights: FxHashMap<Column, i32>,
     lights: FxHashMap<Column, u8>,
-    known: FxHashMap<IVec3, u8>,
+    known: FxHashMap<IVec3, Option<AirLight>>,
 }
 
 impl<'a> SparseSky<'a> {
@@ -103,7 +103,7 @@ impl SkyLights for SparseSky<'_> {
         light
     }
 
-    fn known(&mut self) -> &mut FxHashMap<IVec3, u8> {
+    fn known(&mut self) -> &mut FxHashMap<IVec3, Option<AirLight>> {
         &mut self.known
     }
 }

@@ -64,7 +64,7 @@ fn mean_error(terrain: &Terrain, low: IVec3, high: IVec3) -> (f64, f64, usize) {
     let chosen: Vec<_> = all.into_iter().step_by(step).collect();
     for (place, vertex) in &chosen {
         let sky = seen_sky(world, *place, vertex.normal);
-        let light = f64::from(lights.light(*place)) / 255.0;
+        let light = f64::from(lights.light(*place).sky) / 255.0;
         if std::env::var("SKY_POINTS").is_ok() {
             println!("{:?} {sky:.2} {light:.2}", place.as_vec3() / SNAP as f32);
         }
@@ -118,6 +118,107 @@ fn light_is_the_share_of_the_sky_that_rays_find() {
         println!("{name}: mean error {error:.3}, mean sky {seen:.3}, {count} vertices");
         assert!(count > 20 && error <= 0.1, "{name}: {error:.3}");
     }
+}
+
+/// A ball that is dug into a plain so that its sides hang over, and a trench with upright walls.
+fn dug_plain() -> Terrain {
+    let mut terrain = terrain(Ground::flat(79, 79, 24.0).expect("valid"), 32);
+    let trench = Shape::cuboid(Vec3::new(56.0, 22.0, 40.0), Vec3::new(3.0, 6.0, 16.0));
+    let ball = Shape::sphere(Vec3::new(30.0, 21.5, 40.0), 4.0);
+    dig(&mut terrain, &[Brush::dig(trench), Brush::dig(ball)]);
+    terrain
+}
+
+#[test]
+fn light_changes_between_neighbours_as_the_seen_sky_does() {
+    let mut tunnel = terrain(cliff(), 32);
+    let ends = [Vec3::new(34.0, 22.0, 40.0), Vec3::new(66.0, 22.0, 40.0)];
+    dig(&mut tunnel, &[Brush::dig(Shape::capsule(ends[0], ends[1], 2.5))]);
+    let at = IVec3::new;
+    let plain = dug_plain();
+    let scenes = [
+        ("trench", &plain, at(51, 0, 30), at(61, 23, 50)),
+        ("ball", &plain, at(24, 0, 34), at(36, 23, 46)),
+        ("tunnel", &tunnel, at(42, 0, 34), at(66, 26, 46)),
+    ];
+    for (name, terrain, low, high) in scenes {
+        let world = terrain.world();
+        let mut lights = SparseSky::new(SkyView::of(world));
+        let mut known: FxHashMap<IVec3, f64> = FxHashMap::default();
+        let (mut jumps, mut sum, mut count) = (0, 0.0, 0);
+        for (drawn, mesh) in world.drawn() {
+            let origin = world.origin(drawn) * SNAP;
+            let mut errors = |vertex: &Vertex| {
+                let place = origin + vertex.position;
+                let is_within = place.cmpge(low * SNAP).all() && place.cmple(high * SNAP).all();
+                is_within.then(|| {
+                    *known.entry(place).or_insert_with(|| {
+                        f64::from(lights.light(place).sky) / 255.0 - seen_sky(world, place, vertex.normal)
+                    })
+                })
+            };
+            for corners in mesh.triangles() {
+                let [Some(a), Some(b), Some(c)] = corners.map(|corner| errors(&corner)) else { continue };
+                let jump = a.max(b).max(c) - a.min(b).min(c);
+                jumps += usize::from(jump > 0.25);
+                sum += jump;
+                count += 1;
+            }
+        }
+        let (mean, share) = (sum / f64::from(count), jumps as f64 / f64::from(count));
+        println!(
+            "{name}: light jumps by {mean:.3}, and by more than 0.25 in {share:.3} of {count} triangles"
+        );
+        assert!(count > 200 && mean < 0.08 && share < 0.05, "{name}: {mean:.3}, {share:.3}");
+    }
+}
+
+#[test]
+fn daylight_fades_into_a_tunnel() {
+    // In directions that rays have and in ones between.
+    for turn in [0.0_f32, 0.2, 0.39, 0.6, 0.785] {
+        let mut tunnel = terrain(cliff(), 32);
+        let (from, along) = (Vec3::new(34.0, 22.0, 30.0), Vec3::new(turn.cos(), 0.0, turn.sin()));
+        dig(&mut tunnel, &[Brush::dig(Shape::capsule(from, from + 36.0 * along, 2.5))]);
+        let world = tunnel.world();
+        let mut lights = SparseSky::new(SkyView::of(world));
+        let mut sums = [(0.0, 0.0); 12];
+        for (place, _) in vertices(world) {
+            let out = place.as_vec3() / SNAP as f32 - from;
+            let (deep, aside) = (out.dot(along), out.reject_from(along).length());
+            let light = lights.light(place);
+            assert!(light.daylight >= light.sky, "{place}");
+            if (8.0..32.0).contains(&deep) && aside < 3.0 {
+                let own = &mut sums[(deep / 2.0) as usize - 4];
+                *own = (own.0 + f32::from(light.daylight) / 255.0, own.1 + 1.0);
+            }
+        }
+        let means = sums.map(|(sum, count)| sum / f32::max(count, 1.0));
+        println!("{turn}: {means:.2?}");
+        assert!(means[0] > 0.1 && means[2] > 0.03 && means[10] == 0.0, "{turn}: {means:?}");
+        assert!(means.windows(2).all(|pair| pair[1] <= pair[0] + 0.02), "{turn}: {means:?}");
+    }
+}
+
+#[test]
+fn undug_cliffs_are_lit_as_their_tiles() {
+    let ground = cliff();
+    let mut painted = terrain(cliff(), 32);
+    dig(&mut painted, &[Brush::paint(Shape::sphere(Vec3::new(40.0, 26.0, 40.0), 8.0), MaterialId::GROUND)]);
+    let mut lights = SparseSky::new(SkyView::of(painted.world()));
+    let mut on_cliff = 0;
+    for (place, _) in vertices(painted.world()) {
+        let ends = light::columns_of(place).map(|column| {
+            let place = (column.at(0) * SNAP).with_y(ground.height(column) * (SNAP / ONE));
+            i32::from(lights.light(place).sky)
+        });
+        let part = place.x.rem_euclid(SNAP).max(place.z.rem_euclid(SNAP));
+        let expected = ends[0] + (ends[1] - ends[0]) * part / SNAP;
+        let light = i32::from(lights.light(place).sky);
+        assert!((light - expected).abs() <= 2, "{place}: {light}, a tile has {expected}");
+        on_cliff += usize::from(part > 0);
+    }
+    assert!(on_cliff > 50, "{on_cliff}");
 }
 
 /// The highest solid sample of a column, looked for one by one.
@@ -180,9 +281,9 @@ fn equal_places_have_equal_light_whatever_draws_them() {
     }
     let world = terrain.world();
     let view = SkyView::of(world);
-    let mut known: FxHashMap<IVec3, u8> = FxHashMap::default();
+    let mut known: FxHashMap<IVec3, Light> = FxHashMap::default();
     let mut shared = 0;
-    let mut note = |place: IVec3, light: u8| {
+    let mut note = |place: IVec3, light: Light| {
         let first = *known.entry(place).or_insert_with(|| {
             shared -= 1;
             light
@@ -213,7 +314,7 @@ fn equal_places_have_equal_light_whatever_draws_them() {
 }
 
 /// The light of all corners of triangles of a tile or chunk.
-fn lights_of(world: &World, drawn: MeshKey) -> Vec<u8> {
+fn lights_of(world: &World, drawn: MeshKey) -> Vec<Light> {
     let mesh = match drawn {
         MeshKey::Tile(tile) => world.tile_mesh(tile),
         MeshKey::Chunk(chunk) => world.chunk_mesh(chunk),
