@@ -240,7 +240,8 @@ mod tests {
             let origin = Vec3::new(unit(), unit(), unit()) * 90.0;
             let away = Vec3::new(unit(), unit(), unit()).normalize() * (20.0 + 15.0 * unit());
             let rotation = Quat::from_euler(EulerRot::YXZ, 3.0 * unit(), 3.0 * unit(), 3.0 * unit());
-            let place = Transform::from_translation(origin + away).looking_at(origin + Vec3::splat(unit()), Vec3::Y);
+            let place =
+                Transform::from_translation(origin + away).looking_at(origin + Vec3::splat(unit()), Vec3::Y);
             let camera = if turn % 3 == 0 { &orthographic } else { &perspective };
             let scale = if turn % 2 == 0 { 1.0 } else { 1.5 };
             let view = View { camera, place: place.into(), scale };
@@ -292,7 +293,10 @@ mod tests {
                     }
                     let pointer = frame.view.project(at).expect("ahead");
                     let found = frame.value(handle, pointer).expect("it is there");
-                    assert!((found - expected).abs() < 0.02 * (1.0 + frame.radius), "{handle:?} {found} {expected}");
+                    assert!(
+                        (found - expected).abs() < 0.02 * (1.0 + frame.radius),
+                        "{handle:?} {found} {expected}"
+                    );
                 }
             }
         });
@@ -302,7 +306,8 @@ mod tests {
     fn a_ring_from_its_edge_turns_with_its_near_side() {
         let camera = perspective();
         let place = Transform::from_xyz(0.0, 0.5, 20.0).looking_at(Vec3::ZERO, Vec3::Y);
-        let frame = Frame::new(View { camera: &camera, place: place.into(), scale: 1.0 }, Vec3::ZERO, Quat::IDENTITY);
+        let frame =
+            Frame::new(View { camera: &camera, place: place.into(), scale: 1.0 }, Vec3::ZERO, Quat::IDENTITY);
         let frame = frame.expect("it is ahead");
         let ring = Handle::Turn(Axis::Y);
         let value = |x: f32| frame.value(ring, frame.center + Vec2::new(x, 3.0)).expect("it is there");

@@ -1,7 +1,9 @@
 //! The handles of a placed brush: drawn over the view, and dragged with the left mouse button.
 
 use bevy::prelude::*;
-use bevy_egui::egui::{Align2, Color32, Context, CursorIcon, FontId, LayerId, Pos2, Rect, Stroke, Vec2 as Size};
+use bevy_egui::egui::{
+    Align2, Color32, Context, CursorIcon, FontId, LayerId, Pos2, Rect, Stroke, Vec2 as Size,
+};
 use bevy_egui::{EguiContext, PrimaryEguiContext};
 
 use super::handle_geometry::{Axis, Frame, Handle, View};
@@ -48,7 +50,10 @@ impl Drag {
         let hit = self.tool.placed?;
         if self.handle == Handle::Ground {
             let TerrainHit { terrain, position, .. } = terrains.raycast(view.ray(pointer)?, REACH)?;
-            return Some(BrushTool { placed: Some(TerrainHit { terrain, position, ..hit }), ..self.tool.clone() });
+            return Some(BrushTool {
+                placed: Some(TerrainHit { terrain, position, ..hit }),
+                ..self.tool.clone()
+            });
         }
         let frame = Frame::new(view, hit.position, self.tool.rotation(&hit))?;
         let to = frame.value(self.handle, pointer)?;
@@ -57,7 +62,8 @@ impl Drag {
 }
 
 /// The camera that draws the panel.
-type Eye = (&'static mut EguiContext, &'static Camera, &'static Transform, &'static GlobalTransform, Has<ChildOf>);
+type Eye =
+    (&'static mut EguiContext, &'static Camera, &'static Transform, &'static GlobalTransform, Has<ChildOf>);
 
 /// What the panel's camera sees, and its egui context.
 fn look<'a>(cameras: &'a mut Query<Eye, With<PrimaryEguiContext>>) -> Option<(Context, View<'a>)> {
@@ -204,7 +210,11 @@ fn paint(context: &Context, view: View, frame: &Frame, tool: &BrushTool, used: O
             }
         }
         if let Some(grip) = frame.grip(handle) {
-            widgets::note_in(context, &name(handle), Rect::from_center_size(on_screen(grip), Size::splat(8.0)));
+            widgets::note_in(
+                context,
+                &name(handle),
+                Rect::from_center_size(on_screen(grip), Size::splat(8.0)),
+            );
         }
     }
 }

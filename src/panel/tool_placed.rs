@@ -91,8 +91,7 @@ impl BrushTool {
         if axis == Axis::Y && self.align == ToolAlign::Upright {
             self.turn += degrees;
         } else {
-            let rotation =
-                Quat::from_axis_angle(axis.unit(), degrees.to_radians()) * self.rotation(&hit);
+            let rotation = Quat::from_axis_angle(axis.unit(), degrees.to_radians()) * self.rotation(&hit);
             hit.normal = (rotation * Vec3::Y).normalize_or(Vec3::Y);
             (self.align, self.placed) = (ToolAlign::Surface, Some(hit));
             // What is left about its axis, once that is where it should be.

@@ -121,7 +121,9 @@ impl Stage {
 
     fn click(&mut self, name: &str) {
         let at = self.middle(name);
-        for events in [vec![Event::PointerMoved(at)], vec![Screen::button(at, true)], vec![Screen::button(at, false)]] {
+        for events in
+            [vec![Event::PointerMoved(at)], vec![Screen::button(at, true)], vec![Screen::button(at, false)]]
+        {
             self.frame(events);
         }
         (0..2).for_each(|_| self.frame(Vec::new()));
@@ -158,11 +160,20 @@ fn a_placed_brush_is_dragged_applied_and_undone() {
     assert!(stage.placed().y > first.y + 1.0 && stage.placed().z == first.z, "{}", stage.placed());
     stage.drag("Turn about y", Vec2::new(30.0, 0.0));
     let turned = stage.tool();
-    assert!(turned.turn != 0.0 && turned.turn % 5.0 == 0.0 && turned.align == ToolAlign::Upright, "{}", turned.turn);
+    assert!(
+        turned.turn != 0.0 && turned.turn % 5.0 == 0.0 && turned.align == ToolAlign::Upright,
+        "{}",
+        turned.turn
+    );
     stage.drag("Turn about x", Vec2::new(20.0, 20.0));
     let tilted = stage.tool();
     assert_eq!(tilted.align, ToolAlign::Surface);
-    assert!(tilted.rotation(&tilted.placed.expect("placed")).angle_between(turned.rotation(&turned.placed.expect("placed"))) > 0.05);
+    assert!(
+        tilted
+            .rotation(&tilted.placed.expect("placed"))
+            .angle_between(turned.rotation(&turned.placed.expect("placed")))
+            > 0.05
+    );
     stage.drag("Scale along y", Vec2::new(0.0, -20.0));
     let scaled = stage.tool();
     assert!(scaled.half.y > 3.0 && scaled.half.x == 3.0 && scaled.half.z == 3.0, "{}", scaled.half);
@@ -175,7 +186,9 @@ fn a_placed_brush_is_dragged_applied_and_undone() {
     assert_eq!(world(&stage).undos, 1);
     stage.act(PanelAction::Undo);
     let terrain = stage.terrain;
-    stage.until(move |app| app.world().get::<Terrain>(terrain).is_some_and(|own| own.world().hash() == pristine));
+    stage.until(move |app| {
+        app.world().get::<Terrain>(terrain).is_some_and(|own| own.world().hash() == pristine)
+    });
     stage.act(PanelAction::ReleaseBrush);
     assert!(stage.tool().placed.is_none() && stage.place_of("Move along x").is_none());
 }
@@ -282,7 +295,9 @@ fn a_placed_brush_stays_when_another_level_is_there() {
     let built = stage.hash();
     stage.act(PanelAction::NewLevel);
     let terrain = stage.terrain;
-    stage.until(move |app| app.world().get::<Terrain>(terrain).is_some_and(|own| own.world().hash() == pristine));
+    stage.until(move |app| {
+        app.world().get::<Terrain>(terrain).is_some_and(|own| own.world().hash() == pristine)
+    });
     (0..5).for_each(|_| stage.frame(Vec::new()));
     assert_eq!(stage.placed(), place);
     stage.apply();
