@@ -142,14 +142,14 @@ pub(crate) use reach::reaches;
 pub use request::Brush;
 pub use roughness::Roughness;
 pub(crate) use rounding::Rounding;
+pub(crate) use sculpt_kernel::SculptKernel;
 #[cfg(feature = "cuda")]
 pub(crate) use sculpt_kernel::SculptOp;
-pub(crate) use sculpt_kernel::SculptKernel;
-pub(crate) use stencil::{FARTHEST, Stencil, is_moved};
 #[doc(hidden)]
 pub use shapes::AnyShape;
 pub use shapes::{BrushPath, Corridor, CustomShape, GridShape, MeshGrid, Shape, ShapeGrid};
 pub use stamp::Stamp;
+pub(crate) use stencil::{FARTHEST, Stencil, is_moved};
 
 use crate::lattice::ONE;
 

@@ -265,7 +265,7 @@ pub fn replay(
     level: Option<&BaseLevel>,
 ) -> Result<Terrain, StoreError> {
     let files = Folder::new(folder.as_ref());
-    let (_lock, contents) = read(&files)?;
+    let (_lock, contents) = read(&files, None)?;
     let ground = ground.into();
     let checkpoint = contents.choose_checkpoint();
     if checkpoint.as_ref().is_some_and(|own| own.metadata.ground != ground.hash()) {
