@@ -212,8 +212,7 @@ fn app(options: &Options, agents: usize) -> App {
     app.finish();
     app.cleanup();
 
-    let noise =
-        NoiseHeights { seed: 5, amplitude: 14.0, scale: 60.0, base: 20.0, ..NoiseHeights::default() };
+    let noise = NoiseHeights { seed: 5, amplitude: 14.0, scale: 60.0, base: 20.0, ..NoiseHeights::default() };
     let ground = Ground::from_noise(SIDE, SIDE, &noise).expect("valid parameters");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
     let mut rng = Rng::with_seed(2);
@@ -250,8 +249,7 @@ fn app(options: &Options, agents: usize) -> App {
         app.update();
         std::thread::sleep(Duration::from_millis(1));
         let tiles = app.world().get::<NavigationTiles>(navigation);
-        is_loading =
-            tiles.is_none_or(|tiles| tiles.is_empty() || tiles.is_loading() || tiles.is_building());
+        is_loading = tiles.is_none_or(|tiles| tiles.is_empty() || tiles.is_loading() || tiles.is_building());
     }
     for [at, to] in places {
         app.world_mut().spawn((

@@ -32,8 +32,7 @@ fn print(what: &str, count: usize, unit: &str, bytes: f64) {
 }
 
 fn hills() -> Ground {
-    let noise =
-        NoiseHeights { seed: 5, amplitude: 14.0, scale: 60.0, base: 20.0, ..NoiseHeights::default() };
+    let noise = NoiseHeights { seed: 5, amplitude: 14.0, scale: 60.0, base: 20.0, ..NoiseHeights::default() };
     Ground::from_noise(SIDE, SIDE, &noise).expect("valid parameters")
 }
 
@@ -83,8 +82,14 @@ fn plants() {
 
 fn paths(name: &str, ground: Ground, works: usize) {
     let terrain = terrain(ground, works);
-    let agent =
-        WalkSettings { radius: 0.4, height: 1.8, step: 0.4, slope: 1.0, precision: 0.3, ..Default::default() };
+    let agent = WalkSettings {
+        radius: 0.4,
+        height: 1.8,
+        step: 0.4,
+        slope: 1.0,
+        precision: 0.3,
+        ..Default::default()
+    };
     let walker = Walker::new(&agent).expect("valid settings");
     let world = terrain.world();
     let tiles: Vec<NavTilePos> = NavTilePos::all(world).collect();

@@ -448,7 +448,8 @@ fn an_island_has_another_mesh_only_if_its_polygons_are_others() {
     let (mut app, [terrain, _, navigation]) = app(false, AGENT);
     let meshes = |app: &mut App| -> Vec<(NavTilePos, NavPolygons, Arc<ValidNavigationMesh3d>)> {
         let islands = tiles(app.world(), navigation).islands();
-        let islands: Vec<_> = islands.map(|(pos, island, polygons)| (pos, island, polygons.clone())).collect();
+        let islands: Vec<_> =
+            islands.map(|(pos, island, polygons)| (pos, island, polygons.clone())).collect();
         let all = app.world().resource::<Assets<NavMesh3d>>();
         let mesh = |island: Entity| {
             let handle = app.world().get::<NavMeshHandle3d>(island).expect("an island");
