@@ -279,7 +279,7 @@ mod tests {
         in_frames(|frame| {
             for handle in Handle::all().filter(|handle| frame.is_shown(*handle)) {
                 let axis = frame.axis(handle);
-                for part in [-1.1, -0.4, 0.3, 1.2] {
+                for part in [-1.1_f32, -0.4, 0.3, 1.2] {
                     let (at, expected) = match handle {
                         Handle::Ground => (frame.origin, 0.0),
                         Handle::Turn(axis) => {
