@@ -36,11 +36,11 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     album.compare("tunnel", &studio.picture());
     studio.app.world_mut().despawn(lamp);
     studio.sky(900.0);
-    mouth(studio, album);
+    shoot_mouth(studio, album);
 }
 
 /// A tunnel that runs level into a hillside, and a trench with upright walls in front of it.
-fn mouth(studio: &mut Studio, album: &mut Album) {
+fn shoot_mouth(studio: &mut Studio, album: &mut Album) {
     let hillside = |x: i32, z: i32| {
         let along = (f64::from(x) - 40.0 + 2.0 * (f64::from(z) / 7.0).sin()) / 24.0;
         20.0 + 22.0 * along.clamp(0.0, 1.0)
