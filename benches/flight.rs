@@ -122,7 +122,7 @@ impl Flight {
     fn fly(&mut self, length: Duration, is_digging: bool) {
         println!("\n{}", if is_digging { "with 20 digs a second" } else { "without edits" });
         let (first, commits) = (self.time, self.app.world().resource::<BurrowFigures>().commits);
-        let (mut main_thread, mut most_waiting, mut late) = (Vec::new(), 0, 0);
+        let (mut main_thread, mut max_waiting, mut late) = (Vec::new(), 0, 0);
         let (mut tenth, mut next_dig, mut steady) = (0, self.time, Vec::new());
         while self.time < first + length {
             let start = Instant::now();
@@ -134,7 +134,7 @@ impl Flight {
             self.app.update();
             main_thread.push(self.app.world().resource::<BurrowFigures>().main_thread);
             let waiting = self.app.world().get::<ShownLevels>(self.terrain).map_or(0, |shown| shown.waiting);
-            most_waiting = most_waiting.max(waiting);
+            max_waiting = max_waiting.max(waiting);
             if (self.time - first).as_secs_f64() >= length.as_secs_f64() / 10.0 * f64::from(tenth) {
                 let bytes = self.bytes();
                 let Bytes { nodes, ground, edits, tiles, chunks } = bytes;
@@ -154,7 +154,7 @@ impl Flight {
         let at = |share: f64| main_thread[((main_thread.len() - 1) as f64 * share) as usize];
         let figures = self.app.world().resource::<BurrowFigures>();
         println!(
-            "{} frames, {late} late, {} commits; main thread: p50 {:.0?}, p99 {:.0?}, most {:.0?}; at most {most_waiting} nodes waited",
+            "{} frames, {late} late, {} commits; main thread: p50 {:.0?}, p99 {:.0?}, most {:.0?}; at most {max_waiting} nodes waited",
             main_thread.len(),
             figures.commits - commits,
             at(0.5),

@@ -425,7 +425,7 @@ pub mod prelude {
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{
-        BurrowLevel, ClosedBecause, SaveNow, SaveSystems, SavedWorld, StartLevel, StoreTroubleFound,
+        BurrowLevel, ClosedBecause, SaveNow, SaveSystems, SavedWorld, StartLevel, StoreWarningFound,
         WorldClosed, WorldOpened, WorldSaved, WorldStore,
     };
     pub use crate::terrain::{

@@ -288,7 +288,7 @@ fn parts_that_do_not_fit_are_errors_and_change_nothing() {
     };
     assert!(matches!(
         terrain.apply_one(Order::parts(twice, None)).outcome,
-        Err(Rejection::Parts(PartsError::Order(_)))
+        Err(Rejection::Parts(PartsError::Unsorted(_)))
     ));
     let far = BrickPos(IVec3::new(400, 1, 3));
     let outside = Patch { bricks: vec![(far, parts.change.bricks[0].1.clone())], ..Patch::default() };

@@ -252,7 +252,7 @@ fn whatever_a_game_does_its_log_replays() {
             }
         }
         let (own, other) = (terrain.parts(), replayed.parts());
-        assert_eq!((own.revision, &own.rules, &own.loose), (other.revision, &other.rules, &other.loose));
+        assert_eq!((own.revision, &own.edit_settings), (other.revision, &other.edit_settings));
         assert_eq!(own.change.fields, other.change.fields, "world {index}");
         assert_eq!(own.change.next_field, other.change.next_field, "world {index}");
         let stored: BTreeMap<BrickPos, u64> = own

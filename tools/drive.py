@@ -610,6 +610,42 @@ def sculpt(stage):
         raise Failed("a stamp takes a torus")
     stage.say("each shape works, and a torus can't be a stamp")
 
+    # A placed brush is moved by its handles, and applied and released by keys.
+    press_key("2", r"^tool operation=Add ")
+    stage.move(*middle)
+    before = hash_now()
+    at = press_key("g", r"^tool .*placed=(\[.*\])").group(1)
+    for handle, (right, down) in {"Move along x": (40, 10), "Move along y": (0, -30), "Scale along x": (20, 5)}.items():
+        stage.rest()
+        stage.rest()
+        since = stage.mark()
+        x, y = stage.middle(handle)
+        stage.drag((x, y), (x + right, y + down), steps=2)
+        line = stage.wait(r"^tool .*radius=([\d.]+) .*placed=(\[.*\])", since)
+        stage.say(f"{handle}: {line.group(0)}")
+    stage.rest()
+    if stage.last(r"^tool .*placed=(\[.*\])").group(1) == at:
+        raise Failed("the handles have moved nothing")
+    if hash_now() != before:
+        raise Failed("dragging a handle changes the ground")
+    since = stage.mark()
+    stage.click(middle[0] - 150, middle[1] + 60)
+    stage.rest()
+    stage.rest()
+    if any(line.startswith("stroke ") for line in stage.lines()[since:]):
+        raise Failed("a click beside a placed brush changes the ground")
+    picture(stage, "placed")
+    if press_key("Return", strokes).group(2) == before:
+        raise Failed("applying a placed brush changes nothing")
+    settle()
+    since = stage.mark()
+    stage.chord("ctrl", "z")
+    if stage.wait(r"^undo .*hash=(\w+)", since).group(1) != before:
+        raise Failed("a placed brush is more than one step of undo")
+    press_key("End", r"^tool .*placed=\[")
+    press_key("Escape", r"^tool .*placed=no")
+    stage.say("a brush is placed, dragged by its handles, applied, undone, moved to the ground and released")
+
     # A road is a path: clicks are points, Enter makes one edit of them.
     press_key("equal", r"^tool operation=Road ")
     for right in (-60, 0, 60):

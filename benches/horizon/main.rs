@@ -254,7 +254,7 @@ fn flight(mut terrain: Terrain, summit: Vec3) {
     let known = Arc::new(KnownNodes::default());
     let (drawn, _) = terrain.world().draw_cut(cut_for(terrain.world(), &LodSettings::default(), eye(summit)));
     terrain.set_drawn_cut(Some(Arc::new(drawn)));
-    let (mut made, mut digs, mut cuts, mut most_nodes) = (0, Vec::new(), Vec::new(), 0);
+    let (mut made, mut digs, mut cuts, mut max_nodes) = (0, Vec::new(), Vec::new(), 0);
     let begin = Instant::now();
     let mut memory = Vec::new();
     for frame in 0..FRAMES {
@@ -280,7 +280,7 @@ fn flight(mut terrain: Terrain, summit: Vec3) {
         let commit = terrain.begin_cut(choose).expect("a cut is drawn").run();
         cuts.push(start.elapsed());
         made += commit.meshes.nodes.iter().filter(|update| update.mesh.is_some()).count();
-        most_nodes = most_nodes.max(commit.drawn_cut().map_or(0, |drawn| drawn.cut().nodes().count()));
+        max_nodes = max_nodes.max(commit.drawn_cut().map_or(0, |drawn| drawn.cut().nodes().count()));
         terrain.commit(commit).expect("the one under way");
         if frame % 600 == 1 {
             memory.push(terrain.memory().total() - terrain.memory().edits());
@@ -292,7 +292,7 @@ fn flight(mut terrain: Terrain, summit: Vec3) {
     }
     let at = |times: &[Duration], share: f64| times[((times.len() - 1) as f64 * share) as usize];
     println!(
-        "\nflight of {} s in {took:.1?}: {made} nodes made, at most {most_nodes} drawn; a change of levels p50 {:.2?}, p99 {:.2?}; \
+        "\nflight of {} s in {took:.1?}: {made} nodes made, at most {max_nodes} drawn; a change of levels p50 {:.2?}, p99 {:.2?}; \
          a dig p50 {:.2?}, p99 {:.2?}",
         FRAMES / 60,
         at(&cuts, 0.5),

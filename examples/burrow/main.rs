@@ -28,7 +28,7 @@
 //! | exit code | when |
 //! | --- | --- |
 //! | 0 | all is well |
-//! | 1 | the world is damaged, or was; `troubles` lists the damage |
+//! | 1 | the world is damaged, or was; `warnings` lists the damage |
 //! | 2 | it could not be done: the reason goes to stderr |
 
 mod ground;
@@ -193,7 +193,7 @@ fn info(world: &Path) -> Result<(Value, bool), String> {
         "is_log_whole": info.is_log_whole,
         "game": game,
         "level": info.level.map(|level| level.label),
-        "troubles": info.damage,
+        "warnings": info.damage,
     });
     Ok((answer, info.damage.is_empty()))
 }
@@ -202,9 +202,9 @@ fn check(world: &Path, args: &GroundArgs) -> Result<(Value, bool), String> {
     let Some(ground) = args.build()? else { return info(world) };
     let level = args.level(&ground)?;
     let check = store::check(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
-    let is_sound = check.troubles.is_empty() && check.replays != Some(false);
+    let is_sound = check.warnings.is_empty() && check.replays != Some(false);
     let mut answer = state(check.terrain.world());
-    answer.insert("troubles".into(), check.troubles.into());
+    answer.insert("warnings".into(), check.warnings.into());
     answer.insert("replays".into(), check.replays.into());
     Ok((Value::Object(answer), is_sound))
 }
@@ -227,10 +227,10 @@ fn opened(
     })?;
     work(&mut store)?;
     store.checkpoint().map_err(|why| why.to_string())?;
-    let troubles: Vec<String> =
-        opened.troubles.iter().chain(&store.take_troubles()).map(ToString::to_string).collect();
-    let (mut answer, is_sound) = (state(opened.terrain.world()), troubles.is_empty());
-    answer.insert("troubles".into(), troubles.into());
+    let warnings: Vec<String> =
+        opened.warnings.iter().chain(&store.take_warnings()).map(ToString::to_string).collect();
+    let (mut answer, is_sound) = (state(opened.terrain.world()), warnings.is_empty());
+    answer.insert("warnings".into(), warnings.into());
     answer.insert("is_log_whole".into(), opened.is_log_whole.into());
     Ok((Value::Object(answer), is_sound))
 }
@@ -246,8 +246,8 @@ fn export(world: &Path, file: &Path, args: &GroundArgs) -> Result<(Value, bool),
     })?;
     let mut answer = state(read.terrain.world());
     answer.insert("bytes".into(), bytes.len().into());
-    let is_sound = read.troubles.is_empty();
-    answer.insert("troubles".into(), read.troubles.into());
+    let is_sound = read.warnings.is_empty();
+    answer.insert("warnings".into(), read.warnings.into());
     Ok((Value::Object(answer), is_sound))
 }
 

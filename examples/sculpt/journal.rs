@@ -80,12 +80,13 @@ fn print_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>
 fn print_tool(tool: Res<BrushTool>) {
     if tool.is_changed() {
         println!(
-            "tool operation={:?} shape={:?} radius={:.2} material={} stamp={:?}",
+            "tool operation={:?} shape={:?} radius={:.2} material={} stamp={:?} placed={}",
             tool.operation,
             tool.shape,
             tool.radius,
             tool.material,
-            tool.stamp.name.as_deref().unwrap_or_default()
+            tool.stamp.name.as_deref().unwrap_or_default(),
+            tool.placed.map_or("no".into(), |hit| format!("{:.2}", hit.position))
         );
     }
 }

@@ -57,7 +57,7 @@ const OPERATION_KEYS: [(KeyCode, &str); 17] = [
 ];
 
 /// Keys of the panel's buttons.
-const BUTTON_KEYS: [(&str, &str); 7] = [
+const BUTTON_KEYS: [(&str, &str); 11] = [
     ("New", "Ctrl+N"),
     ("Open", "Ctrl+O"),
     ("Save", "Ctrl+S"),
@@ -65,6 +65,10 @@ const BUTTON_KEYS: [(&str, &str); 7] = [
     ("Undo", "Ctrl+Z"),
     ("Redo", "Ctrl+Y"),
     ("Save picture", "F12"),
+    ("Place", "G"),
+    ("Apply", "Enter"),
+    ("Snap", "End"),
+    ("Release", "Esc"),
 ];
 
 /// Tells the panel the keys that it shows.
@@ -157,7 +161,17 @@ fn keys(
         actions.write(PanelAction::SavePicture);
     }
     if keys.just_pressed(KeyCode::Escape) {
-        actions.write(PanelAction::Quit);
+        let is_placed = tool.placed.is_some();
+        actions.write(if is_placed { PanelAction::ReleaseBrush } else { PanelAction::Quit });
+    }
+    if keys.just_pressed(KeyCode::KeyG) {
+        actions.write(PanelAction::PlaceBrush);
+    }
+    if keys.any_just_pressed([KeyCode::Enter, KeyCode::NumpadEnter]) {
+        actions.write(PanelAction::ApplyBrush);
+    }
+    if keys.just_pressed(KeyCode::End) {
+        actions.write(PanelAction::SnapBrush);
     }
 }
 
@@ -192,7 +206,7 @@ fn command(
     }
 }
 
-/// `Ctrl+C` copies what lies in the brush under the pointer; with Shift, into a file too.
+/// `Ctrl+C` copies what lies in the brush, placed or under the pointer; with Shift, into a file too.
 fn copy(
     mut presses: MessageReader<KeyboardInput>,
     keys: Res<ButtonInput<KeyCode>>,
@@ -208,7 +222,7 @@ fn copy(
     if !presses.read().any(is_pressed) || !is_due {
         return;
     }
-    let Some(hit) = aim.0 else { return };
+    let Some(hit) = tool.placed.or(aim.0) else { return };
     let Ok((terrain, place)) = terrains.get(hit.terrain) else { return };
     let copied = tool.copy(terrain, place, &hit).map_err(|why| why.to_string());
     let is_kept = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);

@@ -17,6 +17,7 @@
 //! | wheel, `[`, `]` | size of the brush |
 //! | `1` to `9`, `0`, `-`, `=`, `P`, `R`, `X`, `U`, `V`, or `Tab` | operations |
 //! | click, `Enter`, `Backspace` with the shape *Path* | sets a point, makes one edit of all points, takes the last one back |
+//! | `G`, `Enter`, `End`, `Esc` | places the brush, with handles to move, turn and scale it; applies it; moves it to the ground; takes it back |
 //! | `Ctrl+C`, `Ctrl+Shift+C` | copies what lies in the brush, to paste it; writes it to a `.prefab` file too |
 //! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
 //! | `Ctrl+N`, `Ctrl+O`, `Ctrl+S`, `Ctrl+Shift+S` | new, open, save, save as |

@@ -173,7 +173,7 @@ fn stroke(
         tool.material = hit.material.0;
         return;
     }
-    if *modifier == Modifier::Line && !is_first {
+    if tool.placed.is_some() || *modifier == Modifier::Line && !is_first {
         return;
     }
     if tool.fitting_shape() == ToolShape::Path {
@@ -204,7 +204,8 @@ fn line(from: Option<Vec3>, to: Vec3, apart: f32) -> impl Iterator<Item = Vec3> 
     (1..steps).map(move |step| start.lerp(to, step as f32 / steps as f32)).chain([to])
 }
 
-/// Shows the shape, and on the ground its outline and where the falloff ends; of a stamp, its image.
+/// Shows the shape, and on the ground its outline and where the falloff ends; of a stamp, its image. The panel shows the
+/// shape of a placed brush.
 fn preview(
     aim: Res<Aim>,
     tool: Res<BrushTool>,
@@ -212,14 +213,17 @@ fn preview(
     terrains: Terrains,
     mut gizmos: Gizmos,
 ) {
-    let Some(hit) = &aim.0 else { return };
-    let tool = modified(&tool, *modifier);
-    let color = match *modifier {
+    let Some(hit) = &tool.placed.or(aim.0) else { return };
+    let modifier = if tool.placed.is_some() { Modifier::None } else { *modifier };
+    let tool = modified(&tool, modifier);
+    let color = match modifier {
         Modifier::Invert => Color::srgb(1.0, 0.45, 0.35),
         Modifier::Smooth => Color::srgb(0.45, 0.75, 1.0),
         _ => Color::srgb(1.0, 0.80, 0.30),
     };
-    draw_shape(&mut gizmos, &tool.shape_at(hit), color.with_alpha(0.5));
+    if tool.placed.is_none() {
+        draw_shape(&mut gizmos, &tool.shape_at(hit), color.with_alpha(0.5));
+    }
     if tool.fitting_shape() == ToolShape::Path {
         gizmos.linestrip(tool.points.iter().copied().chain([hit.position]), color);
         for point in &tool.points {
@@ -323,6 +327,11 @@ mod tests {
         assert!(first.len() > 3 && first.iter().all(|stroke| *stroke == first[0]), "{first:?}");
         let second = press(&mut app, 3);
         assert_ne!(first[0], second[0]);
+        // A brush that was placed stays where it is.
+        let aim = app.world().resource::<Aim>().0;
+        app.world_mut().resource_mut::<BrushTool>().placed = aim;
+        assert!(press(&mut app, 5).is_empty());
+        app.world_mut().resource_mut::<BrushTool>().placed = None;
         // Picking a material changes no ground.
         app.insert_resource(Modifier::Pick);
         assert!(press(&mut app, 2).is_empty());

@@ -24,7 +24,7 @@ pub fn open(folder: &Path, options: &Options, untouched: Terrain) -> Result<(Sav
     let (store, terrain) = if Store::is_in(folder) {
         let ground = noise_ground(options.side)?;
         let (store, opened) = Store::open(folder, ground, StoreOptions::default())?;
-        opened.troubles.iter().for_each(|trouble| complain(format_args!("server: {trouble}")));
+        opened.warnings.iter().for_each(|warning| complain(format_args!("server: {warning}")));
         (store, opened.terrain)
     } else {
         let mut terrain = untouched;
@@ -62,15 +62,15 @@ fn save(mut saving: ResMut<Saving>, mut terrains: Query<&mut Terrain>) {
     tell(&mut saving);
 }
 
-/// Prints the durable revision if it changed, and any trouble.
+/// Prints the durable revision if it changed, and any warning.
 fn tell(saving: &mut Saving) {
     let durable = saving.store.durable();
     if saving.durable != Some(durable) {
         saving.durable = Some(durable);
         say(format_args!(r#"{{"durable":{durable}}}"#));
     }
-    let troubles = saving.store.take_troubles();
-    troubles.iter().for_each(|trouble| complain(format_args!("server: {trouble}")));
+    let warnings = saving.store.take_warnings();
+    warnings.iter().for_each(|warning| complain(format_args!("server: {warning}")));
 }
 
 /// Makes the last commits durable.

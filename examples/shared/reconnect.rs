@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy_burrow::net::KickReason;
-use bevy_burrow::together::{SharingTrouble, SharingTroubleFound};
+use bevy_burrow::together::{SharingError, SharingErrorFound};
 use bevy_replicon::prelude::ClientState;
 
 /// Makes a connection. A token is good for one, so each try asks for a new one.
@@ -43,9 +43,9 @@ impl Plugin for ReconnectPlugin {
 }
 
 /// Stops reconnecting once the player has connected from another device, as a connection from here would end that one.
-fn stop(mut troubles: MessageReader<SharingTroubleFound>, mut commands: Commands) {
-    let plays_elsewhere = SharingTrouble::Kicked(KickReason::ConnectedAgain);
-    if troubles.read().any(|found| found.trouble == plays_elsewhere) {
+fn stop(mut errors: MessageReader<SharingErrorFound>, mut commands: Commands) {
+    let plays_elsewhere = SharingError::Kicked(KickReason::ConnectedAgain);
+    if errors.read().any(|found| found.error == plays_elsewhere) {
         commands.remove_resource::<StayConnected>();
     }
 }

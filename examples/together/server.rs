@@ -79,11 +79,11 @@ impl Dedicated {
             self.app.world_mut().resource_mut::<GroundServer>().with(|server| {
                 let (figures, hash) = (server.figures(), server.terrain().world().hash());
                 println!(
-                    "{{\"number\":{},\"hash\":\"{hash:#018x}\",\"durable\":{},\"players\":{},\"order_bytes\":{},\"bulk_bytes\":{},\"repairs\":{}}}",
+                    "{{\"number\":{},\"hash\":\"{hash:#018x}\",\"durable\":{},\"players\":{},\"main_bytes\":{},\"bulk_bytes\":{},\"repairs\":{}}}",
                     server.applied(),
                     server.durable(),
                     server.clients().count(),
-                    figures.order_bytes,
+                    figures.main_bytes,
                     figures.bulk_bytes,
                     figures.repairs
                 );

@@ -30,7 +30,7 @@ impl Default for Blend {
 }
 
 /// The maximum falloff, in voxels.
-const MOST: i32 = 64;
+const MAX: i32 = 64;
 
 /// A quantised [`Blend`]: strength in 1/256, falloff in 1/256 voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -44,13 +44,13 @@ pub(super) struct QuantizedBlend {
 impl QuantizedBlend {
     pub fn quantize(blend: &Blend) -> Result<Self, BrushError> {
         let strength = in_range("strength", blend.strength, 0.0, 1.0)?;
-        let falloff = in_range("falloff", blend.falloff, 0.0, MOST as f32)?;
+        let falloff = in_range("falloff", blend.falloff, 0.0, MAX as f32)?;
         Ok(Self { strength, falloff, material: blend.material })
     }
 
     pub fn check(self) -> Result<(), BrushError> {
         in_range("strength", voxels(self.strength), 0.0, 1.0)?;
-        in_range("falloff", voxels(self.falloff), 0.0, MOST as f32)?;
+        in_range("falloff", voxels(self.falloff), 0.0, MAX as f32)?;
         Ok(())
     }
 

@@ -82,9 +82,9 @@ fn check_together(
     match operation {
         Operation::Road if shape.road().is_none() => Err(BrushError::NoCorridor),
         Operation::Fill | Operation::Carve
-            if blend.is_some_and(|blend| blend.falloff > rounding::MOST * ONE) =>
+            if blend.is_some_and(|blend| blend.falloff > rounding::MAX * ONE) =>
         {
-            let most = rounding::MOST as f32;
+            let most = rounding::MAX as f32;
             let value = blend.map_or(0.0, |blend| voxels(blend.falloff));
             Err(BrushError::OutOfBounds { what: "falloff", value, least: 0.0, most })
         }
@@ -263,24 +263,24 @@ impl Edit {
     /// pieces.
     pub(crate) fn misses(&self, samples: LatticeBox) -> bool {
         let Some(samples) = self.reach().intersection(samples) else { return true };
-        self.most_bricks().is_some() && self.evaluator().is_out_of_reach(samples)
+        self.max_bricks().is_some() && self.evaluator().is_out_of_reach(samples)
     }
 
     /// Distance outside the shape up to which samples may change.
     fn band(&self) -> i32 {
         // Two more units for the rounding of the distance.
-        self.own_band() + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2
+        self.shape_band() + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2
     }
 
     /// Distance outside the rough shape up to which samples may change.
-    pub(crate) fn own_band(&self) -> i32 {
+    pub(crate) fn shape_band(&self) -> i32 {
         let rounding = self.blend.and_then(|blend| self.operation.rounding(blend.falloff));
         rounding.map_or(BAND, |rounding| rounding.radius.max(BAND))
     }
 
     /// At least the number of bricks that the edit may change, where that is known to be much less than the bricks in
     /// its [`reach`](Self::reach).
-    pub(crate) fn most_bricks(&self) -> Option<u64> {
+    pub(crate) fn max_bricks(&self) -> Option<u64> {
         // Every point of a brick that is reached lies within its diagonal.
         let volume = self.shape.volume_within(self.band() + BRICK_DIAGONAL)?;
         Some((volume / f64::from(8 * ONE).powi(3)).ceil() as u64)
@@ -288,7 +288,7 @@ impl Edit {
 
     /// The edit's signed distance function, ready to evaluate.
     pub fn evaluator(&self) -> Evaluator {
-        Evaluator::new(&self.shape, self.roughness, self.own_band())
+        Evaluator::new(&self.shape, self.roughness, self.shape_band())
     }
 }
 

@@ -119,6 +119,7 @@ mod sculpt_kernel;
 #[doc(hidden)]
 pub mod shapes;
 mod stamp;
+mod stencil;
 mod voxel_count;
 
 pub use blend::Blend;
@@ -141,13 +142,14 @@ pub(crate) use reach::reaches;
 pub use request::Brush;
 pub use roughness::Roughness;
 pub(crate) use rounding::Rounding;
+pub(crate) use sculpt_kernel::SculptKernel;
 #[cfg(feature = "cuda")]
 pub(crate) use sculpt_kernel::SculptOp;
-pub(crate) use sculpt_kernel::{FARTHEST, SculptKernel, Stencil, is_moved};
 #[doc(hidden)]
 pub use shapes::AnyShape;
 pub use shapes::{BrushPath, Corridor, CustomShape, GridShape, MeshGrid, Shape, ShapeGrid};
 pub use stamp::Stamp;
+pub(crate) use stencil::{FARTHEST, Stencil, is_moved};
 
 use crate::lattice::ONE;
 

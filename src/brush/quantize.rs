@@ -76,7 +76,7 @@ fn finite(what: &'static str, value: f32) -> Result<f32, BrushError> {
 }
 
 /// The largest coordinate along each axis, in voxels.
-const MOST: [i32; 3] = [REACH, LIMIT, REACH];
+const MAX: [i32; 3] = [REACH, LIMIT, REACH];
 
 /// Rounds a length of at most a few times [`REACH`] voxels.
 fn round(length: f32) -> i32 {
@@ -84,7 +84,7 @@ fn round(length: f32) -> i32 {
 }
 
 pub(super) fn point(what: &'static str, at: Vec3) -> Result<[i32; 3], BrushError> {
-    for (value, most) in at.to_array().into_iter().zip(MOST) {
+    for (value, most) in at.to_array().into_iter().zip(MAX) {
         if finite(what, value)?.abs() > most as f32 {
             return Err(BrushError::OutOfRange { what, value, most: most as f32 });
         }
@@ -142,7 +142,7 @@ pub(super) fn restored_point(at: [i32; 3]) -> Vec3 {
 }
 
 pub(super) fn check_point(what: &'static str, at: [i32; 3]) -> Result<(), BrushError> {
-    match at.into_iter().zip(MOST).find(|(v, most)| v.unsigned_abs() > (most * ONE) as u32) {
+    match at.into_iter().zip(MAX).find(|(v, most)| v.unsigned_abs() > (most * ONE) as u32) {
         Some((v, most)) => Err(BrushError::OutOfRange { what, value: voxels(v), most: most as f32 }),
         None => Ok(()),
     }

@@ -13,7 +13,7 @@
 use super::{BAND, DEPTH};
 
 /// The maximum radius, in voxels.
-pub(super) const MOST: i32 = 16;
+pub(super) const MAX: i32 = 16;
 
 /// A union or a subtraction with a rounded edge. Lengths are in 1/256 voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +107,7 @@ mod tests {
 
         #[test]
         fn a_union_never_takes_away_and_a_dig_never_adds_nor_do_they_reach_beyond_the_radius(
-            before in -9000..9000i32, outside in -9000..9000i32, radius in 0..=MOST * ONE, surface in 0..=MOST * ONE,
+            before in -9000..9000i32, outside in -9000..9000i32, radius in 0..=MAX * ONE, surface in 0..=MAX * ONE,
         ) {
             for is_dig in [true, false] {
                 let rounding = Rounding { radius, is_dig };
@@ -122,7 +122,7 @@ mod tests {
         }
 
         #[test]
-        fn nothing_jumps_where_the_rounding_begins(near in 0..MOST * ONE, radius in ONE..=MOST * ONE) {
+        fn nothing_jumps_where_the_rounding_begins(near in 0..MAX * ONE, radius in ONE..=MAX * ONE) {
             let rounding = Rounding { radius, is_dig: false };
             let near = near.min(radius);
             // At the radius from one of both, it is as without.

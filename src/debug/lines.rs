@@ -17,9 +17,9 @@ pub struct LineBuffer {
 }
 
 impl LineBuffer {
-    /// A buffer for at most `most_lines` lines.
-    pub fn new(most_lines: usize) -> Self {
-        Self { layers: Vec::new(), room: most_lines }
+    /// A buffer for at most `max_lines` lines.
+    pub fn new(max_lines: usize) -> Self {
+        Self { layers: Vec::new(), room: max_lines }
     }
 
     /// Sets the width of the following lines, in pixels.

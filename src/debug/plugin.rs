@@ -77,7 +77,7 @@ fn note_dirty(
         moves.clear();
         return;
     }
-    let most = debug.most_lines / BOX_LINES;
+    let most = debug.max_lines / BOX_LINES;
     let edited = receipts.read().map(|applied| {
         let bounds = applied.receipt.outcome.as_ref().ok().and_then(|applied| applied.bounds);
         (applied.terrain, bounds)
@@ -185,7 +185,7 @@ fn draw(
                 }
             }
             let fresh = fresh_bricks(&dirty, entity, &debug, now);
-            let mut out = LineBuffer::new(debug.most_lines);
+            let mut out = LineBuffer::new(debug.max_lines);
             views::draw(view, terrain, place, if view == DebugView::Dirty { &fresh } else { &[] }, &mut out);
             own.into_iter().for_each(|old| commands.entity(old).try_despawn());
             let layers = out.finish();

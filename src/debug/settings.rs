@@ -36,7 +36,7 @@ pub struct BurrowDebug {
     /// How far normals, wires and walkable ground reach, in metres.
     pub near: f32,
     /// The maximum number of lines of a view of one terrain.
-    pub most_lines: usize,
+    pub max_lines: usize,
     /// How long dirty bricks are shown, in seconds.
     pub fade: f32,
 }
@@ -60,7 +60,7 @@ impl Default for BurrowDebug {
             focus: None,
             radius: 96.0,
             near: 20.0,
-            most_lines: 40_000,
+            max_lines: 40_000,
             fade: 1.5,
         }
     }

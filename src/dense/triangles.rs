@@ -68,7 +68,7 @@ fn step(code: usize) -> Step {
 }
 
 /// The most triangle corners of a cell.
-const MOST: usize = 15;
+const MAX_INDICES: usize = 15;
 /// Triangle corners that are written for every cell, as few cells have more.
 const USUAL: usize = 9;
 
@@ -83,11 +83,11 @@ pub(super) fn mesh(cells: &Cells, indices: &mut Vec<u32>) {
         if codes.is_empty() {
             continue;
         }
-        // The last cell may write up to MOST surplus indices.
-        if indices.len() < at + (codes.len() + 1) * MOST {
+        // The last cell may write up to MAX_INDICES surplus indices.
+        if indices.len() < at + (codes.len() + 1) * MAX_INDICES {
             let count =
                 codes.iter().map(|&code| usize::from(steps[usize::from(code & 511)].count)).sum::<usize>();
-            let needed = at + count + MOST;
+            let needed = at + count + MAX_INDICES;
             if indices.len() < needed {
                 indices.resize(needed, 0);
             }
@@ -108,7 +108,7 @@ fn mesh_layer(steps: &[Step; 512], codes: &[u16], mut counters: Counters, indice
             numbers[axis * 4..axis * 4 + 4].copy_from_slice(counter.as_array());
             *counter += u32x4::new(step.advance[axis]);
         }
-        let room = &mut indices[at..at + MOST];
+        let room = &mut indices[at..at + MAX_INDICES];
         for (index, &corner) in room[..USUAL].iter_mut().zip(&step.corners) {
             *index = numbers[usize::from(corner)];
         }

@@ -22,7 +22,7 @@ pub(super) fn batches(edits: &[PreparedEdit], most: u64) -> Vec<Range<usize>> {
         if edit.reach.is_none() {
             continue;
         }
-        let own_bricks = edit.most_bricks;
+        let own_bricks = edit.max_bricks;
         bricks += own_bricks;
         let reads_changes = || {
             edit.reads().is_some_and(|around| {

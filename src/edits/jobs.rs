@@ -151,7 +151,7 @@ mod tests {
         }
         assert!((2000..30_000).contains(&jobs.len()), "{}", jobs.len());
         let around = BrickPos::range(own[0].reach.expect("in the world")).volume();
-        assert!(edit.most_bricks().is_some_and(|most| most >= jobs.len() as u64 && most < around / 20));
+        assert!(edit.max_bricks().is_some_and(|most| most >= jobs.len() as u64 && most < around / 20));
     }
 
     #[test]

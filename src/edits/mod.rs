@@ -37,8 +37,8 @@ pub(crate) use effect::{DraftedBrick, EditEffect, MergedBricks, Overlay};
 pub(crate) use jobs::Job;
 pub(crate) use prepared::PreparedEdits;
 #[cfg(feature = "net")]
-pub(crate) use prepared_edit::most_read_around;
-pub(crate) use prepared_edit::{EDIT_WORK, edit_work, most_bricks, reach};
+pub(crate) use prepared_edit::max_read_around;
+pub(crate) use prepared_edit::{EDIT_WORK, edit_work, max_bricks, reach};
 pub(crate) use removal::take_out;
 pub(crate) use reset::{ResetBrick, edited_within, reset};
 pub(crate) use restore::count_replaced;

@@ -15,7 +15,7 @@ pub(crate) struct PreparedEdit {
     /// The part of the edit's reach that lies in the world.
     pub reach: Option<LatticeBox>,
     /// At least the number of bricks that it may change.
-    pub most_bricks: u64,
+    pub max_bricks: u64,
     pub operation: Kind,
     pub evaluator: Evaluator,
     pub sculptor: Option<SculptKernel>,
@@ -28,7 +28,7 @@ impl PreparedEdit {
     pub fn new(grid: ChunkGrid, edit: &Edit, rules: Option<&DiggingRules>) -> Self {
         let mut own = Self {
             reach: reach(grid, edit),
-            most_bricks: most_bricks(grid, edit).unwrap_or(0),
+            max_bricks: max_bricks(grid, edit).unwrap_or(0),
             operation: edit.kind(),
             evaluator: edit.evaluator(),
             sculptor: edit.sculptor(),
@@ -81,7 +81,7 @@ fn reads_around(sculptor: Option<&SculptKernel>) -> IVec3 {
 
 /// How far from the samples that it changes an edit reads others, in voxels along each axis, whatever the rules.
 #[cfg(feature = "net")]
-pub(crate) fn most_read_around(edit: &Edit) -> IVec3 {
+pub(crate) fn max_read_around(edit: &Edit) -> IVec3 {
     reads_around(edit.sculptor().as_ref())
 }
 
@@ -92,9 +92,9 @@ pub(crate) fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
 
 /// At least the number of bricks of a world that an edit may change: along paths far fewer than the bricks in its reach.
 /// `None` when it lies outside.
-pub(crate) fn most_bricks(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
+pub(crate) fn max_bricks(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     let around = BrickPos::range(reach(grid, edit)?).volume();
-    Some(edit.most_bricks().map_or(around, |most| most.min(around)))
+    Some(edit.max_bricks().map_or(around, |most| most.min(around)))
 }
 
 /// The fixed work of an edit, in bricks.
@@ -106,7 +106,7 @@ const SCULPTED: u64 = 4;
 /// world.
 pub(crate) fn edit_work(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     let weight = if edit.kind() == Kind::Sculpt { SCULPTED } else { 1 };
-    Some(EDIT_WORK + weight * most_bricks(grid, edit)?)
+    Some(EDIT_WORK + weight * max_bricks(grid, edit)?)
 }
 
 /// Returns `true` if some rule may restrict an edit of this power that changes these samples.

@@ -23,7 +23,7 @@ use crate::volume::layers::{ALL, Layers, count, indices};
 use crate::volume::{Brick, Sample};
 
 /// Bricks in a region.
-const MOST: usize = 512;
+const MAX_BRICKS: usize = 512;
 
 /// All samples are edited.
 const WHOLE: u8 = 1;
@@ -47,13 +47,13 @@ pub fn position(region: RegionPos, place: usize) -> BrickPos {
 
 /// The already known densities of the bricks of a region, by position.
 struct Region {
-    slots: [u16; MOST],
+    slots: [u16; MAX_BRICKS],
     bricks: Vec<[i16; 512]>,
 }
 
 impl Region {
     fn new() -> Self {
-        Self { slots: [u16::MAX; MOST], bricks: Vec::new() }
+        Self { slots: [u16::MAX; MAX_BRICKS], bricks: Vec::new() }
     }
 
     fn enter(&mut self, place: usize, densities: [i16; 512]) {
@@ -179,16 +179,16 @@ pub fn read_bricks(
 
 fn read_heads(reader: &mut Reader) -> Result<Vec<Head>, FormatError> {
     let bricks = reader.count()?;
-    if bricks > MOST {
+    if bricks > MAX_BRICKS {
         return Err(FormatError::Invalid("number of bricks"));
     }
     let (mut heads, mut next) = (Vec::with_capacity(bricks), 0);
     for _ in 0..bricks {
-        let step = reader.number()?.min(MOST as u64);
+        let step = reader.number()?.min(MAX_BRICKS as u64);
         let place = next + step as usize;
         let flags = reader.byte()?;
         let is_known = flags & !KNOWN == 0 && (flags & FLAT == 0 || flags & WHOLE != 0);
-        if place >= MOST || !is_known {
+        if place >= MAX_BRICKS || !is_known {
             return Err(FormatError::Invalid("head of a brick"));
         }
         next = place + 1;
@@ -263,6 +263,6 @@ fn runs(
 
 /// Whether a region can be at this position.
 pub fn is_possible(region: RegionPos) -> bool {
-    const MOST: i32 = REACH / RegionPos::VOXELS + 1;
-    region.0.max_element() <= MOST && region.0.min_element() >= -MOST
+    const MAX: i32 = REACH / RegionPos::VOXELS + 1;
+    region.0.max_element() <= MAX && region.0.min_element() >= -MAX
 }

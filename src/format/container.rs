@@ -29,24 +29,24 @@ const ENTRY: usize = 9;
 pub struct Container<'a> {
     pub world: WorldId,
     /// The part of its head that does not describe frames.
-    pub own: Vec<u8>,
+    pub data: Vec<u8>,
     /// Frames with the lengths and checksums that the head names.
     pub frames: Vec<&'a [u8]>,
 }
 
-/// A file of frames; `own` is additional data in its head.
+/// A file of frames; `data` is additional data in its head.
 ///
 /// # Errors
 /// When the head would have more bytes than `limit`.
 pub fn write(
     kind: Kind,
     world: WorldId,
-    own: &[u8],
+    data: &[u8],
     frames: &[Vec<u8>],
     limit: usize,
 ) -> Result<Vec<u8>, FormatError> {
     let mut head = Vec::new();
-    put_bytes(&mut head, own);
+    put_bytes(&mut head, data);
     put_number(&mut head, frames.len() as u64);
     for frame in frames {
         put_number(&mut head, frame.len() as u64);
@@ -70,7 +70,7 @@ pub fn write(
 pub fn read(kind: Kind, file: &[u8], limit: usize) -> Result<Container<'_>, FormatError> {
     let (world, head, mut rest) = read_head(kind, file, limit)?;
     let mut reader = Reader(&head);
-    let own = reader.bytes()?.to_vec();
+    let data = reader.bytes()?.to_vec();
     let count = entries(&mut reader)?;
     let mut frames = Vec::with_capacity(count);
     for _ in 0..count {
@@ -84,7 +84,7 @@ pub fn read(kind: Kind, file: &[u8], limit: usize) -> Result<Container<'_>, Form
     }
     reader.end()?;
     rest.end()?;
-    Ok(Container { world, own, frames })
+    Ok(Container { world, data, frames })
 }
 
 /// The world and the additional data in the head, without reading the frames.

@@ -5,6 +5,7 @@
 //!   and is not packed, so that version control can store differences.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,7 @@ use super::portable::{SavedRegion, by_region, of_regions};
 use super::region::region_key;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{LooseSettings, SIMULATION, TerrainSettings, WorldParts};
+use crate::terrain::{EditSettings, LooseSettings, SIMULATION, TerrainSettings, WorldParts};
 use crate::volume::DiggingRules;
 
 /// The file that describes a level.
@@ -34,10 +35,8 @@ pub struct Level {
     pub ground: u64,
     /// The greatest name that a field has had.
     pub next_field: u64,
-    /// Rules for edits.
-    pub rules: Option<DiggingRules>,
-    /// The search for loose pieces.
-    pub loose: Option<LooseSettings>,
+    /// The rules and the search for loose pieces that edits obey.
+    pub edit_settings: EditSettings,
     /// The game's data, by key.
     pub game: BTreeMap<String, Vec<u8>>,
     /// Regions that hold anything; their revisions are 0.
@@ -63,17 +62,17 @@ struct Description {
 impl Level {
     /// A level of the parts of a world over this ground.
     pub fn new(parts: WorldParts, voxel_size: f32, game: BTreeMap<String, Vec<u8>>, ground: &Ground) -> Self {
-        let WorldParts { change, chunk_size, rules, loose, .. } = parts;
+        let WorldParts { change, chunk_size, edit_settings, .. } = parts;
         let (settings, next_field) = (TerrainSettings { chunk_size, voxel_size }, change.next_field);
         let regions = by_region(change, chunk_size, 0, ground);
-        Self { settings, ground: ground.hash(), next_field, rules, loose, game, regions }
+        Self { settings, ground: ground.hash(), next_field, edit_settings, game, regions }
     }
 
     /// Its parts, from which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
     pub fn parts(&self) -> WorldParts {
         let change = of_regions(&self.regions, self.next_field);
-        let (chunk_size, rules) = (self.settings.chunk_size, self.rules.clone());
-        WorldParts { change, chunk_size, revision: 0, rules, loose: self.loose }
+        let (chunk_size, edit_settings) = (self.settings.chunk_size, self.edit_settings.clone());
+        WorldParts { change, chunk_size, revision: 0, edit_settings }
     }
 }
 
@@ -111,8 +110,8 @@ pub(super) fn write_within(level: &Level, limits: &Limits) -> Result<LevelFiles,
         settings: level.settings,
         ground: format!("{:016x}", level.ground),
         next_field: level.next_field,
-        rules: level.rules.clone(),
-        loose: level.loose,
+        rules: level.edit_settings.rules.as_deref().cloned(),
+        loose: level.edit_settings.loose,
         game: level.game.iter().map(|(key, value)| (key.clone(), to_hex(value))).collect(),
         regions: level.regions.keys().map(|at| region_name(*at)).collect(),
     };
@@ -161,7 +160,8 @@ pub(super) fn read_within(
     let game = of.game.iter().map(value).collect::<Option<_>>();
     let game = game.ok_or_else(|| file_error(LEVEL_JSON, "game data is not hexadecimal"))?;
     let Description { settings, next_field, rules, loose, .. } = of;
-    Ok(Level { settings, ground: hash, next_field, rules, loose, game, regions })
+    let edit_settings = EditSettings { rules: rules.map(Arc::new), loose };
+    Ok(Level { settings, ground: hash, next_field, edit_settings, game, regions })
 }
 
 fn to_hex(bytes: &[u8]) -> String {

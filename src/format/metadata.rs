@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::FormatError;
 use super::plain;
-use crate::terrain::{LooseSettings, TerrainSettings};
-use crate::volume::DiggingRules;
+use crate::terrain::{EditSettings, TerrainSettings};
 
 /// A world without its regions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -18,10 +17,8 @@ pub struct Metadata {
     pub hash: u64,
     /// The greatest name that a field has had.
     pub next_field: u64,
-    /// Rules for edits.
-    pub rules: Option<DiggingRules>,
-    /// The search for loose pieces.
-    pub loose: Option<LooseSettings>,
+    /// The rules and the search for loose pieces that edits obey.
+    pub edit_settings: EditSettings,
     /// The [`SIMULATION`](crate::terrain::SIMULATION) that made it.
     pub simulation: u32,
     /// The hash of the whole ground, as [`Ground::hash`](crate::ground::Ground::hash) gives it.

@@ -74,10 +74,10 @@ impl PortableWorld {
     /// A world without its journal. The metadata's revision, rules, settings of loose pieces, names and chunk size are
     /// those of the parts.
     pub fn new(world: WorldId, metadata: Metadata, parts: WorldParts, ground: &Ground) -> Self {
-        let WorldParts { change, chunk_size, revision, rules, loose } = parts;
+        let WorldParts { change, chunk_size, revision, edit_settings } = parts;
         let (mut metadata, next_field) = (metadata, change.next_field);
         metadata.settings.chunk_size = chunk_size;
-        let metadata = Metadata { revision, rules, loose, next_field, ..metadata };
+        let metadata = Metadata { revision, edit_settings, next_field, ..metadata };
         Self {
             world,
             metadata,
@@ -88,10 +88,10 @@ impl PortableWorld {
 
     /// Its parts, of which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
     pub fn parts(&self) -> WorldParts {
-        let Metadata { settings, revision, next_field, rules, loose, .. } = &self.metadata;
+        let Metadata { settings, revision, next_field, edit_settings, .. } = &self.metadata;
         let change = of_regions(&self.regions, *next_field);
-        let (chunk_size, rules) = (settings.chunk_size, rules.clone());
-        WorldParts { change, chunk_size, revision: *revision, rules, loose: *loose }
+        let (chunk_size, edit_settings) = (settings.chunk_size, edit_settings.clone());
+        WorldParts { change, chunk_size, revision: *revision, edit_settings }
     }
 }
 
@@ -187,7 +187,7 @@ pub(crate) fn read_within(
     limits: &Limits,
 ) -> Result<PortableWorld, FormatError> {
     let container = container::read(Kind::Portable, file, limits.head)?;
-    let (world, head) = (container.world, portable_head(&container.own)?);
+    let (world, head) = (container.world, portable_head(&container.data)?);
     let regions = usize::try_from(head.regions).ok().filter(|&regions| regions <= container.frames.len());
     let (regions, batches) = container.frames.split_at(regions.ok_or(FormatError::Truncated)?);
     if head.journal != batches.len() as u64 {

@@ -129,7 +129,7 @@ pub enum ImageError {
     /// The image is not plain grey of 8 or 16 bits.
     #[error("the image has the colour type {found}: heights need plain grey with 8 or 16 bits")]
     ColorType {
-        /// The colour type found, as the decoder names it: `Rgb8`, or `La16` for grey with alpha.
+        /// The colour type found with its bits: `Rgb8`, `Palette8`, or `La16` for grey with alpha.
         found: String,
     },
     /// The data does not have as many bytes or samples as its dimensions say.

@@ -1,12 +1,108 @@
-//! Reading grey images from PNG files, which the `image` crate decodes.
+//! Decodes PNG files with the `png` crate: grey images, heights to import, and material maps.
 
 use std::io::{Cursor, ErrorKind};
 
-use image::codecs::png::PngDecoder;
-use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, Limits};
+use ::png::{ColorType, Decoder, DecodingError, Limits, Reader, Transformations};
 
 use super::error::ImageError;
 use super::grey_image::{GreyImage, ImageLimits};
+
+/// The first bytes of every PNG.
+pub(super) const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// A PNG whose samples are still to be read. They are read as the file has them: gamma and colour profiles are ignored.
+pub(super) struct Png<'a> {
+    reader: Reader<Cursor<&'a [u8]>>,
+    /// Bytes of the file.
+    bytes: u64,
+    /// Samples in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    pub color: ColorType,
+    /// Bits of a sample: 1, 2, 4, 8 or 16.
+    pub bits: u8,
+    pub palette: Vec<[u8; 3]>,
+    /// Whether a colour or shade of it is transparent, or it has an alpha channel.
+    pub has_alpha: bool,
+    pub is_animated: bool,
+}
+
+impl<'a> Png<'a> {
+    /// Reads everything before the samples. The caller keeps `bytes_per_pixel` bytes for each pixel.
+    ///
+    /// # Errors
+    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, or one that is no PNG.
+    /// - [`ImageError::Empty`] for an image without samples.
+    /// - [`ImageError::Dimensions`], [`ImageError::Memory`] for one over the limits, before memory is allocated for it.
+    pub fn open(bytes: &'a [u8], limits: &ImageLimits, bytes_per_pixel: u64) -> Result<Self, ImageError> {
+        let failed = |error| failed(error, bytes.len() as u64);
+        let max_alloc = usize::try_from(limits.max_alloc_bytes).unwrap_or(usize::MAX);
+        let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: max_alloc });
+        decoder.set_transformations(Transformations::IDENTITY);
+        let header =
+            decoder.read_header_info().map_err(|error| empty(bytes).unwrap_or_else(|| failed(error)))?;
+        let pixel_bits = header.color_type.samples() as u64 * header.bit_depth as u64;
+        // The rows of an interlaced image are only known once all of it is decoded.
+        let decoded = if header.interlaced { pixel_bits.div_ceil(8) } else { 0 };
+        limits.check_image(header.width, header.height, bytes_per_pixel + decoded)?;
+        let reader = decoder.read_info().map_err(failed)?;
+        let info = reader.info();
+        let (width, height, color, bits) = (info.width, info.height, info.color_type, info.bit_depth as u8);
+        let palette = info.palette.as_deref().unwrap_or_default().as_chunks::<3>().0.to_vec();
+        let has_alpha = info.trns.is_some() || matches!(color, ColorType::GrayscaleAlpha | ColorType::Rgba);
+        let is_animated = info.animation_control.is_some_and(|control| control.num_frames > 1);
+        let bytes = bytes.len() as u64;
+        Ok(Self { reader, bytes, width, height, color, bits, palette, has_alpha, is_animated })
+    }
+
+    /// Calls `each` with the number and the samples of every row: all channels of a pixel, then those of the next one.
+    ///
+    /// # Errors
+    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file.
+    /// - The error of `each`.
+    pub fn read<E: From<ImageError>>(
+        mut self,
+        mut each: impl FnMut(u32, &[u16]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let length = self.width as usize * self.color.samples();
+        let row_bytes = (length * usize::from(self.bits)).div_ceil(8);
+        let (bits, bytes) = (self.bits, self.bytes);
+        let mut samples = Vec::with_capacity(length);
+        let mut read = |z: u32, row: &[u8]| -> Result<(), E> {
+            let row = row.get(..row_bytes).ok_or_else(|| decode_error("a row is too short"))?;
+            samples.clear();
+            match bits {
+                16 => samples.extend(row.as_chunks::<2>().0.iter().map(|&pair| u16::from_be_bytes(pair))),
+                8 => samples.extend(row.iter().map(|&sample| u16::from(sample))),
+                _ => samples.extend((0..length).map(|index| {
+                    let (bits, at) = (usize::from(bits), index * usize::from(bits));
+                    u16::from(row[at / 8] >> (8 - bits - at % 8)) & ((1 << bits) - 1)
+                })),
+            }
+            each(z, &samples)
+        };
+        if self.reader.info().interlaced {
+            let size = self.reader.output_buffer_size().ok_or_else(|| decode_error("it is too large"))?;
+            let mut image = Vec::new();
+            image.try_reserve_exact(size).map_err(decode_error)?;
+            image.resize(size, 0);
+            let frame = self.reader.next_frame(&mut image).map_err(|error| failed(error, bytes))?;
+            for z in 0..self.height {
+                let start = z as usize * frame.line_size;
+                read(z, image.get(start..start + frame.line_size).unwrap_or_default())?;
+            }
+        } else {
+            for z in 0..self.height {
+                let row = self.reader.next_row().map_err(|error| failed(error, bytes))?;
+                let row = row.ok_or(ImageError::Truncated { bytes })?;
+                read(z, row.data())?;
+            }
+        }
+        // The chunks after the samples show whether the file is whole.
+        Ok(self.reader.finish().map_err(|error| failed(error, bytes))?)
+    }
+}
 
 impl GreyImage {
     /// Decodes a PNG of plain grey with 8 or 16 bits a sample. Gamma and colour profiles are ignored: samples are
@@ -20,47 +116,50 @@ impl GreyImage {
     ///   memory is allocated for its samples.
     pub fn decode_png(bytes: &[u8], limits: &ImageLimits) -> Result<Self, ImageError> {
         limits.check_file(bytes)?;
-        let (width, height, bits) = declared(bytes).unwrap_or((1, 1, 8));
-        // The finished samples take 2 bytes each; those of 8 bits are held as they were while they are widened.
-        limits.check_image(width, height, if bits == 8 { 3 } else { 2 })?;
-        let mut decoder_limits = Limits::no_limits();
-        decoder_limits.max_alloc = Some(limits.max_alloc_bytes);
-        let failed = |error| decode_error(error, bytes.len() as u64);
-        let decoder = PngDecoder::with_limits(Cursor::new(bytes), decoder_limits).map_err(failed)?;
-        match decoder.color_type() {
-            // The decoder widens fewer bits to 8.
-            ColorType::L8 if bits < 8 => return Err(ImageError::ColorType { found: format!("L{bits}") }),
-            ColorType::L8 | ColorType::L16 => (),
-            // A transparent shade of grey becomes an alpha channel.
-            other => return Err(ImageError::ColorType { found: format!("{other:?}") }),
+        let png = Png::open(bytes, limits, 2)?;
+        let (width, height, bits) = (png.width, png.height, png.bits);
+        if png.color != ColorType::Grayscale || png.has_alpha || bits < 8 {
+            let color = match png.color {
+                ColorType::Grayscale if !png.has_alpha => "L",
+                ColorType::Grayscale | ColorType::GrayscaleAlpha => "La",
+                ColorType::Rgb => "Rgb",
+                ColorType::Rgba => "Rgba",
+                ColorType::Indexed => "Palette",
+            };
+            return Err(ImageError::ColorType { found: format!("{color}{bits}") });
         }
-        let samples = match DynamicImage::from_decoder(decoder).map_err(failed)? {
-            DynamicImage::ImageLuma8(grey) => {
-                grey.into_raw().into_iter().map(|v| u16::from(v) * 257).collect()
+        let mut samples = Vec::new();
+        samples.try_reserve_exact(width as usize * height as usize).map_err(decode_error)?;
+        png.read(|_, row| {
+            match bits {
+                8 => samples.extend(row.iter().map(|sample| sample * 257)),
+                _ => samples.extend_from_slice(row),
             }
-            other => other.into_luma16().into_raw(),
-        };
+            Ok::<_, ImageError>(())
+        })?;
         Self::from_samples(width, height, samples)
     }
 }
 
-/// Width, height and bits per channel that a PNG declares in its header; `None` where there is none, which the decoder
-/// then reports. They are read here because the decoder reserves memory for them at once.
-fn declared(bytes: &[u8]) -> Option<(u32, u32, u8)> {
-    let is_png = image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Png);
-    let (&width, rest) = bytes.get(16..).filter(|_| is_png)?.split_first_chunk()?;
-    let (&height, rest) = rest.split_first_chunk()?;
-    Some((u32::from_be_bytes(width), u32::from_be_bytes(height), *rest.first()?))
+/// The error of an image whose header says that it has no samples, which the decoder takes for damage.
+fn empty(bytes: &[u8]) -> Option<ImageError> {
+    let (&width, rest) = bytes.get(16..).filter(|_| bytes.starts_with(SIGNATURE))?.split_first_chunk()?;
+    let [width, height] = [&width, rest.first_chunk()?].map(|side| u32::from_be_bytes(*side));
+    (width == 0 || height == 0).then_some(ImageError::Empty { width, height })
 }
 
-/// Our own error for the decoder's.
-fn decode_error(error: image::ImageError, bytes: u64) -> ImageError {
+/// The decoder's error for a file with this many bytes.
+fn failed(error: DecodingError, bytes: u64) -> ImageError {
     match error {
-        image::ImageError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => {
+        DecodingError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => {
             ImageError::Truncated { bytes }
         }
-        error => ImageError::Decode { reason: error.to_string() },
+        error => decode_error(error),
     }
+}
+
+fn decode_error(reason: impl ToString) -> ImageError {
+    ImageError::Decode { reason: reason.to_string() }
 }
 
 #[cfg(test)]
@@ -88,14 +187,11 @@ mod tests {
         GreyImage::decode_png(bytes, &ImageLimits::default())
     }
 
-    /// First bytes of every PNG.
-    const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
-
     /// A PNG that declares these dimensions, bits and colour type and has no samples.
     fn header(width: u32, height: u32, bits: u8, color_type: u8) -> Vec<u8> {
         let sizes = [width.to_be_bytes(), height.to_be_bytes()].concat();
         let header = chunk(b"IHDR", &[&sizes, &[bits, color_type, 0, 0, 0][..]].concat());
-        [&SIGNATURE[..], &header, &chunk(b"IDAT", &[0])].concat()
+        [SIGNATURE, &header, &chunk(b"IDAT", &[0])].concat()
     }
 
     /// Where the compressed samples lie in [`noisy_png`]: after signature, header and a chunk's length and name.
@@ -133,8 +229,8 @@ mod tests {
     proptest! {
         #[test]
         fn any_bytes_are_an_image_or_an_error(bytes: Vec<u8>) {
-            prop_assert!(bytes.starts_with(&SIGNATURE) || decode(&bytes).is_err());
-            assert_whole(decode(&[&SIGNATURE, bytes.as_slice()].concat()), None);
+            prop_assert!(bytes.starts_with(SIGNATURE) || decode(&bytes).is_err());
+            assert_whole(decode(&[SIGNATURE, bytes.as_slice()].concat()), None);
             assert_whole(decode(&[header(4, 4, 8, 0), bytes].concat()), Some((4, 4)));
         }
 
@@ -155,7 +251,8 @@ mod tests {
             let header = [0, 0, 0, width, 0, 0, 0, height, bits, 0, 0, 0, u8::from(interlaced)];
             let (header, samples) = (chunk(b"IHDR", &header), chunk(b"IDAT", &samples));
             for (name, length) in [(b"tRNS", 2), (b"gAMA", 4), (b"acTL", 8), (b"fcTL", 26), (b"iCCP", 26)] {
-                let file = [&SIGNATURE, &*header, &chunk(name, &extra[..length]), &samples].concat();
+                let (chunk, end) = (chunk(name, &extra[..length]), chunk(b"IEND", &[]));
+                let file = [SIGNATURE, &*header, &chunk, &samples, &end].concat();
                 assert_whole(decode(&file), Some((width.into(), height.into())));
             }
         }
@@ -182,8 +279,7 @@ mod tests {
     fn a_png_cut_off_anywhere_is_truncated() {
         let file = noisy_png();
         assert!(decode(&file).is_ok());
-        // The last 16 bytes, a checksum and the end chunk, do not affect the samples.
-        for length in 1..file.len() - 16 {
+        for length in 0..file.len() {
             assert_eq!(decode(&file[..length]), Err(ImageError::Truncated { bytes: length as u64 }));
         }
     }
@@ -218,7 +314,7 @@ mod tests {
         let huge = ImageError::Dimensions { width: 1 << 31, height: 5, max_width, max_height };
         assert_eq!(decode(&header(1 << 31, 5, 16, 0)), Err(huge));
         let limits = ImageLimits { max_alloc_bytes: 1000, ..ImageLimits::default() };
-        let memory = ImageError::Memory { bytes: 4000 * 4000 * 3, limit: 1000 };
+        let memory = ImageError::Memory { bytes: 4000 * 4000 * 2, limit: 1000 };
         assert_eq!(GreyImage::decode_png(&header(4000, 4000, 8, 0), &limits), Err(memory));
         let file = noisy_png();
         let limits = ImageLimits { max_file_bytes: 20, ..ImageLimits::default() };

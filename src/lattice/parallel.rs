@@ -31,7 +31,7 @@ impl ItemCost {
     }
 
     /// The most items that a thread takes at once. Surfaces differ in cost, so they are taken one at a time.
-    const fn most_at_once(self) -> usize {
+    const fn max_at_once(self) -> usize {
         match self {
             Self::Surface | Self::Collider => 1,
             _ => usize::MAX,
@@ -51,7 +51,7 @@ pub(crate) fn parallel_map<'a, T: Sync, R: Send>(
     work: impl Fn(&'a T) -> R + Send + Sync,
 ) -> Vec<R> {
     if cost.is_shared(list.len()) {
-        list.par_iter().with_max_len(cost.most_at_once()).map(work).collect()
+        list.par_iter().with_max_len(cost.max_at_once()).map(work).collect()
     } else {
         list.iter().map(work).collect()
     }
@@ -64,7 +64,7 @@ pub(crate) fn parallel_map_into<T: Send, R: Send>(
     work: impl Fn(T) -> R + Send + Sync,
 ) -> Vec<R> {
     if cost.is_shared(list.len()) {
-        list.into_par_iter().with_max_len(cost.most_at_once()).map(work).collect()
+        list.into_par_iter().with_max_len(cost.max_at_once()).map(work).collect()
     } else {
         // Not `collect`, which may reuse the larger allocation of the list.
         let mut mapped = Vec::with_capacity(list.len());

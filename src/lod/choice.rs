@@ -127,7 +127,7 @@ pub struct LodSettings {
     /// Nodes farther from all viewpoints than this many voxels are not split; 8,192 by default.
     pub view_distance: f32,
     /// The most nodes, about 2,400 unless set otherwise: beyond them, all limits grow.
-    pub most_nodes: usize,
+    pub max_nodes: usize,
 }
 
 impl Default for LodSettings {
@@ -139,7 +139,7 @@ impl Default for LodSettings {
             hysteresis: 0.7,
             look_ahead: 0.5,
             view_distance: 8192.0,
-            most_nodes: 2400,
+            max_nodes: 2400,
         }
     }
 }
@@ -158,7 +158,7 @@ impl LodSettings {
         };
         let mut cut = with_limits(1.0);
         for times in 1..=MAX_GROWTHS {
-            if cut.nodes().count() <= self.most_nodes {
+            if cut.nodes().count() <= self.max_nodes {
                 break;
             }
             cut = with_limits(GROWTH.powi(times as i32));
@@ -238,12 +238,12 @@ mod tests {
     #[test]
     fn limits_grow_until_there_are_few_enough_nodes() {
         let rough = |node| NodeFacts { error: 1e6, ..mountains(node) };
-        for most_nodes in [400, 1200] {
-            let choice = LodSettings { most_nodes, cell_pixels: 1.0, ..LodSettings::default() };
+        for max_nodes in [400, 1200] {
+            let choice = LodSettings { max_nodes, cell_pixels: 1.0, ..LodSettings::default() };
             let eyes = [eye(4000.0, 4000.0), eye(12_000.0, 9000.0)];
             let cut = choice.cut(&Cut::coarsest(world()), &eyes, rough);
             let count = cut.nodes().count();
-            assert!(count <= most_nodes && count > most_nodes / 3, "{count} of {most_nodes}");
+            assert!(count <= max_nodes && count > max_nodes / 3, "{count} of {max_nodes}");
         }
     }
 
@@ -304,7 +304,7 @@ mod tests {
     proptest! {
         #[test]
         fn an_eye_that_moves_to_and_fro_soon_changes_nothing(x in 200f32..16_000.0, z in 200f32..16_000.0, step in -8f32..8.0) {
-            let choice = LodSettings { most_nodes: usize::MAX, ..LodSettings::default() };
+            let choice = LodSettings { max_nodes: usize::MAX, ..LodSettings::default() };
             let mut cut = choice.cut(&Cut::coarsest(world()), &[eye(x, z)], mountains);
             let mut changes = 0;
             for at in [x + step, x].repeat(4) {
@@ -318,7 +318,7 @@ mod tests {
 
         #[test]
         fn several_eyes_see_what_each_would(places in prop::collection::vec((200f32..16_000.0, 200f32..16_000.0), 1..4)) {
-            let choice = LodSettings { most_nodes: usize::MAX, ..LodSettings::default() };
+            let choice = LodSettings { max_nodes: usize::MAX, ..LodSettings::default() };
             let coarsest = Cut::coarsest(world());
             let eyes: Vec<Viewpoint> = places.iter().map(|&(x, z)| eye(x, z)).collect();
             let all = choice.cut(&coarsest, &eyes, mountains);
@@ -349,7 +349,7 @@ mod tests {
                 for eye in [eye(8000.0, 8000.0), eye(odd, 0.0), Viewpoint { pixels: odd, ..eye(9.0, 9.0) }] {
                     let cut = choice.cut(&Cut::coarsest(world()), &[eye], mountains);
                     let count = cut.nodes().count();
-                    assert!(count <= choice.most_nodes, "{count} nodes for {choice:?}, {eye:?}");
+                    assert!(count <= choice.max_nodes, "{count} nodes for {choice:?}, {eye:?}");
                 }
             }
         }

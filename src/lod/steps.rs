@@ -35,13 +35,13 @@ impl Step {
 impl Cut {
     /// Takes one step towards another cut of the same quadtree; `None` once they are equal.
     ///
-    /// It makes `most_meshes` meshes at most, or more if a single split or merge does. Nodes with a small `rank` are
+    /// It makes `max_meshes` meshes at most, or more if a single split or merge does. Nodes with a small `rank` are
     /// split first and merged last. Nodes are merged first while there are more of them than the other cut has, so that
     /// on the way there are at most three more than at one of its ends.
-    pub fn step_to(&mut self, other: &Self, most_meshes: usize, rank: impl Fn(Node) -> u64) -> Option<Step> {
+    pub fn step_to(&mut self, other: &Self, max_meshes: usize, rank: impl Fn(Node) -> u64) -> Option<Step> {
         // Most steps lead all the way.
         let all = self.changes_to(other);
-        if all.mesh_count() <= most_meshes {
+        if all.mesh_count() <= max_meshes {
             self.clone_from(other);
             return (!all.new.is_empty()).then_some(all);
         }
@@ -58,7 +58,7 @@ impl Cut {
             let new = self.nodes_within(node);
             let mut touched = self.touching(node);
             touched.retain(|&near| before.contains(near));
-            if !step.new.is_empty() && step.mesh_count_with(&gone, &new, &touched) > most_meshes {
+            if !step.new.is_empty() && step.mesh_count_with(&gone, &new, &touched) > max_meshes {
                 // Taken back.
                 if is_split {
                     self.merge(node);
@@ -209,11 +209,11 @@ mod tests {
         ) {
             let grid = LodGrid::new(ChunkGrid::new(8, width, depth), top);
             let [mut cut, target] = [0, 1].map(|at| random_cut(grid, seeds[at], percents[at]));
-            let most_nodes = cut.nodes().count().max(target.nodes().count() + 3);
+            let max_nodes = cut.nodes().count().max(target.nodes().count() + 3);
             let mut before = cut.clone();
             while let Some(step) = cut.step_to(&target, most, |node| hash_node(node, 5) % 64) {
                 assert_is_cut(&cut);
-                prop_assert!(cut.nodes().count() <= most_nodes);
+                prop_assert!(cut.nodes().count() <= max_nodes);
                 let sorted = |nodes: &mut dyn Iterator<Item = Node>| {
                     let mut nodes: Vec<Node> = nodes.collect();
                     nodes.sort_unstable();

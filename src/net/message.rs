@@ -6,7 +6,7 @@
 //!                                     <-   Stream: what follows in this lane answers that greeting (in both lanes)
 //!                                     <-   Welcome: the number n that it starts from, and what comes in the bulk lane
 //!                                     <-   Piece ...      (bulk) regions or old entries, up to n
-//!                                     <-   Entries ...    (order) everything that is ordered after n
+//!                                     <-   Entries ...    (main) everything that is ordered after n
 //!   Ack                               ->                  what has arrived
 //!   Edits, Undo                       ->
 //!                                     <-   Entries with these, or Refused
@@ -22,7 +22,7 @@
 //! A client repeats its greeting until it is answered, and a server that does not know a connected client asks it to
 //! [greet](ToClient::Greet).
 //!
-//! The **order** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the
+//! The **log** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the
 //! pristine world after the entries 1 to n. All clients that have applied them in order have the same world.
 
 use std::sync::Arc;
@@ -34,8 +34,8 @@ use crate::brush::{Edit, Prefab};
 use crate::format::WorldId;
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
-use crate::terrain::{LooseSettings, Order, Patch};
-use crate::volume::{Brick, DiggingRules, Fields};
+use crate::terrain::{EditSettings, Order, Patch};
+use crate::volume::{Brick, Fields};
 
 /// The version of the protocol. It changes whenever the encoding of messages does.
 pub const PROTOCOL: u32 = 6;
@@ -69,12 +69,12 @@ impl ClientId {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lane {
     /// Urgent messages.
-    Order,
+    Main,
     /// Large data, at a rate that the server limits.
     Bulk,
 }
 
-/// One step of the order.
+/// One step of the log.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 #[expect(clippy::large_enum_variant, reason = "nearly all entries are orders")]
@@ -135,7 +135,7 @@ pub struct Entries {
     pub entries: Vec<Entry>,
 }
 
-/// A position in the order of one run of a server. After a restart, entries may differ from those that were sent
+/// A position in the log of one run of a server. After a restart, entries may differ from those that were sent
 /// before, because unsaved entries are lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Epoch {
@@ -161,7 +161,7 @@ pub struct Hello {
     /// The position that it has reached, if it has joined before.
     pub epoch: Option<Epoch>,
     /// Where its player is, in voxels: regions come from there outwards.
-    pub place: IVec3,
+    pub position: IVec3,
 }
 
 /// A message to the server.
@@ -240,10 +240,8 @@ pub enum Join {
 /// The state at a number in addition to bricks and fields.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RuleState {
-    /// The rules.
-    pub rules: Option<DiggingRules>,
-    /// The settings of loose pieces.
-    pub loose: Option<LooseSettings>,
+    /// The rules and the search for loose pieces that later edits obey.
+    pub edit_settings: EditSettings,
     /// The greatest name that a field has had.
     pub next_field: u64,
 }
@@ -253,7 +251,7 @@ pub struct RuleState {
 pub struct Welcome {
     /// Who the client is.
     pub client: ClientId,
-    /// The world, the server's run, and the number n that the client starts from: entries after it follow in the order
+    /// The world, the server's run, and the number n that the client starts from: entries after it follow in the main
     /// lane.
     pub epoch: Epoch,
     /// The client's last sequence number that the server has seen. Edits up to it have an entry, or were refused.
@@ -297,7 +295,7 @@ pub enum ToClient {
     Welcome(Welcome),
     /// The server has removed the client.
     Kicked(KickReason),
-    /// Entries of the order.
+    /// Entries of the log.
     Entries(Entries),
     /// The server could not apply this entry: the regions that it reaches may differ.
     Failed {

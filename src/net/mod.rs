@@ -13,7 +13,7 @@
 //! | `price`, `bucket` | the costs of edits, and their budget |
 //! | `client` | the client: prediction, joins, repair |
 //! | `replica` | the confirmed world and the shown world |
-//! | `server` | the server: order, validation, undo, joins |
+//! | `server` | the server: log, validation, undo, joins |
 //!
 //! A server that lets one client in and orders its dig:
 //!
@@ -82,7 +82,6 @@ pub use message::{
 };
 #[doc(hidden)]
 pub use regions::{region_hash, touched_regions};
-pub use replica::ShownChange;
 #[doc(hidden)]
 pub use server::{
     Admission, Outgoing, Permission, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,

@@ -6,7 +6,28 @@ use rustc_hash::FxHashMap;
 use xxhash_rust::xxh3::Xxh3Default;
 
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, RegionPos};
-use crate::terrain::{Patch, World};
+use crate::terrain::{Patch, Receipt, Terrain, World};
+
+/// Runs and commits everything that was submitted to a terrain, and updates the hashes of its regions. Calls `before` with
+/// the world and the change of each commit, and returns the receipts and the regions that changed.
+pub(super) fn run_submitted(
+    terrain: &mut Terrain,
+    sums: &mut RegionSums,
+    mut before: impl FnMut(&World, &Patch),
+) -> (Vec<Receipt>, BTreeSet<RegionPos>) {
+    let (mut receipts, mut regions) = (terrain.take_receipts(), BTreeSet::new());
+    while let Some(transaction) = terrain.begin() {
+        let commit = transaction.run();
+        let (world, change) = (terrain.world(), commit.change());
+        before(world, &change);
+        regions.append(&mut touched_regions(world.grid(), &change));
+        let steps = Steps::of(world, &change);
+        // It is the one under way.
+        receipts.extend(terrain.commit(commit).unwrap_or_default());
+        sums.add(terrain.world(), steps);
+    }
+    (receipts, regions)
+}
 
 /// The hash of a region in marks and tables: of its [samples](World::region_hash), and of the names of the fields in
 /// all chunks that reach into it. 0 for a pristine region.
@@ -20,11 +41,11 @@ pub fn region_hash(world: &World, region: RegionPos) -> u64 {
 pub(super) struct RegionSums(FxHashMap<RegionPos, u64>);
 
 /// Changes of regions' hashes.
-pub(super) struct Steps(FxHashMap<RegionPos, u64>);
+struct Steps(FxHashMap<RegionPos, u64>);
 
 impl Steps {
     /// The changes of hashes that a patch causes; call it before the patch is applied.
-    pub fn of(world: &World, change: &Patch) -> Self {
+    fn of(world: &World, change: &Patch) -> Self {
         let mut steps = FxHashMap::<RegionPos, u64>::default();
         for (pos, brick) in &change.bricks {
             let sum = steps.entry(RegionPos::of(*pos)).or_default();
@@ -36,7 +57,7 @@ impl Steps {
 
 impl RegionSums {
     /// Adds the steps of a patch that was applied. A region that was not known yet is hashed whole.
-    pub fn add(&mut self, world: &World, steps: Steps) {
+    fn add(&mut self, world: &World, steps: Steps) {
         for (region, step) in steps.0 {
             let known = self.0.entry(region).and_modify(|hash| *hash = hash.wrapping_add(step));
             known.or_insert_with(|| world.region_hash(region));
@@ -131,16 +152,15 @@ mod tests {
                 let at = Vec3::new(rng.f32() * 200.0, rng.f32() * 30.0, rng.f32() * 200.0);
                 let before = hashes(terrain.world());
                 terrain.submit(Brush::dig(Shape::sphere(at, 1.0 + 9.0 * rng.f32())));
-                let commit = terrain.begin().expect("an edit").run();
-                let change = commit.change();
-                let steps = Steps::of(terrain.world(), &change);
-                terrain.commit(commit).expect("its own commit");
-                sums.add(terrain.world(), steps);
+                let mut change = Patch::default();
+                let (receipts, touched) =
+                    run_submitted(&mut terrain, &mut sums, |_, own| change = own.clone());
+                assert_eq!(receipts.len(), 1);
                 for region in before.keys().copied() {
                     let hash = region_hash(terrain.world(), region);
                     assert_eq!(sums.hash(terrain.world(), region), hash, "{region:?} at {at}");
                 }
-                let touched = touched_regions(terrain.world().grid(), &change);
+                assert_eq!(touched, touched_regions(terrain.world().grid(), &change));
                 for (region, hash) in hashes(terrain.world()) {
                     assert!(hash == before[&region] || touched.contains(&region), "{region:?} at {at}");
                 }

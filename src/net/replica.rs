@@ -1,4 +1,4 @@
-//! The confirmed world, which follows the order, and the shown world, which also contains the client's pending edits.
+//! The confirmed world, which follows the log, and the shown world, which also contains the client's pending edits.
 //!
 //! Both share their bricks. The shown world is never edited: after each update, its difference from the expected state
 //! is applied as one change.
@@ -10,9 +10,9 @@ use glam::IVec3;
 
 use super::message::{Entry, RuleState};
 use super::never_shown;
-use super::regions::{RegionSums, Steps, chunks_of, touched_regions};
+use super::regions::{RegionSums, chunks_of, run_submitted};
 use crate::brush::{Edit, Evaluator};
-use crate::edits::most_read_around;
+use crate::edits::max_read_around;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{
@@ -20,7 +20,7 @@ use crate::terrain::{
     WorldParts,
 };
 use crate::volume::{Brick, Fields};
-use crate::world::{Overlay, Places, State};
+use crate::world::{Overlay, Positions, State};
 
 type Stored = Option<Arc<Brick>>;
 
@@ -36,8 +36,8 @@ struct Reads {
 
 impl Reads {
     fn of(edit: &Edit) -> Self {
-        let evaluator = edit.most_bricks().map(|_| edit.evaluator());
-        Self { reach: edit.reach(), around: most_read_around(edit), evaluator }
+        let evaluator = edit.max_bricks().map(|_| edit.evaluator());
+        Self { reach: edit.reach(), around: max_read_around(edit), evaluator }
     }
 
     fn meets(&self, LatticeBox { min, max }: LatticeBox) -> bool {
@@ -51,15 +51,6 @@ impl Reads {
 /// With at least this many pending edits, the shown world is kept as a separate terrain. A further edit is then
 /// predicted alone, and not together with all previous ones.
 const MANY: usize = 16;
-
-/// A change of the shown world.
-#[derive(Clone, Debug)]
-pub struct ShownChange {
-    /// Bricks and fields.
-    pub change: Patch,
-    /// The hash that the shown world has afterwards.
-    pub hash: u64,
-}
 
 /// An edit of this client that the server has not ordered yet.
 #[derive(Clone, Debug)]
@@ -81,7 +72,7 @@ pub(super) struct Applied {
 
 /// The confirmed and the shown world.
 pub(super) struct Replica {
-    /// The world after the order's entries. It is never meshed.
+    /// The world after the entries of the log. It is never meshed.
     confirmed: Terrain,
     pending: VecDeque<Pending>,
     /// The hashes of its regions.
@@ -137,7 +128,7 @@ impl Replica {
         })
     }
 
-    /// The world after the order's entries.
+    /// The world after the entries of the log.
     pub fn world(&self) -> &World {
         self.confirmed.world()
     }
@@ -145,8 +136,7 @@ impl Replica {
     /// The present state in addition to bricks and fields.
     pub fn rule_state(&self) -> RuleState {
         RuleState {
-            rules: self.confirmed.rules().cloned(),
-            loose: self.confirmed.loose().copied(),
+            edit_settings: self.confirmed.edit_settings().clone(),
             next_field: self.world().next_field(),
         }
     }
@@ -208,7 +198,7 @@ impl Replica {
         self.pending.remove(at).map(|pending| pending.edit)
     }
 
-    /// Applies entries of the order. This client's edits among them are no longer pending; `sequence_of`
+    /// Applies entries of the log. This client's edits among them are no longer pending; `sequence_of`
     /// returns their sequence numbers.
     pub fn apply(&mut self, entries: &[Entry], sequence_of: impl Fn(&Entry) -> Option<u64>) -> Applied {
         // Those may be among them.
@@ -254,20 +244,12 @@ impl Replica {
 
     /// Runs all that is submitted.
     fn run(&mut self) -> Applied {
-        let mut applied = Applied { receipts: self.confirmed.take_receipts(), ..Applied::default() };
-        while let Some(transaction) = self.confirmed.begin() {
-            let commit = transaction.run();
-            let change = commit.change();
-            self.before.keep(change.inverse(self.confirmed.world()));
-            applied.regions.append(&mut touched_regions(self.world().grid(), &change));
-            let steps = Steps::of(self.confirmed.world(), &change);
-            // It is the one under way.
-            applied.receipts.extend(self.confirmed.commit(commit).unwrap_or_default());
-            self.sums.add(self.confirmed.world(), steps);
-        }
-        let mut parts = applied.receipts.iter().filter(|receipt| receipt.asked == Asked::Parts);
-        applied.failed_locally = parts.any(Receipt::is_local_failure);
-        applied
+        let Self { confirmed, sums, before, .. } = self;
+        let keep = |world: &World, change: &Patch| before.keep(change.inverse(world));
+        let (receipts, regions) = run_submitted(confirmed, sums, keep);
+        let mut parts = receipts.iter().filter(|receipt| receipt.asked == Asked::Parts);
+        let failed_locally = parts.any(Receipt::is_local_failure);
+        Applied { receipts, regions, failed_locally }
     }
 
     /// Shares the shown bricks with the confirmed world where they are equal, and forgets these differences.
@@ -282,9 +264,9 @@ impl Replica {
         // The shown world does not change: all changes were shown before.
         self.hash_offset = self.shown_regions_hash.wrapping_sub(self.world().regions_hash());
         let before = std::mem::take(&mut self.before);
-        let places = before.places();
+        let positions = before.positions();
         self.predicted.keep(before.patch(0));
-        self.predicted.forget(self.confirmed.world(), &places);
+        self.predicted.forget(self.confirmed.world(), &positions);
     }
 
     /// Replaces parts of the confirmed world by those of another machine.
@@ -301,7 +283,7 @@ impl Replica {
         }
     }
 
-    /// Continues from another position of an order with the rules and settings there, either with the present world or
+    /// Continues from another position of a log with the rules and settings there, either with the present world or
     /// from the pristine one.
     ///
     /// # Errors
@@ -313,8 +295,8 @@ impl Replica {
         }
         let kept = if keeps_world { change } else { Patch::default() };
         let change = Patch { next_field: state.next_field, ..kept };
-        let (rules, loose) = (state.rules.clone(), state.loose);
-        let parts = WorldParts { change, chunk_size, revision: 0, rules, loose };
+        let edit_settings = state.edit_settings.clone();
+        let parts = WorldParts { change, chunk_size, revision: 0, edit_settings };
         let settings = TerrainSettings { chunk_size, voxel_size: self.confirmed.voxel_size() };
         self.confirmed = Terrain::restore(self.confirmed.world().shared_ground(), &settings, parts)?;
         never_shown(&mut self.confirmed);
@@ -372,9 +354,9 @@ impl Replica {
                 .all(|pos| !self.predicted.bricks.contains_key(pos) && !is_read(pos.samples()))
     }
 
-    /// Updates the shown world. Returns its change, if there is one, and the receipts of the pending edits that were
-    /// predicted last, in order.
-    pub fn update(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
+    /// Updates the shown world. Returns the order that changes it, if there is a change, and the receipts of the pending edits
+    /// that were predicted last, in order.
+    pub fn update(&mut self) -> (Option<Order>, Option<Vec<Receipt>>) {
         // Names of fields may differ that were drafted one after the other.
         self.is_outdated |= self.pending.is_empty() && !self.predicted.is_empty();
         let updated = match self.can_append().then(|| self.append()).flatten() {
@@ -382,8 +364,8 @@ impl Replica {
             None => {
                 self.is_outdated |= self.appended > 0;
                 let updated = self.update_all();
-                if let (Some(shown), Some(ShownChange { change, hash })) = (&mut self.shown, &updated.0)
-                    && shown.apply_one(Order::parts(change.clone(), Some(*hash))).outcome.is_err()
+                if let (Some(shown), Some(order)) = (&mut self.shown, &updated.0)
+                    && shown.apply_one(order).outcome.is_err()
                 {
                     self.shown = None;
                 }
@@ -402,7 +384,7 @@ impl Replica {
     }
 
     /// Predicts the last pending edits over the shown world. `None` if that world can't be built.
-    fn append(&mut self) -> Option<(Option<ShownChange>, Vec<Receipt>)> {
+    fn append(&mut self) -> Option<(Option<Order>, Vec<Receipt>)> {
         if self.shown.is_none() {
             self.shown = self.fork_shown();
         }
@@ -422,14 +404,12 @@ impl Replica {
         }
         let world = self.confirmed.world();
         self.predicted.lay(&change);
-        self.predicted.forget(world, &change.places());
+        self.predicted.forget(world, &change.positions());
         (self.shown_regions_hash, self.next_field) =
             (shown.world().regions_hash(), shown.world().next_field());
         self.hash_offset = self.shown_regions_hash.wrapping_sub(world.regions_hash());
         change.next_field = self.next_field;
-        let is_empty = change.is_empty();
-        let hash = self.shown_hash();
-        Some(((!is_empty).then_some(ShownChange { change, hash }), receipts))
+        Some((self.order_of(change), receipts))
     }
 
     /// The shown world, as a terrain.
@@ -441,7 +421,12 @@ impl Replica {
         Some(shown)
     }
 
-    fn update_all(&mut self) -> (Option<ShownChange>, Option<Vec<Receipt>>) {
+    /// The order that makes a change of the shown world; `None` if nothing changes.
+    fn order_of(&self, change: Patch) -> Option<Order> {
+        (!change.is_empty()).then(|| Order::parts(change, Some(self.shown_hash())))
+    }
+
+    fn update_all(&mut self) -> (Option<Order>, Option<Vec<Receipt>>) {
         if self.changes_are_independent && !self.is_outdated {
             self.changes_are_independent = false;
             return (self.follow_apart(), None);
@@ -457,11 +442,11 @@ impl Replica {
         let (world, before) = (self.confirmed.world(), std::mem::take(&mut self.before));
         let mut predicted = Overlay::default();
         predicted.lay(&draft.change);
-        predicted.forget(world, &draft.change.places());
-        let places = before.places().and(self.predicted.places()).and(predicted.places());
+        predicted.forget(world, &draft.change.positions());
+        let positions = before.positions().and(self.predicted.positions()).and(predicted.positions());
         let confirmed = before.over(world);
         let shown = self.predicted.over(&confirmed);
-        let change = Patch::between(&shown, &predicted.over(world), places, draft.change.next_field);
+        let change = Patch::between(&shown, &predicted.over(world), positions, draft.change.next_field);
         // Of equal bricks the one that is shown stays, so that it is held once.
         for (pos, brick) in &mut predicted.bricks {
             if change.bricks.binary_search_by_key(pos, |(at, _)| *at).is_err() {
@@ -471,30 +456,26 @@ impl Replica {
         self.hash_offset = draft.regions_hash.wrapping_sub(world.regions_hash());
         (self.predicted, self.shown_regions_hash) = (predicted, draft.regions_hash);
         self.next_field = change.next_field;
-        let is_empty = change.is_empty();
-        let shown = (!is_empty).then_some(ShownChange { change, hash: draft.hash });
-        (shown, Some(draft.receipts))
+        (self.order_of(change), Some(draft.receipts))
     }
 
     /// The change of the shown world if the confirmed world has changed apart from the pending edits, whose results
     /// stay.
-    fn follow_apart(&mut self) -> Option<ShownChange> {
+    fn follow_apart(&mut self) -> Option<Order> {
         let before = std::mem::take(&mut self.before);
         self.shown_regions_hash = self.world().regions_hash().wrapping_add(self.hash_offset);
-        let (hash, world) = (self.shown_hash(), self.confirmed.world());
+        let world = self.confirmed.world();
         self.next_field = self.next_field.max(world.next_field());
-        let change = Patch::between(&before.over(world), world, before.places(), self.next_field);
-        let is_empty = change.is_empty();
-        (!is_empty).then_some(ShownChange { change, hash })
+        self.order_of(Patch::between(&before.over(world), world, before.positions(), self.next_field))
     }
 
-    /// The change that makes any world equal to the one to be shown.
-    pub fn whole(&self, shown: &World) -> ShownChange {
+    /// The order that makes any world equal to the one to be shown.
+    pub fn whole(&self, shown: &World) -> Order {
         let world = self.confirmed.world();
-        let places = Places::of(world).and(self.predicted.places()).and(Places::of(shown));
+        let positions = Positions::of(world).and(self.predicted.positions()).and(Positions::of(shown));
         let next_field = self.next_field.max(world.next_field());
-        let change = Patch::between(shown, &self.predicted.over(world), places, next_field);
-        ShownChange { change, hash: self.shown_hash() }
+        let change = Patch::between(shown, &self.predicted.over(world), positions, next_field);
+        Order::parts(change, Some(self.shown_hash()))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Compares a replica with a world that applies the order entry by entry, with the pending edits on top.
+//! Compares a replica with a world that applies the log entry by entry, with the pending edits on top.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -118,12 +118,12 @@ struct Play {
     replica: Replica,
     /// Only put.
     shown: Terrain,
-    /// Obeys the order one entry at a time.
+    /// Obeys the log one entry at a time.
     reference: Terrain,
-    /// How much of the order it has obeyed.
+    /// How much of the log it has obeyed.
     obeyed: usize,
     order: Vec<Entry>,
-    /// How much of the order the replica has.
+    /// How much of the log the replica has.
     given: usize,
     /// Own edits that the server has not answered.
     sent: VecDeque<(u64, Edit)>,
@@ -184,9 +184,9 @@ impl Play {
     fn check(&mut self) {
         let (was_outdated, has_pending) = (self.replica.is_outdated, self.replica.pending().count() > 0);
         self.alone += usize::from(self.replica.can_append());
-        if let (Some(ShownChange { change, hash }), _) = self.replica.update() {
+        if let (Some(order), _) = self.replica.update() {
             self.apart += usize::from(!was_outdated && has_pending);
-            self.shown.apply_one(Order::parts(change, Some(hash))).outcome.expect("it fits");
+            self.shown.apply_one(order).outcome.expect("it fits");
         }
         while self.obeyed < self.given {
             obey(&mut self.reference, &self.order[self.obeyed]);
@@ -282,12 +282,10 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
             }
         }
         play.check();
-        let whole = play.replica.whole(play.shown.world());
         let mut other = terrain(&ground());
         obey(&mut other, &Entry::of(OWN, 0, Order::Edit(edit(&mut rng, &image, NEAR))));
-        let ShownChange { change, hash } = play.replica.whole(other.world());
-        other.apply_one(Order::parts(change, Some(hash))).outcome.expect("it fits");
-        assert_eq!((hash, other.world().hash()), (whole.hash, play.shown.world().hash()));
+        other.apply_one(play.replica.whole(other.world())).outcome.expect("it fits");
+        assert_eq!([play.replica.shown_hash(), other.world().hash()], [play.shown.world().hash(); 2]);
         assert_eq!(fields(other.world()), fields(play.shown.world()));
         (quiet, apart) = (quiet + play.quiet, apart + play.apart);
         (alone, shared) = (alone + play.alone, shared + play.shared);

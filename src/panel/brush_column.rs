@@ -6,11 +6,33 @@ use bevy_egui::egui::{self, Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, 
 use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, ROAD_HEIGHT, ROUNDING, STEP, TUBE};
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, BAD, FAINT};
-use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
-use super::{BrushTool, BurrowPanel, ToolAlign, ToolOperation, ToolShape, texts};
+use super::widgets::{
+    choice, figure, key_button, metres, note, percent, section, share, slider, swatches, switch, tiles,
+};
+use super::{BrushTool, BurrowPanel, PanelAction, ToolAlign, ToolOperation, ToolShape, texts};
 
-/// Draws the part that is always in sight: the pointer's position.
-pub fn head(ui: &mut Ui, panel: &BurrowPanel) {
+/// Draws the part that is always in sight: the buttons of a placed brush, and the pointer's position.
+pub fn head(
+    ui: &mut Ui,
+    panel: &BurrowPanel,
+    tool: &BrushTool,
+    has_terrain: bool,
+    actions: &mut Vec<PanelAction>,
+) {
+    let width = share(ui, 4);
+    let is_placed = tool.placed.is_some();
+    ui.horizontal(|ui| {
+        for (name, help, action, is_enabled) in [
+            (texts::PLACE, texts::PLACE_HELP, PanelAction::PlaceBrush, has_terrain && tool.can_be_placed()),
+            (texts::APPLY, texts::APPLY_HELP, PanelAction::ApplyBrush, has_terrain && is_placed),
+            (texts::SNAP, texts::SNAP_HELP, PanelAction::SnapBrush, has_terrain && is_placed),
+            (texts::RELEASE, texts::RELEASE_HELP, PanelAction::ReleaseBrush, is_placed),
+        ] {
+            if key_button(ui, (name, help), &panel.keys, width, is_enabled) {
+                actions.push(action);
+            }
+        }
+    });
     if let Some(Vec3 { x, y, z }) = panel.pointer {
         figure(ui, texts::POINTER, format!("{x:.1}  {y:.1}  {z:.1} m"));
     }

@@ -6,7 +6,7 @@ use bevy_egui::egui::{self, Id, Modal, RichText, TextEdit, Ui};
 use super::open_level::{Answer, Files, Question};
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::theme::{self, ACCENT, BRIGHT, FAINT};
-use super::widgets::{button, note, share};
+use super::widgets::{button, key_button, note, share};
 use super::{level, survey, texts};
 use crate::terrain::Terrain;
 
@@ -74,8 +74,7 @@ pub(super) fn bar(
             (texts::SAVE, texts::SAVE_HELP, PanelAction::SaveLevel),
             (texts::SAVE_AS, texts::SAVE_AS_HELP, PanelAction::SaveLevelAs),
         ] {
-            let key = panel.keys.get(name).map(|key| format!("\n{key}")).unwrap_or_default();
-            if button(ui, name, width, is_free).on_hover_text(format!("{help}{key}")).clicked() {
+            if key_button(ui, (name, help), &panel.keys, width, is_free) {
                 actions.push(action);
             }
         }

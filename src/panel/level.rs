@@ -44,10 +44,10 @@ pub(super) fn save(
         return;
     }
     let (state, path) = (LevelState::of(terrain), folder.clone());
-    let (world, rules, loose) = (terrain.snapshot(), terrain.rules().cloned(), terrain.loose().copied());
+    let (world, edit_settings) = (terrain.snapshot(), terrain.edit_settings().clone());
     let voxel_size = terrain.voxel_size();
     let task = ThreadTask::start(Threads::Background, move || {
-        let level = Level::of_parts(WorldParts::of(&world, rules, loose), voxel_size, &world);
+        let level = Level::of_parts(WorldParts::of(&world, edit_settings), voxel_size, &world);
         // While a snapshot is held, commits have to copy the world's index.
         drop(world);
         save_level(&path, &level).map(drop)

@@ -17,7 +17,8 @@
 //! | [`PanelPlaces`] | the widgets' positions on the screen, for tutorials and tests |
 //! | [`PanelInput`] | whether the panel uses the pointer or the keyboard; run conditions [`pointer_is_free`], [`keyboard_is_free`] |
 //!
-//! [`PanelAction`] messages trigger its buttons, for key bindings. The panel is drawn by the camera with egui's
+//! [`PanelAction`] messages trigger its buttons, for key bindings. A brush that was [placed](BrushTool::placed) has
+//! handles, which the panel draws over the view even while it is closed. The panel is drawn by the camera with egui's
 //! primary context: the first one, unless the game chooses another. That camera may render to an image. When it is
 //! despawned, another camera with a window gets the context, if bevy_egui may create it
 //! (`EguiGlobalSettings::auto_create_primary_context`). With several terrains, the panel shows one at a time.
@@ -25,6 +26,8 @@
 mod brush_column;
 mod context;
 mod files;
+mod handle_geometry;
+mod handles;
 mod lengths;
 mod level;
 mod look_section;
@@ -45,6 +48,7 @@ mod tool_brush;
 mod tool_content;
 mod tool_geometry;
 mod tool_operation;
+mod tool_placed;
 mod widgets;
 mod world_column;
 
@@ -64,6 +68,7 @@ use crate::plugin::{
 };
 use crate::terrain::Terrain;
 use crate::view::GroundLook;
+use handles::Handles;
 use open_level::Files;
 use state::Note;
 use survey::Survey;
@@ -90,9 +95,14 @@ impl Plugin for BurrowPanelPlugin {
             .init_resource::<PanelPlaces>()
             .init_resource::<Survey>()
             .init_resource::<Files>()
+            .init_resource::<Handles>()
             .init_resource::<picture::Saving>()
             .add_message::<PanelAction>()
-            .add_systems(PreUpdate, state::read_input.after(EguiPreUpdateSet::BeginPass))
+            .add_systems(
+                PreUpdate,
+                (state::read_input, handles::hold_pointer).chain().after(EguiPreUpdateSet::BeginPass),
+            )
+            .add_systems(Update, handles::act.before(BurrowSystems::Collect))
             .add_systems(
                 Update,
                 (
@@ -112,7 +122,7 @@ impl Plugin for BurrowPanelPlugin {
             )
             // After the last of the plugin's work in a frame.
             .add_systems(PostUpdate, survey::follow_frames.after(CommitSameFrame))
-            .add_systems(EguiPrimaryContextPass, draw);
+            .add_systems(EguiPrimaryContextPass, (handles::show, draw).chain());
     }
 }
 
@@ -166,6 +176,13 @@ fn perform_actions(
                     .for_each(|own| level::renew(&mut commands, (&mut *panel, &mut *files), own));
             }
             Some(PanelAction::Quit) => drop(exit.write(AppExit::Success)),
+            // See `handles::act`.
+            Some(
+                PanelAction::PlaceBrush
+                | PanelAction::ApplyBrush
+                | PanelAction::SnapBrush
+                | PanelAction::ReleaseBrush,
+            ) => {}
         }
     }
 }
@@ -280,8 +297,10 @@ fn draw(
     };
     fold_one(context, panel.shows_brush && panel.shows_world);
     if panel.shows_brush {
-        let head = |ui: &mut Ui, _: &mut ()| brush_column::head(ui, &panel);
-        column(context, BRUSH, Align2::LEFT_TOP, texts::BRUSH, &mut (), head, |ui, ()| {
+        let head = |ui: &mut Ui, content: &mut Content| {
+            brush_column::head(ui, &panel, &tool, chosen.is_some(), content.actions);
+        };
+        column(context, BRUSH, Align2::LEFT_TOP, texts::BRUSH, &mut content, head, |ui, _| {
             brush_column::show(ui, &mut new_tool, &materials, voxel, &panel);
         });
     }

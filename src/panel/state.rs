@@ -126,6 +126,15 @@ pub enum PanelAction {
     LoadLevel,
     /// Puts the ground without any edits in the terrain's place. Asks before unsaved changes are lost.
     NewLevel,
+    /// [Places](super::BrushTool::placed) the brush where the pointer is on the ground, or, while the pointer is over
+    /// the panel, where the middle of the view is.
+    PlaceBrush,
+    /// Applies the placed brush, which stays where it is. Each time is one undo step.
+    ApplyBrush,
+    /// Moves the placed brush up or down to the nearest ground.
+    SnapBrush,
+    /// Lets the placed brush follow the pointer again.
+    ReleaseBrush,
     /// Ends the app. Asks before unsaved changes are lost. If that is asked already, the question is taken back.
     Quit,
 }
@@ -135,15 +144,15 @@ pub enum PanelAction {
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct PanelInput {
-    /// The pointer is over a widget or drags one.
+    /// The pointer is over a widget, or a handle of a [placed brush](super::BrushTool::placed), or drags one.
     pub has_pointer: bool,
     /// Text is being typed into a widget.
     pub has_keyboard: bool,
 }
 
 /// Positions of the panel's widgets in the last frame, by name, in logical pixels from the window's upper left
-/// corner. For a slider it is the rail, for a section the heading, for a value its line. Empty while the panel is
-/// closed.
+/// corner. For a slider it is the rail, for a section the heading, for a value its line, for a handle a point to grab it.
+/// While the panel is closed, there are only the handles of a [placed brush](super::BrushTool::placed).
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct PanelPlaces(pub HashMap<String, Rect>);

@@ -34,6 +34,18 @@ texts! {
     EDITS_ONLY = "Edits only", SMOOTH_PATH = "Curved", PATH_POINTS = "Points",
     PATH_HELP = "Each click sets a point. The path is one edit and one undo step.",
 }
+
+// A placed brush.
+texts! {
+    PLACE = "Place", PLACE_HELP = "Puts the brush in the middle of the view, with handles to move, turn and scale it",
+    APPLY = "Apply", APPLY_HELP = "Applies the placed brush. Each time is one undo step.",
+    SNAP = "Snap", SNAP_HELP = "Moves the placed brush up or down to the nearest ground",
+    RELEASE = "Release", RELEASE_HELP = "Lets the brush follow the mouse again",
+    NO_GROUND = "There is no ground to place the brush on", MOVE_OVER_GROUND = "Move over the ground",
+    MOVE = "Move along", TURN_ABOUT = "Turn about", SCALE = "Scale along",
+}
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// The operations and what they do, in the order of `ToolOperation`.
 pub const OPERATIONS: [(&str, &str); 17] = [
     ("Dig", "Removes ground"),

@@ -5,6 +5,7 @@ use bevy::prelude::*;
 pub use super::tool_content::{StampImage, ToolModel, ToolPrefab};
 use super::tool_operation::ToolOperation;
 use crate::brush::FULL_POWER;
+use crate::plugin::TerrainHit;
 
 /// The current brush, in metres of world space. The panel and the game may change it. A size that
 /// the game sets is not clamped: a brush with one that is out of range is rejected. The game turns it into
@@ -70,6 +71,10 @@ pub struct BrushTool {
     pub prefab: ToolPrefab,
     /// Whether pastes are mirrored.
     pub is_mirrored: bool,
+    /// Where it was placed: it stays there, with handles to move, turn and scale it. Games show their preview there, and
+    /// make no strokes meanwhile; [`PanelAction`](super::PanelAction) applies it. A path can't be placed.
+    #[reflect(ignore)]
+    pub placed: Option<TerrainHit>,
     /// The points of a path that are set already, in world space; a brush adds its own place as the last one. At most
     /// [`PATH_POINTS`].
     pub points: Vec<Vec3>,
@@ -113,6 +118,7 @@ impl Default for BrushTool {
             model: ToolModel::default(),
             prefab: ToolPrefab::default(),
             is_mirrored: false,
+            placed: None,
             points: Vec::new(),
             is_smooth: true,
             power: FULL_POWER,

@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use bevy::platform::collections::HashMap;
 use bevy_egui::egui::collapsing_header::{CollapsingState, paint_default_icon};
 use bevy_egui::egui::{
     Align, Align2, Button, Color32, Context, CornerRadius, CursorIcon, FontId, Id, Label, Layout, Pos2, Rect,
@@ -17,12 +18,16 @@ struct Drawn(PanelPlaces);
 
 /// Records the position of a widget if it is visible.
 pub fn note(ui: &Ui, name: &str, rect: Rect) {
-    if !ui.is_rect_visible(rect) {
-        return;
+    if ui.is_rect_visible(rect) {
+        note_in(ui.ctx(), name, rect);
     }
+}
+
+/// Records the position of something that is drawn outside of a [`Ui`].
+pub fn note_in(context: &Context, name: &str, rect: Rect) {
     let corner = |at: Pos2| bevy::math::Vec2::new(at.x, at.y);
     let place = bevy::math::Rect::from_corners(corner(rect.min), corner(rect.max));
-    ui.data_mut(|data| {
+    context.data_mut(|data| {
         data.get_temp_mut_or_default::<Drawn>(Id::NULL).0.0.insert(name.into(), place);
     });
 }
@@ -219,6 +224,19 @@ pub fn button(ui: &mut Ui, text: &str, width: f32, is_enabled: bool) -> Response
     let response = ui.add_enabled(is_enabled, Button::new(text).min_size(Vec2::new(width, 26.0)));
     note(ui, text, response.rect);
     response
+}
+
+/// A button that shows its help and the game's key for it on hover. Returns whether it was clicked.
+pub fn key_button(
+    ui: &mut Ui,
+    (name, help): (&str, &str),
+    keys: &HashMap<String, String>,
+    width: f32,
+    is_enabled: bool,
+) -> bool {
+    let key = keys.get(name).map(|key| format!("\n{key}")).unwrap_or_default();
+    let response = button(ui, name, width, is_enabled);
+    response.on_hover_text(format!("{help}{key}")).clicked()
 }
 
 /// Width of one of `count` buttons in a row.

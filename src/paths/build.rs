@@ -71,7 +71,8 @@ fn mesh(polygons: &NavPolygons, scale: f32) -> Option<Arc<ValidNavigationMesh3d>
         .map(Arc::new)
 }
 
-/// Makes islands of tiles that are done. Waits for those that the commit of the last frame changed.
+/// Makes islands of tiles that are done, and replaces those that changed. Waits for tiles that the commit of the last frame
+/// changed.
 pub(super) fn replace_islands(
     mut navigations: Query<(&Navigation, &mut NavigationTiles)>,
     places: Places,
@@ -103,11 +104,20 @@ pub(super) fn replace_islands(
                 };
                 tile.build = number;
                 let ledges = mesh.as_ref().map_or_else(Vec::new, |mesh| mesh.ledges.clone());
-                show(navigation, pos, tile, mesh, (&mut meshes, &handles), &mut commands);
+                // Landmass searches new paths for all agents whose paths cross an island that is replaced.
+                let island = tile.island.filter(|&island| handles.contains(island));
+                let is_same = tile.polygons.as_deref() == mesh.as_ref().map(|mesh| &mesh.polygons);
+                if !is_same || island != tile.island {
+                    show(navigation, pos, tile, mesh, (&mut meshes, &handles), &mut commands);
+                }
+                if ledges == tile.ledges && island == tile.island {
+                    continue;
+                }
                 tile.links.drain(..).for_each(|link| despawn(Some(link), &mut commands));
                 if let (Some(island), Some(place)) = (tile.island, places.of(navigation.terrain)) {
                     tile.links = spawn_links(navigation, island, pos, &ledges, &place, &mut commands);
                 }
+                tile.ledges = ledges;
             }
         }
     }

@@ -2,16 +2,14 @@
 
 use std::sync::Arc;
 
-use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
 use super::build::TILES;
 use super::tiles::NavigationTiles;
 use super::{Navigation, NavigationArea, NavigationSource};
-use crate::lattice::Column;
 use crate::navigation::{NAV_TILE, NavTilePos, Walker};
-use crate::plugin::{Places, TerrainEntities, voxel_metres};
-use crate::terrain::{Terrain, World};
+use crate::plugin::{Places, Squares, TerrainEntities, are_same, position_on, voxel_metres};
+use crate::terrain::Terrain;
 
 /// Reads settings that changed, chooses tiles, and starts to build those that are missing.
 pub(super) fn choose_tiles(
@@ -71,16 +69,18 @@ pub(super) fn choose_tiles(
             let sources: Vec<(Vec2, f32)> = sources
                 .iter()
                 .filter_map(|(source, &NavigationSource { radius })| {
-                    let at = inverse.transform_point3(places.of(source)?.translation());
-                    at.is_finite().then_some((at.xz(), (radius / scale).clamp(0.0, 65536.0)))
+                    let position = position_on(&inverse, &places.of(source)?)?;
+                    Some((position, (radius / scale).clamp(0.0, 65536.0)))
                 })
                 .collect();
-            let near = |(a, b): (&(Vec2, f32), &(Vec2, f32))| a.0.distance(b.0) < 1.0 && a.1 == b.1;
-            let is_settled = tiles.is_chosen && sources.len() == tiles.sources.len();
-            if !is_settled || !sources.iter().zip(&tiles.sources).all(near) {
-                let (wanted, kept) = around(world, &sources);
+            if !tiles.is_chosen || !are_same(&tiles.sources, &sources) {
+                let (mut near, ground) = (Squares::default(), world.ground());
+                for &source in &sources {
+                    let key = |square: IVec2| NavTilePos { x: square.x, z: square.y };
+                    near.add(source, NAV_TILE, (ground.width(), ground.depth()), key);
+                }
                 tiles.sources = sources;
-                tiles.choose(wanted, &kept, &mut commands);
+                tiles.choose(near.wanted(|_| true), &near.kept, &mut commands);
             }
         }
         let is_loading = tiles.builds.iter().any(|build| !build.is_urgent);
@@ -90,27 +90,4 @@ pub(super) fn choose_tiles(
             tiles.build(&terrain.snapshot(), &first, false);
         }
     }
-}
-
-/// The tiles near to sources, nearest first, and those that stay if they are there.
-fn around(world: &World, sources: &[(Vec2, f32)]) -> (Vec<NavTilePos>, HashSet<NavTilePos>) {
-    let (mut near, mut kept, mut seen) = (Vec::new(), HashSet::default(), HashSet::<NavTilePos>::default());
-    let side = NAV_TILE as f32;
-    for &(at, radius) in sources {
-        // Half a tile more keeps one from coming and going.
-        let far = radius + side / 2.0;
-        let corner = |more: f32| Column::new((at.x + more).floor() as i32, (at.y + more).floor() as i32);
-        for pos in NavTilePos::covering(world, corner(-far), corner(far)) {
-            let low = Vec2::new(pos.x as f32, pos.z as f32) * side;
-            let apart = at.distance(at.clamp(low, low + side));
-            if apart <= far {
-                kept.insert(pos);
-            }
-            if apart <= radius && seen.insert(pos) {
-                near.push((apart, pos));
-            }
-        }
-    }
-    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    (near.into_iter().map(|(_, pos)| pos).collect(), kept)
 }

@@ -40,7 +40,8 @@ pub(super) struct LoadedTile {
     pub build: u64,
     pub polygons: Option<Arc<NavPolygons>>,
     pub island: Option<Entity>,
-    /// Its links over ledges, children of the island.
+    /// Its links over ledges, and their entities, children of the island.
+    pub ledges: Vec<LedgeLink>,
     pub links: Vec<Entity>,
 }
 

@@ -8,6 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::columns::ColumnKey;
 use crate::lattice::{ChunkGrid, TilePos};
+use crate::plugin::squares_within;
 
 /// The most stops on a way ahead, one for each chunk's width.
 const STOPS: u32 = 64;
@@ -97,22 +98,14 @@ struct Area {
 
 impl Area {
     fn new(grid: ChunkGrid, stops: Vec<Stop>) -> Self {
-        let (size, (width, depth)) = (grid.size() as f32, grid.tile_counts());
+        let (size, cells) = (grid.size(), (grid.width(), grid.depth()));
         let mut columns = FxHashMap::default();
         let is_all = stops.iter().any(|&stop| reaches_all(grid, stop));
         for (place, radius) in uncovered(&stops) {
-            let reach = radius + size;
-            let (low, high) = ((place - reach) / size - 1.0, (place + reach) / size);
-            let (low, high) = (low.floor().as_ivec2().max(IVec2::ZERO), high.floor().as_ivec2());
-            for z in low.y..=high.y.min(depth - 1) {
-                for x in low.x..=high.x.min(width - 1) {
-                    let corner = Vec2::new(x as f32, z as f32) * size;
-                    let distance = place.distance(place.clamp(corner, corner + size)) - radius;
-                    if distance <= size {
-                        let nearest = columns.entry(TilePos { x, z }).or_insert(distance);
-                        *nearest = nearest.min(distance);
-                    }
-                }
+            for (square, apart) in squares_within(place, radius + size as f32, size, cells) {
+                let distance = apart - radius;
+                let nearest = columns.entry(TilePos { x: square.x, z: square.y }).or_insert(distance);
+                *nearest = distance.min(*nearest);
             }
         }
         Self { grid, stops, is_all, columns }

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use super::{PlantSystems, ShownPlants};
 use crate::lattice::Column;
 use crate::physics::ColliderSource;
-use crate::plugin::{Places, voxel_metres};
+use crate::plugin::{Places, position_on, voxel_metres};
 use crate::scatter::PlantId;
 use crate::terrain::Terrain;
 
@@ -49,10 +49,10 @@ fn keep_colliders(
         let mut near = HashSet::new();
         let stems = stems.bypass_change_detection();
         for (source, &ColliderSource { radius }) in &sources {
-            let (Some(at), Some(patches)) = (places.of(source), shown.patches()) else { continue };
-            let at = inverse.transform_point3(at.translation());
+            let at = places.of(source).and_then(|place| position_on(&inverse, &place));
+            let (Some(at), Some(patches)) = (at, shown.patches()) else { continue };
             let radius = radius.min(NEAR) / voxel;
-            let cell = |more: f32| Column::new((at.x + more).floor() as i32, (at.z + more).floor() as i32);
+            let cell = |more: f32| Column::new((at.x + more).floor() as i32, (at.y + more).floor() as i32);
             let species = patches.scatter().species();
             let has_stem = species.iter().map(|own| own.stem.is_some());
             for plant in patches.near_of(cell(-radius), cell(radius), has_stem) {

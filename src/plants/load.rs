@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::Allow;
-use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 
 use super::follow::PlantMessages;
 use super::{News, PlantSource, Plants, ShownPlants};
-use crate::plugin::{Places, TerrainEntities, voxel_metres};
+use crate::plugin::{Places, Squares, TerrainEntities, are_same, position_on, voxel_metres};
 use crate::scatter::{PatchPos, Plant, PlantPatches, Scatter};
 use crate::terrain::Terrain;
 use crate::threads::{ThreadTask, Threads, free_later};
@@ -99,33 +98,29 @@ pub(super) fn choose_patches(
         let viewers: Vec<Viewer> = viewers
             .iter()
             .filter_map(|(viewer, source)| {
-                let at = inverse.transform_point3(places.of(viewer)?.translation());
-                at.is_finite().then(|| (at.xz(), source.map(|source| source.radius / voxel)))
+                let position = position_on(&inverse, &places.of(viewer)?)?;
+                Some((position, source.map(|source| source.radius / voxel)))
             })
             .collect();
-        let near = |(a, b): (&Viewer, &Viewer)| a.0.distance(b.0) < 1.0 && a.1 == b.1;
-        let is_settled = shown.is_settled && viewers.len() == shown.viewers.len();
-        if is_settled && viewers.iter().zip(&shown.viewers).all(near) {
+        if shown.is_settled && are_same(&shown.viewers, &viewers) {
             continue;
         }
         shown.viewers.clone_from(&viewers);
         let scatter = Arc::clone(patches.scatter());
-        let wanted = wanted(&scatter, (world.ground().width(), world.ground().depth()), &viewers);
+        let near = near(&scatter, (world.ground().width(), world.ground().depth()), &viewers);
         let far: Vec<PatchPos> =
-            patches.iter().map(|(pos, _)| pos).filter(|pos| !wanted.kept.contains(pos)).collect();
+            patches.iter().map(|(pos, _)| pos).filter(|pos| !near.kept.contains(pos)).collect();
         for pos in far {
             free_later(patches.remove(pos));
             shown.news.push(News::Unloaded(pos));
         }
-        let mut missing: Vec<(f32, PatchPos)> =
-            wanted.near.into_iter().filter(|(_, pos)| patches.get(*pos).is_none()).collect();
+        let missing = near.wanted(|pos| patches.get(pos).is_none());
         shown.is_settled = missing.is_empty();
         if shown.is_settled {
             continue;
         }
-        missing.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut cells = 0;
-        let first = missing.into_iter().map(|(_, pos)| pos).take_while(|pos| {
+        let first = missing.into_iter().take_while(|pos| {
             let fits = cells < CELLS;
             cells += scatter.patch_size(pos.species).pow(2);
             fits
@@ -138,43 +133,15 @@ pub(super) fn choose_patches(
     }
 }
 
-/// The patches that viewers want.
-struct Wanted {
-    /// Those to be loaded, with their distance.
-    near: Vec<(f32, PatchPos)>,
-    /// Those, and some more that stay if they are there.
-    kept: HashSet<PatchPos>,
-}
-
-fn wanted(scatter: &Scatter, world: (i32, i32), viewers: &[Viewer]) -> Wanted {
-    let mut wanted = Wanted { near: Vec::new(), kept: HashSet::default() };
-    let mut near = HashSet::new();
+/// The patches around viewers in a world of these many cells.
+fn near(scatter: &Scatter, cells: (i32, i32), viewers: &[Viewer]) -> Squares<PatchPos> {
+    let mut near = Squares::default();
     for (species, own) in (0..=u8::MAX).zip(scatter.species()) {
-        let size = scatter.patch_size(species);
-        let side = size as f32;
-        for &(at, radius) in viewers {
+        for &(position, radius) in viewers {
             let radius = radius.map_or(own.view.end, |radius| radius.clamp(0.0, LARGEST_RADIUS));
-            // Half a patch more keeps one from coming and going.
-            let kept = radius + side / 2.0;
-            let along = |at: f32, cells: i32| {
-                let first = ((at - kept) / side).floor() as i32;
-                let last = ((at + kept) / side).floor() as i32;
-                first.max(0)..=last.min((cells - 1) / size)
-            };
-            for z in along(at.y, world.1) {
-                for x in along(at.x, world.0) {
-                    let low = Vec2::new(x as f32, z as f32) * side;
-                    let apart = at.distance(at.clamp(low, low + side));
-                    let pos = PatchPos { species, x, z };
-                    if apart <= kept {
-                        wanted.kept.insert(pos);
-                    }
-                    if apart <= radius && near.insert(pos) {
-                        wanted.near.push((apart, pos));
-                    }
-                }
-            }
+            let key = |square: IVec2| PatchPos { species, x: square.x, z: square.y };
+            near.add((position, radius), scatter.patch_size(species), cells, key);
         }
     }
-    wanted
+    near
 }

@@ -29,7 +29,7 @@ use crate::terrain::{KnownNodes, Version};
 /// Levels are chosen for all of these cameras together. While there is none, levels stay as they are. Distances and
 /// speeds are measured in the terrain's own space and in real time, so shifted origins and slow motion change nothing.
 ///
-/// The defaults need no change. Values of 0, negative ones and NaN are allowed: `most_nodes` bounds what they can cost. A
+/// The defaults need no change. Values of 0, negative ones and NaN are allowed: `max_nodes` bounds what they can cost. A
 /// terrain that gets or loses this component is loaded again.
 ///
 /// With it, a [`Tile`](super::Tile) has an entity while it is drawn, and of level 0 also while something else needs it,
@@ -53,7 +53,7 @@ pub struct LevelsOfDetail {
     /// Levels are chosen for where cameras will be in this many seconds, too. With 0, only for where they are.
     pub look_ahead: f32,
     /// The approximate maximum of drawn squares; if more would be needed, all ground is drawn coarser.
-    pub most_nodes: usize,
+    pub max_nodes: usize,
     /// Meshes made for one change of levels, unless a single square needs more. 0 counts as 1.
     pub meshes_per_change: usize,
 }
@@ -66,7 +66,7 @@ impl Default for LevelsOfDetail {
             edited_pixels,
             look_ahead,
             view_distance,
-            most_nodes,
+            max_nodes,
             ..
         } = LodSettings::default();
         Self {
@@ -75,7 +75,7 @@ impl Default for LevelsOfDetail {
             cell_pixels,
             edited_pixels,
             look_ahead,
-            most_nodes,
+            max_nodes,
             meshes_per_change: 16,
         }
     }
@@ -89,7 +89,7 @@ impl LevelsOfDetail {
             edited_pixels: self.edited_pixels,
             look_ahead: self.look_ahead,
             view_distance: self.view_distance / voxel_size,
-            most_nodes: self.most_nodes,
+            max_nodes: self.max_nodes,
             ..LodSettings::default()
         }
     }

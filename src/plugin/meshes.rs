@@ -134,7 +134,8 @@ impl MeshBuilder {
         arrays.push(rings, origin);
         if let Some(lights) = lights.get() {
             // Columns lie on the undug surface, so they have no depth below it.
-            let of_columns = lights.ground_lights().into_iter().map(|light| [light.sky, 0, light.daylight, 0]);
+            let of_columns =
+                lights.ground_lights().into_iter().map(|light| [light.sky, 0, light.daylight, 0]);
             arrays.lights.extend(of_columns.take(columns.len()));
             arrays.push_lights(rings, origin, lights);
         }

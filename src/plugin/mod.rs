@@ -54,6 +54,12 @@ mod redraw;
 mod reports;
 mod same_frame;
 mod settings;
+#[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
+#[cfg_attr(
+    not(any(feature = "scatter", feature = "landmass")),
+    allow(dead_code, reason = "colliders need only some of it")
+)]
+mod squares;
 mod task;
 mod times;
 mod vertex_kind;
@@ -104,6 +110,10 @@ pub use query::{TerrainHit, Terrains};
 pub use redraw::Redraw;
 pub(crate) use same_frame::CommitSameFrame;
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
+#[cfg(feature = "avian")]
+pub(crate) use squares::squares_within;
+#[cfg(any(feature = "scatter", feature = "landmass"))]
+pub(crate) use squares::{Squares, are_same, position_on};
 #[doc(hidden)]
 pub use times::Times;
 pub use vertex_kind::{

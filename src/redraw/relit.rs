@@ -15,7 +15,7 @@ use crate::world::sky::{LightChange, LitWorld, REACH, SkyLights, SkyView, Sparse
 use crate::world::{MeshKey, World};
 
 /// Rectangles of columns of at most this many along a side are compared as one, and with larger ones each tile for itself.
-const MOST_TOGETHER: i32 = 128;
+const MAX_TOGETHER: i32 = 128;
 
 /// Stacks of bricks that change.
 #[derive(Clone, Copy)]
@@ -77,7 +77,7 @@ struct Unchanged {
 pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(MeshKey) -> bool + Sync) -> Vec<MeshKey> {
     let (world, grid) = (lit.before(), lit.before().grid());
     let Some(all) = areas(lit).reduce(Area::union) else { return Vec::new() };
-    let is_one = (all.high.x - all.low.x).max(all.high.z - all.low.z) <= MOST_TOGETHER - 2 * REACH;
+    let is_one = (all.high.x - all.low.x).max(all.high.z - all.low.z) <= MAX_TOGETHER - 2 * REACH;
     let mut by_tile: FxHashMap<TilePos, (Area, Vec<ChunkPos>)> = FxHashMap::default();
     let mut add = |area: Area| {
         for tile in area.tiles(grid) {

@@ -39,7 +39,7 @@ impl AbandonedStores {
         }
     }
 
-    /// Logs the troubles of stores, and forgets those that are closed.
+    /// Logs the warnings of stores, and forgets those that are closed.
     pub fn poll(&self) {
         self.lock().stores.retain_mut(|abandoned| !abandoned.is_done());
     }
@@ -70,8 +70,8 @@ impl Abandoned {
         }
         let Some(store) = &self.store else { return false };
         let outcome = store.outcome();
-        for trouble in store.take_troubles() {
-            warn!("a world that is no longer served: {trouble}");
+        for warning in store.take_warnings() {
+            warn!("a world that is no longer served: {warning}");
         }
         if let Some(Err(why)) = &outcome {
             error!("not everything is saved in a world that is no longer served: {why}");

@@ -12,7 +12,7 @@ use bevy::prelude::*;
 use super::abandoned::AbandonedStores;
 use super::components::{EXIT_WAIT, SavedWorld, Unopened, WorldStore};
 use super::follow::follow_same;
-use super::messages::{ClosedBecause, StoreTroubleFound, WorldClosed, WorldOpened};
+use super::messages::{ClosedBecause, StoreWarningFound, WorldClosed, WorldOpened};
 use super::reading::OpeningWorld;
 use crate::store::{ClosingStore, Store, StoreError};
 use crate::terrain::Terrain;
@@ -123,18 +123,18 @@ pub(crate) fn detach(entity: &mut EntityWorldMut, because: ClosedBecause) {
 pub(super) fn report_closed(
     mut closing: ResMut<ClosingWorlds>,
     mut closed: MessageWriter<WorldClosed>,
-    mut troubles: MessageWriter<StoreTroubleFound>,
+    mut warnings: MessageWriter<StoreWarningFound>,
 ) {
     closing.abandoned.poll();
     if closing.worlds.is_empty() {
         return;
     }
     closing.worlds.retain(|Closing { terrain, path, because, store }| {
-        // Its last troubles come before its end.
+        // Its last warnings come before its end.
         let outcome = store.outcome();
-        for trouble in store.take_troubles() {
-            warn!("the world in {}: {trouble}", path.display());
-            troubles.write(StoreTroubleFound { terrain: *terrain, trouble });
+        for warning in store.take_warnings() {
+            warn!("the world in {}: {warning}", path.display());
+            warnings.write(StoreWarningFound { terrain: *terrain, warning });
         }
         let Some(outcome) = outcome else { return true };
         if let Err(why) = &outcome {

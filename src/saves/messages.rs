@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use crate::store::{StoreError, StoreTrouble};
+use crate::store::{StoreError, StoreWarning};
 
 /// Saves at once, and makes a checkpoint: for example when a level ends, or before a menu closes the game. Without it,
 /// everything is saved too, within the loss window. A [`WorldSaved`] follows once everything that was committed or put
@@ -40,11 +40,11 @@ pub struct WorldSaved {
 /// A problem with a saved world to show to the player or operator: the disk is full, a region was damaged. Play
 /// continues, and saving is retried.
 #[derive(Message, Clone, Debug, PartialEq)]
-pub struct StoreTroubleFound {
+pub struct StoreWarningFound {
     /// The terrain's entity.
     pub terrain: Entity,
-    /// The trouble.
-    pub trouble: StoreTrouble,
+    /// The warning.
+    pub warning: StoreWarning,
 }
 
 /// A saved world is closed, so that its folder can be opened, copied or removed.

@@ -38,7 +38,7 @@ pub(crate) use components::EXIT_WAIT;
 pub use components::{SavedWorld, WorldStore};
 #[doc(hidden)]
 pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
-pub use messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldClosed, WorldOpened, WorldSaved};
+pub use messages::{ClosedBecause, SaveNow, StoreWarningFound, WorldClosed, WorldOpened, WorldSaved};
 pub use reading::OpeningWorld;
 pub(crate) use reading::{ReadWorld, WorldReader};
 
@@ -61,7 +61,7 @@ impl Plugin for SavePlugin {
             .add_message::<WorldOpened>()
             .add_message::<WorldSaved>()
             .add_message::<WorldClosed>()
-            .add_message::<StoreTroubleFound>()
+            .add_message::<StoreWarningFound>()
             .init_resource::<ClosingWorlds>()
             .insert_resource(components::SavesWorlds)
             .add_observer(opening::begin_anew)

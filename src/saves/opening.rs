@@ -11,9 +11,9 @@ use super::closing::{ClosingWorlds, detach};
 use super::components::{LevelId, SavedWorld, Unopened, WorldStore, hold_now};
 use super::holding::release;
 use super::level::{FindLevel, MakingLevel, StartLevel, Waiting};
-use super::messages::{ClosedBecause, StoreTroubleFound, WorldOpened};
+use super::messages::{ClosedBecause, StoreWarningFound, WorldOpened};
 use super::reading::{Found, OpeningWorld, ReadWorld, WorldReader};
-use crate::store::{Store, StoreTrouble};
+use crate::store::{Store, StoreWarning};
 use crate::terrain::Terrain;
 use crate::threads::free_later;
 
@@ -170,16 +170,16 @@ pub(super) fn finish_opening(
     mut worlds: Query<(Entity, &mut Terrain, &mut OpeningWorld), (With<SavedWorld>, Allow<Disabled>)>,
     mut closing: ResMut<ClosingWorlds>,
     mut opened: MessageWriter<WorldOpened>,
-    mut troubles: MessageWriter<StoreTroubleFound>,
+    mut warnings: MessageWriter<StoreWarningFound>,
 ) {
     for (entity, mut terrain, mut opening) in &mut worlds {
         let saved = &Arc::clone(&opening.reader).saved;
-        let mut report = |trouble| {
-            warn!("the world in {}: {trouble}", saved.path.display());
-            troubles.write(StoreTroubleFound { terrain: entity, trouble });
+        let mut report = |warning| {
+            warn!("the world in {}: {warning}", saved.path.display());
+            warnings.write(StoreWarningFound { terrain: entity, warning });
         };
         if opening.reports_lock() {
-            report(StoreTrouble::WaitsForLock);
+            report(StoreWarning::WaitsForLock);
         }
         let Some(outcome) = opening.poll() else { continue };
         let now = terrain.world().version();
@@ -200,8 +200,8 @@ pub(super) fn finish_opening(
                     store.adopt(&terrain, opening.reader.next_record);
                     store
                 }
-                Found::Old(ReadWorld { store, terrain: mut read, troubles }) => {
-                    troubles.into_iter().for_each(&mut report);
+                Found::Old(ReadWorld { store, terrain: mut read, warnings }) => {
+                    warnings.into_iter().for_each(&mut report);
                     if now != opening.version {
                         warn!("what the game did to {entity} while its world was read is not in that");
                     }

@@ -9,14 +9,13 @@ use bevy::prelude::*;
 use super::components::{LevelId, SavedWorld};
 use super::level::BurrowLevel;
 use crate::format::read_level;
-use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreTrouble};
-use crate::terrain::{self, LooseSettings, Terrain, TerrainSettings, Version, WorldParts};
+use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreWarning};
+use crate::terrain::{self, EditSettings, Terrain, TerrainSettings, Version, WorldParts};
 use crate::threads::{ThreadTask, Threads, free_later};
-use crate::volume::DiggingRules;
 
 /// How long to wait for a world that is open elsewhere: longer than an exiting server takes to close it.
 const LOCK_WAIT: Duration = Duration::from_secs(15);
-/// The interval of attempts to open it, and the time after which a trouble is reported.
+/// The interval of attempts to open it, and the time after which a warning is reported.
 const LOCK_TRY: Duration = Duration::from_millis(50);
 const REPORT_LOCK_AFTER: Duration = Duration::from_secs(2);
 
@@ -93,7 +92,7 @@ impl Drop for OpeningWorld {
 pub(crate) struct ReadWorld {
     pub store: Store,
     pub terrain: Terrain,
-    pub troubles: Vec<StoreTrouble>,
+    pub warnings: Vec<StoreWarning>,
 }
 
 /// The result of reading.
@@ -121,8 +120,7 @@ pub(crate) struct WorldReader {
     pub(super) id: LevelId,
     /// The content of a world that does not exist yet.
     world: Arc<terrain::World>,
-    rules: Option<DiggingRules>,
-    loose: Option<LooseSettings>,
+    edit_settings: EditSettings,
     /// The number of the next record in the log of the terrain that this content is of.
     pub(super) next_record: u64,
     pub progress: Progress,
@@ -132,11 +130,11 @@ impl WorldReader {
     /// A reader for this saved world. If there is none yet, it is created from the terrain, on the level if one is
     /// given. The terrain's rules and loose settings also hold in a world that exists.
     pub fn new(saved: &SavedWorld, terrain: &Terrain, level: Option<(BurrowLevel, String)>) -> Self {
-        let (world, rules, loose) = (terrain.snapshot(), terrain.rules().cloned(), terrain.loose().copied());
+        let (world, edit_settings) = (terrain.snapshot(), terrain.edit_settings().clone());
         let next_record = terrain.log_numbers().map_or(0, |numbers| numbers.end);
         let (saved, folder, id) = (saved.clone(), Folder::new(&saved.path), LevelId::of(terrain));
         let progress = Progress::default();
-        Self { saved, folder, level, id, world, rules, loose, next_record, progress }
+        Self { saved, folder, level, id, world, edit_settings, next_record, progress }
     }
 
     /// Reads the world, or creates it. Waits while another process has it open.
@@ -152,7 +150,7 @@ impl WorldReader {
 
     /// Reads the world, or creates one, unless it is open elsewhere.
     fn try_read(&self) -> Result<Found, StoreError> {
-        let Self { saved, folder, level, id, world, rules, loose, progress, .. } = self;
+        let Self { saved, folder, level, id, world, edit_settings, progress, .. } = self;
         let ground = &world.shared_ground();
         // An unreadable level was reported when the terrain was built from it.
         let level = level.as_ref();
@@ -161,28 +159,29 @@ impl WorldReader {
         let options = StoreOptions { level, progress: Some(progress.clone()), ..saved.options() };
         if !Store::is_in(folder.path()) {
             let settings = TerrainSettings { chunk_size: id.chunk_size, voxel_size: id.voxel_size };
-            let parts = WorldParts::of(world, rules.clone(), *loose);
+            let parts = WorldParts::of(world, edit_settings.clone());
             let mut terrain = Terrain::restore(Arc::clone(ground), &settings, parts)?;
             match Store::create(folder.path(), &mut terrain, options.clone()) {
                 // Another process created it meanwhile.
                 Err(StoreError::Exists(_)) => {}
                 created => {
-                    let (store, troubles) = (created?, Vec::new());
-                    return Ok(Found::New(ReadWorld { store, terrain, troubles }));
+                    let (store, warnings) = (created?, Vec::new());
+                    return Ok(Found::New(ReadWorld { store, terrain, warnings }));
                 }
             }
         }
         let (store, opened) = Store::open(folder.path(), Arc::clone(ground), options)?;
-        let (mut terrain, troubles) = (opened.terrain, opened.troubles);
+        let (mut terrain, warnings) = (opened.terrain, opened.warnings);
         // A new version of the game may have other rules than the one that saved the world.
-        if let Some(rules) = rules.clone().filter(|rules| terrain.rules() != Some(rules))
-            && let Err(why) = terrain.set_rules(rules)
+        let EditSettings { rules, loose } = edit_settings;
+        if let Some(rules) = rules.as_deref().filter(|rules| terrain.rules() != Some(rules))
+            && let Err(why) = terrain.set_rules(rules.clone())
         {
             error!("the rules of the terrain do not hold for its saved world: {why}");
         }
         if loose.is_some() && loose.as_ref() != terrain.loose() {
             terrain.set_loose(*loose);
         }
-        Ok(Found::Old(ReadWorld { store, terrain, troubles }))
+        Ok(Found::Old(ReadWorld { store, terrain, warnings }))
     }
 }

@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use super::closing::{ClosingWorlds, detach};
 use super::components::{EXIT_WAIT, WorldStore};
 use super::follow::follow;
-use super::messages::{ClosedBecause, SaveNow, StoreTroubleFound, WorldSaved};
+use super::messages::{ClosedBecause, SaveNow, StoreWarningFound, WorldSaved};
 use crate::terrain::Terrain;
 
 /// Sends new commits to stores. A terrain that is not a state of the saved world is not written into it: the world is
@@ -56,7 +56,7 @@ pub(super) fn save_now(
             let world = &mut *world;
             let Some(store) = &mut world.store else { continue };
             world.asked_again = false;
-            // If its thread is gone, that is reported as a trouble.
+            // If its thread is gone, that is reported as a warning.
             if store.request_checkpoint().is_ok() {
                 world.asked = Some(store.point());
             }
@@ -64,18 +64,18 @@ pub(super) fn save_now(
     }
 }
 
-/// Reports what has become durable, and troubles.
+/// Reports what has become durable, and warnings.
 pub(super) fn report(
     mut worlds: Query<(Entity, &mut WorldStore), Allow<Disabled>>,
     mut saved: MessageWriter<WorldSaved>,
-    mut troubles: MessageWriter<StoreTroubleFound>,
+    mut warnings: MessageWriter<StoreWarningFound>,
 ) {
     for (entity, mut world) in &mut worlds {
         let world = &mut *world;
         let Some(store) = &world.store else { continue };
-        for trouble in store.take_troubles() {
-            warn!("the world in {}: {trouble}", world.saved.path.display());
-            troubles.write(StoreTroubleFound { terrain: entity, trouble });
+        for warning in store.take_warnings() {
+            warn!("the world in {}: {warning}", world.saved.path.display());
+            warnings.write(StoreWarningFound { terrain: entity, warning });
         }
         let Some(durable) = store.durable_point() else { continue };
         let is_answered = world.asked.is_some_and(|asked| store.is_durable(asked));

@@ -13,9 +13,9 @@ use crate::format::portable::SavedRegion;
 use crate::format::region::region_key;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, RegionPos};
-use crate::terrain::{Patch, RestoreError, Terrain, TerrainSettings, WorldParts, brick_over};
+use crate::terrain::{EditSettings, Patch, RestoreError, Terrain, TerrainSettings, WorldParts, brick_over};
 use crate::volume::{Brick, Fields, NO_FIELDS};
-use crate::world::{Places, State};
+use crate::world::{Positions, State};
 
 /// A level below a world, for [`StoreOptions::level`](super::StoreOptions::level).
 #[derive(Clone)]
@@ -109,7 +109,7 @@ impl BaseLevel {
 
     /// The level's bricks and fields on a ground, which may differ from the one it was read on.
     pub(super) fn parts(&self, ground: &Ground) -> WorldParts {
-        let mut parts = WorldParts { rules: None, loose: None, ..self.level.parts() };
+        let mut parts = WorldParts { edit_settings: EditSettings::default(), ..self.level.parts() };
         for (pos, brick) in &mut parts.change.bricks {
             *brick = brick.take().map(|brick| brick_over(ground, *pos, brick));
         }
@@ -134,7 +134,7 @@ impl BaseLevel {
         // Fields of other chunks are other fields.
         let is_alike = self.level.settings.chunk_size == chunk_size;
         let below = Below { bricks: &region.bricks, fields: if is_alike { &region.fields } else { &[] } };
-        Patch::between(&below, now, now.places().and(below.places()), 0)
+        Patch::between(&below, now, now.positions().and(below.positions()), 0)
     }
 }
 
@@ -145,8 +145,8 @@ struct Below<'a> {
 }
 
 impl Below<'_> {
-    fn places(&self) -> Places {
-        Places {
+    fn positions(&self) -> Positions {
+        Positions {
             bricks: self.bricks.iter().map(|(pos, _)| *pos).collect(),
             chunks: self.fields.iter().map(|(chunk, _)| *chunk).collect(),
         }

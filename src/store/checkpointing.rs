@@ -6,11 +6,12 @@ use std::time::Instant;
 use super::checkpoint::Checkpoint;
 use super::error::StoreError;
 use super::ground_size::GroundSize;
+use super::message::Message;
 use super::mirror::Mirror;
 use super::progress::Work;
 use super::region::Region;
 use super::segment::FRAME_LIMIT;
-use super::writer::{CHECKPOINT_TIME, Message, Writer};
+use super::writer::{CHECKPOINT_TIME, Writer};
 use super::{checkpoint_copy, keys};
 use crate::format;
 use crate::format::change::put_change;
@@ -108,7 +109,7 @@ impl Writer {
     }
 
     pub(super) fn metadata(&self) -> format::Metadata {
-        let Mirror { revision, hash, next_field, rules, loose, game, .. } = &self.mirror;
+        let Mirror { revision, hash, next_field, edit_settings, game, .. } = &self.mirror;
         let mut game = game.iter().map(|(key, value)| (key.clone(), value.clone())).collect();
         GroundSize::of(&self.ground).put(&mut game);
         format::Metadata {
@@ -116,8 +117,7 @@ impl Writer {
             revision: *revision,
             hash: *hash,
             next_field: *next_field,
-            rules: rules.clone(),
-            loose: *loose,
+            edit_settings: edit_settings.clone(),
             simulation: SIMULATION,
             ground: self.ground.hash(),
             game,

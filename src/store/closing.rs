@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::error::{StoreError, StoreTrouble};
+use super::error::{StoreError, StoreWarning};
 use super::shared::{SavePoint, Shared};
 
 /// The interval at which waiting for a closing store checks its state.
@@ -24,7 +24,7 @@ impl StoreThread {
             if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
                 let why = message_of(&*panic);
                 shared.set_failing(Some(&why));
-                shared.report_trouble(StoreTrouble::Ended(why));
+                shared.report_warning(StoreWarning::Ended(why));
             }
         };
         thread.spawn(guarded).map(Self).map_err(StoreError::files("starting the store's thread"))
@@ -97,8 +97,8 @@ impl ClosingStore {
         }
     }
 
-    /// Troubles since the last call, to show to a player or an operator.
-    pub fn take_troubles(&self) -> Vec<StoreTrouble> {
-        self.shared.take_troubles()
+    /// Warnings since the last call, to show to a player or an operator.
+    pub fn take_warnings(&self) -> Vec<StoreWarning> {
+        self.shared.take_warnings()
     }
 }

@@ -1,4 +1,4 @@
-//! Errors and troubles of saved worlds, each with a message of one sentence.
+//! Errors and warnings of saved worlds, each with a message of one sentence.
 
 use std::{fmt, io};
 
@@ -185,7 +185,7 @@ impl StoreError {
 /// A problem to show to a player or an operator. Play continues.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum StoreTrouble {
+pub enum StoreWarning {
     /// The world can't be saved at present. Everything is kept in memory, and saving is retried.
     #[error("saving fails, and is retried: {0}")]
     NotSaved(String),

@@ -1,7 +1,6 @@
 //! Reads everything that the files of a world contain, before recovery chooses from it.
 
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io;
 
 use super::checkpoint::Checkpoint;
@@ -20,7 +19,7 @@ use crate::format::frame::{self, Kind, WorldId};
 use crate::format::{self, FormatError, Metadata};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{Patch, TerrainSettings};
+use crate::terrain::Patch;
 
 /// The share of opening after which the database is read, and all files.
 const DATABASE_READ: f32 = 0.08;
@@ -75,6 +74,34 @@ impl RegionRecord {
     }
 }
 
+/// The valid records of files.
+#[derive(Default)]
+pub(super) struct FoundRecords {
+    pub checkpoints: Vec<Checkpoint>,
+    pub regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
+}
+
+impl FoundRecords {
+    /// Adds a record, or returns why it is not valid.
+    fn enter(&mut self, world: WorldId, key: &[u8], record: Vec<u8>) -> Result<(), (FormatError, Vec<u8>)> {
+        match Key::of(key) {
+            Some(Key::Checkpoint) => match frame::open(&record, Kind::Checkpoint, world, key, FRAME_LIMIT) {
+                Ok(opened) => self.checkpoints.extend(decode_checkpoint(&opened.payload)),
+                Err(why) => return Err((why, record)),
+            },
+            Some(Key::Region(at)) => {
+                let (found, known) =
+                    (RegionRecord::open(record, world, key)?, self.regions.entry(at).or_default());
+                if known.iter().all(|own| own.revision != found.revision) {
+                    known.push(found);
+                }
+            }
+            None => {}
+        }
+        Ok(())
+    }
+}
+
 /// The files of a world.
 pub(super) struct Contents {
     pub world: WorldId,
@@ -91,17 +118,14 @@ pub(super) struct Contents {
     pub has_lost_journal: bool,
     /// Why the file of regions can't be read at the moment.
     error: Option<io::Error>,
-    /// The checkpoints that the file of regions holds: two alike, but for damage.
-    checkpoints: Vec<Checkpoint>,
-    /// The copies next to the journal.
-    copies: Vec<Checkpoint>,
-    /// The checkpoints of other files that may hold regions.
-    other_checkpoints: Vec<Checkpoint>,
-    /// Valid records of each region: one, but for what was salvaged from a damaged file.
-    regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
-    /// The records of other files.
-    other_regions: BTreeMap<RegionPos, Vec<RegionRecord>>,
-    /// Records that are not valid, by region.
+    /// The records of the file of regions. It holds each checkpoint twice, and one record of a region, but for what was
+    /// salvaged from a damaged file.
+    pub records: FoundRecords,
+    /// The records of other files that may hold regions.
+    pub others: FoundRecords,
+    /// The copies of checkpoints next to the journal.
+    pub copies: Vec<Checkpoint>,
+    /// FoundRecords that are not valid, by region.
     pub invalid: BTreeMap<RegionPos, Vec<u8>>,
 }
 
@@ -155,11 +179,9 @@ impl Contents {
             segments,
             named,
             error,
-            checkpoints: Vec::new(),
+            records: FoundRecords::default(),
+            others: FoundRecords::default(),
             copies: Vec::new(),
-            other_checkpoints: Vec::new(),
-            regions: BTreeMap::new(),
-            other_regions: BTreeMap::new(),
             invalid: BTreeMap::new(),
         };
         let mut others = Vec::new();
@@ -180,10 +202,15 @@ impl Contents {
             None => return Err(contents.no_world(&raw)?),
         }
         for (key, record) in raw {
-            contents.enter(&key, record)?;
+            let entered = contents.records.enter(contents.world, &key, record);
+            let Err((error, record)) = entered else { continue };
+            refuse_newer(error.newer_schema())?;
+            if let Some(Key::Region(at)) = Key::of(&key) {
+                contents.invalid.insert(at, record);
+            }
         }
-        for source in others {
-            contents.enter_others(source);
+        for (key, record) in others.into_iter().flat_map(Source::into_records) {
+            drop(contents.others.enter(contents.world, &key, record));
         }
         for copy in checkpoint_copy::read(files, contents.world) {
             match copy {
@@ -207,52 +234,9 @@ impl Contents {
         })
     }
 
-    fn enter(&mut self, key: &[u8], record: Vec<u8>) -> Result<(), StoreError> {
-        match Key::of(key) {
-            Some(Key::Checkpoint) => {
-                match frame::open(&record, Kind::Checkpoint, self.world, key, FRAME_LIMIT) {
-                    Ok(opened) => self.checkpoints.extend(decode_checkpoint(&opened.payload)),
-                    Err(error) => refuse_newer(error.newer_schema())?,
-                }
-            }
-            Some(Key::Region(at)) => match RegionRecord::open(record, self.world, key) {
-                Ok(found) => self.regions.entry(at).or_default().push(found),
-                Err((error, record)) => {
-                    refuse_newer(error.newer_schema())?;
-                    self.invalid.insert(at, record);
-                }
-            },
-            None => {}
-        }
-        Ok(())
-    }
-
-    /// Adds the records of a file other than the current one.
-    fn enter_others(&mut self, source: Source) {
-        let (Source::Whole(records) | Source::Damaged { records, .. }) = source else { return };
-        for (key, record) in records {
-            match Key::of(&key) {
-                Some(Key::Checkpoint) => {
-                    let opened = frame::open(&record, Kind::Checkpoint, self.world, &key, FRAME_LIMIT);
-                    let checkpoint = opened.ok().and_then(|opened| decode_checkpoint(&opened.payload));
-                    self.other_checkpoints.extend(checkpoint);
-                }
-                Some(Key::Region(at)) => {
-                    let known = self.other_regions.entry(at).or_default();
-                    if let Ok(found) = RegionRecord::open(record, self.world, &key)
-                        && known.iter().all(|own| own.revision != found.revision)
-                    {
-                        known.push(found);
-                    }
-                }
-                None => {}
-            }
-        }
-    }
-
     /// The record of a region at a revision.
     pub fn region(&self, at: RegionPos, revision: u64) -> Option<&RegionRecord> {
-        let all = [&self.regions, &self.other_regions].into_iter().filter_map(|own| own.get(&at));
+        let all = [&self.records, &self.others].into_iter().filter_map(|own| own.regions.get(&at));
         all.flatten().find(|record| record.revision == revision)
     }
 
@@ -262,81 +246,16 @@ impl Contents {
         records.map(|record| record.bytes() as u64).sum()
     }
 
-    /// The checkpoints in the journal, all of which the database had.
-    fn heads(&self) -> impl Iterator<Item = Checkpoint> {
-        let heads = self.segments.iter().filter_map(|found| decode_checkpoint(&found.checkpoint()?));
-        heads.chain(self.copies.iter().cloned())
-    }
-
-    /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, with which
-    /// most regions agree. It is the database's, a segment's, or that of another file if the database has none.
-    pub fn choose_checkpoint(&self) -> Option<Checkpoint> {
-        let heads: Vec<Checkpoint> = self.heads().collect();
-        let others = if self.checkpoints.is_empty() { &self.other_checkpoints[..] } else { &[] };
-        // A damaged database may hold a checkpoint that was never finished, and other files may be old: they say
-        // nothing about what the latest state is.
-        let finished = if self.damaged.is_none() { &self.checkpoints[..] } else { &[] };
-        let known = heads.iter().chain(finished).map(|checkpoint| checkpoint.frame);
-        let latest = known.chain([self.greatest_frame()]).max().unwrap_or_default();
-        let runs = self.frame_runs();
-        let reached = |from: u64| {
-            let run = runs.range(..=from.saturating_add(1)).next_back();
-            run.map_or(from, |(_, last)| from.max(*last))
-        };
-        // Those in a file with their regions come first: over another ground, regions have equal revisions and
-        // different content.
-        let all = self.checkpoints.iter().chain(others).chain(&heads);
-        // Among equals the newest, after which least has to be replayed.
-        let rank = |checkpoint: &&Checkpoint| {
-            let (missing, unknown) = self.disagreeing(checkpoint);
-            let lag = latest.saturating_sub(reached(checkpoint.frame));
-            (lag, missing, unknown, Reverse(checkpoint.frame))
-        };
-        all.min_by_key(rank).cloned()
-    }
-
-    /// The first and the last number of frames that follow each other.
-    fn frame_runs(&self) -> BTreeMap<u64, u64> {
-        let frames = self.segments.iter().flat_map(|found| &found.frames);
-        let numbers: BTreeSet<u64> = frames.map(|frame| frame.number).collect();
-        let mut runs = BTreeMap::<u64, u64>::new();
-        for number in numbers {
-            match runs.last_entry() {
-                Some(mut last) if *last.get() + 1 == number => drop(last.insert(number)),
-                _ => drop(runs.insert(number, number)),
-            }
-        }
-        runs
-    }
-
-    /// A checkpoint of all regions that were found, if no checkpoint is left: rules, the game's data and missing
-    /// regions are unknown.
-    pub fn assume_checkpoint(&self) -> Checkpoint {
-        let mut regions = BTreeMap::new();
-        for (at, records) in self.regions.iter().chain(&self.other_regions) {
-            let latest = records.iter().map(|record| record.revision).max().unwrap_or_default();
-            let known = regions.entry(*at).or_insert(latest);
-            *known = latest.max(*known);
-        }
-        let revision = regions.values().copied().max().unwrap_or_default();
-        let settings = TerrainSettings::default();
-        let metadata = Metadata { settings, revision, ..Metadata::default() };
-        Checkpoint { frame: 0, metadata, regions, level: None, cells: None }
-    }
-
-    /// How many regions of a checkpoint are not there as it says, and how many others are.
-    fn disagreeing(&self, checkpoint: &Checkpoint) -> (usize, usize) {
-        let is_missing = |(at, revision): &(&RegionPos, &u64)| self.region(**at, **revision).is_none();
-        let found = self.regions.keys().chain(self.invalid.keys());
-        let unknown: BTreeSet<_> = found.filter(|at| !checkpoint.regions.contains_key(at)).collect();
-        (checkpoint.regions.iter().filter(is_missing).count(), unknown.len())
+    /// All frames of the journal, in the order in which they lie there.
+    pub fn frames(&self) -> impl Iterator<Item = &Frame> {
+        self.segments.iter().flat_map(|found| &found.frames)
     }
 
     /// The frames from a number on for as long as none is missing.
     pub fn frames_from(&self, first: u64) -> Vec<&Frame> {
         let mut next = first;
         let mut chain = Vec::new();
-        for frame in self.segments.iter().flat_map(|found| &found.frames) {
+        for frame in self.frames() {
             if frame.number == next {
                 chain.push(frame);
                 next += 1;
@@ -347,44 +266,17 @@ impl Contents {
 
     /// The greatest number of a frame that was found, or 0.
     pub fn greatest_frame(&self) -> u64 {
-        let frames = self.segments.iter().flat_map(|found| &found.frames);
-        frames.map(|frame| frame.number).max().unwrap_or_default()
-    }
-
-    /// Whether the log leads to a checkpoint, as far as its last commit before it says: one of another branch of the
-    /// same world does not.
-    pub fn leads_to(&self, checkpoint: &Checkpoint) -> bool {
-        let metadata = &checkpoint.metadata;
-        match self.last_commit(checkpoint.frame) {
-            Ok(last) => last.is_none_or(|last| last == (metadata.revision, metadata.hash)),
-            Err(_) => false,
-        }
-    }
-
-    /// Whether the log holds commits up to a revision.
-    pub fn reaches(&self, revision: u64) -> bool {
-        self.last_commit(u64::MAX).is_ok_and(|last| last.is_some_and(|(last, _)| last >= revision))
-    }
-
-    /// Revision and hash after the last commit in frames up to a number.
-    fn last_commit(&self, frame: u64) -> Result<Option<(u64, u64)>, FormatError> {
-        // Revisions and hashes do not depend on it.
-        let any_ground = Ground::flat(1, 1, 0.0).map_err(|_| FormatError::Invalid("ground"))?;
-        let frames = self.segments.iter().flat_map(|found| &found.frames);
-        let mut before: Vec<&Frame> = frames.filter(|own| own.number <= frame).collect();
-        before.sort_by_key(|own| Reverse(own.number));
-        for frame in before {
-            let batch = frame.batch_without_content(&any_ground)?;
-            if let Some(last) = batch.commits.last() {
-                return Ok(Some((last.revision, last.hash)));
-            }
-        }
-        Ok(None)
+        self.frames().map(|frame| frame.number).max().unwrap_or_default()
     }
 
     /// Whether regions are stored as they differ from a level.
     pub fn is_on_level(&self) -> bool {
-        self.regions.values().chain(self.other_regions.values()).flatten().any(|record| record.is_change)
+        self.records
+            .regions
+            .values()
+            .chain(self.others.regions.values())
+            .flatten()
+            .any(|record| record.is_change)
     }
 
     /// Whether what can't be read of a segment makes no difference to a world at a frame: frames that follow are part
@@ -424,7 +316,7 @@ fn world_of(records: &[(Vec<u8>, Vec<u8>)], is_checkpoint: bool) -> Option<World
 }
 
 /// A checkpoint whose numbers others can follow.
-fn decode_checkpoint(payload: &[u8]) -> Option<Checkpoint> {
+pub(super) fn decode_checkpoint(payload: &[u8]) -> Option<Checkpoint> {
     let checkpoint = Checkpoint::decode(payload)?;
     let Metadata { revision, next_field, .. } = checkpoint.metadata;
     let numbers = checkpoint.regions.values().copied().chain([checkpoint.frame, revision, next_field]);

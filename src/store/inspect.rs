@@ -5,17 +5,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::base_level::{BaseLevel, LevelName};
-use super::error::{StoreError, StoreTrouble};
+use super::error::{StoreError, StoreWarning};
 use super::files::{Files, Folder};
 use super::found::Contents;
 use super::keys;
-use super::open_store::take_lock;
+use super::open_store::read;
 use super::options::{BaseChanged, StoreOptions};
 use super::recover::recover;
 use super::replay_log::replay_all;
 use super::segment::{self, Bad};
 use super::shared::apply_game;
-use super::sources::has_world;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
 use crate::terrain::{Terrain, TerrainSettings};
@@ -71,7 +70,7 @@ pub fn inspect(folder: impl AsRef<Path>) -> Result<WorldInfo, StoreError> {
 /// # Errors
 /// As for a folder.
 pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
-    let (_lock, contents) = read(files)?;
+    let (_lock, contents) = read(files, None)?;
     let unreadable = || StoreError::Unreadable("neither journal nor database hold a valid checkpoint".into());
     let checkpoint = contents.choose_checkpoint().ok_or_else(unreadable)?;
     let mut damage: Vec<String> = contents.damaged.iter().cloned().collect();
@@ -100,7 +99,7 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
         apply_game(&mut game, &batch.game);
         frame_before = frame.number;
     }
-    damage.extend(journal_troubles(&contents, frame_before, revision));
+    damage.extend(journal_warnings(&contents, frame_before, revision));
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     Ok(WorldInfo {
@@ -124,34 +123,26 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
     })
 }
 
-fn read(files: &dyn Files) -> Result<(Box<dyn super::files::Lock>, Contents), StoreError> {
-    if !has_world(files).map_err(StoreError::files("reading the world's folder"))? {
-        return Err(StoreError::Missing(files.name()));
-    }
-    let lock = take_lock(files)?;
-    Ok((lock, Contents::read(files, None)?))
-}
-
 /// Descriptions of unreadable parts of the journal that matter to a world at a frame.
-fn journal_troubles(contents: &Contents, frame: u64, revision: u64) -> Vec<String> {
-    let mut troubles = Vec::new();
+fn journal_warnings(contents: &Contents, frame: u64, revision: u64) -> Vec<String> {
+    let mut warnings = Vec::new();
     for found in &contents.segments {
         let matters = |bad: &&Bad| !contents.is_harmless(found.number, bad, frame);
         let bytes: usize = found.bad.iter().filter(matters).map(|bad| bad.range.len()).sum();
         let path = segment::path(found.number);
         match &found.error {
-            Some(error) => troubles.push(format!("{path} can't be read: {error}")),
-            None if bytes > 0 => troubles.push(format!("{path} holds {bytes} bytes that can't be read")),
+            Some(error) => warnings.push(format!("{path} can't be read: {error}")),
+            None if bytes > 0 => warnings.push(format!("{path} holds {bytes} bytes that can't be read")),
             None => {}
         }
     }
     if contents.greatest_frame() > frame {
-        troubles.push(format!("the log has frames behind a gap after revision {revision}"));
+        warnings.push(format!("the log has frames behind a gap after revision {revision}"));
     }
     if contents.has_lost_journal {
-        troubles.push(StoreTrouble::LogMissing { revision }.to_string());
+        warnings.push(StoreWarning::LogMissing { revision }.to_string());
     }
-    troubles
+    warnings
 }
 
 /// A world as it was read.
@@ -164,8 +155,8 @@ pub struct WorldCheck {
     pub terrain: Terrain,
     /// The game's data, by key.
     pub game: BTreeMap<String, Vec<u8>>,
-    /// The troubles that opening it would report.
-    pub troubles: Vec<String>,
+    /// The warnings that opening it would report.
+    pub warnings: Vec<String>,
     /// Whether replaying the whole log from the first commit gave the same world. `None` if it was not replayed, or
     /// does not reach back to the first commit.
     pub replays: Option<bool>,
@@ -215,16 +206,16 @@ fn look(
     level: Option<&BaseLevel>,
     replays: bool,
 ) -> Result<WorldCheck, StoreError> {
-    let (_lock, mut contents) = read(files)?;
+    let (_lock, mut contents) = read(files, None)?;
     let level = level.cloned();
     let options = StoreOptions { base_changed: BaseChanged::Refuse, level, ..StoreOptions::default() };
     let recovered = recover(&contents, ground, &options)?;
     contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
     // Nothing was copied, as nothing was changed.
-    let told = recovered.findings.troubles(&BTreeMap::new(), contents.damaged.as_deref(), None);
-    let mut troubles: Vec<String> = told.iter().map(as_found).collect();
-    troubles.extend(recovered.refused.iter().map(|why| format!("the log can't be replayed: {why}")));
-    troubles.extend(journal_troubles(&contents, recovered.frame, recovered.mirror.revision));
+    let told = recovered.findings.warnings(&BTreeMap::new(), contents.damaged.as_deref(), None);
+    let mut warnings: Vec<String> = told.iter().map(as_found).collect();
+    warnings.extend(recovered.refused.iter().map(|why| format!("the log can't be replayed: {why}")));
+    warnings.extend(journal_warnings(&contents, recovered.frame, recovered.mirror.revision));
     let is_asked = replays && recovered.is_log_whole;
     let replays = is_asked.then(|| {
         let world = recovered.terrain.world();
@@ -240,22 +231,22 @@ fn look(
         }
     });
     if let Some(Err(why)) = &replays {
-        troubles.push(why.clone());
+        warnings.push(why.clone());
     }
     if recovered.has_other_log {
-        troubles.push(
+        warnings.push(
             "the log does not lead to the last checkpoint: it is that of another branch of the world".into(),
         );
     }
     let replays = replays.map(|replayed| replayed.is_ok());
     let (world, game) = (contents.world, recovered.mirror.game);
-    Ok(WorldCheck { world, terrain: recovered.terrain, game, troubles, replays })
+    Ok(WorldCheck { world, terrain: recovered.terrain, game, warnings, replays })
 }
 
-/// A trouble in words that say that nothing was changed.
-fn as_found(trouble: &StoreTrouble) -> String {
-    match trouble {
-        StoreTrouble::Rebuilt { what, .. } => {
+/// A warning in words that say that nothing was changed.
+fn as_found(warning: &StoreWarning) -> String {
+    match warning {
+        StoreWarning::Rebuilt { what, .. } => {
             format!("{what}; nothing is lost, and it is rebuilt when the world is opened")
         }
         other => other.to_string(),
@@ -274,7 +265,7 @@ pub fn replay(
     level: Option<&BaseLevel>,
 ) -> Result<Terrain, StoreError> {
     let files = Folder::new(folder.as_ref());
-    let (_lock, contents) = read(&files)?;
+    let (_lock, contents) = read(&files, None)?;
     let ground = ground.into();
     let checkpoint = contents.choose_checkpoint();
     if checkpoint.as_ref().is_some_and(|own| own.metadata.ground != ground.hash()) {

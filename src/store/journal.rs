@@ -77,7 +77,6 @@ impl Journal {
         base: u64,
         segments: Vec<Segment>,
         next_frame: u64,
-        head: (u64, Vec<u8>),
     ) -> Self {
         let next_segment = segments.last().map_or(1, |last| last.number + 1);
         let (current, waiting) = (None, VecDeque::new());
@@ -92,7 +91,7 @@ impl Journal {
             written: BTreeSet::new(),
             next_frame,
             next_segment,
-            head,
+            head: (0, Vec::new()),
             is_entered: false,
         }
     }

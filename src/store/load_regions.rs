@@ -96,8 +96,7 @@ pub(super) fn load_regions(
         change,
         chunk_size: metadata.settings.chunk_size,
         revision: metadata.revision,
-        rules: metadata.rules.clone(),
-        loose: metadata.loose,
+        edit_settings: metadata.edit_settings.clone(),
     };
     (parts, damaged)
 }

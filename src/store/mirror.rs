@@ -6,8 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::base_level::BaseLevel;
 use super::region::Region;
 use crate::lattice::{ChunkGrid, RegionPos};
-use crate::terrain::{CommitRecord, LogEntry, LooseSettings, Order, Patch, WorldParts};
-use crate::volume::DiggingRules;
+use crate::terrain::{CommitRecord, EditSettings, LogEntry, Order, Patch, WorldParts};
 
 /// A world by regions.
 #[derive(Clone, Debug)]
@@ -20,8 +19,7 @@ pub(super) struct Mirror {
     pub revision: u64,
     pub hash: u64,
     pub next_field: u64,
-    pub rules: Option<DiggingRules>,
-    pub loose: Option<LooseSettings>,
+    pub edit_settings: EditSettings,
     /// The game's data.
     pub game: BTreeMap<String, Vec<u8>>,
     /// The level below.
@@ -38,7 +36,7 @@ impl Mirror {
         level: Option<BaseLevel>,
     ) -> Self {
         let of_level: Vec<RegionPos> = level.iter().flat_map(BaseLevel::regions).collect();
-        let WorldParts { change, revision, rules, loose, .. } = parts;
+        let WorldParts { change, revision, edit_settings, .. } = parts;
         let mut mirror = Self {
             grid,
             regions: BTreeMap::new(),
@@ -46,8 +44,7 @@ impl Mirror {
             revision,
             hash,
             next_field: change.next_field,
-            rules,
-            loose,
+            edit_settings,
             game,
             level,
         };
@@ -69,8 +66,8 @@ impl Mirror {
     pub fn apply(&mut self, record: &CommitRecord) {
         for entry in &record.entries {
             match entry {
-                LogEntry::Order(Order::Rules(rules)) => self.rules = rules.as_deref().cloned(),
-                LogEntry::Order(Order::Loose(loose)) => self.loose = *loose,
+                LogEntry::Order(Order::Rules(rules)) => self.edit_settings.rules.clone_from(rules),
+                LogEntry::Order(Order::Loose(loose)) => self.edit_settings.loose = *loose,
                 _ => {}
             }
         }

@@ -4,6 +4,7 @@ mod base_level;
 mod checkpoint;
 mod checkpoint_copy;
 mod checkpointing;
+mod choose_checkpoint;
 mod closing;
 mod contents;
 mod database;
@@ -18,6 +19,7 @@ mod journal;
 mod keys;
 mod levels;
 mod load_regions;
+mod message;
 mod mirror;
 mod open_store;
 mod options;
@@ -43,7 +45,7 @@ pub use closing::ClosingStore;
 #[cfg(any(test, feature = "tools"))]
 #[doc(hidden)]
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
-pub use error::{StoreError, StoreTrouble, WorldSize};
+pub use error::{StoreError, StoreWarning, WorldSize};
 #[doc(hidden)]
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
 pub use inspect::{WorldCheck, WorldInfo, check, inspect};

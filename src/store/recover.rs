@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::base_level::BaseLevel;
 use super::checkpoint::Checkpoint;
-use super::error::{StoreError, StoreTrouble};
+use super::error::{StoreError, StoreWarning};
 use super::found::Contents;
 use super::ground_size::GroundSize;
 use super::keys;
@@ -192,15 +192,7 @@ pub(super) fn recover(
         replayed.records.iter().for_each(|record| mirror.apply(record));
         mirror.game = replayed.game;
     } else {
-        mirror = Mirror::new(
-            grid,
-            replayed.terrain.parts(),
-            replayed.terrain.world().hash(),
-            replayed.game,
-            level.cloned(),
-        );
-        // Also those whose records go.
-        mirror.put_back(checkpoint.regions.keys().copied());
+        mirror = mirror_of(&replayed.terrain, replayed.game, level, &checkpoint);
     }
     Ok(Recovered {
         terrain: replayed.terrain,
@@ -222,6 +214,20 @@ pub(super) fn recover(
     })
 }
 
+/// The mirror of a world that takes the place of all records of a checkpoint.
+fn mirror_of(
+    terrain: &Terrain,
+    game: GameData,
+    level: Option<&BaseLevel>,
+    checkpoint: &Checkpoint,
+) -> Mirror {
+    let world = terrain.world();
+    let mut mirror = Mirror::new(world.grid(), terrain.parts(), world.hash(), game, level.cloned());
+    // Also those whose records go.
+    mirror.put_back(checkpoint.regions.keys().copied());
+    mirror
+}
+
 impl Recovered {
     /// The sizes of its chunks and voxels.
     pub fn settings(&self) -> TerrainSettings {
@@ -230,13 +236,8 @@ impl Recovered {
 
     /// A world that was replayed from its first commit.
     fn whole(replayed: Replayed, level: Option<&BaseLevel>, checkpoint: &Checkpoint) -> Self {
-        let world = replayed.terrain.world();
-        let parts = replayed.terrain.parts();
-        let mut mirror = Mirror::new(world.grid(), parts, world.hash(), replayed.game, level.cloned());
-        // Also those whose records go.
-        mirror.put_back(checkpoint.regions.keys().copied());
         Self {
-            mirror,
+            mirror: mirror_of(&replayed.terrain, replayed.game, level, checkpoint),
             terrain: replayed.terrain,
             frame: replayed.frame,
             checkpoint: 0,
@@ -251,19 +252,19 @@ impl Recovered {
 }
 
 impl Findings {
-    /// The troubles to report, given the copies of damaged records, the damage of the file of regions, and its copy.
-    pub fn troubles(
+    /// The warnings to report, given the copies of damaged records, the damage of the file of regions, and its copy.
+    pub fn warnings(
         &self,
         copies: &BTreeMap<RegionPos, String>,
         damaged: Option<&str>,
         kept: Option<&str>,
-    ) -> Vec<StoreTrouble> {
-        let mut troubles = Vec::new();
+    ) -> Vec<StoreWarning> {
+        let mut warnings = Vec::new();
         for at in &self.damaged {
             let quarantine = copies.get(at).map(String::as_str).or(kept).unwrap_or_default().to_owned();
-            troubles.push(match self.is_lossy {
-                true => StoreTrouble::RegionLost { region: keys::name(*at), quarantine },
-                false => StoreTrouble::Rebuilt {
+            warnings.push(match self.is_lossy {
+                true => StoreWarning::RegionLost { region: keys::name(*at), quarantine },
+                false => StoreWarning::Rebuilt {
                     what: format!("the region {} is damaged", keys::name(*at)),
                     quarantine,
                 },
@@ -271,14 +272,14 @@ impl Findings {
         }
         if let (Some(what), true) = (damaged, self.damaged.is_empty()) {
             let quarantine = kept.unwrap_or_default().to_owned();
-            troubles.push(StoreTrouble::Rebuilt { what: what.into(), quarantine });
+            warnings.push(StoreWarning::Rebuilt { what: what.into(), quarantine });
         }
-        let has_lost_rest = self.has_lost_rest.then_some(StoreTrouble::CheckpointLost);
-        troubles.extend(has_lost_rest);
+        let has_lost_rest = self.has_lost_rest.then_some(StoreWarning::CheckpointLost);
+        warnings.extend(has_lost_rest);
         let base_changed = self.base_changed;
-        troubles.extend(base_changed.map(|(regions, kept)| StoreTrouble::BaseChanged { regions, kept }));
-        troubles.extend(self.replayed.map(|commits| StoreTrouble::Replayed { commits }));
-        troubles
+        warnings.extend(base_changed.map(|(regions, kept)| StoreWarning::BaseChanged { regions, kept }));
+        warnings.extend(self.replayed.map(|commits| StoreWarning::Replayed { commits }));
+        warnings
     }
 }
 
@@ -350,7 +351,7 @@ mod tests {
         let (_, opened) = Store::open_in(Arc::new(killed), Arc::clone(&ground), options).unwrap();
         let now = (terrain.world().revision(), terrain.world().hash());
         assert_eq!((opened.terrain.world().revision(), opened.terrain.world().hash()), now);
-        assert_eq!((opened.replayed, opened.troubles), (4, vec![]));
+        assert_eq!((opened.replayed, opened.warnings), (4, vec![]));
     }
 
     #[test]
@@ -377,10 +378,10 @@ mod tests {
             };
             let (_, opened) = open();
             assert_eq!((opened.terrain.world().revision(), opened.terrain.world().hash()), (8, now.hash()));
-            assert_eq!(opened.troubles, [StoreTrouble::Replayed { commits: 4 }]);
+            assert_eq!(opened.warnings, [StoreWarning::Replayed { commits: 4 }]);
             assert!(!opened.is_log_whole);
             let (_, again) = open();
-            assert_eq!((again.terrain.world().hash(), again.troubles), (now.hash(), vec![]));
+            assert_eq!((again.terrain.world().hash(), again.warnings), (now.hash(), vec![]));
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::lattice::{BrickPos, ChunkPos};
 use crate::volume::{Brick, Fields, NO_FIELDS};
-use crate::world::{Patch, Places, State};
+use crate::world::{Patch, Positions, State};
 
 /// The content of a region's record.
 #[derive(Clone, Debug, Default)]
@@ -27,8 +27,8 @@ impl Region {
     }
 
     /// The positions at which it holds something.
-    pub fn places(&self) -> Places {
-        Places {
+    pub fn positions(&self) -> Positions {
+        Positions {
             bricks: self.bricks.keys().copied().collect(),
             chunks: self.fields.keys().copied().collect(),
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io;
 
 use super::database::UNFINISHED;
-use super::error::StoreTrouble;
+use super::error::StoreWarning;
 use super::files::{Files, Opening};
 use super::found::Contents;
 use super::journal::Segment;
@@ -22,7 +22,7 @@ pub(super) struct Settled {
     pub is_unfinished: bool,
     /// Where copies of damaged records are.
     pub copies: BTreeMap<RegionPos, String>,
-    pub troubles: Vec<StoreTrouble>,
+    pub warnings: Vec<StoreWarning>,
 }
 
 /// Moves data that is not part of a world to quarantine, and makes the rest durable.
@@ -45,7 +45,7 @@ pub(super) fn settle(files: &dyn Files, contents: &Contents, recovered: &Recover
         failed = failed.or(left.err());
     }
     if contents.has_lost_journal {
-        told.push(StoreTrouble::LogMissing { revision: recovered.mirror.revision });
+        told.push(StoreWarning::LogMissing { revision: recovered.mirror.revision });
         // It was reported.
         drop(unsaved::clear(files));
     }
@@ -58,11 +58,11 @@ pub(super) fn settle(files: &dyn Files, contents: &Contents, recovered: &Recover
         None => recovered.frame + 1,
         // Frames that are no part of the world may still be there.
         Some(error) => {
-            told.push(StoreTrouble::NotSaved(error.to_string()));
+            told.push(StoreWarning::NotSaved(error.to_string()));
             recovered.frame.max(contents.greatest_frame()) + 2
         }
     };
-    Settled { segments, next_frame, is_unfinished: failed.is_some(), copies, troubles: told }
+    Settled { segments, next_frame, is_unfinished: failed.is_some(), copies, warnings: told }
 }
 
 /// Copies or moves aside all that lies behind the last frame.
@@ -70,7 +70,7 @@ fn cut_journal(
     files: &dyn Files,
     contents: &Contents,
     recovered: &Recovered,
-    told: &mut Vec<StoreTrouble>,
+    told: &mut Vec<StoreWarning>,
     segments: &mut Vec<Segment>,
 ) -> io::Result<()> {
     let is_kept = |found: &&Found| found.frames.iter().any(|frame| frame.number <= recovered.frame);
@@ -124,8 +124,8 @@ fn cut_journal(
     }
     let (Some(quarantine), revision) = (place, recovered.mirror.revision) else { return Ok(()) };
     told.push(match &recovered.refused {
-        Some(why) => StoreTrouble::LogRefused { revision, why: why.clone(), quarantine },
-        None => StoreTrouble::LogCut { revision, bytes, quarantine },
+        Some(why) => StoreWarning::LogRefused { revision, why: why.clone(), quarantine },
+        None => StoreWarning::LogCut { revision, bytes, quarantine },
     });
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::error::StoreTrouble;
+use super::error::StoreWarning;
 
 /// The game's data in a world, by key.
 pub(super) type GameData = BTreeMap<String, Vec<u8>>;
@@ -55,7 +55,7 @@ pub(super) struct Shared(Mutex<Report>);
 #[derive(Debug, Default)]
 struct Report {
     durable: Option<SavePoint>,
-    troubles: VecDeque<StoreTrouble>,
+    warnings: VecDeque<StoreWarning>,
     /// Why saving fails at the moment.
     failing: Option<String>,
     /// When the disk should have answered, while the thread waits for it.
@@ -66,15 +66,15 @@ struct Report {
     queued: usize,
 }
 
-/// Troubles that are kept until they are taken.
-const MAX_TROUBLES: usize = 256;
+/// Warnings that are kept until they are taken.
+const MAX_WARNINGS: usize = 256;
 
 impl Report {
-    fn add(&mut self, trouble: StoreTrouble) {
-        if self.troubles.len() == MAX_TROUBLES {
-            self.troubles.pop_front();
+    fn add(&mut self, warning: StoreWarning) {
+        if self.warnings.len() == MAX_WARNINGS {
+            self.warnings.pop_front();
         }
-        self.troubles.push_back(trouble);
+        self.warnings.push_back(warning);
     }
 }
 
@@ -94,8 +94,8 @@ impl Shared {
         report.durable = report.durable.max(Some(point));
     }
 
-    pub fn report_trouble(&self, trouble: StoreTrouble) {
-        self.report().add(trouble);
+    pub fn report_warning(&self, warning: StoreWarning) {
+        self.report().add(warning);
     }
 
     /// Sets the reason why saving fails, or `None` if it works.
@@ -118,7 +118,7 @@ impl Shared {
         let mut report = self.report();
         report.answer_due = None;
         if std::mem::take(&mut report.is_hanging) {
-            report.add(StoreTrouble::SavedAgain);
+            report.add(StoreWarning::SavedAgain);
         }
     }
 
@@ -127,14 +127,14 @@ impl Shared {
         let is_late = report.answer_due.is_some_and(|due| due <= Instant::now());
         if is_late && !report.is_hanging {
             report.is_hanging = true;
-            report.add(StoreTrouble::Hanging);
+            report.add(StoreWarning::Hanging);
         }
     }
 
-    pub fn take_troubles(&self) -> Vec<StoreTrouble> {
+    pub fn take_warnings(&self) -> Vec<StoreWarning> {
         let mut report = self.report();
         Self::check_waiting(&mut report);
-        std::mem::take(&mut report.troubles).into()
+        std::mem::take(&mut report.warnings).into()
     }
 
     /// Bytes that the thread has not taken.
@@ -177,12 +177,12 @@ mod tests {
     fn a_disk_that_does_not_answer_is_reported_once_and_so_is_its_answer() {
         let shared = Shared::default();
         shared.begin_waiting(Duration::MAX);
-        assert_eq!(shared.take_troubles(), []);
+        assert_eq!(shared.take_warnings(), []);
         shared.begin_waiting(Duration::ZERO);
-        assert_eq!(shared.take_troubles(), [StoreTrouble::Hanging]);
-        assert_eq!(shared.take_troubles(), []);
+        assert_eq!(shared.take_warnings(), [StoreWarning::Hanging]);
+        assert_eq!(shared.take_warnings(), []);
         shared.end_waiting();
         shared.end_waiting();
-        assert_eq!(shared.take_troubles(), [StoreTrouble::SavedAgain]);
+        assert_eq!(shared.take_warnings(), [StoreWarning::SavedAgain]);
     }
 }

@@ -64,6 +64,14 @@ impl Source {
     }
 
     /// Its records.
+    pub fn into_records(self) -> Vec<(Vec<u8>, Vec<u8>)> {
+        match self {
+            Self::Whole(records) | Self::Damaged { records, .. } => records,
+            Self::Missing | Self::Unreadable(_) => Vec::new(),
+        }
+    }
+
+    /// Its records.
     pub fn records(&self) -> &[(Vec<u8>, Vec<u8>)] {
         match self {
             Self::Whole(records) | Self::Damaged { records, .. } => records,

@@ -2,15 +2,16 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::{Duration, Instant};
 
 use rustc_hash::FxHashMap;
 
 use super::checkpoint::Checkpoint;
-use super::error::{StoreError, StoreTrouble};
+use super::error::{StoreError, StoreWarning};
 use super::files::{Files, Lock};
-use super::journal::Journal;
+use super::journal::{Journal, Segment};
+use super::message::{Answer, Content, Given, Message, game_bytes, record_bytes};
 use super::mirror::Mirror;
 use super::options::StoreOptions;
 use super::region_file::RegionFile;
@@ -20,7 +21,7 @@ use super::unsaved;
 use crate::format::Batch;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Order, Patch, TerrainSettings, WorldParts};
+use crate::terrain::{CommitRecord, LogEntry, Order, Patch, TerrainSettings};
 
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
@@ -29,61 +30,6 @@ const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_
 /// answer.
 const FRAME_TIME: Duration = Duration::from_secs(3);
 pub(super) const CHECKPOINT_TIME: Duration = Duration::from_secs(30);
-
-/// The channel for the answer to a request: the durable revision.
-pub(super) type Answer = Sender<Result<u64, StoreError>>;
-
-/// A message to the thread.
-pub(super) enum Message {
-    /// Saves this.
-    Save(Given),
-    /// Makes all earlier messages durable.
-    Flush(Answer),
-    /// Makes a checkpoint of all earlier messages.
-    Checkpoint(Answer),
-    /// Makes a checkpoint, and makes the database as small as possible.
-    Compact(Answer),
-}
-
-/// Data that has to be saved together.
-pub(super) struct Given {
-    /// The point that it leads to.
-    pub point: SavePoint,
-    pub content: Content,
-    /// The game's data for it.
-    pub game: Vec<GameChange>,
-}
-
-/// The given content of the world.
-pub(super) enum Content {
-    Commits(Vec<CommitRecord>),
-    /// The whole world, because records are missing, its ground, and its hash.
-    Whole(Box<WorldParts>, Arc<Ground>, u64),
-}
-
-impl Given {
-    /// Whether it is all of a world.
-    fn is_whole(&self) -> bool {
-        matches!(self.content, Content::Whole(..))
-    }
-
-    /// About how many bytes of memory it takes.
-    pub fn bytes(&self) -> usize {
-        let world = match &self.content {
-            Content::Commits(records) => records.iter().map(record_bytes).sum(),
-            Content::Whole(parts, ..) => parts.change.bricks.len() * 1024,
-        };
-        64 + world + self.game.iter().map(game_bytes).sum::<usize>()
-    }
-}
-
-fn record_bytes(record: &CommitRecord) -> usize {
-    64 + record.entries.len() * 64 + record.change.bricks.len() * 1024
-}
-
-fn game_bytes((key, value): &GameChange) -> usize {
-    key.len() + value.as_ref().map_or(0, Vec::len)
-}
 
 /// The present failure, and the time of the next try.
 struct Failing {
@@ -164,22 +110,23 @@ impl Writer {
     pub fn new(
         files: Arc<dyn Files>,
         options: StoreOptions,
-        shared: Arc<Shared>,
         world: WorldId,
         ground: Arc<Ground>,
         settings: TerrainSettings,
         mirror: Mirror,
-        journal: Journal,
+        (segments, next_frame): (Vec<Segment>, u64),
         database: RegionFile,
         checkpoint: u64,
         lock: Box<dyn Lock>,
     ) -> Self {
+        let base = base(&ground, mirror.level.as_ref());
+        let journal = Journal::new(Arc::clone(&files), world, base, segments, next_frame);
         let (checkpoints, state) = ([checkpoint; 2], State::default());
         let point = SavePoint { revision: mirror.revision, ..SavePoint::default() };
         Self {
             files,
             options,
-            shared,
+            shared: Arc::default(),
             world,
             ground,
             settings,
@@ -376,7 +323,7 @@ impl Writer {
     fn leave_gap(&mut self) {
         if !self.state.has_gap {
             let revision = self.shared.durable().map_or(0, SavePoint::revision);
-            self.shared.report_trouble(StoreTrouble::LogGap { revision });
+            self.shared.report_warning(StoreWarning::LogGap { revision });
         }
         self.give_up_waiting();
         self.checkpoint_soon();
@@ -470,7 +417,7 @@ impl Writer {
             None => RETRY.0,
         };
         if self.state.failing.as_ref().is_none_or(|failing| failing.why != why) {
-            self.shared.report_trouble(StoreTrouble::NotSaved(why.into()));
+            self.shared.report_warning(StoreWarning::NotSaved(why.into()));
         }
         self.shared.set_failing(Some(why));
         self.state.failing = Some(Failing { wait, again: Instant::now() + wait, why: why.into() });
@@ -479,7 +426,7 @@ impl Writer {
 
     pub(super) fn succeed(&mut self) {
         if self.state.failing.take().is_some_and(|failing| !failing.why.is_empty()) {
-            self.shared.report_trouble(StoreTrouble::SavedAgain);
+            self.shared.report_warning(StoreWarning::SavedAgain);
         }
         self.shared.set_failing(None);
     }

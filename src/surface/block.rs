@@ -193,14 +193,14 @@ impl Mesher {
         let table = &*SLOTS;
         let cubes: u32 = drawn[bottom..=top].iter().map(|layer| layer.count_ones()).sum();
         let mut end = out.len();
-        out.resize(end + cubes as usize * MOST, 0);
+        out.resize(end + cubes as usize * MAX_INDICES, 0);
         for y in bottom..=top {
             layer_bits::for_ones(drawn[y], |cell| {
                 let (below, above) = ((solid[y] >> cell) as usize, (solid[y + 1] >> cell) as usize);
                 let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
                 let base = y * 81 + cell;
-                let (slots, count) = (&table[case], usize::from(table[case][MOST]));
-                let Some(room) = out[end..].first_chunk_mut::<MOST>() else { return };
+                let (slots, count) = (&table[case], usize::from(table[case][MAX_INDICES]));
+                let Some(room) = out[end..].first_chunk_mut::<MAX_INDICES>() else { return };
                 // Most cubes have two triangles at most. Those two are always written; the next cube overwrites the
                 // surplus.
                 let (usual, others) = slots.split_at(6);
@@ -274,17 +274,17 @@ impl Numbers {
 
 /// For each case the places in [`Numbers`] of its triangles' edges, counted from the cube's lowest corner, three for a
 /// triangle; the last number is how many they are.
-pub(crate) static SLOTS: LazyLock<[[u16; MOST + 1]; 256]> = LazyLock::new(|| {
+pub(crate) static SLOTS: LazyLock<[[u16; MAX_INDICES + 1]; 256]> = LazyLock::new(|| {
     let slot = |edge| {
         let (corner, axis) = cases::edge_corners(edge);
         let [x, y, z] = cases::corner(corner).map(|step| step as u16);
         axis as u16 * 729 + y * 81 + z * 9 + x
     };
     let of = |case: &Case| {
-        let mut slots = [0; MOST + 1];
+        let mut slots = [0; MAX_INDICES + 1];
         for (place, edge) in case.triangles().flatten().enumerate() {
             slots[place] = slot(edge);
-            slots[MOST] += 1;
+            slots[MAX_INDICES] += 1;
         }
         slots
     };
@@ -292,7 +292,7 @@ pub(crate) static SLOTS: LazyLock<[[u16; MOST + 1]; 256]> = LazyLock::new(|| {
 });
 
 /// The most edges that the triangles of a case have, three for a triangle.
-const MOST: usize = 15;
+const MAX_INDICES: usize = 15;
 
 /// The cubes of a brick that marching cubes draws.
 struct Cubes {

@@ -6,7 +6,7 @@ use crate::lattice::{BrickPos, LatticeBox};
 use crate::volume::{Brick, SampleView};
 
 /// The maximum number of places of a window, so that it fits into the first caches.
-const MOST: u64 = 4096;
+const MAX_PLACES: u64 = 4096;
 
 /// Places that a window may have for any number of bricks.
 const FREE: u64 = 64;
@@ -90,7 +90,7 @@ pub(crate) fn shared(bricks: impl IntoIterator<Item = BrickPos>) -> Option<(usiz
     let (mut count, mut places) = (1, around(bricks.next()?));
     for brick in bricks {
         let more = places.union(around(brick));
-        if more != places && more.volume() > (FREE + EACH * count).min(MOST) {
+        if more != places && more.volume() > (FREE + EACH * count).min(MAX_PLACES) {
             break;
         }
         (count, places) = (count + 1, more);
@@ -161,6 +161,6 @@ mod tests {
         let (count, places) = shared([at(0), at(1), at(1), at(90), at(91)]).unwrap();
         assert_eq!((count, places.min.x, places.max.x), (3, -1, 2));
         let column = (0..8192).map(|y| BrickPos(IVec3::new(0, y, 0)));
-        assert!(shared(column).unwrap().1.volume() <= MOST);
+        assert!(shared(column).unwrap().1.volume() <= MAX_PLACES);
     }
 }

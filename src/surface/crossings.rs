@@ -152,7 +152,7 @@ impl Site<'_, '_> {
                     let (solid, y) = solid_end::<AXIS>(edge, is_lower);
                     MaterialMix::pure(own[y][PLACES[solid].brick][PLACES[solid].index])
                 }
-                None => self.own_materials::<AXIS>(corner, self.low.y + y, step),
+                None => self.ground_materials::<AXIS>(corner, self.low.y + y, step),
             },
             _ => MaterialMix::pure(stored),
         };
@@ -160,7 +160,7 @@ impl Site<'_, '_> {
     }
 
     /// Materials where the ground shows its own, those of both columns blended as the tile does.
-    fn own_materials<const AXIS: usize>(&mut self, corner: usize, y: i32, step: i32) -> MaterialMix {
+    fn ground_materials<const AXIS: usize>(&mut self, corner: usize, y: i32, step: i32) -> MaterialMix {
         let between = |low, high| between(low, high, step);
         let other = corner + NEXT_CORNER[AXIS];
         let depth = match AXIS {

@@ -113,7 +113,7 @@ pub fn vertex(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> V
         position: (p - origin) * SNAP + UNIT[axis] * step,
         normal: lerp_normal(gradient(lattice, p), gradient(lattice, q), step),
         materials: match lattice.stored_material(solid) {
-            MaterialId::GROUND => own_materials(lattice.ground(), [p, q], step, solid),
+            MaterialId::GROUND => ground_materials(lattice.ground(), [p, q], step, solid),
             stored => MaterialMix::pure(stored),
         },
     }
@@ -130,7 +130,7 @@ pub fn sheet_vertex(ground: &Ground, p: IVec3, axis: usize, origin: IVec3) -> Ve
     Vertex {
         position: (p - origin) * SNAP + UNIT[axis] * step,
         normal: heightmap_normal(ground, Column::of(p), Column::of(q), step),
-        materials: own_materials(ground, [p, q], step, if distance < 0 { p } else { q }),
+        materials: ground_materials(ground, [p, q], step, if distance < 0 { p } else { q }),
     }
 }
 
@@ -197,7 +197,7 @@ pub(super) fn between(low: i32, high: i32, step: i32) -> i32 {
 /// Materials at a crossing where the ground shows its own. With strata, that of the solid end: what a dig there yields.
 /// Otherwise those of both columns, blended as the tile does: the overlay within its depth below the pristine surface,
 /// the base below.
-pub(super) fn own_materials(ground: &Ground, [p, q]: [IVec3; 2], step: i32, solid: IVec3) -> MaterialMix {
+pub(super) fn ground_materials(ground: &Ground, [p, q]: [IVec3; 2], step: i32, solid: IVec3) -> MaterialMix {
     if ground.has_own_materials() {
         return MaterialMix::pure(ground.material(solid));
     }

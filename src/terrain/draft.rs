@@ -36,7 +36,7 @@ impl Terrain {
         for edit in edits {
             let request = Request::from(edit);
             let work = request.work(self.world.grid());
-            queue.push(request, work, together, (self.rules.clone(), self.loose));
+            queue.push(request, work, together, self.edit_settings.clone());
         }
         let mut world = Arc::clone(&self.world);
         let (mut receipts, mut regions_hash) = (Vec::new(), world.sample_hash);

@@ -18,7 +18,7 @@ impl Terrain {
         let settings = TerrainSettings { chunk_size, voxel_size: self.voxel_size() };
         let mut fork = Self::new(self.world.shared_ground(), &settings)?;
         fork.world = Arc::clone(&self.world);
-        (fork.rules, fork.loose) = (self.rules.clone(), self.loose);
+        fork.edit_settings = self.edit_settings.clone();
         Ok(fork)
     }
 

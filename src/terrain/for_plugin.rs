@@ -83,7 +83,7 @@ impl Terrain {
     pub(crate) fn take_over(&mut self, old: &mut Self) {
         old.abandon();
         self.queue.take_over(&mut old.queue);
-        self.queue.change_rules((&old.rules, &old.loose), (&self.rules, &self.loose));
+        self.queue.change_settings(&old.edit_settings, &self.edit_settings);
         self.receipts.append(&mut old.receipts);
         if let Some(engine) = old.engine() {
             self.set_engine(engine.clone());

@@ -28,7 +28,7 @@ impl Terrain {
                 self.abandon();
             }
         }
-        self.log_rules();
+        self.log_settings();
     }
 
     /// The records of the commits since the last call, in order; each is returned once.
@@ -61,19 +61,19 @@ impl Terrain {
     #[cfg(feature = "store")]
     pub(crate) fn logged_parts(&self) -> WorldParts {
         let parts = self.parts();
-        match self.log.as_ref().and_then(CommitLog::rules) {
-            Some((rules, loose)) => WorldParts { rules: rules.as_deref().cloned(), loose: *loose, ..parts },
+        match self.log.as_ref().and_then(CommitLog::edit_settings) {
+            Some(edit_settings) => WorldParts { edit_settings: edit_settings.clone(), ..parts },
             None => parts,
         }
     }
 
     /// Records the rules and loose settings of later edits in the log, unless waiting edits obey others.
-    pub(super) fn log_rules(&mut self) {
+    pub(super) fn log_settings(&mut self) {
         if self.is_busy() || self.queue.len() > 0 {
             return;
         }
         if let Some(log) = &mut self.log {
-            log.enter_rules(&self.world, (self.rules.clone(), self.loose));
+            log.enter_settings(&self.world, self.edit_settings.clone());
         }
     }
 }

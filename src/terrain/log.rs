@@ -3,34 +3,19 @@
 use std::collections::VecDeque;
 #[cfg(feature = "store")]
 use std::ops::Range;
-use std::sync::Arc;
 
+use super::edit_settings::EditSettings;
 use super::order::Order;
 use super::queue::Submission;
 use super::receipt::Receipt;
 use super::record::{CommitRecord, LogEntry};
-use crate::loose::LooseSettings;
-use crate::volume::DiggingRules;
 use crate::world::{Patch, World, brick_bytes};
-
-/// Rules and settings of loose pieces.
-type Rules = (Option<Arc<DiggingRules>>, Option<LooseSettings>);
-
-/// The entries that lead from some rules to others; without rules before, all of them.
-fn changed_rules(before: Option<&Rules>, after: &Rules) -> impl Iterator<Item = LogEntry> + use<> {
-    let rules = before
-        .is_none_or(|before| before.0 != after.0)
-        .then(|| LogEntry::Order(Order::Rules(after.0.clone())));
-    let loose =
-        before.is_none_or(|before| before.1 != after.1).then_some(LogEntry::Order(Order::Loose(after.1)));
-    rules.into_iter().chain(loose)
-}
 
 /// A record as its transaction makes it: all but what only the commit knows.
 #[derive(Default)]
 pub(super) struct RecordDraft {
-    /// The rules of the first and of the last edit that was applied. Entries say how those in between differ.
-    rules: Option<[Rules; 2]>,
+    /// The settings of the first and of the last edit that was applied. Entries say how those in between differ.
+    edit_settings: Option<[EditSettings; 2]>,
     entries: Vec<LogEntry>,
     change: Patch,
     /// Bytes that the record may hold alone.
@@ -40,8 +25,9 @@ pub(super) struct RecordDraft {
 impl RecordDraft {
     /// The record of a commit, by the orders, their receipts, and what changes.
     pub fn new(submissions: &[Submission], receipts: &[Receipt], change: Patch) -> Self {
-        // With room for the first rules, if those before were others.
-        let (mut rules, mut entries) = (None::<[Rules; 2]>, Vec::with_capacity(submissions.len() + 2));
+        // With room for the first settings, if those before were others.
+        let (mut edit_settings, mut entries) =
+            (None::<[EditSettings; 2]>, Vec::with_capacity(submissions.len() + 2));
         for (submission, receipt) in submissions.iter().zip(receipts) {
             let (Ok(order), Ok(_)) = (&submission.order, &receipt.outcome) else { continue };
             if order.asked().is_logged_as_change() {
@@ -49,21 +35,21 @@ impl RecordDraft {
                 continue;
             }
             if let Order::Edit(_) = order {
-                let current = (submission.context.rules.clone(), submission.context.loose);
-                let first = match rules.take() {
+                let current = submission.edit_settings.clone();
+                let first = match edit_settings.take() {
                     Some([first, last]) => {
-                        entries.extend(changed_rules(Some(&last), &current));
+                        entries.extend(current.orders_after(Some(&last)).map(LogEntry::Order));
                         first
                     }
                     None => current.clone(),
                 };
-                rules = Some([first, current]);
+                edit_settings = Some([first, current]);
             }
             entries.push(LogEntry::Order(order.clone()));
         }
         let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
         let bytes = bytes_of(&entries, &change) + room;
-        Self { rules, entries, change, bytes }
+        Self { edit_settings, entries, change, bytes }
     }
 
     /// What changes.
@@ -103,8 +89,8 @@ pub(super) struct CommitLog {
     limit: usize,
     /// The number of the next record.
     next: u64,
-    /// The rules that hold after the last record; `None` if nothing is known of them.
-    rules: Option<Rules>,
+    /// The settings that hold after the last record; `None` if nothing is known of them.
+    edit_settings: Option<EditSettings>,
     /// Whether a commit was dropped after the last record that was taken. The first waiting record is a
     /// commit then: any other kind has the same revision as the dropped one, and would hide the gap.
     has_gap: bool,
@@ -113,30 +99,31 @@ pub(super) struct CommitLog {
 impl CommitLog {
     pub fn new(limit: usize) -> Self {
         let (records, sizes) = Default::default();
-        Self { records, sizes, bytes: 0, limit, next: 0, rules: None, has_gap: false }
+        Self { records, sizes, bytes: 0, limit, next: 0, edit_settings: None, has_gap: false }
     }
 
     /// Records the commit that led to this world. Records that no longer fit are moved to `dropped`.
     pub fn enter(&mut self, world: &World, draft: RecordDraft, dropped: &mut Vec<CommitRecord>) {
-        let RecordDraft { rules, mut entries, mut change, mut bytes } = draft;
+        let RecordDraft { edit_settings, mut entries, mut change, mut bytes } = draft;
         change.next_field = world.next_field;
-        if let Some([first, last]) = rules {
-            let changes = changed_rules(self.rules.as_ref(), &first);
+        if let Some([first, last]) = edit_settings {
+            let changes = first.orders_after(self.edit_settings.as_ref()).map(LogEntry::Order);
             drop(entries.splice(0..0, changes.inspect(|entry| bytes += rule_bytes(entry))));
-            self.rules = Some(last);
+            self.edit_settings = Some(last);
         }
         self.push(world, entries, change, bytes, dropped);
     }
 
-    /// Records new rules, if they differ from the previous ones.
-    pub fn enter_rules(&mut self, world: &World, rules: Rules) {
+    /// Records new settings, if they differ from the previous ones.
+    pub fn enter_settings(&mut self, world: &World, edit_settings: EditSettings) {
         // The next edit logs them.
         if self.has_gap && self.records.is_empty() {
             return;
         }
-        let entries: Vec<LogEntry> = changed_rules(self.rules.as_ref(), &rules).collect();
+        let orders = edit_settings.orders_after(self.edit_settings.as_ref());
+        let entries: Vec<LogEntry> = orders.map(LogEntry::Order).collect();
         if !entries.is_empty() {
-            self.rules = Some(rules);
+            self.edit_settings = Some(edit_settings);
             let change = Patch { next_field: world.next_field, ..Patch::default() };
             let bytes = bytes_of(&entries, &change);
             self.push(world, entries, change, bytes, &mut Vec::new());
@@ -165,8 +152,8 @@ impl CommitLog {
 
     /// The rules and loose settings that hold after the last record; `None` if the next record says them.
     #[cfg(feature = "store")]
-    pub fn rules(&self) -> Option<&Rules> {
-        self.rules.as_ref()
+    pub fn edit_settings(&self) -> Option<&EditSettings> {
+        self.edit_settings.as_ref()
     }
 
     /// Whether no record waits.
@@ -214,7 +201,7 @@ impl CommitLog {
             self.bytes -= self.sizes.pop_front().unwrap_or_default();
             dropped.extend(self.records.pop_front());
         }
-        // The dropped records may have held the current rules, so these are logged again.
-        self.rules = None;
+        // The dropped records may have held the current settings, so these are logged again.
+        self.edit_settings = None;
     }
 }

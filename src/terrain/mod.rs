@@ -16,6 +16,7 @@
 mod commit;
 mod commit_light;
 mod draft;
+mod edit_settings;
 #[cfg(feature = "net")]
 mod for_net;
 #[cfg(feature = "plugin")]
@@ -63,6 +64,7 @@ pub use crate::world::{MeshKey, Version};
 pub use commit::Commit;
 #[doc(hidden)]
 pub use draft::Draft;
+pub use edit_settings::EditSettings;
 pub use history::History;
 pub use model::{StaleCommit, Terrain};
 pub use order::{Order, Request};

@@ -5,6 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::commit::Commit;
+use super::edit_settings::EditSettings;
 use super::history::{DeferredDrop, Step, UndoStack};
 use super::log::CommitLog;
 use super::order::Order;
@@ -51,8 +52,8 @@ pub struct Terrain {
     pub(super) queue: Queue,
     pub(super) in_flight: Option<InFlight>,
     pub(super) receipts: VecDeque<Receipt>,
-    pub(super) rules: Option<Arc<DiggingRules>>,
-    pub(super) loose: Option<LooseSettings>,
+    /// What edits obey that are submitted from now on.
+    pub(super) edit_settings: EditSettings,
     pub(super) undo_stack: UndoStack,
     pub(super) log: Option<CommitLog>,
     pub(super) meshing: Meshing,
@@ -99,8 +100,7 @@ impl Terrain {
             queue: Queue::default(),
             in_flight: None,
             receipts: VecDeque::new(),
-            rules: None,
-            loose: None,
+            edit_settings: EditSettings::default(),
             undo_stack: UndoStack::new(UNDO_BUDGET),
             log: None,
             meshing: Meshing::default(),
@@ -123,15 +123,19 @@ impl Terrain {
     /// When the rules name [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND), which no ground has; nothing is
     /// changed then.
     pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
-        rules.check()?;
-        self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
-        self.log_rules();
+        self.replace_rules(Some(Arc::new(rules)))
+    }
+
+    pub(super) fn replace_rules(&mut self, rules: Option<Arc<DiggingRules>>) -> Result<(), RulesError> {
+        rules.as_deref().map_or(Ok(()), DiggingRules::check)?;
+        self.edit_settings.rules = rules.filter(|rules| !rules.is_empty());
+        self.log_settings();
         Ok(())
     }
 
     /// The rules for edits; `None` if there are none.
     pub fn rules(&self) -> Option<&DiggingRules> {
-        self.rules.as_deref()
+        self.edit_settings.rules.as_deref()
     }
 
     /// The engine that was set for this terrain.
@@ -158,13 +162,19 @@ impl Terrain {
     /// Makes later edits search for pieces of ground that they cut off, which receipts then list.
     /// `None`, the default, turns that off. Terrains that must have equal worlds need equal settings.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
-        self.loose = settings;
-        self.log_rules();
+        self.edit_settings.loose = settings;
+        self.log_settings();
     }
 
     /// The settings of the search for loose pieces.
     pub fn loose(&self) -> Option<&LooseSettings> {
-        self.loose.as_ref()
+        self.edit_settings.loose.as_ref()
+    }
+
+    /// The rules and the search for loose pieces of edits that are submitted from now on.
+    #[cfg(any(feature = "net", all(feature = "plugin", feature = "store")))]
+    pub(crate) fn edit_settings(&self) -> &EditSettings {
+        &self.edit_settings
     }
 
     /// The number of orders that wait for their transaction.
@@ -195,7 +205,7 @@ impl Terrain {
         let (work, estimate) = loop {
             let Some((orders, estimate)) = self.queue.take() else {
                 // Steps that found nothing may have been the last that waited.
-                self.log_rules();
+                self.log_settings();
                 return None;
             };
             let step = orders.first().and_then(|first| Step::of(first.asked()));
@@ -282,7 +292,7 @@ impl Terrain {
         if let Some(log) = &mut self.log {
             log.enter(&self.world, record.unwrap_or_default(), &mut dropped.records);
         }
-        self.log_rules();
+        self.log_settings();
         dropped.copy = copy;
         let order = done.work.submissions().first().and_then(|first| first.order.as_ref().ok());
         let replaces_parts = order.is_some_and(Order::replaces_parts);

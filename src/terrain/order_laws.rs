@@ -181,7 +181,7 @@ fn check_log(terrain: &mut Terrain) {
     }
     let now = |terrain: &Terrain| {
         let parts = terrain.parts();
-        (terrain.world().hash(), parts.revision, parts.change.fields, parts.rules, parts.loose)
+        (terrain.world().hash(), parts.revision, parts.change.fields, parts.edit_settings)
     };
     assert_eq!(now(&replayed), now(terrain));
 }

@@ -8,7 +8,7 @@ use crate::lattice::{BrickPos, ChunkPos};
 pub enum PartsError {
     /// A brick is repeated or out of order.
     #[error("the brick {0:?} is repeated or out of order: sort bricks by position")]
-    Order(BrickPos),
+    Unsorted(BrickPos),
     /// A brick, or one of its edited samples, lies outside the world.
     #[error("the brick {0:?} extends beyond the world")]
     OutsideWorld(BrickPos),

@@ -6,11 +6,10 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::edit_settings::EditSettings;
 use super::order::{Order, Request};
 use super::receipt::{Asked, Rejection};
 use crate::brush::Edit;
-use crate::loose::LooseSettings;
-use crate::volume::DiggingRules;
 
 /// Limits of a terrain's work, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
@@ -51,35 +50,15 @@ pub(crate) enum Together {
     Batch(u64),
 }
 
-/// Everything about an edit that is fixed when it is submitted.
-#[derive(Clone, Debug)]
-pub(super) struct SubmissionContext {
-    /// Edits with the same number are one step of undo; later ones have greater numbers.
-    pub group: u64,
-    /// `None`: no restrictions.
-    pub rules: Option<Arc<DiggingRules>>,
-    /// `None`: loose pieces are not searched for.
-    pub loose: Option<LooseSettings>,
-}
-
-impl SubmissionContext {
-    fn is_same(&self, other: &Self) -> bool {
-        let same_rules = match (&self.rules, &other.rules) {
-            (None, None) => true,
-            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
-            _ => false,
-        };
-        same_rules && self.group == other.group && self.loose == other.loose
-    }
-}
-
 /// An order that was submitted, and what was fixed then.
 #[derive(Clone, Debug)]
 pub(crate) struct Submission {
     pub tag: u64,
     /// Only edits are rejected before their turn comes.
     pub order: Result<Order, Rejection>,
-    pub(super) context: SubmissionContext,
+    /// Edits with the same number are one step of undo; later ones have greater numbers.
+    pub(super) group: u64,
+    pub(super) edit_settings: EditSettings,
     work: u64,
 }
 
@@ -96,7 +75,7 @@ impl Submission {
 
     /// Returns `true` if it belongs to the same group, under the same rules and loose settings.
     pub(super) fn goes_with(&self, other: &Self) -> bool {
-        self.context.is_same(&other.context)
+        self.group == other.group && self.edit_settings.is_same(&other.edit_settings)
     }
 
     /// Whether it is a transaction of its own.
@@ -119,13 +98,7 @@ pub(super) struct Queue {
 impl Queue {
     /// Queues an order of this much work. An edit joins the group of the one before it if both belong `together`; edits after any other
     /// order begin a new group.
-    pub fn push(
-        &mut self,
-        request: Request,
-        work: u64,
-        together: Together,
-        (rules, loose): (Option<Arc<DiggingRules>>, Option<LooseSettings>),
-    ) {
+    pub fn push(&mut self, request: Request, work: u64, together: Together, edit_settings: EditSettings) {
         let is_edit = request.asked() == Asked::Edit;
         let together = request.stroke.map_or(together, Together::Stroke);
         let group = match self.open {
@@ -136,12 +109,7 @@ impl Queue {
         self.open = is_edit.then_some((together, group));
         self.work += work;
         let Request { tag, order, .. } = request;
-        self.submissions.push_back(Submission {
-            tag,
-            order,
-            context: SubmissionContext { group, rules, loose },
-            work,
-        });
+        self.submissions.push_back(Submission { tag, order, group, edit_settings, work });
     }
 
     /// Makes the next edit begin a new group.
@@ -196,21 +164,11 @@ impl Queue {
         *self = Self { limits: other.limits, ..std::mem::take(other) };
     }
 
-    /// Replaces the rules and loose settings of waiting orders that have these ones.
+    /// Replaces the rules and loose settings of waiting orders that have the old ones.
     #[cfg(all(feature = "plugin", feature = "store"))]
-    pub fn change_rules(
-        &mut self,
-        (old_rules, old_loose): (&Option<Arc<DiggingRules>>, &Option<LooseSettings>),
-        (rules, loose): (&Option<Arc<DiggingRules>>, &Option<LooseSettings>),
-    ) {
-        for Submission { context, .. } in &mut self.submissions {
-            let is_old = match (&context.rules, old_rules) {
-                (Some(own), Some(old)) => Arc::ptr_eq(own, old),
-                (own, old) => own.is_none() && old.is_none(),
-            };
-            if is_old && context.loose == *old_loose {
-                (context.rules, context.loose) = (rules.clone(), *loose);
-            }
+    pub fn change_settings(&mut self, old: &EditSettings, new: &EditSettings) {
+        for submission in self.submissions.iter_mut().filter(|own| own.edit_settings.is_same(old)) {
+            submission.edit_settings.clone_from(new);
         }
     }
 

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
+use super::edit_settings::EditSettings;
 use super::order::Order;
-use crate::loose::LooseSettings;
-use crate::volume::DiggingRules;
 use crate::world::Patch;
 
 /// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was
@@ -84,8 +83,6 @@ pub struct WorldParts {
     pub chunk_size: u32,
     /// Its revision.
     pub revision: u64,
-    /// The rules for edits; `None` if there are none.
-    pub rules: Option<DiggingRules>,
-    /// The settings of the search for loose pieces.
-    pub loose: Option<LooseSettings>,
+    /// The rules and the search for loose pieces that edits obey.
+    pub edit_settings: EditSettings,
 }

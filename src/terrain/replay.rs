@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use super::edit_settings::EditSettings;
 use super::model::Terrain;
 use super::parts_error::PartsError;
 use super::queue::WorkLimits;
@@ -10,8 +11,7 @@ use super::receipt::{Receipt, Rejection};
 use super::record::{CommitRecord, WorldParts};
 use super::resolve::world_of;
 use crate::ground::Ground;
-use crate::loose::LooseSettings;
-use crate::volume::{DiggingRules, RulesError};
+use crate::volume::RulesError;
 use crate::world::{TerrainError, TerrainSettings, World};
 
 /// An error of restoring a terrain.
@@ -80,9 +80,9 @@ impl ReplayError {
 impl WorldParts {
     /// All of a world but its ground, under these rules and settings of loose pieces. Bricks are shared, not copied, but listing them
     /// takes long in a large world.
-    pub(crate) fn of(world: &World, rules: Option<DiggingRules>, loose: Option<LooseSettings>) -> Self {
+    pub(crate) fn of(world: &World, edit_settings: EditSettings) -> Self {
         let (change, chunk_size) = (world.all_parts(), world.grid.size() as u32);
-        Self { change, chunk_size, revision: world.revision, rules, loose }
+        Self { change, chunk_size, revision: world.revision, edit_settings }
     }
 }
 
@@ -90,7 +90,7 @@ impl Terrain {
     /// All of the world but its ground, as [`restore`](Self::restore) takes it. Bricks are shared, not copied. History
     /// and what waits are not part of it.
     pub fn parts(&self) -> WorldParts {
-        WorldParts::of(&self.world, self.rules().cloned(), self.loose)
+        WorldParts::of(&self.world, self.edit_settings.clone())
     }
 
     /// A terrain from the parts of a world over this ground. Nothing is meshed: surfaces are made when they are asked
@@ -107,7 +107,7 @@ impl Terrain {
         parts: WorldParts,
     ) -> Result<Self, RestoreError> {
         let mut terrain = Self::new(ground, settings)?;
-        let WorldParts { mut change, chunk_size, revision, rules, loose } = parts;
+        let WorldParts { mut change, chunk_size, revision, edit_settings } = parts;
         if chunk_size != settings.chunk_size {
             change.fields.clear();
             change.cover(terrain.world.grid());
@@ -117,8 +117,8 @@ impl Terrain {
         // Unwind safe: nothing else sees what it makes.
         let world = catch_unwind(AssertUnwindSafe(made)).map_err(|_| RestoreError::Panicked)??;
         terrain.world = Arc::new(world);
-        terrain.set_rules(rules.unwrap_or_default())?;
-        terrain.loose = loose;
+        terrain.edit_settings.loose = edit_settings.loose;
+        terrain.replace_rules(edit_settings.rules)?;
         Ok(terrain)
     }
 

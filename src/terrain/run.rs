@@ -21,7 +21,7 @@ use super::resolve::{self, Resolved};
 use super::transaction::Transaction;
 use super::work::Work;
 use crate::backend::{Compute, Cpu, Engine};
-use crate::edits::most_bricks;
+use crate::edits::max_bricks;
 use crate::lattice::ItemCost;
 use crate::redraw;
 use crate::redraw::{ChooseCut, Scene, Stages};
@@ -95,7 +95,7 @@ impl Transaction {
     /// Returns `true` if it may reach enough bricks for several threads.
     fn is_large(&self) -> bool {
         let bricks = |own: &Submission| match &own.order {
-            Ok(Order::Edit(edit)) => most_bricks(self.world.grid, edit).unwrap_or(0),
+            Ok(Order::Edit(edit)) => max_bricks(self.world.grid, edit).unwrap_or(0),
             Ok(Order::Parts { change, .. }) => change.bricks.len() as u64,
             Ok(Order::Ground(_)) => self.world.bricks.len() as u64,
             _ => self.work.target().map_or(0, |target| target.change.patch.bricks.len() as u64),

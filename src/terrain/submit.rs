@@ -4,7 +4,6 @@ use super::model::Terrain;
 use super::order::{Order, Request};
 use super::queue::{Together, WorkLimits};
 use super::receipt::{Applied, Receipt, Rejection};
-use crate::volume::DiggingRules;
 use crate::world::unique;
 
 /// The most untaken receipts that are kept; then the oldest are dropped.
@@ -79,14 +78,9 @@ impl Terrain {
         together: Together,
     ) -> Result<(), Rejection> {
         match request.order {
-            Ok(Order::Rules(rules)) => {
-                self.set_rules(rules.as_deref().map_or_else(DiggingRules::default, Clone::clone))?;
-            }
+            Ok(Order::Rules(rules)) => self.replace_rules(rules)?,
             Ok(Order::Loose(settings)) => self.set_loose(settings),
-            _ => {
-                let rules = (self.rules.clone(), self.loose);
-                self.queue.push(request, work, together, rules);
-            }
+            _ => self.queue.push(request, work, together, self.edit_settings.clone()),
         }
         Ok(())
     }

@@ -7,14 +7,14 @@ use bevy::ecs::lifecycle::Discard;
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 
+use super::error::{SharingError, SharingErrorFound};
 use super::link::{Link, MAX_PENDING, PieceMessage, Standing, Worked};
-use super::messages::{BulkLane, FromPlayer, OrderLane};
+use super::messages::{BulkLane, FromPlayer, MainLane};
 use super::replicon::ToOwnServer;
 use super::service::Service;
 use super::shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
 use super::sharing::Sharing;
-use super::trouble::{SharingTrouble, SharingTroubleFound};
-use crate::net::{Client, ClientEvent, KickReason, Lane, Refusal, ShownChange};
+use crate::net::{Client, ClientEvent, KickReason, Lane, Refusal};
 use crate::plugin::{BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Applied, Asked, Order, Receipt, Rejection, Terrain};
 use crate::threads::{ThreadTask, Threads, free_later};
@@ -24,7 +24,7 @@ use crate::threads::{ThreadTask, Threads, free_later};
 pub(super) struct EditMessages<'w> {
     edited: MessageWriter<'w, GroundEdited>,
     joined: MessageWriter<'w, GroundJoined>,
-    troubles: MessageWriter<'w, SharingTroubleFound>,
+    errors: MessageWriter<'w, SharingErrorFound>,
     applied: MessageWriter<'w, BrushApplied>,
     moved: MessageWriter<'w, HistoryMoved>,
 }
@@ -32,10 +32,10 @@ pub(super) struct EditMessages<'w> {
 /// Reads messages of the server. The client ignores those from before its last greeting.
 pub(super) fn receive(
     mut shared: Query<&mut SharedTerrain>,
-    mut order: MessageReader<OrderLane>,
+    mut order: MessageReader<MainLane>,
     mut bulk: MessageReader<BulkLane>,
 ) {
-    let order = order.read().map(|message| (Lane::Order, &message.0));
+    let order = order.read().map(|message| (Lane::Main, &message.0));
     let messages: Vec<_> = order.chain(bulk.read().map(|message| (Lane::Bulk, &message.0))).collect();
     if messages.is_empty() {
         return;
@@ -88,11 +88,11 @@ pub(super) fn send(
         let shared = shared.bypass_change_detection();
         if is_held && shared.link.is_none() && active == Some(entity) {
             // It begins with the level that the terrain waits for.
-            shared.trouble = None;
+            shared.error = None;
             continue;
         }
         let requests = outbox.map(take_requests).unwrap_or_default();
-        let trouble = match (terrain, active) {
+        let error = match (terrain, active) {
             (Some(mut terrain), Some(active)) if active == entity => {
                 let terrain = terrain.bypass_change_detection();
                 let mut turn = Turn { entity, edit_messages: &mut edit_messages };
@@ -101,20 +101,20 @@ pub(super) fn send(
             (terrain, active) => {
                 requests.into_iter().for_each(|request| edit_messages.refuse(entity, request, None));
                 edit_messages.close(entity, shared.link.take(), &mut messages);
-                let other = active.filter(|_| terrain.is_some()).map(SharingTrouble::AnotherIsShared);
-                Some(other.unwrap_or(SharingTrouble::NoTerrain))
+                let other = active.filter(|_| terrain.is_some()).map(SharingError::AnotherIsShared);
+                Some(other.unwrap_or(SharingError::NoTerrain))
             }
         };
-        if trouble != shared.trouble {
-            shared.trouble = trouble;
-            if let Some(SharingTrouble::OtherGround { ours, theirs, .. }) = trouble
+        if error != shared.error {
+            shared.error = error;
+            if let Some(SharingError::OtherGround { ours, theirs, .. }) = error
                 && !shared.was_served
             {
                 // As over other transports. The connection stays.
                 let why = if ours == theirs { KickReason::ChunkSize } else { KickReason::Ground };
                 edit_messages.joined.write(GroundJoined { terrain: entity, event: ClientEvent::Kicked(why) });
             }
-            trouble.into_iter().for_each(|trouble| edit_messages.warn(entity, trouble));
+            error.into_iter().for_each(|error| edit_messages.warn(entity, error));
         }
     }
 }
@@ -142,7 +142,7 @@ impl Turn<'_, '_> {
         terrain: &mut Terrain,
         requests: Vec<Order>,
         messages: &mut MessageWriter<FromPlayer>,
-    ) -> Option<SharingTrouble> {
+    ) -> Option<SharingError> {
         let ground = super::messages::GroundId::of(terrain.world());
         if shared.link.as_ref().is_some_and(|link| link.ground != ground) {
             self.edit_messages.close(self.entity, shared.link.take(), messages);
@@ -155,7 +155,7 @@ impl Turn<'_, '_> {
         requests.into_iter().for_each(|request| link.request(request));
         if terrain.rules() != link.rules.as_ref() {
             link.rules = terrain.rules().cloned();
-            self.edit_messages.warn(self.entity, SharingTrouble::RulesIgnored);
+            self.edit_messages.warn(self.entity, SharingError::RulesIgnored);
         }
         link.take_back_client();
         let standing = link.standing(service);
@@ -165,12 +165,12 @@ impl Turn<'_, '_> {
         };
         link.facts.has_joined &= follows.is_some() && follows == link.greeted;
         link.has_new_contents |= is_changed;
-        let Some(mut client) = link.client.take() else { return standing.trouble() };
+        let Some(mut client) = link.client.take() else { return standing.error() };
         if std::mem::take(&mut link.has_new_contents) {
             // It may have got others from the server.
             client.contents_mut().add_all(&shared.contents);
         }
-        client.set_place(shared.place);
+        client.set_position(shared.position);
         if follows != link.greeted {
             change_server(link, &mut client, follows, service, messages);
             shared.was_served |= link.was_served;
@@ -189,7 +189,7 @@ impl Turn<'_, '_> {
         link.facts.id = client.id();
         link.facts.has_joined = link.greeted.is_some() && client.has_joined();
         link.client = Some(client);
-        standing.trouble()
+        standing.error()
     }
 
     /// Hands over what the player asked for, in order.
@@ -207,7 +207,7 @@ impl Turn<'_, '_> {
                 request => {
                     let is_full = !is_refused && request.edit().is_some();
                     if is_full && !std::mem::replace(&mut link.is_full, true) {
-                        self.edit_messages.warn(self.entity, SharingTrouble::TooManyPending(MAX_PENDING));
+                        self.edit_messages.warn(self.entity, SharingError::TooManyPending(MAX_PENDING));
                     }
                     self.edit_messages.refuse(self.entity, request, Some(link));
                 }
@@ -270,11 +270,9 @@ pub(super) fn show(
             // All of it comes once those that wait are answered.
             changes.clear();
         }
-        for ShownChange { change, hash } in changes {
-            // One that finds no room is rejected, and comes again with all others.
-            terrain.submit(Order::parts(change, Some(hash)));
-            display.submitted += 1;
-        }
+        display.submitted += changes.len() as u64;
+        // One that finds no room is rejected, and comes again with all others.
+        terrain.submit_all(changes);
         display.compare(terrain.world(), client.shown_hash());
         let broken = (display.is_broken && display.is_idle()).then(|| terrain.snapshot());
         client.take_events().into_iter().for_each(|event| edit_messages.report(entity, link, event));
@@ -302,9 +300,9 @@ pub(super) fn close(
 
 impl EditMessages<'_> {
     /// Reports what is wrong.
-    fn warn(&mut self, terrain: Entity, trouble: SharingTrouble) {
-        warn!("{terrain}: {trouble}");
-        self.troubles.write(SharingTroubleFound { terrain, trouble });
+    fn warn(&mut self, terrain: Entity, error: SharingError) {
+        warn!("{terrain}: {error}");
+        self.errors.write(SharingErrorFound { terrain, error });
     }
 
     /// Answers something that is not sent to a server.
@@ -376,7 +374,7 @@ impl EditMessages<'_> {
                     _ => Rejection::Refused,
                 };
                 if let Some(why) = why.filter(|why| *why != Refusal::Nothing) {
-                    self.warn(terrain, SharingTrouble::UndoRefused(why));
+                    self.warn(terrain, SharingError::UndoRefused(why));
                 }
                 self.stepped(terrain, Asked::Undo, Err(outcome));
             }

@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use bevy::platform::time::Instant;
 
+use super::error::SharingError;
 use super::messages::GroundId;
 use super::service::Service;
-use super::trouble::SharingTrouble;
-use crate::net::{self, Client, ContentTable, KickReason, Lane, ShownChange};
+use crate::net::{self, Client, ContentTable, KickReason, Lane};
 use crate::plugin::{LoosePieceFound, LoosePieceReturned};
 use crate::terrain::{Asked, Order, Terrain, TerrainError, TerrainSettings, Version, World};
 use crate::threads::{ThreadTask, Threads};
@@ -54,7 +54,7 @@ pub(super) struct Link {
 pub(super) struct Worked {
     pub client: Client,
     /// All that has to be put into the shown terrain, if that was asked for.
-    pub whole: Option<ShownChange>,
+    pub whole: Option<Order>,
 }
 
 /// The client's values after its last update.
@@ -75,7 +75,7 @@ pub(super) struct Display {
     /// Whether the shown world is wrong, so that all of it has to be replaced.
     pub is_broken: bool,
     /// All of it, to be put next.
-    pub whole: Option<ShownChange>,
+    pub whole: Option<Order>,
     /// Messages about pieces, each with the number of answered changes at which it is sent: the ground changes with
     /// these.
     pub pieces: VecDeque<(u64, PieceMessage)>,
@@ -98,7 +98,7 @@ pub(super) enum Standing {
     /// There is no connection. Edits are shown, and wait for another one.
     Lost,
     /// Edits are refused.
-    Refuses(SharingTrouble),
+    Refuses(SharingError),
 }
 
 impl Link {
@@ -185,13 +185,13 @@ impl Link {
         if let Some((kick, at)) = self.kicked
             && !matches!(service, Service::Served(_, invitation) if invitation != at)
         {
-            return Standing::Refuses(SharingTrouble::Kicked(kick));
+            return Standing::Refuses(SharingError::Kicked(kick));
         }
         match service {
             Service::Served(served, invitation) if served.ground == self.ground => {
                 Standing::Follows(invitation)
             }
-            Service::Served(served, _) => Standing::Refuses(SharingTrouble::OtherGround {
+            Service::Served(served, _) => Standing::Refuses(SharingError::OtherGround {
                 ours: self.ground.hash,
                 our_chunks: self.ground.chunk_size,
                 theirs: served.ground.hash,
@@ -200,16 +200,16 @@ impl Link {
             Service::Silent => Standing::Waits,
             _ if !self.was_served => Standing::Waits,
             Service::Apart => Standing::Lost,
-            Service::Unserved => Standing::Refuses(SharingTrouble::NotServed),
+            Service::Unserved => Standing::Refuses(SharingError::NotServed),
         }
     }
 }
 
 impl Standing {
-    pub fn trouble(self) -> Option<SharingTrouble> {
+    pub fn error(self) -> Option<SharingError> {
         match self {
             Self::Follows(_) | Self::Waits => None,
-            Self::Lost => Some(SharingTrouble::ConnectionLost),
+            Self::Lost => Some(SharingError::ConnectionLost),
             Self::Refuses(why) => Some(why),
         }
     }

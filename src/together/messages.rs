@@ -19,9 +19,9 @@ pub(super) enum FromPlayer {
     TooLong,
 }
 
-/// From the server to a client, in the order lane.
+/// From the server to a client, in the main lane.
 #[derive(Message, Clone, Debug, Serialize, Deserialize)]
-pub(super) struct OrderLane(pub Vec<u8>);
+pub(super) struct MainLane(pub Vec<u8>);
 
 /// From the server to a client, in the bulk lane.
 #[derive(Message, Clone, Debug, Serialize, Deserialize)]

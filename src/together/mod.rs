@@ -31,6 +31,7 @@
 //! [bevy_replicon]: https://docs.rs/bevy_replicon
 
 mod client;
+mod error;
 mod link;
 mod messages;
 mod players;
@@ -40,11 +41,10 @@ mod server;
 mod service;
 mod shared;
 mod sharing;
-mod trouble;
 
+pub use error::{SharingError, SharingErrorFound};
 pub use server::{GroundServer, GroundServerEvent};
 pub use shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
-pub use trouble::{SharingTrouble, SharingTroubleFound};
 
 use bevy::prelude::*;
 
@@ -80,7 +80,7 @@ impl Plugin for TogetherPlugin {
             .add_message::<GroundServerEvent>()
             .add_message::<GroundEdited>()
             .add_message::<GroundJoined>()
-            .add_message::<SharingTroubleFound>()
+            .add_message::<SharingErrorFound>()
             // Those of the terrains, if BurrowPlugins come later.
             .add_message::<BrushApplied>()
             .add_message::<HistoryMoved>()

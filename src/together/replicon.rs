@@ -12,7 +12,7 @@ use bevy_replicon::prelude::*;
 pub(super) use bevy_replicon::shared::backend::connected_client::NetworkId;
 use bevy_replicon::shared::message::ctx::{ClientSendCtx, ServerReceiveCtx};
 
-use super::messages::{BulkLane, FromPlayer, Invitation, OrderLane, Served};
+use super::messages::{BulkLane, FromPlayer, Invitation, MainLane, Served};
 use crate::net::{self, Lane, MAX_TO_SERVER};
 
 /// The most bytes of a [`FromPlayer`] in addition to its content.
@@ -34,11 +34,11 @@ pub(super) fn build<M>(
         return false;
     }
     app.add_client_message_with::<FromPlayer>(Channel::Ordered, write, read)
-        .add_server_message::<OrderLane>(Channel::Ordered)
+        .add_server_message::<MainLane>(Channel::Ordered)
         .add_server_message::<BulkLane>(Channel::Ordered)
         .add_server_message::<Invitation>(Channel::Ordered)
         // They contain their own version numbers, and do not depend on replicated types.
-        .make_message_independent::<OrderLane>()
+        .make_message_independent::<MainLane>()
         .make_message_independent::<BulkLane>()
         .make_message_independent::<Invitation>()
         .add_observer(drop_messages)
@@ -117,7 +117,7 @@ impl FromPlayers<'_> {
 /// Messages of this app's server to players.
 #[derive(SystemParam)]
 pub(super) struct ToPlayers<'w> {
-    order: MessageWriter<'w, ToClients<OrderLane>>,
+    order: MessageWriter<'w, ToClients<MainLane>>,
     bulk: MessageWriter<'w, ToClients<BulkLane>>,
     invitations: MessageWriter<'w, ToClients<Invitation>>,
     leave: MessageWriter<'w, DisconnectRequest>,
@@ -128,7 +128,7 @@ impl ToPlayers<'_> {
     pub fn send(&mut self, to: Peer, lane: Lane, bytes: Vec<u8>) {
         let targets = SendTargets::Single(to);
         match lane {
-            Lane::Order => drop(self.order.write(ToClients { targets, message: OrderLane(bytes) })),
+            Lane::Main => drop(self.order.write(ToClients { targets, message: MainLane(bytes) })),
             Lane::Bulk => drop(self.bulk.write(ToClients { targets, message: BulkLane(bytes) })),
         }
     }
@@ -174,7 +174,7 @@ impl Connection<'_> {
 fn drop_messages(
     gone: On<Remove, AuthorizedClient>,
     mut invitations: ResMut<Messages<ToClients<Invitation>>>,
-    mut order: ResMut<Messages<ToClients<OrderLane>>>,
+    mut order: ResMut<Messages<ToClients<MainLane>>>,
     mut bulk: ResMut<Messages<ToClients<BulkLane>>>,
 ) {
     drop_for(gone.entity, &mut invitations);

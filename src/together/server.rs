@@ -13,7 +13,7 @@ use super::players::{PlayerMessage, Players};
 use super::replicon::{FromPlayers, NetworkId, Peer, Peers, ReadMessages, ToPlayers, number};
 use crate::net::{self, KickReason, Lane, Server, ServerEvent, ServerSettings, ToClient};
 use crate::saves::{AbandonedStores, ClosingWorlds, EXIT_WAIT, ReadWorld, SavedWorld, WorldReader};
-use crate::store::{Progress, Store, StoreError, StoreTrouble};
+use crate::store::{Progress, Store, StoreError, StoreWarning};
 use crate::terrain::Terrain;
 use crate::threads::{ThreadTask, Threads};
 
@@ -42,7 +42,7 @@ pub struct GroundServer {
 /// The state of the server.
 enum State {
     /// Its world is being read.
-    Opening(ThreadTask<Result<(Box<ServerState>, Vec<StoreTrouble>), StoreError>>, Progress),
+    Opening(ThreadTask<Result<(Box<ServerState>, Vec<StoreWarning>), StoreError>>, Progress),
     Idle(Box<ServerState>),
     Running(ThreadTask<Box<ServerState>>),
     /// Its world could not be read, or it is taken out for a moment.
@@ -71,7 +71,7 @@ pub enum GroundServerEvent {
     /// An event about its players.
     Players(ServerEvent),
     /// A problem with its saved world; play continues.
-    Trouble(StoreTrouble),
+    Warning(StoreWarning),
 }
 
 impl GroundServer {
@@ -87,9 +87,9 @@ impl GroundServer {
         let reader = WorldReader::new(world, terrain, None);
         let progress = reader.progress.clone();
         let task = ThreadTask::start(Threads::Background, move || {
-            let ReadWorld { store, terrain, troubles } = reader.read()?;
+            let ReadWorld { store, terrain, warnings } = reader.read()?;
             let server = Server::open(terrain, &store, settings);
-            Ok((Box::new(ServerState { server, store: Some(store), has_failed: false }), troubles))
+            Ok((Box::new(ServerState { server, store: Some(store), has_failed: false }), warnings))
         });
         Self::with_state(State::Opening(task, progress))
     }
@@ -220,13 +220,13 @@ impl GroundServer {
             },
             State::Opening(mut task, progress) => match task.finish() {
                 None => self.state = State::Opening(task, progress),
-                Some(Ok((parts, troubles))) => {
+                Some(Ok((parts, warnings))) => {
                     // Values that were put meanwhile are newer.
                     let newer = std::mem::take(&mut self.data);
                     self.data.extend(parts.store.iter().flat_map(|store| store.game_data().clone()));
                     self.data.extend(newer);
                     self.served = Some(Served::by(&parts.server));
-                    troubles.into_iter().map(GroundServerEvent::Trouble).for_each(&mut report);
+                    warnings.into_iter().map(GroundServerEvent::Warning).for_each(&mut report);
                     report(GroundServerEvent::Opened(Ok(())));
                     return Some(parts);
                 }
@@ -339,7 +339,7 @@ pub(super) fn serve(
     }
     ground.receive(&messages, &peers);
     for client in ground.players.take_replaced(&peers) {
-        to_players.send(client.into(), Lane::Order, ToClient::Kicked(KickReason::ConnectedAgain).to_bytes());
+        to_players.send(client.into(), Lane::Main, ToClient::Kicked(KickReason::ConnectedAgain).to_bytes());
         to_players.disconnect(client);
     }
     let parts = ground.take_state(|event| {
@@ -357,7 +357,7 @@ pub(super) fn serve(
         events.write(GroundServerEvent::Players(event));
     }
     if let Some(store) = &parts.store {
-        events.write_batch(store.take_troubles().into_iter().map(GroundServerEvent::Trouble));
+        events.write_batch(store.take_warnings().into_iter().map(GroundServerEvent::Warning));
     }
     for (player, lane, bytes) in parts.server.take_outgoing() {
         if let Some(client) = ground.players.client(player) {

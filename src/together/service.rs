@@ -3,7 +3,7 @@
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
-use super::messages::{BulkLane, Invitation, OrderLane, Served};
+use super::messages::{BulkLane, Invitation, MainLane, Served};
 use super::replicon::{Connection, Peers, ToPlayers};
 use super::server::GroundServer;
 
@@ -72,7 +72,7 @@ pub(super) fn find_service(
 pub(super) fn forget_connection(
     mut service: ResMut<Service>,
     mut invitations: ResMut<Messages<Invitation>>,
-    mut order: ResMut<Messages<OrderLane>>,
+    mut order: ResMut<Messages<MainLane>>,
     mut bulk: ResMut<Messages<BulkLane>>,
 ) {
     *service = Service::Apart;

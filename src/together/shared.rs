@@ -3,9 +3,9 @@
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 
+use super::error::SharingError;
 use super::link::Link;
 use super::sharing::Sharing;
-use super::trouble::SharingTrouble;
 use crate::net::{self, ClientEvent, ContentTable, Refusal};
 use crate::plugin::EditOutbox;
 use crate::terrain::Receipt;
@@ -20,7 +20,7 @@ use crate::terrain::Receipt;
 /// despawned, removed and inserted again at any time, and another `Terrain` may be inserted on its entity. An app
 /// shares one terrain at a time: the first one, until it is gone.
 ///
-/// If it cannot stay in sync with a server, a [`SharingTroubleFound`](super::SharingTroubleFound) is sent.
+/// If it cannot stay in sync with a server, a [`SharingErrorFound`](super::SharingErrorFound) is sent.
 #[derive(Component, Default)]
 #[component(on_add = warn_without_plugin)]
 pub struct SharedTerrain {
@@ -28,18 +28,18 @@ pub struct SharedTerrain {
     /// there.
     pub contents: ContentTable,
     /// The player's position, in voxels of the terrain: missing ground is fetched from there outwards.
-    pub place: IVec3,
+    pub position: IVec3,
     pub(super) link: Option<Link>,
     /// The position among all shared terrains, in the order of insertion.
     pub(super) order: u64,
     /// Whether it has greeted a server, with this ground or another.
     pub(super) was_served: bool,
-    /// The last reported trouble, while it persists.
-    pub(super) trouble: Option<SharingTrouble>,
+    /// The last reported error, while it persists.
+    pub(super) error: Option<SharingError>,
 }
 
 impl SharedTerrain {
-    /// The number in the server's order of the last entry that the player's world holds.
+    /// The number in the server's log of the last entry that the player's world holds.
     pub fn number(&self) -> u64 {
         self.link.as_ref().map_or(0, |link| link.facts.number)
     }
@@ -65,8 +65,8 @@ impl SharedTerrain {
     }
 
     /// The reason why it is not in sync with a server; `None` while it is, or while it joins a server or waits for one.
-    pub fn trouble(&self) -> Option<SharingTrouble> {
-        self.trouble
+    pub fn error(&self) -> Option<SharingError> {
+        self.error
     }
 }
 

@@ -22,7 +22,7 @@ pub(crate) struct KeptSurfaces {
     time: u64,
     /// Bytes of all surfaces.
     bytes: usize,
-    most_bytes: usize,
+    max_bytes: usize,
 }
 
 /// A kept surface, and when it changed last.
@@ -39,7 +39,7 @@ impl Default for KeptSurfaces {
             by_time: VecDeque::new(),
             time: 0,
             bytes: 0,
-            most_bytes: MAX_BYTES,
+            max_bytes: MAX_BYTES,
         }
     }
 }
@@ -73,7 +73,7 @@ impl KeptSurfaces {
     /// their chunks.
     pub fn trim(&mut self) -> Vec<ChunkPos> {
         let mut dropped = Vec::new();
-        while self.bytes > self.most_bytes && self.surfaces.len() > 1 {
+        while self.bytes > self.max_bytes && self.surfaces.len() > 1 {
             let Some((time, chunk)) = self.by_time.pop_front() else { break };
             if self.surfaces.get(&chunk).is_some_and(|kept| kept.time == time) {
                 self.remove(chunk);
@@ -122,8 +122,8 @@ impl KeptSurfaces {
 
     /// Sets the limit.
     #[cfg(test)]
-    pub fn set_most_bytes(&mut self, most_bytes: usize) {
-        self.most_bytes = most_bytes;
+    pub fn set_max_bytes(&mut self, max_bytes: usize) {
+        self.max_bytes = max_bytes;
     }
 }
 
@@ -168,7 +168,7 @@ mod tests {
             let mut terrains = limits.map(|limit| {
                 let ground = Ground::flat(96, 96, 8.0).expect("valid ground");
                 let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
-                terrain.edit_world(|world| world.meshes.surfaces.set_most_bytes(limit));
+                terrain.edit_world(|world| world.meshes.surfaces.set_max_bytes(limit));
                 terrain
             });
             for number in 0..60 {
@@ -198,7 +198,7 @@ mod tests {
         let ground = Ground::flat(96, 96, 8.0).expect("valid ground");
         let settings = TerrainSettings { chunk_size: 8, ..Default::default() };
         let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
-        terrain.edit_world(|world| world.meshes.surfaces.set_most_bytes(30_000));
+        terrain.edit_world(|world| world.meshes.surfaces.set_max_bytes(30_000));
         let dig = |x: i32| Brush::dig(Shape::sphere(Vec3::new(x as f32, 8.0, 40.0), 2.5));
         for x in 5..90 {
             terrain.apply([dig(x)]);

@@ -45,7 +45,7 @@ pub(crate) use meshes::NewSurfaces;
 pub(crate) use parts::{brick_over, columns_of};
 pub use patch::Patch;
 #[cfg_attr(not(feature = "net"), allow(unused_imports))]
-pub(crate) use patch::{ChangedBrick, Overlay, Places, State};
+pub(crate) use patch::{ChangedBrick, Overlay, Positions, State};
 pub use query::{RayHit, Span};
 pub use settings::{TerrainError, TerrainSettings};
 pub use splats::SplatMaps;

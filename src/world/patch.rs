@@ -53,14 +53,14 @@ impl State for World {
 
 /// Positions at which states are compared.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Places {
+pub(crate) struct Positions {
     /// Positions of bricks.
     pub bricks: BTreeSet<BrickPos>,
     /// Chunks whose fields are compared.
     pub chunks: BTreeSet<ChunkPos>,
 }
 
-impl Places {
+impl Positions {
     /// All positions at which a world holds something.
     pub fn of(world: &World) -> Self {
         Self {
@@ -84,20 +84,20 @@ impl Patch {
     }
 
     /// The positions at which it holds something.
-    pub(crate) fn places(&self) -> Places {
-        Places {
+    pub(crate) fn positions(&self) -> Positions {
+        Positions {
             bricks: self.bricks.iter().map(|(pos, _)| *pos).collect(),
             chunks: self.fields.iter().map(|(chunk, _)| *chunk).collect(),
         }
     }
 
     /// What leads from one state to another, as far as they differ at these positions.
-    pub(crate) fn between(from: &impl State, to: &impl State, places: Places, next_field: u64) -> Self {
-        let bricks = places.bricks.into_iter().filter_map(|pos| {
+    pub(crate) fn between(from: &impl State, to: &impl State, positions: Positions, next_field: u64) -> Self {
+        let bricks = positions.bricks.into_iter().filter_map(|pos| {
             let new = to.brick(pos);
             (!Brick::is_same(from.brick(pos), new)).then(|| (pos, new.cloned()))
         });
-        let fields = places.chunks.into_iter().filter_map(|chunk| {
+        let fields = positions.chunks.into_iter().filter_map(|chunk| {
             let new = to.fields(chunk);
             (from.fields(chunk) != new).then(|| (chunk, new.clone()))
         });
@@ -230,7 +230,7 @@ impl Overlay {
     }
 
     /// Removes entries that equal a state's.
-    pub fn forget(&mut self, state: &impl State, at: &Places) {
+    pub fn forget(&mut self, state: &impl State, at: &Positions) {
         for pos in &at.bricks {
             if self.bricks.get(pos).is_some_and(|own| Brick::is_same(own.as_ref(), state.brick(*pos))) {
                 self.bricks.remove(pos);
@@ -244,8 +244,8 @@ impl Overlay {
     }
 
     /// The positions at which it holds something.
-    pub fn places(&self) -> Places {
-        Places {
+    pub fn positions(&self) -> Positions {
+        Positions {
             bricks: self.bricks.keys().copied().collect(),
             chunks: self.fields.keys().copied().collect(),
         }
@@ -315,7 +315,7 @@ mod tests {
     }
 
     fn between(from: &World, to: &World) -> Patch {
-        Patch::between(from, to, Places::of(from).and(Places::of(to)), to.next_field)
+        Patch::between(from, to, Positions::of(from).and(Positions::of(to)), to.next_field)
     }
 
     /// Whether two worlds hold the same bricks and fields, and the same bricks in their stacks.
@@ -404,14 +404,14 @@ mod tests {
                 before.keep(patch.inverse(from));
                 overlay.lay(&patch);
             }
-            let places = Places::of(&states[3]).and(overlay.places());
-            let none = Patch::between(&overlay.over(&states[0]), &states[3], places.clone(), 0);
+            let positions = Positions::of(&states[3]).and(overlay.positions());
+            let none = Patch::between(&overlay.over(&states[0]), &states[3], positions.clone(), 0);
             assert!(none.is_empty());
-            let none = Patch::between(&before.over(&states[3]), &states[0], places, 0);
+            let none = Patch::between(&before.over(&states[3]), &states[0], positions, 0);
             assert!(none.is_empty());
             before.keep(overlay.patch(0));
             assert_eq!(before.bricks.len(), overlay.bricks.len());
-            overlay.forget(&states[3], &overlay.places());
+            overlay.forget(&states[3], &overlay.positions());
             assert!(overlay.is_empty());
         }
     }

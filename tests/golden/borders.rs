@@ -24,7 +24,7 @@ const ALONG: f32 = 5.0;
 
 /// The largest share of borders along edges. Of borders in random directions it is a sixth; where borders follow the mesh, it is
 /// nearly a third. Measured: 0.22.
-const MOST: f32 = 0.24;
+const MAX_SHARE: f32 = 0.24;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let middle = VOXELS as f32 / 2.0;
@@ -58,7 +58,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let borders = Borders::measure(&picture);
     println!("borders: {borders:?}, along edges {:.3}", borders.share());
     album.check(borders.length > 300.0, || format!("too few borders: {borders:?}"));
-    album.check(borders.share() <= MOST, || format!("borders follow the mesh: {borders:?}"));
+    album.check(borders.share() <= MAX_SHARE, || format!("borders follow the mesh: {borders:?}"));
     studio.resize(SIZE);
     studio.renew_camera(Msaa::Off);
     studio

@@ -102,7 +102,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         levels: true,
         focus: Some(pit),
         radius: 500.0,
-        most_lines: 200_000,
+        max_lines: 200_000,
         ..default()
     });
     (0..3).for_each(|_| studio.app.update());

@@ -1,12 +1,14 @@
 //! Islands follow commits: a path through a tunnel exists in the frame after the commit that opened it.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::query::Allow;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
-use bevy_burrow::navigation::{NavTilePos, WalkSettings, WalkableTile, Walker};
+use bevy_burrow::lattice::LatticeBox;
+use bevy_burrow::navigation::{NavPolygons, NavTilePos, WalkSettings, WalkableTile, Walker};
 use bevy_burrow::paths::bevy_landmass::{
     PermittedAnimationLinks, PointSampleDistance3d, UsingAnimationLink, prelude::*,
 };
@@ -441,81 +443,39 @@ fn a_terrain_that_a_parent_mirrors_has_no_islands() {
     assert_eq!(island_count(&mut app), 9);
 }
 
-/// A thousand agents cross hilly ground that is dug 20 times a second; prints how long frames take.
-///
-/// ```text
-/// cargo test --release --features examples --test navigation -- --ignored --nocapture thousand
-/// ```
 #[test]
-#[ignore = "prints figures"]
-fn a_thousand_agents_while_the_ground_is_dug() {
-    use bevy::time::TimeUpdateStrategy;
-    let number = |name: &str, default: usize| {
-        std::env::var(name).ok().and_then(|count| count.parse().ok()).unwrap_or(default)
-    };
-    let (agents, side) = (number("BURROW_AGENTS", 1000), number("BURROW_SIDE", 512) as u32);
-    for digs in [false, true] {
-        let (mut app, archipelago) = empty_app(true);
-        app.world_mut().resource_mut::<BurrowSettings>().same_frame = BurrowSettings::default().same_frame;
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_micros(16_667)));
-        let waves = |x: i32, z: i32| 20.0 + 4.0 * ((f64::from(x) * 0.07).sin() + (f64::from(z) * 0.09).cos());
-        let ground = Ground::from_fn(side, side, waves).expect("finite");
-        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
-        let terrain = app.world_mut().spawn(terrain).id();
-        let area = NavigationArea::Everywhere;
-        let navigation = app.world_mut().spawn(Navigation { terrain, archipelago, agent: AGENT, area }).id();
-        wait_for_tiles(&mut app, navigation);
-        let mut rng = Rng::with_seed(3);
-        let place = |rng: &mut Rng| {
-            let [x, z] = [0, 1].map(|_| 4.0 + rng.f32() * (side as f32 - 8.0));
-            Vec3::new(x, waves(x as i32, z as i32) as f32, z)
+fn an_island_has_another_mesh_only_if_its_polygons_are_others() {
+    let (mut app, [terrain, _, navigation]) = app(false, AGENT);
+    let meshes = |app: &mut App| -> Vec<(NavTilePos, NavPolygons, Arc<ValidNavigationMesh3d>)> {
+        let islands = tiles(app.world(), navigation).islands();
+        let islands: Vec<_> =
+            islands.map(|(pos, island, polygons)| (pos, island, polygons.clone())).collect();
+        let all = app.world().resource::<Assets<NavMesh3d>>();
+        let mesh = |island: Entity| {
+            let handle = app.world().get::<NavMeshHandle3d>(island).expect("an island");
+            Arc::clone(&all.get(&handle.0).expect("a mesh").nav_mesh)
         };
-        for _ in 0..agents {
-            let (at, to) = (place(&mut rng), place(&mut rng));
-            app.world_mut().spawn((
-                Transform::from_translation(at),
-                Agent3dBundle {
-                    agent: default(),
-                    settings: AgentSettings { radius: 0.4, desired_speed: 3.0, max_speed: 4.0 },
-                    archipelago_ref: ArchipelagoRef3d::new(archipelago),
-                },
-                AgentTarget3d::Point(to),
-            ));
+        let mut meshes: Vec<_> =
+            islands.into_iter().map(|(pos, island, polygons)| (pos, polygons, mesh(island))).collect();
+        meshes.sort_by_key(|island| island.0);
+        meshes
+    };
+    let walker = Walker::new(&AGENT).expect("valid");
+    let (mut replaced, mut kept) = (0, 0);
+    for x in 0..8 {
+        // Nearer and nearer to the border of two tiles.
+        let at = Vec3::new(41.0 - x as f32, 10.0, 16.0);
+        let before = meshes(&mut app);
+        commit(&mut app, terrain, send(Brush::dig(Shape::sphere(at, 1.5))));
+        app.update();
+        let world = app.world().get::<Terrain>(terrain).expect("a terrain").world();
+        let samples = LatticeBox { min: (at - 2.0).as_ivec3(), max: (at + 2.0).as_ivec3() };
+        let affected: Vec<NavTilePos> = NavTilePos::affected(world, samples, &walker).collect();
+        for (before, after) in before.iter().zip(meshes(&mut app)) {
+            assert_eq!(before.1 == after.1, Arc::ptr_eq(&before.2, &after.2), "{:?}, dig at {at}", after.0);
+            replaced += usize::from(before.1 != after.1);
+            kept += usize::from(before.1 == after.1 && affected.contains(&after.0));
         }
-        app.add_systems(
-            Update,
-            |mut agents: Query<(&mut Transform, &AgentDesiredVelocity3d)>,
-             terrain: Single<&Terrain>,
-             time: Res<Time>| {
-                for (mut place, wanted) in &mut agents {
-                    place.translation += wanted.velocity() * time.delta_secs();
-                    let [x, z] = [place.translation.x, place.translation.z].map(f64::from);
-                    place.translation.y = terrain.world().height(x, z).unwrap_or_default() as f32;
-                }
-            },
-        );
-        let mut times = Vec::new();
-        for frame in 0..360 {
-            if digs && frame % 3 == 0 {
-                send(Brush::dig(Shape::sphere(place(&mut rng), 2.5)))(&mut app);
-            }
-            let start = Instant::now();
-            app.update();
-            times.push(start.elapsed().as_secs_f64() * 1e3);
-        }
-        let mut states = app.world_mut().query::<&AgentState>();
-        let moving = states.iter(app.world()).filter(|state| **state == AgentState::Moving).count();
-        let bytes = tiles(app.world(), navigation).bytes();
-        let polygons: usize =
-            tiles(app.world(), navigation).islands().map(|(.., polygons)| polygons.len()).sum();
-        times.drain(..60);
-        times.sort_by(f64::total_cmp);
-        println!(
-            "{agents} agents, {side} x {side} voxels, digs: {digs}: {moving} move; frame median {:.2} ms, 95 % {:.2}, \
-             most {:.2}; {polygons} polygons of {bytes} bytes",
-            times[times.len() / 2],
-            times[times.len() * 95 / 100],
-            times[times.len() - 1]
-        );
     }
+    assert!(replaced > 5 && kept > 0, "{replaced} replaced, {kept} of the affected ones kept");
 }

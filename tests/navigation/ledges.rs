@@ -146,3 +146,23 @@ fn a_platform_is_left_by_jumps_and_climbed_if_it_is_low() {
         found.iter().all(|link| link.way != IVec3::X) && found.iter().any(|link| link.way == IVec3::NEG_X)
     );
 }
+
+#[test]
+fn a_cliff_that_runs_diagonally_is_passed_along_x_and_z() {
+    // 4 voxels high, along x + z = 64.
+    let cliff = Ground::from_fn(64, 64, |x, z| if x + z < 64 { 14.0 } else { 10.0 }).expect("finite");
+    let terrain = Terrain::new(cliff, &TerrainSettings::default()).expect("valid");
+    let count = |radius: f32, leap: f32| {
+        let settings = WalkSettings { radius, leap, jump_down: 5.0, ..WalkSettings::default() };
+        let all = NavTilePos::all(terrain.world());
+        let links = all.flat_map(|pos| links(terrain.world(), pos, &settings));
+        let leaps: Vec<Leap> = links.flat_map(|link| leaps_of(&link)).collect();
+        assert!(leaps.iter().all(|leap| [(1, 0), (0, 1)].contains(&leap.1)), "{leaps:?}");
+        leaps.len()
+    };
+    assert_eq!(count(0.4, 0.0), 0);
+    assert!(count(0.4, 1.0) > 80, "{}", count(0.4, 1.0));
+    // A wider agent keeps farther from it.
+    assert_eq!(count(0.9, 2.0), 0);
+    assert!(count(0.9, 3.0) > 80, "{}", count(0.9, 3.0));
+}

@@ -91,6 +91,8 @@ fn random_hills(rng: &mut Rng) -> Terrain {
 #[test]
 fn nearly_all_that_recast_finds_is_walkable() {
     let (mut both, mut theirs, mut ours) = (0, 0, 0);
+    // Of those with ground above: in tunnels and under bridges.
+    let (mut both_below, mut theirs_below) = (0, 0);
     let mut worst = (1.0, 0);
     for index in 0..world_count(8) {
         let mut rng = Rng::with_seed(5000 + index);
@@ -117,6 +119,13 @@ fn nearly_all_that_recast_finds_is_walkable() {
             cells.get(column).is_some_and(|cells| cells.iter().any(|cell| is_near(cell, *height)))
         };
         let common = found.iter().filter(is_ours).count();
+        let is_below = |(column, height): &&(Column, f32)| {
+            let (x, z) = (f64::from(column.x) + 0.5, f64::from(column.z) + 0.5);
+            terrain.world().spans(x, z).iter().any(|span| span.floor > f64::from(*height) + 1.0)
+        };
+        let below: Vec<_> = found.iter().filter(is_below).collect();
+        theirs_below += below.len();
+        both_below += below.into_iter().filter(is_ours).count();
         let share = common as f64 / found.len().max(1) as f64;
         if share < worst.0 && found.len() > 200 {
             worst = (share, index);
@@ -124,10 +133,13 @@ fn nearly_all_that_recast_finds_is_walkable() {
         (both, theirs) = (both + common, theirs + found.len());
     }
     println!(
-        "rerecast finds {theirs} cells; {both} of them ({:.2} %) are among our {ours}; at least {:.2} % in world {}",
+        "rerecast finds {theirs} cells; {both} of them ({:.2} %) are among our {ours}; at least {:.2} % in world {}; \
+         of {theirs_below} with ground above, {both_below} ({:.2} %)",
         100.0 * both as f64 / theirs as f64,
         100.0 * worst.0,
-        worst.1
+        worst.1,
+        100.0 * both_below as f64 / theirs_below as f64
     );
+    assert!(theirs_below > 100, "{theirs_below} cells in tunnels and under bridges");
     assert!(theirs > 1000 && both * 100 >= theirs * 97, "{both} of {theirs}");
 }

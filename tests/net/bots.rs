@@ -7,8 +7,7 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::ChunkPos;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, ContentTable, Entries, Entry, Lane, Server, ServerSettings, ShownChange,
-    ToClient,
+    Client, ClientEvent, ClientId, ContentTable, Entries, Entry, Lane, Server, ServerSettings, ToClient,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
@@ -38,7 +37,7 @@ fn plants(world: &World) -> Vec<bevy_burrow::scatter::Plant> {
     scatter.expect("valid rules").in_box(world, -all, all, |_| true)
 }
 
-/// The world that results from the order, entry by entry, and its hash at every number.
+/// The world that results from the log, entry by entry, and its hash at every number.
 pub struct Reference {
     terrain: Terrain,
     ground: Arc<Ground>,
@@ -46,7 +45,7 @@ pub struct Reference {
     pub number: u64,
     pub hashes: BTreeMap<u64, u64>,
     pub loose: usize,
-    /// Edits of players: the number in the order, the player, and the player's number.
+    /// Edits of players: the number in the log, the player, and the player's number.
     pub done: Vec<(u64, ClientId, u64)>,
     /// Applied parts, by the player that asked for the undo.
     pub undone: BTreeMap<ClientId, Vec<Applied>>,
@@ -177,7 +176,7 @@ impl Bot {
         if id.is_multiple_of(2) {
             add_contents(client.contents_mut());
         }
-        client.set_place(IVec3::new(20, 20, 20));
+        client.set_position(IVec3::new(20, 20, 20));
         client.connect(now);
         let (up, order, bulk, free, dug, arrived, events) = Default::default();
         Self {
@@ -245,8 +244,8 @@ impl Bot {
     }
 
     fn look(&mut self, frame: u64, now: Duration) {
-        for ShownChange { change, hash } in self.client.take_shown() {
-            self.shown.apply_one(Order::parts(change, Some(hash))).outcome.expect("it fits");
+        for order in self.client.take_shown() {
+            self.shown.apply_one(order).outcome.expect("it fits");
         }
         for event in self.client.take_events() {
             let name = match event {
@@ -385,7 +384,7 @@ impl Play {
     /// Sends the server's messages.
     pub fn send(&mut self) {
         for (to, lane, message) in self.server.take_outgoing() {
-            if lane == Lane::Order {
+            if lane == Lane::Main {
                 self.reference.obey(&message);
             }
             let Some(bot) = self.bots.iter_mut().find(|bot| bot.id == to && bot.is_connected) else {
@@ -397,7 +396,7 @@ impl Play {
             };
             let Some(message) = message else { continue };
             bot.bytes[lane as usize] += message.len() as u64;
-            let way = if lane == Lane::Order { &mut bot.order } else { &mut bot.bulk };
+            let way = if lane == Lane::Main { &mut bot.order } else { &mut bot.bulk };
             way.send(message, self.now, &mut bot.free[0], &self.line, &mut self.rng);
         }
     }
@@ -438,7 +437,7 @@ impl Play {
         }
         for bot in &mut self.bots {
             if bot.is_connected {
-                for (lane, way) in [(Lane::Order, &mut bot.order), (Lane::Bulk, &mut bot.bulk)] {
+                for (lane, way) in [(Lane::Main, &mut bot.order), (Lane::Bulk, &mut bot.bulk)] {
                     while let Some((at, message)) = way.next(self.now) {
                         if let Ok(ToClient::Entries(Entries { first, entries })) =
                             ToClient::from_bytes(&message, &self.ground, &self.reference.contents)

@@ -1,4 +1,4 @@
-//! The simplest client: it applies the order, predicts nothing, and fetches regions that differ. Tests of the server
+//! The simplest client: it applies the log, predicts nothing, and fetches regions that differ. Tests of the server
 //! use it.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -13,7 +13,7 @@ use bevy_burrow::net::{
     touched_regions,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Meshing, Patch, SIMULATION};
+use bevy_burrow::terrain::{EditSettings, Meshing, Patch, SIMULATION};
 use bevy_burrow::volume::Fields;
 use fastrand::Rng;
 use glam::IVec3;
@@ -45,7 +45,7 @@ pub fn terrain(ground: &Arc<Ground>) -> Terrain {
     terrain
 }
 
-/// A client that applies the order.
+/// A client that applies the log.
 pub struct Follower {
     pub id: ClientId,
     ground: Arc<Ground>,
@@ -57,7 +57,7 @@ pub struct Follower {
     /// The number that the last welcome led to. Marks up to it were compared with others.
     joined_at: u64,
     pub last_sequence: u64,
-    pub place: IVec3,
+    pub position: IVec3,
     /// Messages to send.
     pub out: Vec<ToServer>,
     /// Received entries that can't be applied yet.
@@ -100,7 +100,7 @@ impl Follower {
             number: 0,
             joined_at: 0,
             last_sequence: 0,
-            place: IVec3::ZERO,
+            position: IVec3::ZERO,
             out: Vec::new(),
             waiting: VecDeque::new(),
             awaited: BTreeSet::new(),
@@ -130,7 +130,7 @@ impl Follower {
             ground: self.ground.hash(),
             chunk_size: 32,
             epoch: self.epoch.map(|epoch| Epoch { number: self.number, ..epoch }),
-            place: self.place,
+            position: self.position,
         }
     }
 
@@ -228,8 +228,10 @@ impl Follower {
             }
         };
         self.number = welcome.epoch.number;
-        self.terrain.set_rules(state.rules.unwrap_or_default()).expect("valid rules");
-        self.terrain.set_loose(state.loose);
+        let EditSettings { rules, loose } = state.edit_settings;
+        let rules = rules.as_deref().cloned().unwrap_or_default();
+        self.terrain.set_rules(rules).expect("valid rules");
+        self.terrain.set_loose(loose);
     }
 
     fn compare(&mut self, regions: &RegionHashes) {

@@ -116,7 +116,7 @@ impl Messages {
             server.advance(now);
             for (to, lane, bytes) in server.take_outgoing() {
                 let bot = bots.iter_mut().find(|bot| bot.id == to).unwrap();
-                if lane == Lane::Order {
+                if lane == Lane::Main {
                     to_client.push(bytes.clone());
                 }
                 bot.receive(lane, &bytes);
@@ -254,7 +254,7 @@ fn hello(ground: &Ground) -> Vec<u8> {
         ground,
         chunk_size: 32,
         epoch: None,
-        place: IVec3::splat(20),
+        position: IVec3::splat(20),
     };
     ToServer::Hello(hello).to_bytes()
 }
@@ -275,13 +275,13 @@ fn a_server_takes_any_messages() {
     let mut now = Duration::from_secs(1);
     let begin = |server: &mut Server, client: ClientId, now: Duration| {
         server.connect(client, now);
-        server.set_place(client, Some(IVec3::new(64, 20, 64)));
+        server.set_position(client, Some(IVec3::new(64, 20, 64)));
         server.receive(client, &hello(&ground), now);
     };
     let mut honest = Follower::new(99, &ground);
     honest.contents = contents.clone();
     honest.connect(&mut server, now);
-    server.set_place(honest.id, Some(IVec3::new(64, 20, 64)));
+    server.set_position(honest.id, Some(IVec3::new(64, 20, 64)));
     let mut attackers: Vec<(ClientId, u64)> = (0..8).map(|id| (ClientId(1000 + id), 1)).collect();
     let edits: Vec<Vec<Edit>> = to_server
         .iter()

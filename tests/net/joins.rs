@@ -62,7 +62,7 @@ fn join(ground: &Arc<Ground>, world: &Terrain, line: &Line, settings: ServerSett
     let served = Terrain::restore(Arc::clone(ground), &TerrainSettings::default(), world.parts());
     let mut server = Server::new(served.expect("its own parts"), settings);
     let mut client = Client::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
-    client.set_place(IVec3::new(20, 20, 20));
+    client.set_position(IVec3::new(20, 20, 20));
     let [mut up, mut order, mut bulk] = std::array::from_fn(|_| Way::default());
     let (mut free, mut rng, mut now) = ([Duration::ZERO; 2], Rng::with_seed(8), Duration::from_secs(1));
     let begin = now;
@@ -77,11 +77,11 @@ fn join(ground: &Arc<Ground>, world: &Terrain, line: &Line, settings: ServerSett
             }
             server.advance(now);
             for (_, lane, message) in server.take_outgoing() {
-                let way = if lane == Lane::Order { &mut order } else { &mut bulk };
+                let way = if lane == Lane::Main { &mut order } else { &mut bulk };
                 way.send(message, now, &mut free[0], line, &mut rng);
             }
         }
-        for (lane, way) in [(Lane::Order, &mut order), (Lane::Bulk, &mut bulk)] {
+        for (lane, way) in [(Lane::Main, &mut order), (Lane::Bulk, &mut bulk)] {
             while let Some((_, message)) = way.next(now) {
                 client.receive(lane, message);
             }

@@ -67,7 +67,7 @@ fn lie(play: &mut Play, mut change: impl FnMut(&mut Vec<Entry>) -> Lie + 'static
     known.add(stamps);
     let mut is_done = false;
     play.tamper = Some(Box::new(move |to, lane, bytes| {
-        if is_done || to != ClientId(1) || lane != Lane::Order {
+        if is_done || to != ClientId(1) || lane != Lane::Main {
             return Some(bytes);
         }
         match ToClient::from_bytes(&bytes, &ground, &known) {

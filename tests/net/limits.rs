@@ -5,147 +5,18 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use allocation_counter::measure;
-use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, ContentTable, Hello, KickReason, Lane, MAX_SEQUENCE_JUMP, PROTOCOL, Rate,
-    Reach, Refusal, Server, ServerSettings, ToClient, ToServer, UndoPolicy,
+    ClientEvent, ClientId, ContentTable, KickReason, Lane, MAX_SEQUENCE_JUMP, Rate, Reach, Server,
+    ServerSettings, ToClient, ToServer,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
-use bevy_burrow::terrain::{Patch, SIMULATION};
-use glam::{DVec3, IVec3, Vec2, Vec3};
+use bevy_burrow::terrain::Patch;
+use glam::{DVec3, IVec3, Vec3};
 
 use crate::follower::terrain;
-
-const FRAME: Duration = Duration::from_millis(50);
-const BEGIN: Duration = Duration::from_secs(1);
-const ONE: ClientId = ClientId(1);
-
-fn flat(side: u32) -> Arc<Ground> {
-    Arc::new(Ground::flat(side, side, 20.0).expect("a valid ground"))
-}
-
-fn ball(x: f32, z: f32, radius: f32) -> Brush {
-    Brush::dig(Shape::sphere(Vec3::new(x, 20.0, z), radius))
-}
-
-fn edit(brush: &Brush) -> Edit {
-    Edit::quantize(brush).expect("a valid brush")
-}
-
-/// A client of this test, which greets, joins, and can send any messages.
-fn let_in(server: &mut Server, id: ClientId, ground: &Ground, now: Duration) {
-    let (chunk_size, ground, place) = (32, ground.hash(), IVec3::splat(20));
-    let (protocol, simulation) = (PROTOCOL, SIMULATION);
-    let hello = Hello { protocol, simulation, ground, chunk_size, epoch: None, place };
-    server.connect(id, now);
-    server.receive(id, &ToServer::Hello(hello).to_bytes(), now);
-    server.advance(now);
-    drop(server.take_outgoing());
-}
-
-fn send(server: &mut Server, id: ClientId, first: u64, edits: Vec<Edit>, now: Duration) {
-    server.receive(id, &ToServer::Edits { first, edits }.to_bytes(), now);
-}
-
-/// A server and clients of this crate; lines between them lose nothing.
-struct Play {
-    ground: Arc<Ground>,
-    server: Server,
-    players: Vec<Player>,
-    now: Duration,
-}
-
-struct Player {
-    id: ClientId,
-    client: Client,
-    is_connected: bool,
-    events: Vec<ClientEvent>,
-}
-
-impl Player {
-    fn count(&self, is_such: impl Fn(&ClientEvent) -> bool) -> usize {
-        self.events.iter().filter(|event| is_such(event)).count()
-    }
-
-    fn confirmed(&self) -> usize {
-        self.count(|event| matches!(event, ClientEvent::Confirmed { .. }))
-    }
-
-    fn refused(&self) -> usize {
-        self.count(|event| matches!(event, ClientEvent::Refused { .. }))
-    }
-
-    fn kicked(&self) -> usize {
-        self.count(|event| matches!(event, ClientEvent::Kicked(_)))
-    }
-}
-
-impl Play {
-    fn new(ground: &Arc<Ground>, settings: ServerSettings) -> Self {
-        Self::of(ground, Server::new(terrain(ground), settings))
-    }
-
-    fn of(ground: &Arc<Ground>, server: Server) -> Self {
-        Self { ground: Arc::clone(ground), server, players: Vec::new(), now: BEGIN }
-    }
-
-    fn join(&mut self, id: u64) -> usize {
-        let client = Client::new(Arc::clone(&self.ground), &TerrainSettings::default()).expect("valid");
-        self.players.push(Player { id: ClientId(id), client, is_connected: false, events: Vec::new() });
-        self.connect(self.players.len() - 1);
-        self.frames(4);
-        self.players.len() - 1
-    }
-
-    fn connect(&mut self, at: usize) {
-        let player = &mut self.players[at];
-        self.server.connect(player.id, self.now);
-        player.client.connect(self.now);
-        player.is_connected = true;
-    }
-
-    fn cut(&mut self, at: usize) {
-        let player = &mut self.players[at];
-        self.server.disconnect(player.id);
-        player.client.disconnect();
-        player.is_connected = false;
-    }
-
-    fn dig(&mut self, at: usize, brush: &Brush) {
-        self.players[at].client.submit(edit(brush));
-    }
-
-    fn frames(&mut self, count: u32) {
-        for _ in 0..count {
-            self.now += FRAME;
-            for player in self.players.iter_mut().filter(|player| player.is_connected) {
-                for message in player.client.take_outgoing() {
-                    self.server.receive(player.id, &message, self.now);
-                }
-            }
-            self.server.advance(self.now);
-            for (to, lane, bytes) in self.server.take_outgoing() {
-                let player = self.players.iter_mut().find(|player| player.id == to && player.is_connected);
-                player.into_iter().for_each(|player| player.client.receive(lane, bytes.clone()));
-            }
-            for player in &mut self.players {
-                while player.client.advance(self.now) {}
-                drop(player.client.take_shown());
-                player.events.extend(player.client.take_events());
-            }
-        }
-    }
-
-    fn hash(&self) -> u64 {
-        self.server.terrain().world().hash()
-    }
-
-    fn is_solid(&self, x: f64, z: f64) -> bool {
-        self.server.terrain().world().is_solid(DVec3::new(x, 18.0, z))
-    }
-}
+use crate::play::{BEGIN, FRAME, ONE, Play, ball, edit, flat, let_in, send};
 
 /// Additional bytes that the server holds after ten seconds in which a client digs, with or without fetching regions.
 /// It acknowledges nothing, and yet all of its edits are done.
@@ -366,7 +237,7 @@ fn nobody_digs_beyond_the_reach() {
     let is_left = |shape: Shape| {
         let settings = ServerSettings { reach, ..ServerSettings::default() };
         let mut server = Server::new(terrain(&ground), settings);
-        server.set_place(ONE, Some(IVec3::new(64, 15, 64)));
+        server.set_position(ONE, Some(IVec3::new(64, 15, 64)));
         let_in(&mut server, ONE, &ground, BEGIN);
         send(&mut server, ONE, 1, vec![edit(&Brush::dig(shape))], BEGIN);
         server.advance(BEGIN);
@@ -452,115 +323,6 @@ fn who_comes_back_with_an_empty_bucket_is_not_refused() {
     assert_eq!((player.confirmed(), player.refused(), player.kicked()), (900, 0, 0));
 }
 
-/// Whether the first of two digs is undone, and the second stays.
-fn stays(frames: u32) -> bool {
-    let ground = flat(128);
-    let mut play = Play::new(&ground, ServerSettings { undo: UndoPolicy::Own, ..ServerSettings::default() });
-    let at = play.join(1);
-    play.dig(at, &ball(30.0, 30.0, 4.0).with_stroke(1));
-    play.frames(frames);
-    play.players[at].client.undo(None);
-    play.frames(frames);
-    play.dig(at, &ball(90.0, 90.0, 4.0).with_stroke(2));
-    play.frames(20);
-    play.is_solid(30.0, 30.0) && !play.is_solid(90.0, 90.0)
-}
-
-#[test]
-fn an_undo_takes_back_what_was_dug_before_it_and_not_what_was_dug_after() {
-    assert!(stays(5) && stays(1) && stays(0));
-}
-
-#[test]
-fn undos_among_digs_are_done_in_order_while_the_server_is_behind() {
-    let ground = flat(128);
-    let settings = ServerSettings { undo: UndoPolicy::Own, work: 1, ..ServerSettings::default() };
-    let mut play = Play::new(&ground, settings);
-    let (a, b) = (play.join(1), play.join(2));
-    for turn in 0..8_u32 {
-        let at = 16.0 + 12.0 * turn as f32;
-        play.dig(a, &ball(at, 30.0, 4.0).with_stroke(turn.into()));
-        if turn % 2 == 0 {
-            play.players[a].client.undo(None);
-        }
-        play.dig(b, &ball(at, 90.0, 4.0));
-    }
-    play.frames(60);
-    for turn in 0..8 {
-        let at = 16.0 + 12.0 * f64::from(turn);
-        assert_eq!(play.is_solid(at, 30.0), turn % 2 == 0, "{turn}");
-        assert!(!play.is_solid(at, 90.0));
-    }
-    for player in &play.players {
-        assert_eq!((player.client.world().hash(), player.refused()), (play.hash(), 0));
-    }
-}
-
-/// The number of answers to undos in ten seconds, while another player digs several times a frame on a server with
-/// small work limits.
-fn answers(digs: u32) -> usize {
-    let ground = flat(128);
-    let settings = ServerSettings { undo: UndoPolicy::Own, work: 60, ..ServerSettings::default() };
-    let mut play = Play::new(&ground, settings);
-    let (a, b) = (play.join(1), play.join(2));
-    play.dig(a, &ball(30.0, 30.0, 3.0));
-    play.frames(5);
-    play.players[a].client.undo(None);
-    for turn in 0..200 {
-        (0..digs).for_each(|step| play.dig(b, &ball(10.0 + ((turn * digs + step) % 100) as f32, 90.0, 3.0)));
-        play.frames(1);
-    }
-    play.players[a].count(|event| matches!(event, ClientEvent::Undone(_) | ClientEvent::UndoRefused(_)))
-}
-
-#[test]
-fn an_undo_is_answered_though_others_keep_the_server_busy() {
-    assert_eq!([answers(0), answers(4)], [1, 1]);
-}
-
-#[test]
-fn an_undo_that_nobody_may_do_is_forbidden() {
-    let ground = flat(64);
-    let mut play = Play::new(&ground, ServerSettings::default());
-    let at = play.join(1);
-    play.dig(at, &ball(30.0, 30.0, 3.0));
-    play.players[at].client.undo(None);
-    play.frames(4);
-    let forbidden = ClientEvent::UndoRefused(Some(Refusal::Forbidden));
-    assert_eq!(play.players[at].count(|event| *event == forbidden), 1);
-}
-
-#[test]
-fn who_is_made_an_administrator_is_one() {
-    for when in ["before", "now", "came back"] {
-        let ground = flat(128);
-        let settings = ServerSettings { undo: UndoPolicy::Administrators, ..ServerSettings::default() };
-        let mut play = Play::new(&ground, settings);
-        let pristine = play.hash();
-        if when == "before" {
-            play.server.set_administrator(ClientId(2), true);
-        }
-        let (a, b) = (play.join(1), play.join(2));
-        play.server.set_administrator(ClientId(2), true);
-        if when == "came back" {
-            play.cut(b);
-            play.connect(b);
-            play.frames(4);
-        }
-        play.dig(a, &ball(30.0, 30.0, 3.0));
-        play.frames(4);
-        assert_ne!(play.hash(), pristine);
-        play.players[b].client.undo(Some(ONE));
-        play.frames(4);
-        assert_eq!(play.hash(), pristine, "{when}");
-        play.server.set_administrator(ClientId(2), false);
-        play.dig(a, &ball(30.0, 30.0, 3.0));
-        play.players[b].client.undo(Some(ONE));
-        play.frames(4);
-        assert_ne!(play.hash(), pristine, "{when}");
-    }
-}
-
 #[test]
 fn who_is_not_admitted_is_told_why() {
     let ground = flat(64);
@@ -575,64 +337,10 @@ fn who_is_not_admitted_is_told_why() {
     assert_eq!(play.players[a].events.last(), Some(&ClientEvent::Kicked(KickReason::Refused(7))));
 }
 
-fn image(side: u32) -> Arc<GreyImage> {
-    let samples = (0..side * side).map(|at| (at * 900 % 60_000) as u16).collect();
-    Arc::new(GreyImage::from_samples(side, side, samples).expect("an image"))
-}
-
-fn stamp(image: &Arc<GreyImage>, x: f32) -> Brush {
-    let at = Vec3::new(x, 20.0, 64.0);
-    Brush::stamp(Shape::sphere(at, 6.0), Stamp::new(Arc::clone(image), at, Vec2::splat(9.0), 3.0))
-}
-
-/// Players without an image get it, while they play, in the log that they join with, and when it was added later.
-#[test]
-fn who_lacks_the_image_of_a_stamp_gets_it() {
-    let ground = flat(128);
-    let mut play = Play::new(&ground, ServerSettings::default());
-    let (first, later) = (image(8), image(100));
-    let (a, b) = (play.join(1), play.join(2));
-    for (image, x) in [(&first, 40.0), (&later, 80.0)] {
-        play.server.contents_mut().add(Arc::clone(image));
-        play.players[a].client.contents_mut().add(Arc::clone(image));
-        play.dig(a, &stamp(image, x));
-        play.dig(a, &ball(30.0, 30.0, 4.0));
-        play.frames(40);
-        for player in &play.players {
-            assert_eq!(player.client.world().hash(), play.hash());
-        }
-    }
-    let c = play.join(3);
-    play.frames(40);
-    assert!(play.players[c].client.has_joined());
-    assert_eq!(play.players[c].client.world().hash(), play.hash());
-    for player in [b, c].map(|at| &play.players[at]) {
-        assert_eq!((player.client.figures().malformed, player.kicked()), (0, 0));
-    }
-    assert_eq!(play.server.figures().malformed, 0);
-}
-
-/// An image that the server lacks: the edit is refused, and the others in the message are applied.
-#[test]
-fn a_stamp_that_the_server_does_not_know_is_refused() {
-    let ground = flat(128);
-    let mut play = Play::new(&ground, ServerSettings::default());
-    let (unknown, at) = (image(8), play.join(1));
-    play.players[at].client.contents_mut().add(Arc::clone(&unknown));
-    play.dig(at, &ball(30.0, 30.0, 4.0));
-    play.dig(at, &stamp(&unknown, 64.0).with_tag(5));
-    play.dig(at, &ball(90.0, 90.0, 4.0));
-    play.frames(10);
-    let player = &play.players[at];
-    let refused = ClientEvent::Refused { tag: 5, why: Some(Refusal::UnknownContent) };
-    assert_eq!((player.count(|event| *event == refused), player.confirmed()), (1, 2));
-    assert_eq!((player.client.pending(), play.server.figures().malformed), (0, 0));
-}
-
 /// Parts that a game replaces are sent as clients acknowledge them, and reach all in the end; a client that
 /// acknowledges nothing gets at most a window.
 #[test]
-fn the_order_lane_keeps_within_its_window() {
+fn the_main_lane_keeps_within_its_window() {
     let ground = flat(512);
     let mut other = terrain(&ground);
     let mut rng = fastrand::Rng::with_seed(2);
@@ -661,7 +369,7 @@ fn the_order_lane_keeps_within_its_window() {
         for (to, lane, bytes) in play.server.take_outgoing() {
             let length = bytes.len();
             if to == ONE {
-                at_once += if lane == Lane::Order { length } else { 0 };
+                at_once += if lane == Lane::Main { length } else { 0 };
                 play.players[at].client.receive(lane, bytes);
             } else if let Ok(ToClient::Entries(_)) =
                 ToClient::from_bytes(&bytes, &ground, &ContentTable::default())
@@ -675,6 +383,6 @@ fn the_order_lane_keeps_within_its_window() {
     }
     println!("{silent} bytes to one that is silent, {longest} in a message");
     assert_eq!(play.players[at].client.world().hash(), play.hash());
-    assert!(play.server.figures().order_bytes as usize > 2 * window, "there is too little to send");
+    assert!(play.server.figures().main_bytes as usize > 2 * window, "there is too little to send");
     assert!(silent <= window.max(longest));
 }

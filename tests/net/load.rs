@@ -46,7 +46,7 @@ impl Player {
 /// What a run costs.
 #[allow(dead_code, reason = "the test reads only `bytes`, the benchmark `players` all of it")]
 pub struct Load {
-    /// To a client, in the order lane, for each edit.
+    /// To a client, in the main lane, for each edit.
     pub bytes: f64,
     pub with_headers: f64,
     /// From a client, for each edit.
@@ -85,7 +85,7 @@ pub fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) 
         ground: ground.hash(),
         chunk_size: 32,
         epoch: None,
-        place: IVec3::ZERO,
+        position: IVec3::ZERO,
     };
     let mut now = Duration::from_secs(1);
     for player in &players {
@@ -123,7 +123,7 @@ pub fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) 
         outgoing.extend(server.take_outgoing());
         let took = cpu_time() - before;
         (cpu, longest) = (cpu + took, longest.max(took));
-        let first = outgoing.iter().filter(|(to, lane, _)| (*to, *lane) == (ClientId(1), Lane::Order));
+        let first = outgoing.iter().filter(|(to, lane, _)| (*to, *lane) == (ClientId(1), Lane::Main));
         let sent: u64 = first.map(|(.., message)| message.len() as u64).sum();
         bytes += sent;
         packets += u64::from(sent > 0);

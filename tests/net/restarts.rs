@@ -152,7 +152,7 @@ fn after_a_restart_clients_get_what_they_miss_as_entries() {
         for follower in [&a, &b, &away] {
             assert_eq!((&follower.joins[..], follower.repairs), (&["log", "log"][..], 0), "{kill}");
         }
-        // A new one, after the others have gone, begins with the pristine world, from which the order leads here.
+        // A new one, after the others have gone, begins with the pristine world, from which the log leads here.
         [&a, &b, &away].iter().for_each(|follower| scene.server.disconnect(follower.id));
         let new = scene.join(4);
         assert_eq!(
@@ -223,7 +223,7 @@ fn clients_compare_where_something_else_changed_the_saved_world() {
         scene.connect(&mut a);
         agreed(&scene.server, &[&a]);
         assert_eq!((&a.joins[..], a.repairs), (&["log", "compare"][..], 0), "{what}");
-        // From there on, the order is saved again.
+        // From there on, the log is saved again.
         scene.dig(&mut [&mut a], 10..20);
         scene.restart(|disk| disk);
         scene.connect(&mut a);

@@ -1,4 +1,4 @@
-//! The server's order, its refusals, the policies of undo, and how clients join and reconnect.
+//! The server's log, its refusals, the policies of undo, and how clients join and reconnect.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -132,7 +132,7 @@ fn an_edit_is_refused_where_its_player_does_not_reach() {
     a.edit([dig(30.0, 30.0)]);
     scene.play(&mut [&mut a], 1);
     assert_eq!(a.refused, [(1, Refusal::TooFar)], "the player's position is unknown");
-    scene.server.set_place(ClientId(1), Some(IVec3::new(30, 20, 30)));
+    scene.server.set_position(ClientId(1), Some(IVec3::new(30, 20, 30)));
     // All of a ball of 3 has to be within 13.
     a.edit([dig(30.0, 39.0), dig(30.0, 42.0), dig(20.5, 30.0), dig(10.0, 30.0)]);
     scene.play(&mut [&mut a], 1);
@@ -387,7 +387,7 @@ fn regions_come_from_the_player_outwards_and_no_faster_than_allowed() {
     a.edit((0..12).flat_map(|x| (0..12).map(move |z| dig(8.0 + 9.0 * x as f32, 8.0 + 9.0 * z as f32))));
     scene.play(&mut [&mut a], 4);
     let mut late = Follower::new(2, &scene.ground);
-    late.place = IVec3::new(110, 20, 20);
+    late.position = IVec3::new(110, 20, 20);
     late.connect(&mut scene.server, scene.now);
     late.send(&mut scene.server, scene.now);
     let (start, mut regions, mut stream, mut got) = (scene.now, Vec::new(), Default::default(), 0);
@@ -421,7 +421,7 @@ fn regions_come_from_the_player_outwards_and_no_faster_than_allowed() {
         }
     }
     assert_eq!(regions.last().map(|(_, left)| *left), Some(0), "{regions:?}");
-    let distance = |at: IVec3| (at * 64 + 32 - late.place).as_i64vec3().length_squared();
+    let distance = |at: IVec3| (at * 64 + 32 - late.position).as_i64vec3().length_squared();
     let distances: Vec<i64> = regions.iter().map(|(pos, _)| distance(pos.0)).collect();
     assert!(distances.len() >= 4 && distances.is_sorted(), "{distances:?}");
 }

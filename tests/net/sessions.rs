@@ -6,19 +6,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::lattice::LatticeBox;
-use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, Lane, Rate, Refusal, Server, ServerSettings, ToClient, ToServer,
-    UndoPolicy,
-};
+use bevy_burrow::net::{Client, ClientEvent, ClientId, Lane, Rate, Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
 use fastrand::Rng;
-use glam::{IVec3, UVec3, Vec3};
+use glam::{IVec3, Vec3};
 
 use crate::follower::{count, hills, terrain};
+use crate::pair::{ID, TICK, joins_again, new_client, pump, quick};
 
-const TICK: Duration = Duration::from_millis(20);
 const SIDE: u32 = 64;
 
 /// A client and the lanes between it and the server.
@@ -120,7 +116,7 @@ impl Play {
     fn client(&self) -> Client {
         let settings = TerrainSettings::default();
         let mut client = Client::new(Arc::clone(&self.ground), &settings).expect("valid settings");
-        client.set_place(IVec3::new(30, 18, 30));
+        client.set_position(IVec3::new(30, 18, 30));
         client
     }
 
@@ -140,7 +136,7 @@ impl Play {
         }
         self.send();
         for player in &mut self.players {
-            for (lane, messages) in [Lane::Order, Lane::Bulk].into_iter().zip(&mut player.down) {
+            for (lane, messages) in [Lane::Main, Lane::Bulk].into_iter().zip(&mut player.down) {
                 for _ in 0..self.rng.usize(0..=messages.len()) {
                     messages.pop_front().into_iter().for_each(|message| player.client.receive(lane, message));
                 }
@@ -183,7 +179,7 @@ impl Play {
                 .into_iter()
                 .for_each(|bytes| self.server.receive(player.id, &bytes, self.now));
         }
-        for (lane, messages) in [Lane::Order, Lane::Bulk].into_iter().zip(&mut player.down) {
+        for (lane, messages) in [Lane::Main, Lane::Bulk].into_iter().zip(&mut player.down) {
             for _ in 0..self.rng.usize(0..=messages.len()) {
                 messages.pop_front().into_iter().for_each(|bytes| player.client.receive(lane, bytes));
             }
@@ -354,50 +350,6 @@ fn whatever_happens_everybody_ends_with_the_world() {
     assert!(failed.is_empty(), "failing seeds: {failed:?}");
 }
 
-/// A fast server, a world of `digs` rough digs, and one player with lanes that deliver everything at once.
-fn quick(side: u32, digs: u32) -> (Server, Arc<Ground>) {
-    let ground = Arc::new(Ground::flat(side, side, 0.0).expect("valid"));
-    let mut dug = terrain(&ground);
-    let mut rng = Rng::with_seed(7);
-    for _ in 0..digs {
-        let at = Vec3::new(rng.f32() * side as f32, rng.f32() * 8.0 - 6.0, rng.f32() * side as f32);
-        let brush = Brush::dig(Shape::sphere(at, 4.0 + rng.f32() * 4.0));
-        dug.submit(Edit::quantize(&brush).expect("a valid brush"));
-    }
-    while let Some(transaction) = dug.begin() {
-        dug.commit(transaction.run()).expect("it waits for it");
-    }
-    (Server::new(dug, ServerSettings::default()), ground)
-}
-
-const ID: ClientId = ClientId(1);
-
-fn new_client(ground: &Arc<Ground>, now: Duration) -> Client {
-    let mut client = Client::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid");
-    client.set_place(IVec3::new(64, 2, 64));
-    client.connect(now);
-    client
-}
-
-fn pump(server: &mut Server, client: &mut Client, now: &mut Duration) {
-    *now += TICK;
-    client.take_outgoing().iter().for_each(|message| server.receive(ID, message, *now));
-    server.advance(*now);
-    server.take_outgoing().into_iter().for_each(|(_, lane, message)| client.receive(lane, message));
-    client.advance(*now);
-    drop((client.take_shown(), client.take_events()));
-}
-
-/// Joins over the connection of a previous client; returns the time that this took.
-fn joins_again(server: &mut Server, ground: &Arc<Ground>, now: &mut Duration) -> Option<Duration> {
-    let (mut client, began) = (new_client(ground, *now), *now);
-    while !client.has_joined() && *now - began < Duration::from_secs(60) {
-        pump(server, &mut client, now);
-    }
-    let is_same = client.world().hash() == server.terrain().world().hash();
-    (client.has_joined() && is_same).then(|| *now - began)
-}
-
 #[test]
 fn a_client_that_takes_the_place_of_another_on_its_connection_gets_all_of_the_world() {
     let step = count("BURROW_STEP", 9) as usize;
@@ -441,125 +393,6 @@ fn a_greeting_that_nobody_heard_is_repeated() {
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
     assert_eq!(client.world().hash(), server.terrain().world().hash());
     assert_eq!(server.figures().malformed, 0);
-}
-
-#[test]
-fn paths_roads_and_grids_reach_everybody() {
-    let ((mut server, ground), mut now) = (quick(128, 20), Duration::from_secs(1));
-    server.connect(ID, now);
-    let mut client = new_client(&ground, now);
-    while !client.has_joined() {
-        pump(&mut server, &mut client, &mut now);
-    }
-    let path = |y: f32| {
-        BrushPath::spline([10.0, 40.0, 66.0, 90.0].map(|x| (Vec3::new(x, y - 0.05 * x, 20.0 + 0.6 * x), 2.0)))
-    };
-    let road = Corridor::new(path(3.0), 6.0, 9.0);
-    for (tag, brush) in (1..).zip([Brush::dig(path(-8.0)), Brush::road(road, 2.0)]) {
-        let before = server.terrain().world().hash();
-        client.submit(Edit::quantize(&brush.with_tag(tag)).expect("valid"));
-        client.advance(now);
-        (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
-        assert_ne!(server.terrain().world().hash(), before, "brush {tag}");
-        assert_eq!(client.world().hash(), server.terrain().world().hash());
-    }
-    assert_eq!((server.figures().malformed, server.figures().refused), (0, 0));
-    // A grid is named: the client gets it once.
-    let grid = ShapeGrid::from_fn(UVec3::splat(40), |at| (at - 20).as_vec3().length() - 15.5).expect("valid");
-    let shape = |x: f32| GridShape::new(grid.clone(), Vec3::new(x, 2.0, 70.0)).with_scale(0.5);
-    let edit = |x: f32| Edit::quantize(&Brush::dig(shape(x))).expect("valid");
-    assert!(server.edit(edit(50.0)).is_err(), "nobody can get it");
-    server.contents_mut().add(Arc::clone(grid.image()));
-    let sent = |server: &Server| server.figures().bulk_bytes;
-    let before = sent(&server);
-    for x in [50.0, 56.0, 30.0] {
-        server.edit(edit(x)).expect("it is in the list");
-        (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
-        assert_eq!(client.world().hash(), server.terrain().world().hash());
-    }
-    let bytes = 2 * 40 * 40 * 40;
-    assert!((bytes..bytes + bytes / 4).contains(&(sent(&server) - before)), "{}", sent(&server) - before);
-    // Clients that have it dig with it too.
-    client.submit(edit(90.0).with_labels(9, None));
-    (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
-    assert_eq!(client.world().hash(), server.terrain().world().hash());
-    assert_eq!((server.figures().malformed, server.figures().refused), (0, 0));
-    // One that joins later gets the same world.
-    assert!(joins_again(&mut server, &ground, &mut now).is_some());
-}
-
-/// A server and a client that has joined.
-fn joined() -> (Server, Client, Arc<Ground>, Duration) {
-    let ((mut server, ground), mut now) = (quick(128, 20), Duration::from_secs(1));
-    server.connect(ID, now);
-    let mut client = new_client(&ground, now);
-    while !client.has_joined() {
-        pump(&mut server, &mut client, &mut now);
-    }
-    (server, client, ground, now)
-}
-
-/// A ball of some samples along its side.
-fn ball(side: i32) -> ShapeGrid {
-    let middle = (side - 1) as f32 / 2.0;
-    let distance = |at: IVec3| (at.as_vec3() - middle).length() - middle + 1.5;
-    ShapeGrid::from_fn(UVec3::splat(side as u32), distance).expect("valid")
-}
-
-#[test]
-fn a_paste_within_a_grid_reaches_everybody() {
-    let (mut server, mut client, ground, mut now) = joined();
-    let prefab = {
-        let mut other = terrain(&ground);
-        other.apply([Brush::add(Shape::sphere(Vec3::new(30.0, 20.0, 30.0), 9.0), MaterialId(3))]);
-        let min = IVec3::new(18, 8, 18);
-        Arc::new(other.world().copy(LatticeBox { min, max: min + 24 }, min).expect("in the world"))
-    };
-    let grid = ball(20);
-    let paste = |at: Vec3| {
-        let within = GridShape::new(grid.clone(), at + 12.0);
-        let operation = Operation::Paste { paste: Paste::new(Arc::clone(&prefab), at) };
-        Edit::quantize(&Brush { operation, ..Brush::dig(within) }).expect("valid")
-    };
-    let at = Vec3::new(60.0, 8.0, 60.0);
-    assert!(server.edit(paste(at)).is_err(), "nobody can get it");
-    server.contents_mut().add(Arc::clone(grid.image()));
-    assert!(server.edit(paste(at)).is_err(), "nobody can get the prefab");
-    assert!(server.contents_mut().add_prefab(Arc::clone(&prefab)).is_some());
-    let before = server.terrain().world().hash();
-    server.edit(paste(at)).expect("both are in the list");
-    (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
-    assert_ne!(server.terrain().world().hash(), before);
-    assert_eq!(client.world().hash(), server.terrain().world().hash());
-    // The client has both now.
-    client.submit(paste(at + 20.0).with_labels(9, None));
-    (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
-    assert_eq!(client.world().hash(), server.terrain().world().hash());
-    assert_eq!((server.figures().malformed, server.figures().refused), (0, 0));
-    assert_eq!(client.figures().malformed, 0);
-    assert!(joins_again(&mut server, &ground, &mut now).is_some());
-}
-
-#[test]
-fn a_grid_that_is_too_large_where_it_is_named_is_refused() {
-    let (mut server, mut client, _, mut now) = joined();
-    let (small, large) = (ball(5), ball(128));
-    let known = [&small, &large].map(|grid| server.contents_mut().add(Arc::clone(grid.image())));
-    let shape = GridShape::new(small, Vec3::splat(40.0)).with_scale(64.0);
-    let edit = Edit::quantize(&Brush::dig(shape)).expect("valid");
-    let mut message = ToServer::Edits { first: 1, edits: vec![edit] }.to_bytes();
-    // That edit with the name of the other grid: 8,128 voxels a side.
-    let name = known[0].0.to_le_bytes();
-    let at = message.windows(8).position(|window| window == name).expect("its name is in it");
-    message[at..at + 8].copy_from_slice(&known[1].0.to_le_bytes());
-    let before = server.terrain().world().hash();
-    server.receive(ID, &message, now);
-    let answers: Vec<Vec<u8>> = server.take_outgoing().into_iter().map(|(_, _, bytes)| bytes).collect();
-    let refused = ToClient::Refused { sequence: 1, why: Refusal::TooLarge }.to_bytes();
-    assert_eq!(answers, [refused]);
-    (0..20).for_each(|_| pump(&mut server, &mut client, &mut now));
-    assert_eq!(server.terrain().world().hash(), before);
-    assert_eq!((server.figures().malformed, server.figures().refused), (0, 1));
 }
 
 /// A player digs without a connection on one machine, and meanwhile plays on another one.
@@ -632,8 +465,8 @@ fn who_begins_with_the_level_gets_only_what_differs() {
             server.advance(now);
             server.take_outgoing().into_iter().for_each(|(_, lane, message)| client.receive(lane, message));
             client.advance(now);
-            for change in client.take_shown() {
-                shown.apply_one(Order::parts(change.change, Some(change.hash))).outcome.expect("it fits");
+            for order in client.take_shown() {
+                shown.apply_one(order).outcome.expect("it fits");
             }
         }
         assert!(client.has_joined());

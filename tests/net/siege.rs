@@ -70,8 +70,9 @@ struct Attackers {
 
 impl Attackers {
     fn greet(&self, server: &mut Server, at: usize, now: Duration) {
-        let (protocol, simulation, place) = (PROTOCOL, SIMULATION, IVec3::splat(20));
-        let hello = Hello { protocol, simulation, ground: self.ground, chunk_size: 32, epoch: None, place };
+        let (protocol, simulation, position) = (PROTOCOL, SIMULATION, IVec3::splat(20));
+        let hello =
+            Hello { protocol, simulation, ground: self.ground, chunk_size: 32, epoch: None, position };
         server.receive(ClientId(HOSTILE + at as u64), &ToServer::Hello(hello).to_bytes(), now);
     }
 

@@ -91,7 +91,7 @@ fn dirty_bricks_fade() {
 #[test]
 fn no_view_draws_more_lines_than_allowed() {
     let (mut stage, _) = dug_stage();
-    stage.app.world_mut().resource_mut::<BurrowDebug>().most_lines = 9;
+    stage.app.world_mut().resource_mut::<BurrowDebug>().max_lines = 9;
     for view in DebugView::ALL {
         switch(&mut stage, view, true);
         assert_eq!(vertices(&mut stage, view), 18, "{view:?}");

@@ -73,7 +73,7 @@ fn no_frame_of_a_flight_with_digging_shows_a_hole() {
     let (terrain, camera) = show(&mut stage, mountains());
     stage.assert_whole(terrain, "loaded");
     let mut rng = Rng::with_seed(4);
-    let (mut cuts, mut most_levels, mut last) = (0, 0, shown_levels(&stage, terrain).clone());
+    let (mut cuts, mut max_levels, mut last) = (0, 0, shown_levels(&stage, terrain).clone());
     for frame in 0..frames {
         let turn = frame as f32 / 400.0;
         let at = Vec3::new(
@@ -100,11 +100,11 @@ fn no_frame_of_a_flight_with_digging_shows_a_hole() {
         let now = shown_levels(&stage, terrain);
         cuts += usize::from(now.nodes != last.nodes);
         last = now.clone();
-        most_levels = most_levels.max(last.nodes.iter().filter(|&&count| count > 0).count());
+        max_levels = max_levels.max(last.nodes.iter().filter(|&&count| count > 0).count());
     }
     stage.settle();
     println!("{frames} frames, the cut changed in {cuts} of them; now {:?}", last.nodes);
-    assert!(cuts > 30 && most_levels > 2, "{cuts} changes, {most_levels} levels");
+    assert!(cuts > 30 && max_levels > 2, "{cuts} changes, {max_levels} levels");
     // All is exact at level 0, wherever it is drawn coarsely.
     assert!(stage.terrain(terrain).world().check_seams().is_flawless());
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::StoreTrouble;
+use bevy_burrow::store::StoreWarning;
 
 /// A folder that is removed with this.
 pub struct Folder(pub PathBuf);
@@ -31,7 +31,7 @@ pub struct Heard {
     pub opened: Vec<Result<u64, String>>,
     pub saved: Vec<u64>,
     pub closed: Vec<WorldClosed>,
-    pub troubles: Vec<StoreTrouble>,
+    pub warnings: Vec<StoreWarning>,
     /// Brushes that were applied.
     pub receipts: usize,
     /// Brushes that were answered in any way.
@@ -43,7 +43,7 @@ pub fn hear(
     mut opened: MessageReader<WorldOpened>,
     mut saved: MessageReader<WorldSaved>,
     mut closed: MessageReader<WorldClosed>,
-    mut troubles: MessageReader<StoreTroubleFound>,
+    mut warnings: MessageReader<StoreWarningFound>,
     mut receipts: MessageReader<BrushApplied>,
     mut heard: ResMut<Heard>,
 ) {
@@ -51,7 +51,7 @@ pub fn hear(
     heard.opened.extend(opened.read().map(outcome));
     heard.saved.extend(saved.read().map(|message| message.revision));
     heard.closed.extend(closed.read().cloned());
-    heard.troubles.extend(troubles.read().map(|message| message.trouble.clone()));
+    heard.warnings.extend(warnings.read().map(|message| message.warning.clone()));
     for message in receipts.read() {
         heard.answered += 1;
         heard.receipts += usize::from(message.receipt.outcome.is_ok());

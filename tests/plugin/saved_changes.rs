@@ -42,7 +42,7 @@ fn another_level_on_the_entity_closes_the_world_and_is_not_written_into_it() {
         assert_eq!((closed.terrain, &closed.path), (entity, &folder.0), "{name}");
         assert!(game.world().get::<SavedWorld>(entity).is_none(), "{name}: nothing says that it is saved");
         assert!(
-            game.world().get::<WorldStore>(entity).is_none() && heard(&game).troubles.is_empty(),
+            game.world().get::<WorldStore>(entity).is_none() && heard(&game).warnings.is_empty(),
             "{name}"
         );
         exit(game);

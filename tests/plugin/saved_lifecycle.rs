@@ -205,7 +205,7 @@ impl Story {
 
     fn check(self, story: &str) {
         let Self { mut game, folders, expected, .. } = self;
-        let troubles = game.world().resource::<Heard>().troubles.clone();
+        let warnings = game.world().resource::<Heard>().warnings.clone();
         game.world_mut().write_message(AppExit::Success);
         game.update();
         drop(game);
@@ -215,9 +215,9 @@ impl Story {
             let options = StoreOptions { base_changed: BaseChanged::Refuse, ..StoreOptions::default() };
             let opened = Store::open(&folders[kind].0, ground, options);
             let (_, opened) = opened.unwrap_or_else(|why| panic!("{story}: {why}"));
-            assert!(opened.troubles.is_empty(), "{story}: {:?}", opened.troubles);
+            assert!(opened.warnings.is_empty(), "{story}: {:?}", opened.warnings);
             let found = opened.terrain.world().hash();
-            assert_eq!(found, expected, "{story}: folder {kind}, {troubles:?}");
+            assert_eq!(found, expected, "{story}: folder {kind}, {warnings:?}");
         }
     }
 }

@@ -273,19 +273,19 @@ fn a_folder_that_is_removed_while_a_world_is_open_is_told_of_and_written_again()
     game.world_mut().write_message(SaveNow::default());
     run_until(&mut game, "it is told", |world| {
         let heard = world.resource::<Heard>();
-        !heard.troubles.is_empty() || heard.saved.contains(&2)
+        !heard.warnings.is_empty() || heard.saved.contains(&2)
     });
     let before = hash(&game, entity);
     game.world_mut().entity_mut(entity).remove::<SavedWorld>();
     run_until_closed(&mut game, 1);
     let closed =
         heard(&game).closed[0].outcome.as_ref().map(|revision| *revision).map_err(ToString::to_string);
-    let troubles = heard(&game).troubles.clone();
+    let warnings = heard(&game).warnings.clone();
     exit(game);
     match closed {
         // Everything reported as saved is there.
-        Ok(_) => assert_eq!(hash_in(&folder.0, terrain()), Ok((2, before)), "{troubles:?}"),
-        Err(why) => assert!(!troubles.is_empty(), "{why}"),
+        Ok(_) => assert_eq!(hash_in(&folder.0, terrain()), Ok((2, before)), "{warnings:?}"),
+        Err(why) => assert!(!warnings.is_empty(), "{why}"),
     }
 }
 
@@ -360,7 +360,7 @@ fn an_app_that_ends_in_any_frame_of_opening_leaves_a_world_or_none() {
             let (mut again, entity) = app(&folder.0);
             run_until_opened(&mut again);
             assert!(heard(&again).opened[0].is_ok(), "{frames}: {:?}", heard(&again).opened);
-            assert_eq!(heard(&again).troubles, [], "{frames}");
+            assert_eq!(heard(&again).warnings, [], "{frames}");
             dig_now(&mut again, 60.0);
             let before = hash(&again, entity);
             exit(again);

@@ -1,11 +1,11 @@
-//! Trouble with saved worlds is reported for each world, and nothing waits for ever.
+//! Warning with saved worlds is reported for each world, and nothing waits for ever.
 #![cfg(feature = "store")]
 
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{Store, StoreOptions, StoreTrouble};
+use bevy_burrow::store::{Store, StoreOptions, StoreWarning};
 
 use crate::saved::{
     Folder, Heard, app, dig_now, empty, exit, ground, hash, hash_in, heard, run_until, run_until_opened,
@@ -28,7 +28,7 @@ fn any_loss_window_saves() {
                 world.resource::<Heard>().saved.contains(&revision)
             });
         }
-        assert_eq!(heard(&game).troubles, []);
+        assert_eq!(heard(&game).warnings, []);
         let before = hash(&game, entity);
         exit(game);
         assert_eq!(hash_in(&folder.0, terrain()), Ok((3, before)));
@@ -57,7 +57,7 @@ fn a_world_that_is_closed_slowly_is_opened_in_the_end() {
     assert!(!closing.is_finished(), "the other one was opened after {:?}", start.elapsed());
     run_until(&mut game, "the slow one is opened", |world| world.resource::<Heard>().opened.len() >= 2);
     assert_eq!(heard(&game).opened[..2], [Ok(0), Ok(0)]);
-    assert!(heard(&game).troubles.contains(&StoreTrouble::WaitsForLock));
+    assert!(heard(&game).warnings.contains(&StoreWarning::WaitsForLock));
     closing.join().expect("no panic");
 }
 
@@ -98,8 +98,8 @@ fn each_world_that_can_not_be_saved_is_told_of() {
     struct Troubled(Vec<Entity>);
     game.init_resource::<Troubled>().add_systems(
         Last,
-        |mut found: MessageReader<StoreTroubleFound>, mut troubled: ResMut<Troubled>| {
-            let failing = found.read().filter(|found| matches!(found.trouble, StoreTrouble::NotSaved(_)));
+        |mut found: MessageReader<StoreWarningFound>, mut troubled: ResMut<Troubled>| {
+            let failing = found.read().filter(|found| matches!(found.warning, StoreWarning::NotSaved(_)));
             troubled.0.extend(failing.map(|found| found.terrain));
         },
     );

@@ -19,8 +19,8 @@ use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::{Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::together::{
-    EditOutcome, GroundEdited, GroundJoined, GroundServer, SharedTerrain, SharingTrouble,
-    SharingTroubleFound, TogetherPlugin,
+    EditOutcome, GroundEdited, GroundJoined, GroundServer, SharedTerrain, SharingError, SharingErrorFound,
+    TogetherPlugin,
 };
 use bevy_replicon::prelude::*;
 use bevy_replicon::test_app::{ServerTestAppExt, TestClientEntity};
@@ -74,7 +74,7 @@ fn player_with(auth_method: AuthMethod) -> Stage {
         .recording::<GroundEdited>()
         .recording::<GroundJoined>()
         .recording::<HistoryMoved>()
-        .recording::<SharingTroubleFound>()
+        .recording::<SharingErrorFound>()
 }
 
 fn player() -> Stage {
@@ -185,7 +185,7 @@ impl Party {
             let shared = stage.app.world().get::<SharedTerrain>(*terrain);
             let model = stage.app.world().get::<Terrain>(*terrain);
             let shared = shared.map(|shared| {
-                (shared.has_joined(), shared.number(), shared.pending(), shared.id(), shared.trouble())
+                (shared.has_joined(), shared.number(), shared.pending(), shared.id(), shared.error())
             });
             let model = model.map(|model| (model.world().hash(), model.queued(), model.is_busy()));
             format!("{shared:?} {model:x?}")
@@ -246,8 +246,8 @@ impl Party {
     }
 
     /// What was reported to a player since the last call.
-    fn troubles(&mut self, player: usize) -> Vec<SharingTrouble> {
-        let found = self.players[player].0.recorded::<SharingTroubleFound>();
-        found.into_iter().map(|found| found.trouble).collect()
+    fn errors(&mut self, player: usize) -> Vec<SharingError> {
+        let found = self.players[player].0.recorded::<SharingErrorFound>();
+        found.into_iter().map(|found| found.error).collect()
     }
 }

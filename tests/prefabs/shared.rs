@@ -32,7 +32,7 @@ fn a_world_with_a_paste_is_the_same_after_it_was_saved() {
         store.close().wait(Duration::from_secs(60)).expect("saved");
         let (_store, opened) = Store::open_in(files(), Arc::clone(&ground), options()).expect("saved");
         assert_eq!(opened.terrain.world().hash(), world.world().hash());
-        assert!(opened.troubles.is_empty(), "{:?}", opened.troubles);
+        assert!(opened.warnings.is_empty(), "{:?}", opened.warnings);
 
         let bytes = to_bytes(&world, WorldId(1), &BTreeMap::new()).expect("it is small");
         let read = from_bytes(&bytes, ground).expect("its own bytes").terrain;
@@ -82,7 +82,7 @@ fn clients_that_lack_a_prefab_get_it_once_and_have_the_servers_world() {
     let mut clients = Vec::new();
     for id in 1..=3 {
         let mut client = Client::new(Arc::clone(&ground), &settings).expect("valid settings");
-        client.set_place(IVec3::splat(20));
+        client.set_position(IVec3::splat(20));
         server.connect(ClientId(id), Duration::ZERO);
         client.connect(Duration::ZERO);
         clients.push(client);

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{Files, SimulatedDisk, Store, StoreOptions, StoreTrouble, inspect_in};
+use bevy_burrow::store::{Files, SimulatedDisk, Store, StoreOptions, StoreWarning, inspect_in};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -62,7 +62,7 @@ fn an_edit_takes_the_bytes_of_names_in_place_of_its_content() {
         assert!(bytes < most, "{in_a_frame} edits in a frame: {bytes} bytes each");
         assert_eq!(contents(&disk), files, "nothing was written twice");
         let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
-        assert_eq!((state(&opened.terrain), opened.troubles), (state(&terrain), vec![]));
+        assert_eq!((state(&opened.terrain), opened.warnings), (state(&terrain), vec![]));
         assert_eq!(opened.replayed, 101);
         drop(store);
     }
@@ -111,7 +111,7 @@ fn content_stays_as_long_as_the_log_names_it() {
     store.flush().expect("the disk works");
     assert_eq!(contents(&disk), first);
     let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
-    assert_eq!((state(&opened.terrain), opened.troubles), (state(&terrain), vec![]));
+    assert_eq!((state(&opened.terrain), opened.warnings), (state(&terrain), vec![]));
 }
 
 #[test]
@@ -142,15 +142,15 @@ fn missing_or_damaged_content_loses_nothing_but_the_commits_that_need_it() {
         }
         if how == "whole" {
             let (_, opened) = open(&disk, &ground).expect("it can be opened");
-            assert_eq!((state(&opened.terrain), opened.troubles), (state(&terrain), vec![]));
+            assert_eq!((state(&opened.terrain), opened.warnings), (state(&terrain), vec![]));
             continue;
         }
         let damage = inspect_in(&disk).expect("it can be inspected").damage;
         assert!(damage.iter().any(|what| what.contains("frame")), "{damage:?}");
         let (store, opened) = open(&disk, &ground).expect("it can be opened");
         assert_eq!(opened.terrain.world().revision(), 6, "{how}");
-        let why = match &opened.troubles[..] {
-            [StoreTrouble::LogRefused { why, .. }] => why,
+        let why = match &opened.warnings[..] {
+            [StoreWarning::LogRefused { why, .. }] => why,
             other => panic!("{how}: {other:?}"),
         };
         assert!(why.contains("content") && why.contains("missing or damaged"), "{why}");
@@ -161,6 +161,6 @@ fn missing_or_damaged_content_loses_nothing_but_the_commits_that_need_it() {
         save(&mut store, &mut terrain).expect("the thread runs");
         store.flush().expect("the disk works");
         let (_, again) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
-        assert_eq!((state(&again.terrain), again.troubles), (state(&terrain), vec![]));
+        assert_eq!((state(&again.terrain), again.warnings), (state(&terrain), vec![]));
     }
 }

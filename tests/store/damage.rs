@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{DiskImage, Files, SimulatedDisk, Store, StoreOptions, StoreTrouble};
+use bevy_burrow::store::{DiskImage, Files, SimulatedDisk, Store, StoreOptions, StoreWarning};
 use fastrand::Rng;
 use glam::Vec3;
 use redb::{Builder, ReadableDatabase, ReadableTable, StorageBackend, TableDefinition};
@@ -129,15 +129,15 @@ fn with_a_whole_log_everything_is_rebuilt() {
             let (store, opened) = open_damaged(&disk, &world.ground);
             let revision = opened.terrain.world().revision();
             let now = state(&opened.terrain);
-            assert!(world.states[&revision].contains(&now), "{what}: {:?}", opened.troubles);
-            let lost = opened.troubles.iter().any(|own| matches!(own, StoreTrouble::RegionLost { .. }));
-            assert!(!lost, "{what}: {:?}", opened.troubles);
+            assert!(world.states[&revision].contains(&now), "{what}: {:?}", opened.warnings);
+            let lost = opened.warnings.iter().any(|own| matches!(own, StoreWarning::RegionLost { .. }));
+            assert!(!lost, "{what}: {:?}", opened.warnings);
             rebuilt +=
-                u32::from(opened.troubles.iter().any(|own| matches!(own, StoreTrouble::Rebuilt { .. })));
+                u32::from(opened.warnings.iter().any(|own| matches!(own, StoreWarning::Rebuilt { .. })));
             if revision < latest {
                 cut += 1;
                 // Only a log that is shorter by whole frames can't be distinguished from one that never was longer.
-                let is_told = !opened.troubles.is_empty();
+                let is_told = !opened.warnings.is_empty();
                 let is_shorter = ["cut to", "kind 4", "kind 5"].iter().any(|kind| what.contains(kind));
                 assert!(what.starts_with("journal"), "{what}: {revision} of {latest}");
                 assert!(is_told || is_shorter, "{what}: {revision} of {latest}");
@@ -145,7 +145,7 @@ fn with_a_whole_log_everything_is_rebuilt() {
             drop(store);
             // It is intact from then on.
             let (_, again) = open_damaged(&disk, &world.ground);
-            assert!(again.troubles.is_empty(), "{what}: {:?}", again.troubles);
+            assert!(again.warnings.is_empty(), "{what}: {:?}", again.warnings);
             assert_eq!(state(&again.terrain), now, "{what}");
         }
     }
@@ -159,8 +159,8 @@ fn regions(terrain: &Terrain) -> BTreeMap<RegionPos, u64> {
 }
 
 fn lost_regions(opened: &bevy_burrow::store::Opened) -> BTreeSet<RegionPos> {
-    let lost = opened.troubles.iter().filter_map(|own| match own {
-        StoreTrouble::RegionLost { region, .. } => {
+    let lost = opened.warnings.iter().filter_map(|own| match own {
+        StoreWarning::RegionLost { region, .. } => {
             let parts: Vec<i32> = region.split(' ').map(|part| part.parse().expect("a number")).collect();
             Some(RegionPos(glam::IVec3::from_slice(&parts)))
         }
@@ -172,15 +172,15 @@ fn lost_regions(opened: &bevy_burrow::store::Opened) -> BTreeSet<RegionPos> {
 fn check_losses(world: &Saved, disk: &SimulatedDisk, what: &str) -> usize {
     let (store, opened) = open_damaged(disk, &world.ground);
     let lost = lost_regions(&opened);
-    assert!(lost.len() <= 1, "{what}: {:?}", opened.troubles);
+    assert!(lost.len() <= 1, "{what}: {:?}", opened.warnings);
     let mut expected = regions(&world.terrain);
     expected.retain(|at, _| !lost.contains(at));
-    assert!(regions(&opened.terrain) == expected, "{what}: {:?}", opened.troubles);
+    assert!(regions(&opened.terrain) == expected, "{what}: {:?}", opened.warnings);
     let (hash, number) = (opened.terrain.world().hash(), lost.len());
     drop(store);
     let (_, again) = open_damaged(disk, &world.ground);
     assert_eq!(again.terrain.world().hash(), hash, "{what}");
-    assert!(again.troubles.is_empty(), "{what}: {:?}", again.troubles);
+    assert!(again.warnings.is_empty(), "{what}: {:?}", again.warnings);
     number
 }
 
@@ -290,10 +290,10 @@ fn swapped_stale_and_missing_records_are_found() {
                         state(&opened.terrain),
                         state(&world.terrain),
                         "{what}: {:?}",
-                        opened.troubles
+                        opened.warnings
                     );
                     assert!(lost_regions(&opened).is_empty(), "{what}");
-                    rebuilt += opened.troubles.len();
+                    rebuilt += opened.warnings.len();
                 } else {
                     lost += check_losses(&world, &disk, &what);
                 }

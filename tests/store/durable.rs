@@ -133,7 +133,7 @@ fn a_terrain_of_another_size_is_refused_before_anything_is_written() {
         drop(store);
         let (_, opened) = open(&disk, &ground).expect("a saved world");
         assert_eq!(state(&opened.terrain), state(&first));
-        assert!(opened.is_log_whole && opened.troubles.is_empty(), "{:?}", opened.troubles);
+        assert!(opened.is_log_whole && opened.warnings.is_empty(), "{:?}", opened.warnings);
     }
 }
 
@@ -180,7 +180,7 @@ fn lost_records_of_rules_alone_are_noticed() {
             store.flush().expect("the disk works");
             let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("a saved world");
             assert_eq!(state(&opened.terrain), state(&terrain), "{which} {after}");
-            assert!(opened.troubles.is_empty(), "{which} {after}: {:?}", opened.troubles);
+            assert!(opened.warnings.is_empty(), "{which} {after}: {:?}", opened.warnings);
         }
     }
 }
@@ -226,7 +226,7 @@ fn edits_that_wait_while_the_whole_world_is_saved_obey_their_own_rules_when_they
         store.flush().expect("the disk works");
         let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("a saved world");
         assert_eq!(state(&opened.terrain), state(&terrain), "{is_new}");
-        assert!(opened.troubles.is_empty(), "{is_new}: {:?}", opened.troubles);
+        assert!(opened.warnings.is_empty(), "{is_new}: {:?}", opened.warnings);
     }
 }
 
@@ -311,7 +311,7 @@ impl Story {
                 let ground = Arc::clone(&self.grounds[self.ground]);
                 let opened = Store::open_in(Arc::new(self.disk.clone()), ground, lazy());
                 let (store, opened) = opened.expect("it was closed well");
-                assert_eq!(state(&opened.terrain), state(&self.terrain), "{:?}", opened.troubles);
+                assert_eq!(state(&opened.terrain), state(&self.terrain), "{:?}", opened.warnings);
                 // Points are those of one store.
                 (self.store, self.terrain) = (Some(store), opened.terrain);
                 self.past.clear();
@@ -351,7 +351,7 @@ impl Story {
                 found.loose != past.state.loose,
                 turn != past.turn,
             ];
-            seen.push((past.point, differs, opened.troubles));
+            seen.push((past.point, differs, opened.warnings));
         }
         panic!("{story}: {first:?} is durable, but the saved world is none of the later ones: {seen:?}");
     }

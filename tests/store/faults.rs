@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{DiskFault, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble};
+use bevy_burrow::store::{DiskFault, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning};
 use bevy_burrow::terrain::Meshing;
 use fastrand::Rng;
 
@@ -65,12 +65,12 @@ fn play_goes_on_while_saving_fails_and_nothing_is_lost() {
             disk.fail_at(disk.operations() + begin, fault);
             player.play(20);
             let refused = player.store().flush();
-            let troubles = player.store().take_troubles();
+            let warnings = player.store().take_warnings();
             if let Err(why) = &refused {
                 assert!(matches!(why, StoreError::NotSaved(_)) && why.to_string().contains(message), "{why}");
-                let is_told = |own: &StoreTrouble| matches!(own, StoreTrouble::NotSaved(_));
-                assert!(troubles.iter().any(is_told), "{fault:?} from {begin}: {troubles:?}");
-                assert!(troubles.len() < 6, "{troubles:?}");
+                let is_told = |own: &StoreWarning| matches!(own, StoreWarning::NotSaved(_));
+                assert!(warnings.iter().any(is_told), "{fault:?} from {begin}: {warnings:?}");
+                assert!(warnings.len() < 6, "{warnings:?}");
             }
             // Even if the power is lost now, acknowledged commits are there.
             let durable = player.store().durable();
@@ -83,7 +83,7 @@ fn play_goes_on_while_saving_fails_and_nothing_is_lost() {
             player.play(2);
             player.store().flush().expect("the disk works again");
             if refused.is_err() {
-                assert!(player.store().take_troubles().contains(&StoreTrouble::SavedAgain));
+                assert!(player.store().take_warnings().contains(&StoreWarning::SavedAgain));
             }
             assert!(player.check(&disk.image().lose_power(|| false), 2), "the log is whole");
             // Closing makes a checkpoint.
@@ -105,8 +105,8 @@ fn when_too_much_waits_the_world_is_saved_whole() {
         player.store().flush().expect_err("the disk does not");
         player.play(100);
         player.store().flush().expect_err("the disk does not");
-        let troubles = player.store().take_troubles();
-        assert!(troubles.iter().any(|own| matches!(own, StoreTrouble::LogGap { .. })), "{troubles:?}");
+        let warnings = player.store().take_warnings();
+        assert!(warnings.iter().any(|own| matches!(own, StoreWarning::LogGap { .. })), "{warnings:?}");
         disk.set_fault(DiskFault::None);
         player.store().flush().expect("the disk works again");
         assert_eq!(player.store().durable(), player.terrain.world().revision());
@@ -126,14 +126,14 @@ fn a_commit_that_is_too_much_for_a_frame_is_saved_whole() {
         let mut player = Player::new(&disk, 2, StoreOptions { frame_bytes, ..options(1_000) });
         player.play(5);
         player.store().flush().expect("the disk works");
-        assert_eq!(player.store().take_troubles(), []);
+        assert_eq!(player.store().take_warnings(), []);
         player.store().put("map", data.clone());
         player.play(1);
         let durable = player.store().flush().expect("the disk works");
         assert_eq!(durable, player.terrain.world().revision());
-        let troubles = player.store().take_troubles();
-        let is_gap = |own: &StoreTrouble| matches!(own, StoreTrouble::LogGap { .. });
-        assert!(troubles.iter().all(is_gap) && troubles.is_empty() != is_too_much, "{troubles:?}");
+        let warnings = player.store().take_warnings();
+        let is_gap = |own: &StoreWarning| matches!(own, StoreWarning::LogGap { .. });
+        assert!(warnings.iter().all(is_gap) && warnings.is_empty() != is_too_much, "{warnings:?}");
         for _ in 0..3 {
             for image in [disk.image().lose_power(|| false), disk.image().lose_process()] {
                 assert_eq!(player.check(&image, 2), !is_too_much, "the log is whole without a gap");

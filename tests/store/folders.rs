@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    Files, Folder, Store, StoreError, StoreTrouble, check, inspect, read_world, replay,
+    Files, Folder, Store, StoreError, StoreWarning, check, inspect, read_world, replay,
 };
 
 use crate::opening::Place;
@@ -44,9 +44,9 @@ fn killed(name: &str, ground: &Arc<Ground>) -> (Place, State) {
     (killed, state(&world))
 }
 
-fn opened(path: &Path, ground: &Arc<Ground>) -> Result<(State, Vec<StoreTrouble>), StoreError> {
+fn opened(path: &Path, ground: &Arc<Ground>) -> Result<(State, Vec<StoreWarning>), StoreError> {
     let opened = Store::open(path, Arc::clone(ground), options(99));
-    opened.map(|(_, own)| (state(&own.terrain), own.troubles))
+    opened.map(|(_, own)| (state(&own.terrain), own.warnings))
 }
 
 #[cfg(unix)]
@@ -212,13 +212,13 @@ fn a_folder_with_files_without_a_byte_is_empty() {
 fn a_journal_that_is_removed_after_a_crash_is_missed() {
     let ground = ground(1);
     let is_told =
-        |troubles: &[StoreTrouble]| troubles.iter().any(|own| matches!(own, StoreTrouble::LogMissing { .. }));
+        |warnings: &[StoreWarning]| warnings.iter().any(|own| matches!(own, StoreWarning::LogMissing { .. }));
     let (place, _) = killed("journal", &ground);
     fs::remove_dir_all(place.0.join("journal")).expect("a folder");
     let checked = check(&place.0, Arc::clone(&ground), None).expect("it can be read");
-    assert!(checked.troubles.iter().any(|own| own.contains("the log is missing")), "{:?}", checked.troubles);
-    let (now, troubles) = opened(&place.0, &ground).expect("the database is whole");
-    assert!(is_told(&troubles) && now.hash == terrain(&ground).world().hash(), "{troubles:?}");
+    assert!(checked.warnings.iter().any(|own| own.contains("the log is missing")), "{:?}", checked.warnings);
+    let (now, warnings) = opened(&place.0, &ground).expect("the database is whole");
+    assert!(is_told(&warnings) && now.hash == terrain(&ground).world().hash(), "{warnings:?}");
     assert_eq!(opened(&place.0, &ground).expect("it is whole").1, vec![], "it was reported");
     // After it was closed, no log is missing.
     let place = Place::new("journal_closed");
@@ -250,7 +250,7 @@ fn child_that_changes_its_folder() {
             save(&mut store, &mut world).expect("the thread runs");
             store.flush().expect("the disk works");
         }
-        assert_eq!(store.take_troubles(), [], "{path}");
+        assert_eq!(store.take_warnings(), [], "{path}");
         drop(store);
         let place = here.join(path);
         let now = opened(&place, &ground).expect("it is where it was made");

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bevy_burrow::format::WorldId;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store, StoreTrouble, from_bytes, inspect_in, to_bytes};
+use bevy_burrow::store::{SimulatedDisk, Store, StoreWarning, from_bytes, inspect_in, to_bytes};
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{MeshKey, Meshing, PartsError};
 use fastrand::Rng;
@@ -142,13 +142,13 @@ fn a_saved_world_goes_on_on_its_new_ground() {
                 check_opened(&opened, &states, acknowledged, revision);
             }
         }
-        assert_eq!(store.take_troubles(), []);
+        assert_eq!(store.take_warnings(), []);
         assert_eq!(store.checkpoint().expect("the disk works"), world.world().revision());
         // The other ground is one that has changed.
         let now = world.world().ground().hash();
         let other = grounds.iter().find(|own| own.hash() != now).expect("one of the two");
         let (_, opened) = open(&disk.image().lose_process(), other).expect("it can be opened");
-        assert!(opened.troubles.iter().any(|own| matches!(own, StoreTrouble::BaseChanged { .. })));
+        assert!(opened.warnings.iter().any(|own| matches!(own, StoreWarning::BaseChanged { .. })));
         assert_eq!(opened.terrain.world().hash(), read_over(other, &world).world().hash());
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    DiskFault, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble, check_in, inspect_in,
+    DiskFault, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning, check_in, inspect_in,
     replay,
 };
 use fastrand::Rng;
@@ -49,7 +49,7 @@ fn looking_at_a_world_changes_nothing() {
             assert_eq!(state(&check.terrain), state(&world));
             assert_eq!((info.revision, check.replays), (world.world().revision(), Some(true)));
             assert_eq!(info.damage.is_empty(), damage.is_none(), "{:?}", info.damage);
-            assert_eq!(check.troubles.is_empty(), damage.is_none(), "{:?}", check.troubles);
+            assert_eq!(check.warnings.is_empty(), damage.is_none(), "{:?}", check.warnings);
         }
     }
 }
@@ -83,11 +83,11 @@ fn a_world_is_whole_after_a_disk_was_full() {
                 drop(store.take());
             }
             let check = check_in(disk, Arc::clone(&ground), None).expect("it can be read");
-            assert_eq!((check.troubles, state(&check.terrain)), (vec![], state(&world)), "from {begin}");
+            assert_eq!((check.warnings, state(&check.terrain)), (vec![], state(&world)), "from {begin}");
             let info = inspect_in(disk).expect("it can be read");
             assert_eq!(info.damage, Vec::<String>::new(), "from {begin}");
             let (_, opened) = open(&disk.image().lose_process(), &ground).expect("it is whole");
-            assert_eq!(opened.troubles, [], "from {begin}");
+            assert_eq!(opened.warnings, [], "from {begin}");
         }
     }
 }
@@ -126,7 +126,7 @@ fn the_log_of_another_branch_is_not_taken_for_that_of_the_world() {
     }
     let check = check_in(&mixed, Arc::clone(&ground), None).expect("it can be read");
     assert_ne!(check.replays, Some(true));
-    assert!(check.troubles.iter().any(|own| own.contains("another branch")), "{:?}", check.troubles);
+    assert!(check.warnings.iter().any(|own| own.contains("another branch")), "{:?}", check.warnings);
     assert!(!inspect_in(&mixed).expect("it can be read").is_log_whole);
     let (_, opened) = open(&mixed, &ground).expect("its regions are whole");
     assert_eq!((opened.is_log_whole, state(&opened.terrain)), (false, state(&expected)));
@@ -158,10 +158,10 @@ fn a_copy_is_named_where_there_is_one() {
             let opened = open(&disk, &ground);
             let (store, opened) = opened.unwrap_or_else(|why| panic!("{damage}: {why}"));
             let mut copies = 0;
-            for trouble in &opened.troubles {
-                let text = trouble.to_string();
-                if let StoreTrouble::Rebuilt { quarantine, .. }
-                | StoreTrouble::RegionLost { quarantine, .. } = trouble
+            for warning in &opened.warnings {
+                let text = warning.to_string();
+                if let StoreWarning::Rebuilt { quarantine, .. }
+                | StoreWarning::RegionLost { quarantine, .. } = warning
                 {
                     assert_eq!(text.contains("a copy is in"), !quarantine.is_empty(), "{text}");
                     let exists = quarantine.is_empty() || disk.paths().contains(quarantine);
@@ -170,7 +170,7 @@ fn a_copy_is_named_where_there_is_one() {
                 }
             }
             let has_copy = !["nothing", "removed", "emptied"].contains(&damage);
-            assert_eq!(copies > 0, has_copy, "{damage}: {:?}", opened.troubles);
+            assert_eq!(copies > 0, has_copy, "{damage}: {:?}", opened.warnings);
             drop((store, opened));
         }
     }
@@ -199,11 +199,11 @@ fn what_is_only_looked_at_is_not_said_to_be_rebuilt() {
     for _ in 0..2 {
         let looked = check_in(&disk, Arc::clone(&ground), None).expect("its log is whole");
         assert_eq!(samples(&looked.terrain), samples(&world));
-        let [trouble] = &looked.troubles[..] else { panic!("{:?}", looked.troubles) };
-        assert!(trouble.contains("when the world is opened") && !trouble.contains("has been"), "{trouble}");
+        let [warning] = &looked.warnings[..] else { panic!("{:?}", looked.warnings) };
+        assert!(warning.contains("when the world is opened") && !warning.contains("has been"), "{warning}");
     }
     let (_, opened) = open(&disk, &ground).expect("its log is whole");
-    assert!(matches!(opened.troubles[..], [StoreTrouble::Rebuilt { .. }]), "{:?}", opened.troubles);
+    assert!(matches!(opened.warnings[..], [StoreWarning::Rebuilt { .. }]), "{:?}", opened.warnings);
 }
 
 #[test]
@@ -245,9 +245,9 @@ fn whatever_is_left_of_a_world_can_be_opened() {
     let options = StoreOptions { salvage: true, ..options(9) };
     let opened =
         Store::open_in(Arc::new(disk.clone()), Arc::clone(&ground), options).expect("it has regions");
-    assert_eq!(opened.1.troubles, [StoreTrouble::CheckpointLost]);
+    assert_eq!(opened.1.warnings, [StoreWarning::CheckpointLost]);
     assert_eq!(samples(&opened.1.terrain), samples(&world));
     drop(opened);
     let (_, again) = open(&disk, &ground).expect("it is a world again");
-    assert_eq!((again.troubles, samples(&again.terrain)), (vec![], samples(&world)));
+    assert_eq!((again.warnings, samples(&again.terrain)), (vec![], samples(&world)));
 }

@@ -194,9 +194,9 @@ fn a_killed_process_loses_nothing_that_was_acknowledged() {
         assert!(
             bounds.contains(&revision),
             "kill {kill}: {revision}, not in {bounds:?}: {:?}",
-            opened.troubles
+            opened.warnings
         );
-        assert!(known.hashes[&revision].contains(&hash), "kill {kill}: {revision}, {:?}", opened.troubles);
+        assert!(known.hashes[&revision].contains(&hash), "kill {kill}: {revision}, {:?}", opened.warnings);
         let turn = store.get(TURN).map_or(0, |turn| u64::from_le_bytes(turn.try_into().expect("8 bytes")));
         assert_eq!(turn, revision, "kill {kill}: game data is of another revision");
         lost += known.latest - revision;

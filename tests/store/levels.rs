@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bevy_burrow::format::Level;
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseChanged, BaseLevel, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble, check_in,
+    BaseChanged, BaseLevel, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning, check_in,
     from_bytes, inspect_in, to_bytes,
 };
 use bevy_burrow::terrain::{Meshing, Patch};
@@ -79,14 +79,14 @@ fn a_world_on_a_level_comes_back_whatever_happens() {
         }
         drop(store);
         let check = check_in(&disk, Arc::clone(&ground), Some(&level)).expect("it can be read");
-        assert_eq!((check.troubles, check.replays), (vec![], Some(true)), "seed {seed}");
+        assert_eq!((check.warnings, check.replays), (vec![], Some(true)), "seed {seed}");
         // Without its regions, replaying the log on the level gives the same world.
         let damaged = disk.image().lose_process();
         damaged.remove("regions.redb").expect("it is there");
         let (_, opened) = open(&damaged).expect("it can be rebuilt");
         assert_eq!(state(&opened.terrain), state(&world), "seed {seed}");
         let (_, opened) = open(&disk).expect("it can be opened");
-        assert!(opened.troubles.is_empty() && opened.is_log_whole && opened.replayed == 0);
+        assert!(opened.warnings.is_empty() && opened.is_log_whole && opened.replayed == 0);
         assert_eq!(state(&opened.terrain), state(&world));
         // A file to share needs no level.
         let bytes = to_bytes(&opened.terrain, Default::default(), &BTreeMap::new()).expect("it is small");
@@ -151,7 +151,7 @@ fn a_level_that_is_missing_or_has_changed_is_told_and_loses_nothing() {
     // An equal level under another name is accepted.
     let renamed = BaseLevel::new(level.level().clone(), "elsewhere");
     let (store, opened) = open(Some(&renamed)).expect("it is the same level");
-    assert_eq!((state(&opened.terrain), opened.troubles), (state(&world), vec![]));
+    assert_eq!((state(&opened.terrain), opened.warnings), (state(&world), vec![]));
     drop(store);
     // Worlds that were begun without a level need none, and ignore it.
     let whole = SimulatedDisk::new();
@@ -181,8 +181,8 @@ fn a_world_on_a_level_keeps_its_edits_on_another_ground() {
         for (disk, is_told) in [(image.lose_process(), true), (disk, false)] {
             let opened = Store::open_in(Arc::new(disk), Arc::clone(&after), on(&level, options(9)));
             let (_, opened) = opened.expect("it can be opened");
-            let is_changed = |own: &StoreTrouble| matches!(own, StoreTrouble::BaseChanged { .. });
-            assert_eq!(opened.troubles.iter().any(is_changed), is_told, "{:?}", opened.troubles);
+            let is_changed = |own: &StoreWarning| matches!(own, StoreWarning::BaseChanged { .. });
+            assert_eq!(opened.warnings.iter().any(is_changed), is_told, "{:?}", opened.warnings);
             if !is_told {
                 assert_eq!(state(&opened.terrain), state(&world), "seed {seed}");
             }

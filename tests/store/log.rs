@@ -78,7 +78,7 @@ fn checkpoints_take_no_room_in_the_log() {
         // Sessions take no room either.
         for _ in 0..20 {
             let (mut store, mut opened) = open(&disk, &ground).expect("a saved world");
-            assert!(opened.is_log_whole && opened.troubles.is_empty(), "{:?}", opened.troubles);
+            assert!(opened.is_log_whole && opened.warnings.is_empty(), "{:?}", opened.warnings);
             opened.terrain.apply([Brush::dig(Shape::sphere(Vec3::splat(30.0), 2.0))]);
             store.follow(&mut opened.terrain).expect("the thread runs");
         }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Barrier};
 
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseChanged, Files, Progress, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
+    BaseChanged, Files, Progress, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning,
 };
 use bevy_burrow::terrain::Meshing;
 use fastrand::Rng;
@@ -48,7 +48,7 @@ fn a_world_is_created_once_and_opened_by_one() {
     assert!(matches!(exists, StoreError::Exists(_)), "{exists}");
     let (_, opened) = Store::open(&place.0, ground, options(9)).expect("it can be opened");
     assert_eq!(state(&opened.terrain), state(&first));
-    assert!(opened.troubles.is_empty() && opened.replayed == 0 && opened.is_log_whole);
+    assert!(opened.warnings.is_empty() && opened.replayed == 0 && opened.is_log_whole);
 }
 
 #[test]
@@ -197,8 +197,8 @@ fn a_changed_ground_keeps_the_edits() {
         drop(store);
 
         let (store, kept) = open(&disk, BaseChanged::Keep).expect("it keeps");
-        let told = |own: &StoreTrouble| matches!(own, StoreTrouble::BaseChanged { .. });
-        assert!(kept.troubles.iter().any(told), "{:?}", kept.troubles);
+        let told = |own: &StoreWarning| matches!(own, StoreWarning::BaseChanged { .. });
+        assert!(kept.warnings.iter().any(told), "{:?}", kept.warnings);
         assert_eq!(kept.terrain.world().revision(), first.world().revision());
         for (pos, brick) in first.world().bricks().filter(|_| !tail) {
             let now: Vec<_> = kept.terrain.world().bricks().filter(|(own, _)| *own == pos).collect();
@@ -210,7 +210,7 @@ fn a_changed_ground_keeps_the_edits() {
         // From now on it is the world of the other ground.
         let (_, same) = open(&disk, BaseChanged::Refuse).expect("the ground is the same now");
         assert_eq!(same.terrain.world().hash(), hash);
-        assert!(same.troubles.is_empty(), "{:?}", same.troubles);
+        assert!(same.warnings.is_empty(), "{:?}", same.warnings);
     }
 }
 

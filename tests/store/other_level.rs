@@ -7,7 +7,7 @@ use bevy_burrow::format::Level;
 use bevy_burrow::lattice::{BrickPos, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseChanged, BaseLevel, DiskImage, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble,
+    BaseChanged, BaseLevel, DiskImage, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning,
     check_in, inspect_in,
 };
 use bevy_burrow::terrain::{Meshing, Patch};
@@ -93,8 +93,8 @@ fn assert_fields(terrain: &Terrain) {
     }
 }
 
-fn was_kept(troubles: &[StoreTrouble]) -> bool {
-    matches!(troubles, [StoreTrouble::BaseChanged { kept: "kept", .. }])
+fn was_kept(warnings: &[StoreWarning]) -> bool {
+    matches!(warnings, [StoreWarning::BaseChanged { kept: "kept", .. }])
 }
 
 /// A world that was edited on a level and closed, or whose process was killed.
@@ -130,10 +130,10 @@ fn own_bricks_stay_and_all_others_are_those_of_the_new_level() {
         assert!(matches!(missing, Err(StoreError::LevelMissing { .. })));
         let (_, same) =
             open(&disk.image().lose_process(), &ground, &old, BaseChanged::Refuse).expect("it is whole");
-        assert_eq!((state(&same.terrain), same.troubles), (state(&world), vec![]), "seed {seed}");
+        assert_eq!((state(&same.terrain), same.warnings), (state(&world), vec![]), "seed {seed}");
 
         let (mut store, opened) = open(&disk, &ground, &new, BaseChanged::Keep).expect("it can be moved");
-        assert!(was_kept(&opened.troubles) && !opened.is_log_whole, "seed {seed}: {:?}", opened.troubles);
+        assert!(was_kept(&opened.warnings) && !opened.is_log_whole, "seed {seed}: {:?}", opened.warnings);
         let mut moved = opened.terrain;
         assert_eq!(moved.world().hash(), expected.world().hash(), "seed {seed}");
         assert_eq!(moved.world().revision(), world.world().revision());
@@ -153,17 +153,17 @@ fn own_bricks_stay_and_all_others_are_those_of_the_new_level() {
         for disk in [&killed, &disk] {
             let (_, again) = open(&disk.image().lose_process(), &ground, &new, BaseChanged::Refuse)
                 .expect("it is its level");
-            assert_eq!((state(&again.terrain), again.troubles), (state(&moved), vec![]), "seed {seed}");
+            assert_eq!((state(&again.terrain), again.warnings), (state(&moved), vec![]), "seed {seed}");
         }
         // No record of the old state is left.
         let is_region = |(key, _): &&Record| key.len() == 13 && key[0] == b'r';
         let stored = records(&disk).1.iter().filter(is_region).count();
         assert_eq!(stored, inspect_in(&disk).expect("it can be read").regions, "seed {seed}");
         let check = check_in(&disk, Arc::clone(&ground), Some(&new)).expect("it can be read");
-        assert_eq!((check.troubles, check.replays), (vec![], None), "seed {seed}");
+        assert_eq!((check.warnings, check.replays), (vec![], None), "seed {seed}");
         let back = by_hand(&moved, &ground, &new, &old);
         let (_, opened) = open(&disk, &ground, &old, BaseChanged::Keep).expect("it can be moved back");
-        assert!(was_kept(&opened.troubles));
+        assert!(was_kept(&opened.warnings));
         assert_eq!(opened.terrain.world().hash(), back.world().hash(), "seed {seed}");
         assert_fields(&opened.terrain);
     }
@@ -190,13 +190,13 @@ fn a_whole_log_is_replayed_on_the_new_level() {
         expected.set_loose(world.loose().copied());
         brushes.iter().for_each(|brush| drop(expected.apply([brush.clone()])));
         let (store, opened) = open(&disk, &ground, &new, BaseChanged::Replay).expect("it can be moved");
-        assert!(matches!(opened.troubles[..], [StoreTrouble::BaseChanged { kept: "replayed", .. }]));
+        assert!(matches!(opened.warnings[..], [StoreWarning::BaseChanged { kept: "replayed", .. }]));
         assert_eq!(opened.terrain.world().hash(), expected.world().hash(), "seed {seed}");
         assert_eq!(opened.terrain.world().revision(), world.world().revision());
         assert_fields(&opened.terrain);
         drop(store);
         let (_, again) = open(&disk, &ground, &new, BaseChanged::Refuse).expect("it is its level");
-        assert_eq!((state(&again.terrain), again.troubles), (state(&opened.terrain), vec![]));
+        assert_eq!((state(&again.terrain), again.warnings), (state(&opened.terrain), vec![]));
     }
 }
 
@@ -227,7 +227,7 @@ fn a_crash_while_a_world_is_moved_loses_nothing() {
                 assert_eq!(state(&there.terrain), state(&moved), "seed {seed}, {image:?}");
                 let (_, here) = open(&after, &ground, &old, BaseChanged::Keep).expect("it can be opened");
                 // Moved or not, there is nothing in between.
-                let is_moved = !here.troubles.is_empty();
+                let is_moved = !here.warnings.is_empty();
                 let expected = if is_moved { &back.terrain } else { &world };
                 assert_eq!(state(&here.terrain), state(expected), "seed {seed}, {image:?}");
                 outcomes[usize::from(is_moved)] += 1;
@@ -276,7 +276,7 @@ fn commits_behind_the_last_checkpoint_are_made_again() {
         let (_, opened) = open(&killed, &ground, &new, BaseChanged::Keep).expect("it can be moved");
         assert_eq!(opened.terrain.world().hash(), expected.world().hash(), "seed {seed}");
         assert_eq!(opened.terrain.world().revision(), world.world().revision());
-        assert!(was_kept(&opened.troubles), "{:?}", opened.troubles);
+        assert!(was_kept(&opened.warnings), "{:?}", opened.warnings);
         assert_fields(&opened.terrain);
     }
 }

@@ -153,11 +153,11 @@ pub fn check_opened(
     assert!(
         (acknowledged..=latest).contains(&revision),
         "revision {revision}, but {acknowledged} was acknowledged and {latest} the last: {:?}",
-        opened.troubles
+        opened.warnings
     );
     let found = state(&opened.terrain);
     let was = states.get(&revision).is_some_and(|states| states.contains(&found));
-    assert!(was, "revision {revision} was never like {found:?}: {:?}", opened.troubles);
+    assert!(was, "revision {revision} was never like {found:?}: {:?}", opened.warnings);
     let turn = store.get(TURN).map(|turn| u64::from_le_bytes(turn.try_into().expect("8 bytes")));
     assert_eq!(turn.unwrap_or_default(), revision, "game data is of another revision");
     assert_eq!((store.revision(), store.durable()), (revision, revision));

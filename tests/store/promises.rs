@@ -1,4 +1,4 @@
-//! The guide lists every trouble, and each of its promises names existing tests.
+//! The guide lists every warning, and each of its promises names existing tests.
 
 use std::fs;
 use std::path::Path;
@@ -32,9 +32,9 @@ fn variants(source: &str, name: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_guide_lists_every_trouble() {
+fn the_guide_lists_every_warning() {
     let (guide, source) = (text("docs/guide/src/saving.md"), text("src/store/error.rs"));
-    let all = variants(&source, "StoreTrouble");
+    let all = variants(&source, "StoreWarning");
     assert!(all.len() > 8 && all.contains(&"RegionLost".to_owned()), "{all:?}");
     let missing: Vec<_> = all.iter().filter(|name| !guide.contains(&format!("| `{name}` |"))).collect();
     assert!(missing.is_empty(), "not in the guide: {missing:?}");

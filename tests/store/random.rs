@@ -47,7 +47,8 @@ impl Model {
     fn go_back(&mut self, ground: &Arc<Ground>, to: &Terrain) {
         let found = state(to);
         let is_it = |(revision, parts): &&(u64, WorldParts)| {
-            let is_same = parts.rules == found.rules && parts.loose == found.loose;
+            let is_same = (parts.edit_settings.rules.as_deref(), parts.edit_settings.loose)
+                == (found.rules.as_ref(), found.loose);
             *revision == to.world().revision() && is_same
         };
         let (_, parts) = self.parts.iter().rfind(is_it).expect("it was so").clone();

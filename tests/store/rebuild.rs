@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
     BaseChanged, DiskFault, DiskImage, Files, Opening, SimulatedDisk, Store, StoreError, StoreOptions,
-    StoreTrouble, inspect_in,
+    StoreWarning, inspect_in,
 };
 use bevy_burrow::terrain::Meshing;
 use fastrand::Rng;
@@ -160,13 +160,13 @@ fn check(disk: &SimulatedDisk, played: &Played, known: &Known, what: &str) {
         let (_, opened) = opened.unwrap_or_else(|why| panic!("{what}: {why}"));
         let (revision, now) = (opened.terrain.world().revision(), state(&opened.terrain));
         let bounds = known.acknowledged.load(Ordering::SeqCst)..=known.latest.load(Ordering::SeqCst);
-        assert!(bounds.contains(&revision), "{what}: {revision}, not in {bounds:?}: {:?}", opened.troubles);
+        assert!(bounds.contains(&revision), "{what}: {revision}, not in {bounds:?}: {:?}", opened.warnings);
         let was = known.states.lock().expect("no panic").get(&revision).is_some_and(|all| all.contains(&now));
-        assert!(was, "{what}: revision {revision} was never like that: {:?}", opened.troubles);
-        let is_lost = |own: &StoreTrouble| matches!(own, StoreTrouble::RegionLost { .. });
-        assert!(!opened.troubles.iter().any(is_lost), "{what}: {:?}", opened.troubles);
+        assert!(was, "{what}: revision {revision} was never like that: {:?}", opened.warnings);
+        let is_lost = |own: &StoreWarning| matches!(own, StoreWarning::RegionLost { .. });
+        assert!(!opened.warnings.iter().any(is_lost), "{what}: {:?}", opened.warnings);
         if time > 0 {
-            assert!(opened.troubles.is_empty(), "{what}: {:?}", opened.troubles);
+            assert!(opened.warnings.is_empty(), "{what}: {:?}", opened.warnings);
             assert_eq!(found.as_ref(), Some(&now), "{what}");
         }
         found = Some(now);

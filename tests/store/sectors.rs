@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    Files, Lock, OpenFile, Opening, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble, check_in,
+    Files, Lock, OpenFile, Opening, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning, check_in,
 };
 use glam::Vec3;
 
@@ -170,9 +170,9 @@ fn sectors(disk: &SimulatedDisk, path: &str) -> Vec<Range<u64>> {
     (0..length).step_by(512).map(|start| start..(start + 512).min(length)).collect()
 }
 
-fn open(files: Arc<BadDisk>, salvage: bool) -> Result<(State, Vec<StoreTrouble>), StoreError> {
+fn open(files: Arc<BadDisk>, salvage: bool) -> Result<(State, Vec<StoreWarning>), StoreError> {
     let options = StoreOptions { salvage, ..options(u64::MAX) };
-    Store::open_in(files, ground(), options).map(|(_, own)| (state(&own.terrain), own.troubles))
+    Store::open_in(files, ground(), options).map(|(_, own)| (state(&own.terrain), own.warnings))
 }
 
 /// The sectors of a file that hold anything but zeros.
@@ -194,7 +194,7 @@ fn a_bad_sector_of_the_database_costs_nothing_while_the_log_is_whole() {
             assert_eq!(now, expected, "{bad:?}");
             // The new file has no bad sector, and the unreadable file is kept.
             let check = check_in(&disk, ground(), None).expect("it is whole");
-            assert_eq!((state(&check.terrain), check.troubles), (expected.clone(), vec![]), "{bad:?}");
+            assert_eq!((state(&check.terrain), check.warnings), (expected.clone(), vec![]), "{bad:?}");
         }
     }
 }
@@ -224,10 +224,10 @@ fn without_a_log_a_bad_sector_costs_the_region_in_it_only_and_is_reported() {
     let mut lost = 0;
     for bad in used(&disk, DATABASE) {
         let disk = disk.image().lose_process();
-        let (now, troubles) = open(BadDisk::new(&disk, DATABASE, bad.clone(), false), false)
+        let (now, warnings) = open(BadDisk::new(&disk, DATABASE, bad.clone(), false), false)
             .unwrap_or_else(|why| panic!("{bad:?}: {why}"));
-        let regions = troubles.iter().filter(|own| matches!(own, StoreTrouble::RegionLost { .. })).count();
-        assert_eq!(now == expected, regions == 0, "{bad:?}: {troubles:?}");
+        let regions = warnings.iter().filter(|own| matches!(own, StoreWarning::RegionLost { .. })).count();
+        assert_eq!(now == expected, regions == 0, "{bad:?}: {warnings:?}");
         lost += regions;
     }
     assert!(lost > 0);
@@ -251,7 +251,7 @@ fn a_disk_that_is_gone_is_no_damage() {
             assert_eq!(disk.paths(), before, "nothing was changed");
             // The disk works again.
             let opened = Store::open_in(Arc::new(disk), ground(), options(9)).expect("it is whole");
-            assert_eq!((state(&opened.1.terrain), opened.1.troubles), (expected.clone(), vec![]));
+            assert_eq!((state(&opened.1.terrain), opened.1.warnings), (expected.clone(), vec![]));
         }
     }
 }
@@ -273,8 +273,8 @@ fn a_file_that_can_not_be_read_at_all_is_no_reason_to_lock_anybody_out() {
             Err(why) => panic!("{path}: {why}"),
             Ok((now, _)) => assert_eq!(now, expected, "{path}"),
         }
-        let (_, troubles) = open(bad(), true).unwrap_or_else(|why| panic!("{path}: {why}"));
-        assert!(path != DATABASE && !path.starts_with(FIRST_SEGMENT) || !troubles.is_empty());
+        let (_, warnings) = open(bad(), true).unwrap_or_else(|why| panic!("{path}: {why}"));
+        assert!(path != DATABASE && !path.starts_with(FIRST_SEGMENT) || !warnings.is_empty());
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{BaseChanged, SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble};
+use bevy_burrow::store::{BaseChanged, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning};
 use bevy_burrow::terrain::Meshing;
 use glam::Vec3;
 
@@ -34,10 +34,10 @@ fn open(
     disk: &SimulatedDisk,
     ground: &Arc<Ground>,
     base_changed: BaseChanged,
-) -> Result<(Terrain, Vec<StoreTrouble>), StoreError> {
+) -> Result<(Terrain, Vec<StoreWarning>), StoreError> {
     let options = StoreOptions { base_changed, ..options(99) };
     let opened = Store::open_in(Arc::new(disk.clone()), Arc::clone(ground), options);
-    opened.map(|(_, own)| (own.terrain, own.troubles))
+    opened.map(|(_, own)| (own.terrain, own.warnings))
 }
 
 #[test]
@@ -62,9 +62,9 @@ fn another_size_and_back_changes_nothing_or_is_refused() {
             }
             let before = disk.paths();
             match open(&disk, &other, BaseChanged::Keep) {
-                Ok((moved, troubles)) => {
-                    let is_told = troubles.iter().any(|own| matches!(own, StoreTrouble::BaseChanged { .. }));
-                    assert!(is_told && (is_closed || places.is_empty()), "{what}: {troubles:?}");
+                Ok((moved, warnings)) => {
+                    let is_told = warnings.iter().any(|own| matches!(own, StoreWarning::BaseChanged { .. }));
+                    assert!(is_told && (is_closed || places.is_empty()), "{what}: {warnings:?}");
                     assert_eq!(samples(&moved), samples(&world), "{what}");
                 }
                 Err(why) => {

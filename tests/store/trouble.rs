@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store, StoreError, StoreOptions, StoreTrouble};
+use bevy_burrow::store::{SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning};
 use bevy_burrow::terrain::Meshing;
 use glam::Vec3;
 
@@ -40,11 +40,11 @@ impl Game {
     }
 
     /// Digs until something is reported.
-    fn dig_until_told(&mut self) -> Vec<StoreTrouble> {
+    fn dig_until_told(&mut self) -> Vec<StoreWarning> {
         let start = Instant::now();
         loop {
             self.dig();
-            let told = self.store.take_troubles();
+            let told = self.store.take_warnings();
             if !told.is_empty() || start.elapsed() > Duration::from_secs(60) {
                 return told;
             }
@@ -64,14 +64,14 @@ impl Game {
 fn a_disk_that_does_not_answer_is_reported_and_catches_up() {
     let mut game = Game::new(options(u64::MAX));
     game.gate.set(Gate::Shut);
-    assert_eq!(game.dig_until_told(), [StoreTrouble::Hanging]);
+    assert_eq!(game.dig_until_told(), [StoreWarning::Hanging]);
     let durable = game.store.durable();
     assert!(durable < game.store.revision());
     assert!(matches!(game.store.flush_within(Duration::from_millis(20)), Err(StoreError::TimedOut)));
     game.gate.set(Gate::Open);
     game.store.flush().expect("the disk answers");
     assert_eq!(game.store.durable(), game.terrain.world().revision());
-    assert_eq!(game.store.take_troubles(), [StoreTrouble::SavedAgain]);
+    assert_eq!(game.store.take_warnings(), [StoreWarning::SavedAgain]);
     game.check_saved();
 }
 
@@ -160,12 +160,12 @@ fn a_thread_that_panics_is_reported_and_lets_the_world_go() {
     assert!(matches!(game.store.flush(), Err(StoreError::Ended)));
     // It may be reported a moment after its channel is gone.
     let start = Instant::now();
-    let mut told = game.store.take_troubles();
+    let mut told = game.store.take_warnings();
     while told.is_empty() && start.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(1));
-        told = game.store.take_troubles();
+        told = game.store.take_warnings();
     }
-    assert_eq!(told, [StoreTrouble::Ended("the driver panics".into())]);
+    assert_eq!(told, [StoreWarning::Ended("the driver panics".into())]);
     game.terrain.apply([dig(3)]);
     assert!(matches!(game.store.follow(&mut game.terrain), Err(StoreError::Ended)));
     game.gate.set(Gate::Open);

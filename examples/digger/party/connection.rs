@@ -178,8 +178,8 @@ fn serve_unsaved(
                     server.serve_instead(unsaved(ground)?);
                 }
             }
-            GroundServerEvent::Trouble(trouble) => {
-                hints.write(Hint(trouble.to_string()));
+            GroundServerEvent::Warning(warning) => {
+                hints.write(Hint(warning.to_string()));
             }
             _ => {}
         }

@@ -141,7 +141,7 @@ fn tell_pose(players: Query<(&Player, Body)>, lamp: Res<HeadlampSwitch>, mut mes
 /// Ground comes from the player outwards.
 fn place_ground(players: Query<Body, With<Player>>, mut terrains: Query<&mut SharedTerrain>) {
     for (body, mut terrain) in players.iter().zip(&mut terrains) {
-        terrain.bypass_change_detection().place = voxel(body.feet());
+        terrain.bypass_change_detection().position = voxel(body.feet());
     }
 }
 
@@ -194,7 +194,7 @@ fn place(
             }
         }
         let (player, at) = (GroundServer::player(*client_id, &ids), new.voxel());
-        server.with(move |server: &mut net::Server| server.set_place(player, Some(at)));
+        server.with(move |server: &mut net::Server| server.set_position(player, Some(at)));
     }
 }
 

@@ -237,7 +237,7 @@ fn insert_terrain(
         // The host's server saves it.
         (Party::Host(_) | Party::Guest(..), _) => {
             let mut shared = SharedTerrain::default();
-            shared.place = voxel(places.hillside.mouth);
+            shared.position = voxel(places.hillside.mouth);
             entity.insert(shared);
         }
     }

@@ -56,7 +56,7 @@ impl Plugin for SavesPlugin {
                                 .or_else(on_message::<AppExit>)
                                 .or_else(state_changed::<GameState>),
                         ),
-                        tell_trouble,
+                        tell_warning,
                     )
                         .after(BurrowSystems::Commit)
                         .after(inventory::read_history)
@@ -355,8 +355,8 @@ fn continue_game(
     }
 }
 
-fn tell_trouble(mut troubles: MessageReader<StoreTroubleFound>, mut hints: MessageWriter<Hint>) {
-    hints.write_batch(troubles.read().map(|found| Hint(found.trouble.to_string())));
+fn tell_warning(mut warnings: MessageReader<StoreWarningFound>, mut hints: MessageWriter<Hint>) {
+    hints.write_batch(warnings.read().map(|found| Hint(found.warning.to_string())));
 }
 
 #[cfg(test)]

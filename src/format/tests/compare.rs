@@ -31,7 +31,7 @@ pub fn changes(a: &Patch, b: &Patch) -> bool {
 }
 
 pub fn parts(a: &WorldParts, b: &WorldParts) -> bool {
-    let of = |parts: &WorldParts| (parts.chunk_size, parts.revision, parts.rules.clone(), parts.loose);
+    let of = |parts: &WorldParts| (parts.chunk_size, parts.revision, parts.edit_settings.clone());
     changes(&a.change, &b.change) && of(a) == of(b)
 }
 

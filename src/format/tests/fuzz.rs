@@ -157,7 +157,7 @@ fn portable_files() {
         Err(_) => false,
     };
     fuzz("portable file", std::slice::from_ref(&file), 800, read);
-    let own = container::read(Kind::Portable, &file, LIMIT).unwrap().own;
+    let own = container::read(Kind::Portable, &file, LIMIT).unwrap().data;
     fuzz("portable head", &[own], 10_000, |own| {
         let file = resealed(&file, Kind::Portable, own);
         // NaN as a voxel size is not equal to itself.

@@ -16,7 +16,7 @@ use crate::format::portable::{read_portable, read_portable_head, write_portable}
 use crate::format::{Batch, Metadata, decode_region, encode_region};
 use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::{LatticeBox, RegionPos};
-use crate::terrain::{Terrain, TerrainSettings};
+use crate::terrain::{EditSettings, Terrain, TerrainSettings};
 use crate::volume::layers;
 
 #[test]
@@ -207,11 +207,11 @@ fn any_densities_come_back() {
 
 #[test]
 fn metadata_comes_back() {
+    let rules = crate::volume::DiggingRules::default().with_bedrock(-9).with_hardness(MaterialId(3), 4);
     let metadata = Metadata {
         revision: u64::MAX,
         hash: 7,
-        rules: Some(crate::volume::DiggingRules::default().with_bedrock(-9).with_hardness(MaterialId(3), 4)),
-        loose: Some(Default::default()),
+        edit_settings: EditSettings { rules: Some(Arc::new(rules)), loose: Some(Default::default()) },
         game: vec![("a".into(), vec![]), (String::new(), vec![255; 300])],
         ..Metadata::default()
     };

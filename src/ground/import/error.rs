@@ -252,6 +252,11 @@ impl From<ImageError> for ImportError {
     fn from(error: ImageError) -> Self {
         match error {
             ImageError::Empty { .. } => Self::Empty,
+            // Only PNG files are decoded with such errors.
+            ImageError::Decode { reason } => Self::Damaged { format: HeightFormat::Png, reason },
+            ImageError::Truncated { bytes } => {
+                Self::Damaged { format: HeightFormat::Png, reason: format!("it ends after {bytes} bytes") }
+            }
             error => Self::Limit(error),
         }
     }

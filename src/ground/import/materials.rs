@@ -1,15 +1,15 @@
 //! Materials from pictures: splat maps, whose channels are weights, and id maps, whose samples are materials.
 
 use std::fmt;
-use std::io::Cursor;
 use std::path::Path;
 
-use ::png::{ColorType, Decoder, Limits, Transformations};
+use ::png::ColorType;
 
 use super::decoded::damaged;
 use super::error::ImportError;
 use super::kind::HeightFormat;
 use super::open::read_file;
+use crate::ground::png::{Png, SIGNATURE};
 use crate::ground::{ColumnMaterial, ImageLimits, MaterialId, MaterialMap};
 
 /// The maximum number of layers of splat maps.
@@ -149,50 +149,23 @@ struct Pixels {
 
 impl Pixels {
     fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Self, ImportError> {
-        const FORMAT: HeightFormat = HeightFormat::Png;
         limits.check_file(bytes)?;
         if bytes.is_empty() {
             return Err(ImportError::Empty);
         }
-        if !bytes.starts_with(b"\x89PNG\r\n\x1A\n") {
+        if !bytes.starts_with(SIGNATURE) {
             return Err(ImportError::MapFormat);
         }
-        let most = usize::try_from(limits.max_alloc_bytes).unwrap_or(usize::MAX);
-        let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: most });
-        decoder.set_transformations(Transformations::IDENTITY);
-        let header = decoder.read_header_info().map_err(|error| damaged(FORMAT, error))?;
-        limits.check_image(header.width, header.height, 16)?;
-        let mut reader = decoder.read_info().map_err(|error| damaged(FORMAT, error))?;
-        let info = reader.info();
-        let (width, height, color, bits) = (info.width, info.height, info.color_type, info.bit_depth as u8);
-        let palette = info.palette.as_deref().unwrap_or_default().as_chunks::<3>().0.to_vec();
-        let size = reader.output_buffer_size().ok_or_else(|| damaged(FORMAT, "it is too large"))?;
-        let mut image = Vec::new();
-        image.try_reserve_exact(size).map_err(|_| ImportError::Memory { bytes: size as u64 })?;
-        image.resize(size, 0);
-        let line = reader.next_frame(&mut image).map_err(|error| damaged(FORMAT, error))?.line_size;
-        reader.finish().map_err(|error| damaged(FORMAT, error))?;
-        let row_len = width as usize * color.samples();
-        if line.saturating_mul(8) < row_len.saturating_mul(bits.into()) {
-            return Err(damaged(FORMAT, "a row is too short"));
-        }
-        let mut samples = Vec::new();
-        let count = row_len.saturating_mul(height as usize);
+        // Up to four channels of 16 bits.
+        let mut png = Png::open(bytes, limits, 8)?;
+        let (width, height, color, bits) = (png.width, png.height, png.color, png.bits);
+        let (palette, mut samples) = (std::mem::take(&mut png.palette), Vec::new());
+        let count = width as usize * height as usize * color.samples();
         samples.try_reserve_exact(count).map_err(|_| ImportError::Memory { bytes: count as u64 * 2 })?;
-        for row in image.chunks_exact(line.max(1)).take(height as usize) {
-            let value = |index: usize| match bits {
-                16 => u16::from_be_bytes([row[index * 2], row[index * 2 + 1]]),
-                8 => row[index].into(),
-                bits => {
-                    let (bits, at) = (usize::from(bits), index * usize::from(bits));
-                    u16::from(row[at / 8] >> (8 - bits - at % 8)) & ((1 << bits) - 1)
-                }
-            };
-            samples.extend((0..row_len).map(value));
-        }
-        if samples.len() != count {
-            return Err(damaged(FORMAT, "it ends too early"));
-        }
+        png.read(|_, row| {
+            samples.extend_from_slice(row);
+            Ok::<_, ImportError>(())
+        })?;
         Ok(Self { width, height, color, bits, palette, samples })
     }
 

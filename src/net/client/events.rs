@@ -17,7 +17,7 @@ pub enum ClientEvent {
     },
     /// The ground around the player has arrived.
     Playable,
-    /// The whole world has arrived, and the client follows the order.
+    /// The whole world has arrived, and the client follows the log.
     Joined,
     /// An edit of the player is shown with the predicted result.
     Predicted(Receipt),
@@ -35,7 +35,7 @@ pub enum ClientEvent {
         /// The reason; `None` if it could not be sent or applied, or the client was disconnected when it was refused.
         why: Option<Refusal>,
     },
-    /// An undo by this client succeeded, with the restored parts. They have no tags, because the order does not contain
+    /// An undo by this client succeeded, with the restored parts. They have no tags, because the log does not contain
     /// tags of edits. Inventories should follow this. `None` if the client was disconnected when it happened.
     Undone(Option<Applied>),
     /// An undo was refused. `None` if the request could not be sent, or the client was disconnected when it was

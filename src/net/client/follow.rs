@@ -1,4 +1,4 @@
-//! Applies entries of the order, and reports what they do.
+//! Applies entries of the log, and reports what they do.
 
 use std::collections::BTreeMap;
 

@@ -27,7 +27,7 @@ pub(super) enum Stage {
     ByRegions { to: u64, left: usize },
     /// The table of regions at a number arrives.
     ByTable { to: u64 },
-    /// It follows the order.
+    /// It follows the log.
     Following,
 }
 
@@ -88,32 +88,27 @@ impl Client {
         self.finish_regions();
     }
 
-    /// Continues from another position of the order.
+    /// Continues from another position of the log.
     fn restart(&mut self, state: &RuleState, keeps_world: bool, sequence: u64) {
         if self.replica.restart(state, keeps_world).is_err() {
             self.figures.malformed += 1;
         }
         // The answers to these were sent while the client was disconnected; if they were applied, the world contains
         // them.
-        for tag in self.take_answered(sequence) {
-            self.events.push(ClientEvent::Confirmed { tag, receipt: None });
-        }
-        let undone = self.take_answered_undos(sequence).map(|_| ClientEvent::Undone(None));
-        self.events.extend(undone);
+        let edit = |tag| ClientEvent::Confirmed { tag, receipt: None };
+        self.settle(sequence, edit, || ClientEvent::Undone(None));
     }
 
-    /// Removes pending edits up to a number; returns their tags.
-    fn take_answered(&mut self, sequence: u64) -> Vec<u64> {
-        let answered: Vec<u64> =
-            self.replica.pending().map(|(number, _)| number).filter(|number| *number <= sequence).collect();
+    /// Removes pending edits and undos up to a number, and reports an event for each, of an edit with its tag.
+    fn settle(&mut self, sequence: u64, edit: impl Fn(u64) -> ClientEvent, undo: impl Fn() -> ClientEvent) {
+        let numbers = self.replica.pending().map(|(number, _)| number);
+        let answered: Vec<u64> = numbers.filter(|number| *number <= sequence).collect();
         answered.iter().for_each(|number| self.settle_pieces(*number));
-        answered.into_iter().filter_map(|number| Some(self.replica.take_back(number)?.tag())).collect()
-    }
-
-    /// Removes waiting undos up to a number; returns their numbers.
-    fn take_answered_undos(&mut self, sequence: u64) -> impl Iterator<Item = u64> + use<> {
+        let edits = answered.into_iter().filter_map(|number| self.replica.take_back(number));
+        self.events.extend(edits.map(|own| edit(own.tag())));
         let later = self.undos.split_off(&sequence.saturating_add(1));
-        std::mem::replace(&mut self.undos, later).into_iter()
+        let undos = std::mem::replace(&mut self.undos, later);
+        self.events.extend(undos.iter().map(|_| undo()));
     }
 
     /// Sends edits that the server has not seen, and those from before the first welcome.
@@ -157,11 +152,8 @@ impl Client {
             && self.number() >= to
         {
             // They were refused while the client was away.
-            for tag in self.take_answered(sequence) {
-                self.events.push(ClientEvent::Refused { tag, why: None });
-            }
-            let refused = self.take_answered_undos(sequence).map(|_| ClientEvent::UndoRefused(None));
-            self.events.extend(refused);
+            let edit = |tag| ClientEvent::Refused { tag, why: None };
+            self.settle(sequence, edit, || ClientEvent::UndoRefused(None));
             self.follow_from_now();
         }
     }
@@ -199,7 +191,7 @@ impl Client {
             region_hash(world, *region) != theirs.get(region).copied().unwrap_or_default()
         };
         let mut wanted: Vec<RegionPos> = all.into_iter().filter(differs).collect();
-        wanted.sort_by_key(|region| distance(*region, self.place));
+        wanted.sort_by_key(|region| distance(*region, self.position));
         self.stage = Stage::ByRegions { to, left: wanted.len() };
         self.wanted = wanted.into();
         self.fetch_more();
@@ -233,7 +225,7 @@ impl Client {
         if content.number != to || left == 0 {
             return;
         }
-        if distance(content.pos, self.place) > i64::from(self.near) && !self.is_playable {
+        if distance(content.pos, self.position) > i64::from(self.near) && !self.is_playable {
             self.is_playable = true;
             self.events.push(ClientEvent::Playable);
         }
@@ -263,9 +255,9 @@ impl Client {
 }
 
 /// The distance from a position to a region along the axis on which it is farthest, in voxels.
-fn distance(region: RegionPos, place: IVec3) -> i64 {
+fn distance(region: RegionPos, position: IVec3) -> i64 {
     let samples = region.samples();
     let (low, high) = (samples.min.as_i64vec3(), samples.max.as_i64vec3());
-    let place = place.as_i64vec3();
-    (low - place).max(place - high).max_element().max(0)
+    let position = position.as_i64vec3();
+    (low - position).max(position - high).max_element().max(0)
 }

@@ -1,14 +1,14 @@
-//! The client: it shows the player's edits at once, and follows the server's order.
+//! The client: it shows the player's edits at once, and follows the server's log.
 //!
 //! | file | what it does |
 //! | --- | --- |
 //! | `client` | the interface for games |
-//! | `receive`, `follow` | received messages, and entries of the order |
+//! | `receive`, `follow` | received messages, and entries of the log |
 //! | `join` | catching up with the server: old entries, regions, a comparison |
 //! | `outbox` | sends the player's edits and undos as fast as the server's limits allow |
 //! | `repair` | marks, and regions that differ |
 //! | `images` | images, grids and prefabs that are missing |
-//! | `replica` | the world of the order, and the shown world |
+//! | `replica` | the world of the log, and the shown world |
 
 mod events;
 mod follow;
@@ -30,12 +30,12 @@ use super::ContentTable;
 use super::bulk::BulkReader;
 use super::message::{ClientId, Entry, Epoch, Hello, Lane, PROTOCOL, Refusal, ToServer};
 use super::price::cost;
-use super::replica::{Replica, ShownChange};
+use super::replica::Replica;
 use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
+use crate::terrain::{Order, Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
@@ -63,7 +63,7 @@ pub struct Client {
     replica: Replica,
     contents: ContentTable,
     chunk_size: u32,
-    place: IVec3,
+    position: IVec3,
     /// Regions within this distance, in voxels, have to be there before play begins.
     near: u32,
     id: Option<ClientId>,
@@ -85,7 +85,7 @@ pub struct Client {
     acknowledged: (u64, u64, Duration),
     /// Entries that came and are not applied yet.
     waiting: BTreeMap<u64, Entry>,
-    /// The number of the last entry that came in the order lane.
+    /// The number of the last entry that came in the main lane.
     received: u64,
     marks: Marks,
     reaches: Reaches,
@@ -111,7 +111,7 @@ pub struct Client {
     undos: BTreeSet<u64>,
     pieces: Pieces,
     outgoing: Vec<Vec<u8>>,
-    shown: Vec<ShownChange>,
+    shown: Vec<Order>,
     events: Vec<ClientEvent>,
     figures: ClientFigures,
 }
@@ -127,7 +127,7 @@ impl Client {
             replica,
             contents: ContentTable::default(),
             chunk_size: settings.chunk_size,
-            place: IVec3::ZERO,
+            position: IVec3::ZERO,
             near: 96,
             id: None,
             epoch: None,
@@ -173,7 +173,7 @@ impl Client {
     /// When the parts do not fit the ground or the chunk size.
     pub fn begin_with(&mut self, change: Patch) -> Result<(), Rejection> {
         self.replica.put(change)?;
-        // It is in no order, so the server has to compare.
+        // It is in no log, so the server has to compare.
         self.epoch = Some(Epoch { world: WorldId(0), run: 0, number: 0 });
         self.is_part = true;
         Ok(())
@@ -185,8 +185,8 @@ impl Client {
     }
 
     /// Sets the player's position, in voxels: regions are sent from there outwards.
-    pub fn set_place(&mut self, place: IVec3) {
-        self.place = place;
+    pub fn set_position(&mut self, position: IVec3) {
+        self.position = position;
     }
 
     /// Sets how far around the player the ground must have arrived before play begins, in voxels; 96 by default.
@@ -233,7 +233,7 @@ impl Client {
             epoch: self
                 .epoch
                 .map(|epoch| if self.is_part { Epoch { number: u64::MAX, ..epoch } } else { epoch }),
-            place: self.place,
+            position: self.position,
         };
         self.outgoing.push(ToServer::Greeting { stream: self.stream, hello }.to_bytes());
     }
@@ -253,7 +253,7 @@ impl Client {
         self.id
     }
 
-    /// Whether it has the whole world and follows the order.
+    /// Whether it has the whole world and follows the log.
     pub fn has_joined(&self) -> bool {
         matches!(self.stage, Stage::Following)
     }
@@ -263,9 +263,9 @@ impl Client {
         self.replica.shown_hash()
     }
 
-    /// All that is to be put into a terrain that does not hold what it should, for example because a change was refused
-    /// there. It takes the place of everything that [`take_shown`](Self::take_shown) would return now.
-    pub fn show_whole(&mut self, shown: &World) -> ShownChange {
+    /// The order that repairs a shown terrain with this world, for example because a change was refused there. It takes the
+    /// place of everything that [`take_shown`](Self::take_shown) would return now.
+    pub fn show_whole(&mut self, shown: &World) -> Order {
         let (_, receipts) = self.replica.update();
         self.shown.clear();
         self.report_predictions(receipts.unwrap_or_default());
@@ -338,9 +338,9 @@ impl Client {
         self.inbox.push_back((lane, bytes));
     }
 
-    /// Changes for the shown terrain, in order, for [`Terrain::submit`](crate::terrain::Terrain::submit);
-    /// each is returned once.
-    pub fn take_shown(&mut self) -> Vec<ShownChange> {
+    /// The changes of the shown terrain, for [`Terrain::submit_all`](crate::terrain::Terrain::submit_all); each is
+    /// returned once.
+    pub fn take_shown(&mut self) -> Vec<Order> {
         std::mem::take(&mut self.shown)
     }
 

@@ -11,7 +11,7 @@ use crate::lattice::LatticeBox;
 use crate::terrain::{LoosePiece, PieceFate, Receipt, ReturnedPiece, Run};
 
 /// The maximum number of pieces that are remembered.
-const MOST: usize = 1 << 13;
+const MAX_PIECES: usize = 1 << 13;
 
 /// A piece that is out of the ground.
 struct Gone {
@@ -53,7 +53,7 @@ fn all(receipt: &Receipt) -> impl Iterator<Item = &LoosePiece> {
 impl Pieces {
     fn add(&mut self, gone: impl IntoIterator<Item = Gone>) {
         self.gone.extend(gone);
-        let excess = self.gone.len().saturating_sub(MOST);
+        let excess = self.gone.len().saturating_sub(MAX_PIECES);
         self.gone.drain(..excess);
     }
 

@@ -94,7 +94,7 @@ impl Client {
     /// Records received entries; greets again if others before them are missing.
     fn note_received(&mut self, lane: Lane, Entries { first, entries }: &Entries) {
         let last = first.saturating_add(entries.len() as u64).saturating_sub(1);
-        if lane == Lane::Order && self.is_welcome() {
+        if lane == Lane::Main && self.is_welcome() {
             if *first > self.received.saturating_add(1) {
                 // Something is missing: what follows waits until it has come.
                 self.figures.gaps += 1;

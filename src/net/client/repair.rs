@@ -1,4 +1,4 @@
-//! Marks: positions of the order at which hashes of regions are compared; and the repair of regions that differ.
+//! Marks: positions of the log at which hashes of regions are compared; and the repair of regions that differ.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 

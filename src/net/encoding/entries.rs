@@ -1,6 +1,4 @@
-//! Entries of the order, one by one and in messages.
-
-use std::sync::Arc;
+//! Entries of the log, one by one and in messages.
 
 use super::super::message::{ClientId, Entry};
 use super::super::{ContentId, ContentTable};
@@ -60,13 +58,13 @@ pub(in crate::net) fn entry_bytes(entry: &Entry) -> usize {
 
 /// Writes entries as they are ordered into one message.
 #[derive(Debug, Default)]
-pub(in crate::net) struct OrderWriter {
+pub(in crate::net) struct EntryWriter {
     bytes: Vec<u8>,
     count: u64,
     coder: EditSequence,
 }
 
-impl OrderWriter {
+impl EntryWriter {
     pub fn put(&mut self, entry: &Entry) {
         put_entry(&mut self.bytes, entry, &mut self.coder);
         self.count += 1;
@@ -100,7 +98,7 @@ pub(super) fn read_entry(
     coder: &mut EditSequence,
 ) -> Result<(Entry, Vec<ContentId>), FormatError> {
     let entry = match reader.byte()? {
-        RULES => Entry::of_server(Order::Rules(read_rules(reader.bytes()?)?.map(Arc::new))),
+        RULES => Entry::of_server(Order::Rules(read_rules(reader.bytes()?)?)),
         LOOSE => {
             let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
             Entry::of_server(Order::Loose(loose))

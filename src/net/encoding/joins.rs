@@ -5,6 +5,7 @@ use super::parts::{flag, read_rules, small};
 use crate::format::bytes::{Reader, put_bytes, put_number};
 use crate::format::fields::{point, put_point};
 use crate::format::{FormatError, WorldId, plain};
+use crate::terrain::EditSettings;
 
 const LOG: u8 = 0;
 const REGIONS: u8 = 1;
@@ -15,7 +16,7 @@ pub(super) fn put_hello(to: &mut Vec<u8>, hello: &Hello) {
     put_number(to, hello.simulation.into());
     to.extend_from_slice(&hello.ground.to_le_bytes());
     put_number(to, hello.chunk_size.into());
-    put_point(to, hello.place);
+    put_point(to, hello.position);
     to.push(hello.epoch.is_some().into());
     hello.epoch.iter().for_each(|epoch| put_epoch(to, epoch));
 }
@@ -26,7 +27,7 @@ pub(super) fn read_hello(reader: &mut Reader) -> Result<Hello, FormatError> {
         simulation: small(reader)?,
         ground: u64::from_le_bytes(reader.array()?),
         chunk_size: small(reader)?,
-        place: point(reader)?,
+        position: point(reader)?,
         epoch: if flag(reader)? { Some(epoch(reader)?) } else { None },
     })
 }
@@ -97,13 +98,14 @@ pub(super) fn read_welcome(reader: &mut Reader) -> Result<Welcome, FormatError> 
 }
 
 fn put_rule_state(to: &mut Vec<u8>, state: &RuleState) {
-    put_bytes(to, &plain::to_bytes(&state.rules));
-    put_bytes(to, &plain::to_bytes(&state.loose));
+    put_bytes(to, &plain::to_bytes(&state.edit_settings.rules.as_deref()));
+    put_bytes(to, &plain::to_bytes(&state.edit_settings.loose));
     put_number(to, state.next_field);
 }
 
 fn read_rule_state(reader: &mut Reader) -> Result<Box<RuleState>, FormatError> {
     let rules = read_rules(reader.bytes()?)?;
     let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
-    Ok(Box::new(RuleState { rules, loose, next_field: reader.number()? }))
+    let edit_settings = EditSettings { rules, loose };
+    Ok(Box::new(RuleState { edit_settings, next_field: reader.number()? }))
 }

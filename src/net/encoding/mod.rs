@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | `to_server`, `to_client` | messages of a client, and of a server |
 //! | `edits` | a client's edits |
-//! | `entries` | entries of the order |
+//! | `entries` | entries of the log |
 //! | `joins` | the greeting of a client, and its answer |
 //! | `packed` | compressed messages |
 //! | `parts` | numbers, reasons, regions, rules |
@@ -22,6 +22,6 @@ mod to_client;
 mod to_server;
 
 pub(super) use edits::EditWriter;
-pub(super) use entries::{OrderWriter, entry_bytes};
+pub(super) use entries::{EntryWriter, entry_bytes};
 pub(super) use packed::pack;
 pub(super) use to_client::PIECE;

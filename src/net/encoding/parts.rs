@@ -1,5 +1,7 @@
 //! Parts of messages: numbers, flags, reasons, regions, rules.
 
+use std::sync::Arc;
+
 use super::super::message::*;
 use crate::format::bytes::{Reader, put_number};
 use crate::format::fields::{point, put_point};
@@ -27,19 +29,19 @@ pub(super) fn flag(reader: &mut Reader) -> Result<bool, FormatError> {
     }
 }
 
-pub(super) fn place_in<T: PartialEq>(all: &[T], one: &T) -> u8 {
+pub(super) fn index_of<T: PartialEq>(all: &[T], one: &T) -> u8 {
     debug_assert!(all.contains(one), "a reason without a number");
     all.iter().position(|other| other == one).unwrap_or_default() as u8
 }
 
-pub(super) fn at_place<T: Copy>(all: &[T], place: u8) -> Result<T, FormatError> {
-    all.get(usize::from(place)).copied().ok_or(FormatError::Invalid("reason"))
+pub(super) fn at_index<T: Copy>(all: &[T], index: u8) -> Result<T, FormatError> {
+    all.get(usize::from(index)).copied().ok_or(FormatError::Invalid("reason"))
 }
 
-pub(super) fn read_rules(bytes: &[u8]) -> Result<Option<DiggingRules>, FormatError> {
+pub(super) fn read_rules(bytes: &[u8]) -> Result<Option<Arc<DiggingRules>>, FormatError> {
     let rules: Option<DiggingRules> = plain::from_bytes(bytes, "rules")?;
     match rules.as_ref().map_or(Ok(()), DiggingRules::check) {
-        Ok(()) => Ok(rules),
+        Ok(()) => Ok(rules.map(Arc::new)),
         Err(_) => Err(FormatError::Invalid("rules")),
     }
 }

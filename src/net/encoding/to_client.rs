@@ -8,7 +8,7 @@ use super::super::{ContentId, ContentTable};
 use super::entries::{ENTRIES, put_entry, read_entry};
 use super::joins::{put_welcome, read_welcome};
 use super::packed::{PACKED, unpack};
-use super::parts::{at_place, place_in, put_hashes, read_hashes, small, within};
+use super::parts::{at_index, index_of, put_hashes, read_hashes, small, within};
 use crate::format::bytes::{Reader, put_number};
 use crate::format::contents::{put_image, read_image};
 use crate::format::edits::EditSequence;
@@ -71,7 +71,7 @@ impl ToClient {
                 to.extend([KICKED, REFUSED_BY_GAME]);
                 put_number(&mut to, (*reason).into());
             }
-            Self::Kicked(why) => to.extend([KICKED, place_in(&KICKS, why)]),
+            Self::Kicked(why) => to.extend([KICKED, index_of(&KICKS, why)]),
             Self::Entries(Entries { first, entries }) => {
                 to.push(ENTRIES);
                 put_number(&mut to, *first);
@@ -84,7 +84,7 @@ impl ToClient {
                 put_number(&mut to, *number);
             }
             Self::Refused { sequence, why } => {
-                to.extend([REFUSED, place_in(&REFUSALS, why)]);
+                to.extend([REFUSED, index_of(&REFUSALS, why)]);
                 put_number(&mut to, *sequence);
             }
             Self::Hashes { number, regions } => put_hashes(&mut to, HASHES, *number, regions),
@@ -147,7 +147,7 @@ impl ToClient {
             WELCOME => Self::Welcome(read_welcome(&mut reader)?),
             KICKED => Self::Kicked(match reader.byte()? {
                 REFUSED_BY_GAME => KickReason::Refused(small(&mut reader)?),
-                place => at_place(&KICKS, place)?,
+                index => at_index(&KICKS, index)?,
             }),
             ENTRIES => {
                 let (first, count) = (reader.number()?, reader.count()?);
@@ -164,7 +164,7 @@ impl ToClient {
             }
             FAILED => Self::Failed { number: reader.number()? },
             REFUSED => {
-                let why = at_place(&REFUSALS, reader.byte()?)?;
+                let why = at_index(&REFUSALS, reader.byte()?)?;
                 Self::Refused { sequence: reader.number()?, why }
             }
             HASHES => Self::Hashes { number: reader.number()?, regions: read_hashes(&mut reader)? },

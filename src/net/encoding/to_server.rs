@@ -89,14 +89,14 @@ impl ToServer {
                 let (first, count) = (reader.number()?, reader.count()?);
                 within(count, MAX_EDITS)?;
                 let (mut edits, mut coder) = (Vec::with_capacity(count), EditSequence::default());
-                for place in 0..count {
+                for index in 0..count {
                     let head = reader.byte()?;
                     let read = coder.read(head, &mut reader, contents)?;
                     let why = match read.refused {
                         Some(_) => Some(Refusal::TooLarge),
                         None => read.missing.first().map(|_| Refusal::UnknownContent),
                     };
-                    refused.extend(why.map(|why| (place, why)));
+                    refused.extend(why.map(|why| (index, why)));
                     edits.push(read.edit);
                 }
                 Self::Edits { first, edits }

@@ -1,4 +1,4 @@
-//! Applies entries of the order to the server's world.
+//! Applies entries of the log to the server's world.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -10,8 +10,8 @@ use crate::lattice::RegionPos;
 use crate::net::encoding::entry_bytes;
 use crate::net::message::{Entry, Refusal, RegionHashes, ToClient};
 use crate::net::price::{MAX_UNDO_BYTES, UNDO, UNDO_BYTES};
-use crate::net::regions::{Steps, touched_regions};
-use crate::terrain::{Order, Patch, Receipt};
+use crate::net::regions::run_submitted;
+use crate::terrain::{Order, Patch, Receipt, World};
 
 impl Server {
     /// Applies entries, as much as one call may.
@@ -107,48 +107,40 @@ impl Server {
     /// Applies edits, and records the touched regions.
     fn transact(&mut self, edits: &[Edit], stroke: Option<(super::ClientId, Option<u64>)>) -> Vec<Receipt> {
         self.terrain.submit_all(edits);
-        let mut receipts = self.terrain.take_receipts();
-        while let Some(transaction) = self.terrain.begin() {
-            let commit = transaction.run();
-            let change = commit.change();
+        self.run_submitted(stroke)
+    }
+
+    /// Runs what was submitted, as part of a stroke that can be undone.
+    fn run_submitted(&mut self, stroke: Option<(super::ClientId, Option<u64>)>) -> Vec<Receipt> {
+        let (number, Self { terrain, sums, strokes, .. }) = (self.applied + 1, &mut *self);
+        let record = |world: &World, change: &Patch| {
             if let Some((player, label)) = stroke
                 && !change.bricks.is_empty()
             {
-                self.strokes.record(player, label, self.terrain.world(), &change);
+                strokes.record(player, label, world, change);
             }
-            let steps = Steps::of(self.terrain.world(), &change);
-            // This terrain is waiting for it.
-            receipts.extend(self.terrain.commit(commit).unwrap_or_default());
-            self.touch(&change, steps);
+        };
+        let (receipts, regions) = run_submitted(terrain, sums, record);
+        for region in regions {
+            self.touched.insert(region);
+            self.changed.insert(region, number);
         }
         receipts
     }
 
-    fn touch(&mut self, change: &Patch, steps: Steps) {
-        let number = self.applied + 1;
-        for region in touched_regions(self.terrain.world().grid(), change) {
-            self.touched.insert(region);
-            self.changed.insert(region, number);
-        }
-        self.sums.add(self.terrain.world(), steps);
-    }
-
     fn put_parts(&mut self, number: u64, change: &Arc<Patch>) {
-        let steps = Steps::of(self.terrain.world(), change);
-        let receipt = self.terrain.apply_one(Order::parts(Arc::clone(change), None));
-        if receipt.outcome.is_ok() {
-            self.touch(change, steps);
-        } else if receipt.is_local_failure() {
+        self.terrain.submit(Order::parts(Arc::clone(change), None));
+        // Where another error comes, nothing changed, and the same holds on all machines.
+        if self.run_submitted(None).iter().any(Receipt::is_local_failure) {
             self.fail(number);
         }
-        // Otherwise nothing changed, and the same holds on all machines.
     }
 
     pub(super) fn fail(&mut self, number: u64) {
         self.figures.failed += 1;
         self.failed.insert(number);
         #[cfg(feature = "store")]
-        self.saved_order.iter_mut().for_each(|saved| saved.fail(number));
+        self.saved_log.iter_mut().for_each(|saved| saved.fail(number));
         self.report(ServerEvent::EntryFailed(number));
         self.send_to_all(&ToClient::Failed { number });
     }

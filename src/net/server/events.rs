@@ -42,8 +42,8 @@ pub struct ServerFigures {
     pub stuck: u64,
     /// Regions that clients fetched because they differed.
     pub repairs: u64,
-    /// Bytes of the order lane to all clients.
-    pub order_bytes: u64,
+    /// Bytes of the main lane to all clients.
+    pub main_bytes: u64,
     /// Bytes of the bulk lane to all clients.
     pub bulk_bytes: u64,
 }

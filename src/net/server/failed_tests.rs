@@ -42,7 +42,7 @@ impl Play {
     fn join(&mut self, id: u64) {
         let mut client =
             Client::new(Arc::clone(&self.ground), &TerrainSettings::default()).expect("valid settings");
-        client.set_place(IVec3::new(64, 20, 64));
+        client.set_position(IVec3::new(64, 20, 64));
         client.connect(self.now);
         self.server.connect(ClientId(id), self.now);
         self.clients.insert(ClientId(id), (client, Vec::new()));

@@ -100,7 +100,7 @@ impl Server {
             (Some(log), _) => (self.epoch.number, log),
             // Whatever its state is, it needs the differences.
             (None, Some(_)) => self.compare(client),
-            (None, None) => self.all_regions(hello.place),
+            (None, None) => self.all_regions(hello.position),
         };
         let now = self.now;
         let welcome = Welcome {
@@ -113,7 +113,7 @@ impl Server {
             join,
         };
         let Some(session) = self.sessions.get_mut(&client) else { return };
-        session.order = super::sender::OrderSender::new(&self.settings, number);
+        session.order = super::sender::EntrySender::new(&self.settings, number);
         match bulk {
             Bulk::Messages(messages) => messages.into_iter().for_each(|message| session.bulk.push(message)),
             Bulk::Regions(world, regions) => session.bulk.push_regions(world, &regions),
@@ -127,12 +127,12 @@ impl Server {
         self.report(ServerEvent::Joined(client));
     }
 
-    /// Whether the order leads from this position to the present one: a position of this run, or of an earlier run of
+    /// Whether the log leads from this position to the present one: a position of this run, or of an earlier run of
     /// which everything up to it was saved.
     fn has_passed(&self, epoch: Epoch) -> bool {
         let of_this_run = (epoch.run == self.epoch.run).then_some(self.epoch.number);
         #[cfg(feature = "store")]
-        let last = of_this_run.or_else(|| self.saved_order.as_ref()?.shared_with(epoch.run));
+        let last = of_this_run.or_else(|| self.saved_log.as_ref()?.shared_with(epoch.run));
         #[cfg(not(feature = "store"))]
         let last = of_this_run;
         epoch.world == self.epoch.world && last.is_some_and(|last| epoch.number <= last)
@@ -163,10 +163,10 @@ impl Server {
     }
 
     /// All regions, nearest first.
-    fn all_regions(&mut self, place: IVec3) -> (u64, (Join, Bulk)) {
+    fn all_regions(&mut self, position: IVec3) -> (u64, (Join, Bulk)) {
         let (world, state) = self.keep();
         let mut regions: Vec<RegionPos> = regions_of(&world.1).into_iter().collect();
-        regions.sort_by_cached_key(|region| squared_distance(*region, place));
+        regions.sort_by_cached_key(|region| squared_distance(*region, position));
         let join = Join::Regions { regions: regions.len() as u32, state: Box::new(state) };
         (world.0, (join, Bulk::Regions(world, regions)))
     }
@@ -245,8 +245,8 @@ impl Server {
                         ToClient::Greet.to_bytes()
                     }
                 };
-                self.figures.order_bytes += message.len() as u64;
-                self.outgoing.push((*client, Lane::Order, message));
+                self.figures.main_bytes += message.len() as u64;
+                self.outgoing.push((*client, Lane::Main, message));
             }
         }
     }
@@ -276,7 +276,7 @@ impl Server {
 }
 
 /// The distance from a position to the middle of a region.
-fn squared_distance(region: RegionPos, place: IVec3) -> i128 {
-    let way = region.samples().min.as_i64vec3() + i64::from(RegionPos::VOXELS / 2) - place.as_i64vec3();
+fn squared_distance(region: RegionPos, position: IVec3) -> i128 {
+    let way = region.samples().min.as_i64vec3() + i64::from(RegionPos::VOXELS / 2) - position.as_i64vec3();
     way.to_array().into_iter().map(|way| i128::from(way).pow(2)).sum()
 }

@@ -38,8 +38,7 @@ impl Server {
         let (now, number) = (self.now, self.applied);
         let kept = self.kept.get_or_insert_with(|| {
             let state = RuleState {
-                rules: self.terrain.rules().cloned(),
-                loose: self.terrain.loose().copied(),
+                edit_settings: self.terrain.edit_settings().clone(),
                 next_field: self.terrain.world().next_field(),
             };
             Kept { world: (number, self.terrain.snapshot()), state, table: None, since: now }
@@ -54,7 +53,7 @@ impl Server {
                 session.begin_again(&self.settings, now);
                 self.figures.stuck += 1;
                 self.outgoing.retain(|(to, ..)| to != client);
-                self.outgoing.push((*client, Lane::Order, ToClient::Greet.to_bytes()));
+                self.outgoing.push((*client, Lane::Main, ToClient::Greet.to_bytes()));
             }
         }
     }
@@ -62,10 +61,12 @@ impl Server {
 
 impl Kept {
     /// Whether a returning client may get it: it contains everything that the client has done and seen.
-    pub fn is_for(&self, hello: &Hello, run: u64, last_own: u64) -> bool {
+    pub fn is_for(&self, hello: &Hello, run: u64, last_applied: u64) -> bool {
         let number = self.world.0;
         // A client with a part of a world sends no number.
         let has_more = |number_there: u64| number_there > number && number_there != u64::MAX;
-        hello.epoch.is_none_or(|epoch| last_own <= number && !(epoch.run == run && has_more(epoch.number)))
+        hello
+            .epoch
+            .is_none_or(|epoch| last_applied <= number && !(epoch.run == run && has_more(epoch.number)))
     }
 }

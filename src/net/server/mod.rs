@@ -1,33 +1,37 @@
-//! The server: it owns the order. It numbers the edits of clients, sends them on, and applies them to its own terrain,
+//! The server: it owns the log. It numbers the edits of clients, sends them on, and applies them to its own terrain,
 //! which has no meshes.
 //!
 //! | file | what it does |
 //! | --- | --- |
 //! | `settings`, `events` | its limits, its events and statistics |
 //! | `session`, `players` | a connected client, data that is kept for its player |
+//! | `recent` | a table of clients that forgets the oldest |
 //! | `receive`, `validation` | received messages, and the reasons to refuse edits |
-//! | `order_log` | the latest entries, in long messages |
+//! | `numbering` | numbers entries, and sends them |
+//! | `entry_log` | the latest entries, in long messages |
 //! | `sequences` | the last sequence numbers of players' edits |
 //! | `apply` | applies entries to the world |
 //! | `strokes` | strokes that can be undone |
 //! | `join`, `sender`, `pace` | clients that join, reconnect, or differ; the bulk lane; how fast it is |
 //! | `kept` | older states of the world that are kept for joining clients |
-//! | `save`, `saved_order` | a server that survives a restart; the entries that it saves |
+//! | `save`, `saved_log` | a server that survives a restart; the entries that it saves |
 
 mod apply;
+mod entry_log;
 mod events;
 mod join;
 mod kept;
 #[cfg(feature = "store")]
 mod keys;
-mod order_log;
+mod numbering;
 mod pace;
 mod players;
 mod receive;
+mod recent;
 #[cfg(feature = "store")]
 mod save;
 #[cfg(feature = "store")]
-mod saved_order;
+mod saved_log;
 mod sender;
 mod sequences;
 mod session;
@@ -43,18 +47,18 @@ use std::time::Duration;
 use glam::IVec3;
 
 use super::ContentTable;
-use super::encoding::{OrderWriter, entry_bytes};
+use super::encoding::{EntryWriter, entry_bytes};
 use super::message::{ClientId, Entry, Epoch, KickReason, Lane, MAX_TO_CLIENT, ToClient};
 use super::never_shown;
 use super::regions::RegionSums;
 use crate::brush::Edit;
 use crate::format::{FormatError, WorldId};
 use crate::lattice::RegionPos;
-use crate::terrain::{LooseSettings, Order, Patch, Terrain};
+use crate::terrain::{EditSettings, LooseSettings, Order, Patch, Terrain};
 use crate::volume::{DiggingRules, RulesError};
+use entry_log::EntryLog;
 pub use events::{ServerEvent, ServerFigures};
 use kept::Kept;
-use order_log::OrderLog;
 use players::Players;
 use sender::Encodings;
 use sequences::Sequences;
@@ -137,11 +141,11 @@ pub struct Server {
     applied: u64,
     waiting: VecDeque<Ordered>,
     waiting_cost: u64,
-    writer: OrderWriter,
-    log: OrderLog,
+    writer: EntryWriter,
+    log: EntryLog,
     /// Entries of the log that could not be applied.
     failed: BTreeSet<u64>,
-    /// Whether the order leads from the pristine world to this one.
+    /// Whether the log leads from the pristine world to this one.
     is_whole: bool,
     /// An undo and all later entries, which get numbers after the undo has one, so it applies to everything before it.
     later: VecDeque<Later>,
@@ -167,9 +171,9 @@ pub struct Server {
     durable: u64,
     #[cfg(feature = "store")]
     saving: save::Saving,
-    /// The order in the store; `None` without one.
+    /// The log in the store; `None` without one.
     #[cfg(feature = "store")]
-    saved_order: Option<saved_order::SavedOrder>,
+    saved_log: Option<saved_log::SavedLog>,
     outgoing: Vec<Outgoing>,
     events: VecDeque<ServerEvent>,
     figures: ServerFigures,
@@ -200,7 +204,7 @@ impl Server {
             && world.next_field() == 0
             && world.bricks().next().is_none()
             && world.fields().next().is_none();
-        let (rules, loose) = (terrain.rules().cloned().map(Arc::new), terrain.loose().copied());
+        let edit_settings = terrain.edit_settings().clone();
         let run = WorldId::random().0 as u64;
         let mut server = Self {
             terrain,
@@ -214,8 +218,8 @@ impl Server {
             applied: number,
             waiting: VecDeque::new(),
             waiting_cost: 0,
-            writer: OrderWriter::default(),
-            log: OrderLog::new(settings.log_bytes, number),
+            writer: EntryWriter::default(),
+            log: EntryLog::new(settings.log_bytes, number),
             failed: BTreeSet::new(),
             is_whole,
             later: VecDeque::new(),
@@ -236,17 +240,15 @@ impl Server {
             #[cfg(feature = "store")]
             saving: save::Saving::at(0, number),
             #[cfg(feature = "store")]
-            saved_order: None,
+            saved_log: None,
             outgoing: Vec::new(),
             events: VecDeque::new(),
             figures: ServerFigures::default(),
         };
         // What holds already is part of what leads from the pristine world.
-        if let (true, Some(rules)) = (is_whole, rules) {
-            server.order(Entry::of_server(Order::Rules(Some(rules))));
-        }
-        if let (true, Some(loose)) = (is_whole, loose) {
-            server.order(Entry::of_server(Order::Loose(Some(loose))));
+        if is_whole {
+            let orders = edit_settings.orders_after(Some(&EditSettings::default()));
+            orders.for_each(|order| server.order(Entry::of_server(order)));
         }
         server
     }
@@ -351,9 +353,9 @@ impl Server {
 
     /// Sets the position of a client's player, in voxels, from which its [reach](ServerSettings::reach) is measured;
     /// `None` if it is unknown. It can be set before the client connects, and persists over its connections.
-    pub fn set_place(&mut self, client: ClientId, place: Option<IVec3>) {
-        if place.is_some() || self.players.get(client).is_some() {
-            self.players.player(client).place = place;
+    pub fn set_position(&mut self, client: ClientId, position: Option<IVec3>) {
+        if position.is_some() || self.players.get(client).is_some() {
+            self.players.player(client).position = position;
             self.players.trim(|client| self.sessions.contains_key(&client));
         }
     }
@@ -406,82 +408,6 @@ impl Server {
         }
         self.order(entry);
         Ok(())
-    }
-
-    fn order_edit(&mut self, author: ClientId, sequence: u64, edit: Edit, cost: u64) {
-        let labels = (edit.tag(), edit.stroke());
-        let entry = Entry::of(author, sequence, Order::Edit(edit.with_labels(0, None)));
-        self.enter(Ordered { entry, labels, cost });
-    }
-
-    /// Gives an entry the next number.
-    fn order(&mut self, entry: Entry) {
-        self.enter(Ordered { entry, labels: (0, None), cost: 0 });
-    }
-
-    fn enter(&mut self, ordered: Ordered) {
-        self.waiting_cost += ordered.cost;
-        if self.later.is_empty() {
-            self.number(ordered);
-        } else {
-            self.later.push_back(Later::Entry(ordered));
-        }
-    }
-
-    fn number(&mut self, ordered: Ordered) {
-        self.epoch.number += 1;
-        self.figures.ordered += 1;
-        self.writer.put(&ordered.entry);
-        self.log.push(&ordered.entry);
-        #[cfg(feature = "store")]
-        if let Some(saved) = &mut self.saved_order {
-            saved.push(self.epoch.number, &ordered.entry);
-        }
-        self.waiting.push_back(ordered);
-        if self.writer.len() >= FULL_MESSAGE {
-            self.flush();
-        }
-    }
-
-    /// Sends ordered entries to all clients that have everything before them, and room for them.
-    fn flush(&mut self) {
-        let (last, writer) = (self.epoch.number, std::mem::take(&mut self.writer));
-        let Some(message) = writer.message(last) else { return };
-        let before = last - writer.count();
-        for (client, session) in &mut self.sessions {
-            if session.has_joined()
-                && session.order.sent() == before
-                && session.order.send(last, message.len())
-            {
-                self.figures.order_bytes += message.len() as u64;
-                self.outgoing.push((*client, Lane::Order, message.clone()));
-            }
-        }
-    }
-
-    fn send(&mut self, client: ClientId, message: &ToClient) {
-        let bytes = message.to_bytes();
-        self.figures.order_bytes += bytes.len() as u64;
-        self.outgoing.push((client, Lane::Order, bytes));
-    }
-
-    /// Sends a message to all clients that have joined, after all ordered entries.
-    fn send_to_all(&mut self, message: &ToClient) {
-        self.flush();
-        let bytes = message.to_bytes();
-        for (client, session) in &self.sessions {
-            if session.has_joined() {
-                self.figures.order_bytes += bytes.len() as u64;
-                self.outgoing.push((*client, Lane::Order, bytes.clone()));
-            }
-        }
-    }
-
-    fn report(&mut self, event: ServerEvent) {
-        if self.events.len() == MAX_EVENTS {
-            self.events.pop_front();
-        }
-        self.events.push_back(event);
     }
 
     /// Applies ordered entries, welcomes new clients, and sends bulk data within its limits.

@@ -1,12 +1,12 @@
 //! Data that a server keeps for players, connected or not: a player that reconnects under the same number has the same
 //! budget.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use glam::IVec3;
 
 use super::pace::Pace;
+use super::recent::Recent;
 use super::settings::ServerSettings;
 use crate::net::bucket::{Bucket, Rate};
 use crate::net::message::ClientId;
@@ -25,10 +25,8 @@ pub struct Player {
     pub malformed: Bucket,
     pub greetings: Bucket,
     pub bulk: Bucket,
-    pub place: Option<IVec3>,
+    pub position: Option<IVec3>,
     pub is_administrator: bool,
-    /// Counts the uses of all players.
-    used: u64,
 }
 
 impl Player {
@@ -41,50 +39,37 @@ impl Player {
             malformed: full(settings.malformed),
             greetings: full(GREETINGS),
             bulk: full(Pace::new(settings).rate()),
-            place: None,
+            position: None,
             is_administrator: false,
-            used: 0,
         }
     }
 }
 
 /// The data of all players.
 pub struct Players {
-    players: BTreeMap<ClientId, Player>,
+    players: Recent<Player>,
     settings: ServerSettings,
-    uses: u64,
 }
 
 impl Players {
     pub fn new(settings: ServerSettings) -> Self {
-        Self { players: BTreeMap::new(), settings, uses: 0 }
+        Self { players: Recent::default(), settings }
     }
 
     /// A player as it is remembered, or a new one.
     pub fn player(&mut self, client: ClientId) -> &mut Player {
-        self.uses += 1;
-        let player = self.players.entry(client).or_insert_with(|| Player::new(&self.settings));
-        player.used = self.uses;
-        player
+        self.players.get_or_insert_with(client, || Player::new(&self.settings))
     }
 
     /// A player, if it is remembered.
     pub fn get(&self, client: ClientId) -> Option<&Player> {
-        self.players.get(&client)
+        self.players.get(client)
     }
 
     /// Forgets the players that have been away for the longest time, if there are too many.
     pub fn trim(&mut self, is_connected: impl Fn(ClientId) -> bool) {
-        if self.players.len() <= MAX_PLAYERS {
-            return;
-        }
-        let is_kept = |client: ClientId, player: &Player| player.is_administrator || is_connected(client);
-        let away = self.players.iter().filter(|(client, player)| !is_kept(**client, player));
-        let mut uses: Vec<u64> = away.map(|(_, player)| player.used).collect();
-        uses.sort_unstable();
-        // Half of them at once, so that this is rare.
-        let Some(&oldest) = uses.get(uses.len() / 2) else { return };
-        self.players.retain(|client, player| player.used >= oldest || is_kept(*client, player));
+        let is_kept = |client, player: &Player| player.is_administrator || is_connected(client);
+        self.players.trim(MAX_PLAYERS, is_kept);
     }
 }
 

@@ -100,8 +100,8 @@ impl Server {
         if first == 0 || first.checked_add(edits.len() as u64).is_none() {
             return false;
         }
-        for (place, edit) in edits.into_iter().enumerate() {
-            let sequence = first + place as u64;
+        for (index, edit) in edits.into_iter().enumerate() {
+            let sequence = first + index as u64;
             self.figures.edits += 1;
             if !self.sessions.get(&client).is_some_and(|session| session.takes_edits()) {
                 // It counts as not seen: the client may send it again once it has joined.
@@ -119,7 +119,7 @@ impl Server {
             if !self.may_go_on(client, counted, now) {
                 return true;
             }
-            if let Some(why) = refused.get(&place) {
+            if let Some(why) = refused.get(&index) {
                 self.refuse(client, sequence, *why);
                 continue;
             }

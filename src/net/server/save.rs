@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::keys::{NUMBER, RESERVED, prefix};
-use super::saved_order::{FoundOrder, SavedOrder};
+use super::saved_log::{FoundLog, SavedLog};
 use super::sequences::{Applied, MAX_SEQUENCE, Sequences};
 use super::{Server, ServerSettings};
 use crate::net::message::ClientId;
@@ -48,17 +48,17 @@ impl Server {
         server.sequences = Sequences::open(store);
         server.saving = Saving::at(store.revision(), number);
         let (run, log_bytes) = (server.epoch.run, server.settings.log_bytes);
-        let FoundOrder { pieces, is_whole, mut saved } =
-            SavedOrder::open(store, &server.terrain, run, number, log_bytes);
-        let has_order = !pieces.is_empty();
+        let FoundLog { pieces, is_whole, mut saved } =
+            SavedLog::open(store, &server.terrain, run, number, log_bytes);
+        let has_entries = !pieces.is_empty();
         for piece in pieces.into_iter().rev() {
             server.log.push_front(piece.first, piece.message, piece.names);
         }
-        server.is_whole |= is_whole && has_order;
+        server.is_whole |= is_whole && has_entries;
         saved.set_whole(server.is_whole);
         // Those that say what holds at first.
         (number + 1..).zip(&server.waiting).for_each(|(number, ordered)| saved.push(number, &ordered.entry));
-        server.saved_order = Some(saved);
+        server.saved_log = Some(saved);
         server
     }
 
@@ -71,7 +71,7 @@ impl Server {
     pub fn save(&mut self, store: &mut Store) -> Result<(), StoreError> {
         let has_new = self.saving.number != self.applied;
         if has_new {
-            match &mut self.saved_order {
+            match &mut self.saved_log {
                 Some(saved) => saved.save(store, self.applied, &self.terrain),
                 None => store.put(format!("{RESERVED}{NUMBER}"), self.applied.to_le_bytes()),
             }

@@ -15,8 +15,8 @@ use crate::net::message::{RegionContent, ToClient};
 use crate::net::regions::chunks_of;
 use crate::terrain::World;
 
-/// Unacknowledged entries in the order lane of a client: at most the bytes of the window, or one message.
-pub struct OrderSender {
+/// Unacknowledged entries in the main lane of a client: at most the bytes of the window, or one message.
+pub struct EntrySender {
     /// The number of the last entry that was sent.
     sent: u64,
     /// Messages that are not acknowledged: the numbers of their last entries, and their bytes.
@@ -25,7 +25,7 @@ pub struct OrderSender {
     window: u64,
 }
 
-impl OrderSender {
+impl EntrySender {
     /// For a client that starts from this number.
     pub fn new(settings: &ServerSettings, number: u64) -> Self {
         Self { sent: number, on_the_way: VecDeque::new(), bytes: 0, window: settings.window }
@@ -94,11 +94,11 @@ pub struct Encodings {
 impl Encodings {
     /// Resets what is left for another call.
     pub fn refill(&mut self) {
-        (self.left, self.is_short) = (Self::MOST, false);
+        (self.left, self.is_short) = (Self::MAX_PER_CALL, false);
     }
 
     /// Regions in a call: at 60 calls a second, 480, of some 20 to 100 KB each.
-    const MOST: usize = 8;
+    const MAX_PER_CALL: usize = 8;
 
     /// Whether a region was not encoded since the last refill because too many others were.
     pub fn is_short(&self) -> bool {
@@ -122,7 +122,7 @@ impl Encodings {
     /// Estimates the bytes of regions in messages from those that were encoded. If there were none, some are.
     pub fn estimate(&mut self, world: &Snapshot, regions: &[RegionPos]) -> usize {
         if self.count == 0 {
-            let step = regions.len().div_ceil(Self::MOST).max(1);
+            let step = regions.len().div_ceil(Self::MAX_PER_CALL).max(1);
             regions.iter().step_by(step).for_each(|region| self.note(region_bytes(world, *region, 0).len()));
         }
         self.bytes / self.count.max(1) * regions.len()

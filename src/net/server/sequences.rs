@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::recent::Recent;
 use crate::net::message::{ClientId, MAX_SEQUENCE_JUMP};
 
 /// The most players whose numbers are remembered, in addition to those that are connected.
@@ -18,7 +19,7 @@ pub(super) const MAX_SAVED: usize = 1024;
 pub(super) struct Applied {
     /// Its sequence number.
     pub sequence: u64,
-    /// Its number in the order.
+    /// Its number in the log.
     pub number: u64,
 }
 
@@ -32,19 +33,11 @@ pub enum SequenceCheck {
     Impossible,
 }
 
-/// The last sequence number of a player that was seen.
-#[derive(Clone, Copy, Default)]
-struct Seen {
-    sequence: u64,
-    /// Counts the uses of all players.
-    used: u64,
-}
-
 /// The last sequence numbers of all players' edits.
 #[derive(Default)]
 pub struct Sequences {
-    seen: BTreeMap<ClientId, Seen>,
-    uses: u64,
+    /// The last sequence number of each player that was seen.
+    seen: Recent<u64>,
     pub(super) applied: BTreeMap<ClientId, Applied>,
     /// Players whose last edit that is applied is another than the one that is saved.
     pub(super) changed: BTreeSet<ClientId>,
@@ -59,7 +52,7 @@ impl Sequences {
 
     /// The last number that was seen.
     pub fn last(&self, client: ClientId) -> u64 {
-        self.seen.get(&client).map_or(0, |seen| seen.sequence)
+        self.seen.get(client).copied().unwrap_or_default()
     }
 
     /// Classifies a received number.
@@ -76,23 +69,14 @@ impl Sequences {
 
     /// Records that a number was seen.
     pub fn note(&mut self, client: ClientId, sequence: u64) {
-        self.uses += 1;
-        let seen = self.seen.entry(client).or_default();
-        *seen = Seen { sequence: sequence.max(seen.sequence), used: self.uses };
+        let seen = self.seen.get_or_insert_with(client, || 0);
+        *seen = sequence.max(*seen);
     }
 
     /// Forgets the players that have been silent for the longest time, if there are too many; `is_kept` selects players
     /// that stay in any case.
     pub fn trim(&mut self, is_kept: impl Fn(ClientId) -> bool) {
-        if self.seen.len() <= MAX_SEEN {
-            return;
-        }
-        let away = self.seen.iter().filter(|(client, _)| !is_kept(**client));
-        let mut uses: Vec<u64> = away.map(|(_, seen)| seen.used).collect();
-        uses.sort_unstable();
-        // Half of them at once, so that this is rare.
-        let Some(&oldest) = uses.get(uses.len() / 2) else { return };
-        self.seen.retain(|client, seen| seen.used >= oldest || is_kept(*client));
+        self.seen.trim(MAX_SEEN, |client, _| is_kept(client));
     }
 
     /// Records that an edit of a player was applied.
@@ -111,7 +95,7 @@ impl Sequences {
         }
     }
 
-    /// The number in the order of a player's last edit that is applied; 0 where it is not known.
+    /// The number in the log of a player's last edit that is applied; 0 where it is not known.
     pub fn last_applied(&self, client: ClientId) -> u64 {
         self.applied.get(&client).map_or(0, |last| last.number)
     }

@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::sender::{BulkSender, OrderSender};
+use super::sender::{BulkSender, EntrySender};
 use super::settings::ServerSettings;
 use crate::lattice::RegionPos;
 use crate::net::ContentId;
@@ -42,7 +42,7 @@ pub struct Session {
     pub asked: Duration,
     /// The number that its world is at, as it has acknowledged.
     pub acknowledged: u64,
-    pub order: OrderSender,
+    pub order: EntrySender,
     pub bulk: BulkSender,
     pub fetches: VecDeque<Fetch>,
     /// Images that it was sent.
@@ -60,7 +60,7 @@ impl Session {
             stream: None,
             asked: now,
             acknowledged: 0,
-            order: OrderSender::new(settings, 0),
+            order: EntrySender::new(settings, 0),
             bulk: BulkSender::new(settings),
             fetches: VecDeque::new(),
             images: BTreeSet::new(),

@@ -41,7 +41,7 @@ pub enum UndoPolicy {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ServerSettings {
     /// How far from its player a client may dig; `None` does not check it. Otherwise a client whose
-    /// [place](super::Server::set_place) is not known may not dig.
+    /// [position](super::Server::set_position) is not known may not dig.
     pub reach: Option<Reach>,
     /// The budget for a client's edits. An edit costs 20, and 1 for each brick that it reaches, or 4 if it sculpts;
     /// edits beyond the budget are refused.
@@ -60,7 +60,7 @@ pub struct ServerSettings {
     /// The most bytes of the bulk lane for each client. The lane begins at 256 KiB a second, or this rate if it is
     /// lower, and becomes faster as long as acknowledgements show that the client's connection keeps up.
     pub bulk: Rate,
-    /// Bytes of each lane that a client may not have acknowledged. In the order lane, one message is sent in any case; in the bulk
+    /// Bytes of each lane that a client may not have acknowledged. In the main lane, one message is sent in any case; in the bulk
     /// lane, there are more in proportion to its rate.
     pub window: u64,
     /// The maximum size in bytes of a piece of the bulk lane.

@@ -11,22 +11,22 @@ use crate::net::message::{ClientId, Refusal};
 use crate::net::price::UNDO;
 
 /// Whether all of an edit's shape, with its roughness, lies within a distance of a place.
-fn is_within(place: IVec3, edit: &Edit, allowed: u32) -> bool {
+fn is_within(position: IVec3, edit: &Edit, allowed: u32) -> bool {
     let samples = edit.reach();
     // Its reach is what its shape and its roughness take up, and a band around them.
-    let band = i64::from(edit.own_band() / ONE);
+    let band = i64::from(edit.shape_band() / ONE);
     let middle = (samples.min.as_i64vec3() + samples.max.as_i64vec3()).div_euclid(I64Vec3::splat(2));
     let min = (samples.min.as_i64vec3() + band).min(middle);
     let max = (samples.max.as_i64vec3() - band).max(middle);
-    let place = place.as_i64vec3();
+    let position = position.as_i64vec3();
     if let Shape::Sphere(_) = edit.shape() {
         // In half voxels, with one voxel for rounding.
-        let way = min + max - 2 * place;
+        let way = min + max - 2 * position;
         let radius = (max - min).max_element().unsigned_abs();
         let left = (2 * (u64::from(allowed) + 1)).checked_sub(radius);
         return left.is_some_and(|left| squared_length(way) <= u128::from(left).pow(2));
     }
-    let farthest = (min - place).abs().max((max - place).abs());
+    let farthest = (min - position).abs().max((max - position).abs());
     squared_length(farthest) <= u128::from(u64::from(allowed) + 1).pow(2)
 }
 
@@ -47,7 +47,7 @@ impl Server {
         let cost = cost.ok_or(Refusal::OutsideWorld)?;
         let player = self.players.player(client);
         if let Some(reach) = self.settings.reach
-            && !player.place.is_some_and(|place| is_within(place, edit, reach.allowed()))
+            && !player.position.is_some_and(|position| is_within(position, edit, reach.allowed()))
         {
             return Err(Refusal::TooFar);
         }

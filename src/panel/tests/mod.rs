@@ -1,6 +1,7 @@
 //! Tests of the panel on a simulated screen, mostly without an app.
 
 mod level_files;
+mod placed;
 mod tool;
 
 use std::time::Duration;
@@ -86,7 +87,10 @@ impl Screen {
             let was_typing = context.text_edit_focused();
             files::ask(&context, &mut self.files);
             fold_one(&context, true);
-            let head = |ui: &mut Ui, panel: &mut BurrowPanel| brush_column::head(ui, panel);
+            let shown = self.tool.clone();
+            let head = |ui: &mut Ui, panel: &mut BurrowPanel| {
+                brush_column::head(ui, panel, &shown, chosen.is_some(), &mut actions);
+            };
             column(&context, BRUSH, Align2::LEFT_TOP, "Brush", &mut self.panel, head, |ui, panel| {
                 brush_column::show(ui, &mut self.tool, &materials, voxel, panel);
             });

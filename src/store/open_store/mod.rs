@@ -18,24 +18,23 @@ use std::time::Duration;
 
 use super::closing::{ClosingStore, StoreThread};
 use super::database::DATABASE;
-use super::error::{StoreError, StoreTrouble, WorldSize};
+use super::error::{StoreError, StoreWarning, WorldSize};
 use super::files::{Files, Folder, Lock};
 use super::found::Contents;
-use super::journal::Journal;
+use super::message::{Content, Message};
 use super::mirror::Mirror;
 use super::options::StoreOptions;
-use super::progress::Work;
+use super::progress::{Progress, Work};
 use super::recover::recover;
 use super::region_file::RegionFile;
-use super::segment::base;
 use super::settle::settle;
 use super::shared::{GameData, SavePoint, Shared};
 use super::sources::has_world;
 use super::unsaved;
-use super::writer::{Content, Message, Writer};
+use super::writer::Writer;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Order, Patch, Terrain, TerrainSettings, Version};
+use crate::terrain::{CommitRecord, EditSettings, LogEntry, Patch, Terrain, TerrainSettings, Version};
 
 /// The file that is locked while a world is open.
 const LOCK: &str = "lock";
@@ -71,7 +70,7 @@ pub struct Store {
     unsent: BTreeMap<String, Option<Vec<u8>>>,
     world: WorldId,
     /// Bytes that may wait for the thread.
-    most_queued: usize,
+    max_queued: usize,
     close_timeout: Duration,
 }
 
@@ -94,8 +93,8 @@ pub struct Opened {
     pub replayed: u64,
     /// Whether damaged regions can be rebuilt from the log.
     pub is_log_whole: bool,
-    /// Troubles to show to a player or an operator.
-    pub troubles: Vec<StoreTrouble>,
+    /// Warnings to show to a player or an operator.
+    pub warnings: Vec<StoreWarning>,
 }
 
 impl Store {
@@ -143,7 +142,7 @@ impl Store {
         files.create_folder("").map_err(StoreError::files("creating the world's folder"))?;
         let lock = take_lock(&*files)?;
         if has_world(&*files).map_err(StoreError::files("reading the world's folder"))? {
-            return Err(StoreError::Exists(name(&*files)));
+            return Err(StoreError::Exists(files.name()));
         }
         // The marker of a world that was removed.
         unsaved::clear(&*files).map_err(StoreError::files("creating the world"))?;
@@ -154,7 +153,7 @@ impl Store {
         let world = WorldId::random();
         let ground = terrain.world().shared_ground();
         let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
-        let (rules, loose) = (parts.rules.clone(), parts.loose);
+        let edit_settings = parts.edit_settings.clone();
         let (grid, level) = (terrain.world().grid(), options.level.clone());
         let progress = options.progress.clone();
         let mirror = Mirror::new(grid, parts, hash, data.clone(), level);
@@ -162,26 +161,15 @@ impl Store {
         let is_whole = revision == 0 && mirror.is_as_level() && data.is_empty();
         let mut entries = Vec::new();
         if is_whole {
-            entries.extend(rules.map(|rules| LogEntry::Order(Order::Rules(Some(Arc::new(rules))))));
-            entries.extend(loose.map(|loose| LogEntry::Order(Order::Loose(Some(loose)))));
+            let orders = edit_settings.orders_after(Some(&EditSettings::default()));
+            entries.extend(orders.map(LogEntry::Order));
         }
         let frame = u64::from(!is_whole);
-        let shared = Arc::new(Shared::default());
-        let journal = Journal::new(
-            Arc::clone(&files),
-            world,
-            base(&ground, mirror.level.as_ref()),
-            Vec::new(),
-            frame + 1,
-            (0, Vec::new()),
-        );
-        let saved = Arc::clone(&shared);
-        let database = RegionFile::new();
-        let mut writer = Writer::new(
-            files, options, saved, world, ground, settings, mirror, journal, database, frame, lock,
-        );
+        let (journal, database) = ((Vec::new(), frame + 1), RegionFile::new());
+        let mut writer =
+            Writer::new(files, options, world, ground, settings, mirror, journal, database, frame, lock);
         writer.save_all()?;
-        let mut store = Self::start(writer, shared, world, terrain)?;
+        let mut store = Self::start(writer, terrain)?;
         if !entries.is_empty() {
             let record = CommitRecord { number: 0, revision, hash, entries, change: Patch::default() };
             store.give(store.point, Content::Commits(vec![record]))?;
@@ -198,7 +186,7 @@ impl Store {
     /// has changed and the options [say so](super::BaseChanged::Refuse), when the [level](StoreOptions::level) below is
     /// missing, and when nothing of it can be read. Also when a file that can't be read at the moment holds something
     /// that no other file has, and when this ground has no room for edits that were made on a ground of another size.
-    /// Nothing is changed then. All other problems are reported in [`Opened::troubles`].
+    /// Nothing is changed then. All other problems are reported in [`Opened::warnings`].
     pub fn open(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,
@@ -216,13 +204,8 @@ impl Store {
         ground: impl Into<Arc<Ground>>,
         options: StoreOptions,
     ) -> Result<(Self, Opened), StoreError> {
-        if !has_world(&*files).map_err(StoreError::files("reading the world's folder"))? {
-            return Err(StoreError::Missing(name(&*files)));
-        }
-        let lock = take_lock(&*files)?;
-        let ground = ground.into();
-        let progress = options.progress.clone();
-        let mut contents = Contents::read(&*files, progress.as_ref())?;
+        let (ground, progress) = (ground.into(), options.progress.clone());
+        let (lock, mut contents) = read(&*files, progress.as_ref())?;
         let recovered = recover(&contents, &ground, &options)?;
         if !options.salvage {
             contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
@@ -235,60 +218,46 @@ impl Store {
         );
         let (settings, findings) = (recovered.settings(), recovered.findings.clone());
         let (mut terrain, mirror) = (recovered.terrain, recovered.mirror);
-        let shared = Arc::new(Shared::default());
-        let world = contents.world;
         let database = match &contents.damaged {
             None => RegionFile::new(),
             Some(_) => RegionFile::damaged(contents.choose_checkpoint().map_or(0, |own| own.frame)),
         };
-        let journal = Journal::new(
-            Arc::clone(&files),
-            world,
-            base(&ground, mirror.level.as_ref()),
-            settled.segments,
-            settled.next_frame,
-            (0, Vec::new()),
-        );
+        let (journal, frame) = ((settled.segments, settled.next_frame), recovered.checkpoint);
         let mut writer = Writer::new(
             files,
             options,
-            Arc::clone(&shared),
-            world,
+            contents.world,
             ground,
             settings,
             mirror,
             journal,
             database,
-            recovered.checkpoint,
+            frame,
             lock,
         );
         let mut failures = Vec::new();
         if is_new {
             writer.save_all_or_later();
-            failures = shared.take_troubles();
+            failures = writer.shared.take_warnings();
         } else {
-            shared.set_durable(writer.point);
+            writer.shared.set_durable(writer.point);
         }
         // Where it could not be replaced yet, the damaged file is still in its place.
         let is_in_place = contents.has_database && !failures.is_empty();
         let kept = writer.database.kept().or(is_in_place.then_some(DATABASE));
-        let mut troubles = findings.troubles(&settled.copies, contents.damaged.as_deref(), kept);
-        troubles.extend(settled.troubles);
-        troubles.extend(failures);
+        let mut warnings = findings.warnings(&settled.copies, contents.damaged.as_deref(), kept);
+        warnings.extend(settled.warnings);
+        warnings.extend(failures);
         terrain.keep_log(Some(LOG_BYTES));
         drop(terrain.take_log());
-        let store = Self::start(writer, shared, world, &terrain)?;
+        let store = Self::start(writer, &terrain)?;
         Work::until(progress.as_ref(), 1.0, 1).finish();
-        Ok((store, Opened { terrain, replayed, is_log_whole, troubles }))
+        Ok((store, Opened { terrain, replayed, is_log_whole, warnings }))
     }
 
-    fn start(
-        mut writer: Writer,
-        shared: Arc<Shared>,
-        world: WorldId,
-        terrain: &Terrain,
-    ) -> Result<Self, StoreError> {
+    fn start(mut writer: Writer, terrain: &Terrain) -> Result<Self, StoreError> {
         writer.begin_segment();
+        let (shared, world) = (Arc::clone(&writer.shared), writer.world);
         let StoreOptions { waiting_bytes, close_timeout, .. } = writer.options;
         let (point, game) = (writer.point, writer.mirror.game.clone());
         let (messages, inbox): (Sender<Message>, Receiver<Message>) = channel();
@@ -305,15 +274,15 @@ impl Store {
             game,
             unsent: BTreeMap::new(),
             world,
-            most_queued: waiting_bytes.max(LEAST_QUEUED),
+            max_queued: waiting_bytes.max(LEAST_QUEUED),
             close_timeout,
         })
     }
 
-    /// Troubles since the last call, to show to a player or an operator. If they are not taken, the latest 256 are
+    /// Warnings since the last call, to show to a player or an operator. If they are not taken, the latest 256 are
     /// kept.
-    pub fn take_troubles(&self) -> Vec<StoreTrouble> {
-        self.shared.take_troubles()
+    pub fn take_warnings(&self) -> Vec<StoreWarning> {
+        self.shared.take_warnings()
     }
 
     /// The unique id of the world.
@@ -344,12 +313,19 @@ impl Drop for Store {
     }
 }
 
-pub(super) fn take_lock(files: &dyn Files) -> Result<Box<dyn Lock>, StoreError> {
-    let lock = files.lock(LOCK).map_err(StoreError::files("locking the world"))?;
-    lock.ok_or_else(|| StoreError::Locked(name(files)))
+/// Locks a world, and reads its files.
+pub(super) fn read(
+    files: &dyn Files,
+    progress: Option<&Progress>,
+) -> Result<(Box<dyn Lock>, Contents), StoreError> {
+    if !has_world(files).map_err(StoreError::files("reading the world's folder"))? {
+        return Err(StoreError::Missing(files.name()));
+    }
+    let lock = take_lock(files)?;
+    Ok((lock, Contents::read(files, progress)?))
 }
 
-/// How messages name the world.
-pub(super) fn name(files: &dyn Files) -> String {
-    files.name()
+fn take_lock(files: &dyn Files) -> Result<Box<dyn Lock>, StoreError> {
+    let lock = files.lock(LOCK).map_err(StoreError::files("locking the world"))?;
+    lock.ok_or_else(|| StoreError::Locked(files.name()))
 }

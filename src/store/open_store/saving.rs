@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use super::{LOG_BYTES, Store};
 use crate::store::error::{StoreError, WorldSize};
+use crate::store::message::{Answer, Content, Given, Message};
 use crate::store::shared::SavePoint;
-use crate::store::writer::{Answer, Content, Given, Message};
 use crate::terrain::{CommitRecord, Terrain};
 
 impl Store {
@@ -75,7 +75,7 @@ impl Store {
 
     /// Whether more data waits for the thread than allowed.
     fn is_full(&self) -> bool {
-        self.shared.queued() > self.most_queued
+        self.shared.queued() > self.max_queued
     }
 
     fn check_thread(&self) -> Result<(), StoreError> {

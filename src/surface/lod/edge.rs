@@ -12,7 +12,7 @@ use crate::ground::{Ground, MaterialId};
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::Vertex;
 use crate::surface::vertex::{
-    Lattice, WorldView, height_vertex, lerp_normal_over, linear_over, own_materials, sheet_vertex, vertex,
+    Lattice, WorldView, ground_materials, height_vertex, lerp_normal_over, linear_over, sheet_vertex, vertex,
 };
 
 const AXES: [IVec3; 3] = [IVec3::X, IVec3::Y, IVec3::Z];
@@ -165,7 +165,7 @@ impl Edge {
                 Vertex {
                     position: (p - origin) * SNAP + AXES[axis] * step,
                     normal: lerp_normal_over(a, b, step, length),
-                    materials: own_materials(ground, [p, q], step / length.max(1), solid),
+                    materials: ground_materials(ground, [p, q], step / length.max(1), solid),
                 }
             }
         }

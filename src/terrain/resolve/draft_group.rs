@@ -27,9 +27,9 @@ pub(crate) fn draft_group(
     group: &[Submission],
 ) -> (Draft, LoosePieces) {
     let edits: Vec<&Edit> = group.iter().filter_map(|submission| submission.edit()).collect();
-    let context = group.first().map(|first| &first.context);
-    let rules = context.and_then(|context| context.rules.as_deref());
-    match context.and_then(|context| context.loose.as_ref()) {
+    let settings = group.first().map(|first| &first.edit_settings);
+    let rules = settings.and_then(|settings| settings.rules.as_deref());
+    match settings.and_then(|settings| settings.loose.as_ref()) {
         Some(settings) => one_by_one(world, drafter, &edits, rules, settings),
         None => (drafter.draft(&edits, rules), LoosePieces::new()),
     }

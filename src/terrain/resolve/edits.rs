@@ -6,7 +6,6 @@
 use std::borrow::Cow;
 
 use rustc_hash::FxHashMap;
-use web_time::Instant;
 
 use super::draft_group::{Found, LoosePieces, draft_group};
 use super::field_log::{FieldChange, FieldLog};
@@ -87,7 +86,7 @@ fn merged<'a>(earlier: &[Group], last: &'a [DraftedBrick]) -> Cow<'a, [DraftedBr
 /// Resolves edits, in order.
 pub(crate) fn edits(scene: Scene, submissions: &[Submission]) -> Resolved {
     let Scene { world, backend, .. } = scene;
-    let (start, mut stages) = (Instant::now(), Stages::default());
+    let mut stages = Stages::default();
     let apply = |work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta])| backend.edit(work, each);
     let mut drafter = Drafter::new(world.samples(), world.grid, world.sample_hash, &world.uniform, &apply);
     let (mut groups, mut effects) = (Vec::<Group>::new(), Vec::<Effects>::new());
@@ -147,11 +146,10 @@ pub(crate) fn edits(scene: Scene, submissions: &[Submission]) -> Resolved {
         let mask = exact(mask.word_count(), mask.words());
         let patch = Patch { bricks: changed_bricks(bricks), fields, next_field };
         let change = Change { patch, mask, sample_hash };
-        let number = submissions.first().map_or(0, |first| first.context.group);
+        let number = submissions.first().map_or(0, |first| first.group);
         UndoDelta::new(change, replaced_bytes, number, (tags, pieces))
     });
     let changes = changes.collect();
-    stages.whole = start.elapsed();
     Resolved {
         uniform: drafter.into_uniform(),
         receipts: entered.receipts,

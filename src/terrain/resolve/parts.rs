@@ -2,103 +2,62 @@
 
 use std::sync::Arc;
 
-use glam::IVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashSet;
-use web_time::Instant;
 
+use super::replacement::Replacement;
 use super::resolved::{Resolved, install};
-use super::step::{Placed, place};
 use crate::backend::Cpu;
-use crate::edits::{EditEffect, count_replaced};
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, LatticeBox};
-use crate::redraw::{Scene, Stages, dirty_cells, joined_mask};
-use crate::surface::vertex::WorldView;
-use crate::surface::{Mask, MaskView};
-use crate::terrain::history::UndoDelta;
+use crate::lattice::BrickPos;
+use crate::redraw::{Scene, Stages};
 use crate::terrain::parts_error::{PartsError, check_number};
 use crate::terrain::receipt::{Applied, Asked, Receipt};
 use crate::volume::layers::{self, offset};
 use crate::volume::{Brick, Field, FieldId, UniformBricks, pristine_layers};
-use crate::world::{self, Change, Meshing, Patch, World, brick_over, columns_of};
+use crate::world::{Change, ChangedBrick, Meshing, Patch, World, brick_over};
 
-/// A replacement brick.
-struct NewBrick {
+/// A brick that fits the world, or `None` if it has no edited sample and so is pristine.
+fn checked(
+    world: &World,
     pos: BrickPos,
-    brick: Option<Arc<Brick>>,
-    changed: Option<LatticeBox>,
-    effect: EditEffect,
-    /// By how much the hash of the world's samples changes.
-    hash: u64,
-}
-
-impl NewBrick {
-    fn new(
-        world: &World,
-        pos: BrickPos,
-        brick: Option<&Arc<Brick>>,
-        counts: bool,
-    ) -> Result<Self, PartsError> {
-        let mut brick = brick.map(Arc::clone);
-        let (bounds, own) = (world.grid.edit_bounds(), pos.samples());
-        // Far out, lattice points do not fit 32 bits, and those that wrap around may seem to lie in the world.
-        if BrickPos::of(own.min) != pos || own.intersection(bounds).is_none() {
+    brick: Option<&Arc<Brick>>,
+) -> Result<Option<Arc<Brick>>, PartsError> {
+    let (bounds, samples) = (world.grid.edit_bounds(), pos.samples());
+    // Far out, lattice points do not fit 32 bits, and those that wrap around may seem to lie in the world.
+    if BrickPos::of(samples.min) != pos || samples.intersection(bounds).is_none() {
+        return Err(PartsError::OutsideWorld(pos));
+    }
+    if let Some(brick) = brick {
+        let is_inside = |index| bounds.contains(pos.origin() + offset(index));
+        if !bounds.encloses(samples) && !layers::indices(brick.edited()).all(is_inside) {
             return Err(PartsError::OutsideWorld(pos));
         }
-        if let Some(new) = &brick {
-            let is_inside = |index| bounds.contains(pos.origin() + offset(index));
-            if !bounds.encloses(own) && !layers::indices(new.edited()).all(is_inside) {
-                return Err(PartsError::OutsideWorld(pos));
-            }
-            let pristine = layers::without(&pristine_layers(&world.ground, pos), new.edited());
-            if layers::without(new.solid(), new.edited()) != pristine {
-                return Err(PartsError::OtherGround(pos));
-            }
+        let pristine = layers::without(&pristine_layers(&world.ground, pos), brick.edited());
+        if layers::without(brick.solid(), brick.edited()) != pristine {
+            return Err(PartsError::OtherGround(pos));
         }
-        // One without an edited sample is pristine.
-        brick.take_if(|brick| *brick.edited() == layers::NONE);
-        let before = world.bricks.get(&pos);
-        let mut effect = EditEffect::default();
-        let changed = if counts || before.is_some() {
-            let pair = [before.map(Arc::as_ref), brick.as_deref()];
-            count_replaced(&world.ground, pos, pair, &mut effect)
-        } else {
-            brick.as_ref().and_then(|brick| layers::bounds(brick.edited(), pos.origin()))
-        };
-        let columns = columns_of(pos);
-        let hash = |brick: Option<&Arc<Brick>>| {
-            brick.map_or(0, |brick| brick.hash(pos.origin().y, brick.edited(), &columns))
-        };
-        let hash = hash(brick.as_ref()).wrapping_sub(hash(before));
-        Ok(Self { pos, brick, changed, effect, hash })
     }
+    Ok(brick.filter(|brick| *brick.edited() != layers::NONE).cloned())
 }
 
 /// Resolves replaced parts; `hash` is the one that the world must have afterwards.
 pub(crate) fn parts(scene: Scene, change: &Patch, hash: Option<u64>) -> Resolved {
-    answered(scene.world, Asked::Parts, || replaced(scene, change, hash, true))
+    answered(scene.world, Asked::Parts, replaced(scene, change, hash, true))
 }
 
 /// Resolves another ground.
 pub(crate) fn ground(scene: Scene, ground: &Arc<Ground>) -> Resolved {
-    answered(scene.world, Asked::Ground, || on_ground(scene.world, ground))
+    answered(scene.world, Asked::Ground, on_ground(scene.world, ground))
 }
 
-/// Adds the receipt, and the time that it took.
-fn answered(
-    world: &World,
-    asked: Asked,
-    resolve: impl FnOnce() -> Result<(Resolved, Applied), PartsError>,
-) -> Resolved {
-    let start = Instant::now();
-    let (mut resolved, outcome) = match resolve() {
+/// Adds the receipt.
+fn answered(world: &World, asked: Asked, result: Result<(Resolved, Applied), PartsError>) -> Resolved {
+    let (resolved, outcome) = match result {
         Ok((resolved, applied)) => (resolved, Ok(applied)),
         Err(why) => (Resolved::nothing(world), Err(why.into())),
     };
-    resolved.receipts.push(Receipt::of(asked, outcome));
-    resolved.stages.whole = start.elapsed();
-    resolved
+    Resolved { receipts: vec![Receipt::of(asked, outcome)], ..resolved }
 }
 
 /// A world of these parts. Nothing is meshed: surfaces are made when they are asked for.
@@ -144,54 +103,28 @@ fn replaced(
     let (world, mut stages) = (scene.world, Stages::default());
     check_order(&change.bricks)?;
     let next_field = check_fields(world, change)?;
-    let all = change.bricks.par_iter().with_min_len(64);
-    let all = all.map(|(pos, brick)| NewBrick::new(world, *pos, brick.as_ref(), counts));
-    let mut new = Stages::time(&mut stages.edit, || all.collect::<Result<Vec<NewBrick>, PartsError>>())?;
-    let delta = new.iter().fold(0u64, |sum, own| sum.wrapping_add(own.hash));
-    let sample_hash = world.sample_hash.wrapping_add(delta);
-    let found = World::hash_of(world.ground.hash(), sample_hash);
+    let bricks = change.bricks.par_iter().with_min_len(64);
+    let bricks = bricks.map(|(pos, brick)| Ok((*pos, checked(world, *pos, brick.as_ref())?)));
+    let mut bricks: Vec<ChangedBrick> =
+        Stages::time(&mut stages.edit, || bricks.collect::<Result<_, PartsError>>())?;
+    let uniform = share_uniform(world, &mut bricks);
+    let mut fields = change.fields.clone();
+    fields.sort_by_key(|(chunk, _)| *chunk);
+    let change = Change { patch: Patch { bricks, fields, next_field }, ..Change::default() };
+    let mut replacement = Replacement::new(scene, change, counts, stages);
+    replacement.update_hash();
+    let found = World::hash_of(world.ground.hash(), replacement.change.sample_hash);
     if let Some(expected) = hash.filter(|&expected| expected != found) {
         return Err(PartsError::Hash { found, expected });
     }
-    let uniform = share_uniform(world, &mut new);
-    let mut effect = EditEffect::default();
-    for own in &mut new {
-        let EditEffect { removed, added, painted, .. } = std::mem::take(&mut own.effect);
-        effect.removed.add(&removed);
-        effect.added.add(&added);
-        effect.painted.add(&painted);
-    }
-    let bricks: Vec<(BrickPos, Option<Arc<Brick>>)> =
-        new.iter().map(|own| (own.pos, own.brick.clone())).collect();
-    let changed: Vec<(BrickPos, LatticeBox)> =
-        new.iter().filter_map(|own| Some((own.pos, own.changed?))).collect();
-    let pristine = |pos| Arc::new(Brick::pristine(pristine_layers(&world.ground, pos)));
-    let whole: Vec<(BrickPos, Arc<Brick>)> =
-        bricks.iter().map(|(pos, brick)| (*pos, brick.clone().unwrap_or_else(|| pristine(*pos)))).collect();
-    let words = Stages::time(&mut stages.ring, || words_of(world, &whole, &changed));
-    let mut fields = change.fields.clone();
-    fields.sort_by_key(|(chunk, _)| *chunk);
-    let patch = Patch { bricks, fields, next_field };
-    let change = Change { patch, mask: words, sample_hash };
-    let replaced_bytes = change.patch.bricks.iter().map(|(pos, _)| world::replaced_bytes(world, *pos)).sum();
-    let Placed { meshes, news } = place(scene, &change, &whole, &changed, &mut stages);
-    let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
-    let EditEffect { removed, added, painted, .. } = effect;
-    let applied = Applied { bounds, removed, added, painted, ..Applied::default() };
-    let delta = UndoDelta::new(change, replaced_bytes, 0, Default::default());
-    let resolved = Resolved {
-        news,
-        uniform,
-        next_field,
-        stages,
-        ..Resolved::new(world, vec![delta], sample_hash, meshes)
-    };
-    Ok((resolved, applied))
+    replacement.update_mask();
+    let (resolved, applied) = replacement.resolve(0, Default::default());
+    Ok((Resolved { uniform, ..resolved }, applied))
 }
 
-fn check_order(bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> Result<(), PartsError> {
+fn check_order(bricks: &[ChangedBrick]) -> Result<(), PartsError> {
     let wrong = bricks.windows(2).find(|pair| pair[0].0 >= pair[1].0);
-    wrong.map_or(Ok(()), |pair| Err(PartsError::Order(pair[1].0)))
+    wrong.map_or(Ok(()), |pair| Err(PartsError::Unsorted(pair[1].0)))
 }
 
 /// Checks the fields of a change; returns the greatest name that a field will have had.
@@ -215,9 +148,9 @@ fn check_fields(world: &World, change: &Patch) -> Result<u64, PartsError> {
 }
 
 /// Shares equal uniform bricks; returns the pool, if it has grown.
-fn share_uniform(world: &World, new: &mut [NewBrick]) -> Option<UniformBricks> {
+fn share_uniform(world: &World, bricks: &mut [ChangedBrick]) -> Option<UniformBricks> {
     let mut grown: Option<UniformBricks> = None;
-    for brick in new.iter_mut().filter_map(|own| own.brick.as_mut()) {
+    for brick in bricks.iter_mut().filter_map(|(_, brick)| brick.as_mut()) {
         let Some(kind) = brick.uniform() else { continue };
         let pool = grown.as_ref().unwrap_or(&world.uniform);
         match pool.get(&kind) {
@@ -228,38 +161,4 @@ fn share_uniform(world: &World, new: &mut [NewBrick]) -> Option<UniformBricks> {
         }
     }
     grown
-}
-
-/// Evaluates rule 2 again near changed bricks, as samples may have become pristine again. Returns the mask
-/// words that change.
-pub(crate) fn words_of(
-    world: &World,
-    bricks: &[(BrickPos, Arc<Brick>)],
-    changed: &[(BrickPos, LatticeBox)],
-) -> Vec<((i32, i32), u64)> {
-    // A cell has its corners in its own stack of bricks and in those behind it.
-    let stacks: FxHashSet<(i32, i32)> = changed.iter().map(|(pos, _)| pos.stack()).collect();
-    let behind = |&(x, z): &(i32, i32)| [(x, z), (x - 1, z), (x, z - 1), (x - 1, z - 1)];
-    let words: FxHashSet<(i32, i32)> = stacks.iter().flat_map(behind).collect();
-    let read: FxHashSet<(i32, i32)> =
-        words.iter().flat_map(|&(x, z)| [(x, z), (x + 1, z), (x, z + 1), (x + 1, z + 1)]).collect();
-    let mut cleared = Mask::default();
-    words.iter().for_each(|&word| cleared.lay_word(word, 0));
-    let stored = read.iter().flat_map(|stack| {
-        let ys = world.stacks.get(stack).map(Vec::as_slice).unwrap_or_default();
-        ys.iter().map(|&y| BrickPos(IVec3::new(stack.0, y, stack.1)))
-    });
-    let mut near: Vec<BrickPos> = stored.chain(bricks.iter().map(|(pos, _)| *pos)).collect();
-    near.sort_unstable();
-    near.dedup();
-    let latest: Vec<_> = bricks.iter().map(|(pos, brick)| (*pos, brick.as_ref())).collect();
-    let view = WorldView {
-        samples: world.samples().under(&latest),
-        mask: MaskView::new(&world.mask).over(&cleared),
-        grid: world.grid,
-    };
-    let cells = dirty_cells(world.grid, &near, |&pos| (pos, pos.samples(), true));
-    let found = joined_mask(world, &view, &cells);
-    let words = words.into_iter().map(|word| (word, found.get_word(word).unwrap_or_default()));
-    words.filter(|&(word, cells)| cells != world.mask.word(word)).collect()
 }

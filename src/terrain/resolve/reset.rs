@@ -7,67 +7,42 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
-use web_time::Instant;
 
-use super::parts::words_of;
+use super::replacement::Replacement;
 use super::resolved::Resolved;
-use super::step::{Placed, place};
 use crate::brush::Edit;
-use crate::edits::{self, EditEffect, ResetBrick, count_replaced, edited_within, reach};
+use crate::edits::{self, EditEffect, ResetBrick, edited_within, reach};
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::redraw::{Scene, Stages};
-use crate::terrain::history::UndoDelta;
 use crate::terrain::queue::Submission;
 use crate::terrain::receipt::{Applied, ChunkScenario, Receipt, Rejection};
-use crate::volume::{Brick, Field, Fields, Scenario, layers, pristine_layers};
-use crate::world::{Change, Patch, World, columns_of, replaced_bytes};
+use crate::volume::{Brick, Field, Fields, Scenario, layers};
+use crate::world::{Change, Patch, World};
 
 /// Resolves a reset.
 pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resolved {
-    let (world, start, mut stages) = (scene.world, Instant::now(), Stages::default());
-    let tag = submission.tag;
+    let (world, tag, mut stages) = (scene.world, submission.tag, Stages::default());
     if reach(world.grid, edit).is_none() {
         let receipts = vec![Receipt::of_edit(tag, Err(Rejection::OutsideWorld))];
         return Resolved { receipts, ..Resolved::nothing(world) };
     }
+    // Counts only what rules refuse.
     let mut effect = EditEffect::default();
-    let rules = submission.context.rules.as_deref();
+    let rules = submission.edit_settings.rules.as_deref();
     let found = Stages::time(&mut stages.edit, || {
         edits::reset(world.samples(), world.grid, edit, rules, &mut effect)
     });
-    let (mut bricks, mut whole) = (Vec::with_capacity(found.len()), Vec::with_capacity(found.len()));
-    let (mut changed, mut sample_hash) = (Vec::with_capacity(found.len()), world.sample_hash);
-    for ResetBrick { pos, brick, .. } in &found {
-        let before = world.bricks.get(pos);
-        let pair = [before.map(Arc::as_ref), brick.as_deref()];
-        changed.extend(count_replaced(&world.ground, *pos, pair, &mut effect).map(|own| (*pos, own)));
-        let columns = columns_of(*pos);
-        let hash = |brick: Option<&Arc<Brick>>| {
-            brick.map_or(0, |brick| brick.hash(pos.origin().y, brick.edited(), &columns))
-        };
-        sample_hash = sample_hash.wrapping_add(hash(brick.as_ref())).wrapping_sub(hash(before));
-        let pristine = || Arc::new(Brick::pristine(pristine_layers(&world.ground, *pos)));
-        whole.push((*pos, brick.clone().unwrap_or_else(pristine)));
-        bricks.push((*pos, brick.clone()));
-    }
-    let mask = Stages::time(&mut stages.ring, || words_of(world, &whole, &changed));
     let (fields, chunks) = shrunk_fields(world, &found);
-    let patch = Patch { bricks, fields, next_field: world.next_field };
-    let change = Change { patch, mask, sample_hash };
-    let Placed { meshes, news } = place(scene, &change, &whole, &changed, &mut stages);
-    let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
     let tags = if found.is_empty() { Vec::new() } else { vec![tag] };
-    let replaced = change.patch.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
-    let delta = UndoDelta::new(change, replaced, submission.context.group, (tags, Vec::new()));
-    let EditEffect { removed, added, painted, refused, .. } = effect;
-    let applied = Applied { chunks, bounds, removed, added, painted, refused, ..Applied::default() };
-    stages.whole = start.elapsed();
-    Resolved {
-        receipts: vec![Receipt::of_edit(tag, Ok(applied))],
-        news,
-        stages,
-        ..Resolved::new(world, vec![delta], sample_hash, meshes)
-    }
+    let bricks = found.into_iter().map(|ResetBrick { pos, brick, .. }| (pos, brick)).collect();
+    let patch = Patch { bricks, fields, next_field: world.next_field };
+    let change = Change { patch, ..Change::default() };
+    let mut replacement = Replacement::new(scene, change, true, stages);
+    replacement.update_hash();
+    replacement.update_mask();
+    let (resolved, applied) = replacement.resolve(submission.group, (tags, Vec::new()));
+    let applied = Applied { chunks, refused: effect.refused, ..applied };
+    Resolved { receipts: vec![Receipt::of_edit(tag, Ok(applied))], ..resolved }
 }
 
 /// The fields of each chunk in which samples were reset, shrunk to what is left of them; and what the receipt says.

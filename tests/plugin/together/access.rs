@@ -3,7 +3,7 @@
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
 use bevy_burrow::net::{self, ClientEvent, KickReason};
-use bevy_burrow::together::{EditOutcome, GroundJoined, GroundServer, SharedTerrain, SharingTrouble};
+use bevy_burrow::together::{EditOutcome, GroundJoined, GroundServer, SharedTerrain, SharingError};
 use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;
 
@@ -99,7 +99,7 @@ fn who_is_no_longer_authorised_is_told_and_joins_again_once_it_is() {
     let client = party.client(0);
     party.server.world_mut().entity_mut(client).remove::<AuthorizedClient>();
     party.rounds_until("it is told", |party| !party.shared(0).has_joined());
-    assert_eq!(party.troubles(0), [SharingTrouble::NotServed]);
+    assert_eq!(party.errors(0), [SharingError::NotServed]);
     let before = party.terrain_hash(1);
     party.dig_at(0, 30.0, 30.0);
     party.rounds(50);
@@ -118,9 +118,9 @@ fn who_is_kicked_stays_out_of_the_ground_while_connected() {
     party.all_join();
     let player = party.shared(0).id().expect("it has joined");
     party.server.world_mut().resource_mut::<GroundServer>().with(move |server| server.kick(player));
-    party.rounds_until("it is told", |party| party.shared(0).trouble().is_some());
-    let kicked = SharingTrouble::Kicked(KickReason::ByGame);
-    assert_eq!(party.shared(0).trouble(), Some(kicked));
+    party.rounds_until("it is told", |party| party.shared(0).error().is_some());
+    let kicked = SharingError::Kicked(KickReason::ByGame);
+    assert_eq!(party.shared(0).error(), Some(kicked));
     let joined = party.players[0].0.recorded::<GroundJoined>();
     assert!(joined.iter().any(|joined| joined.event == ClientEvent::Kicked(KickReason::ByGame)));
     // This transport closes no connections.

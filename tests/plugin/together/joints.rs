@@ -11,7 +11,7 @@ use bevy_burrow::format::Level;
 use bevy_burrow::net::{KickReason, Server, ServerSettings};
 use bevy_burrow::plugin::Held;
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble};
+use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingError};
 use bevy_replicon::prelude::*;
 use bevy_replicon::shared::backend::connected_client::NetworkId;
 use bevy_replicon::test_app::TestClientEntity;
@@ -195,8 +195,8 @@ fn who_comes_back_before_the_ground_is_served_loses_nothing() {
     party.dig_at(0, 60.0, 60.0);
     party.rounds(100);
     assert_eq!(party.shared(0).pending(), 2);
-    assert_eq!(party.troubles(0), [SharingTrouble::ConnectionLost]);
-    assert_eq!(party.shared(0).trouble(), None);
+    assert_eq!(party.errors(0), [SharingError::ConnectionLost]);
+    assert_eq!(party.shared(0).error(), None);
     let before = party.terrain_hash(0);
     party.server.insert_resource(server());
     party.rounds_until("both digs are done", |party| party.agrees() && party.shared(0).number() >= 2);
@@ -275,8 +275,8 @@ fn who_connects_twice_plays_over_the_later_connection() {
     // The first connection continues.
     party.join();
     party.rounds_until("the later one joins", |party| party.shared(1).has_joined());
-    party.rounds_until("the earlier one has a trouble", |party| party.shared(0).trouble().is_some());
-    assert_eq!(party.shared(0).trouble(), Some(SharingTrouble::Kicked(KickReason::ConnectedAgain)));
+    party.rounds_until("the earlier one has an error", |party| party.shared(0).error().is_some());
+    assert_eq!(party.shared(0).error(), Some(SharingError::Kicked(KickReason::ConnectedAgain)));
     let messages = party.ask(|server| server.figures().messages);
     for turn in 0..10 {
         party.dig_at(0, 20.0 + 5.0 * turn as f32, 20.0);
@@ -316,7 +316,7 @@ fn a_server_that_pauses_is_waited_for() {
     }
     let pristine = ground().world().hash();
     party.rounds_until("all go on", |party| party.agrees() && party.terrain_hash(2) != pristine);
-    assert!((0..3).all(|player| party.shared(player).trouble().is_none()));
+    assert!((0..3).all(|player| party.shared(player).error().is_none()));
 }
 
 /// A host changes levels while somebody joins.
@@ -331,8 +331,8 @@ fn a_host_changes_levels_while_somebody_joins() {
         // As with one system: the server, and the terrain next to it.
         party.server.world_mut().entity_mut(host).insert(other_ground());
         let hash = party.serve(dug(other_ground(), 12));
-        party.rounds_until("the player has a trouble", |party| {
-            matches!(party.shared(0).trouble(), Some(SharingTrouble::OtherGround { .. }))
+        party.rounds_until("the player has an error", |party| {
+            matches!(party.shared(0).error(), Some(SharingError::OtherGround { .. }))
         });
         let terrain = party.players[0].1;
         party.world_mut(0).entity_mut(terrain).insert(other_ground());
@@ -431,7 +431,7 @@ fn a_player_who_pauses_is_shown_later_what_others_dug() {
         party.world_mut(1).remove_resource::<Paused>();
         party.world_mut(1).entity_mut(terrain).remove::<Held>();
         party.rounds_until("it is shown", |party| party.agrees() && party.terrain_hash(1) != pristine);
-        assert!(party.shared(1).trouble().is_none());
+        assert!(party.shared(1).error().is_none());
     }
 }
 

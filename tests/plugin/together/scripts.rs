@@ -155,7 +155,7 @@ fn after_any_script_all_join_and_show_the_same() {
             }
             assert!(start.elapsed() < super::PATIENCE, "seed {seed}: another world after {steps:?}");
         }
-        assert!((0..party.players.len()).all(|player| party.shared(player).trouble().is_none()));
+        assert!((0..party.players.len()).all(|player| party.shared(player).error().is_none()));
         for (player, asked) in asked.iter().enumerate() {
             check_answers(&mut party, player, asked, &format!("seed {seed}, after {steps:?}"));
         }

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_burrow::net::{Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble};
+use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingError};
 use bevy_replicon::prelude::*;
 
 use super::{Party, dug, ground, large_ground, other_ground, player, server, settings};
@@ -51,7 +51,7 @@ fn another_server_in_the_place_of_one_is_joined() {
     party.rounds_until("both join the other one", |party| party.all_show(hash));
     party.dig_at(1, 60.0, 60.0);
     party.rounds_until("and dig there", |party| party.agrees() && party.terrain_hash(0) != hash);
-    assert!((0..2).all(|player| party.shared(player).trouble().is_none()));
+    assert!((0..2).all(|player| party.shared(player).error().is_none()));
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn a_server_that_is_put_in_later_is_joined() {
     party.all_join();
     party.server.world_mut().remove_resource::<GroundServer>();
     party.rounds_until("the server is missed", |party| {
-        party.shared(0).trouble() == Some(SharingTrouble::NotServed)
+        party.shared(0).error() == Some(SharingError::NotServed)
     });
     let built = dug(ground(), 20);
     let hash = built.world().hash();
@@ -87,7 +87,7 @@ fn a_host_joins_the_server_that_takes_the_place_of_its_own() {
     stage.frames(5);
     let shared = stage.app.world().get::<SharedTerrain>(terrain).expect("it is shared");
     assert!(!shared.has_joined());
-    assert_eq!(shared.trouble(), Some(SharingTrouble::NotServed));
+    assert_eq!(shared.error(), Some(SharingError::NotServed));
     stage.app.insert_resource(server);
     stage.frames_until("it has joined again", |stage| has_joined(stage, hash));
 }
@@ -154,12 +154,8 @@ fn the_next_level_is_joined_whoever_changes_first() {
             party.rounds(20);
         }
         for player in 0..2 {
-            let trouble = party.shared(player).trouble();
-            assert_eq!(
-                server_first,
-                matches!(trouble, Some(SharingTrouble::OtherGround { .. })),
-                "{trouble:?}"
-            );
+            let error = party.shared(player).error();
+            assert_eq!(server_first, matches!(error, Some(SharingError::OtherGround { .. })), "{error:?}");
             let terrain = party.players[player].1;
             party.world_mut(player).entity_mut(terrain).insert(other_ground());
         }
@@ -187,14 +183,14 @@ fn a_terrain_may_come_after_its_sharing() {
     let entity = stage.app.world_mut().spawn(SharedTerrain::default()).id();
     party.connect(stage, entity);
     party.rounds(20);
-    assert_eq!(party.shared(1).trouble(), Some(SharingTrouble::NoTerrain));
+    assert_eq!(party.shared(1).error(), Some(SharingError::NoTerrain));
     party.world_mut(1).entity_mut(entity).insert(ground());
     party.all_join();
     // Without its terrain it has left, and answered everything.
     party.send(1, dig(30.0, 20.0, 30.0, 4.0));
     party.world_mut(1).entity_mut(entity).remove::<Terrain>();
     party.rounds(20);
-    assert_eq!(party.troubles(1), [SharingTrouble::NoTerrain, SharingTrouble::NoTerrain]);
+    assert_eq!(party.errors(1), [SharingError::NoTerrain, SharingError::NoTerrain]);
     assert_eq!(party.shared(1).pending(), 0);
     party.world_mut(1).entity_mut(entity).insert(ground());
     party.all_join();
@@ -208,7 +204,7 @@ fn one_of_two_shared_terrains_is_shared() {
     let second = party.world_mut(0).spawn((ground(), SharedTerrain::default(), far)).id();
     party.rounds(30);
     let first = party.players[0].1;
-    assert_eq!(party.troubles(0), [SharingTrouble::AnotherIsShared(first)], "once");
+    assert_eq!(party.errors(0), [SharingError::AnotherIsShared(first)], "once");
     // Digs on it are answered, and the first one continues.
     party.send(0, dig(1030.0, 20.0, 30.0, 4.0));
     party.dig_at(0, 30.0, 30.0);

@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::{Refusal, Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingTrouble, TogetherPlugin};
+use bevy_burrow::together::{EditOutcome, GroundServer, SharedTerrain, SharingError, TogetherPlugin};
 use bevy_replicon::prelude::*;
 
 use super::{Party, ground, player, server_app};
@@ -29,7 +29,7 @@ fn a_server_that_is_removed_is_reported_and_digs_are_answered() {
     party.dig_at(0, 60.0, 60.0);
     party.rounds(20);
     assert!(is_refused(&party.outcomes(0)), "later digs are answered too");
-    assert_eq!(party.troubles(0), [SharingTrouble::NotServed], "once");
+    assert_eq!(party.errors(0), [SharingError::NotServed], "once");
     party.rounds_until("nothing of it is shown", |party| party.terrain_hash(0) == hash);
     let receipt = &party.players[0].0.receipts().last().expect("an answer").receipt;
     assert_eq!(receipt.outcome, Err(Rejection::Refused));
@@ -43,7 +43,7 @@ fn a_lost_connection_is_reported_and_digs_wait_for_the_next_one() {
     party.disconnect(0);
     party.rounds(5);
     assert!(!party.shared(0).has_joined());
-    assert_eq!(party.troubles(0), [SharingTrouble::ConnectionLost]);
+    assert_eq!(party.errors(0), [SharingError::ConnectionLost]);
     for turn in 0..5 {
         party.dig_at(0, 20.0 + 10.0 * turn as f32, 30.0);
         party.rounds(5);
@@ -55,7 +55,7 @@ fn a_lost_connection_is_reported_and_digs_wait_for_the_next_one() {
     let confirmed = party.outcomes(0);
     let is_confirmed = |outcome: &&EditOutcome| matches!(outcome, EditOutcome::Confirmed(_));
     assert_eq!(confirmed.iter().filter(is_confirmed).count(), 5);
-    assert_eq!(party.shared(0).trouble(), None);
+    assert_eq!(party.shared(0).error(), None);
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn rules_of_a_shared_terrain_are_the_servers() {
     let mut shown = party.world_mut(0).get_mut::<Terrain>(terrain).expect("it is there");
     shown.set_rules(rules.clone()).expect("valid rules");
     party.rounds(20);
-    assert_eq!(party.troubles(0), [SharingTrouble::RulesIgnored]);
+    assert_eq!(party.errors(0), [SharingError::RulesIgnored]);
     let before = party.terrain_hash(1);
     party.dig_at(0, 30.0, 30.0);
     party.rounds_until("it is dug all the same", |party| party.agrees() && party.terrain_hash(1) != before);
@@ -139,7 +139,7 @@ fn an_undo_that_is_not_allowed_is_not_nothing_to_undo() {
     let moved = party.players[0].0.recorded::<HistoryMoved>();
     let outcomes: Vec<_> = moved.iter().map(|moved| &moved.receipt.outcome).collect();
     assert_eq!(outcomes, [&Err(Rejection::Refused)]);
-    assert_eq!(party.troubles(0), [SharingTrouble::UndoRefused(Refusal::Forbidden)]);
+    assert_eq!(party.errors(0), [SharingError::UndoRefused(Refusal::Forbidden)]);
     // Where it is allowed, and nothing is there, that is said.
     let mut party = Party::new(1);
     party.all_join();
@@ -147,7 +147,7 @@ fn an_undo_that_is_not_allowed_is_not_nothing_to_undo() {
     party.rounds(50);
     let moved = party.players[0].0.recorded::<HistoryMoved>();
     assert_eq!(moved[0].receipt.outcome, Err(Rejection::NothingToUndo));
-    assert_eq!(party.troubles(0), []);
+    assert_eq!(party.errors(0), []);
 }
 
 /// Bytes of memory that this process has.

@@ -16,7 +16,7 @@ use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_burrow::net::{Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::together::{GroundServer, SharedTerrain, SharingTrouble, TogetherPlugin};
+use bevy_burrow::together::{GroundServer, SharedTerrain, SharingError, TogetherPlugin};
 use bevy_replicon::prelude::*;
 use bevy_replicon_renet::RepliconRenetPlugins;
 
@@ -161,7 +161,7 @@ fn players_come_back_by_themselves() {
     frames_until("the loss is noticed", &mut [&mut player.0], |apps| {
         let mut terrains = apps[0].world_mut().query::<&SharedTerrain>();
         let shared = terrains.single(apps[0].world()).expect("it is shared");
-        shared.trouble() == Some(SharingTrouble::ConnectionLost)
+        shared.error() == Some(SharingError::ConnectionLost)
     });
     // It digs on.
     dig(&mut player, 70.0);

@@ -8,7 +8,7 @@ use crate::net::{KickReason, Refusal};
 /// text says what to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum SharingTrouble {
+pub enum SharingError {
     /// The connection is lost. Players can keep digging, and their edits are sent over the next connection.
     #[error("the connection to the server is lost; connect again, and edits made until then are sent")]
     ConnectionLost,
@@ -62,9 +62,9 @@ pub enum SharingTrouble {
 /// Reports that a [`SharedTerrain`](super::SharedTerrain) is not in sync with a server, or refuses a request. The
 /// problem is also logged as a warning.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SharingTroubleFound {
+pub struct SharingErrorFound {
     /// The terrain.
     pub terrain: Entity,
     /// The problem.
-    pub trouble: SharingTrouble,
+    pub error: SharingError,
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::FULL_MESSAGE;
 use crate::net::ContentId;
-use crate::net::encoding::{OrderWriter, pack};
+use crate::net::encoding::{EntryWriter, pack};
 use crate::net::message::Entry;
 
 /// Entries of one message.
@@ -17,19 +17,19 @@ struct Block {
 }
 
 /// The latest entries, within a limit of bytes.
-pub struct OrderLog {
+pub struct EntryLog {
     /// The number of the first entry that is kept.
     first: u64,
     blocks: VecDeque<Block>,
     bytes: usize,
     limit: usize,
     /// The entries after those of the last block.
-    writer: OrderWriter,
+    writer: EntryWriter,
     last: u64,
 }
 
-impl OrderLog {
-    /// The log of an order that continues after a number.
+impl EntryLog {
+    /// The log that continues after a number.
     pub fn new(limit: usize, number: u64) -> Self {
         let (blocks, writer) = Default::default();
         Self { first: number + 1, blocks, bytes: 0, limit, writer, last: number }
@@ -61,7 +61,7 @@ impl OrderLog {
             self.bytes += message.len();
             self.blocks.push_back(Block { last: self.last, message, names: BTreeSet::new() });
         }
-        self.writer = OrderWriter::default();
+        self.writer = EntryWriter::default();
     }
 
     /// Drops the oldest entries beyond the limit. Those after `applied` are kept in any case.
@@ -118,15 +118,15 @@ mod tests {
     }
 
     /// Twenty thousand entries after the number 7.
-    fn log(limit: usize, applied: u64) -> OrderLog {
-        let mut log = OrderLog::new(limit, 7);
+    fn log(limit: usize, applied: u64) -> EntryLog {
+        let mut log = EntryLog::new(limit, 7);
         (8..=20_007).for_each(|number| log.push(&entry(number)));
         log.trim(applied);
         log
     }
 
     /// The numbers of all entries after this one; checks that these are unchanged.
-    fn numbers(log: &OrderLog, number: u64) -> Option<Vec<u64>> {
+    fn numbers(log: &EntryLog, number: u64) -> Option<Vec<u64>> {
         let ground = Ground::flat(8, 8, 4.0).expect("a valid ground");
         let mut numbers = Vec::new();
         for message in log.after(number)? {

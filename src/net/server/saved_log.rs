@@ -1,4 +1,4 @@
-//! The latest entries of the order as data of a store, and the runs of the server that it goes through. A client that
+//! The latest entries of the log as data of a store, and the runs of the server that it goes through. A client that
 //! was here before a restart gets the entries that it misses, as after a short loss of its connection.
 //!
 //! | key | value |
@@ -7,7 +7,7 @@
 //! | `runs` | the runs of the server, each with the number that it began with |
 //! | `state` | the number and the [state](state_of) that the entries lead to, and whether they began with the pristine world |
 //!
-//! The store keeps these together with the commits: after a crash, the order ends with the world that was saved.
+//! The store keeps these together with the commits: after a crash, the log ends with the world that was saved.
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -17,7 +17,7 @@ use super::keys::{NUMBER, RESERVED};
 use crate::format::bytes::{Reader, put_number};
 use crate::format::{FormatError, plain};
 use crate::net::ContentId;
-use crate::net::encoding::OrderWriter;
+use crate::net::encoding::EntryWriter;
 use crate::net::message::Entry;
 use crate::store::Store;
 use crate::terrain::Terrain;
@@ -77,18 +77,18 @@ impl Piece {
     }
 }
 
-/// What a store has of the order of its world.
-pub struct FoundOrder {
+/// What a store has of the log of its world.
+pub struct FoundLog {
     /// The latest entries, up to the present number.
     pub pieces: Vec<Piece>,
     /// Whether the first entry of all followed the pristine world.
     pub is_whole: bool,
-    pub saved: SavedOrder,
+    pub saved: SavedLog,
 }
 
 /// The order as it is saved.
-pub struct SavedOrder {
-    /// The runs that the order goes through, oldest first, each with the number that it began with. The last is the
+pub struct SavedLog {
+    /// The runs that the log goes through, oldest first, each with the number that it began with. The last is the
     /// present one.
     runs: VecDeque<(u64, u64)>,
     is_whole: bool,
@@ -102,15 +102,15 @@ pub struct SavedOrder {
     pieces: VecDeque<(u64, usize)>,
     bytes: usize,
     /// The entries of the last piece, which is not complete.
-    tail: OrderWriter,
+    tail: EntryWriter,
     names: BTreeSet<ContentId>,
     /// Keys that are of no use.
     stale: Vec<String>,
 }
 
-impl SavedOrder {
-    /// Reads the order of a store whose world is at this number and state, for a new run of the server.
-    pub fn open(store: &Store, terrain: &Terrain, run: u64, number: u64, log_bytes: usize) -> FoundOrder {
+impl SavedLog {
+    /// Reads the log of a store whose world is at this number and state, for a new run of the server.
+    pub fn open(store: &Store, terrain: &Terrain, run: u64, number: u64, log_bytes: usize) -> FoundLog {
         let state = store.get(&format!("{RESERVED}{STATE}")).and_then(|bytes| State::decode(bytes).ok());
         // Otherwise something has changed the world, or lost a part of it, that is in no entry.
         let state = state.filter(|state| (state.number, state.hash) == (number, state_of(terrain)));
@@ -147,19 +147,19 @@ impl SavedOrder {
             unsaved: VecDeque::new(),
             bytes: sizes.iter().map(|(_, bytes)| bytes).sum(),
             pieces: sizes,
-            tail: OrderWriter::default(),
+            tail: EntryWriter::default(),
             names: BTreeSet::new(),
             stale,
         };
-        FoundOrder { pieces, is_whole, saved }
+        FoundLog { pieces, is_whole, saved }
     }
 
-    /// Sets whether the order begins with the pristine world.
+    /// Sets whether the log begins with the pristine world.
     pub fn set_whole(&mut self, is_whole: bool) {
         self.is_whole = is_whole;
     }
 
-    /// The number up to which the order of an earlier run is the present one.
+    /// The number up to which the log of an earlier run is the present one.
     pub fn shared_with(&self, run: u64) -> Option<u64> {
         let at = self.runs.iter().position(|(own, _)| *own == run)?;
         // A run continues from what was saved of the one before.
