@@ -489,7 +489,7 @@ def digger(stage):
     together()
 
 
-@play("800x600", "--cells", "96")
+@play("800x640", "--cells", "96")
 def sculpt(stage):
     """Every operation and shape, a held stroke and its undo, questions, save, open, quit with unsaved work."""
     tool = r"^tool operation=(\w+) shape=(\w+) radius=([\d.]+)"

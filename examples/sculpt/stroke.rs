@@ -213,7 +213,8 @@ fn preview(
     terrains: Terrains,
     mut gizmos: Gizmos,
 ) {
-    let Some(hit) = &tool.placed.or(aim.0) else { return };
+    let Some(hit) = tool.placed.or(aim.0) else { return };
+    let hit = &hit;
     let modifier = if tool.placed.is_some() { Modifier::None } else { *modifier };
     let tool = modified(&tool, modifier);
     let color = match modifier {

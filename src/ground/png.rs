@@ -32,16 +32,14 @@ impl<'a> Png<'a> {
     /// Reads everything before the samples. The caller keeps `bytes_per_pixel` bytes for each pixel.
     ///
     /// # Errors
-    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, or one that is no PNG.
-    /// - [`ImageError::Empty`] for an image without samples.
+    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, one without samples, or one that is no PNG.
     /// - [`ImageError::Dimensions`], [`ImageError::Memory`] for one over the limits, before memory is allocated for it.
     pub fn open(bytes: &'a [u8], limits: &ImageLimits, bytes_per_pixel: u64) -> Result<Self, ImageError> {
         let failed = |error| failed(error, bytes.len() as u64);
         let max_alloc = usize::try_from(limits.max_alloc_bytes).unwrap_or(usize::MAX);
         let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: max_alloc });
         decoder.set_transformations(Transformations::IDENTITY);
-        let header =
-            decoder.read_header_info().map_err(|error| empty(bytes).unwrap_or_else(|| failed(error)))?;
+        let header = decoder.read_header_info().map_err(failed)?;
         let pixel_bits = header.color_type.samples() as u64 * header.bit_depth as u64;
         // The rows of an interlaced image are only known once all of it is decoded.
         let decoded = if header.interlaced { pixel_bits.div_ceil(8) } else { 0 };
@@ -116,6 +114,9 @@ impl GreyImage {
     ///   memory is allocated for its samples.
     pub fn decode_png(bytes: &[u8], limits: &ImageLimits) -> Result<Self, ImageError> {
         limits.check_file(bytes)?;
+        if let Some(error) = empty(bytes) {
+            return Err(error);
+        }
         let png = Png::open(bytes, limits, 2)?;
         let (width, height, bits) = (png.width, png.height, png.bits);
         if png.color != ColorType::Grayscale || png.has_alpha || bits < 8 {

@@ -102,8 +102,13 @@ impl Area {
         let mut columns = FxHashMap::default();
         let is_all = stops.iter().any(|&stop| reaches_all(grid, stop));
         for (place, radius) in uncovered(&stops) {
-            for (square, apart) in squares_within(place, radius + size as f32, size, cells) {
+            // One more, as the sum is rounded.
+            let reach = radius + size as f32 + 1.0;
+            for (square, apart) in squares_within(place, reach, size, cells) {
                 let distance = apart - radius;
+                if distance > size as f32 {
+                    continue;
+                }
                 let nearest = columns.entry(TilePos { x: square.x, z: square.y }).or_insert(distance);
                 *nearest = distance.min(*nearest);
             }

@@ -210,7 +210,11 @@ impl Contents {
             }
         }
         for (key, record) in others.into_iter().flat_map(Source::into_records) {
-            drop(contents.others.enter(contents.world, &key, record));
+            let is_invalid = contents.others.enter(contents.world, &key, record).is_err();
+            if let (true, Some(Key::Region(at))) = (is_invalid, Key::of(&key)) {
+                // There was a region, whatever it held.
+                contents.others.regions.entry(at).or_default();
+            }
         }
         for copy in checkpoint_copy::read(files, contents.world) {
             match copy {
