@@ -629,7 +629,7 @@ def sculpt(stage):
     if hash_now() != before:
         raise Failed("dragging a handle changes the ground")
     since = stage.mark()
-    stage.click(middle[0] - 150, middle[1] + 60)
+    stage.click(middle[0] - 80, middle[1] + 60)
     stage.rest()
     stage.rest()
     if any(line.startswith("stroke ") for line in stage.lines()[since:]):
