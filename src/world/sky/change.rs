@@ -1,7 +1,7 @@
 //! What a commit changes in the light of a rectangle of columns.
 //!
-//! Light under the open sky depends on tops, in eight directions. So only the directions in which a column sees a changed
-//! top are compared, before and after; where none of them differs, its light is the same.
+//! Light under the open sky depends on tops, in eight directions. So only the directions in which a column sees a
+//! changed top are compared, before and after; where none of them differs, its light is the same.
 
 use std::ops::Range;
 
@@ -32,15 +32,15 @@ pub(crate) struct LightChange<'a> {
     highest_top: i32,
     /// For each row of all columns, those between which changed tops lie: counted from the rectangle's first column.
     moved: Vec<Run>,
-    /// By how much more or less of the sky is hidden on the tops of the rectangle's columns, x fastest; in rows for which it
-    /// was asked.
+    /// By how much more or less of the sky is hidden on the tops of the rectangle's columns, x fastest; in rows for
+    /// which it was asked.
     hidden: Vec<i16>,
     is_known: Vec<bool>,
 }
 
 impl<'a> LightChange<'a> {
-    /// The columns from `low` to `high`, both included, where the columns of changed stacks of bricks have these ends, and the
-    /// highest changed brick ends at this height, in 1/256 voxel.
+    /// The columns from `low` to `high`, both included, where the columns of changed stacks of bricks have these ends,
+    /// and the highest changed brick ends at this height, in 1/256 voxel.
     pub fn new(
         lit: &'a LitWorld,
         (low, high): (Column, Column),
@@ -78,8 +78,8 @@ impl<'a> LightChange<'a> {
         }
     }
 
-    /// Whether the light differs on the ground of any column between two, both included, where the ground is what it was
-    /// before anyone dug: there, tiles may draw it.
+    /// Whether the light differs on the ground of any column between two, both included, where the ground is what it
+    /// was before anyone dug: there, tiles may draw it.
     pub fn shows_on_ground(&mut self, view: SkyView, low: Column, high: Column) -> bool {
         let [width, depth] = self.before.size();
         let within = |from: i32, to: i32, low: i32, count: usize| {

@@ -121,8 +121,8 @@ pub(super) fn light_of(hidden: u16) -> u8 {
 pub(crate) struct Light {
     /// The share of the sky that lights it, weighted by the cosine to the vertical.
     pub sky: u8,
-    /// That share or, if it is larger, the share of level directions in which a place under a roof sees the open: ground there
-    /// is lit, and lights what is under the roof.
+    /// That share or, if it is larger, the share of level directions in which a place under a roof sees the open, at
+    /// most a third: ground there is lit, and lights what is under the roof.
     pub daylight: u8,
 }
 
@@ -186,8 +186,8 @@ pub(crate) trait SkyLights {
         }
     }
 
-    /// How far a place in 1/4096 voxel, as [`light`](Self::light) takes it, lies below the surface that was there before
-    /// anyone dug, in 1/256 voxel; less than 0 above it.
+    /// How far a place in 1/4096 voxel, as [`light`](Self::light) takes it, lies below the surface that was there
+    /// before anyone dug, in 1/256 voxel; less than 0 above it.
     fn depth(&mut self, place: IVec3) -> i32 {
         let [column, next] = columns_of(place);
         let part = place.x.rem_euclid(SNAP).max(place.z.rem_euclid(SNAP));
@@ -197,8 +197,8 @@ pub(crate) trait SkyLights {
         height as i32 - place.y.div_euclid(SNAP / ONE)
     }
 
-    /// The light at a place on the surface, in 1/4096 voxel, that lies on an edge of the lattice or over the diagonal of a
-    /// cell. It depends on the place alone.
+    /// The light at a place on the surface, in 1/4096 voxel, that lies on an edge of the lattice or over the diagonal
+    /// of a cell. It depends on the place alone.
     fn light(&mut self, place: IVec3) -> Light {
         let columns = columns_of(place);
         let y = place.y.div_euclid(SNAP / ONE);
@@ -243,7 +243,8 @@ pub(crate) trait SkyLights {
         self.covered_light_by_rays(place, columns)
     }
 
-    /// The same, where some ground around may be low enough: a mean of the corners of its cube of 2x2x2 voxels that are air.
+    /// The same, where some ground around may be low enough: a mean of the corners of its cube of 2x2x2 voxels that are
+    /// air.
     fn covered_light_by_rays(&mut self, place: IVec3, columns: [Column; 2]) -> Option<Light> {
         const SIDE: i32 = 2 * SNAP;
         let low = place.y.div_euclid(SNAP);
@@ -294,25 +295,31 @@ pub(crate) trait SkyLights {
 
     /// The share of rays from a point that get out.
     fn ray_light(&mut self, from: IVec3) -> Light {
-        let (mut open, mut open_level) = (0, 0);
-        for (number, &direction) in AROUND.iter().enumerate() {
-            if number % 2 == 0 {
-                for (steps, rise) in RAYS[number / 2 % 2] {
-                    open += u32::from(self.escapes(from, direction, steps, rise));
+        let mut open = 0;
+        for (number, &direction) in AROUND.iter().step_by(2).enumerate() {
+            for (steps, rise) in RAYS[number % 2] {
+                open += u32::from(self.escapes(from, direction, steps, rise));
+            }
+        }
+        let sky = open * 255 / (8 * RAYS[0].len() as u32);
+        let share = |directions: u32| directions * 255 / AROUND.len() as u32;
+        let mut seen = 0;
+        if sky < share(MAX_LEVEL) {
+            for (number, &direction) in AROUND.iter().enumerate() {
+                let (steps, rise) = LEVEL_RAYS[number % 4];
+                let may_escape = from.y * ONE + steps * rise >= self.top(along(from, direction, steps));
+                let mut rises = [0, rise, -rise].into_iter();
+                seen += u32::from(may_escape && rises.any(|rise| self.escapes(from, direction, steps, rise)));
+                if seen == MAX_LEVEL {
+                    break;
                 }
             }
-            let (steps, rise) = LEVEL_RAYS[number % 4];
-            let may_escape = from.y * ONE + steps * rise >= self.top(along(from, direction, steps));
-            let mut rises = [0, rise, -rise].into_iter();
-            open_level +=
-                u32::from(may_escape && rises.any(|rise| self.escapes(from, direction, steps, rise)));
         }
-        let sky = (open * 255 / (8 * RAYS[0].len() as u32)) as u8;
-        Light { sky, daylight: sky.max((open_level * 255 / AROUND.len() as u32) as u8) }
+        Light { sky: sky as u8, daylight: sky.max(share(seen)) as u8 }
     }
 
-    /// Whether a ray leads to the open, given its direction in half columns, its number of steps and its rise in each of them,
-    /// in 1/256 voxel.
+    /// Whether a ray leads to the open, given its direction in half columns, its number of steps and its rise in each
+    /// of them, in 1/256 voxel.
     fn escapes(&mut self, from: IVec3, direction: (i32, i32), steps: i32, rise: i32) -> bool {
         let mut y = from.y * ONE;
         // Most rays of a tunnel end in the ground, wherever they enter it.
@@ -335,29 +342,31 @@ pub(crate) trait SkyLights {
     }
 }
 
-/// The columns at the ends of the edge or diagonal on which a place in 1/4096 voxel lies; the same one twice over a column.
+/// The columns at the ends of the edge or diagonal on which a place in 1/4096 voxel lies; the same one twice over a
+/// column.
 pub(super) fn columns_of(place: IVec3) -> [Column; 2] {
     let cell = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
     [cell, cell.offset(i32::from(place.x.rem_euclid(SNAP) > 0), i32::from(place.z.rem_euclid(SNAP) > 0))]
 }
 
-/// Whether the surface at a height is under a roof, given the lower top of its columns, both in 1/256 voxel: what is open has air
-/// up to the sky in one of them. The heights of places and tops are rounded separately.
+/// Whether the surface at a height is under a roof, given the lower top of its columns, both in 1/256 voxel: what is
+/// open has air up to the sky in one of them. The heights of places and tops are rounded separately.
 pub(super) fn is_covered(y: i32, lower_top: i32) -> bool {
     y + 2 < lower_top
 }
 
-/// The largest rise from one column to the next, in 1/256 voxel, that is a slope where ground was dug; a voxel more is a wall.
+/// The largest rise from one column to the next, in 1/256 voxel, that is a slope where ground was dug; a voxel more is
+/// a wall.
 const STEEPEST_SLOPE: i32 = 2 * ONE;
 
-/// Whether ground that rises this high from one column to the next is lit as a wall, given which of them were dug or built: ground
-/// that is neither is lit as its tile is, whose triangles reach from column to column.
+/// Whether ground that rises this high from one column to the next is lit as a wall, given which of them were dug or
+/// built: ground that is neither is lit as its tile is, whose triangles reach from column to column.
 pub(super) fn is_wall(rise: i32, are_changed: [bool; 2]) -> bool {
     rise > STEEPEST_SLOPE && are_changed != [false; 2]
 }
 
-/// What a wall hides that rises this high above a place on it, in 1/256 voxel, in addition to what it hides over the column in
-/// front, from which it is half a column farther away: in three of eight directions.
+/// What a wall hides that rises this high above a place on it, in 1/256 voxel, in addition to what it hides over the
+/// column in front, from which it is half a column farther away: in three of eight directions.
 fn hidden_by_wall(rise: i32) -> u16 {
     let slope = (rise >> 3).min(255) as i16;
     3 * (below(2 * slope) - below(slope)) / 8
@@ -400,11 +409,15 @@ const RAYS: [[(i32, i32); 3]; 2] = [[(13, 114), (9, 256), (5, 572)], [(9, 162), 
 /// Rays of some 14 voxels that rise or fall slightly, with a slope of 0.25 at most, for every fourth direction.
 const LEVEL_RAYS: [(i32, i32); 4] = [(14, 64), (12, 72), (10, 90), (12, 72)];
 
-/// How far from the column of a place, along x or z, ground may be on which its light under a roof depends: rays start at the
-/// corners of its cube of 2x2x2 voxels.
+/// Of the level directions, those in which the open is seen count up to this number: a place with as much light of the
+/// sky, which has more rays that get out and so take long, needs none.
+const MAX_LEVEL: u32 = 5;
+
+/// How far from the column of a place, along x or z, ground may be on which its light under a roof depends: rays start
+/// at the corners of its cube of 2x2x2 voxels.
 pub(super) const RAY_REACH: i32 = 16;
 
-/// How far above a place, in 1/256 voxel, nothing is light where all ground around is higher; and how far below, ground may be on
-/// which its light under a roof depends.
+/// How far above a place, in 1/256 voxel, nothing is light where all ground around is higher; and how far below, ground
+/// may be on which its light under a roof depends.
 pub(super) const HIGHEST_RISE: i32 = 15 * ONE;
 pub(super) const LOWEST_RAY: i32 = 6 * ONE;

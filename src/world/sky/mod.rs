@@ -1,17 +1,19 @@
 //! Sky light: the share of the sky that lights a place on the ground.
 //!
-//! It is weighted by the cosine to the vertical, as a level face receives it from a sky that is equally bright all over:
-//! 255 on a plain, 0 in a cave. Everything is computed in integers from heights and samples alone, so it is the same on
-//! each machine, for each backend and at each level of detail, and equal places have equal light whatever draws them.
+//! It is weighted by the cosine to the vertical, as a level face receives it from a sky that is equally bright all
+//! over: 255 on a plain, 0 in a cave. Everything is computed in integers from heights and samples alone, so it is the
+//! same on each machine, for each backend and at each level of detail, and equal places have equal light whatever draws
+//! them.
 //!
-//! - **Under the open sky**, light depends on the *tops* of the columns around: the height of the highest ground in each.
-//!   In eight directions, the steepest rise to the top of a column at one of a few distances is the horizon.
-//!   On dug walls, what the wall itself hides is added.
-//! - **Under a roof**, rays in eight directions and at three angles look for a way out, from every second lattice point along each
-//!   axis. Light is interpolated between these, so it does not jump. Level rays in sixteen directions tell how much of the
-//!   daylight is seen from there.
+//! - **Under the open sky**, light depends on the *tops* of the columns around: the height of the highest ground in
+//!   each. In eight directions, the steepest rise to the top of a column at one of a few distances is the horizon. On
+//!   dug walls, what the wall itself hides is added.
+//! - **Under a roof**, rays in eight directions and at three angles look for a way out, from every second lattice point
+//!   along each axis. Light is interpolated between these, so it does not jump. Level rays in sixteen directions tell
+//!   how much of the daylight is seen from there.
 //!
-//! No light depends on ground that is more than [`REACH`](light::REACH) columns away, so a dig changes light near it only.
+//! No light depends on ground that is more than [`REACH`](light::REACH) columns away, so a dig changes light near it
+//! only.
 //!
 //! | file | what it holds |
 //! | --- | --- |
@@ -205,8 +207,8 @@ impl<'a> SkyView<'a> {
 
 impl World {
     /// The share of the sky that lights a place on the surface, 0..=1, weighted by the cosine to the vertical: 1 on a
-    /// plain, 0 in a cave. In voxels; the place is taken to the nearest column. It is what a terrain with sky light shows
-    /// there. Ground more than 17 columns away counts as none.
+    /// plain, 0 in a cave. In voxels; the place is taken to the nearest column. It is what a terrain with sky light
+    /// shows there. Ground more than 17 columns away counts as none.
     pub fn sky_light(&self, place: DVec3) -> f32 {
         let last = DVec3::new(
             f64::from(self.grid.width()),
