@@ -65,8 +65,9 @@ setup: ## Install what is missing
 test-model:
 	cargo test $(WITHOUT_BEVY) --lib --tests --example export --example figures --example paper
 
+# Optimising the library with its tests takes longer than these tests do.
 test-plugin:
-	cargo test $(WITH_BEVY) --lib -- threads:: plugin:: saves:: together:: view:: physics:: panel:: debug:: plants:: paths:: brush::request:: brush::shapes::mesh_grid::
+	cargo test --config 'profile.release.package.bevy_burrow.opt-level=1' $(WITH_BEVY) --lib -- threads:: plugin:: saves:: together:: view:: physics:: panel:: debug:: plants:: paths:: brush::request:: brush::shapes::mesh_grid::
 	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example physics --example sculpt --example server --example together
 	cargo test $(WITH_BEVY) --doc
 
