@@ -37,7 +37,7 @@
 //!     ground: ground.hash(),
 //!     chunk_size: 32,
 //!     epoch: None,
-//!     place: IVec3::new(32, 10, 32),
+//!     position: IVec3::new(32, 10, 32),
 //! };
 //! let dig = Edit::quantize(&Brush::dig(Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0)))?;
 //! server.connect(client, now);
