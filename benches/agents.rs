@@ -53,7 +53,7 @@ struct Options {
     /// Metres within which agents avoid each other and walls; those of landmass for their radius unless given.
     #[arg(long)]
     neighbourhood: Option<f32>,
-    /// Agents take turns: in each frame, landmass sees one of so many.
+    /// Agents take turns: in each frame, landmass sees one agent in this many.
     #[arg(long, default_value_t = 1)]
     turns: u32,
     /// Seconds that are measured.
@@ -76,7 +76,7 @@ impl Options {
         }
     }
 
-    /// A place on the ground within the radius, at most so far from another one.
+    /// A position on the ground within the radius, at most `target` metres from another one.
     fn place(&self, rng: &mut Rng, terrain: &Terrain, near: Option<Vec3>) -> Vec3 {
         let middle = Vec2::splat(SIDE as f32 / 2.0);
         loop {

@@ -1,7 +1,7 @@
 //! Memory for plants and for paths on a square kilometre: `cargo bench --features examples --bench memory`; without Bevy and
 //! without landmass `cargo bench --no-default-features --features navigation,scatter --bench memory`.
 //!
-//! Prints what is allocated and stays so, on 1024 x 1024 voxels of a metre: plants as those of the bench `plants`, one tuft of
+//! Prints the memory that stays allocated, on 1024 x 1024 voxels of a metre: plants as those of the bench `plants`, one tuft of
 //! grass for every 0.64 square metres and trees 7.5 m apart; polygons for an agent of 0.4 x 1.8 m on a plain, on hills, and on
 //! hills with 3,200 pits and tunnels; and, with landmass, its own meshes made from these polygons. In a game, both are loaded
 //! near to cameras and sources only.

@@ -13,7 +13,8 @@ const RING: u16 = 48;
 const NEAR: f32 = 9.0;
 /// Arrows and squares that point this much at the viewer can't be dragged: the cosine of the angle between.
 const END_ON: f32 = 0.96;
-/// The same for the axis of a ring that is seen from its edge, and is dragged along the screen instead of around.
+/// A ring is seen from its edge, and is dragged along the screen instead of around, if the cosine of the angle between its axis
+/// and the line of sight is smaller than this.
 const EDGE_ON: f32 = 0.2;
 
 /// An axis of the world or of a brush.

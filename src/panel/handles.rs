@@ -153,7 +153,7 @@ pub(super) fn show(
         handles.drag = None;
     }
     if let Some(drag) = &handles.drag {
-        // Someone else has changed the tool: what was changed stays.
+        // Something else has changed the tool: continue from the changed tool.
         if tool.is_changed() {
             handles.drag = Drag::begin(drag.handle, &tool, view, pointer);
         }

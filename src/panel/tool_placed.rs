@@ -24,11 +24,11 @@ impl BrushTool {
 
     /// Its handles at a position.
     pub(super) fn handles(&self, hit: &TerrainHit) -> impl Iterator<Item = Handle> {
-        let axis = self.rotation(hit) * Vec3::Y;
+        let (axis, mut tool) = (self.rotation(hit) * Vec3::Y, self.clone());
         Handle::all().filter(move |handle| match handle {
             Handle::Ground | Handle::Move(_) => true,
-            Handle::Turn(about) => self.turns_about(about.unit(), axis),
-            Handle::Scale(along) => self.clone().size(*along, 1.0).is_some(),
+            Handle::Turn(about) => tool.turns_about(about.unit(), axis),
+            Handle::Scale(along) => tool.size(*along, 1.0).is_some(),
         })
     }
 
@@ -94,7 +94,7 @@ impl BrushTool {
             let rotation = Quat::from_axis_angle(axis.unit(), degrees.to_radians()) * self.rotation(&hit);
             hit.normal = (rotation * Vec3::Y).normalize_or(Vec3::Y);
             (self.align, self.placed) = (ToolAlign::Surface, Some(hit));
-            // What is left about its axis, once that is where it should be.
+            // The rest of the rotation is about the axis, after the axis itself has its direction.
             let about = Quat::from_rotation_arc(Vec3::Y, hit.normal).inverse() * rotation;
             self.turn = 2.0 * about.y.atan2(about.w).to_degrees();
         }

@@ -93,7 +93,7 @@ mod tests {
         let (side, cells) = (16, (200, 120));
         let mut rng = fastrand::Rng::with_seed(3);
         for _ in 0..200 {
-            // Some lie beside the world, and some on borders of squares.
+            // Some lie outside the world, and some on borders of squares.
             let position = Vec2::new(rng.f32() * 300.0 - 50.0, rng.f32() * 220.0 - 50.0);
             let position = if rng.bool() { (position / 16.0).round() * 16.0 } else { position };
             let distance = [0.0, 16.0, 40.0, 1000.0, f32::INFINITY][rng.usize(0..5)];

@@ -315,16 +315,21 @@ fn numbers_are_typed_where_one_clicks_on_them() {
     assert_eq!(screen.context.memory(|memory| memory.focused()), None);
 }
 
-#[test]
-fn every_slider_value_makes_a_valid_brush() {
-    let hit = TerrainHit {
+/// A place on the ground.
+fn hit() -> TerrainHit {
+    TerrainHit {
         terrain: Entity::PLACEHOLDER,
         distance: 9.0,
         position: Vec3::new(10.0, 20.0, 30.0),
         normal: Vec3::Y,
         material: MaterialId(1),
         from_inside: false,
-    };
+    }
+}
+
+#[test]
+fn every_slider_value_makes_a_valid_brush() {
+    let hit = hit();
     let sliders = [
         "Radius",
         "Half width",

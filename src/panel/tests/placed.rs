@@ -320,17 +320,6 @@ fn buttons_of_a_placed_brush_act_only_where_they_can() {
     }
 }
 
-fn hit() -> TerrainHit {
-    TerrainHit {
-        terrain: Entity::PLACEHOLDER,
-        distance: 9.0,
-        position: Vec3::new(10.0, 20.0, 30.0),
-        normal: Vec3::Y,
-        material: MaterialId(1),
-        from_inside: false,
-    }
-}
-
 #[test]
 fn turns_about_any_axes_add_up() {
     let mut rng = fastrand::Rng::with_seed(3);

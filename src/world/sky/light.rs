@@ -243,8 +243,8 @@ pub(crate) trait SkyLights {
         self.covered_light_by_rays(place, columns)
     }
 
-    /// The same, where some ground around may be low enough: a mean of the corners of its cube of 2x2x2 voxels that are
-    /// air.
+    /// The light of a place under a roof by rays, if ground around it may be low enough to let light in: a mean of the
+    /// corners of its cube of 2x2x2 voxels that are air.
     fn covered_light_by_rays(&mut self, place: IVec3, columns: [Column; 2]) -> Option<Light> {
         const SIDE: i32 = 2 * SNAP;
         let low = place.y.div_euclid(SNAP);
@@ -264,7 +264,7 @@ pub(crate) trait SkyLights {
             }
             let point = first + 2 * side;
             let Some(AirLight { light, is_under_open_sky }) = self.air_light(point) else { continue };
-            // Behind a thin roof or wall, another light counts for nothing.
+            // A corner behind a thin roof or wall is left out.
             let middle = (point + air + (point - air).signum().max(IVec3::ZERO)) >> 1;
             if is_under_open_sky && self.view().is_solid(middle) {
                 continue;
