@@ -85,7 +85,7 @@ struct Options {
     /// Image to stamp: a PNG of plain grey with 8 or 16 bits, 2 to 256 samples a side; white is high.
     #[arg(long, value_name = "FILE")]
     stamp: Option<PathBuf>,
-    /// Model to dig and build with: a .glb or .gltf file with closed meshes.
+    /// Model to dig and build with in a window: a .glb or .gltf file with closed meshes.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Write each frame, and where the panel's widgets are, to standard output: for scripts that click on them.

@@ -26,6 +26,9 @@ struct Stage {
 
 /// Plays the script.
 pub fn play(options: &Options) -> Result {
+    if let Some(file) = &options.model {
+        return Err(format!("{}: a model needs a window, as the script builds none", file.display()).into());
+    }
     let stamp = stamps::read_or_crater(options.stamp.as_deref())?;
     std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
     let mut stage = Stage::open(options)?;

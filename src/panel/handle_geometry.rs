@@ -171,6 +171,12 @@ impl<'a> Frame<'a> {
         near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, handle)| handle)
     }
 
+    /// Whether dragging may begin at this value: a size is multiplied by the ratio of the values, so it may not begin at the
+    /// middle or beyond.
+    pub fn can_begin(&self, handle: Handle, value: f32) -> bool {
+        !matches!(handle, Handle::Scale(_)) || value > 0.1 * SQUARE * self.radius
+    }
+
     /// How far along its axis, in metres, or around it, in radians, a handle is at the pointer. `None` where the pointer
     /// is at no such position.
     pub fn value(&self, handle: Handle, pointer: Vec2) -> Option<f32> {
@@ -271,6 +277,12 @@ mod tests {
                 grabbed += usize::from(frame.pick(Handle::all(), grip) == Some(handle));
             }
             assert_eq!(frame.pick(Handle::all(), frame.center), Some(Handle::Ground));
+            for axis in Axis::ALL {
+                let at_middle = [0.0, -1.0, f32::NAN].map(|value| value * frame.radius);
+                assert!(at_middle.iter().all(|value| !frame.can_begin(Handle::Scale(axis), *value)));
+                assert!(frame.can_begin(Handle::Scale(axis), SQUARE * frame.radius));
+                assert!(frame.can_begin(Handle::Move(axis), 0.0));
+            }
         });
         assert!(grabbed > 1200, "{grabbed} of about 2,000");
     }

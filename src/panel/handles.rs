@@ -7,12 +7,12 @@ use bevy_egui::egui::{
 use bevy_egui::{EguiContext, PrimaryEguiContext};
 
 use super::handle_geometry::{Axis, Frame, Handle, View};
+use super::open_level::Files;
 use super::state::{BurrowPanel, PanelAction, PanelInput};
 use super::theme::{ACCENT, BAD, BLUE, BRIGHT, GOOD};
-use super::{BrushTool, survey, texts, widgets};
+use super::{BrushTool, texts, widgets};
 use crate::brush::Brush;
 use crate::plugin::{TerrainHit, Terrains};
-use crate::terrain::Terrain;
 
 /// Metres from the camera within which a brush can be placed.
 const REACH: f32 = 1000.0;
@@ -41,13 +41,15 @@ struct Drag {
 impl Drag {
     fn begin(handle: Handle, tool: &BrushTool, view: View, pointer: Vec2) -> Option<Self> {
         let hit = tool.placed.filter(|hit| tool.handles(hit).any(|own| own == handle))?;
-        let from = Frame::new(view, hit.position, tool.rotation(&hit))?.value(handle, pointer)?;
+        let frame = Frame::new(view, hit.position, tool.rotation(&hit))?;
+        let from = frame.value(handle, pointer).filter(|from| frame.can_begin(handle, *from))?;
         Some(Self { handle, from, tool: tool.clone() })
     }
 
     /// The tool with the pointer here. `None` where nothing is to be dragged to.
-    fn to(&self, view: View, pointer: Vec2, terrains: &Terrains, voxel: f32) -> Option<BrushTool> {
+    fn to(&self, view: View, pointer: Vec2, terrains: &Terrains) -> Option<BrushTool> {
         let hit = self.tool.placed?;
+        let voxel = terrains.voxel_metres(hit.terrain).unwrap_or(1.0);
         if self.handle == Handle::Ground {
             let TerrainHit { terrain, position, .. } = terrains.raycast(view.ray(pointer)?, REACH)?;
             return Some(BrushTool {
@@ -76,7 +78,15 @@ fn look<'a>(cameras: &'a mut Query<Eye, With<PrimaryEguiContext>>) -> Option<(Co
 }
 
 /// Keeps the pointer from the game while it is at a handle. Runs after the panel's input was read.
-pub(super) fn hold_pointer(handles: Res<Handles>, mut input: ResMut<PanelInput>) {
+pub(super) fn hold_pointer(
+    cameras: Query<(), With<PrimaryEguiContext>>,
+    mut handles: ResMut<Handles>,
+    mut input: ResMut<PanelInput>,
+) {
+    if cameras.is_empty() {
+        // Without a camera, nothing is shown that could be let go.
+        *handles = Handles::default();
+    }
     if handles.used().is_some() {
         input.has_pointer = true;
     }
@@ -89,10 +99,15 @@ pub(super) fn act(
     terrains: Terrains,
     input: Res<PanelInput>,
     handles: Res<Handles>,
+    files: Res<Files>,
     mut tool: ResMut<BrushTool>,
     mut panel: ResMut<BurrowPanel>,
     mut brushes: MessageWriter<Brush>,
 ) {
+    // A question has to be answered first.
+    if files.is_asking() {
+        actions.clear();
+    }
     for action in actions.read() {
         match (action, tool.placed) {
             (PanelAction::PlaceBrush, _) if tool.can_be_placed() => {
@@ -111,12 +126,15 @@ pub(super) fn act(
                 brushes.write(tool.brush_at(&hit));
             }
             (PanelAction::SnapBrush, Some(mut hit)) => {
-                let floors = terrains.spans(hit.position.x, hit.position.z).into_iter();
+                let floors = terrains.spans_on(hit.terrain, hit.position.x, hit.position.z).into_iter();
                 let floors = floors.map(|span| span.floor as f32);
                 let away = |floor: f32| (floor - hit.position.y).abs();
-                if let Some(floor) = floors.min_by(|a, b| away(*a).total_cmp(&away(*b))) {
-                    hit.position.y = floor;
-                    tool.placed = Some(hit);
+                match floors.min_by(|a, b| away(*a).total_cmp(&away(*b))) {
+                    Some(floor) => {
+                        hit.position.y = floor;
+                        tool.placed = Some(hit);
+                    }
+                    None => panel.report(Err(texts::NO_GROUND.into())),
                 }
             }
             (PanelAction::ReleaseBrush, Some(_)) => tool.placed = None,
@@ -128,8 +146,6 @@ pub(super) fn act(
 /// Drags the handles, and draws them and the outline of the brush.
 pub(super) fn show(
     mut cameras: Query<Eye, With<PrimaryEguiContext>>,
-    panel: Res<BurrowPanel>,
-    models: Query<(Entity, &Terrain)>,
     terrains: Terrains,
     mut tool: ResMut<BrushTool>,
     mut handles: ResMut<Handles>,
@@ -141,8 +157,6 @@ pub(super) fn show(
         *handles = Handles::default();
         return;
     };
-    let chosen = survey::chosen(&panel, &models).and_then(|entity| models.get(entity).ok());
-    let voxel = chosen.map_or(1.0, |(_, terrain)| terrain.voxel_size());
     let frame = Frame::new(view, hit.position, tool.rotation(&hit));
     let (pointer, is_pressed, is_down) = context.input(|input| {
         let pointer = &input.pointer;
@@ -164,7 +178,7 @@ pub(super) fn show(
         let grabbed = handles.hovered.filter(|_| is_pressed);
         handles.drag = grabbed.and_then(|handle| Drag::begin(handle, &tool, view, pointer));
     }
-    if let Some(dragged) = handles.drag.as_ref().and_then(|drag| drag.to(view, pointer, &terrains, voxel)) {
+    if let Some(dragged) = handles.drag.as_ref().and_then(|drag| drag.to(view, pointer, &terrains)) {
         tool.set_if_neq(dragged);
     }
     let frame = tool.placed.and_then(|hit| Frame::new(view, hit.position, tool.rotation(&hit)));

@@ -102,7 +102,6 @@ impl Plugin for BurrowPanelPlugin {
                 PreUpdate,
                 (state::read_input, handles::hold_pointer).chain().after(EguiPreUpdateSet::BeginPass),
             )
-            .add_systems(Update, handles::act.before(BurrowSystems::Collect))
             .add_systems(
                 Update,
                 (
@@ -112,6 +111,8 @@ impl Plugin for BurrowPanelPlugin {
                     level::finish,
                     picture::give_up,
                     files::answer,
+                    // Both read the same actions, whether a question is open or not.
+                    handles::act,
                     perform_actions,
                     files::track_changes,
                     note_rejection,

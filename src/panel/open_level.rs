@@ -148,7 +148,6 @@ impl Files {
         self.then = None;
     }
 
-    #[cfg(test)]
     pub fn is_asking(&self) -> bool {
         self.question.is_some()
     }
@@ -168,8 +167,8 @@ impl Files {
             _ => false,
         };
         let may_lose = self.may_lose.take_if(|own| *own == action).is_some();
-        if action == PanelAction::Quit && self.question.is_some() {
-            // The key that asks also takes the question back.
+        if matches!(action, PanelAction::Quit | PanelAction::ReleaseBrush) && self.question.is_some() {
+            // The key that asks also takes the question back; while a brush is placed, games may use it to release that.
             self.question = None;
             return None;
         }

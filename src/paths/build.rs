@@ -114,10 +114,11 @@ pub(super) fn replace_islands(
                     continue;
                 }
                 tile.links.drain(..).for_each(|link| despawn(Some(link), &mut commands));
+                tile.ledges.clear();
                 if let (Some(island), Some(place)) = (tile.island, places.of(navigation.terrain)) {
                     tile.links = spawn_links(navigation, island, pos, &ledges, &place, &mut commands);
+                    tile.ledges = ledges;
                 }
-                tile.ledges = ledges;
             }
         }
     }

@@ -33,6 +33,16 @@ pub struct Terrains<'w, 's> {
         Query<'w, 's, (Entity, &'static Terrain, &'static GlobalTransform, Option<&'static TerrainEntities>)>,
 }
 
+/// The stretches of air over (x, z) of a terrain that is upright, in world space.
+fn spans_of(terrain: &Terrain, place: &GlobalTransform, x: f32, z: f32) -> Option<Vec<Span>> {
+    let space = Space::of(place).filter(Space::is_upright)?;
+    let local = space.inverse.transform_point3(DVec3::new(f64::from(x), 0.0, f64::from(z)));
+    let world = |y: f64| y * space.world.matrix3.y_axis.y + space.world.translation.y;
+    let spans = terrain.world().spans(local.x, local.z).into_iter();
+    let spans = spans.map(|span| Span { floor: world(span.floor), ceiling: span.ceiling.map(world) });
+    Some(spans.collect())
+}
+
 /// Where a ray meets the ground, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TerrainHit {
@@ -93,18 +103,25 @@ impl Terrains<'_, '_> {
     /// the topmost ground counts; of two at one height it is always the same one.
     pub fn spans(&self, x: f32, z: f32) -> Vec<Span> {
         let over = self.terrains.iter().filter_map(|(entity, terrain, place, _)| {
-            let space = Space::of(place).filter(Space::is_upright)?;
-            let local = space.inverse.transform_point3(DVec3::new(f64::from(x), 0.0, f64::from(z)));
-            let spans = terrain.world().spans(local.x, local.z);
-            let world = |y: f64| y * space.world.matrix3.y_axis.y + space.world.translation.y;
-            let spans = spans
-                .into_iter()
-                .map(|span| Span { floor: world(span.floor), ceiling: span.ceiling.map(world) })
-                .collect::<Vec<_>>();
+            let spans = spans_of(terrain, place, x, z)?;
             Some((spans.last()?.floor, entity, spans))
         });
         let highest = over.max_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         highest.map(|(_, _, spans)| spans).unwrap_or_default()
+    }
+
+    /// The stretches of air of one terrain over (x, z), lowest first, in metres; none if its y axis does not point straight
+    /// up.
+    #[cfg(feature = "egui")]
+    pub(crate) fn spans_on(&self, terrain: Entity, x: f32, z: f32) -> Vec<Span> {
+        let spans = self.terrains.get(terrain).ok().and_then(|own| spans_of(own.1, own.2, x, z));
+        spans.unwrap_or_default()
+    }
+
+    /// The side of a terrain's voxel in metres.
+    #[cfg(feature = "egui")]
+    pub(crate) fn voxel_metres(&self, terrain: Entity) -> Option<f32> {
+        self.terrains.get(terrain).ok().map(|own| super::voxel_metres(own.2))
     }
 
     /// The unit normal of the surface that is nearest to `place` along the y of its terrain; `None` if there is no

@@ -125,7 +125,7 @@ pub(super) struct Contents {
     pub others: FoundRecords,
     /// The copies of checkpoints next to the journal.
     pub copies: Vec<Checkpoint>,
-    /// FoundRecords that are not valid, by region.
+    /// Records that are not valid, by region.
     pub invalid: BTreeMap<RegionPos, Vec<u8>>,
 }
 

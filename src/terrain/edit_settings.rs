@@ -19,7 +19,7 @@ pub struct EditSettings {
 }
 
 impl EditSettings {
-    /// Whether they are equal and share their rules. Equal rules that were set twice are not the same.
+    /// Whether they are equal and share their rules. Equal rules in two allocations are not the same.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let has_same_rules = match (&self.rules, &other.rules) {
             (Some(own), Some(other)) => Arc::ptr_eq(own, other),

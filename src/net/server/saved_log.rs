@@ -86,7 +86,7 @@ pub struct FoundLog {
     pub saved: SavedLog,
 }
 
-/// The order as it is saved.
+/// The log as it is saved.
 pub struct SavedLog {
     /// The runs that the log goes through, oldest first, each with the number that it began with. The last is the
     /// present one.

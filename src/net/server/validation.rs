@@ -10,7 +10,7 @@ use crate::lattice::ONE;
 use crate::net::message::{ClientId, Refusal};
 use crate::net::price::UNDO;
 
-/// Whether all of an edit's shape, with its roughness, lies within a distance of a place.
+/// Whether all of an edit's shape, with its roughness, lies within a distance of a position.
 fn is_within(position: IVec3, edit: &Edit, allowed: u32) -> bool {
     let samples = edit.reach();
     // Its reach is what its shape and its roughness take up, and a band around them.

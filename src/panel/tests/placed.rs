@@ -26,8 +26,7 @@ impl Stage {
             .init_resource::<EguiUserTextures>()
             .add_message::<PanelAction>()
             .add_systems(PreUpdate, (state::read_input, handles::hold_pointer).chain())
-            .add_systems(Update, handles::act.before(BurrowSystems::Collect))
-            .add_systems(Update, (level::finish, perform_actions, note_rejection).chain())
+            .add_systems(Update, (level::finish, handles::act, perform_actions, note_rejection).chain())
             .add_systems(Last, (handles::show, draw).chain());
         app.finish();
         let terrain = app.world_mut().spawn((flat(1.0), Transform::default())).id();
@@ -278,6 +277,60 @@ fn the_terrain_may_be_gone_while_a_brush_is_placed() {
     assert_eq!(stage.placed(), moved, "without a terrain, these buttons do nothing");
     stage.click("Release");
     assert!(stage.tool().placed.is_none());
+}
+
+#[test]
+fn the_pointer_is_free_when_the_camera_is_gone() {
+    let mut stage = Stage::new();
+    stage.act(PanelAction::PlaceBrush);
+    stage.grab("Move along x");
+    stage.frame(Vec::new());
+    assert!(stage.is_held());
+    let world = stage.app.world_mut();
+    let camera =
+        world.query_filtered::<Entity, With<PrimaryEguiContext>>().single(world).expect("one camera");
+    world.despawn(camera);
+    // Bevy's egui shows nothing without a camera, so what ran there no longer does.
+    for _ in 0..2 {
+        stage.app.world_mut().run_system_cached(state::read_input).expect("it runs");
+        stage.app.world_mut().run_system_cached(handles::hold_pointer).expect("it runs");
+    }
+    assert!(!stage.is_held());
+}
+
+#[test]
+fn a_question_comes_before_a_placed_brush() {
+    let mut stage = Stage::new();
+    stage.app.add_systems(Update, files::track_changes.after(note_rejection));
+    stage.change(placed_box);
+    stage.act(PanelAction::PlaceBrush);
+    stage.apply();
+    let (built, placed) = (stage.hash(), stage.placed());
+    let is_asked = |stage: &Stage| stage.app.world().resource::<Files>().is_asking();
+    (0..3).for_each(|_| stage.frame(Vec::new()));
+    stage.act(PanelAction::Quit);
+    assert!(is_asked(&stage));
+    stage.change(|tool| tool.material = 7);
+    stage.act(PanelAction::ApplyBrush);
+    (0..5).for_each(|_| stage.frame(Vec::new()));
+    assert_eq!(stage.hash(), built);
+    // The key that releases a brush takes the question back first.
+    stage.act(PanelAction::ReleaseBrush);
+    assert_eq!((is_asked(&stage), stage.placed()), (false, placed));
+    stage.act(PanelAction::ReleaseBrush);
+    assert!(stage.tool().placed.is_none());
+}
+
+#[test]
+fn a_placed_brush_snaps_to_the_terrain_it_was_placed_on() {
+    let mut stage = Stage::new();
+    stage.act(PanelAction::PlaceBrush);
+    let first = stage.placed();
+    stage.app.world_mut().spawn((flat(1.0), Transform::from_xyz(0.0, 90.0, 0.0)));
+    (0..20).for_each(|_| stage.frame(Vec::new()));
+    stage.drag("Move along y", Vec2::new(0.0, -60.0));
+    stage.act(PanelAction::SnapBrush);
+    assert_eq!(stage.placed(), first, "not to the island above it");
 }
 
 #[test]

@@ -68,12 +68,15 @@ impl<'a> Replacement<'a> {
     /// Sets the hash of all samples to that of the world with these bricks.
     pub fn update_hash(&mut self) {
         let world = self.scene.world;
-        let differences = parallel_map(&self.change.patch.bricks, ItemCost::Brick, |(pos, brick)| {
+        let difference = |(pos, brick): &ChangedBrick| {
             let columns = columns_of(*pos);
             let hash = |brick: Option<&Arc<Brick>>| {
                 brick.map_or(0, |brick| brick.hash(pos.origin().y, brick.edited(), &columns))
             };
             hash(brick.as_ref()).wrapping_sub(hash(world.bricks.get(pos)))
+        };
+        let differences = Stages::time(&mut self.stages.edit, || {
+            parallel_map(&self.change.patch.bricks, ItemCost::Brick, difference)
         });
         self.change.sample_hash = differences.into_iter().fold(world.sample_hash, u64::wrapping_add);
     }

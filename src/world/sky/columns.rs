@@ -398,11 +398,11 @@ impl SkyLights for SkyColumns<'_> {
         &mut self.known
     }
 
-    fn covered_light(&mut self, place: IVec3, columns: [Column; 2]) -> Option<Light> {
+    fn covered_light(&mut self, place: IVec3, columns: [Column; 2]) -> Light {
         let tops = || self.tops[..self.row_count() * self.width].iter();
         let lowest = *self.lowest.get_or_init(|| tops().copied().min().unwrap_or_default());
         if place.y.div_euclid(SNAP / ONE) + HIGHEST_RISE < lowest {
-            return Some(Light::NONE);
+            return Light::NONE;
         }
         self.covered_light_by_rays(place, columns)
     }

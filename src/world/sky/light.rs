@@ -203,10 +203,8 @@ pub(crate) trait SkyLights {
         let columns = columns_of(place);
         let y = place.y.div_euclid(SNAP / ONE);
         let [low, high] = self.by_top(columns);
-        if is_covered(y, low.1)
-            && let Some(light) = self.covered_light(place, columns)
-        {
-            return light;
+        if is_covered(y, low.1) {
+            return self.covered_light(place, columns);
         }
         Light::open(self.open_light_between(low, high, y))
     }
@@ -238,20 +236,20 @@ pub(crate) trait SkyLights {
         (on_wall + (on_slope - on_wall) * share / i64::from(ONE)).clamp(0, 255) as u8
     }
 
-    /// The light of a place under a roof, between two columns; `None` if none of the points next to it is air.
-    fn covered_light(&mut self, place: IVec3, columns: [Column; 2]) -> Option<Light> {
+    /// The light of a place under a roof, between two columns; none inside ground.
+    fn covered_light(&mut self, place: IVec3, columns: [Column; 2]) -> Light {
         self.covered_light_by_rays(place, columns)
     }
 
     /// The light of a place under a roof by rays, if ground around it may be low enough to let light in: a mean of the
     /// corners of its cube of 2x2x2 voxels that are air.
-    fn covered_light_by_rays(&mut self, place: IVec3, columns: [Column; 2]) -> Option<Light> {
+    fn covered_light_by_rays(&mut self, place: IVec3, columns: [Column; 2]) -> Light {
         const SIDE: i32 = 2 * SNAP;
         let low = place.y.div_euclid(SNAP);
         let heights = [low + i32::from(place.y.rem_euclid(SNAP) > 0), low];
         let view = self.view();
         let points = heights.into_iter().flat_map(|y| columns.map(|column| column.at(y)));
-        let air = { points }.find(|&point| !view.is_solid(point))?;
+        let Some(air) = { points }.find(|&point| !view.is_solid(point)) else { return Light::NONE };
         let first = place.div_euclid(IVec3::splat(SIDE)) * 2;
         let part = place.rem_euclid(IVec3::splat(SIDE));
         let (mut sky, mut daylight, mut sum) = (0, 0, 0);
@@ -274,9 +272,9 @@ pub(crate) trait SkyLights {
             sum += weight;
         }
         if sum == 0 {
-            return Some(self.air_light(air).map_or(Light::NONE, |air| air.light));
+            return self.air_light(air).map_or(Light::NONE, |air| air.light);
         }
-        Some(Light { sky: (sky / sum) as u8, daylight: (daylight / sum) as u8 })
+        Light { sky: (sky / sum) as u8, daylight: (daylight / sum) as u8 }
     }
 
     /// The light at a point, by rays; `None` if it is solid.

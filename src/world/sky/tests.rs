@@ -201,6 +201,23 @@ fn daylight_fades_into_a_tunnel() {
 }
 
 #[test]
+fn vertices_inside_built_ground_are_dark() {
+    let mut terrain = terrain(Ground::flat(79, 79, 24.0).expect("valid"), 32);
+    let mut inside = Vec::new();
+    for height in [6.0, 4.0] {
+        let block = Shape::cuboid(Vec3::new(40.0, 22.0 + height, 40.0), Vec3::new(8.0, height, 8.0));
+        dig(&mut terrain, &[Brush::reset(Shape::sphere(Vec3::new(40.0, 30.0, 40.0), 20.0))]);
+        dig(&mut terrain, &[Brush::add(block, MaterialId(1))]);
+        let mut lights = SparseSky::new(SkyView::of(terrain.world()));
+        let places = (35..45).map(|x| IVec3::new(x, 24, 40) * SNAP);
+        inside.push(places.map(|place| lights.light(place)).collect::<Vec<_>>());
+        // So what happens on top of a block draws no tile below it again.
+        assert!(inside.iter().flatten().all(|light| *light == Light::NONE), "{inside:?}");
+        assert!(lights.light(IVec3::new(20, 24, 40) * SNAP).sky > 200);
+    }
+}
+
+#[test]
 fn undug_cliffs_are_lit_as_their_tiles() {
     let ground = cliff();
     let mut painted = terrain(cliff(), 32);
