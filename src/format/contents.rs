@@ -80,8 +80,8 @@ impl Resolved {
     }
 }
 
-/// The images, grids and prefabs that edits may hold. A client sends no edits with others, and a server refuses them. Clients that lack one of the server's get it at its first use, so only players that use them need
-/// their own.
+/// The images, grids and prefabs that edits may hold. A client sends no edits with others, and a server refuses them.
+/// Clients that lack one of the server's get it at its first use, so only players that use them need their own.
 #[derive(Clone, Debug, Default)]
 pub struct ContentTable {
     images: FxHashMap<ContentId, Arc<GreyImage>>,

@@ -10,8 +10,8 @@
 //! 4. A cell is **walkable** if all cells that the agent touches while it stands anywhere on it are passable, and belong to the
 //!    world.
 //!
-//! With [`WalkSettings::jump_down`] or [`climb_up`](WalkSettings::climb_up), its [`ledges`](WalkableTile::ledges) lead from walkable
-//! cells to lower ones beyond a ledge, and back.
+//! With [`WalkSettings::jump_down`] or [`climb_up`](WalkSettings::climb_up), its [`ledges`](WalkableTile::ledges) lead
+//! from walkable cells to lower ones beyond a ledge, and back.
 //!
 //! Its [`polygons`](WalkableTile::polygons) are convex, share their edges, and meet those of the next tile in the same line.
 //!

@@ -147,8 +147,8 @@ impl ToolOperation {
         self.row().name()
     }
 
-    /// Whether a brush of this operation may have a shape. A stamp covers a whole area, so it can't be a ring, a path or a model; a
-    /// road is a path; what is pasted has a shape of its own.
+    /// Whether a brush of this operation may have a shape. A stamp covers a whole area, so it can't be a ring, a path
+    /// or a model; a road is a path; what is pasted has a shape of its own.
     pub fn fits(self, shape: ToolShape) -> bool {
         match self {
             Self::Stamp => !matches!(shape, ToolShape::Torus | ToolShape::Path | ToolShape::Model),

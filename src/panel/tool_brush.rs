@@ -64,8 +64,8 @@ impl BrushTool {
         }
     }
 
-    /// What is pasted at a position, with its anchor there: exactly, if it is upright, turned by quarter turns, and pasted on a terrain
-    /// with voxels of the same size at whole multiples of it.
+    /// What is pasted at a position, with its anchor there: exactly, if it is upright, turned by quarter turns, and
+    /// pasted on a terrain with voxels of the same size at whole multiples of it.
     pub(super) fn paste_at(&self, hit: &TerrainHit) -> Option<Paste> {
         let (prefab, voxel) = (self.prefab.prefab()?, self.prefab.voxel_size);
         let place = (hit.position / voxel).round() * voxel;

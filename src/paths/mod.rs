@@ -1,4 +1,5 @@
-//! Navigation meshes of terrains for [`bevy_landmass`]: a path through a tunnel exists in the frame after the commit that opened it.
+//! Navigation meshes of terrains for [`bevy_landmass`]: a path through a tunnel exists in the frame after the commit
+//! that opened it.
 //!
 //! Spawn a [`Navigation`] for each kind of agent, and add the [`NavigationPlugin`] as well as
 //! [`Landmass3dPlugin`](bevy_landmass::Landmass3dPlugin). It turns the [walkable](crate::navigation) ground of each tile into an
@@ -84,7 +85,8 @@ impl Plugin for NavigationPlugin {
 pub struct Navigation {
     /// The terrain.
     pub terrain: Entity,
-    /// The entity of the [`Archipelago3d`](bevy_landmass::Archipelago3d) that islands are added to. Several terrains may share one.
+    /// The entity of the [`Archipelago3d`](bevy_landmass::Archipelago3d) that islands are added to. Several terrains
+    /// may share one.
     pub archipelago: Entity,
     /// The agent, in metres.
     pub agent: WalkSettings,

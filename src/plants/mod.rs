@@ -43,7 +43,7 @@ use crate::plugin::{BurrowSystems, CommitSameFrame, FollowCommits};
 use crate::scatter::{Plant, PlantPatches, Scatter, ScatterRules};
 use crate::terrain::Version;
 
-/// Keeps plants of terrains with [`Plants`] up to date. Draws nothing by itself.
+/// Keeps plants of terrains with [`Plants`] up to date. Draws nothing.
 #[derive(Default)]
 pub struct PlantsPlugin;
 

@@ -140,7 +140,7 @@ fn vertex(in: Vertex) -> Varying {
     let placed = place(in.position, slot, world_from_local);
     let world = world_from_local * vec4(placed.position, 1.0);
     out.world_position = world;
-    // Triangles of what is not drawn are points outside the picture.
+    // Plants that are not drawn have triangles without area, outside the picture.
     out.position = select(vec4(2.0, 2.0, 2.0, 1.0), position_world_to_clip(world.xyz), placed.is_drawn);
 #ifdef PREPASS_PIPELINE
 #ifdef UNCLIPPED_DEPTH_ORTHO_EMULATION

@@ -1,4 +1,5 @@
-//! The buffers of plants, and how what changed in them is written to the GPU: some hundred bytes for a dig, some thousand for a patch.
+//! The buffers of plants, and how what changed in them is written to the GPU: some hundred bytes for a dig, some
+//! thousand for a patch.
 
 use bevy::asset::{AssetId, RenderAssetUsages};
 use bevy::prelude::*;

@@ -119,8 +119,8 @@ pub enum GroundFileError {
     Ground(#[from] GroundError),
 }
 
-/// Loads files with the extension `ground.json`, and the files that they name, as [`GroundAsset`]. Where Bevy's asset server watches
-/// files, a change of any of them loads the ground again.
+/// Loads files with the extension `ground.json`, and the files that they name, as [`GroundAsset`]. Where Bevy's asset
+/// server watches files, a change of any of them loads the ground again.
 #[derive(Default, TypePath)]
 pub struct GroundLoader;
 
@@ -249,8 +249,8 @@ impl GroundFrom {
     }
 }
 
-/// A terrain with a [`GroundFrom`] got the ground of its file, or the file can't be used. Sent each time the file is read with another
-/// result than before.
+/// A terrain with a [`GroundFrom`] got the ground of its file, or the file can't be used. Sent each time the file is
+/// read with another result than before.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct GroundFileRead {
     /// The terrain's entity.

@@ -23,8 +23,8 @@ pub struct KnownNodes {
     settled: Mutex<Option<Settled>>,
 }
 
-/// What a cut was chosen from that stayed as it was: chosen from the same again, it stays so again. After most digs, nothing else has
-/// to be looked at, however many nodes there are.
+/// What a cut was chosen from that stayed as it was: chosen from the same again, it stays so again. After most digs,
+/// nothing else has to be looked at, however many nodes there are.
 #[derive(PartialEq)]
 struct Settled {
     cut: Cut,

@@ -26,8 +26,8 @@ pub struct ScatterRules {
 
 /// A kind of plant or stone.
 ///
-/// Lengths are in voxels. Spots lie in squares with sides of [`spacing`](Self::spacing), one at a random point of each. A plant stands on a spot that
-/// passes all rules.
+/// Lengths are in voxels. Spots lie in squares with sides of [`spacing`](Self::spacing), one at a random point of each.
+/// A plant stands on a spot that passes all rules.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Species {

@@ -96,8 +96,8 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    /// Queues an order of this much work. An edit joins the group of the one before it if both belong `together`; edits after any other
-    /// order begin a new group.
+    /// Queues an order of this much work. An edit joins the group of the one before it if both belong `together`; edits
+    /// after any other order begin a new group.
     pub fn push(&mut self, request: Request, work: u64, together: Together, edit_settings: EditSettings) {
         let is_edit = request.asked() == Asked::Edit;
         let together = request.stroke.map_or(together, Together::Stroke);

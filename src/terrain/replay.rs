@@ -78,8 +78,8 @@ impl ReplayError {
 }
 
 impl WorldParts {
-    /// All of a world but its ground, under these rules and settings of loose pieces. Bricks are shared, not copied, but listing them
-    /// takes long in a large world.
+    /// All of a world but its ground, under these rules and settings of loose pieces. Bricks are shared, not copied,
+    /// but listing them takes long in a large world.
     pub(crate) fn of(world: &World, edit_settings: EditSettings) -> Self {
         let (change, chunk_size) = (world.all_parts(), world.grid.size() as u32);
         Self { change, chunk_size, revision: world.revision, edit_settings }

@@ -39,8 +39,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     shoot_mouth(studio, album);
 }
 
-/// A tunnel that runs level into a hillside, and a trench with upright walls in front of it. At the tunnel's end the sun shines in
-/// below the rim of the small world, which has no wall there.
+/// A tunnel that runs level into a hillside, and a trench with upright walls in front of it. At the tunnel's end the
+/// sun shines in below the rim of the small world, which has no wall there.
 fn shoot_mouth(studio: &mut Studio, album: &mut Album) {
     let hillside = |x: i32, z: i32| {
         let along = (f64::from(x) - 40.0 + 2.0 * (f64::from(z) / 7.0).sin()) / 24.0;

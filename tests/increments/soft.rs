@@ -68,7 +68,7 @@ fn the_full_change_is_made_in_the_middle_of_a_soft_brush() {
         let world = terrain.world();
         let change = |point: IVec3| world.samples().distance(point) - world.ground().distance(point);
         assert_eq!(change(middle), -512, "{shape:?}");
-        let beside = [outwards, -outwards].map(|way| change(middle + way));
-        assert!(beside.iter().all(|change| (-511..0).contains(change)), "{shape:?}: {beside:?}");
+        let near = [outwards, -outwards].map(|way| change(middle + way));
+        assert!(near.iter().all(|change| (-511..0).contains(change)), "{shape:?}: {near:?}");
     }
 }

@@ -73,12 +73,12 @@ fn columns_cross_what_is_drawn() {
                 continue;
             }
             close_calls += 1;
-            let beside: Vec<Vec<(f64, bool)>> = steps()
+            let neighbours: Vec<Vec<(f64, bool)>> = steps()
                 .map(|(dx, dz)| triangles.column(inside(x + dx, width), inside(z + dz, depth)))
                 .collect();
             assert!(
-                beside.iter().any(|expected| agrees(expected)),
-                "{what}: {answer:?}, but brute force {expected:?}, and next to the column {beside:?}"
+                neighbours.iter().any(|expected| agrees(expected)),
+                "{what}: {answer:?}, but brute force {expected:?}, and next to the column {neighbours:?}"
             );
         }
     }

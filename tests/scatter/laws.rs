@@ -238,7 +238,7 @@ fn plants_go_with_their_clearance() {
     let tree = *plants.iter().find(middle).expect("a tree");
     let at = tree.position().as_vec3();
     let stands = |terrain: &Terrain| scatter.stands(terrain.world(), &tree);
-    // A branch of it is built in, a hole beside it, a tunnel under it, a bridge over it.
+    // A branch of it is built in, a hole next to it, a tunnel under it, a bridge over it.
     let block = |offset: Vec3| Brush::add(Shape::sphere(at + offset, 1.0), MaterialId(3));
     let hole = |offset: Vec3, radius| Brush::dig(Shape::sphere(at + offset, radius));
     for (brush, expected) in [

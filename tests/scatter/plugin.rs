@@ -72,7 +72,7 @@ fn wait(app: &mut App, is_done: impl Fn(&World) -> bool) {
     }
 }
 
-/// Whether what is shown is what stands in the world, and everything near enough is loaded.
+/// Whether exactly the plants that stand in the world are shown, and everything near enough is loaded.
 fn assert_up_to_date(app: &App, terrain: Entity, when: &str) {
     let (shown, model) = (app.world().get::<ShownPlants>(terrain), app.world().get::<Terrain>(terrain));
     let (shown, world) = (shown.expect("plants"), model.expect("a terrain").world());
@@ -109,7 +109,7 @@ fn plants_go_in_the_frame_of_their_ground_and_return_with_it() {
             let at = Vec3::new(30.0 + 7.0 * turn as f32, 20.5, 40.0);
             dig(&mut app, at, 3.5);
             let hash = app.world().get::<Terrain>(terrain).expect("there").world().hash();
-            // In every frame what is shown is what stands.
+            // In every frame exactly the plants that stand are shown.
             let start = Instant::now();
             loop {
                 app.update();

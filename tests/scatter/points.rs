@@ -98,7 +98,7 @@ fn other_species_and_seeds() {
     };
     let oaks = places(&rules(1, &["oak"]), 0);
     assert!(oaks.len() > 1000);
-    // In another place of the list, beside others, the same.
+    // Elsewhere in the list, among others, they grow at the same places.
     assert_eq!(places(&rules(1, &["fir", "oak"]), 1), oaks);
     assert!(places(&rules(2, &["oak"]), 0).intersection(&oaks).count() < 20);
     assert!(places(&rules(1, &["fir"]), 0).intersection(&oaks).count() < 20);

@@ -38,19 +38,27 @@ fn paste(prefab: &Arc<Prefab>, grid: &ShapeGrid, number: usize) -> Brush {
 #[test]
 fn an_edit_takes_the_bytes_of_names_in_place_of_its_content() {
     let (grid, prefab) = (ball(64), Arc::new(block(1)));
-    for (in_a_frame, most) in [(1, 164.0), (100, 45.0)] {
+    let paste = |number| paste(&prefab, &grid, number);
+    let dig = |number| Brush { operation: Operation::Dig, ..paste(number) };
+    let cases: [(&str, &dyn Fn(usize) -> Brush, usize, usize, f64); 4] = [
+        ("a dig of a grid", &dig, 1, 1, 130.0),
+        ("digs of a grid", &dig, 1, 100, 30.0),
+        ("a paste within a grid", &paste, 2, 1, 164.0),
+        ("pastes within a grid", &paste, 2, 100, 45.0),
+    ];
+    for (what, brush, named, in_a_frame, most) in cases {
         let (disk, ground) = (SimulatedDisk::new(), ground(3));
         let mut terrain = terrain(&ground);
         let mut store = create(&disk, &mut terrain, options(1000));
         store.flush().expect("the disk works");
-        terrain.apply([paste(&prefab, &grid, 0)]);
+        terrain.apply([brush(0)]);
         store.follow(&mut terrain).expect("the thread runs");
         store.flush().expect("the disk works");
         let (files, before) = (contents(&disk), log_bytes(&disk));
-        assert_eq!(files.len(), 2);
+        assert_eq!(files.len(), named);
         assert!(files.iter().map(|path| length(&disk, path)).sum::<usize>() > 10_000);
         for number in 1..=100 {
-            let outcome = terrain.apply_one(paste(&prefab, &grid, number)).outcome;
+            let outcome = terrain.apply_one(brush(number)).outcome;
             assert!(outcome.is_ok(), "{outcome:?}");
             if number % in_a_frame == 0 {
                 store.follow(&mut terrain).expect("the thread runs");
@@ -58,8 +66,8 @@ fn an_edit_takes_the_bytes_of_names_in_place_of_its_content() {
             }
         }
         let bytes = (log_bytes(&disk) - before) as f64 / 100.0;
-        println!("{in_a_frame} edits in a frame: {bytes:.1} bytes each");
-        assert!(bytes < most, "{in_a_frame} edits in a frame: {bytes} bytes each");
+        println!("{what}, {in_a_frame} in a frame: {bytes:.1} bytes each");
+        assert!(bytes < most, "{what}, {in_a_frame} in a frame: {bytes} bytes each");
         assert_eq!(contents(&disk), files, "nothing was written twice");
         let (_, opened) = open(&disk.image().lose_power(|| false), &ground).expect("it can be opened");
         assert_eq!((state(&opened.terrain), opened.warnings), (state(&terrain), vec![]));

@@ -1,5 +1,5 @@
-//! The air: Bevy's atmosphere, which colours the sky, the sun's light and all that is far away. Where the device can't compute it,
-//! and in low quality, there is fog, and the sky's own colours are those of `day.rs`.
+//! The air: Bevy's atmosphere, which colours the sky, the sun's light and all that is far away. Where the device can't
+//! compute it, and in low quality, there is fog, and the sky's own colours are those of `day.rs`.
 
 use bevy::light::{Atmosphere, SunDisk, atmosphere::ScatteringMedium};
 use bevy::pbr::{AtmosphereSettings, ExtractedAtmosphere, GpuAtmosphereSettings};

@@ -34,8 +34,8 @@ pub struct MeshGrid {
 }
 
 impl MeshGrid {
-    /// The shape that the mesh has after every point p of it moved to `rotation * (p * scale) + place`. In metres, as in a message, a
-    /// scale of 1 makes a unit of the mesh a metre; in voxels, a voxel.
+    /// The shape that the mesh has after every point p of it moved to `rotation * (p * scale) + place`. In metres, as
+    /// in a message, a scale of 1 makes a unit of the mesh a metre; in voxels, a voxel.
     pub fn placed(&self, place: Vec3, rotation: Quat, scale: f32) -> GridShape {
         GridShape::new(self.grid.clone(), place + rotation * (self.middle * scale))
             .with_rotation(rotation)

@@ -18,8 +18,8 @@ const CARRIED: u64 = 92;
 /// Measurements in a row that must show that the line does not carry a rate. A single one may only have met a lost packet.
 const FAILURES: u32 = 2;
 
-/// What the rate becomes, in percent: of itself while the line carries it, before and after the line's limit was met for the first
-/// time, and of what was delivered where the line does not carry it.
+/// What the rate becomes, in percent: of itself while the line carries it, before and after the line's limit was met
+/// for the first time, and of what was delivered where the line does not carry it.
 const GROWTH: u64 = 150;
 const LATER_GROWTH: u64 = 110;
 const BACK: u64 = 85;

@@ -7,11 +7,13 @@ use crate::plugin::{SkyLight, SlimVertices};
 /// The maximum number of layers of a ground; ids from the last one on share it.
 pub const MAX_LAYERS: usize = 16;
 
-/// The look of a terrain's ground, whose meshes then have [`SlimVertices`]. Put it on the terrain's entity instead of a material, and
-/// [`GroundPlugin`](super::GroundPlugin) creates and updates its [`GroundMaterial`](super::GroundMaterial).
+/// The look of a terrain's ground, whose meshes then have [`SlimVertices`]. Put it on the terrain's entity instead of a
+/// material, and [`GroundPlugin`](super::GroundPlugin) creates and updates its
+/// [`GroundMaterial`](super::GroundMaterial).
 ///
-/// A [`MaterialId`](crate::ground::MaterialId) is the number of a layer of the textures: [`GroundTextures`](super::GroundTextures).
-/// Changes made before `PostUpdate` show in the same frame, on the terrain's pieces too.
+/// A [`MaterialId`](crate::ground::MaterialId) is the number of a layer of the textures:
+/// [`GroundTextures`](super::GroundTextures). Changes made before `PostUpdate` show in the same frame, on the terrain's
+/// pieces too.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -41,8 +43,8 @@ pub struct GroundLook {
 /// A picture of the whole ground from above, such as a satellite image or the colour map of a terrain tool. Far from the camera,
 /// layers keep their texture and take the picture's colours, except for faces that were dug.
 ///
-/// It is stretched over the terrain: its first row lies at z = 0, and the first pixel of each row at x = 0. When its file changes and
-/// Bevy's asset server watches files, the ground changes too.
+/// It is stretched over the terrain: its first row lies at z = 0, and the first pixel of each row at x = 0. When its
+/// file changes and Bevy's asset server watches files, the ground changes too.
 #[derive(Reflect, Clone, Debug, PartialEq)]
 pub struct ColorMap {
     /// The picture. Until it is loaded, the ground has the colours of its layers.
