@@ -230,6 +230,11 @@ mod tests {
             }
             prop_assert_eq!(cut, target);
         }
+    }
+
+    proptest! {
+        // Each case takes thousands of steps.
+        #![proptest_config(ProptestConfig::with_cases(64))]
 
         #[test]
         fn a_step_makes_few_meshes_unless_one_change_makes_more(seeds: [u64; 2], most in 16usize..60) {
