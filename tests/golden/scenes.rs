@@ -89,7 +89,7 @@ impl Places {
             })),
             cliff: direction(best(&|(_, fall)| fall.length())),
             meadow: best(&|(place, fall)| -fall.length() + 0.02 * near(place.y, 20.0)).0,
-            snow: direction(best(&|(place, fall)| near(place.y, 92.0) + 20.0 * near(fall.length(), 0.5))),
+            snow: direction(best(&|(place, fall)| near(place.y, 98.0) + 20.0 * near(fall.length(), 0.35))),
         }
     }
 }
@@ -281,7 +281,7 @@ impl Book {
         views.push(("bridge", eye, bends[2], afternoon));
         let eye = beside(studio, works, Vec3::new(10.0, 0.0, 26.0), 16.0);
         views.push(("works", eye, works, afternoon));
-        let eye = beside(studio, snow.0, snow.1 * 45.0, 12.0);
+        let eye = beside(studio, snow.0, snow.1 * 60.0, 20.0);
         views.push(("snow_line", eye, snow.0, afternoon));
         let eye = over(summit, 90.0);
         views.push(("horizon", eye, eye + Vec3::new(-10.0, -1.2, 4.0), afternoon));

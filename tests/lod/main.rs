@@ -7,6 +7,7 @@ mod worlds;
 
 mod drawn;
 mod random;
+mod ridges;
 mod same;
 mod seams;
 mod shares;

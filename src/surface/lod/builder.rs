@@ -21,6 +21,8 @@ pub(super) struct Builder {
     places: FxHashMap<IVec3, Number>,
     /// Of the columns.
     shares: Shares,
+    /// Which cells are split across, row by row; see [`splits_across`](Self::splits_across).
+    across: Vec<bool>,
 }
 
 /// The vertex of a page's column with this number, relative to the column `low` at y = 0.
@@ -49,7 +51,22 @@ impl Builder {
         let places = zs.iter().flat_map(|&z| xs.iter().map(move |&x| Column::new(x, z)));
         vertices.extend(places.enumerate().map(|(at, column)| page_vertex(&page, inside(at), column, low)));
         let indices = Vec::with_capacity((xs.len() - 1) * (zs.len() - 1) * 6);
-        Self { columns, stride, vertices, indices, places: FxHashMap::default(), shares }
+        let middles = ground.page_heights(low.offset(stride / 2, stride / 2), stride, [across - 1, down - 1]);
+        let is_across = |(cell, &middle): (usize, &i32)| {
+            let a = cell / (across - 1) * across + cell % (across - 1);
+            let height = |at: usize| i64::from(page.heights[inside(at)]);
+            let miss = |from: usize, to: usize| (height(from) + height(to) - 2 * i64::from(middle)).abs();
+            miss(a + across, a + 1) < miss(a, a + across + 1)
+        };
+        let splits = middles.iter().enumerate().map(is_across).collect();
+        Self { columns, stride, vertices, indices, places: FxHashMap::default(), shares, across: splits }
+    }
+
+    /// Whether the cell with its lowest corner at these places is split along (x, z + s)-(x + s, z), and not along
+    /// (x, z)-(x + s, z + s): the line whose middle is nearer to the ground. On a ridge that runs along the other one, each
+    /// cell would be a tooth.
+    pub fn splits_across(&self, [x, z]: [usize; 2]) -> bool {
+        self.across[z * (self.columns[0].len() - 1) + x]
     }
 
     /// How many columns there are along x and along z.

@@ -183,11 +183,16 @@ impl<'a> Drawing<'a> {
             if bent == [false; 4] {
                 let [a, b, c, d] =
                     [[x, z], [x, z + 1], [x + 1, z + 1], [x + 1, z]].map(|at| self.builder.column(at));
-                self.builder.emit([a, b, c]);
-                self.builder.emit([c, d, a]);
+                if self.builder.splits_across([x, z]) {
+                    self.builder.emit([d, a, b]);
+                    self.builder.emit([b, c, d]);
+                } else {
+                    self.builder.emit([a, b, c]);
+                    self.builder.emit([c, d, a]);
+                }
             } else {
                 let is_at_border = beside.map(|own| own.is_none());
-                self.heightmap_cell(cell, bent, is_at_border);
+                self.heightmap_cell(cell, self.builder.splits_across([x, z]), bent, is_at_border);
             }
         }
         self.close_sides();
@@ -340,8 +345,8 @@ impl<'a> Drawing<'a> {
         self.builder.number(vertex)
     }
 
-    /// Two triangles split along (x, z)-(x + s, z + s), whose sides may be lines of several vertices.
-    fn heightmap_cell(&mut self, cell: Cell, bent: [bool; 4], is_at_border: [bool; 4]) {
+    /// Two triangles whose sides may be lines of several vertices.
+    fn heightmap_cell(&mut self, cell: Cell, is_across: bool, bent: [bool; 4], is_at_border: [bool; 4]) {
         let [a, b, c, d] = cell.corners();
         let ends = [(a, b), (b, c), (c, d), (d, a)];
         let lines: [Vec<Number>; 4] = std::array::from_fn(|side| {
@@ -363,8 +368,10 @@ impl<'a> Drawing<'a> {
             }
         });
         let [ab, bc, cd, da] = &lines;
-        fan(ab, bc, |triangle| self.builder.emit(triangle));
-        fan(cd, da, |triangle| self.builder.emit(triangle));
+        let halves = if is_across { [(da, ab), (bc, cd)] } else { [(ab, bc), (cd, da)] };
+        halves
+            .into_iter()
+            .for_each(|(first, second)| fan(first, second, |triangle| self.builder.emit(triangle)));
     }
 
     /// What the cells on one side of an undisturbed interval draw of the ground: straight edges and chains.
