@@ -226,7 +226,7 @@ fn come_late(log_bytes: usize) -> Play {
     // Without undo, edits that wait go into one transaction.
     let settings = ServerSettings { log_bytes, ..ServerSettings::default() };
     let edits = count("BURROW_EDITS", 600);
-    let mut play = Play::new(&hills(if edits > 20_000 { 512 } else { 160 }), OTHERS, settings);
+    let mut play = Play::new(&hills(if edits > 20_000 { 512 } else { 160 }), OTHERS as u64, settings);
     play.seconds(2.0);
     dig_before(&mut play, edits);
     play.seconds(20.0);
