@@ -234,6 +234,10 @@ mod tests {
     use fastrand::Rng;
 
     use super::*;
+    use crate::brush::{Brush, Edit, Shape};
+    use crate::ground::Ground;
+    use crate::lattice::ChunkGrid;
+    use crate::volume::{Bricks, SampleView};
 
     fn load(kind: Kind, amount: usize) -> Load {
         Load { kind, ..Load::of_blocks(amount) }
@@ -251,6 +255,24 @@ mod tests {
     fn estimate(costs: &Costs, amount: usize) -> [u128; 2] {
         let (Estimate { cpu, cuda }, _) = costs.choose(Load::of_blocks(amount));
         [cpu, cuda].map(|time| time.as_micros())
+    }
+
+    #[test]
+    fn edits_that_round_edges_cost_as_much_as_they_look_at() {
+        let (ground, none) = (Ground::flat(64, 64, 20.0).expect("a ground"), Bricks::default());
+        let (samples, grid) = (SampleView::new(&ground, &none), ChunkGrid::new(32, 64, 64));
+        let of_each_brick = |brush: Brush| {
+            let edit = Edit::quantize(&brush).expect("a valid brush");
+            let work = PreparedEdits::new(samples, grid, &[&edit]);
+            let load = Load::of_edits(&work);
+            (load.kind, load.amount / work.jobs().len())
+        };
+        let shape = Shape::sphere(glam::Vec3::splat(30.0), 5.0);
+        assert_eq!(of_each_brick(Brush::dig(shape)), (Kind::Edit, 1));
+        assert_eq!(of_each_brick(Brush::smooth(shape, 1.0)), (Kind::Stencil, 1));
+        // 18 and 42 samples along each side instead of 8.
+        assert_eq!(of_each_brick(Brush::fill(shape, 3.0)), (Kind::Rounded, 11));
+        assert_eq!(of_each_brick(Brush::carve(shape, 16.0)), (Kind::Rounded, 144));
     }
 
     #[test]

@@ -146,7 +146,7 @@ struct GridRecord {
 };
 
 // What a distance of 0 is stored as in the image of a grid.
-constexpr i32 GRID_ZERO = 1 << 15;
+constexpr i32 GRID_ZERO = 0x8000;
 
 // How an edit changes samples, apart from digging, adding and painting (PLAIN). UNION and SUBTRACTION have rounded
 // edges: they are fills and carves.
