@@ -27,6 +27,8 @@ pub(super) enum Kind {
     Rough,
     /// Edits that read samples around those they change, as sculpting does.
     Stencil,
+    /// Edits that round edges: they look for the surface around the samples that they change.
+    Rounded,
     /// Blocks meshed.
     Mesh,
 }
@@ -35,7 +37,8 @@ pub(super) enum Kind {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Load {
     pub kind: Kind,
-    /// Bricks, once for each edit that may reach them; or blocks.
+    /// Bricks, once for each edit that may reach them; or blocks. For edits that round edges, the bricks that they look
+    /// at, once for each brick that they may reach.
     pub amount: usize,
     /// Blocks that will be meshed after edits, roughly: the bricks that they reach, each once.
     pub blocks: usize,
@@ -52,7 +55,9 @@ impl Load {
     /// The work of these edits.
     pub fn of_edits(work: &PreparedEdits) -> Self {
         let jobs = work.jobs();
-        let kind = if work.looks_around() {
+        let kind = if work.edits.iter().any(|edit| edit.rounding().is_some()) {
+            Kind::Rounded
+        } else if work.looks_around() {
             Kind::Stencil
         } else if work.edits.iter().any(|record: &PreparedEdit| record.evaluator.is_rough()) {
             Kind::Rough
@@ -63,7 +68,11 @@ impl Load {
         let step = jobs.len().div_ceil(SAMPLED).max(1);
         let is_first = |&at: &usize| at == 0 || !Job::is_same_brick(&jobs[at - 1], &jobs[at]);
         let blocks = (0..jobs.len()).step_by(step).filter(is_first).count() * step;
-        Self { kind, amount: jobs.len(), blocks, is_cold: false }
+        let amount = match kind {
+            Kind::Rounded => jobs.iter().map(|job| work.edits[job.edit as usize].bricks_read()).sum(),
+            _ => jobs.len(),
+        };
+        Self { kind, amount, blocks, is_cold: false }
     }
 }
 
@@ -149,9 +158,9 @@ fn gpu_index(load: Load) -> usize {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Costs {
     /// By kind and by backend ([`CPU`], [`WARM_GPU`], [`COLD_GPU`]).
-    times: [[Times; 3]; 4],
+    times: [[Times; 3]; 5],
     /// Seconds that each row may lose on the slower backend; negative after a larger loss.
-    credit: [Vec<f64>; 4],
+    credit: [Vec<f64>; 5],
 }
 
 impl Costs {
@@ -225,6 +234,10 @@ mod tests {
     use fastrand::Rng;
 
     use super::*;
+    use crate::brush::{Brush, Edit, Shape};
+    use crate::ground::Ground;
+    use crate::lattice::ChunkGrid;
+    use crate::volume::{Bricks, SampleView};
 
     fn load(kind: Kind, amount: usize) -> Load {
         Load { kind, ..Load::of_blocks(amount) }
@@ -242,6 +255,24 @@ mod tests {
     fn estimate(costs: &Costs, amount: usize) -> [u128; 2] {
         let (Estimate { cpu, cuda }, _) = costs.choose(Load::of_blocks(amount));
         [cpu, cuda].map(|time| time.as_micros())
+    }
+
+    #[test]
+    fn edits_that_round_edges_cost_as_much_as_they_look_at() {
+        let (ground, none) = (Ground::flat(64, 64, 20.0).expect("a ground"), Bricks::default());
+        let (samples, grid) = (SampleView::new(&ground, &none), ChunkGrid::new(32, 64, 64));
+        let of_each_brick = |brush: Brush| {
+            let edit = Edit::quantize(&brush).expect("a valid brush");
+            let work = PreparedEdits::new(samples, grid, &[&edit]);
+            let load = Load::of_edits(&work);
+            (load.kind, load.amount / work.jobs().len())
+        };
+        let shape = Shape::sphere(glam::Vec3::splat(30.0), 5.0);
+        assert_eq!(of_each_brick(Brush::dig(shape)), (Kind::Edit, 1));
+        assert_eq!(of_each_brick(Brush::smooth(shape, 1.0)), (Kind::Stencil, 1));
+        // 18 and 42 samples along each side instead of 8.
+        assert_eq!(of_each_brick(Brush::fill(shape, 3.0)), (Kind::Rounded, 11));
+        assert_eq!(of_each_brick(Brush::carve(shape, 16.0)), (Kind::Rounded, 144));
     }
 
     #[test]

@@ -6,6 +6,8 @@ use glam::{I64Vec3, IVec3};
 use wide::{i16x8, i32x8};
 
 use super::roughness::QuantizedRoughness;
+#[cfg(feature = "cuda")]
+use super::shapes::GridParams;
 use super::shapes::{QuantizedShape, ShapeSdf, larger, smaller};
 use crate::lattice::{LatticeBox, ONE};
 
@@ -148,6 +150,8 @@ pub(crate) struct Constants {
     pub shape: [f32; 12],
     /// Amplitude, scale, seed and origin of roughness.
     pub roughness: Option<(i32, i32, u32, [i32; 3])>,
+    /// Distance outside the rough shape within which the edit changes samples.
+    pub band: i32,
 }
 
 #[cfg(feature = "cuda")]
@@ -162,6 +166,11 @@ impl Evaluator {
         self.form.is_for_cpu()
     }
 
+    /// The parameters of the grid, if the shape is one.
+    pub(crate) fn grid(&self) -> Option<GridParams<'_>> {
+        self.form.grid()
+    }
+
     /// All parameters of distances.
     pub(crate) fn constants(&self) -> Constants {
         let (kind, shape) = self.form.constants();
@@ -172,6 +181,7 @@ impl Evaluator {
             kind,
             shape,
             roughness,
+            band: self.band,
         }
     }
 }

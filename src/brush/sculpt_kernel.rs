@@ -89,7 +89,7 @@ impl SculptKernel {
     /// Whether only the CPU computes its densities.
     #[cfg(feature = "cuda")]
     pub fn is_for_cpu(&self) -> bool {
-        self.rounding.is_some() || self.road.is_some()
+        self.road.is_some()
     }
 
     /// The density at a lattice point after the operation, from its distance to the shape and from what is around;
@@ -177,6 +177,8 @@ pub(crate) enum SculptOp<'a> {
     Stamp(StampParams<'a>),
     /// Step and base.
     Terrace(i32, i32),
+    /// A union or a subtraction with a rounded edge.
+    Rounded(Rounding),
 }
 
 #[cfg(feature = "cuda")]
@@ -194,13 +196,12 @@ impl SculptKernel {
             QuantizedOperation::Lower { amount } => SculptOp::Shift(*amount),
             QuantizedOperation::Stamp { stamp } => SculptOp::Stamp(stamp.constants()),
             QuantizedOperation::Terrace { step, base } => SculptOp::Terrace(*step, *base),
+            QuantizedOperation::Fill | QuantizedOperation::Carve => SculptOp::Rounded(self.rounding?),
             QuantizedOperation::Dig
             | QuantizedOperation::Add { .. }
             | QuantizedOperation::Paint { .. }
             | QuantizedOperation::Reset
             | QuantizedOperation::Road
-            | QuantizedOperation::Fill
-            | QuantizedOperation::Carve
             | QuantizedOperation::Paste { .. } => {
                 return None;
             }

@@ -6,7 +6,7 @@ use glam::{IVec3, USizeVec3};
 
 use super::prepared_edit::PreparedEdit;
 use super::surface_distance::SurfaceDistance;
-use crate::brush::{DEPTH, FARTHEST, SculptKernel, Stencil, is_moved};
+use crate::brush::{DEPTH, FARTHEST, Stencil, is_moved};
 use crate::lattice::{BRICK, BrickPos, Column, ONE};
 use crate::volume::{Brick, SampleView, row};
 
@@ -55,8 +55,7 @@ impl PaddedBrick {
 
     /// The samples of a brick and those around it, with what an edit that rounds edges needs in addition.
     pub fn for_edit(view: &SampleView, pos: BrickPos, edit: &PreparedEdit) -> Self {
-        let rounding = edit.sculptor.as_ref().and_then(SculptKernel::rounding);
-        let surface = rounding.map(|rounding| SurfaceDistance::new(view, pos, rounding.horizon()));
+        let surface = edit.rounding().map(|rounding| SurfaceDistance::new(view, pos, rounding.horizon()));
         Self { surface, ..Self::new(view, pos) }
     }
 

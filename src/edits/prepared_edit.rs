@@ -3,7 +3,9 @@
 use glam::IVec3;
 
 use super::surface_distance::margin;
-use crate::brush::{Edit, Evaluator, Kind, SculptKernel};
+use crate::brush::{Edit, Evaluator, Kind, Rounding, SculptKernel};
+#[cfg(feature = "cuda")]
+use crate::lattice::BRICK;
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
 use crate::volume::DiggingRules;
 
@@ -54,6 +56,18 @@ impl PreparedEdit {
     #[cfg(feature = "cuda")]
     pub fn is_for_cpu(&self) -> bool {
         self.evaluator.is_for_cpu() || self.sculptor.as_ref().is_some_and(SculptKernel::is_for_cpu)
+    }
+
+    /// How the edit rounds edges, if it does.
+    pub fn rounding(&self) -> Option<Rounding> {
+        self.sculptor.as_ref().and_then(SculptKernel::rounding)
+    }
+
+    /// Samples that the CPU looks at for each brick of the edit, in bricks.
+    #[cfg(feature = "cuda")]
+    pub fn bricks_read(&self) -> usize {
+        let side = |rounding: Rounding| (BRICK + 2 * margin(rounding.horizon())) as usize;
+        self.rounding().map_or(1, |rounding| side(rounding).pow(3) / (BRICK as usize).pow(3))
     }
 
     /// The samples that the edit reads, if it reads others than those that it changes.

@@ -305,7 +305,7 @@ pub fn random_lower_and_raise(rng: &mut Rng, ground: &Ground) -> (Brush, Brush) 
 
 /// A random brush of any kind: every shape, every operation. New ones belong here, and all tests of laws get them.
 pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
-    let like = random_gpu_brush(rng, ground);
+    let like = random_simple_brush(rng, ground);
     let dig = rng.bool();
     let (at, radius) = (random_center(rng, ground, dig, 2.0), 1.5 + rng.f32() * 4.0);
     let material = MaterialId(rng.u8(0..8));
@@ -320,10 +320,7 @@ pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     // Stamps within grids are refused, and other operations take any shape.
     let is_stamp = matches!(like.operation, Operation::Stamp { .. });
     let brush = match shape {
-        Some(shape) if !(is_stamp && matches!(shape, CustomShape::Grid(_))) => {
-            let own = Brush::dig(shape);
-            Brush { shape: own.shape, custom: own.custom, ..like }
-        }
+        Some(shape) if !(is_stamp && matches!(shape, CustomShape::Grid(_))) => with_shape(like, shape),
         _ if rng.u32(0..12) == 0 => {
             let ends = [at, at, at, at].map(|at| at + random_direction(rng) * 9.0);
             Brush { shape: Shape::curve(ends, [radius, radius * 0.5]), ..like }
@@ -332,16 +329,7 @@ pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     };
     match rng.u32(0..16) {
         0 => Brush { operation: Operation::Reset, ..brush },
-        1 | 2 => {
-            let rounding = [0.0, 0.7, 2.0, 4.5, 9.0][rng.usize(0..5)];
-            let operation = if dig { Operation::Carve } else { Operation::Fill };
-            let brush = Brush { operation, ..brush }.with_falloff(rounding);
-            match rng.u32(0..3) {
-                0 => brush,
-                1 => brush.with_material(material),
-                _ => brush.with_strength(rng.f32()),
-            }
-        }
+        1 | 2 => rounded(rng, brush, dig, material),
         3 => {
             let road = Corridor::new(random_path(rng, at), 1.0 + rng.f32() * 6.0, rng.f32() * 6.0);
             Brush { power: brush.power, ..Brush::road(road, rng.f32() * 3.0) }
@@ -355,6 +343,23 @@ pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
             }
         }
         _ => brush,
+    }
+}
+
+fn with_shape(brush: Brush, shape: CustomShape) -> Brush {
+    let own = Brush::dig(shape);
+    Brush { shape: own.shape, custom: own.custom, ..brush }
+}
+
+/// A fill or a carve with the shape of a brush.
+fn rounded(rng: &mut Rng, brush: Brush, dig: bool, material: MaterialId) -> Brush {
+    let rounding = [0.0, 0.7, 2.0, 4.5, 9.0][rng.usize(0..5)];
+    let operation = if dig { Operation::Carve } else { Operation::Fill };
+    let brush = Brush { operation, ..brush }.with_falloff(rounding);
+    match rng.u32(0..3) {
+        0 => brush,
+        1 => brush.with_material(material),
+        _ => brush.with_strength(rng.f32()),
     }
 }
 
@@ -428,6 +433,38 @@ pub fn has_content(brush: &Brush) -> bool {
 
 /// A random brush of those that GPUs apply.
 pub fn random_gpu_brush(rng: &mut Rng, ground: &Ground) -> Brush {
+    match rng.u32(0..6) {
+        0 => {
+            let brush = random_simple_brush(rng, ground);
+            let is_stamp = matches!(brush.operation, Operation::Stamp { .. });
+            if is_stamp { brush } else { in_grid(rng, ground, brush) }
+        }
+        1 => random_rounded_brush(rng, ground),
+        _ => random_simple_brush(rng, ground),
+    }
+}
+
+/// A random fill or carve of those that GPUs apply.
+pub fn random_rounded_brush(rng: &mut Rng, ground: &Ground) -> Brush {
+    let brush = random_simple_brush(rng, ground);
+    let brush = if rng.u32(0..3) == 0 { in_grid(rng, ground, brush) } else { brush };
+    let (dig, material) = (rng.bool(), MaterialId(rng.u8(0..8)));
+    let brush = rounded(rng, brush, dig, material);
+    match rng.u32(0..10) {
+        0 => brush.with_falloff(16.0 * rng.f32()),
+        _ => brush,
+    }
+}
+
+/// The brush with a random grid as its shape.
+fn in_grid(rng: &mut Rng, ground: &Ground, brush: Brush) -> Brush {
+    let dig = rng.bool();
+    let at = random_center(rng, ground, dig, 2.0);
+    with_shape(brush, CustomShape::Grid(random_grid(rng, at)))
+}
+
+/// A random brush whose shape is no grid and whose edges are not rounded.
+fn random_simple_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let brush = if rng.bool() { random_brush(rng, ground) } else { random_sculpting_brush(rng, ground) };
     if rng.u32(0..8) > 0 {
         return brush;

@@ -8,8 +8,8 @@
 //   5 launch    kernel, blocks, length, params   -> 0, or 1 where it failed
 //   6 fill      address, length, byte
 //
-// Kernels: 0 scatter, 1 edit, 2 mesh, 3 heights, 4 stencil_edit. At the end of the input it ends. Past each allocation lies
-// protected memory. With BURROW_EMULATOR_SHUFFLE set to a number, the threads of a block run in another order
+// Kernels: 0 scatter, 1 edit, 2 mesh, 3 heights, 4 stencil_edit, 5 surface_start, 6 surface_spread. At the end of the
+// input it ends. Past each allocation lies protected memory. With BURROW_EMULATOR_SHUFFLE set to a number, the threads of a block run in another order
 // after each barrier, and some warps wait while others run on, which shows where a barrier is missing.
 
 #include "emulator.h"
@@ -260,6 +260,8 @@ static bool launch(uint64_t number, uint64_t blocks, const std::vector<char>& pa
         case 2: return launch<MeshParams, mesh>(params, blocks);
         case 3: return launch<HeightsParams, heights>(params, blocks);
         case 4: return launch<StencilEditParams, stencil_edit>(params, blocks);
+        case 5: return launch<SurfaceStartParams, surface_start>(params, blocks);
+        case 6: return launch<SurfaceSpreadParams, surface_spread>(params, blocks);
         default: return false;
     }
 }

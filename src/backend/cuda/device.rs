@@ -60,11 +60,23 @@ pub(super) enum Kernel {
     Heights,
     /// Applies edits to bricks, including stencil edits.
     StencilEdit,
+    /// Computes distances to the surface of the samples next to it.
+    SurfaceStart,
+    /// Spreads distances to the surface.
+    SurfaceSpread,
 }
 
 impl Kernel {
     /// All kernels, ordered by number.
-    pub const ALL: [Self; 5] = [Self::Scatter, Self::Edit, Self::Mesh, Self::Heights, Self::StencilEdit];
+    pub const ALL: [Self; 7] = [
+        Self::Scatter,
+        Self::Edit,
+        Self::Mesh,
+        Self::Heights,
+        Self::StencilEdit,
+        Self::SurfaceStart,
+        Self::SurfaceSpread,
+    ];
 
     /// Its name in the CUDA source.
     pub const fn name(self) -> &'static str {
@@ -74,6 +86,8 @@ impl Kernel {
             Self::Mesh => "mesh",
             Self::Heights => "heights",
             Self::StencilEdit => "stencil_edit",
+            Self::SurfaceStart => "surface_start",
+            Self::SurfaceSpread => "surface_spread",
         }
     }
 }

@@ -3,6 +3,8 @@
 //   scatter       copies uploaded data to its destinations
 //   edit          applies edits to one brick           like edits/brick_editor.rs
 //   stencil_edit  the same, including stencil edits    like edits/stencil_edit.rs
+//   surface_*     distances of one brick's samples     like edits/surface_distance.rs
+//                 to the surface, step by step
 //   mesh          meshes the cells of one brick        like surface/block.rs
 //   heights       computes heights from noise          like ground/noise_heights.rs; one block per 1024 columns
 //

@@ -10,7 +10,8 @@
 //!
 //! Stencil edits (sculpting, and edits under rules) have their own kernel, which reads windows of neighbouring
 //! bricks. They are launched batch by batch, as on the CPU: a batch sees on the device what the previous one
-//! changed. After a fault, the batches that have come back are kept and the CPU does the rest.
+//! changed. Fills and carves need distances to the surface, which `surface_start` and `surface_spread` compute
+//! before. After a fault, the batches that have come back are kept and the CPU does the rest.
 //!
 //! - [`device`](self::device) is the interface of a device; `driver` implements it for a GPU.
 //! - [`session`](self::session) keeps bricks and heights on the device within a budget; `cache` assigns and evicts
@@ -249,7 +250,7 @@ impl Cuda {
             return attempt;
         }
         choice.missing = missing(session);
-        attempt.load.is_cold = choice.missing > load.amount / 2;
+        attempt.load.is_cold = choice.missing > choice.amount / 2;
         if !self.is_chosen(choice, attempt.load) {
             return attempt;
         }

@@ -1,15 +1,15 @@
-//! Checks a device before it is used: computes ground from noise, digs and sculpts it, and compares every bit with
-//! the CPU.
+//! Checks a device before it is used: computes ground from noise, digs, sculpts and fills it, and compares every bit
+//! with the CPU.
 
 use std::sync::Arc;
 
-use glam::{IVec3, Vec2, Vec3};
+use glam::{IVec3, Quat, UVec3, Vec2, Vec3};
 
 use super::device::Fault;
 use super::session::Session;
 use super::surfaces::Surfaces;
 use crate::backend::{Compute, Cpu};
-use crate::brush::{Brush, Edit, Roughness, Shape, Stamp};
+use crate::brush::{Brush, Edit, GridShape, Roughness, Shape, ShapeGrid, Stamp};
 use crate::edits::{DraftedBrick, EditDelta, EditEffect, PreparedEdits, enter_effects, latest};
 use crate::ground::{GreyImage, Ground, GroundError, MaterialId, NoiseHeights, NoiseKind};
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE};
@@ -62,6 +62,9 @@ fn compare(session: &mut Session, ground: &Ground, count: i32, radius: f32) -> R
     let dug = samples.under(&latest);
     let sculpting = sculpting_edits(ground, count, radius);
     compare_edits(session, &PreparedEdits::new(dug, grid, &sculpting.iter().collect::<Vec<_>>()))?;
+    let rounding = rounding_edits(ground, count, radius)?;
+    let work = PreparedEdits::new(dug, grid, &rounding.iter().collect::<Vec<_>>());
+    compare_edits(session, &work.under(Some(&rules)))?;
 
     let mask = Mask::default();
     let view = WorldView { samples: dug, mask: MaskView::new(&mask), grid };
@@ -191,6 +194,27 @@ fn sculpting_edits(ground: &Ground, count: i32, radius: f32) -> Vec<Edit> {
         }
     };
     (0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect()
+}
+
+/// Fills and carves, every other one of a grid with materials, where others dug. None reads what another one changes.
+fn rounding_edits(ground: &Ground, count: i32, radius: f32) -> Result<Vec<Edit>, Fault> {
+    let distance = |at: IVec3| (at - 4).as_vec3().length() - 3.0;
+    let grid =
+        ShapeGrid::from_fn(UVec3::splat(9), distance).map_err(|error| Fault::Failed(error.to_string()))?;
+    let grid = grid.with_materials(|at| MaterialId([2, 255, 7][at.y as usize % 3]));
+    let brush = |i: i32| {
+        let center = place(ground, i, radius);
+        let turn = Quat::from_xyzw(0.36, -0.48, 0.64, 0.48);
+        let grid = GridShape::new(grid.clone(), center).with_rotation(turn).with_scale(radius / 4.0);
+        let rounding = radius * [0.3, 0.5][(i / 4 % 2) as usize];
+        match i % 4 {
+            0 => Brush::fill(grid, rounding),
+            1 => Brush::carve(Shape::sphere(center, radius), rounding),
+            2 => Brush::fill(Shape::sphere(center, radius), rounding),
+            _ => Brush::carve(grid, rounding).with_strength(0.7),
+        }
+    };
+    Ok((0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect())
 }
 
 /// A grid of brushes near the surface.

@@ -11,7 +11,7 @@ use super::edit::output::EditOutput;
 use super::layout::{self, BRICK_BYTES, EditJob, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
 use super::lists::{cut, fill, for_each_parallel};
 use super::mesh::output::MeshOutput;
-use super::staging::{InputBuffer, Section, StagingLayout};
+use super::staging::{DeviceBuffer, InputBuffer, Section, StagingLayout};
 use super::windows::{KeptSlabs, Windows};
 use crate::edits::PreparedEdits;
 use crate::ground::Ground;
@@ -30,6 +30,8 @@ pub(super) struct Session {
     pub(super) input: InputBuffer,
     pub(super) meshes: MeshOutput,
     pub(super) edits: EditOutput,
+    /// Distances to the surface during fills and carves.
+    pub(super) surface: DeviceBuffer,
     /// Memory reused for the jobs and windows of the next launch.
     pub(super) edit_jobs: Vec<EditJob>,
     pub(super) kept: KeptSlabs,
@@ -207,6 +209,7 @@ impl Session {
             input,
             meshes,
             edits,
+            surface: DeviceBuffer::default(),
             edit_jobs: Vec::new(),
             kept: KeptSlabs::default(),
             table: address,
@@ -233,6 +236,7 @@ impl Session {
         // After a fault, work may still be in flight.
         self.device.wait()?;
         let device = &mut *self.device;
+        self.surface.trim(device);
         let trimmed = self
             .input
             .trim(device)

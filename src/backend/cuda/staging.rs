@@ -142,6 +142,48 @@ impl StrataInput {
     }
 }
 
+/// Memory on the device that kernels write for later launches.
+#[derive(Default)]
+pub(super) struct DeviceBuffer {
+    /// Address and length, if allocated.
+    own: Option<(u64, usize)>,
+    /// Largest size needed since the last trim, in bytes.
+    needed: usize,
+}
+
+impl DeviceBuffer {
+    /// Makes room. The previous content is lost, and no work may be in flight.
+    pub fn reserve(&mut self, device: &mut dyn Device, bytes: usize) -> Result<(), Fault> {
+        self.needed = self.needed.max(bytes);
+        if self.own.is_some_and(|(_, len)| bytes <= len) {
+            return Ok(());
+        }
+        self.release(device);
+        let len = roomy(bytes);
+        self.own = Some((device.alloc(len)?, len));
+        Ok(())
+    }
+
+    /// Its address, once there is [room](Self::reserve).
+    pub fn address(&self) -> u64 {
+        self.own.map_or(0, |(address, _)| address)
+    }
+
+    /// Frees the memory if it is much larger than was needed since the last trim. No work may be in flight.
+    pub fn trim(&mut self, device: &mut dyn Device) {
+        let needed = std::mem::take(&mut self.needed);
+        if self.own.is_some_and(|(_, len)| needed == 0 || roomy(needed) <= len / TRIMMED) {
+            self.release(device);
+        }
+    }
+
+    fn release(&mut self, device: &mut dyn Device) {
+        if let Some((address, _)) = self.own.take() {
+            device.free(address);
+        }
+    }
+}
+
 /// The byte that [`OutputList::wipe`] writes: an invalid entry for kernels and host.
 const WIPED: u8 = 0xff;
 

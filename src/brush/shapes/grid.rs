@@ -8,6 +8,8 @@ use super::shape_grid::{ShapeGrid, ZERO};
 use super::{Outline, Shape, ShapeGeometry};
 use crate::brush::quantize::{self, Shift, check_point, check_turn, in_range, matrix, voxels};
 use crate::brush::{BrushError, is_default};
+#[cfg(feature = "cuda")]
+use crate::ground::GreyImage;
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
@@ -219,7 +221,7 @@ impl GridMaterials {
     }
 }
 
-/// Distances between the samples of a grid, in integers. Only the CPU computes them.
+/// Distances between the samples of a grid, in integers.
 #[derive(Clone, Debug)]
 pub struct GridDistance {
     /// Rows of the rotation's matrix, and what to divide them by.
@@ -265,6 +267,36 @@ impl GridDistance {
         let layer = |z: i64| along(0, z) * (256 - part[1]) + along(1, z) * part[1];
         let sum = layer(0) * (256 - part[2]) + layer(1) * part[2];
         (sum * self.scale + (1 << 31)) >> 32
+    }
+}
+
+/// A grid's distance function as plain numbers, for the GPU.
+#[cfg(feature = "cuda")]
+pub(crate) struct GridParams<'a> {
+    /// Rows of the rotation's matrix, and what to divide them by.
+    pub rows: [[i64; 3]; 3],
+    pub squared: i64,
+    pub scale: i64,
+    /// Zero unless the image holds a grid.
+    pub size: [u32; 3],
+    /// The distances, after a first row, and the materials.
+    pub image: &'a GreyImage,
+    pub has_materials: bool,
+}
+
+#[cfg(feature = "cuda")]
+impl GridDistance {
+    /// All parameters of distances and materials.
+    pub(super) fn params(&self) -> GridParams<'_> {
+        let Self { rows, squared, scale, grid, .. } = self;
+        GridParams {
+            rows: *rows,
+            squared: *squared,
+            scale: *scale,
+            size: grid.size().to_array(),
+            image: grid.image(),
+            has_materials: grid.has_materials(),
+        }
     }
 }
 

@@ -55,6 +55,8 @@ pub use mesh_grid::MeshGrid;
 pub use numbers::{Numbers, Units, Voxels};
 pub use path::BrushPath;
 pub use shape_grid::ShapeGrid;
+#[cfg(all(test, feature = "cuda"))]
+pub(crate) use shape_grid::ZERO as GRID_ZERO;
 pub use sphere::Sphere;
 pub use torus::Torus;
 
@@ -63,6 +65,8 @@ pub(super) use corridor::Road;
 use distance::Distance;
 pub(super) use distance::{larger, smaller};
 pub(super) use grid::GridMaterials;
+#[cfg(feature = "cuda")]
+pub(crate) use grid::GridParams;
 use grid::QuantizedGrid;
 use numbers::{Check, Convert, Kind, Quantize, Restore, Transform};
 use outline::Outline;
@@ -237,7 +241,7 @@ macro_rules! shapes {
 
         /// The names of all shapes, in the order of their numbers.
         #[cfg(all(test, feature = "cuda"))]
-        pub(crate) const NAMES: &[&str] = &[$(stringify!($name)),*];
+        pub(crate) const NAMES: &[&str] = &[$(stringify!($name),)* $(stringify!($custom)),*];
 
         impl Shape {
             fn quantize(&self) -> Result<QuantizedShape, BrushError> {
@@ -396,7 +400,7 @@ macro_rules! shapes {
     };
 }
 
-// In the order in which `kernels/shapes.cuh` has them; those that it does not have come last.
+// In the order in which `kernels/shapes.cuh` has them.
 shapes! {
     Sphere,
     #[serde(rename = "box")]
@@ -443,7 +447,12 @@ impl Shape {
 impl ShapeSdf {
     /// Whether only the CPU computes distances of the shape.
     pub(super) fn is_for_cpu(&self) -> bool {
-        matches!(self, Self::Curve(_) | Self::Path(_) | Self::Corridor(_) | Self::Grid(_))
+        matches!(self, Self::Curve(_) | Self::Path(_) | Self::Corridor(_))
+    }
+
+    /// The parameters of a grid, if it is one.
+    pub(super) fn grid(&self) -> Option<GridParams<'_>> {
+        if let Self::Grid(grid) = self { Some(grid.params()) } else { None }
     }
 }
 
@@ -526,20 +535,22 @@ mod tests {
 
     #[cfg(feature = "cuda")]
     #[test]
-    fn shapes_of_many_numbers_are_for_the_cpu() {
+    fn shapes_along_lines_are_for_the_cpu() {
         let path = BrushPath::polyline([(Vec3::ZERO, 1.0), (Vec3::X * 9.0, 2.0)]);
+        let curve = Shape::curve([Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|at| at * 9.0), [1.0, 2.0]);
         let grid = ShapeGrid::from_fn(glam::UVec3::splat(5), |at| at.as_vec3().length() - 3.0).unwrap();
-        let customs: [AnyShape; 3] = [
-            path.clone().into(),
-            Corridor::new(path, 1.0, 1.0).into(),
-            GridShape::new(grid, Vec3::ONE).into(),
+        let shapes: [(AnyShape, bool); 5] = [
+            (curve.into(), true),
+            (path.clone().into(), true),
+            (Corridor::new(path, 1.0, 1.0).into(), true),
+            (GridShape::new(grid, Vec3::ONE).into(), false),
+            (Shape::sphere(Vec3::ONE, 2.0).into(), false),
         ];
-        for shape in customs {
+        for (shape, is_for_cpu) in shapes {
             let brush = crate::brush::Brush::dig(shape);
-            assert!(crate::brush::Edit::quantize(&brush).unwrap().evaluator().is_for_cpu(), "{brush:?}");
+            let evaluator = crate::brush::Edit::quantize(&brush).unwrap().evaluator();
+            assert_eq!(evaluator.is_for_cpu(), is_for_cpu, "{brush:?}");
         }
-        let brush = crate::brush::Brush::dig(Shape::sphere(Vec3::ONE, 2.0));
-        assert!(!crate::brush::Edit::quantize(&brush).unwrap().evaluator().is_for_cpu());
     }
 
     #[test]

@@ -15,7 +15,7 @@ use crate::lattice::ONE;
 pub(super) const SIDES: (u32, u32) = (3, 128);
 
 /// What a distance of 0 is stored as.
-pub(super) const ZERO: i32 = 1 << 15;
+pub(crate) const ZERO: i32 = 1 << 15;
 
 /// Signed distances on a grid, in 1/256 of its cells: negative inside. The outermost samples are outside. It may have
 /// [materials](Self::with_materials), which a [fill](crate::brush::Operation::Fill) builds with.

@@ -54,7 +54,7 @@ fn list_from(first: usize, piece: &[Job], grid: ChunkGrid) -> impl Iterator<Item
         let (pos, own, count) = (of_brick[0].pos(), first, of_brick.len() as u32);
         first += count;
         let cuts = layout::cuts(grid, pos);
-        EditJob { brick: pos.0.to_array(), first: own, count, cuts, ..EditJob::default() }
+        EditJob { brick: pos.0.to_array(), first: own, count, cuts, surface: NONE, ..EditJob::default() }
     })
 }
 

@@ -1,12 +1,15 @@
 //! Edits on the device: one launch for all bricks that they may reach.
 //!
 //! Batches with stencil edits use another kernel, which also reads neighbouring bricks: see
-//! [`stencil`](self::stencil). [`jobs`](self::jobs) lists the work, and [`output`](self::output) turns the results
-//! into deltas.
+//! [`stencil`](self::stencil). Fills and carves need distances to the surface, which further launches compute before:
+//! see [`surface`](self::surface). [`jobs`](self::jobs) lists the work, [`images`](self::images) the images that it
+//! reads, and [`output`](self::output) turns the results into deltas.
 
+mod images;
 mod jobs;
 pub(super) mod output;
 mod stencil;
+pub(super) mod surface;
 
 use super::cache::RecordCache;
 use super::device::{Fault, Launch};
@@ -16,6 +19,7 @@ use super::session::{Session, Uploads};
 use super::staging::{StagingLayout, StrataInput};
 use crate::edits::{EditDelta, EditEffect, PreparedEdit, PreparedEdits, enter_effects};
 use crate::lattice::side_by_side;
+use images::ImageInput;
 use output::{LONG, Target, Totals};
 use stencil::Look;
 
@@ -99,7 +103,13 @@ impl Session {
     ) -> Result<Option<EditDelta>, Fault> {
         // Stencil edits look up their bricks in the windows instead.
         self.list_edits(work, jobs, look.is_none(), uploads)?;
-        let mut stencil = look.map(|look| self.stencil_input(work, look, jobs, uploads)).transpose()?;
+        let mut images = ImageInput::new(work);
+        let mut surface = self.surface_input(work, jobs, uploads)?;
+        let stencil = look.map(|look| self.stencil_input(work, look, jobs, uploads, &mut images));
+        let mut stencil = stencil.transpose()?;
+        if images.is_full() {
+            return Err(Fault::TooLarge(work.jobs().len()));
+        }
         let mut plan = StagingLayout::default();
         uploads.plan(&mut plan);
         let job_list = plan.section::<EditJob>(jobs.len());
@@ -107,6 +117,8 @@ impl Session {
         let edits = plan.section::<u32>(work.jobs().len());
         let counters = plan.section::<u32>(4);
         let strata = StrataInput::plan(work.base.ground(), &mut plan);
+        images.plan(&mut plan);
+        surface.iter_mut().for_each(|surface| surface.plan(&mut plan));
         stencil.iter_mut().for_each(|stencil| stencil.plan(&mut plan));
         self.input.open(&mut *self.device, &plan)?;
         let (all_jobs, edit_records, list) = self.input.entries_of(job_list, record_list, edits);
@@ -116,13 +128,18 @@ impl Session {
             bricks.take_many(&mut **device, jobs, all_jobs, targets, |job, target| EditJob { target, ..*job })
         };
         let write_lists = || {
-            fill(&work.edits, edit_records, MANY, |_, own| record(own));
+            fill(&work.edits, edit_records, MANY, |number, own| record(own, images.numbers.of(number)));
             fill(work.jobs(), list, LONG_LIST, |_, job| job.edit);
         };
         side_by_side(are_many, take, write_lists).0?;
         self.input.entries::<u32>(counters).fill(0);
         strata.put(&mut self.input);
+        images.put(&mut self.input);
+        surface.iter_mut().for_each(|surface| surface.put(&mut self.input, &mut self.kept));
         stencil.iter_mut().for_each(|stencil| stencil.put(&mut self.input, &mut self.kept));
+        if let Some(surface) = &surface {
+            self.reserve_surface(surface)?;
+        }
         let is_long = jobs.len() >= COPIED || work.jobs().len() >= COPIED_JOBS;
         self.edits.results.reserve(&mut *self.device, jobs.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
@@ -131,6 +148,8 @@ impl Session {
             self.edits.parts.wipe();
             self.edits.counts.wipe();
             self.send(&plan, uploads)?;
+            let distances = surface.as_ref().map(|surface| self.launch_surface(surface)).transpose()?;
+            let [grids, images] = images.addresses(&self.input);
             let params = EditParams {
                 bricks: self.bricks.base(),
                 stacks: self.stacks.base(),
@@ -148,6 +167,8 @@ impl Session {
                 part_capacity: self.edits.parts.capacity(),
                 count_capacity: self.edits.counts.capacity(),
                 strata: strata.address(&self.input),
+                grids,
+                images,
             };
             let blocks = jobs.len() as u32;
             match &stencil {
@@ -155,7 +176,7 @@ impl Session {
                 // None of them is accessed before the wait below.
                 None => unsafe { self.device.launch(Launch::new(blocks, &params)) }?,
                 Some(stencil) => {
-                    let params = stencil.params(params, &self.input);
+                    let params = stencil.params(params, distances.unwrap_or_default(), &self.input);
                     // SAFETY: as above.
                     unsafe { self.device.launch(Launch::new(blocks, &params)) }?;
                 }
@@ -223,6 +244,6 @@ fn free_targets(slots: &mut RecordCache, results: &[EditResult], targets: &[Targ
     }
 }
 
-fn record(record: &PreparedEdit) -> layout::EditRecord {
-    layout::record(record.reach, record.operation, &record.evaluator)
+fn record(record: &PreparedEdit, grid: u32) -> layout::EditRecord {
+    layout::record(record.reach, record.operation, &record.evaluator, grid)
 }

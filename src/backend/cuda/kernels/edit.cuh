@@ -206,12 +206,12 @@ __device__ inline void begin(EditMemory& shared, const Brick* base, bool had_mat
 }
 
 // Whether an edit may change a sample of the brick.
-__device__ inline bool may_change(const EditRecord& record, const i32* low) {
+__device__ inline bool may_change(const EditParams& params, const EditRecord& record, const i32* low) {
     bool is_reached = true;
     for (i32 axis = 0; axis < 3; axis++) {
         is_reached &= record.min[axis] <= low[axis] + SIDE - 1 && low[axis] <= record.max[axis];
     }
-    return is_reached && !is_out_of_reach(record, low);
+    return is_reached && !is_out_of_reach(params, record, low);
 }
 
 // Whether the operation leaves a sample with this density unchanged, whatever its distance from the shape.
@@ -238,7 +238,8 @@ __device__ inline u32 open_samples(const EditRecord& record, const OwnColumn& co
 // Applies one edit to the thread's open samples and returns which of them changed, one bit each. Sets
 // `has_materials` if a material was stored.
 __device__ inline u32 apply(
-    const EditRecord& record, const OwnColumn& column, u32 open, const Noise& noise, EditMemory& shared, bool& has_materials
+    const EditParams& params, const EditRecord& record, const OwnColumn& column, u32 open, const Noise& noise,
+    EditMemory& shared, bool& has_materials
 ) {
     Brick& brick = shared.brick;
     Place along_x = place_of(noise, 0, column.x), along_z = place_of(noise, 2, column.z);
@@ -251,7 +252,7 @@ __device__ inline u32 apply(
         Outcome outcome = {false, NONE};
         if (open >> k & 1) {
             i32 offset[3] = {column.x, y, column.z};
-            float distance = smooth_distance(record, from_origin(record, column.low, offset));
+            float distance = smooth_distance(params, record, from_origin(record, column.low, offset));
             if (record.is_rough) distance += bumps(record, noise, shared.noise, along_x, along_y, along_z);
             i32 outside = round_distance(distance);
             i16& sample = brick.samples[index];
@@ -387,7 +388,7 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, 
     for (u32 start = 0; start < job.count; start += 32) {
         // Each lane tests one edit. All warps test the same ones.
         u32 number = start + lane() < job.count ? params.list[job.first + start + lane()] : NONE;
-        u32 reaching = __ballot_sync(WARP, number != NONE && may_change(params.edit_records[number], column.low));
+        u32 reaching = __ballot_sync(WARP, number != NONE && may_change(params, params.edit_records[number], column.low));
         for (; reaching != 0; reaching &= reaching - 1) {
             u32 edit = __shfl_sync(WARP, number, __ffs(reaching) - 1);
             const EditRecord& record = params.edit_records[edit];
@@ -412,7 +413,7 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, 
                     continue;
                 }
             }
-            u32 own = apply(record, column, open, noise, shared, has_materials);
+            u32 own = apply(params, record, column, open, noise, shared, has_materials);
             changed |= own;
             if (!__syncthreads_or(own != 0)) continue;
             is_changed = true;

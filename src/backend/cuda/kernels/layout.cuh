@@ -108,7 +108,8 @@ struct EditJob {
     // Stencil edits only: the brick's entry in `windows`, and the strides to its neighbours, x | z << 16. The
     // stride along y is 1.
     u32 window, strides;
-    u32 pad;
+    // Fills and carves only: the number of the brick's `SurfaceJob`, or `NONE`.
+    u32 surface;
 };
 
 enum Operation { DIG, ADD, PAINT };
@@ -124,19 +125,40 @@ struct EditRecord {
     u32 seed;
     // The point that noise is tied to, in 1/256 voxel.
     i32 noise_origin[3];
-    u32 pad[2];
+    // Distance outside the rough shape up to which samples may change.
+    i32 band;
+    // Grids: the shape's index in `grids`.
+    u32 grid;
 };
 
-// How an edit changes samples, apart from digging, adding and painting (PLAIN).
-enum Stroke { PLAIN, SMOOTH, SHARPEN, FLATTEN, LEVEL, SHIFT, STAMP, TERRACE };
+// A shape that is given by distances on a grid.
+struct GridRecord {
+    // Rows of the rotation's matrix, and their divisor.
+    i64 rows[3][3], squared;
+    // Spacing of the samples in 1/256 voxel.
+    i64 scale;
+    // Number of samples along each side.
+    u32 size[3];
+    // Index of the first sample of its image in `images`. After a first row, the image has the distances: x varies
+    // fastest, then y, then z. Materials may follow, two in a sample.
+    u32 image;
+    u32 has_materials, pad;
+};
+
+// What a distance of 0 is stored as in the image of a grid.
+constexpr i32 GRID_ZERO = 0x8000;
+
+// How an edit changes samples, apart from digging, adding and painting (PLAIN). UNION and SUBTRACTION have rounded
+// edges: they are fills and carves.
+enum Stroke { PLAIN, SMOOTH, SHARPEN, FLATTEN, LEVEL, SHIFT, STAMP, TERRACE, UNION, SUBTRACTION };
 
 // What a stencil edit needs in addition to its EditRecord.
 struct SculptParams {
-    // `material` is the material of new ground, or `NONE` to derive it from the surroundings.
+    // `material` is the material of new ground, or `NONE` to take it from a union's grid or from the surroundings.
     u32 operation, material;
     // Strength in 1/256, falloff in 1/256 voxel.
     i32 strength, falloff;
-    // Level: the height. Shift: the amount added to densities. Terrace: step and base.
+    // Level: the height. Shift: the amount added to densities. Terrace: step and base. Union, subtraction: the radius.
     i32 amounts[2];
     // Flatten: a point on the plane. Stamp: the centre of the image.
     i32 point[3];
@@ -184,6 +206,9 @@ struct EditParams {
     u32 record_capacity, material_capacity, part_capacity, count_capacity;
     // Null without strata.
     const StrataTable* strata;
+    const GridRecord* grids;
+    // Samples of images, of stamps and of grids.
+    const u16* images;
 };
 
 // Rules that forbid or slow down edits.
@@ -207,7 +232,8 @@ struct StencilEditParams {
     const u32* windows;
     // One per edit record.
     const SculptParams* sculpt_params;
-    const u16* images;
+    // Distances to the surface, in the format of `SurfaceStartParams`.
+    const i16* surface;
     // Null if there are no rules. Protected boxes follow directly.
     const Rules* rules;
     // How many bricks the windows extend up and down.
@@ -215,6 +241,39 @@ struct StencilEditParams {
     // The last columns of the world along x and z.
     i32 last[2];
     u32 pad;
+};
+
+// A brick whose samples' distances to the surface of the ground are computed.
+struct SurfaceJob {
+    i32 brick[3];
+    // As in `EditJob`.
+    u32 stack, window, strides;
+    // The jobs of the 27 bricks around, x fastest, then z, then y; `NONE` where there is none.
+    u32 around[27];
+    u32 pad;
+};
+
+// The first step: distances of the samples next to the surface.
+struct SurfaceStartParams {
+    const Brick* bricks;
+    const Stack* stacks;
+    const u32* windows;
+    const SurfaceJob* jobs;
+    // LEN per job, in 1/256 voxel. Those of solid samples are inverted bit by bit.
+    i16* distances;
+    // The greatest distance.
+    i32 horizon;
+    // The last columns of the world along x and z.
+    i32 last[2];
+    u32 pad;
+};
+
+// A further step: distances spread within each brick, and into it from the bricks around.
+struct SurfaceSpreadParams {
+    const SurfaceJob* jobs;
+    // Distances before and after the step.
+    const i16* from;
+    i16* to;
 };
 
 struct alignas(16) ColumnJob {
@@ -270,10 +329,12 @@ struct HeightsParams {
 
 static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout/");
 static_assert(sizeof(EditJob) == 48 && sizeof(EditRecord) == 144 && sizeof(EditResult) == 32, "see layout/");
-static_assert(sizeof(SculptParams) == 152 && sizeof(StencilEditParams) == 160, "see layout/");
+static_assert(sizeof(SculptParams) == 152 && sizeof(StencilEditParams) == 176, "see layout/");
+static_assert(sizeof(GridRecord) == 112 && sizeof(SurfaceJob) == 136, "see layout/");
+static_assert(sizeof(SurfaceStartParams) == 56 && sizeof(SurfaceSpreadParams) == 24, "see layout/");
 static_assert(sizeof(Rules) == 296 && sizeof(Protected) == 24, "see layout/");
 static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout/");
 static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout/");
-static_assert(sizeof(EditParams) == 112 && sizeof(MeshParams) == 136, "see layout/");
+static_assert(sizeof(EditParams) == 128 && sizeof(MeshParams) == 136, "see layout/");
 static_assert(sizeof(StratumRecord) == 68 && sizeof(StrataTable) == 2208, "see layout/");
 static_assert(sizeof(HeightsParams) == 128, "see layout/");

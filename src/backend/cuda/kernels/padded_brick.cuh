@@ -28,6 +28,8 @@ struct PaddedBrick {
     const u32* window;
     i32 to_x, to_z;
     const Stack* stack;
+    // Distances of the brick's samples to the surface; null without.
+    const i16* surface;
     // Whether the padding is loaded. Whether the search for a material went beyond the window.
     bool has_looked, is_too_far;
 
@@ -36,6 +38,7 @@ struct PaddedBrick {
         has_looked = true;
         window = params.windows + job.window;
         stack = &own_stack;
+        surface = job.surface == NONE ? nullptr : params.surface + (u64)job.surface * LEN;
         to_x = job.strides & 0xffff;
         to_z = job.strides >> 16;
         for (i32 i = threadIdx.x; i < 27; i += THREADS) {

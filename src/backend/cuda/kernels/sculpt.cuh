@@ -1,4 +1,4 @@
-// Sculpting operations on one sample, in integers: brush/sculpt_kernel.rs, brush/blend.rs,
+// Sculpting operations on one sample, in integers: brush/sculpt_kernel.rs, brush/blend.rs, brush/rounding.rs,
 // brush/quantized_operation.rs, brush/stamp.rs.
 #pragma once
 
@@ -43,12 +43,6 @@ __device__ inline i32 magnitude(i32 value) { return value < 0 ? -value : value; 
 __device__ inline Marked marked(i32 density, i32 pristine) {
     i32 far = magnitude(density), by = density < 0 ? pristine - density : density - pristine;
     return density * 4 + (far == DEPTH || far == FARTHEST) + (by >= ONE) * 2;
-}
-
-// Division rounded towards minus infinity; the divisor is positive.
-__device__ inline i64 divided(i64 value, i64 by) {
-    i64 quotient = value / by;
-    return quotient * by > value ? quotient - 1 : quotient;
 }
 
 __device__ inline i32 within_reach(i64 value) {
@@ -217,6 +211,38 @@ __device__ inline i32 above_stamp(const SculptParams& sculpt, const u16* images,
 __device__ inline i32 terraced(i32 height, i32 step) {
     i32 tread = (i32)divided(height, step) * step;
     return tread + clamped((height - tread - step * 3 / 8) * 4, 0, step);
+}
+
+// The length of the longest side of a right triangle, rounded down. The squares of both sides add up to less than 2^31,
+// of which the root of a double is exact enough.
+__device__ inline i32 hypotenuse(i32 a, i32 b) { return (i32)sqrt((double)(a * a + b * b)); }
+
+// The density after a union with a rounded edge. `is_inside` says whether the sample was inside already, `surface` is its
+// distance to the surface of the ground.
+__device__ inline i32 united(i32 before, bool is_inside, i32 outside, i32 surface, i32 radius) {
+    i32 shape = largest(outside, -DEPTH), plain = outside <= BAND ? smallest(before, shape) : before;
+    if (shape >= radius || (!is_inside && surface >= radius) || (is_inside && before <= -DEPTH)) return plain;
+    i32 own = is_inside ? -surface : surface, beside = is_inside ? largest(shape, 0) : shape;
+    i32 arc = radius - hypotenuse(radius - own, radius - beside), rounded = arc;
+    if (is_inside) {
+        rounded = smallest(before, shape) - (own - arc);
+    } else if (arc > 0 && own < shape) {
+        rounded = (i32)((i64)before * arc / own);
+    }
+    return smallest(plain, largest(rounded, -DEPTH));
+}
+
+__device__ inline bool is_rounded(const SculptParams& sculpt) {
+    return sculpt.operation == UNION || sculpt.operation == SUBTRACTION;
+}
+
+// The density after a fill or a carve, whose edges are rounded.
+__device__ inline i32 rounded(const SculptParams& sculpt, i32 before, i32 outside, i32 surface) {
+    i32 radius = sculpt.amounts[0], near = smallest(surface, largest(radius, DEPTH));
+    bool is_solid = before < 0;
+    i32 after = sculpt.operation == UNION ? united(before, is_solid, outside, near, radius)
+                                          : -united(-before, !is_solid, outside, near, radius);
+    return before + part_of(after - before, sculpt.strength);
 }
 
 // Computes a sample's density after the operation from its distance to the shape and its neighbourhood; false if it

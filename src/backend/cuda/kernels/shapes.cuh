@@ -2,19 +2,10 @@
 // brush/evaluator.rs.
 #pragma once
 
-#include "threads.cuh"
+#include "grid.cuh"
 
-// In the same order as in brush/shapes/mod.rs.
-enum Kind { SPHERE, CUBOID, CYLINDER, CAPSULE, CONE, TORUS };
-
-struct Vector {
-    float x, y, z;
-};
-
-// Like Rust's `if a > b { a } else { b }`; fmaxf treats zeroes differently.
-__device__ inline float larger(float a, float b) { return a > b ? a : b; }
-
-__device__ inline float smaller(float a, float b) { return a < b ? a : b; }
+// In the same order as in brush/shapes/mod.rs. Curves, paths and corridors are for the CPU only.
+enum Kind { SPHERE, CUBOID, CYLINDER, CAPSULE, CONE, TORUS, CURVE, PATH, CORRIDOR, GRID };
 
 __device__ inline float length(float x, float y, float z) { return sqrtf(x * x + (y * y + z * z)); }
 
@@ -77,15 +68,21 @@ __device__ inline float torus(Vector p, const float* constants) {
     return length(beyond, along, 0.0f) - tube;
 }
 
-__device__ inline float smooth_distance(const EditRecord& record, Vector p) {
+__device__ inline float smooth_distance(const EditParams& params, const EditRecord& record, Vector p) {
     switch (record.kind) {
         case SPHERE: return sphere(p, record.constants);
         case CUBOID: return cuboid(p, record.constants);
         case CYLINDER: return cylinder(p, record.constants);
         case CAPSULE: return capsule(p, record.constants);
         case CONE: return cone(p, record.constants);
-        default: return torus(p, record.constants);
+        case TORUS: return torus(p, record.constants);
+        default: return grid_distance(params.grids[record.grid], params.images, p);
     }
+}
+
+// At most the distance of a point, changing no faster than the point moves.
+__device__ inline float least_distance(const EditParams& params, const EditRecord& record, Vector p) {
+    return record.kind == GRID ? beyond_grid(params.grids[record.grid], p) : smooth_distance(params, record, p);
 }
 
 // SplitMix64, as in lattice/hash.rs.
@@ -205,13 +202,13 @@ __device__ inline Vector from_origin(const EditRecord& record, const i32* low, c
 
 // Whether every sample of the brick is too far outside the shape to change; false if uncertain. Like
 // `Evaluator::is_out_of_reach`: no sample is farther from the brick's centre than half of its diagonal.
-__device__ inline bool is_out_of_reach(const EditRecord& record, const i32* low) {
+__device__ inline bool is_out_of_reach(const EditParams& params, const EditRecord& record, const i32* low) {
     // Half of the diagonal: 3.5 voxels along each axis, times the square root of 3, rounded up.
     const float HALF = 3.5f * (float)ONE;
     const i32 DIAGONAL = 1553, LOWEST[3] = {0, 0, 0};
     Vector p = from_origin(record, low, LOWEST);
-    i32 distance = round_distance(smooth_distance(record, {p.x + HALF, p.y + HALF, p.z + HALF}));
+    i32 distance = round_distance(least_distance(params, record, {p.x + HALF, p.y + HALF, p.z + HALF}));
     // A generous bound on the rounding error of floats.
     i32 rounding = 16 + (distance >> 14), amplitude = record.is_rough ? record.amplitude : 0;
-    return distance - rounding > BAND + amplitude + DIAGONAL;
+    return distance - rounding > record.band + amplitude + DIAGONAL;
 }

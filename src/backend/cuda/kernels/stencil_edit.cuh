@@ -5,6 +5,7 @@
 #pragma once
 
 #include "rules.cuh"
+#include "surface.cuh"
 
 struct StencilEditor : RuleChecker {
     static constexpr bool LOOKS = true;
@@ -52,10 +53,26 @@ struct StencilEditor : RuleChecker {
         const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample, i32& after
     ) {
         const Marked* own = shared.around + around_at(column.x, sample.y, column.z);
-        if (sculpt.operation != PLAIN) return sculpted(sculpt, params.images, sample.at, sample.outside, own, after);
+        if (is_rounded(sculpt)) {
+            after = rounded(sculpt, sample.before, sample.outside, distance_of(surface[sample.index]));
+            return true;
+        }
+        if (sculpt.operation != PLAIN) return sculpted(sculpt, params.edit.images, sample.at, sample.outside, own, after);
         i32 depth = largest(sample.outside, -DEPTH);
         after = record.operation == DIG ? largest(sample.before, -depth) : smallest(sample.before, depth);
         return sample.outside <= BAND;
+    }
+
+    // The material of a sample that a sculpting edit makes solid.
+    __device__ u32 sculpted_material(
+        const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample
+    ) {
+        u32 material = sculpt.material;
+        if (material == NONE && sculpt.operation == UNION && record.kind == GRID) {
+            const GridRecord& grid = params.edit.grids[record.grid];
+            if (grid.has_materials) material = grid_material(record, grid, params.edit.images, sample.at);
+        }
+        return material == NONE ? new_material(column, sample.y) : material;
     }
 
     // Changes a sample's density as far as the rules allow. Results are those of `paint`.
@@ -72,7 +89,7 @@ struct StencilEditor : RuleChecker {
             if (sculpt.operation == PLAIN) {
                 material = record.operation == ADD ? record.material : GROUND;
             } else {
-                material = sculpt.material == NONE ? new_material(column, sample.y) : sculpt.material;
+                material = sculpted_material(record, sculpt, column, sample);
             }
         }
         if (is_refused) {
@@ -109,7 +126,7 @@ struct StencilEditor : RuleChecker {
             u32 counted = NONE;
             if (open >> k & 1) {
                 i32 offset[3] = {column.x, y, column.z};
-                float distance = smooth_distance(record, from_origin(record, column.low, offset));
+                float distance = smooth_distance(params.edit, record, from_origin(record, column.low, offset));
                 if (record.is_rough) distance += bumps(record, noise, work.noise, along_x, along_y, along_z);
                 Sample sample = {
                     {column.low[0] + column.x, column.low[1] + y, column.low[2] + column.z},
@@ -142,6 +159,6 @@ struct StencilEditor : RuleChecker {
 
 extern "C" __global__ void __launch_bounds__(THREADS) stencil_edit(StencilEditParams params) {
     __shared__ StencilEditMemory shared;
-    StencilEditor editor = {{{params, shared, nullptr, 0, 0, nullptr, false, false}, false}};
+    StencilEditor editor = {{{params, shared, nullptr, 0, 0, nullptr, nullptr, false, false}, false}};
     edit_brick(params.edit, shared.work, editor);
 }

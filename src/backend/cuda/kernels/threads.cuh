@@ -7,6 +7,12 @@ __device__ inline i32 smallest(i32 a, i32 b) { return a < b ? a : b; }
 
 __device__ inline i32 largest(i32 a, i32 b) { return a > b ? a : b; }
 
+// Division rounded towards minus infinity; the divisor is positive.
+__device__ inline i64 divided(i64 value, i64 by) {
+    i64 quotient = value / by;
+    return quotient * by > value ? quotient - 1 : quotient;
+}
+
 __device__ inline u32 lane() { return threadIdx.x & 31; }
 
 __device__ inline u32 warp() { return threadIdx.x >> 5; }

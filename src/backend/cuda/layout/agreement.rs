@@ -142,19 +142,23 @@ fn every_field_is_where_the_kernels_expect_it() {
         StrataTable is StrataTable: bedding, last, count, strata;
         ScatterJob is ScatterJob: to, from, bytes, pad;
         ScatterParams is ScatterParams: jobs;
-        EditJob is EditJob: brick, base, target, stack, first, count, cuts, window, strides, pad;
+        EditJob is EditJob: brick, base, target, stack, first, count, cuts, window, strides, surface;
         EditRecord is EditRecord: kind, operation, material, is_rough, origin_voxel, origin_fraction, min, max, constants, amplitude, scale, seed, noise_origin,
-            pad;
+            band, grid;
+        GridRecord is GridRecord: rows, squared, scale, size, image, has_materials, pad;
         SculptParams is SculptParams: operation, material, strength, falloff, amounts, point, half, height, image, columns, rows, power,
             matrix, squared, length;
         EditResult is EditResult: hash, flags, record, material, bounds, uniform, pad;
         EditPart is EditPart: job, edit, part, bounds;
         EditCount is EditCount: edit, outcome, voxels, pad;
         EditParams is EditParams: bricks, stacks, jobs, list, edit_records, results, records, materials, parts, counts, counters,
-            record_capacity, material_capacity, part_capacity, count_capacity, strata;
+            record_capacity, material_capacity, part_capacity, count_capacity, strata, grids, images;
         Rules is Rules: hardness, unbreakable, bedrock, boxes;
         Protected is Protected: min, max;
-        StencilEditParams is StencilEditParams: edit, windows, sculpt_params, images, rules, look, last, pad;
+        StencilEditParams is StencilEditParams: edit, windows, sculpt_params, surface, rules, look, last, pad;
+        SurfaceJob is SurfaceJob: brick, stack, window, strides, around, pad;
+        SurfaceStartParams is SurfaceStartParams: bricks, stacks, windows, jobs, distances, horizon, last, pad;
+        SurfaceSpreadParams is SurfaceSpreadParams: jobs, from, to;
         ColumnJob is ColumnJob: stack, x, z, pad, mask, pad2, borders;
         MeshJob is MeshJob: window, strides, column, y, cells, pad;
         MeshResult is MeshResult: vertex, vertices, index, indices;
@@ -192,6 +196,7 @@ fn every_constant_is_the_same() {
     check("HAS_MATERIALS", EditResult::HAS_MATERIALS.into());
     check("TOO_FAR", EditResult::TOO_FAR.into());
     check("MOST_STRATA", MAX_STRATA as i64);
+    check("GRID_ZERO", crate::brush::shapes::GRID_ZERO.into());
     for (name, number) in [("FILL", FILL), ("BED", BED), ("VEIN", VEIN), ("POCKET", POCKET)] {
         check(name, number.into());
     }
@@ -200,7 +205,18 @@ fn every_constant_is_the_same() {
         |names: &[&str]| names.iter().zip(0..).map(|(name, n)| ((*name).to_owned(), n)).collect::<Vec<_>>();
     for (name, number) in [
         numbered(&["DIG", "ADD", "PAINT"]),
-        numbered(&["PLAIN", "SMOOTH", "SHARPEN", "FLATTEN", "LEVEL", "SHIFT", "STAMP", "TERRACE"]),
+        numbered(&[
+            "PLAIN",
+            "SMOOTH",
+            "SHARPEN",
+            "FLATTEN",
+            "LEVEL",
+            "SHIFT",
+            "STAMP",
+            "TERRACE",
+            "UNION",
+            "SUBTRACTION",
+        ]),
     ]
     .concat()
     {
@@ -214,7 +230,5 @@ fn shapes_have_the_same_numbers() {
     let shapes = include_str!("../kernels/shapes.cuh");
     let list = shapes.split_once("enum Kind {").and_then(|(_, rest)| rest.split_once('}')).expect("a list").0;
     let names: Vec<String> = list.split(',').map(|name| name.trim().to_lowercase()).collect();
-    // The curve is for the CPU alone.
-    let known = crate::brush::shapes::NAMES.iter().filter(|name| **name != "Curve");
-    assert!(known.map(|name| name.to_lowercase()).eq(names));
+    assert!(crate::brush::shapes::NAMES.iter().map(|name| name.to_lowercase()).eq(names));
 }

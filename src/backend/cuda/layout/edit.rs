@@ -5,6 +5,7 @@ use glam::IVec3;
 
 use super::Address;
 use crate::backend::cuda::device::{Kernel, KernelParams};
+use crate::brush::shapes::GridParams;
 use crate::brush::{Evaluator, Kind};
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox};
 
@@ -31,7 +32,8 @@ pub(crate) struct EditJob {
     /// `stencil_edit` only: its entry in the windows, and the strides along x and along z `<< 16`; along y it is 1.
     pub window: u32,
     pub strides: u32,
-    pub pad: u32,
+    /// Fills and carves only: the number of its [`SurfaceJob`](super::SurfaceJob), or [`NONE`].
+    pub surface: u32,
 }
 
 impl EditJob {
@@ -69,7 +71,35 @@ pub(crate) struct EditRecord {
     pub seed: u32,
     /// The point that noise is tied to, in 1/256 voxel.
     pub noise_origin: [i32; 3],
-    pub pad: [u32; 2],
+    /// Distance outside the rough shape up to which samples may change.
+    pub band: i32,
+    /// Index of its [`GridRecord`], or [`NONE`].
+    pub grid: u32,
+}
+
+/// A shape that is given by distances on a grid.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct GridRecord {
+    /// Rows of the rotation's matrix, and their divisor.
+    pub rows: [[i64; 3]; 3],
+    pub squared: i64,
+    /// Spacing of the samples in 1/256 voxel.
+    pub scale: i64,
+    /// Number of samples along each side.
+    pub size: [u32; 3],
+    /// Index of the first sample of its image.
+    pub image: u32,
+    pub has_materials: u32,
+    pub pad: u32,
+}
+
+impl GridRecord {
+    /// The record of a grid, whose image begins at an index.
+    pub fn new(of: &GridParams, image: u32) -> Self {
+        let &GridParams { rows, squared, scale, size, has_materials, .. } = of;
+        Self { rows, squared, scale, size, image, has_materials: has_materials.into(), pad: 0 }
+    }
 }
 
 /// The result for a brick.
@@ -160,14 +190,24 @@ pub(crate) struct EditParams {
     pub count_capacity: u32,
     /// A [`StrataTable`](super::StrataTable), or 0.
     pub strata: Address,
+    /// [`GridRecord`]s.
+    pub grids: Address,
+    /// Samples of the images of stamps and grids, `u16` each.
+    pub images: Address,
 }
 
 impl KernelParams for EditParams {
     const KERNEL: Kernel = Kernel::Edit;
 }
 
-/// The record of an edit with this reach in the world; `None` if it reaches no sample.
-pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evaluator) -> EditRecord {
+/// The record of an edit with this reach in the world; `None` if it reaches no sample. `grid` is the index of its grid,
+/// or [`NONE`].
+pub(crate) fn record(
+    reach: Option<LatticeBox>,
+    operation: Kind,
+    evaluator: &Evaluator,
+    grid: u32,
+) -> EditRecord {
     let of = evaluator.constants();
     let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
     let LatticeBox { min, max } = reach.unwrap_or(nothing);
@@ -191,7 +231,8 @@ pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Eva
         scale,
         seed,
         noise_origin,
-        pad: [0; 2],
+        band: of.band,
+        grid,
     }
 }
 

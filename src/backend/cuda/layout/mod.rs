@@ -11,6 +11,7 @@ mod heights;
 mod mesh;
 mod stencil_edit;
 mod strata;
+mod surface;
 
 use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
@@ -25,6 +26,7 @@ pub(crate) use heights::*;
 pub(crate) use mesh::*;
 pub(crate) use stencil_edit::*;
 pub(crate) use strata::*;
+pub(crate) use surface::*;
 
 /// A device address.
 pub(crate) type Address = u64;

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{Address, EditParams, NONE};
 use crate::backend::cuda::device::{Kernel, KernelParams};
-use crate::brush::{SculptKernel, SculptOp};
+use crate::brush::{Rounding, SculptKernel, SculptOp};
 use crate::edits::BatchRules;
 use crate::ground::GreyImage;
 use crate::lattice::LatticeBox;
@@ -13,9 +13,9 @@ use crate::lattice::LatticeBox;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct SculptParams {
-    /// 0 plain, 1 smooth, 2 sharpen, 3 flatten, 4 level, 5 shift, 6 stamp, 7 terrace.
+    /// 0 plain, 1 smooth, 2 sharpen, 3 flatten, 4 level, 5 shift, 6 stamp, 7 terrace, 8 fill, 9 carve.
     pub operation: u32,
-    /// Material of new ground, or [`NONE`] to derive it from the surroundings.
+    /// Material of new ground, or [`NONE`] to take it from a fill's grid or from the surroundings.
     pub material: u32,
     pub strength: i32,
     pub falloff: i32,
@@ -62,8 +62,8 @@ pub(crate) struct StencilEditParams {
     pub windows: Address,
     /// One [`SculptParams`] per edit record.
     pub sculpt_params: Address,
-    /// Image samples, `u16` each.
-    pub images: Address,
+    /// Distances to the surface, as in [`SurfaceStartParams`](super::SurfaceStartParams).
+    pub surface: Address,
     /// [`Rules`], or 0.
     pub rules: Address,
     pub look: i32,
@@ -114,6 +114,9 @@ pub(crate) fn sculpt<'a>(
             ..sculpt(6)
         },
         &SculptOp::Terrace(step, base) => SculptParams { amounts: [step, base], ..sculpt(7) },
+        &SculptOp::Rounded(Rounding { radius, is_dig }) => {
+            SculptParams { amounts: [radius, 0], ..sculpt(if is_dig { 9 } else { 8 }) }
+        }
     }
 }
 

@@ -208,6 +208,56 @@ fn ground_lowered_and_raised_far_equals_the_cpus() {
 }
 
 #[test]
+fn fills_and_carves_of_any_shape_equal_the_cpus() {
+    let Some(first) = zero_copy() else { return };
+    let Some(second) = device() else { return };
+    let second = engine(second, 64 << 20);
+    let mut rng = Rng::with_seed(41);
+    for index in 0..worlds::world_count(40).div_ceil(4) {
+        let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
+        // Many brushes in one place, so that most read what others change.
+        let brushes = |rng: &mut Rng| {
+            let place = worlds::random_sculpting_brush(rng, &ground).shape;
+            let near = |rng: &mut Rng| match rng.u32(0..4) {
+                0 => worlds::random_gpu_brush(rng, &ground),
+                1 => Brush { shape: place, custom: None, ..worlds::random_rounded_brush(rng, &ground) },
+                _ => worlds::random_rounded_brush(rng, &ground),
+            };
+            (0..4).map(|_| Brush { power: rng.u8(..) | rng.u8(..), ..near(rng) }).collect()
+        };
+        let transactions: Vec<Vec<Brush>> = (0..3).map(|_| brushes(&mut rng)).collect();
+        let rules =
+            if index % 2 == 0 { DiggingRules::default() } else { worlds::random_rules(&mut rng, &ground) };
+        compare_under(rules, ground, chunk_size, &[&first, &second], &transactions);
+    }
+    for engine in [&first, &second] {
+        let figures = engine.figures();
+        assert!(figures.cuda > figures.cpu * 10, "{figures:?}");
+    }
+}
+
+#[test]
+fn a_fill_with_the_materials_of_its_grid_runs_on_the_device() {
+    let Some(device) = device() else { return };
+    let engine = engine(device, 64 << 20);
+    let size = glam::UVec3::new(17, 13, 15);
+    let ball = ShapeGrid::from_fn(size, |at| (at - IVec3::new(8, 6, 7)).as_vec3().length() - 5.3);
+    let layers = |at: IVec3| MaterialId([4, 5, 255, 6][at.y as usize % 4]);
+    let place =
+        GridShape::new(ball.expect("valid").with_materials(layers), glam::Vec3::new(20.3, 33.0, 21.0));
+    let turned = place.clone().with_rotation(glam::Quat::from_rotation_x(0.7)).with_scale(1.4);
+    let brush = Brush::fill(turned, 3.0);
+    let mut terrain =
+        Terrain::new(Ground::flat(60, 60, 30.0).expect("valid"), &TerrainSettings::default()).expect("valid");
+    terrain.set_engine(engine.clone());
+    let receipt = terrain.apply_one(brush.clone());
+    let added = receipt.outcome.expect("applied").added;
+    assert!([4, 5, 6].iter().all(|&material| added.of(MaterialId(material)) > 50), "{added:?}");
+    assert_eq!(engine.figures().cpu, 0);
+    compare_on(Ground::flat(60, 60, 30.0).expect("valid"), 32, &[&engine], &[vec![brush]]);
+}
+
+#[test]
 fn new_ground_far_from_all_other_finds_its_material() {
     let Some(first) = zero_copy() else { return };
     let Some(second) = device() else { return };

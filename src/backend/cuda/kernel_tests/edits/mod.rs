@@ -26,6 +26,7 @@ fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
         let mut brush = match rng.u32(0..6) {
             0 => worlds::random_brush_at_a_face(rng, ground, chunk_size),
             1 | 2 if sculpts => worlds::random_sculpting_brush(rng, ground),
+            3 => worlds::random_gpu_brush(rng, ground),
             _ => worlds::random_brush(rng, ground),
         };
         match rng.u32(0..8) {
@@ -133,6 +134,74 @@ fn edits_are_those_of_the_cpu() {
 }
 
 #[test]
+fn fills_and_carves_are_those_of_the_cpu() {
+    let Some(mut device) = Device::start() else { return };
+    let mut bricks = 0;
+    for (seed, mut rng) in seeds(24) {
+        let terrain = worlds::random_world(&mut rng, seed);
+        let (world, chunk_size) = (terrain.world(), terrain.world().grid().size() as u32);
+        let brush = |rng: &mut Rng| {
+            let brush = worlds::random_rounded_brush(rng, world.ground());
+            let brush = match rng.u32(0..6) {
+                // At the world's rim and on the faces of chunks.
+                0 => {
+                    let Brush { shape, .. } = worlds::random_brush_at_a_face(rng, world.ground(), chunk_size);
+                    Brush { shape, custom: None, ..brush }
+                }
+                1 => worlds::random_gpu_brush(rng, world.ground()),
+                _ => brush,
+            };
+            Brush { power: rng.u8(..) | rng.u8(..), ..brush }
+        };
+        let mut brushes: Vec<Brush> = (0..rng.usize(1..5)).map(|_| brush(&mut rng)).collect();
+        // In one place with different radii, so that ways of different lengths count.
+        if rng.bool() {
+            let Brush { shape, custom, .. } = brushes[0].clone();
+            brushes.push(Brush { shape, custom, ..worlds::random_rounded_brush(&mut rng, world.ground()) });
+        }
+        let edits: Vec<Edit> = brushes.iter().filter_map(|brush| Edit::quantize(brush).ok()).collect();
+        bricks += compare_edits(&mut device, (world.samples(), world.grid()), &edits, &mut rng);
+    }
+    println!("{bricks} edited bricks are the same");
+    assert!(bricks > worlds::world_count(24) as usize, "{bricks}");
+}
+
+#[test]
+fn grids_are_those_of_the_cpu() {
+    let Some(mut device) = Device::start() else { return };
+    let mut bricks = 0;
+    for (seed, mut rng) in seeds(24) {
+        let ground = worlds::random_ground(&mut rng, seed).0;
+        let grid =
+            ChunkGrid::new(worlds::CHUNK_SIZES[seed as usize % 4] as i32, ground.width(), ground.depth());
+        let brush = |rng: &mut Rng| {
+            let (x, z) = (rng.i32(0..=ground.width()), rng.i32(0..=ground.depth()));
+            let height = ground.height(Column::new(x, z)) as f32 / 256.0;
+            let at = Vec3::new(x as f32 + rng.f32(), height + rng.f32() * 8.0 - 4.0, z as f32);
+            let (shape, material) = (worlds::random_grid(rng, at), MaterialId(rng.u8(0..9)));
+            let brush = match rng.u32(0..6) {
+                0 => Brush::dig(shape),
+                1 => Brush::add(shape, material),
+                2 => Brush::paint(shape, material),
+                3 => Brush::raise(shape, 2.0),
+                // With the grid's materials, if it has any.
+                _ => Brush::fill(shape, 0.0),
+            };
+            match rng.u32(0..3) {
+                0 => brush.with_roughness(worlds::random_roughness(rng, 2.0)),
+                _ => brush,
+            }
+        };
+        let brushes: Vec<Brush> = (0..rng.usize(2..6)).map(|_| brush(&mut rng)).collect();
+        let edits: Vec<Edit> = brushes.iter().filter_map(|brush| Edit::quantize(brush).ok()).collect();
+        let none = Bricks::default();
+        bricks += compare_edits(&mut device, (SampleView::new(&ground, &none), grid), &edits, &mut rng);
+    }
+    println!("{bricks} edited bricks are the same");
+    assert!(bricks > worlds::world_count(24) as usize, "{bricks}");
+}
+
+#[test]
 fn edits_at_the_ends_of_the_lattice_are_those_of_the_cpu() {
     let Some(mut device) = Device::start() else { return };
     for (seed, mut rng) in seeds(12) {
@@ -190,7 +259,12 @@ fn noise_is_sculpted_like_on_the_cpu() {
         let brush = |rng: &mut Rng| {
             let place = Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 16.0 + 4.0;
             let shape = Shape::sphere(place, 2.0 + rng.f32() * 5.0);
-            worlds::sculpting_brush(rng, shape, place)
+            // Ways through noise are as crooked as can be.
+            match rng.u32(0..6) {
+                0 => Brush::fill(shape, rng.f32() * 16.0),
+                1 => Brush::carve(shape, rng.f32() * 16.0),
+                _ => worlds::sculpting_brush(rng, shape, place),
+            }
         };
         let edits: Vec<Edit> = (0..3).filter_map(|_| Edit::quantize(&brush(&mut rng)).ok()).collect();
         compare_edits(&mut device, (SampleView::new(&ground, &bricks), grid), &edits, &mut rng);

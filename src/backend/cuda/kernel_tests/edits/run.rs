@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, HashMap};
 use fastrand::Rng;
 use glam::IVec3;
 
+use super::super::super::edit::surface::{greatest_horizon, steps, surface_jobs};
 use super::super::super::layout::{self, *};
 use super::super::{Device, Slots, assert_same};
-use crate::edits::{EditDelta, PreparedEdits};
+use crate::edits::{EditDelta, PreparedEdit, PreparedEdits};
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::volume::{Brick, SampleView, UniformKind};
@@ -54,6 +55,48 @@ impl Stencil {
     }
 }
 
+/// The bricks whose distances to the surface jobs need, and the references of the bricks around them.
+fn surface_jobs_with_windows(
+    work: &PreparedEdits,
+    slots: &mut Slots,
+    jobs: &mut [EditJob],
+) -> (Vec<SurfaceJob>, Vec<u32>) {
+    let (mut own, mut windows) = (surface_jobs(work, jobs), Stencil { look: 1, refs: Vec::new() });
+    for job in &mut own {
+        let pos = job.pos();
+        (job.window, job.strides) = windows.around(slots, work.base, pos);
+        job.stack = slots.stack(work.base.ground(), (pos.0.x, pos.0.z));
+    }
+    (own, windows.refs)
+}
+
+/// Computes distances to the surface, and returns their address; 0 if none are needed.
+fn launch_surface(
+    device: &mut Device,
+    work: &PreparedEdits,
+    [bricks, stacks]: [Address; 2],
+    (own, windows): &(Vec<SurfaceJob>, Vec<u32>),
+) -> Address {
+    let horizon = greatest_horizon(work);
+    if horizon == 0 {
+        return 0;
+    }
+    let (jobs, last) = (device.upload(own), [work.grid.width(), work.grid.depth()]);
+    let mut places = [0, 1].map(|_| device.output::<[i16; 512]>(own.len()));
+    let (windows, distances) = (device.upload(windows), places[0].address);
+    device.launch(
+        own.len(),
+        SurfaceStartParams { bricks, stacks, windows, jobs, distances, horizon, last, pad: 0 },
+    );
+    for _ in 0..steps(horizon) {
+        let [from, to] = places.each_ref().map(|place| place.address);
+        device.launch(own.len(), SurfaceSpreadParams { jobs, from, to });
+        places.reverse();
+    }
+    places.iter().for_each(|place| drop(device.read_checked(place)));
+    places[0].address
+}
+
 impl EditRun {
     pub fn new(device: &mut Device, work: &PreparedEdits, rng: &mut Rng, room: EditRoom, look: i32) -> Self {
         let (mut slots, mut jobs, mut list) = (Slots::default(), Vec::new(), Vec::new());
@@ -80,14 +123,25 @@ impl EditRun {
                 cuts,
                 window,
                 strides,
-                pad: 0,
+                surface: NONE,
             });
         }
-        let edit_records: Vec<EditRecord> = work
-            .edits
-            .iter()
-            .map(|record| layout::record(record.reach, record.operation, &record.evaluator))
-            .collect();
+        let surface_jobs = surface_jobs_with_windows(work, &mut slots, &mut jobs);
+        let (mut images, mut grids) = (vec![7u16; 3], Vec::new());
+        let mut image = |image: &GreyImage| {
+            images.extend_from_slice(image.samples());
+            (images.len() - image.samples().len()) as u32
+        };
+        let mut record = |record: &PreparedEdit| {
+            let grid = record.evaluator.grid().map_or(NONE, |grid| {
+                grids.push(GridRecord::new(&grid, image(grid.image)));
+                grids.len() as u32 - 1
+            });
+            layout::record(record.reach, record.operation, &record.evaluator, grid)
+        };
+        let edit_records: Vec<EditRecord> = work.edits.iter().map(&mut record).collect();
+        let sculpt = |record: &PreparedEdit| layout::sculpt(record, &mut image);
+        let sculpt_params: Vec<SculptParams> = work.edits.iter().map(sculpt).collect();
 
         let bricks = device.upload(&slots.bricks);
         let results = device.output::<EditResult>(jobs.len());
@@ -96,9 +150,11 @@ impl EditRun {
         let parts = device.output::<EditPart>(room.parts);
         let counts = device.output::<EditCount>(room.counts);
         let counters = device.counters(4);
+        let stacks = device.upload(&slots.stacks);
+        let surface = launch_surface(device, work, [bricks, stacks], &surface_jobs);
         let params = EditParams {
             bricks,
-            stacks: device.upload(&slots.stacks),
+            stacks,
             jobs: device.upload(&jobs),
             list: device.upload(&list),
             edit_records: device.upload(&edit_records),
@@ -113,15 +169,10 @@ impl EditRun {
             part_capacity: room.parts as u32,
             count_capacity: room.counts as u32,
             strata: device.strata(work.base.ground()),
+            grids: device.upload(&grids),
+            images: device.upload(&images),
         };
         if work.looks_around() {
-            let mut images = vec![7u16; 3];
-            let mut image = |image: &GreyImage| {
-                images.extend_from_slice(image.samples());
-                (images.len() - image.samples().len()) as u32
-            };
-            let sculpt = |record: &crate::edits::PreparedEdit| layout::sculpt(record, &mut image);
-            let sculpt_params: Vec<SculptParams> = work.edits.iter().map(sculpt).collect();
             let rules = work.rules.as_ref().map_or(0, |rules| {
                 let (rules, boxes) = layout::rules(rules);
                 device.place(&[bytemuck::bytes_of(&rules), bytemuck::cast_slice(&boxes)].concat())
@@ -130,7 +181,7 @@ impl EditRun {
                 edit: params,
                 windows: device.upload(&windows.refs),
                 sculpt_params: device.upload(&sculpt_params),
-                images: device.upload(&images),
+                surface,
                 rules,
                 look,
                 last: [work.grid.width(), work.grid.depth()],
