@@ -85,12 +85,12 @@ pub(super) fn load_regions(
     let next_field = metadata.next_field.max(below.change.next_field);
     let mut change = Patch { bricks, fields, next_field };
     if checkpoint.metadata.ground != ground.hash() {
-        fit_fields(&mut change, grid);
+        cut_fields(&mut change, grid);
     }
     if !is_same_level || checkpoint.metadata.ground != ground.hash() {
-        // Fields of two levels may overlap and have one name: those of the new level continue, and grow. Beyond the rim
-        // of a smaller ground, edits reach into more chunks.
-        change.cover(grid);
+        // Fields of two levels may overlap and have one name: those of the new level continue, and fit what is edited
+        // now. Beyond the rim of a smaller ground, edits reach into more chunks.
+        change.fit_fields(grid);
     }
     let parts = WorldParts {
         change,
@@ -102,7 +102,7 @@ pub(super) fn load_regions(
 }
 
 /// Cuts fields off where their chunk ends on a ground of another size: the last chunk has one column more than others.
-fn fit_fields(change: &mut Patch, grid: ChunkGrid) {
+fn cut_fields(change: &mut Patch, grid: ChunkGrid) {
     for (chunk, fields) in &mut change.fields {
         let own = grid.chunk_samples(*chunk).intersection(grid.edit_bounds());
         let own = own.filter(|_| grid.has_tile(chunk.tile()));

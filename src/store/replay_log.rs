@@ -128,10 +128,10 @@ fn replay(
     terrain.set_meshing(Meshing::All);
     terrain.keep_log(None);
     if !is_checked && let Some(revision) = revision {
-        // Other transactions than those of the records may have led here, and bricks have come without fields.
+        // Other transactions than those of the records may have led here, and bricks have come and gone without fields.
         let (ground, mut parts) = (terrain.world().shared_ground(), terrain.parts());
-        let has_grown = parts.change.cover(terrain.world().grid());
-        if has_grown || revision != parts.revision {
+        let has_changed = parts.change.fit_fields(terrain.world().grid());
+        if has_changed || revision != parts.revision {
             let settings = TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() };
             terrain = Terrain::restore(ground, &settings, WorldParts { revision, ..parts })?;
         }

@@ -110,7 +110,7 @@ impl Terrain {
         let WorldParts { mut change, chunk_size, revision, edit_settings } = parts;
         if chunk_size != settings.chunk_size {
             change.fields.clear();
-            change.cover(terrain.world.grid());
+            change.fit_fields(terrain.world.grid());
         }
         let ground = terrain.world.shared_ground();
         let made = || world_of(ground, settings.chunk_size as i32, change, revision);

@@ -16,7 +16,7 @@ use fastrand::Rng;
 use glam::{IVec3, Vec2, Vec3};
 
 use crate::follower::{FRAME, Follower, count, hills, play, terrain};
-use crate::worlds::{any_random_brush, has_content};
+use crate::worlds::{any_random_brush, contents as random_contents};
 
 /// Bytes that a decoder may take regardless of the size of its input.
 const ANYWAY: u64 = 1 << 20;
@@ -73,6 +73,13 @@ impl Messages {
         let image = Arc::new(GreyImage::from_samples(8, 8, samples).unwrap());
         let mut contents = ContentTable::default();
         contents.add(Arc::clone(&image));
+        let (grids, prefabs) = random_contents();
+        for grid in grids {
+            contents.add(Arc::clone(grid.image()));
+        }
+        for prefab in prefabs {
+            contents.add_prefab(Arc::clone(prefab)).expect("it is small");
+        }
         let settings = ServerSettings {
             undo: UndoPolicy::Own,
             cost: Rate { per_second: 1 << 40, burst: 1 << 40 },
@@ -92,7 +99,8 @@ impl Messages {
             } else {
                 for bot in &mut bots {
                     let brushes = (0..rng.u32(0..3)).map(|_| any_random_brush(&mut rng, &ground));
-                    let kept = brushes.filter(|brush| !has_content(brush));
+                    let kept = brushes
+                        .filter(|brush| Edit::quantize(brush).is_ok_and(|edit| contents.can_send(&edit)));
                     let place = Vec3::new(64.0, 20.0, 64.0);
                     let stamp = Stamp::new(Arc::clone(&image), place, Vec2::splat(9.0), 3.0);
                     bot.edit(

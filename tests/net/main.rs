@@ -2,12 +2,14 @@
 
 mod bots;
 mod contents;
+mod fields;
 mod follower;
 #[allow(dead_code, reason = "the tests of the store use all of it")]
 #[path = "../store/gated.rs"]
 mod gated;
 mod hostile;
 mod joins;
+mod lacking;
 mod laws;
 mod limits;
 mod link;

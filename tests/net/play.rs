@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::net::{Client, ClientEvent, ClientId, Hello, PROTOCOL, Server, ServerSettings, ToServer};
+use bevy_burrow::net::{
+    Client, ClientEvent, ClientId, ContentTable, Hello, PROTOCOL, Server, ServerSettings, ToServer,
+};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::SIMULATION;
 use glam::{DVec3, IVec3, Vec3};
@@ -53,6 +55,8 @@ pub struct Play {
 pub struct Player {
     pub id: ClientId,
     pub client: Client,
+    /// What the player sees, in tests that look at it.
+    pub shown: Option<Terrain>,
     pub is_connected: bool,
     pub events: Vec<ClientEvent>,
 }
@@ -85,8 +89,15 @@ impl Play {
     }
 
     pub fn join(&mut self, id: u64) -> usize {
-        let client = Client::new(Arc::clone(&self.ground), &TerrainSettings::default()).expect("valid");
-        self.players.push(Player { id: ClientId(id), client, is_connected: false, events: Vec::new() });
+        self.join_with(id, ContentTable::default(), None)
+    }
+
+    /// A player with this content joins, and sees the world in a terrain.
+    pub fn join_with(&mut self, id: u64, contents: ContentTable, shown: Option<Terrain>) -> usize {
+        let mut client = Client::new(Arc::clone(&self.ground), &TerrainSettings::default()).expect("valid");
+        client.contents_mut().add_all(&contents);
+        let (id, is_connected, events) = (ClientId(id), false, Vec::new());
+        self.players.push(Player { id, client, shown, is_connected, events });
         self.connect(self.players.len() - 1);
         self.frames(4);
         self.players.len() - 1
@@ -125,7 +136,11 @@ impl Play {
             }
             for player in &mut self.players {
                 while player.client.advance(self.now) {}
-                drop(player.client.take_shown());
+                for order in player.client.take_shown() {
+                    if let Some(shown) = &mut player.shown {
+                        shown.apply_one(order).outcome.expect("it fits");
+                    }
+                }
                 player.events.extend(player.client.take_events());
             }
         }

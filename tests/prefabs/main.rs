@@ -3,6 +3,7 @@
 
 mod files;
 mod laws;
+mod mixed;
 mod shared;
 mod turns;
 #[path = "../worlds/mod.rs"]

@@ -1,6 +1,7 @@
 //! Random worlds and edits for the tests: steep, flat, at integer heights, and cut from real elevation data.
 #![allow(dead_code)] // each test file uses its own part of this
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use bevy_burrow::brush::CustomShape;
@@ -11,7 +12,8 @@ use bevy_burrow::ground::{
 };
 use bevy_burrow::lattice::{BrickPos, ChunkPos, LatticeBox};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Patch, WorldParts};
+use bevy_burrow::terrain::{Patch, World, WorldParts};
+use bevy_burrow::volume::FieldId;
 use fastrand::Rng;
 use glam::{IVec3, Quat, Vec2, Vec3};
 
@@ -569,4 +571,34 @@ pub fn change_towards(terrain: &Terrain, parts: &WorldParts) -> Patch {
     let gone = now.fields.iter().filter(|(chunk, _)| gone(chunk));
     change.fields.extend(gone.map(|(chunk, _)| (*chunk, Default::default())));
     change
+}
+
+/// Checks that each edited sample lies in one field of its chunk, that each field is the box around some, and that fields
+/// do not meet and have names of their own.
+pub fn check_fields(world: &World, what: &str) {
+    let mut edited: BTreeMap<FieldId, LatticeBox> = BTreeMap::new();
+    for (pos, brick) in world.bricks() {
+        for (point, ..) in brick.edited_samples(pos) {
+            let fields = world.fields_of(world.grid().chunk_of(point));
+            let own = fields.and_then(|fields| fields.iter().find(|field| field.bounds.contains(point)));
+            let id = own.map(|field| field.id);
+            let id = id.unwrap_or_else(|| panic!("{what}: no field holds {point}"));
+            let own = LatticeBox::point(point);
+            edited.entry(id).and_modify(|all| *all = all.union(own)).or_insert(own);
+        }
+    }
+    let mut count = 0;
+    for (chunk, fields) in world.fields() {
+        for (number, field) in fields.iter().enumerate() {
+            assert_eq!(edited.get(&field.id), Some(&field.bounds), "{what}: {field:?} of {chunk:?}");
+            assert!(field.id.0 <= world.next_field(), "{what}: {field:?} has a name to come");
+            let mut others = fields.iter().skip(number + 1);
+            assert!(
+                others.all(|other| !other.bounds.meets(field.bounds)),
+                "{what}: fields of {chunk:?} meet"
+            );
+            count += 1;
+        }
+    }
+    assert_eq!(edited.len(), count, "{what}: two fields have one name");
 }

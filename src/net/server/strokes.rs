@@ -1,11 +1,11 @@
 //! Strokes that can be undone: the parts that each replaced, and their new content.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::lattice::BrickPos;
+use crate::lattice::{BrickPos, ChunkPos};
 use crate::net::message::ClientId;
 use crate::terrain::{Patch, World};
 use crate::volume::Brick;
@@ -22,6 +22,8 @@ struct Stroke {
     after: Overlay,
     /// Whether another player changed its result between its edits.
     is_touched: bool,
+    /// Chunks whose fields another player changed between its edits.
+    mixed: BTreeSet<ChunkPos>,
     bytes: usize,
 }
 
@@ -59,7 +61,8 @@ impl Strokes {
             let (before, after) = Default::default();
             let bytes = size_of::<Stroke>();
             self.bytes += bytes;
-            strokes.push_back(Stroke { number, label, before, after, is_touched: false, bytes });
+            let (is_touched, mixed) = (false, BTreeSet::new());
+            strokes.push_back(Stroke { number, label, before, after, is_touched, mixed, bytes });
         }
         if let Some(stroke) = strokes.back_mut() {
             self.bytes -= stroke.bytes;
@@ -102,6 +105,10 @@ impl Stroke {
             own.is_some_and(|own| !Brick::is_same(own.as_ref(), world.brick(*pos)))
         };
         self.is_touched |= change.bricks.iter().any(is_other);
+        let is_mixed = |chunk: &ChunkPos| {
+            self.after.fields.get(chunk).is_some_and(|own| own != State::fields(world, *chunk))
+        };
+        self.mixed.extend(change.fields.iter().map(|(chunk, _)| *chunk).filter(is_mixed));
         self.bytes -= self.bytes_at(change);
         self.before.keep(change.inverse(world));
         self.after.lay(change);
@@ -122,8 +129,8 @@ impl Stroke {
         bricks.chain(fields).sum()
     }
 
-    /// The change that undoes it, if its result is still unchanged. Fields that others have changed since stay: they
-    /// also contain the replaced parts.
+    /// The change that undoes it, if its result is still unchanged. Where others have changed the fields of a chunk since,
+    /// the fields there are made to fit what is edited afterwards.
     fn undone(&self, world: &World) -> Option<Patch> {
         let is_there =
             |(pos, own): (&BrickPos, &Option<Arc<Brick>>)| Brick::is_same(own.as_ref(), world.brick(*pos));
@@ -131,7 +138,11 @@ impl Stroke {
             return None;
         }
         let mut undone = self.before.patch(world.next_field());
-        undone.fields.retain(|(chunk, _)| self.after.fields.get(chunk) == Some(State::fields(world, *chunk)));
+        let is_own = |chunk: ChunkPos| {
+            !self.mixed.contains(&chunk) && self.after.fields.get(&chunk) == Some(State::fields(world, chunk))
+        };
+        undone.fields.retain(|(chunk, _)| is_own(*chunk));
+        undone.add_fitted_fields(world, self.before.fields.keys().copied().filter(|chunk| !is_own(*chunk)));
         Some(undone)
     }
 }
