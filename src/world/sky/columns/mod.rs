@@ -99,10 +99,11 @@ impl<'a> SkyColumns<'a> {
         for at in lit.changed_stacks() {
             let stack = Column::new(at.0 << 3, at.1 << 3);
             let is_near = |at: i32, first: i32, last: i32| first - 8 < at && at <= last;
-            if is_near(stack.x, all.first.x, last.x) && is_near(stack.z, all.first.z, last.z) {
-                if view.with_tops(at, |own| all.fill(at, &own.tops, own.changed)).is_none() {
-                    all.fill(at, view.ground().heights::<8>(stack).as_flattened(), 0);
-                }
+            if !is_near(stack.x, all.first.x, last.x) || !is_near(stack.z, all.first.z, last.z) {
+                continue;
+            }
+            if view.with_tops(at, |own| all.fill(at, &own.tops, own.changed)).is_none() {
+                all.fill(at, view.ground().heights::<8>(stack).as_flattened(), 0);
             }
         }
         all.repeat_rim();
